@@ -1,0 +1,100 @@
+"""The records that every room of the package speaks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+UNDECODED = -1
+"""Identifier of a target that was found but whose code word is not certain."""
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """One identified target, in the pixels of the image as received.
+
+    Attributes
+    ----------
+    id : int
+        The number its vendor gives the code word, or `UNDECODED`.
+    code : int
+        The code word: for ring codes the smallest rotation, 0 where undecoded.
+    x, y : float
+        Image of the physical centre, px; (0, 0) is the centre of the first pixel, x right, y down.
+    semi_major, semi_minor : float
+        Semi-axes of the ellipse of the central dot, px.
+    angle : float
+        Direction of the major axis, rad in (-pi/2, pi/2], from +x towards +y.
+    confidence : float
+        Probability that `id` is right, 0 to 1.
+    covariance : tuple of 4 float
+        Row-major covariance of (x, y), px^2.
+    """
+
+    id: int
+    code: int
+    x: float
+    y: float
+    semi_major: float
+    semi_minor: float
+    angle: float = 0.0
+    confidence: float = 1.0
+    covariance: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class FilterState:
+    """The homomorphic filter that led to an identification, and what it cost to find.
+
+    Attributes
+    ----------
+    applied : bool
+        False where the unfiltered image gave the result; the filter is then the identity.
+    gamma_high, gamma_low : float
+        Gains of the high and the low frequencies, dimensionless.
+    cutoff : float
+        D0, cycles per image; 0 where no filter was applied.
+    attenuation : float
+        c, dimensionless.
+    evaluations, generations : int
+        Identifications run, the unfiltered one included, and generations of the search.
+    duration : float
+        Time from the image to the result, s.
+    """
+
+    applied: bool = False
+    gamma_high: float = 1.0
+    gamma_low: float = 1.0
+    cutoff: float = 0.0
+    attenuation: float = 0.0
+    evaluations: int = 0
+    generations: int = 0
+    duration: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Identification:
+    """What was identified in one image.
+
+    Attributes
+    ----------
+    targets : tuple of Target
+        Sorted by `id`, undecoded targets first.
+    expected : int
+        N, the number of coded targets that the image shows; 0 where unknown.
+    filter : FilterState
+        The filter that gave the targets.
+    """
+
+    targets: tuple[Target, ...]
+    expected: int = 0
+    filter: FilterState = field(default_factory=FilterState)
+
+    @property
+    def count(self) -> int:
+        """n, the number of distinct codes identified."""
+        return count_codes(self.targets)
+
+
+def count_codes(targets: list[Target] | tuple[Target, ...]) -> int:
+    """Return the number of distinct codes among `targets`, undecoded ones left out."""
+    return len({target.id for target in targets} - {UNDECODED})
