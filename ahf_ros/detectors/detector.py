@@ -1,0 +1,86 @@
+"""What a detector is, and the settings that every detector of ours understands."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from ahf_ros.codes.ring import FAMILY_NAMES
+from ahf_ros.parameter import check_parameters, parameter
+from ahf_ros.target import Target
+
+POLARITIES = ('auto', 'dark', 'bright')
+"""Colour of the dot against its surroundings; 'auto' accepts both in one image."""
+
+
+class Detector(Protocol):
+    """A callable with a name: grayscale image in, targets out. It is the whole contract.
+
+    A detector keeps nothing between calls, may be called from several threads at once and gives
+    the same targets for the same image. Nothing but the image given is its input, so a filtered
+    image is as good as one that a camera took.
+    """
+
+    @property
+    def name(self) -> str:
+        """Name in the registry, and in results."""
+        ...
+
+    def __call__(self, image: np.ndarray) -> list[Target]:
+        """Identify the targets of one image.
+
+        Parameters
+        ----------
+        image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
+            Gray values, increasing with light.
+
+        Returns
+        -------
+        list of Target
+            Sorted by ID, undecoded targets first; coordinates in the pixels of `image`.
+
+        Raises
+        ------
+        ValueError
+            If `image` is not a two-dimensional, non-empty array of finite gray values.
+        """
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class DetectorSettings:
+    """What the targets in the image look like.
+
+    Attributes
+    ----------
+    family : str
+        Name of a family of `ahf_ros.codes.ring`.
+    polarity : str
+        One of `POLARITIES`.
+    min_radius, max_radius : float
+        Bounds of the semi-major axis of the dot, px.
+    report_undecoded : bool
+        Whether targets whose code word is not certain are reported, with the ID `UNDECODED`.
+    """
+
+    family: str = parameter(
+        'metashape12', 'Family of the coded targets.', choices=FAMILY_NAMES
+    )
+    polarity: str = parameter(
+        'auto', 'Colour of the dot: dark on bright, bright on dark, or either.', choices=POLARITIES
+    )
+    min_radius: float = parameter(4.0, 'Smallest radius of a dot, px.', minimum=1.0, maximum=1e4)
+    max_radius: float = parameter(60.0, 'Largest radius of a dot, px.', minimum=1.0, maximum=1e4)
+    report_undecoded: bool = parameter(
+        False, 'Whether to report targets whose code word is not certain, with the ID -1.'
+    )
+
+    def __post_init__(self) -> None:
+        check_parameters(self)
+        if self.min_radius > self.max_radius:
+            raise ValueError(
+                f'min_radius is {self.min_radius!r}, accepted is a number of at most max_radius, '
+                f'{self.max_radius!r}'
+            )
