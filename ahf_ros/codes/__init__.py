@@ -1,0 +1,1 @@
+"""Code words of target families: pure arithmetic, no images."""

@@ -1,0 +1,166 @@
+"""Code words of ring targets: a dot and a concentric band of sectors (Schneider type).
+
+A code word of n bits is read round the band, least significant bit first: bit s is the sector
+from s 360/n to (s + 1) 360/n degrees counter-clockwise as seen on the printed target, 1 where the
+sector has the colour of the dot. The direction zero is any sector edge, so that all rotations of a
+word are the same code; the smallest one is canonical.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+_BAND_RADII = {'metashape': (2.25, 3.5), 'aicon': (2.0, 3.0)}
+_VENDORS_AND_BITS = {
+    'metashape12': ('metashape', 12),
+    'metashape14': ('metashape', 14),
+    'metashape16': ('metashape', 16),
+    'metashape20': ('metashape', 20),
+    'aicon12': ('aicon', 12),
+    'aicon14': ('aicon', 14),
+}
+FAMILY_NAMES: tuple[str, ...] = tuple(_VENDORS_AND_BITS)
+"""The ring code families that `family` knows."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Family:
+    """The code words of one kind of ring target, and the proportions of its print.
+
+    Attributes
+    ----------
+    name : str
+        One of `FAMILY_NAMES`.
+    bits : int
+        Number of sectors of the band.
+    band_inner, band_outer : float
+        Radii of the band, in radii of the dot.
+    words : ndarray of int64, shape (n,)
+        The canonical code words, ascending and read-only; index i has the ID i + 1.
+    """
+
+    name: str
+    bits: int
+    band_inner: float
+    band_outer: float
+    words: np.ndarray
+
+    def number(self, word: int) -> int | None:
+        """Return the ID of `word`, in any rotation; None where the family does not have it."""
+        if not 0 <= word < 1 << self.bits:
+            return None
+        canonical = int(smallest_rotation(word, self.bits))
+        index = int(np.searchsorted(self.words, canonical))
+        if index < self.words.size and self.words[index] == canonical:
+            return index + 1
+        return None
+
+    def word(self, number: int) -> int:
+        """Return the canonical code word of the ID `number`.
+
+        Raises
+        ------
+        ValueError
+            If the family has no such ID.
+        """
+        if not 1 <= number <= self.words.size:
+            raise ValueError(
+                f'number is {number!r}, accepted is an ID of {self.name} from 1 to '
+                f'{self.words.size}'
+            )
+        return int(self.words[number - 1])
+
+
+@lru_cache(maxsize=None)
+def family(name: str) -> Family:
+    """Return a family of ring codes by its name.
+
+    The words have even parity. Metashape keeps those above 2^(n/2) + 1 other than all ones; AICON
+    (patent DE 197 33 466) those with at least one pair of opposite ones. The lists of 12 and 14
+    bit were compared with published tables and photographs; the order of 16 and 20 bit is the
+    same rule carried on.
+
+    Parameters
+    ----------
+    name : str
+        One of `FAMILY_NAMES`.
+
+    Raises
+    ------
+    ValueError
+        If there is no family of that name.
+
+    Examples
+    --------
+    >>> family('metashape12').word(1)
+    71
+    >>> family('metashape12').number(0b100011100000)
+    1
+    """
+    if name not in _VENDORS_AND_BITS:
+        raise ValueError(f'family is {name!r}, accepted is one of {", ".join(FAMILY_NAMES)}')
+    vendor, bits = _VENDORS_AND_BITS[name]
+    words = _even_canonical_words(bits)
+    half = bits // 2
+    if vendor == 'metashape':
+        words = words[(words > (1 << half) + 1) & (words != (1 << bits) - 1)]
+    else:
+        words = words[words & (words >> half) & ((1 << half) - 1) != 0]
+    words.setflags(write=False)
+    inner, outer = _BAND_RADII[vendor]
+    return Family(name, bits, inner, outer, words)
+
+
+def smallest_rotation(words: Any, bits: int) -> np.ndarray:
+    """Return the smallest of all rotations of each word.
+
+    Parameters
+    ----------
+    words : array_like of int, any shape
+        Words of `bits` bits, 0 to 2^bits - 1.
+    bits : int
+        Length of a word.
+
+    Returns
+    -------
+    ndarray of int64, shape of `words`
+    """
+    rotated = np.asarray(words, dtype=np.int64)
+    smallest = rotated.copy()
+    for _ in range(bits - 1):
+        rotated = (rotated >> 1) | ((rotated & 1) << (bits - 1))
+        np.minimum(smallest, rotated, out=smallest)
+    return smallest
+
+
+def sectors(word: int, bits: int) -> np.ndarray:
+    """Return the colours of the sectors of a band.
+
+    Parameters
+    ----------
+    word : int
+        A code word, in the rotation wanted.
+    bits : int
+        Length of the word.
+
+    Returns
+    -------
+    ndarray of bool, shape (bits,)
+        Element s is the sector from s 360/bits to (s + 1) 360/bits degrees counter-clockwise as
+        seen on the printed target: true where it has the colour of the dot.
+    """
+    return (word >> np.arange(bits) & 1).astype(bool)
+
+
+def _even_canonical_words(bits: int) -> np.ndarray:
+    """Return the words of even parity that are their own smallest rotation, ascending."""
+    words = np.arange(1 << bits, dtype=np.int64)
+    parity = np.zeros_like(words)
+    for bit in range(bits):
+        parity ^= words >> bit & 1
+    words = words[parity == 0]
+    return words[words == smallest_rotation(words, bits)]
