@@ -78,6 +78,7 @@ class DetectorSettings:
     )
 
     def __post_init__(self) -> None:
+        """Refuse values that are not accepted."""
         check_parameters(self)
         if self.min_radius > self.max_radius:
             raise ValueError(
