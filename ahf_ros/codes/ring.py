@@ -9,7 +9,7 @@ word are the same code; the smallest one is canonical.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -75,14 +75,14 @@ class Family:
         return int(self.words[number - 1])
 
 
-@lru_cache(maxsize=None)
+@cache
 def family(name: str) -> Family:
     """Return a family of ring codes by its name.
 
-    The words have even parity. Metashape keeps those above 2^(n/2) + 1 other than all ones; AICON
-    (patent DE 197 33 466) those with at least one pair of opposite ones. The lists of 12 and 14
-    bit were compared with published tables and photographs; the order of 16 and 20 bit is the
-    same rule carried on.
+    The words have even parity and are not all ones. Metashape keeps those above 2^(n/2) + 1;
+    AICON (patent DE 197 33 466) those with at least one pair of opposite ones. The lists of 12
+    and 14 bit were compared with published tables and photographs; the order of 16 and 20 bit is
+    the same rule carried on.
 
     Parameters
     ----------
@@ -104,10 +104,10 @@ def family(name: str) -> Family:
     if name not in _VENDORS_AND_BITS:
         raise ValueError(f'family is {name!r}, accepted is one of {", ".join(FAMILY_NAMES)}')
     vendor, bits = _VENDORS_AND_BITS[name]
-    words = _even_canonical_words(bits)
+    words = _even_canonical_words(bits)[:-1]  # without all ones, a ring that has no sectors
     half = bits // 2
     if vendor == 'metashape':
-        words = words[(words > (1 << half) + 1) & (words != (1 << bits) - 1)]
+        words = words[words > (1 << half) + 1]
     else:
         words = words[words & (words >> half) & ((1 << half) - 1) != 0]
     words.setflags(write=False)

@@ -1,0 +1,1 @@
+"""Images of walls of targets whose truth is known exactly."""

@@ -1,0 +1,207 @@
+"""A pinhole camera before a wall, and its sensor.
+
+Lengths on the wall are in units that the camera images as one pixel at the principal point of a
+wall without tilt. The wall has x to the right and y down, as seen by that camera.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+_NEWTON_STEPS = 20
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Camera:
+    """A camera that looks at the wall z = 0.
+
+    Attributes
+    ----------
+    width, height : int
+        Size of the image, px.
+    intrinsics : ndarray of float64, shape (3, 3)
+        K, for pixel (0, 0) at the centre of the first pixel.
+    distortion : float
+        k1 of Brown's radial distortion: a ray (x, y) is seen at (x, y) (1 + k1 (x^2 + y^2)).
+    pose : ndarray of float64, shape (3, 3)
+        Homography from the wall (x, y, 1) to rays (x, y, 1), to scale; its third row gives the
+        depth.
+    """
+
+    width: int
+    height: int
+    intrinsics: np.ndarray
+    distortion: float
+    pose: np.ndarray
+
+    def project(self, points: np.ndarray) -> np.ndarray:
+        """Return the pixels that show points of the wall, shape (n, 2) both."""
+        rays = _transform(self.pose, points)
+        seen = rays * (1 + self.distortion * (rays**2).sum(axis=1, keepdims=True))
+        return seen * np.diag(self.intrinsics)[:2] + self.intrinsics[:2, 2]
+
+    def wall(self, pixels: np.ndarray) -> np.ndarray:
+        """Return the points of the wall that pixels show, shape (n, 2) both."""
+        x, y = self.rays(pixels[:, 0], pixels[:, 1])
+        return _transform(np.linalg.inv(self.pose), np.stack((x, y), axis=1))
+
+    def rays(self, columns: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the rays (x, y, 1) of pixels.
+
+        Parameters
+        ----------
+        columns, rows : ndarray of float64
+            Pixel coordinates, of shapes that can be broadcast together.
+
+        Returns
+        -------
+        x, y : ndarray of float64
+            Without distortion each has the shape of its argument, otherwise the common shape.
+        """
+        x = (columns - self.intrinsics[0, 2]) / self.intrinsics[0, 0]
+        y = (rows - self.intrinsics[1, 2]) / self.intrinsics[1, 1]
+        if not self.distortion:
+            return x, y
+        seen = np.sqrt(x**2 + y**2)
+        radius = seen.copy()
+        for _ in range(_NEWTON_STEPS):
+            excess = radius * (1 + self.distortion * radius**2) - seen
+            step = excess / (1 + 3 * self.distortion * radius**2)
+            radius -= step
+            if np.abs(step).max() < 1e-14:
+                break
+        scale = np.divide(radius, seen, out=np.ones_like(seen), where=seen > 0)
+        return x * scale, y * scale
+
+    def jacobian(self, point: np.ndarray) -> np.ndarray:
+        """Return d(pixel) / d(wall) at a point of the wall, shape (2, 2)."""
+        ray = self.pose @ np.array([*point, 1.0])
+        x, y = ray[:2] / ray[2]
+        pinhole = (self.pose[:2, :2] - np.outer((x, y), self.pose[2, :2])) / ray[2]
+        radial = np.eye(2) * (1 + self.distortion * (x * x + y * y))
+        radial += 2 * self.distortion * np.outer((x, y), (x, y))
+        return np.diag(np.diag(self.intrinsics)[:2]) @ radial @ pinhole
+
+    def view_angle(self, points: np.ndarray) -> np.ndarray:
+        """Return the angles between the rays to points of the wall and its normal, rad."""
+        axes = self.pose[:, :2] / np.linalg.norm(self.pose[:, :2], axis=0)
+        normal = np.cross(axes[:, 0], axes[:, 1])
+        rays = np.column_stack((points, np.ones(len(points)))) @ self.pose.T
+        return np.arccos(np.abs(rays @ normal) / np.linalg.norm(rays, axis=1))
+
+    def circle(self, centre: np.ndarray, radius: float) -> tuple[float, float, float]:
+        """Return the ellipse that a circle on the wall is seen as.
+
+        The image of the circle's conic under the pinhole camera is exact; lens distortion is
+        taken as affine over the circle.
+
+        Parameters
+        ----------
+        centre : ndarray of float64, shape (2,)
+            On the wall.
+        radius : float
+            In units of the wall.
+
+        Returns
+        -------
+        semi_major, semi_minor : float
+            In px.
+        angle : float
+            Direction of the major axis, rad in (-pi/2, pi/2], from +x towards +y.
+        """
+        ray = self.pose @ np.array([*centre, 1.0])
+        x, y = ray[:2] / ray[2]
+        to_ray = np.array([[1, 0, -x], [0, 1, -y], [0, 0, 1]]) @ self.pose
+        from_circle = np.array([[radius, 0, centre[0]], [0, radius, centre[1]], [0, 0, 1]])
+        back = np.linalg.inv(to_ray @ from_circle)
+        conic = back.T @ np.diag([1.0, 1.0, -1.0]) @ back
+        middle = -np.linalg.solve(conic[:2, :2], conic[:2, 2])
+        level = -(conic[2, 2] + conic[2, :2] @ middle)
+        radial = np.eye(2) * (1 + self.distortion * (x * x + y * y))
+        radial += 2 * self.distortion * np.outer((x, y), (x, y))
+        to_pixel = np.diag(np.diag(self.intrinsics)[:2]) @ radial
+        spread = to_pixel @ np.linalg.inv(conic[:2, :2] / level) @ to_pixel.T
+        squares, directions = np.linalg.eigh(spread)
+        angle = math.atan2(directions[1, 1], directions[0, 1])
+        if angle > math.pi / 2:
+            angle -= math.pi
+        elif angle <= -math.pi / 2:
+            angle += math.pi
+        return math.sqrt(squares[1]), math.sqrt(squares[0]), angle
+
+
+@dataclass(frozen=True, slots=True)
+class Sensor:
+    """What a camera makes of the light on its sensor.
+
+    Attributes
+    ----------
+    full_well : float
+        Photo-electrons at saturation; 0 for an image without photon noise.
+    read_noise : float
+        Standard deviation in electrons.
+    gamma : float
+        The grey value is the light to the power of 1 / gamma.
+    """
+
+    full_well: float
+    read_noise: float
+    gamma: float
+
+    def grey_values(self, light: np.ndarray, generator: np.random.Generator) -> np.ndarray:
+        """Return 8-bit grey values of light, 1 being saturation; overwrites `light`.
+
+        Photon noise is normal with the variance of the Poisson distribution.
+        """
+        if self.full_well:
+            deviation = np.sqrt(light / np.float32(self.full_well)
+                                + np.float32((self.read_noise / self.full_well) ** 2))
+            deviation *= generator.standard_normal(light.shape, dtype=np.float32)
+            light += deviation
+        np.clip(light, 0, 1, out=light)
+        return np.rint(cv2.pow(light, 1 / self.gamma) * np.float32(255)).astype(np.uint8)
+
+
+def tilted_camera(
+    width: int,
+    height: int,
+    focal_length: float,
+    tilt: float,
+    distortion: float,
+    generator: np.random.Generator,
+) -> Camera:
+    """Return a camera that looks at the wall's origin from a tilt about an axis drawn at random.
+
+    Parameters
+    ----------
+    width, height : int
+        Size of the image, px.
+    focal_length : float
+        In px; also the distance from the wall's origin, in units of the wall.
+    tilt : float
+        Between the optical axis and the wall's normal, rad.
+    distortion : float
+        k1.
+    generator : numpy.random.Generator
+        Draws the direction of the tilt and the principal point (within 1 % of the width of the
+        middle).
+    """
+    direction = generator.uniform(0, 2 * math.pi)
+    offset = generator.uniform(-0.01, 0.01, 2) * width
+    axis = np.array([math.cos(direction), math.sin(direction), 0.0])
+    rotation, _ = cv2.Rodrigues(axis * tilt)
+    pose = np.column_stack((rotation[:, 0], rotation[:, 1], (0.0, 0.0, focal_length)))
+    principal = (np.array([width, height]) - 1) / 2 + offset
+    intrinsics = np.array([[focal_length, 0, principal[0]], [0, focal_length, principal[1]],
+                           [0, 0, 1.0]])
+    return Camera(width, height, intrinsics, distortion, pose)
+
+
+def _transform(homography: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return points, shape (n, 2), after a homography."""
+    transformed = points @ homography[:, :2].T + homography[:, 2]
+    return transformed[:, :2] / transformed[:, 2:]

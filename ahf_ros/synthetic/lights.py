@@ -1,0 +1,281 @@
+"""Projected light: patterns, and the projector that throws them on the wall."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+Pattern = Callable[[np.ndarray, np.ndarray], np.ndarray]
+"""Brightness 0 to 1 at projector pixels (u, v), all float32 of one shape."""
+
+_HALF_VIEW = (640.0, 400.0)  # projector px from the middle of the view to its sides
+
+
+def uniform(_generator: np.random.Generator, _defocus: float) -> Pattern:
+    """Return the pattern of a projector that lights everything."""
+    return lambda u, _v: np.ones_like(u)
+
+
+def stripes(period: float, direction: float = 0.0) -> Callable[..., Pattern]:
+    """Return a maker of hard-edged stripes, half of each period lit.
+
+    Parameters
+    ----------
+    period : float
+        In projector px.
+    direction : float
+        Of the normal of the stripes, rad from +u; each pattern is up to 10 degrees off, to
+        either side, and mirrored half of the times.
+    """
+
+    def make(generator: np.random.Generator, defocus: float) -> Pattern:
+        x, y, phase = _wave(generator, period, direction)
+
+        def pattern(u: np.ndarray, v: np.ndarray) -> np.ndarray:
+            along = _remainder(u * x + (v * y + phase), period)
+            return _soft_step(np.float32(period / 4) - np.abs(along, out=along), defocus)
+
+        return pattern
+
+    return make
+
+
+def fringe(period: float) -> Callable[..., Pattern]:
+    """Return a maker of sinusoidal fringes with a period in projector px."""
+
+    def make(generator: np.random.Generator, defocus: float) -> Pattern:
+        x, y, phase = _wave(generator, period, 0.0)
+        wave = np.float32(2 * math.pi / period)
+        contrast = np.float32(0.5 * math.exp(-((float(wave) * defocus) ** 2) / 2))
+
+        def pattern(u: np.ndarray, v: np.ndarray) -> np.ndarray:
+            return np.float32(0.5) + contrast * np.cos((u * x + (v * y + phase)) * wave)
+
+        return pattern
+
+    return make
+
+
+def lattice(period: float, diameter: float) -> Callable[..., Pattern]:
+    """Return a maker of a square lattice of bright round spots, in projector px."""
+
+    def make(generator: np.random.Generator, defocus: float) -> Pattern:
+        x, y, phase = _wave(generator, period, 0.0)
+        shift = np.float32(generator.uniform(0, period))
+
+        def pattern(u: np.ndarray, v: np.ndarray) -> np.ndarray:
+            across = _remainder(u * x + (v * y + phase), period)
+            along = _remainder(v * x - (u * y + shift), period)
+            distance = np.sqrt(across * across + along * along)
+            return _soft_step(np.float32(diameter / 2) - distance, defocus)
+
+        return pattern
+
+    return make
+
+
+def spots(generator: np.random.Generator, defocus: float) -> Pattern:
+    """Return three large bright spots with soft edges on a dark scene."""
+    half_width, half_height = _HALF_VIEW
+    u_centres = (np.array([-0.6, 0.0, 0.6]) + generator.uniform(-0.12, 0.12, 3)) * half_width
+    v_centres = generator.uniform(-0.5, 0.5, 3) * half_height
+    radii = generator.uniform(170, 240, 3)
+    softness = math.hypot(35, defocus)
+
+    def pattern(u: np.ndarray, v: np.ndarray) -> np.ndarray:
+        brightest = np.zeros_like(u)
+        for u_centre, v_centre, radius in np.float32(np.stack((u_centres, v_centres, radii), 1)):
+            distance = np.sqrt((u - u_centre) ** 2 + (v - v_centre) ** 2)
+            np.maximum(brightest, _soft_step(radius - distance, softness), out=brightest)
+        return brightest
+
+    return pattern
+
+
+def shadow(generator: np.random.Generator, defocus: float) -> Pattern:
+    """Return full light with the hard shadows of bars and convex polygons."""
+    edges = [_bar(generator) for _ in range(3)] + [_polygon(generator) for _ in range(9)]
+
+    def pattern(u: np.ndarray, v: np.ndarray) -> np.ndarray:
+        outside = np.full_like(u, np.inf)
+        for occluder in edges:
+            distance = np.full_like(u, -np.inf)
+            for x, y, offset in occluder:
+                np.maximum(distance, u * x + (v * y - offset), out=distance)
+            np.minimum(outside, distance, out=outside)
+        return _soft_step(outside, defocus)
+
+    return pattern
+
+
+_MAKERS: dict[str, Callable[[np.random.Generator, float], Pattern]] = {
+    'normal': uniform,
+    'stripe': stripes(26),
+    'wide_stripe': stripes(70),
+    'fine_stripe': stripes(14),
+    'diagonal_stripe': stripes(34, math.pi / 4),
+    'lattice': lattice(30, 18),
+    'dense_lattice': lattice(16, 9.6),
+    'fringe': fringe(40),
+    'spots': spots,
+    'shadow': shadow,
+}
+LIGHT_NAMES: tuple[str, ...] = tuple(_MAKERS)
+"""The lights that `light_pattern` knows."""
+
+
+def light_pattern(name: str, defocus: float, generator: np.random.Generator) -> Pattern:
+    """Return the pattern of a light, its phase and directions drawn at random.
+
+    Parameters
+    ----------
+    name : str
+        One of `LIGHT_NAMES`.
+    defocus : float
+        Standard deviation of the projector's blur, projector px.
+    generator : numpy.random.Generator
+        Draws phase, directions and places.
+
+    Raises
+    ------
+    ValueError
+        If there is no light of that name.
+    """
+    if name not in _MAKERS:
+        raise ValueError(f'light is {name!r}, accepted is one of {", ".join(LIGHT_NAMES)}')
+    return _MAKERS[name](generator, defocus)
+
+
+def benchmark_lights() -> tuple[tuple[str, float], ...]:
+    """Return the lights that identification is measured under, as (name, ambient) pairs."""
+    deep = tuple((name, ambient) for name in LIGHT_NAMES[1:] for ambient in (0.3, 0.12, 0.04))
+    return (('normal', 0.3), *deep)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Projector:
+    """A projector beside the camera that lights the same part of the wall.
+
+    Attributes
+    ----------
+    pose : ndarray of float64, shape (3, 3)
+        Homography from the wall (x, y, 1) to rays (x, y, 1), to scale.
+    position : ndarray of float64, shape (3,)
+        In the coordinates of the wall.
+    scale : float
+        Projector px a unit of a ray; projector pixel (0, 0) is the principal point.
+    """
+
+    pose: np.ndarray
+    position: np.ndarray
+    scale: float
+
+    def irradiance(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Return the light on points of the wall, 1 at its origin, for a pattern that is 1.
+
+        It falls with the square of the distance, with the obliquity of the wall and with the
+        fourth power of the cosine of the projector's field angle.
+        """
+        towards = np.stack((x - self.position[0], y - self.position[1]), axis=-1)
+        squared = (towards**2).sum(axis=-1) + self.position[2] ** 2
+        reach = self.position @ self.position
+        field = (self.position[2] ** 2 - towards @ self.position[:2]) / np.sqrt(squared * reach)
+        return (reach / squared) ** 1.5 * np.clip(field, 0, 1) ** 4
+
+
+def rig_projector(
+    camera_pose: np.ndarray, pixel: float, generator: np.random.Generator
+) -> Projector:
+    """Return a projector 12 to 20 degrees aside of the camera, aimed at the wall's origin.
+
+    It stands off along the axis that the wall is tilted about, so that neither sees the wall
+    more obliquely than the other by much, and is turned by up to 8 degrees.
+
+    Parameters
+    ----------
+    camera_pose : ndarray, shape (3, 3)
+        `Camera.pose`; its origin is on the optical axis.
+    pixel : float
+        Size of a projector pixel at the wall's origin, in units of the wall.
+    generator : numpy.random.Generator
+        Draws the angles and the distance.
+    """
+    aside = generator.uniform(math.radians(12), math.radians(20)) * generator.choice((-1, 1))
+    turn = generator.uniform(-math.radians(8), math.radians(8))
+    nearness = generator.uniform(0.85, 1.1)
+    rotation = np.column_stack(
+        (camera_pose[:, :2], np.cross(camera_pose[:, 0], camera_pose[:, 1]))
+    )
+    tilted = np.hypot(*rotation[:2, 2])
+    free = generator.uniform(0, 2 * math.pi)
+    across = rotation[:2, 2] / tilted if tilted > 1e-6 else (math.cos(free), math.sin(free))
+    swing, _ = cv2.Rodrigues(np.array([*across, 0.0]) * aside)
+    roll, _ = cv2.Rodrigues(np.array([0.0, 0.0, turn]))
+    orientation = roll @ swing @ rotation
+    distance = camera_pose[2, 2] * nearness
+    pose = np.column_stack((orientation[:, :2], (0.0, 0.0, distance)))
+    return Projector(pose, -orientation.T @ (0.0, 0.0, distance), distance / pixel)
+
+
+def _wave(
+    generator: np.random.Generator, period: float, direction: float
+) -> tuple[np.float32, np.float32, np.float32]:
+    """Return a normal (x, y) near a direction or its mirror image, and a phase."""
+    angle = direction + generator.uniform(-math.radians(10), math.radians(10))
+    angle *= generator.choice((-1, 1))
+    phase = generator.uniform(0, period)
+    return np.float32(math.cos(angle)), np.float32(math.sin(angle)), np.float32(phase)
+
+
+def _remainder(values: np.ndarray, period: float) -> np.ndarray:
+    """Return values less the nearest multiple of the period; overwrites `values`."""
+    turns = values * np.float32(1 / period)
+    values -= np.rint(turns, out=turns) * np.float32(period)
+    return values
+
+
+def _soft_step(distance: np.ndarray, sigma: float) -> np.ndarray:
+    """Return an edge blurred by a normal distribution, 1 where `distance` is large.
+
+    The error function is approximated by a tanh (to 3e-4), which numpy has in float32.
+    """
+    if not sigma:
+        return (distance > 0).astype(np.float32)
+    scaled = distance * np.float32(1 / sigma)
+    np.clip(scaled, -4, 4, out=scaled)
+    cubic = scaled * scaled
+    cubic *= np.float32(0.0356774)
+    cubic += np.float32(0.7978846)
+    scaled *= cubic
+    np.tanh(scaled, out=scaled)
+    scaled *= np.float32(0.5)
+    scaled += np.float32(0.5)
+    return scaled
+
+
+def _bar(generator: np.random.Generator) -> list[tuple[np.float32, np.float32, np.float32]]:
+    """Return the two sides of a bar across the view, as outward normals and offsets."""
+    angle = generator.uniform(0, math.pi)
+    x, y = np.float32(math.cos(angle)), np.float32(math.sin(angle))
+    middle = np.float32(generator.uniform(-350, 350))
+    half = np.float32(generator.uniform(6, 22))
+    return [(x, y, middle + half), (-x, -y, half - middle)]
+
+
+def _polygon(generator: np.random.Generator) -> list[tuple[np.float32, np.float32, np.float32]]:
+    """Return the sides of a convex polygon round a place in the view."""
+    place = generator.uniform(-1, 1, 2) * _HALF_VIEW
+    corners = int(generator.integers(3, 7))
+    turn = generator.uniform(0, 2 * math.pi)
+    steps = (np.arange(corners) + generator.uniform(-0.2, 0.2, corners)) / corners
+    size = generator.uniform(20, 90)
+    sides = []
+    for angle in turn + 2 * math.pi * steps:
+        x, y = math.cos(angle), math.sin(angle)
+        offset = place[0] * x + place[1] * y + size * generator.uniform(0.5, 1.0)
+        sides.append((np.float32(x), np.float32(y), np.float32(offset)))
+    return sides
