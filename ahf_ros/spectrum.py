@@ -1,0 +1,173 @@
+"""The transfer function of the homomorphic filter, in the spectrum and as kernels."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+TOLERANCE = 1e-3
+"""Weight of a kernel that may lie beyond its last tap, of one."""
+
+
+def distances(height: int, width: int) -> np.ndarray:
+    """Return D(u, v), the distance of every frequency to the centre of the spectrum [1]_.
+
+    Parameters
+    ----------
+    height, width : int
+        Size of the image, px.
+
+    Returns
+    -------
+    ndarray of float64, shape (height, width)
+        sqrt(u^2 + v^2) in cycles per image, in the order of `numpy.fft.fft2`; 0 at the origin.
+
+    Notes
+    -----
+    Eq. (5) prints a minus sign under the root, a slip. After a shift of the origin to pixel
+    (height // 2, width // 2) this is the distance to that pixel.
+
+    References
+    ----------
+    .. [1] Shang & Liu, Remote Sens. 2023, 15, 3151.
+    """
+    return np.hypot(_frequencies(height)[:, None], _frequencies(width))
+
+
+@lru_cache(maxsize=64)
+def median_distance(height: int, width: int) -> float:
+    """Return the exact median of `distances`, the published cut-off D0, in cycles per image.
+
+    The squares of the distances are integers, so the order statistics in the middle are found
+    by bisection on the number of frequencies in a disc, without sorting the spectrum.
+    """
+    middle = height * width
+    ranks = ((middle - 1) // 2, middle // 2)
+    lower, upper = (np.sqrt(_square_of_rank(height, width, rank)) for rank in ranks)
+    return float(lower + upper) / 2
+
+
+def transfer(
+    height: int,
+    width: int,
+    gamma_high: float,
+    gamma_low: float,
+    cutoff: float,
+    attenuation: float,
+) -> np.ndarray:
+    """Return H(u, v) of Eq. (4) in [1]_.
+
+    H = (gamma_high - gamma_low) (1 - exp(-attenuation (D / cutoff)^2)) + gamma_low
+
+    Parameters
+    ----------
+    height, width : int
+        Size of the image, px.
+    gamma_high, gamma_low : float
+        Gains of the high and of the low frequencies, dimensionless.
+    cutoff : float
+        D0, cycles per image, > 0.
+    attenuation : float
+        c, dimensionless, >= 0.
+
+    Returns
+    -------
+    ndarray of float64, shape (height, width)
+        In the order of `numpy.fft.fft2`.
+
+    References
+    ----------
+    .. [1] Shang & Liu, Remote Sens. 2023, 15, 3151.
+    """
+    attenuated = np.exp(-attenuation * (distances(height, width) / cutoff) ** 2)
+    return (gamma_high - gamma_low) * (1 - attenuated) + gamma_low
+
+
+def blur_kernel(length: int, attenuation: float, cutoff: float) -> np.ndarray:
+    """Return the circular 1-D kernel whose DFT is exp(-c (u / D0)^2).
+
+    The Gaussian of Eq. (4) in [1]_ separates into one factor an axis, so the two-dimensional
+    Fourier filter is exactly two one-dimensional circular convolutions.
+
+    Parameters
+    ----------
+    length : int
+        Number of samples along the axis, px.
+    attenuation : float
+        c of Eq. (4), dimensionless, >= 0.
+    cutoff : float
+        D0 of Eq. (4), cycles per image, > 0.
+
+    Returns
+    -------
+    ndarray of float64, shape (length,)
+        Sums to one; sample 0 is the centre.
+
+    Raises
+    ------
+    ValueError
+        If `cutoff` is not positive or `attenuation` is negative.
+
+    References
+    ----------
+    .. [1] Shang & Liu, Remote Sens. 2023, 15, 3151.
+    """
+    if not cutoff > 0:
+        raise ValueError(f'cutoff is {cutoff!r}, accepted is a number above 0')
+    if not attenuation >= 0:
+        raise ValueError(f'attenuation is {attenuation!r}, accepted is a number of at least 0')
+    return np.fft.ifft(np.exp(-attenuation * (_frequencies(length) / cutoff) ** 2)).real
+
+
+def blur_taps(
+    length: int, attenuation: float, cutoff: float, tolerance: float = TOLERANCE
+) -> np.ndarray:
+    """Return `blur_kernel` cut to the taps that matter, for a convolution in space.
+
+    The spectrum is cut at the Nyquist frequency, where it is not yet zero, so that the kernel
+    has a tail (-1)^k / k^2 which never ends. What lies beyond the last tap is added to the last
+    tap: constants pass exactly, and slow changes better than with a kernel twice as long.
+
+    Parameters
+    ----------
+    length, attenuation, cutoff
+        As for `blur_kernel`.
+    tolerance : float
+        Weight that may lie beyond the last tap, before it is added there. 0 takes the whole
+        kernel: the convolution is then the Fourier filter, up to rounding.
+
+    Returns
+    -------
+    ndarray of float64, shape (2 reach + 1,)
+        Symmetric, the centre in the middle, sums to one; reach <= length // 2.
+    """
+    half = blur_kernel(length, attenuation, cutoff)[: length // 2 + 1].copy()
+    if length % 2 == 0:
+        half[-1] /= 2  # the sample opposite the centre is reached from both sides
+    beyond = 1 - (2 * np.cumsum(half) - half[0])
+    above = np.flatnonzero(np.abs(beyond[:-1]) > tolerance)
+    reach = int(above[-1]) + 1 if above.size else 0
+    taps = half[: reach + 1]
+    taps[reach] += beyond[reach] / (2 if reach else 1)
+    return np.concatenate([taps[:0:-1], taps])
+
+
+def _frequencies(length: int) -> np.ndarray:
+    return np.fft.ifftshift(np.arange(length) - length // 2).astype(np.float64)
+
+
+def _square_of_rank(height: int, width: int, rank: int) -> int:
+    """Return the `rank`-th smallest (from 0) squared distance of a spectrum."""
+    rows = (np.arange(height) - height // 2) ** 2
+    low, high = 0, (height // 2) ** 2 + (width // 2) ** 2
+    while low < high:
+        square = (low + high) // 2
+        inside = rows[rows <= square]
+        radius = np.sqrt(square - inside).astype(np.int64)
+        count = np.minimum(radius, width // 2) + np.minimum(radius, (width - 1) // 2) + 1
+        if count.sum() > rank:
+            high = square
+        else:
+            low = square + 1
+    return low
