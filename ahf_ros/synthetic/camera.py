@@ -158,8 +158,10 @@ class Sensor:
         Photon noise is normal with the variance of the Poisson distribution.
         """
         if self.full_well:
-            deviation = np.sqrt(light / np.float32(self.full_well)
-                                + np.float32((self.read_noise / self.full_well) ** 2))
+            deviation = np.sqrt(
+                light / np.float32(self.full_well)
+                + np.float32((self.read_noise / self.full_well) ** 2)
+            )
             deviation *= generator.standard_normal(light.shape, dtype=np.float32)
             light += deviation
         np.clip(light, 0, 1, out=light)
@@ -196,8 +198,9 @@ def tilted_camera(
     rotation, _ = cv2.Rodrigues(axis * tilt)
     pose = np.column_stack((rotation[:, 0], rotation[:, 1], (0.0, 0.0, focal_length)))
     principal = (np.array([width, height]) - 1) / 2 + offset
-    intrinsics = np.array([[focal_length, 0, principal[0]], [0, focal_length, principal[1]],
-                           [0, 0, 1.0]])
+    intrinsics = np.array(
+        [[focal_length, 0, principal[0]], [0, focal_length, principal[1]], [0, 0, 1.0]]
+    )
     return Camera(width, height, intrinsics, distortion, pose)
 
 

@@ -1,8 +1,9 @@
-"""What is printed on the wall: the reflectance of ring targets, without aliasing."""
+"""What is printed on the wall, put into the image without aliasing."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import cv2
@@ -11,175 +12,168 @@ import numpy as np
 from ahf_ros.codes.ring import Family, sectors
 from ahf_ros.synthetic.camera import Camera
 
-SUPERSAMPLING = 3
-"""Samples a pixel and axis, each of them anti-aliased by its distance to the edges."""
+_SUPERSAMPLING = 3  # samples a pixel and axis, each anti-aliased by its distance to the edges
+_BLOCK_PIXELS = 1 << 18  # supersampled at a time
+
+Cover = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+"""Ink, 0 to 1, at places (x, y) of a mark, float32 of one shape in units of the mark's radius.
+
+y is up, so that angles are counter-clockwise as seen. The third argument, shape (2, 2), is
+d(place) / d(sample) in the middle of the mark.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Print:
-    """One ring target on the wall.
+class Mark:
+    """Something printed on the wall.
 
     Attributes
     ----------
-    number : int
-        ID of the code.
-    word : int
-        Code word, canonical.
     centre : ndarray of float64, shape (2,)
         On the wall.
     radius : float
-        Radius of the dot, units of the wall.
-    turn : float
-        Direction of the edge before sector 0, rad, counter-clockwise as seen, from the wall's x.
+        Unit of length of `cover`, in units of the wall; the dot's radius for a target.
+    reach : float
+        Radius that holds all ink, in radii of the mark.
+    cover : Cover
+        Where the ink is.
     """
 
-    number: int
-    word: int
     centre: np.ndarray
     radius: float
-    turn: float
+    reach: float
+    cover: Cover
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Ink:
-    """Which part of a block of pixels is covered with the colour of the dot.
-
-    Attributes
-    ----------
-    rows, columns : slice
-        The block in the image.
-    cover : ndarray of float32
-        0 to 1, `SUPERSAMPLING` samples a pixel and axis.
-    """
-
-    rows: slice
-    columns: slice
-    cover: np.ndarray
-
-
-def ink(printed: Print, family: Family, pinhole: float, camera: Camera, margin: float) -> Ink:
-    """Return the ink of a target as the camera sees it, without blur.
+def ring_cover(family: Family, word: int, turn: float, pinhole: float) -> Cover:
+    """Return the ink of a ring target.
 
     The signed distance to each edge, in samples, gives the share of a sample that is covered.
 
     Parameters
     ----------
-    printed : Print
-        The target.
     family : Family
         Gives the proportions and the number of sectors.
+    word : int
+        Code word.
+    turn : float
+        Direction of the edge before sector 0, rad.
     pinhole : float
         Radius of the hole in the middle of the dot, in radii of the dot; 0 for none.
-    camera : Camera
-        Sees the target whole.
-    margin : float
-        What the block shows beyond the band, px.
     """
-    rows, columns = _block(printed, family.band_outer, camera, margin)
-    x, y = _print_coordinates(printed, camera, rows, columns)
-    jacobian = np.linalg.inv(camera.jacobian(printed.centre)) / printed.radius
-    distance = np.sqrt(x * x + y * y)
-    radial = _width(jacobian, x, y) / np.maximum(distance, np.float32(1e-6))
 
-    cover = _inside(1 - distance, radial)
-    if pinhole:
-        cover -= _inside(pinhole - distance, radial)
-    reach = np.float32(3 * radial.max())
-    band = (distance > family.band_inner - reach) & (distance < family.band_outer + reach)
-    distance, radial, x, y = distance[band], radial[band], x[band], y[band]
-    ring = _inside(distance - family.band_inner, radial)
-    ring *= _inside(family.band_outer - distance, radial)
-    around = _width(jacobian, -y, x) / np.maximum(distance, np.float32(1e-6))
-    ring *= _sector_cover(printed, family.bits, x, y, distance, around)
-    cover[band] += ring
-    return Ink(rows, columns, cover)
+    def cover(x: np.ndarray, y: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
+        distance = np.sqrt(x * x + y * y)
+        radial = _width(jacobian, x, y, distance)
+        inked = _inside(1 - distance, radial)
+        if pinhole:
+            inked -= _inside(pinhole - distance, radial)
+        margin = np.float32(2 * radial.max())
+        band = (distance > family.band_inner - margin) & (distance < family.band_outer + margin)
+        distance, radial, x, y = distance[band], radial[band], x[band], y[band]
+        ring = _inside(distance - np.float32(family.band_inner), radial)
+        ring *= _inside(np.float32(family.band_outer) - distance, radial)
+        around = _width(jacobian, -y, x, distance) / distance
+        ring *= _sector_cover(sectors(word, family.bits), np.arctan2(y, x) - turn, around)
+        inked[band] += ring
+        return inked
 
-
-def _block(
-    printed: Print, outer: float, camera: Camera, margin: float
-) -> tuple[slice, slice]:
-    """Return the rows and columns of the pixels that the band and a margin fill."""
-    angles = np.linspace(0, 2 * math.pi, 64, endpoint=False)
-    circle = np.stack((np.cos(angles), np.sin(angles)), axis=1) * outer * printed.radius
-    pixels = camera.project(printed.centre + circle)
-    low = np.floor(pixels.min(axis=0) - margin).astype(int)
-    high = np.ceil(pixels.max(axis=0) + margin).astype(int) + 1
-    low = np.maximum(low, 0)
-    high = np.minimum(high, (camera.width, camera.height))
-    return slice(low[1], high[1]), slice(low[0], high[0])
+    return cover
 
 
-def _print_coordinates(
-    printed: Print, camera: Camera, rows: slice, columns: slice
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the samples' places relative to the target, in radii of the dot, float32."""
-    x, y = camera.rays(_samples(columns)[None, :], _samples(rows)[:, None])
+def print_mark(
+    image: np.ndarray, light: np.ndarray, mark: Mark, camera: Camera, change: float, blur: float
+) -> None:
+    """Add to an image what the ink of a mark changes.
+
+    Light times ink is supersampled, blurred by the lens and averaged over each pixel.
+
+    Parameters
+    ----------
+    image : ndarray of float32, shape (height, width)
+        Light that the wall sends to each pixel; changed in place.
+    light : ndarray of float32, shape (height, width)
+        Light that a white wall would send.
+    mark : Mark
+        At least its centre is in the image.
+    camera : Camera
+        Sees the mark.
+    change : float
+        Reflectance of the ink less that of the ground.
+    blur : float
+        Standard deviation of the lens's blur, px.
+    """
+    spread = math.ceil(4 * blur) + 1
     back = np.linalg.inv(camera.pose)
-    back[:2] -= np.outer(printed.centre, back[2])
-    back[:2] /= printed.radius
+    back[:2] -= np.outer(mark.centre, back[2])
+    back[:2] /= np.array([[mark.radius], [-mark.radius]])
+    jacobian = np.linalg.inv(camera.jacobian(mark.centre)) / mark.radius / _SUPERSAMPLING
+    jacobian[1] *= -1
+    for rows, columns, kept in _blocks(mark, camera, spread):
+        x, y = _places(back, camera, rows, columns)
+        inked = mark.cover(x, y, np.float32(jacobian))
+        lit = cv2.resize(light[rows, columns], inked.shape[::-1], interpolation=cv2.INTER_CUBIC)
+        inked *= lit
+        if blur:
+            inked = cv2.GaussianBlur(inked, (0, 0), blur * _SUPERSAMPLING)
+        size = columns.stop - columns.start, rows.stop - rows.start
+        added = cv2.resize(inked, size, interpolation=cv2.INTER_AREA) * np.float32(change)
+        image[kept, columns] += added[kept.start - rows.start : kept.stop - rows.start]
+
+
+def _blocks(mark: Mark, camera: Camera, spread: int) -> Iterator[tuple[slice, slice, slice]]:
+    """Yield blocks of rows and columns that show a mark, and the rows of each to be kept."""
+    angles = np.linspace(0, 2 * math.pi, 64, endpoint=False)
+    circle = np.stack((np.cos(angles), np.sin(angles)), axis=1) * mark.reach * mark.radius
+    pixels = camera.project(mark.centre + circle)
+    size = np.array([camera.width, camera.height])
+    left, top = np.clip(np.floor(pixels.min(axis=0) - spread).astype(int), 0, size)
+    right, bottom = np.clip(np.ceil(pixels.max(axis=0) + spread + 1).astype(int), 0, size)
+    height = max(_BLOCK_PIXELS // (right - left), 4 * spread)
+    for start in range(top, bottom, height):
+        stop = min(start + height, bottom)
+        rows = slice(max(start - spread, 0), min(stop + spread, camera.height))
+        yield rows, slice(left, right), slice(start, stop)
+
+
+def _places(
+    back: np.ndarray, camera: Camera, rows: slice, columns: slice
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the places of the samples of a block, through a homography from rays to places."""
+    x, y = camera.rays(_samples(columns)[None, :], _samples(rows)[:, None])
     inverse = 1 / (back[2, 0] * x + (back[2, 1] * y + back[2, 2]))
-    return tuple(
-        ((row[0] * x + (row[1] * y + row[2])) * inverse).astype(np.float32) for row in back[:2]
-    )
+    across = (back[0, 0] * x + (back[0, 1] * y + back[0, 2])) * inverse
+    up = (back[1, 0] * x + (back[1, 1] * y + back[1, 2])) * inverse
+    return across.astype(np.float32), up.astype(np.float32)
 
 
 def _samples(pixels: slice) -> np.ndarray:
     """Return the coordinates of the samples of a run of pixels."""
-    count = (pixels.stop - pixels.start) * SUPERSAMPLING
-    return pixels.start - 0.5 + (np.arange(count) + 0.5) / SUPERSAMPLING
+    count = (pixels.stop - pixels.start) * _SUPERSAMPLING
+    return pixels.start - 0.5 + (np.arange(count) + 0.5) / _SUPERSAMPLING
 
 
-def _width(jacobian: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return the size of a sample along (x, y), times the length of (x, y)."""
-    form = np.float32(jacobian @ jacobian.T / SUPERSAMPLING**2)
-    return np.sqrt(x * (form[0, 0] * x + 2 * form[0, 1] * y) + form[1, 1] * y * y)
+def _width(jacobian: np.ndarray, x: np.ndarray, y: np.ndarray, distance: np.ndarray) -> np.ndarray:
+    """Return the size of a sample along (x, y), a vector of length `distance`."""
+    form = jacobian @ jacobian.T
+    squared = x * (form[0, 0] * x + 2 * form[0, 1] * y) + form[1, 1] * y * y
+    width: np.ndarray = np.sqrt(squared) / np.maximum(distance, np.float32(1e-6))
+    return np.maximum(width, np.float32(1e-6), out=width)
 
 
 def _inside(distance: np.ndarray, width: np.ndarray) -> np.ndarray:
     """Return the share of samples of a width that lies on the positive side of an edge."""
-    share = distance / np.maximum(width, np.float32(1e-9)) + np.float32(0.5)
+    share: np.ndarray = distance / width + np.float32(0.5)
     return np.clip(share, 0, 1, out=share)
 
 
-def _sector_cover(
-    printed: Print,
-    bits: int,
-    x: np.ndarray,
-    y: np.ndarray,
-    distance: np.ndarray,
-    width: np.ndarray,
-) -> np.ndarray:
-    """Return the share of each sample in the band that its sectors cover."""
-    angle = np.arctan2(-y, x) - np.float32(printed.turn)
+def _sector_cover(colours: np.ndarray, angle: np.ndarray, width: np.ndarray) -> np.ndarray:
+    """Return the share of samples, `width` rad wide, that inked sectors cover."""
+    bits = len(colours)
     position = angle * np.float32(bits / (2 * math.pi))
     edge = np.rint(position)
-    past = (position - edge) * np.float32(2 * math.pi / bits) * distance
-    share = _inside(past, width)
-    colours = sectors(printed.word, bits).astype(np.float32)
+    share = _inside((position - edge) * np.float32(2 * math.pi / bits), width)
     after = edge.astype(np.int32) % bits
-    return colours[after] * share + colours[after - 1] * (1 - share)
-
-
-def apply_ink(
-    light: np.ndarray, marks: Ink, ground: float, ink_reflectance: float, blur: float
-) -> np.ndarray:
-    """Return the pixels of a block whose light falls on a printed ground, seen through a lens.
-
-    Parameters
-    ----------
-    light : ndarray of float32
-        Light on the block, a value a pixel.
-    marks : Ink
-        Of the block.
-    ground, ink_reflectance : float
-        Reflectance without and with ink.
-    blur : float
-        Standard deviation of the lens's blur, px.
-    """
-    height, width = marks.cover.shape
-    samples = cv2.resize(light, (width, height), interpolation=cv2.INTER_CUBIC)
-    samples *= ground + np.float32(ink_reflectance - ground) * marks.cover
-    if blur:
-        sigma = blur * SUPERSAMPLING
-        samples = cv2.GaussianBlur(samples, (0, 0), sigma, borderType=cv2.BORDER_REPLICATE)
-    return cv2.resize(samples, light.shape[::-1], interpolation=cv2.INTER_AREA)
+    shades = colours.astype(np.float32)
+    cover: np.ndarray = shades[after] * share + shades[after - 1] * (1 - share)
+    return cover

@@ -8,16 +8,24 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from ahf_ros.codes.ring import FAMILY_NAMES, Family, family
+from ahf_ros.codes.ring import FAMILY_NAMES, family
 from ahf_ros.parameter import check_parameters, parameter
 from ahf_ros.synthetic.camera import Camera, Sensor, tilted_camera
-from ahf_ros.synthetic.lights import LIGHT_NAMES, Projector, light_pattern, rig_projector
-from ahf_ros.synthetic.prints import Print, apply_ink, ink
+from ahf_ros.synthetic.distractors import distractor_cover
+from ahf_ros.synthetic.layout import (
+    Places,
+    finest_grid,
+    grid_places,
+    quiet_radius,
+    scattered_places,
+)
+from ahf_ros.synthetic.lights import LIGHT_NAMES, light_pattern
+from ahf_ros.synthetic.prints import Cover, Mark, print_mark, ring_cover
+from ahf_ros.synthetic.projector import Projector, rig_projector
 from ahf_ros.target import Target
 
-_QUIET_ZONE = 4.2  # free radius of a target, in radii of the dot
-_CLEARANCE = 1.05  # perspective over one target
-_STEEPEST_VIEW = math.radians(75)
+_PROJECTOR_PIXELS = 6.4  # in the radius of a dot
+_PIXEL_DEVIATION = 12**-0.5  # of a place in a pixel, px
 _STRIP = 128  # rows of light computed at a time
 _FIELD_STEP = 16  # px between the samples of smooth light
 
@@ -39,6 +47,9 @@ class SceneSettings:
     radius_spread: float = parameter(
         0.1, 'Largest deviation of a radius, as a share of it.', minimum=0.0, maximum=0.5
     )
+    distractors: int = parameter(
+        0, 'Number of marks that are no coded targets: dots, rings, writing, leaves.', minimum=0
+    )
     pinhole: float = parameter(
         0.05, 'Radius of the hole in the dot, in dot radii.', minimum=0.0, maximum=0.5
     )
@@ -56,7 +67,10 @@ class SceneSettings:
         0.3, 'Ambient light as a share of the light of the projector.', minimum=0.0, maximum=10.0
     )
     defocus: float = parameter(
-        0.5, 'Blur of the projector, standard deviation in projector px.', minimum=0.0, maximum=20.0
+        0.5,
+        'Blur of the projector, standard deviation in px of the projector.',
+        minimum=0.0,
+        maximum=20.0,
     )
     black: float = parameter(
         0.06, 'Reflectance of black as a share of white.', minimum=0.0, maximum=1.0
@@ -67,9 +81,7 @@ class SceneSettings:
     blur: float = parameter(
         0.7, 'Blur of the lens, standard deviation in px.', minimum=0.0, maximum=20.0
     )
-    exposure: float = parameter(
-        220.0, 'Grey value of lit white.', minimum=1.0, maximum=255.0
-    )
+    exposure: float = parameter(220.0, 'Grey value of lit white.', minimum=1.0, maximum=255.0)
     gamma: float = parameter(
         2.2, 'Grey value = light to the power of 1 / gamma.', minimum=0.5, maximum=4.0
     )
@@ -84,7 +96,7 @@ class SceneSettings:
     )
 
     def __post_init__(self) -> None:
-        """Check each parameter and that the wall is in view and holds the targets.
+        """Check each parameter, that the wall fills the view and that it holds the targets.
 
         Raises
         ------
@@ -93,13 +105,22 @@ class SceneSettings:
         """
         check_parameters(self)
         half_view = math.hypot(self.width, self.height) / 2 / (self.width * self.focal_length)
-        steepest = math.degrees(math.atan(0.95 / (half_view + 0.01)))
+        half_view += 0.02 / self.focal_length  # the principal point is not quite in the middle
+        steepest = math.degrees(math.atan(0.95 / half_view))
         if self.tilt > steepest:
             raise ValueError(
                 f'tilt is {self.tilt!r}, accepted is a number from 0 to {steepest:.1f} with a '
                 f'focal_length of {self.focal_length:g}'
             )
-        columns, rows = _most_cells(self)
+        strongest = 0.13 / half_view**2  # below 4/27 the view is one to one
+        if self.distortion < -strongest:
+            raise ValueError(
+                f'distortion is {self.distortion!r}, accepted is a number of at least '
+                f'{-strongest:.3f} with a focal_length of {self.focal_length:g}'
+            )
+        largest = self.dot_radius * (1 + self.radius_spread)
+        reach = float(quiet_radius(largest, self.focal_length * self.width))
+        columns, rows = finest_grid(self.width, self.height, reach)
         if self.targets > columns * rows:
             raise ValueError(
                 f'targets is {self.targets!r}, accepted is an integer from 0 to {columns * rows} '
@@ -118,7 +139,7 @@ class Rendering:
     targets : tuple of Target
         Sorted by `id`: the projected physical centres and the ellipses of the dots.
     intrinsics : ndarray of float64, shape (3, 3)
-        K of the camera.
+        K of the camera; its distortion is k1 = `settings.distortion`.
     settings : SceneSettings
         What was rendered.
     """
@@ -132,18 +153,18 @@ class Rendering:
 def render(settings: SceneSettings) -> Rendering:
     """Return the photograph of a scene; the same settings always give the same image.
 
-    Light is smooth on the scale of a pixel, prints are not: the light is computed once a pixel,
-    and its product with the prints is supersampled, blurred by the lens and averaged over each
-    pixel.
+    Light is smooth on the scale of a pixel, prints are not: light is computed once a pixel, and
+    its product with the prints is supersampled, blurred by the lens and averaged over each pixel.
 
     Raises
     ------
     ValueError
-        If the targets that are wanted do not fit into the part of the wall that is seen at
-        less than 75 degrees.
+        If there is no room for the targets where the wall is seen at less than 75 degrees, or
+        for the distractors.
     """
-    setup, wall, lamp, noise = np.random.default_rng(settings.seed).spawn(4)
-    table = family(settings.family)
+    setup, wall, lamp, noise, clutter = (
+        np.random.default_rng(stream) for stream in np.random.SeedSequence(settings.seed).spawn(5)
+    )
     camera = tilted_camera(
         settings.width,
         settings.height,
@@ -152,8 +173,9 @@ def render(settings: SceneSettings) -> Rendering:
         settings.distortion,
         setup,
     )
-    projector = rig_projector(camera.pose, settings.dot_radius / 6.4, setup)
-    prints = place_targets(settings, camera, table, wall)
+    projector = rig_projector(camera.pose, settings.dot_radius / _PROJECTOR_PIXELS, setup)
+    marks, targets, places = _coded_targets(settings, camera, wall)
+    marks += _distractors(settings, camera, places, clutter)
 
     light = _light_on_sensor(settings, camera, projector, lamp)
     if settings.texture:
@@ -162,7 +184,8 @@ def render(settings: SceneSettings) -> Rendering:
     image = light * np.float32(ground)
     if settings.blur:
         image = cv2.GaussianBlur(image, (0, 0), settings.blur, borderType=cv2.BORDER_REPLICATE)
-    _print_targets(image, light, prints, settings, table, camera, (ground, inked))
+    for mark in marks:
+        print_mark(image, light, mark, camera, inked - ground, settings.blur)
     del light
 
     sensor = Sensor(settings.full_well, settings.read_noise, settings.gamma)
@@ -170,100 +193,59 @@ def render(settings: SceneSettings) -> Rendering:
     for top in range(0, settings.height, _STRIP):
         strip = slice(top, top + _STRIP)
         grey[strip] = sensor.grey_values(image[strip], noise)
-    targets = sorted((_truth(item, camera) for item in prints), key=lambda target: target.id)
+    targets = sorted(targets, key=lambda target: target.id)
     return Rendering(grey, tuple(targets), camera.intrinsics, settings)
 
 
-def place_targets(
-    settings: SceneSettings, camera: Camera, table: Family, generator: np.random.Generator
-) -> list[Print]:
-    """Return targets on the wall that appear in a grid with jitter, sizes and codes at random.
+def _coded_targets(
+    settings: SceneSettings, camera: Camera, generator: np.random.Generator
+) -> tuple[list[Mark], list[Target], Places]:
+    """Return targets with places, sizes, codes and directions drawn at random.
 
     The prints are larger where the wall is further away, so that every dot is about
     `dot_radius` in the image. Codes repeat only where there are more targets than codes.
     """
-    corners, cell = _free_cells(settings, camera, generator)
-    order = [generator.permutation(table.words.size) for _ in range(
-        -(-settings.targets // table.words.size))]
-    numbers = np.concatenate(order)[: settings.targets] + 1 if order else ()
-    spread = 1 + generator.uniform(-1, 1, settings.targets) * settings.radius_spread
-    turns = generator.uniform(0, 2 * math.pi, settings.targets)
-    places = generator.uniform(0, 1, (settings.targets, 2))
-
-    prints = []
-    for corner, number, share, turn, place in zip(corners, numbers, spread, turns, places):
-        semi_major = settings.dot_radius * share
-        reach = semi_major * _QUIET_ZONE * _CLEARANCE
-        pixel = corner + reach + place * (cell - 2 * reach) - 0.5
-        centre = camera.wall(pixel[None])[0]
-        radius = semi_major / np.linalg.norm(camera.jacobian(centre), ord=2)
-        word = table.word(int(number))
-        prints.append(Print(int(number), word, centre, float(radius), float(turn)))
-    return prints
-
-
-def _footprint(settings: SceneSettings) -> float:
-    """Return the side of the square that the largest target needs, px."""
-    largest = settings.dot_radius * (1 + settings.radius_spread)
-    return 2 * largest * _QUIET_ZONE * _CLEARANCE
-
-
-def _most_cells(settings: SceneSettings) -> tuple[int, int]:
-    """Return the columns and rows of the finest grid whose cells hold a target."""
-    footprint = _footprint(settings)
-    return int(settings.width / footprint), int(settings.height / footprint)
-
-
-def _free_cells(
-    settings: SceneSettings, camera: Camera, generator: np.random.Generator
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the upper left corners of cells, one a target, and the size of a cell, px."""
-    most_columns, most_rows = _most_cells(settings)
-    size = np.array([settings.width, settings.height], dtype=float)
-    cells = np.empty((0, 2))
-    cell = size
-    ratio = settings.width / settings.height
-    for count in range(settings.targets, most_columns * most_rows + 1):
-        columns = min(max(round(math.sqrt(count * ratio)), 1), most_columns)
-        rows = min(-(-count // columns), most_rows)
-        columns = min(-(-count // rows), most_columns)
-        if columns * rows < settings.targets:
-            continue
-        cell = size / (columns, rows)
-        x, y = np.meshgrid(np.arange(columns), np.arange(rows))
-        cells = np.stack((x.ravel(), y.ravel()), axis=1) * cell
-        cells = cells[camera.view_angle(camera.wall(cells + cell / 2)) < _STEEPEST_VIEW]
-        if len(cells) >= settings.targets:
-            chosen = generator.permutation(len(cells))[: settings.targets]
-            return cells[chosen], cell
-    raise ValueError(
-        f'targets is {settings.targets!r}, accepted is an integer from 0 to {len(cells)} at a '
-        f'tilt of {settings.tilt:g}'
+    table = family(settings.family)
+    count = settings.targets
+    semi_major = settings.dot_radius * (
+        1 + settings.radius_spread * generator.uniform(-1, 1, count)
     )
+    turns = generator.uniform(0, 2 * math.pi, count)
+    rounds = -(-count // table.words.size)
+    shuffled = [generator.permutation(table.words.size) + 1 for _ in range(rounds)]
+    numbers = np.concatenate([np.empty(0, int), *shuffled])[:count].tolist()
+    reach = quiet_radius(semi_major, float(camera.intrinsics[0, 0]))
+    places = grid_places(camera, reach, generator)
+
+    marks, targets = [], []
+    for number, pixel, size, turn in zip(numbers, places.centres, semi_major, turns, strict=True):
+        word = table.word(number)
+        cover = ring_cover(table, word, turn, settings.pinhole)
+        mark = _mark(camera, pixel, size, table.band_outer, cover)
+        x, y = camera.project(mark.centre[None])[0].tolist()
+        marks.append(mark)
+        targets.append(Target(number, word, x, y, *camera.circle(mark.centre, mark.radius)))
+    return marks, targets, places
 
 
-def _truth(printed: Print, camera: Camera) -> Target:
-    """Return the exact record of a printed target."""
-    x, y = camera.project(printed.centre[None])[0]
-    semi_major, semi_minor, angle = camera.circle(printed.centre, printed.radius)
-    return Target(printed.number, printed.word, float(x), float(y), semi_major, semi_minor, angle)
+def _distractors(
+    settings: SceneSettings, camera: Camera, taken: Places, generator: np.random.Generator
+) -> list[Mark]:
+    """Return marks that are no coded targets, clear of the targets."""
+    drawn = [distractor_cover(generator) for _ in range(settings.distractors)]
+    radii = np.array([radius for _, radius in drawn]) * settings.dot_radius
+    places = scattered_places(camera, radii, taken, generator)
+    return [
+        _mark(camera, pixel, radius, 1.0, cover)
+        for pixel, radius, (cover, _) in zip(places.centres, radii, drawn, strict=True)
+    ]
 
 
-def _print_targets(
-    image: np.ndarray,
-    light: np.ndarray,
-    prints: list[Print],
-    settings: SceneSettings,
-    table: Family,
-    camera: Camera,
-    reflectances: tuple[float, float],
-) -> None:
-    """Put the prints into the image, each with what the lens blurs over its surroundings."""
-    margin = 2 + 4 * settings.blur
-    for printed in prints:
-        marks = ink(printed, table, settings.pinhole, camera, margin)
-        block = marks.rows, marks.columns
-        image[block] = apply_ink(light[block], marks, *reflectances, settings.blur)
+def _mark(camera: Camera, pixel: np.ndarray, radius: float, reach: float, cover: Cover) -> Mark:
+    """Return a mark at a pixel, so large that a circle of its radius is seen `radius` px wide."""
+    centre = camera.wall(pixel[None])[0]
+    enlargement = np.linalg.norm(camera.jacobian(centre), ord=2)
+    return Mark(centre, float(radius / enlargement), reach, cover)
 
 
 def _light_on_sensor(
@@ -273,16 +255,17 @@ def _light_on_sensor(
     generator: np.random.Generator,
 ) -> np.ndarray:
     """Return the light that white would send to each pixel, as a share of saturation."""
-    pattern = light_pattern(settings.light, settings.defocus, generator)
-    lit, ambient = _smooth_light(settings, camera, projector, generator)
+    pixel = settings.dot_radius / _PROJECTOR_PIXELS
+    softness = math.hypot(settings.defocus, _PIXEL_DEVIATION / pixel)
+    pattern = light_pattern(settings.light, softness, generator)
+    light, ambient = _smooth_light(settings, camera, projector, generator)
     to_projector = np.diag((projector.scale, projector.scale, 1.0)) @ projector.pose
-    to_projector = to_projector @ np.linalg.inv(camera.pose)
+    to_projector = np.float32(to_projector @ np.linalg.inv(camera.pose))
     columns = np.arange(settings.width, dtype=float)[None, :]
-    light = lit
     for top in range(0, settings.height, _STRIP):
         rows = np.arange(top, min(top + _STRIP, settings.height), dtype=float)[:, None]
         x, y = (ray.astype(np.float32) for ray in camera.rays(columns, rows))
-        u, v, depth = (row[0] * x + (row[1] * y + row[2]) for row in np.float32(to_projector))
+        u, v, depth = (row[0] * x + (row[1] * y + row[2]) for row in to_projector)
         np.reciprocal(depth, out=depth)
         strip = slice(top, top + len(rows))
         light[strip] *= pattern(u * depth, v * depth)
@@ -296,7 +279,7 @@ def _smooth_light(
     projector: Projector,
     generator: np.random.Generator,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the light of a pattern that is 1, and of the surroundings, shape of the image each.
+    """Return the light of a pattern that is 1, and of the surroundings, at every pixel.
 
     White in full light has the grey value `exposure` on average, and nowhere more than midway
     from there to saturation.
@@ -305,10 +288,11 @@ def _smooth_light(
         (np.arange(-(-size // _FIELD_STEP) + 2) - 0.5) * _FIELD_STEP - 0.5
         for size in (settings.width, settings.height)
     )
-    grid = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
+    pixels = np.stack(np.meshgrid(columns, rows), axis=-1)
+    grid = pixels.reshape(-1, 2)
     x, y = camera.wall(grid).T
-    seen_x, seen_y = camera.rays(grid[:, 0], grid[:, 1])
-    vignetting = (1 + seen_x**2 + seen_y**2) ** -2
+    seen = (grid - camera.intrinsics[:2, 2]) / camera.intrinsics[0, 0]
+    vignetting = (1 + (seen**2).sum(axis=1)) ** -2
     lit = projector.irradiance(x, y) * vignetting
     direction = generator.uniform(0, 2 * math.pi)
     slope = (x * math.cos(direction) + y * math.sin(direction)) / settings.width
@@ -318,9 +302,12 @@ def _smooth_light(
     levels = np.array([settings.exposure, (settings.exposure + 255) / 2]) / 255
     average, highest = levels**settings.gamma
     scale = min(average / white.mean(), highest / white.max())
-    return tuple(
-        _enlarge(np.float32(field * scale).reshape(len(rows), len(columns)), _FIELD_STEP, settings)
-        for field in (lit, ambient)
+    lit_samples, ambient_samples = (
+        np.float32(field * scale).reshape(pixels.shape[:2]) for field in (lit, ambient)
+    )
+    return (
+        _enlarge(lit_samples, _FIELD_STEP, settings),
+        _enlarge(ambient_samples, _FIELD_STEP, settings),
     )
 
 
@@ -328,10 +315,11 @@ def _texture(settings: SceneSettings, generator: np.random.Generator) -> np.ndar
     """Return the unevenness of the wall as factors about 1: noise of several scales."""
     factors = np.ones((settings.height, settings.width), np.float32)
     scales = (4, 32, 256)
+    share = np.float32(settings.texture / math.sqrt(len(scales)))
     for scale in scales:
         shape = (-(-settings.height // scale) + 2, -(-settings.width // scale) + 2)
         noise = generator.standard_normal(shape, dtype=np.float32)
-        factors += _enlarge(noise * np.float32(settings.texture / len(scales) ** 0.5), scale, settings)
+        factors += _enlarge(noise * share, scale, settings)
     return np.clip(factors, 0.2, 1.8, out=factors)
 
 
@@ -339,6 +327,5 @@ def _enlarge(samples: np.ndarray, step: int, settings: SceneSettings) -> np.ndar
     """Return samples that are `step` px apart, from half a step outside, at every pixel."""
     rows, columns = samples.shape
     whole = cv2.resize(samples, (columns * step, rows * step), interpolation=cv2.INTER_CUBIC)
-    return np.ascontiguousarray(
-        whole[step : step + settings.height, step : step + settings.width]
-    )
+    inside = whole[step : step + settings.height, step : step + settings.width]
+    return np.ascontiguousarray(inside)

@@ -1,0 +1,99 @@
+"""Marks that are no coded targets: plain dots, rings, writing, leaves."""
+
+from __future__ import annotations
+
+import math
+import string
+
+import cv2
+import numpy as np
+
+from ahf_ros.synthetic.prints import Cover
+
+_SIDE = 256  # px of a stamp
+_FINE = 3  # fractional bits of drawing coordinates
+
+
+def distractor_cover(generator: np.random.Generator) -> tuple[Cover, float]:
+    """Return the ink of a mark inside the unit circle, and a usual radius in dot radii.
+
+    Parameters
+    ----------
+    generator : numpy.random.Generator
+        Draws kind, shape, direction and darkness.
+    """
+    kinds = ((_dot, 1.0), (_ring, 2.0), (_writing, 3.0), (_leaf, 4.0))
+    draw, radius = kinds[generator.integers(len(kinds))]
+    stamp = np.zeros((_SIDE, _SIDE), np.uint8)
+    draw(stamp, generator)
+    turned = generator.uniform(0, 2 * math.pi)
+    return _stamp_cover(stamp, turned), radius * generator.uniform(0.6, 1.3)
+
+
+def _stamp_cover(stamp: np.ndarray, turn: float) -> Cover:
+    """Return the ink of a stamp that fills the square round the unit circle, turned."""
+    cosine, sine = np.float32(math.cos(turn)), np.float32(math.sin(turn))
+    half = np.float32(_SIDE / 2)
+    ink = np.float32(stamp) / np.float32(255)
+
+    def cover(x: np.ndarray, y: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
+        sample = float(np.sqrt(abs(np.linalg.det(jacobian)))) * float(half)
+        smooth = cv2.GaussianBlur(ink, (0, 0), max(sample / 2, 0.5))
+        columns = (x * cosine + y * sine) * half + (half - np.float32(0.5))
+        rows = (x * sine - y * cosine) * half + (half - np.float32(0.5))
+        return cv2.remap(smooth, columns, rows, cv2.INTER_LINEAR)
+
+    return cover
+
+
+def _fixed(points: np.ndarray) -> np.ndarray:
+    """Return places in the unit circle as drawing coordinates with fractional bits."""
+    pixels = (np.asarray(points) + 1) * (_SIDE / 2) - 0.5
+    return np.rint(pixels * 2**_FINE).astype(np.int32)
+
+
+def _dot(stamp: np.ndarray, _generator: np.random.Generator) -> None:
+    """Draw an uncoded target."""
+    middle = tuple(_fixed(np.zeros(2)).tolist())
+    radius = int(0.95 * _SIDE / 2 * 2**_FINE)
+    cv2.circle(stamp, middle, radius, 255, -1, cv2.LINE_AA, _FINE)
+
+
+def _ring(stamp: np.ndarray, generator: np.random.Generator) -> None:
+    """Draw a closed ring, like a letter O or a washer."""
+    middle = tuple(_fixed(np.zeros(2)).tolist())
+    outer = 0.95 * _SIDE / 2 * 2**_FINE
+    inner = outer * generator.uniform(0.4, 0.8)
+    cv2.circle(stamp, middle, int(outer), 255, -1, cv2.LINE_AA, _FINE)
+    cv2.circle(stamp, middle, int(inner), 0, -1, cv2.LINE_AA, _FINE)
+
+
+def _writing(stamp: np.ndarray, generator: np.random.Generator) -> None:
+    """Draw some lines of capital letters and digits."""
+    signs = np.array(list(string.ascii_uppercase + string.digits))
+    count = int(generator.integers(1, 4))
+    height = 1.3 / count
+    for line in range(count):
+        text = ''.join(generator.choice(signs, int(generator.integers(2, 6))))
+        font, weight = cv2.FONT_HERSHEY_DUPLEX, int(generator.integers(2, 6))
+        (width, ascent), _ = cv2.getTextSize(text, font, 1.0, weight)
+        scale = min(1.2 * _SIDE / 2 / width, 0.7 * height * _SIDE / 2 / ascent)
+        baseline = (-0.65 + height * (line + 0.8) + 1) * _SIDE / 2
+        origin = (int(0.2 * _SIDE), int(baseline))
+        cv2.putText(stamp, text, origin, font, scale, 255, weight, cv2.LINE_AA)
+
+
+def _leaf(stamp: np.ndarray, generator: np.random.Generator) -> None:
+    """Draw a pointed leaf with a stalk, lighter than ink and with a light vein."""
+    along = np.linspace(0, 1, 40)
+    breadth = generator.uniform(0.2, 0.45)
+    edge = breadth * np.sin(math.pi * along ** generator.uniform(0.6, 1.0))
+    bend = generator.uniform(-0.3, 0.3) * np.sin(math.pi * along)
+    spine = np.stack((1.3 * along - 0.4, bend), axis=1)
+    side = np.stack((np.zeros_like(edge), edge), axis=1)
+    outline = np.concatenate((spine + side, (spine - side)[::-1]))
+    shade = int(generator.integers(120, 240))
+    cv2.fillPoly(stamp, [_fixed(outline)], shade, cv2.LINE_AA, _FINE)
+    stalk = np.array([[-0.9, generator.uniform(-0.2, 0.2)], [-0.4, 0.0]])
+    cv2.polylines(stamp, [_fixed(stalk)], False, shade, 6, cv2.LINE_AA, _FINE)
+    cv2.polylines(stamp, [_fixed(spine)], False, shade // 2, 3, cv2.LINE_AA, _FINE)
