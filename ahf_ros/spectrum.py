@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -48,40 +50,84 @@ def median_distance(height: int, width: int) -> float:
     return float(lower + upper) / 2
 
 
+@dataclass(frozen=True, slots=True)
+class Transfer:
+    """The numbers of one filter, all of them set.
+
+    Attributes
+    ----------
+    gamma_high, gamma_low : float
+        Gains of the high and the low frequencies, dimensionless.
+    cutoff : float
+        D0, cycles per image.
+    attenuation : float
+        c, dimensionless.
+    """
+
+    gamma_high: float
+    gamma_low: float
+    cutoff: float
+    attenuation: float
+
+    def response(self, shape: tuple[int, int]) -> np.ndarray:
+        """Return H(u, v) of Eq. (4) in [1]_.
+
+        H = (gamma_high - gamma_low) (1 - exp(-attenuation (D / cutoff)^2)) + gamma_low
+
+        Parameters
+        ----------
+        shape : tuple of int
+            Height and width of the image, px.
+
+        Returns
+        -------
+        ndarray of float64, shape (height, width)
+            In the order of `numpy.fft.fft2`.
+
+        References
+        ----------
+        .. [1] Shang & Liu, Remote Sens. 2023, 15, 3151.
+        """
+        attenuated = np.exp(-self.attenuation * (distances(*shape) / self.cutoff) ** 2)
+        return (self.gamma_high - self.gamma_low) * (1 - attenuated) + self.gamma_low
+
+
 def transfer(
-    height: int,
-    width: int,
+    shape: tuple[int, int],
     gamma_high: float,
     gamma_low: float,
-    cutoff: float,
-    attenuation: float,
-) -> np.ndarray:
-    """Return H(u, v) of Eq. (4) in [1]_.
-
-    H = (gamma_high - gamma_low) (1 - exp(-attenuation (D / cutoff)^2)) + gamma_low
+    cutoff: float | None = None,
+    attenuation: float | None = None,
+) -> Transfer:
+    """Return the filter with what is not given at its published value.
 
     Parameters
     ----------
-    height, width : int
-        Size of the image, px.
+    shape : tuple of int
+        Height and width of the image, px.
     gamma_high, gamma_low : float
-        Gains of the high and of the low frequencies, dimensionless.
-    cutoff : float
-        D0, cycles per image, > 0.
-    attenuation : float
-        c, dimensionless, >= 0.
+        Gains of the high and the low frequencies, 0 <= gamma_low <= gamma_high, gamma_high > 0.
+    cutoff : float, optional
+        D0, cycles per image, > 0; the median of D where not given.
+    attenuation : float, optional
+        c, > 0; gamma_high - gamma_low (Eq. 8) where not given.
 
-    Returns
-    -------
-    ndarray of float64, shape (height, width)
-        In the order of `numpy.fft.fft2`.
-
-    References
-    ----------
-    .. [1] Shang & Liu, Remote Sens. 2023, 15, 3151.
+    Raises
+    ------
+    ValueError
+        If a value is out of its range or not finite.
     """
-    attenuated = np.exp(-attenuation * (distances(height, width) / cutoff) ** 2)
-    return (gamma_high - gamma_low) * (1 - attenuated) + gamma_low
+    _check_number('gamma_high', gamma_high, gamma_high > 0, 'above 0')
+    within = 0 <= gamma_low <= gamma_high
+    _check_number('gamma_low', gamma_low, within, f'from 0 to gamma_high, {gamma_high:g}')
+    if cutoff is None:
+        cutoff = median_distance(*shape)
+    _check_number('cutoff', cutoff, cutoff > 0, 'above 0')
+    if attenuation is None:
+        attenuation = gamma_high - gamma_low
+    else:
+        _check_number('attenuation', attenuation, attenuation > 0, 'above 0')
+    return Transfer(float(gamma_high), float(gamma_low), float(cutoff), float(attenuation))
 
 
 def blur_kernel(length: int, attenuation: float, cutoff: float) -> np.ndarray:
@@ -171,3 +217,8 @@ def _square_of_rank(height: int, width: int, rank: int) -> int:
         else:
             low = square + 1
     return low
+
+
+def _check_number(name: str, value: float, accepted: bool, words: str) -> None:
+    if not (accepted and math.isfinite(value)):
+        raise ValueError(f'{name} is {value!r}, accepted is a number {words}')
