@@ -179,7 +179,7 @@ def _soft_step(distance: np.ndarray, sigma: float) -> np.ndarray:
     if not sigma:
         return (distance > 0).astype(np.float32)
     scaled = distance * np.float32(1 / sigma)
-    np.clip(scaled, -4, 4, out=scaled)
+    np.clip(scaled, -6, 6, out=scaled)
     cubic = scaled * scaled
     cubic *= np.float32(0.0356774)
     cubic += np.float32(0.7978846)

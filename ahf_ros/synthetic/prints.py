@@ -12,14 +12,15 @@ import numpy as np
 from ahf_ros.codes.ring import Family, sectors
 from ahf_ros.synthetic.camera import Camera
 
-_SUPERSAMPLING = 3  # samples a pixel and axis, each anti-aliased by its distance to the edges
+_SUPERSAMPLING = 3  # samples a pixel and axis
+_EDGE = 2.0  # samples that an edge is spread over, which takes off the blur that follows
 _BLOCK_PIXELS = 1 << 18  # supersampled at a time
 
 Cover = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 """Ink, 0 to 1, at places (x, y) of a mark, float32 of one shape in units of the mark's radius.
 
-y is up, so that angles are counter-clockwise as seen. The third argument, shape (2, 2), is
-d(place) / d(sample) in the middle of the mark.
+y is up, so that angles are counter-clockwise as seen. The third argument, shape (2, 2), is the
+change of place over the width of an anti-aliased edge along the columns and the rows.
 """
 
 
@@ -48,7 +49,8 @@ class Mark:
 def ring_cover(family: Family, word: int, turn: float, pinhole: float) -> Cover:
     """Return the ink of a ring target.
 
-    The signed distance to each edge, in samples, gives the share of a sample that is covered.
+    The signed distance to each edge, in widths of an anti-aliased edge, gives the share of a
+    sample that is covered.
 
     Parameters
     ----------
@@ -103,19 +105,22 @@ def print_mark(
     blur : float
         Standard deviation of the lens's blur, px.
     """
+    sigma, edge = blur * _SUPERSAMPLING, 1.0
+    if sigma >= 1:
+        sigma, edge = math.sqrt(sigma**2 - (_EDGE**2 - 1) / 12), _EDGE
     spread = math.ceil(4 * blur) + 1
     back = np.linalg.inv(camera.pose)
     back[:2] -= np.outer(mark.centre, back[2])
     back[:2] /= np.array([[mark.radius], [-mark.radius]])
-    jacobian = np.linalg.inv(camera.jacobian(mark.centre)) / mark.radius / _SUPERSAMPLING
+    jacobian = np.linalg.inv(camera.jacobian(mark.centre)) * edge / mark.radius / _SUPERSAMPLING
     jacobian[1] *= -1
     for rows, columns, kept in _blocks(mark, camera, spread):
         x, y = _places(back, camera, rows, columns)
         inked = mark.cover(x, y, np.float32(jacobian))
         lit = cv2.resize(light[rows, columns], inked.shape[::-1], interpolation=cv2.INTER_CUBIC)
         inked *= lit
-        if blur:
-            inked = cv2.GaussianBlur(inked, (0, 0), blur * _SUPERSAMPLING)
+        if sigma:
+            inked = cv2.GaussianBlur(inked, (0, 0), sigma)
         size = columns.stop - columns.start, rows.stop - rows.start
         added = cv2.resize(inked, size, interpolation=cv2.INTER_AREA) * np.float32(change)
         image[kept, columns] += added[kept.start - rows.start : kept.stop - rows.start]
@@ -154,7 +159,7 @@ def _samples(pixels: slice) -> np.ndarray:
 
 
 def _width(jacobian: np.ndarray, x: np.ndarray, y: np.ndarray, distance: np.ndarray) -> np.ndarray:
-    """Return the size of a sample along (x, y), a vector of length `distance`."""
+    """Return the width of an edge across (x, y), a vector of length `distance`."""
     form = jacobian @ jacobian.T
     squared = x * (form[0, 0] * x + 2 * form[0, 1] * y) + form[1, 1] * y * y
     width: np.ndarray = np.sqrt(squared) / np.maximum(distance, np.float32(1e-6))
@@ -162,13 +167,13 @@ def _width(jacobian: np.ndarray, x: np.ndarray, y: np.ndarray, distance: np.ndar
 
 
 def _inside(distance: np.ndarray, width: np.ndarray) -> np.ndarray:
-    """Return the share of samples of a width that lies on the positive side of an edge."""
+    """Return the share of samples on the positive side of an edge of a width."""
     share: np.ndarray = distance / width + np.float32(0.5)
     return np.clip(share, 0, 1, out=share)
 
 
 def _sector_cover(colours: np.ndarray, angle: np.ndarray, width: np.ndarray) -> np.ndarray:
-    """Return the share of samples, `width` rad wide, that inked sectors cover."""
+    """Return the share of samples that inked sectors cover, for edges `width` rad wide."""
     bits = len(colours)
     position = angle * np.float32(bits / (2 * math.pi))
     edge = np.rint(position)
