@@ -74,9 +74,6 @@ class HomomorphicFilter:
         As `ahf_ros.image.check_image` accepts it. It is not kept.
     settings : FilterSettings
         Offset and output mapping.
-    executor : concurrent.futures.Executor, optional
-        Threads that share the strips of one filtered image. Never the one whose threads call
-        `filtered`: they would wait for themselves. The result does not depend on it.
 
     Raises
     ------
@@ -90,16 +87,10 @@ class HomomorphicFilter:
     the last eight, each of which takes 42 MB at 10.6 MP, and writing it for the others costs more.
     """
 
-    def __init__(
-        self,
-        image: np.ndarray,
-        settings: FilterSettings | None = None,
-        executor: Executor | None = None,
-    ) -> None:
+    def __init__(self, image: np.ndarray, settings: FilterSettings | None = None) -> None:
         check_image(image)
         self.settings = settings or FilterSettings()
         self.shape: tuple[int, int] = image.shape
-        self._executor = executor
         self._margined = _surrounded(logarithm(image, self.settings.log_offset), MARGIN, MARGIN)
 
     def filtered(
@@ -108,6 +99,7 @@ class HomomorphicFilter:
         gamma_low: float,
         cutoff: float | None = None,
         attenuation: float | None = None,
+        executor: Executor | None = None,
     ) -> np.ndarray:
         """Return g of Eq. (7), mapped to 8 bit.
 
@@ -115,6 +107,9 @@ class HomomorphicFilter:
         ----------
         gamma_high, gamma_low, cutoff, attenuation
             As for `transfer`.
+        executor : concurrent.futures.Executor, optional
+            Threads that share the strips of the image; the result does not depend on them. Never
+            the one whose thread makes this call: it would wait for itself.
 
         Returns
         -------
@@ -142,7 +137,7 @@ class HomomorphicFilter:
             # subtracts, rounds and saturates in one go
             cv2.addWeighted(values, 0.5, values, 0.5, -zero, image[rows], cv2.CV_8U)
 
-        self._in_strips(fill)
+        _in_strips(fill, self.shape[0], executor)
         return image
 
     def filtered_logarithm(
@@ -151,6 +146,7 @@ class HomomorphicFilter:
         gamma_low: float,
         cutoff: float | None = None,
         attenuation: float | None = None,
+        executor: Executor | None = None,
     ) -> np.ndarray:
         """Return s of Eq. (6), float32, shape (height, width).
 
@@ -165,7 +161,7 @@ class HomomorphicFilter:
         def fill(rows: slice) -> None:
             filtered[rows] = _filtered_rows(padded, rows, spatial)
 
-        self._in_strips(fill)
+        _in_strips(fill, self.shape[0], executor)
         return filtered
 
     def _padded(self, spatial: _Spatial) -> np.ndarray:
@@ -177,12 +173,6 @@ class HomomorphicFilter:
             return _surrounded(inside, spatial.above, spatial.beside)
         bottom, right = height + 2 * MARGIN - top, width + 2 * MARGIN - left
         return self._margined[top:bottom, left:right]
-
-    def _in_strips(self, fill: Callable[[slice], None]) -> None:
-        height = self.shape[0]
-        strips = [slice(top, min(top + STRIP, height)) for top in range(0, height, STRIP)]
-        for _ in (self._executor.map if self._executor else map)(fill, strips):
-            pass
 
 
 def filtered_fft(
@@ -259,6 +249,12 @@ def _spatial(shape: tuple[int, int], chosen: Transfer) -> _Spatial:
 
 def _surrounded(values: np.ndarray, above: int, beside: int) -> np.ndarray:
     return cv2.copyMakeBorder(values, above, above, beside, beside, cv2.BORDER_WRAP)
+
+
+def _in_strips(fill: Callable[[slice], None], height: int, executor: Executor | None) -> None:
+    strips = [slice(top, min(top + STRIP, height)) for top in range(0, height, STRIP)]
+    for _ in (executor.map if executor else map)(fill, strips):
+        pass
 
 
 def _filtered_rows(

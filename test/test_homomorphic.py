@@ -102,9 +102,10 @@ def test_the_result_does_not_depend_on_the_threads(threads):
     image = scene(600, 301)
     expected = HomomorphicFilter(image).filtered(2.8, 0.82)
     with ThreadPoolExecutor(threads) as executor:
-        prepared = HomomorphicFilter(image, executor=executor)
-        np.testing.assert_array_equal(prepared.filtered(2.8, 0.82), expected)
-        logarithms = prepared.filtered_logarithm(2.8, 0.82)
+        prepared = HomomorphicFilter(image)
+        result = prepared.filtered(2.8, 0.82, executor=executor)
+        logarithms = prepared.filtered_logarithm(2.8, 0.82, executor=executor)
+    np.testing.assert_array_equal(result, expected)
     np.testing.assert_array_equal(
         logarithms, HomomorphicFilter(image).filtered_logarithm(2.8, 0.82)
     )
