@@ -115,8 +115,8 @@ def test_the_projector_stands_aside_and_lights_the_origin(tilt: float, seed: int
     projector = rig_projector(camera.pose, 3.0, generator)
     assert projector.pose[:2, 2] == pytest.approx((0, 0))
     assert projector.irradiance(np.zeros(1), np.zeros(1)) == pytest.approx(1.0)
-    steps = projector.pose @ np.array([[0, 1e-3], [0, 0], [1, 1]])
-    moved = projector.scale * np.diff(steps[:2] / steps[2], axis=1)
+    steps = projector.homography @ np.array([[0, 1e-3], [0, 0], [1, 1]])
+    moved = np.diff(steps[:2] / steps[2], axis=1)
     assert np.linalg.norm(moved) <= 1e-3 / 3.0 * 1.2
     rotation = np.column_stack(
         (camera.pose[:, :2], np.cross(camera.pose[:, 0], camera.pose[:, 1]))

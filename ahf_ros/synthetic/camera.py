@@ -93,6 +93,12 @@ class Camera:
         rays = np.column_stack((points, np.ones(len(points)))) @ self.pose.T
         return np.arccos(np.abs(rays @ normal) / np.linalg.norm(rays, axis=1))
 
+    def vignetting(self, pixels: np.ndarray) -> np.ndarray:
+        """Return the share of light that reaches pixels, shape (n, 2): cos^4 of their angle."""
+        seen = (pixels - self.intrinsics[:2, 2]) / self.intrinsics[0, 0]
+        share: np.ndarray = (1 + (seen**2).sum(axis=1)) ** -2
+        return share
+
     def circle(self, centre: np.ndarray, radius: float) -> tuple[float, float, float]:
         """Return the ellipse that a circle on the wall is seen as.
 

@@ -27,6 +27,11 @@ class Projector:
     position: np.ndarray
     scale: float
 
+    @property
+    def homography(self) -> np.ndarray:
+        """Homography from the wall (x, y, 1) to projector pixels, to scale."""
+        return np.diag((self.scale, self.scale, 1.0)) @ self.pose
+
     def irradiance(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return the light on points of the wall, 1 at its origin, for a pattern that is 1.
 
@@ -37,7 +42,8 @@ class Projector:
         squared = (towards**2).sum(axis=-1) + self.position[2] ** 2
         reach = self.position @ self.position
         field = (self.position[2] ** 2 - towards @ self.position[:2]) / np.sqrt(squared * reach)
-        return (reach / squared) ** 1.5 * np.clip(field, 0, 1) ** 4
+        light: np.ndarray = (reach / squared) ** 1.5 * np.clip(field, 0, 1) ** 4
+        return light
 
 
 def rig_projector(

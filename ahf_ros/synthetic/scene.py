@@ -19,15 +19,15 @@ from ahf_ros.synthetic.layout import (
     quiet_radius,
     scattered_places,
 )
+from ahf_ros.synthetic.lighting import paper_texture, white_light
 from ahf_ros.synthetic.lights import LIGHT_NAMES, light_pattern
 from ahf_ros.synthetic.prints import Cover, Mark, print_mark, ring_cover
-from ahf_ros.synthetic.projector import Projector, rig_projector
+from ahf_ros.synthetic.projector import rig_projector
 from ahf_ros.target import Target
 
 _PROJECTOR_PIXELS = 6.4  # in the radius of a dot
 _PIXEL_DEVIATION = 12**-0.5  # of a place in a pixel, px
-_STRIP = 128  # rows of light computed at a time
-_FIELD_STEP = 16  # px between the samples of smooth light
+_STRIP = 128  # rows exposed at a time
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,13 +173,18 @@ def render(settings: SceneSettings) -> Rendering:
         settings.distortion,
         setup,
     )
-    projector = rig_projector(camera.pose, settings.dot_radius / _PROJECTOR_PIXELS, setup)
+    projector_pixel = settings.dot_radius / _PROJECTOR_PIXELS
+    projector = rig_projector(camera.pose, projector_pixel, setup)
     marks, targets, places = _coded_targets(settings, camera, wall)
     marks += _distractors(settings, camera, places, clutter)
 
-    light = _light_on_sensor(settings, camera, projector, lamp)
+    softness = math.hypot(settings.defocus, _PIXEL_DEVIATION / projector_pixel)
+    pattern = light_pattern(settings.light, softness, lamp)
+    average = (settings.exposure / 255) ** settings.gamma
+    highest = ((settings.exposure + 255) / 2 / 255) ** settings.gamma
+    light = white_light(camera, projector, pattern, settings.ambient, average, highest, lamp)
     if settings.texture:
-        light *= _texture(settings, wall)
+        light *= paper_texture(light.shape, settings.texture, settings.dot_radius, wall)
     ground, inked = (1.0, settings.black) if settings.polarity == 'dark' else (settings.black, 1.0)
     image = light * np.float32(ground)
     if settings.blur:
@@ -246,86 +251,3 @@ def _mark(camera: Camera, pixel: np.ndarray, radius: float, reach: float, cover:
     centre = camera.wall(pixel[None])[0]
     enlargement = np.linalg.norm(camera.jacobian(centre), ord=2)
     return Mark(centre, float(radius / enlargement), reach, cover)
-
-
-def _light_on_sensor(
-    settings: SceneSettings,
-    camera: Camera,
-    projector: Projector,
-    generator: np.random.Generator,
-) -> np.ndarray:
-    """Return the light that white would send to each pixel, as a share of saturation."""
-    pixel = settings.dot_radius / _PROJECTOR_PIXELS
-    softness = math.hypot(settings.defocus, _PIXEL_DEVIATION / pixel)
-    pattern = light_pattern(settings.light, softness, generator)
-    light, ambient = _smooth_light(settings, camera, projector, generator)
-    to_projector = np.diag((projector.scale, projector.scale, 1.0)) @ projector.pose
-    to_projector = np.float32(to_projector @ np.linalg.inv(camera.pose))
-    columns = np.arange(settings.width, dtype=float)[None, :]
-    for top in range(0, settings.height, _STRIP):
-        rows = np.arange(top, min(top + _STRIP, settings.height), dtype=float)[:, None]
-        x, y = (ray.astype(np.float32) for ray in camera.rays(columns, rows))
-        u, v, depth = (row[0] * x + (row[1] * y + row[2]) for row in to_projector)
-        np.reciprocal(depth, out=depth)
-        strip = slice(top, top + len(rows))
-        light[strip] *= pattern(u * depth, v * depth)
-        light[strip] += ambient[strip]
-    return light
-
-
-def _smooth_light(
-    settings: SceneSettings,
-    camera: Camera,
-    projector: Projector,
-    generator: np.random.Generator,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the light of a pattern that is 1, and of the surroundings, at every pixel.
-
-    White in full light has the grey value `exposure` on average, and nowhere more than midway
-    from there to saturation.
-    """
-    columns, rows = (
-        (np.arange(-(-size // _FIELD_STEP) + 2) - 0.5) * _FIELD_STEP - 0.5
-        for size in (settings.width, settings.height)
-    )
-    pixels = np.stack(np.meshgrid(columns, rows), axis=-1)
-    grid = pixels.reshape(-1, 2)
-    x, y = camera.wall(grid).T
-    seen = (grid - camera.intrinsics[:2, 2]) / camera.intrinsics[0, 0]
-    vignetting = (1 + (seen**2).sum(axis=1)) ** -2
-    lit = projector.irradiance(x, y) * vignetting
-    direction = generator.uniform(0, 2 * math.pi)
-    slope = (x * math.cos(direction) + y * math.sin(direction)) / settings.width
-    ambient = settings.ambient * (1 + 0.2 * np.tanh(slope)) * vignetting
-
-    white = lit + ambient
-    levels = np.array([settings.exposure, (settings.exposure + 255) / 2]) / 255
-    average, highest = levels**settings.gamma
-    scale = min(average / white.mean(), highest / white.max())
-    lit_samples, ambient_samples = (
-        np.float32(field * scale).reshape(pixels.shape[:2]) for field in (lit, ambient)
-    )
-    return (
-        _enlarge(lit_samples, _FIELD_STEP, settings),
-        _enlarge(ambient_samples, _FIELD_STEP, settings),
-    )
-
-
-def _texture(settings: SceneSettings, generator: np.random.Generator) -> np.ndarray:
-    """Return the unevenness of the wall as factors about 1: noise of several scales."""
-    factors = np.ones((settings.height, settings.width), np.float32)
-    scales = (4, 32, 256)
-    share = np.float32(settings.texture / math.sqrt(len(scales)))
-    for scale in scales:
-        shape = (-(-settings.height // scale) + 2, -(-settings.width // scale) + 2)
-        noise = generator.standard_normal(shape, dtype=np.float32)
-        factors += _enlarge(noise * share, scale, settings)
-    return np.clip(factors, 0.2, 1.8, out=factors)
-
-
-def _enlarge(samples: np.ndarray, step: int, settings: SceneSettings) -> np.ndarray:
-    """Return samples that are `step` px apart, from half a step outside, at every pixel."""
-    rows, columns = samples.shape
-    whole = cv2.resize(samples, (columns * step, rows * step), interpolation=cv2.INTER_CUBIC)
-    inside = whole[step : step + settings.height, step : step + settings.width]
-    return np.ascontiguousarray(inside)
