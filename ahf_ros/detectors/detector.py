@@ -65,9 +65,7 @@ class DetectorSettings:
         Whether targets whose code word is not certain are reported, with the ID `UNDECODED`.
     """
 
-    family: str = parameter(
-        'metashape12', 'Family of the coded targets.', choices=FAMILY_NAMES
-    )
+    family: str = parameter('metashape12', 'Family of the coded targets.', choices=FAMILY_NAMES)
     polarity: str = parameter(
         'auto', 'Colour of the dot: dark on bright, bright on dark, or either.', choices=POLARITIES
     )

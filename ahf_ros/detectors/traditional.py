@@ -5,8 +5,9 @@ threshold, contours whose perimeter and roundness are those of a dot, a least-sq
 the coded band read by its grey gradient in the affine frame of that ellipse. It has no defence of
 its own against uneven light, which makes it the fair test of a filter that has.
 
-Its centre is that of the ellipse of the dot. The image of the physical centre differs from it by
-the perspective bias, 0.03 px for a dot of 20 px radius at 45 degrees, which is not removed here.
+Beyond the paper, the edges of dot and band are measured at sub-pixel accuracy, and together give
+the image of the physical centre of a decoded target; that of an undecoded one is the centre of its
+ellipse, with the perspective bias in it (0.03 px for a dot of 20 px radius at 45 degrees).
 
 References
 ----------
@@ -15,6 +16,7 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import cv2
@@ -22,22 +24,19 @@ import numpy as np
 
 from ahf_ros.codes.ring import Family, family
 from ahf_ros.detectors.detector import DetectorSettings
-from ahf_ros.detectors.frames import (
-    Dots,
-    dots_from_ellipses,
-    inside,
-    refined,
-    sampled,
-    semi_axes,
-)
+from ahf_ros.detectors.edges import refined
+from ahf_ros.frame import affine_frames, circle_points, ellipse_axes, project, sample
 from ahf_ros.image import check_image
 from ahf_ros.target import UNDECODED, Target
 
-THRESHOLD_BLOCK = 81
-"""Side of the square over which the adaptive threshold takes its mean, px."""
+THRESHOLD_WINDOW = 80
+"""Side of the square in which the threshold lies halfway from darkest to brightest, px."""
 
-THRESHOLD_OFFSET = 8
-"""Contrast to that mean that makes a pixel part of a blob, gray values of 8 bit."""
+MINIMUM_CONTRAST = 20
+"""Least difference of those two for there to be anything, gray values of 8 bit."""
+
+REDUCTION = 4
+"""The darkest and the brightest are looked for in an image reduced by this."""
 
 MINIMUM_ROUNDNESS = 0.5
 """Smallest 4 pi area / perimeter^2 of a dot; an ellipse seen at 70 degrees has 0.65."""
@@ -45,14 +44,24 @@ MINIMUM_ROUNDNESS = 0.5
 MAXIMUM_MISFIT = 0.12
 """Largest relative difference between the area of a contour and that of its ellipse."""
 
+MAXIMUM_SCATTER = 0.08
+"""Largest RMS distance of the edge from the ellipse, in radii of the dot."""
+
 SAMPLES_PER_SECTOR = 12
 """Directions in which the band of a target is sampled, per sector of the code."""
 
 MARGIN = 0.35
 """Distance from the band at which the margin of a target is tested, in radii of the dot."""
 
+LEVEL = 0.4
+"""Where ground ends and dot begins, from the ground, 0, to the dot, 1.
+
+Less than a half, because the gap shows the ground in all directions, the darkest included, but the
+dot shows its colour in one place only.
+"""
+
 MINIMUM_CLARITY = 0.15
-"""Least distance of a sector's mean from half the contrast of the dot, relative to that."""
+"""Least distance of a sector's mean from `LEVEL`."""
 
 MINIMUM_COHERENCE = 0.6
 """Least agreement of the band's grey gradient with one division into sectors, 0 to 1."""
@@ -98,14 +107,12 @@ class TraditionalDetector:
             If `image` is not an image, see `ahf_ros.image.check_image`.
         """
         check_image(image)
-        gray = _eight_bit(image)
         found: list[Target] = []
-        for polarity in ('dark', 'bright'):
-            if self.settings.polarity in ('auto', polarity):
-                candidates = _candidates(gray, polarity == 'bright', self.settings)
-                for start in range(0, len(candidates.centres), CHUNK):
-                    chunk = candidates.chosen(slice(start, start + CHUNK))
-                    found += _identified(image, chunk, self.settings)
+        for sign, mask in _masks(_eight_bit(image), self.settings.polarity):
+            candidates = _candidates(mask, self.settings)
+            for start in range(0, len(candidates), CHUNK):
+                chunk = candidates[start : start + CHUNK]
+                found += _identified(image, chunk, sign, self.settings)
         targets = _settled(found)
         if not self.settings.report_undecoded:
             targets = [target for target in targets if target.id != UNDECODED]
@@ -119,16 +126,34 @@ def _eight_bit(image: np.ndarray) -> np.ndarray:
     return cv2.normalize(image, scaled, 0, 255, cv2.NORM_MINMAX, cv2.CV_8U)
 
 
-def _candidates(gray: np.ndarray, bright: bool, settings: DetectorSettings) -> Dots:
-    """Return the blobs of an 8-bit image that pass the gates of a dot."""
-    mask = cv2.adaptiveThreshold(
-        gray,
-        255,
-        cv2.ADAPTIVE_THRESH_MEAN_C,
-        cv2.THRESH_BINARY if bright else cv2.THRESH_BINARY_INV,
-        THRESHOLD_BLOCK,
-        -THRESHOLD_OFFSET if bright else THRESHOLD_OFFSET,
+def _masks(gray: np.ndarray, polarity: str) -> Iterator[tuple[int, np.ndarray]]:
+    """Yield -1 and the mask of the dark pixels of an 8-bit image, 1 and that of the bright ones.
+
+    The threshold is Bernsen's, halfway between the extremes of the neighbourhood.
+    """
+    height, width = gray.shape
+    size = (-(-width // REDUCTION), -(-height // REDUCTION))
+    reduced = cv2.resize(gray, size, interpolation=cv2.INTER_AREA)
+    window = (THRESHOLD_WINDOW // REDUCTION,) * 2
+    kernel = np.ones(window, np.uint8)
+    darkest, brightest = (
+        cv2.blur(extreme(reduced, kernel), window, borderType=cv2.BORDER_REPLICATE)
+        for extreme in (cv2.erode, cv2.dilate)
     )
+    middle = cv2.addWeighted(darkest, 0.5, brightest, 0.5, 0)
+    flat = cv2.subtract(brightest, darkest) < MINIMUM_CONTRAST
+    smooth = cv2.blur(gray, (3, 3))
+    for sign, name, unreachable in ((-1, 'dark', 0), (1, 'bright', 255)):
+        if polarity in ('auto', name):
+            threshold = np.where(flat, np.uint8(unreachable), middle)
+            threshold = cv2.resize(threshold, (width, height), interpolation=cv2.INTER_LINEAR)
+            comparison = cv2.CMP_LT if sign < 0 else cv2.CMP_GT
+            mask = cv2.compare(smooth, threshold, comparison)
+            yield sign, cv2.medianBlur(cv2.medianBlur(mask, 3), 3)
+
+
+def _candidates(mask: np.ndarray, settings: DetectorSettings) -> np.ndarray:
+    """Return the frames of the blobs that pass the gates of a dot."""
     contours, hierarchy = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     shortest = max(5.0, 2 * settings.min_radius)
     longest = 2 * np.pi * (settings.max_radius + 2)
@@ -143,53 +168,60 @@ def _candidates(gray: np.ndarray, bright: bool, settings: DetectorSettings) -> D
         if abs(np.pi / 4 * width * height - area) < MAXIMUM_MISFIT * area:
             # A contour runs through the centres of a blob's outermost pixels, half a pixel inside.
             ellipses.append((x, y, (width + 1) / 2, (height + 1) / 2, np.deg2rad(angle)))
-    return dots_from_ellipses(*np.reshape(ellipses, (-1, 5)).T)
+    return affine_frames(*np.reshape(ellipses, (-1, 5)).T)
 
 
-def _identified(image: np.ndarray, candidates: Dots, settings: DetectorSettings) -> list[Target]:
+def _identified(
+    image: np.ndarray, candidates: np.ndarray, sign: int, settings: DetectorSettings
+) -> list[Target]:
     """Return the targets among the candidates, those without a code word as undecoded."""
-    dots = candidates
+    frames = candidates
     for _ in range(2):
-        dots, fits = refined(image, dots)
-        dots = dots.chosen(fits)
-    lengths, angles = semi_axes(dots)
+        frames, covariances, scatter = refined(image, frames)
+        fits = scatter < MAXIMUM_SCATTER
+        frames, covariances = frames[fits], covariances[fits]
+    if not len(frames):
+        return []
     code_family = family(settings.family)
-    surrounded, words, certainties = _read(image, dots, code_family)
-    of_size = (settings.min_radius <= lengths[:, 0]) & (lengths[:, 0] <= settings.max_radius)
-    targets = []
-    for i in np.flatnonzero(of_size & surrounded):
-        number = code_family.number(int(words[i])) if certainties[i] > 0 else None
-        xx, xy, yx, yy = dots.covariances[i].ravel().tolist()
-        target = Target(
-            id=UNDECODED,
-            code=0,
-            x=float(dots.centres[i, 0]),
-            y=float(dots.centres[i, 1]),
-            semi_major=float(lengths[i, 0]),
-            semi_minor=float(lengths[i, 1]),
+    surrounded, words, certainties = _read(image, frames, sign, code_family)
+    numbers = [
+        code_family.number(int(word)) if certainty else None
+        for word, certainty in zip(words, certainties, strict=True)
+    ]
+    decoded = np.array([number is not None for number in numbers], bool)
+    circles = (1.0, code_family.band_inner, code_family.band_outer)
+    frames[decoded], covariances[decoded], _ = refined(image, frames[decoded], circles)
+    semi_major, semi_minor, angles = ellipse_axes(frames)
+    of_size = (settings.min_radius <= semi_major) & (semi_major <= settings.max_radius)
+    return [
+        Target(
+            id=UNDECODED if number is None else number,
+            code=0 if number is None else code_family.word(number),
+            x=float(frames[i, 0, 2]),
+            y=float(frames[i, 1, 2]),
+            semi_major=float(semi_major[i]),
+            semi_minor=float(semi_minor[i]),
             angle=float(angles[i]),
-            confidence=0.0,
-            covariance=(xx, xy, yx, yy),
+            confidence=0.0 if number is None else float(certainties[i]),
+            covariance=tuple(covariances[i].ravel().tolist()),
         )
-        if number is not None:
-            code, confidence = code_family.word(number), float(certainties[i])
-            target = replace(target, id=number, code=code, confidence=confidence)
-        targets.append(target)
-    return targets
+        for i, number in enumerate(numbers)
+        if of_size[i] and surrounded[i]
+    ]
 
 
 def _read(
-    image: np.ndarray, dots: Dots, code_family: Family
+    image: np.ndarray, frames: np.ndarray, sign: int, code_family: Family
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Read the bands of n dots.
+    """Read the bands of k targets.
 
     Returns
     -------
-    surrounded : ndarray of bool, shape (n,)
+    surrounded : ndarray of bool, shape (k,)
         Whether a gap of one colour lies round the dot, in the image.
-    words : ndarray of int64, shape (n,)
+    words : ndarray of int64, shape (k,)
         The words read, in any rotation.
-    certainties : ndarray of float64, shape (n,)
+    certainties : ndarray of float64, shape (k,)
         Probability that the word is right if the target is one, sectors being two gray values
         with normal errors; 0 where gap, band or margin are not those of a target.
     """
@@ -197,16 +229,23 @@ def _read(
     gap = 1 + (inner - 1) * np.array([0.4, 0.6])
     band = inner + (outer - inner) * np.array([0.3, 0.5, 0.7])
     radii = np.concatenate([[0.6], gap, band, [outer + MARGIN]])
-    values = sampled(image, dots, radii, SAMPLES_PER_SECTOR * code_family.bits)
-    dot, ground = np.median(values[:, 0], axis=1), np.median(values[:, 1:3], axis=(1, 2))
-    contrast = np.where(dot == ground, np.inf, dot - ground)
+    samples = SAMPLES_PER_SECTOR * code_family.bits
+    angles = -2 * np.pi * np.arange(samples) / samples  # counter-clockwise, y pointing down
+    pixels = project(frames, circle_points(angles, radii))
+    values = sign * sample(image, pixels).astype(np.float32)
+    inside = ((pixels >= 0) & (pixels <= np.array(image.shape[::-1]) - 1)).all(axis=(1, 3))
+
+    dot = np.percentile(values[..., 0], 10, axis=1)
+    ground = np.percentile(values[..., 1:3], 90, axis=(1, 2))
+    contrast = np.where(dot > ground, dot - ground, np.inf)
     shares = (values - ground[:, None, None]) / contrast[:, None, None]
-    surrounded = inside(dots, inner, image.shape) & _mostly_ground(shares[:, 1:3])
-    means, deviation, coherence = _sectors(shares[:, 3:6].mean(axis=1), code_family.bits)
+    surrounded = (dot > ground) & inside[:, 2]
+    whole = surrounded & inside[:, 5] & ((shares[..., 6] < LEVEL).mean(axis=1) > 0.85)
+    profiles = np.clip(4 * (shares[..., 3:6].mean(axis=2) - LEVEL) + 0.5, 0, 1)
+    means, deviation, coherence = _sectors(profiles, code_family.bits)
     words = (means > 0.5) @ (1 << np.arange(code_family.bits))
     odds = np.abs(2 * means - 1) / (2 * np.maximum(deviation, 0.1)[:, None] ** 2)
     certainties = np.prod(1 / (1 + np.exp(-odds)), axis=1)
-    whole = inside(dots, outer, image.shape) & _mostly_ground(shares[:, 6:]) & surrounded
     whole &= (np.abs(means - 0.5).min(axis=1) > MINIMUM_CLARITY) & (coherence > MINIMUM_COHERENCE)
     return surrounded, words, np.where(whole, certainties, 0.0)
 
@@ -244,10 +283,6 @@ def _sectors(profiles: np.ndarray, bits: int) -> tuple[np.ndarray, np.ndarray, n
     means = sectors.mean(axis=2)
     errors = sectors - (means > 0.5)[:, :, None]
     return means, np.sqrt((errors**2).mean(axis=(1, 2))), coherence
-
-
-def _mostly_ground(shares: np.ndarray) -> np.ndarray:
-    return (np.abs(shares) < 0.35).mean(axis=(1, 2)) > 0.85
 
 
 def _settled(targets: list[Target]) -> list[Target]:
