@@ -188,9 +188,11 @@ def _identified(
         code_family.number(int(word)) if certainty else None
         for word, certainty in zip(words, certainties, strict=True)
     ]
-    decoded = np.array([number is not None for number in numbers], bool)
+    decoded = np.array([i for i, number in enumerate(numbers) if number is not None], int)
     circles = (1.0, code_family.band_inner, code_family.band_outer)
-    frames[decoded], covariances[decoded], _ = refined(image, frames[decoded], circles)
+    joint, joint_covariances, scatter = refined(image, frames[decoded], circles)
+    fits = scatter < MAXIMUM_SCATTER
+    frames[decoded[fits]], covariances[decoded[fits]] = joint[fits], joint_covariances[fits]
     semi_major, semi_minor, angles = ellipse_axes(frames)
     of_size = (settings.min_radius <= semi_major) & (semi_major <= settings.max_radius)
     return [
@@ -233,7 +235,8 @@ def _read(
     angles = -2 * np.pi * np.arange(samples) / samples  # counter-clockwise, y pointing down
     pixels = project(frames, circle_points(angles, radii))
     values = sign * sample(image, pixels).astype(np.float32)
-    inside = ((pixels >= 0) & (pixels <= np.array(image.shape[::-1]) - 1)).all(axis=(1, 3))
+    last = np.array(image.shape[::-1]) - 1
+    inside = np.all((pixels >= 0) & (pixels <= last), axis=(1, 3))
 
     dot = np.percentile(values[..., 0], 10, axis=1)
     ground = np.percentile(values[..., 1:3], 90, axis=(1, 2))
