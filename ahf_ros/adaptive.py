@@ -1,0 +1,293 @@
+"""Adaptive homomorphic filtering: the identification chooses the filter of its image [1]_.
+
+The image as received is identified first. Where it does not show the N targets that are expected,
+a genetic search looks for the filter through which the detector finds n with the smallest |N - n|.
+It works with any detector, of which it knows nothing but how it is called.
+
+References
+----------
+.. [1] Shang & Liu, Remote Sens. 2023, 15, 3151.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import nullcontext
+from dataclasses import asdict, dataclass, field, replace
+from numbers import Integral
+from threading import Lock
+from typing import Any
+
+import numpy as np
+
+from ahf_ros.genetic import Gene, GeneticSettings, SearchResult, Values, search
+from ahf_ros.homomorphic import FilterSettings, HomomorphicFilter
+from ahf_ros.image import check_image
+from ahf_ros.parameter import check_parameters, parameter
+from ahf_ros.spectrum import transfer
+from ahf_ros.target import FilterState, Identification, Target, count_codes
+
+AnyDetector = Callable[[np.ndarray], list[Target]]
+"""From an 8-bit image, shape (height, width), to the targets in it. Called from several threads at
+once where `AdaptiveSettings.threads` is not 1."""
+
+Refinement = Callable[[np.ndarray, Sequence[Target]], Sequence[Target]]
+"""From the image as received and targets found in a filtered one to the same targets, with centres
+taken from the image as received."""
+
+
+@dataclass(frozen=True, slots=True)
+class AdaptiveSettings:
+    """Whether and where a filter is searched for, and how.
+
+    The default of `max_evaluations` bounds what an image costs where no filter shows all N
+    targets: 200 identifications, a fifteenth of the 3131 filters there are.
+    """
+
+    ahf: bool = parameter(
+        True, 'Whether to search for a filter where the image as received does not show N targets.'
+    )
+    gamma_high_min: float = parameter(
+        1.0, 'Smallest gain of the high frequencies.', minimum=0.1, maximum=20.0
+    )
+    gamma_high_max: float = parameter(
+        4.0, 'Largest gain of the high frequencies.', minimum=0.1, maximum=20.0
+    )
+    gamma_high_step: float = parameter(
+        0.1, 'Step of the gain of the high frequencies.', minimum=0.001, maximum=20.0
+    )
+    gamma_low_min: float = parameter(
+        0.0, 'Smallest gain of the low frequencies.', minimum=0.0, maximum=20.0
+    )
+    gamma_low_max: float = parameter(
+        1.0,
+        'Largest gain of the low frequencies, at most gamma_high_min.',
+        minimum=0.0,
+        maximum=20.0,
+    )
+    gamma_low_step: float = parameter(
+        0.01, 'Step of the gain of the low frequencies.', minimum=0.001, maximum=20.0
+    )
+    threads: int = parameter(
+        0,
+        'Filters tried at the same time, 0: one a processor core. The result is the same.',
+        minimum=0,
+        maximum=256,
+    )
+    filter: FilterSettings = field(default_factory=FilterSettings)
+    genetic: GeneticSettings = field(default_factory=GeneticSettings)
+
+    def __post_init__(self) -> None:
+        """Check every parameter, and the ranges against each other."""
+        check_parameters(self)
+        _check_order(self, 'gamma_high_min', 'gamma_high_max')
+        _check_order(self, 'gamma_low_min', 'gamma_low_max')
+        _check_order(self, 'gamma_low_max', 'gamma_high_min')
+
+    @property
+    def genes(self) -> tuple[Gene, Gene]:
+        """What is searched for, in the order of the arguments of the filter."""
+        return (
+            Gene('gamma_high', self.gamma_high_min, self.gamma_high_max, self.gamma_high_step),
+            Gene('gamma_low', self.gamma_low_min, self.gamma_low_max, self.gamma_low_step),
+        )
+
+
+def identify(
+    image: np.ndarray,
+    detector: AnyDetector,
+    expected: int,
+    settings: AdaptiveSettings | None = None,
+    refine: Refinement | None = None,
+) -> Identification:
+    """Identify the targets of one image through the filter that suits the detector.
+
+    Parameters
+    ----------
+    image, expected
+        As for `AdaptiveIdentifier.identify`.
+    detector, settings, refine
+        As for `AdaptiveIdentifier`.
+
+    Returns
+    -------
+    Identification
+
+    Raises
+    ------
+    ValueError
+        As `AdaptiveIdentifier.identify` does.
+    """
+    return AdaptiveIdentifier(detector, settings, refine).identify(image, expected)
+
+
+class AdaptiveIdentifier:
+    """Identifies one image after the other and begins each with the filter that worked last.
+
+    Results depend on the images since the last `reset` and, with `max_duration`, on the machine.
+
+    Parameters
+    ----------
+    detector : callable
+        From an 8-bit image to the targets in it. Targets with the same ID count once and are all
+        passed on; what it raises, `identify` raises.
+    settings : AdaptiveSettings, optional
+        The limits of the search and the number of threads.
+    refine : callable, optional
+        From the image as received and the targets to the same targets with better centres. It is
+        asked where the targets were found in another image: through a filter, or in the
+        8-bit version of an image with more bits.
+    clock : callable, optional
+        Time in s.
+
+    Attributes
+    ----------
+    last_search : SearchResult or None
+        The search for the last image; None where there was none.
+    """
+
+    def __init__(
+        self,
+        detector: AnyDetector,
+        settings: AdaptiveSettings | None = None,
+        refine: Refinement | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.last_search: SearchResult | None = None
+        self._detector = detector
+        self._settings = settings or AdaptiveSettings()
+        self._refine = refine
+        self._clock = clock
+        self._remembered: Values | None = None
+
+    def reset(self) -> None:
+        """Forget what worked for earlier images."""
+        self._remembered = None
+
+    def identify(self, image: np.ndarray, expected: int) -> Identification:
+        """Identify the targets of one image; call it from one thread at a time.
+
+        Parameters
+        ----------
+        image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
+            The image as received.
+        expected : int
+            N, the number of coded targets that it shows; 0 where unknown: no filter is tried then.
+
+        Returns
+        -------
+        Identification
+            The result with the smallest |N - n|, of equally good ones that of the image as
+            received, then the first. The evaluations of its filter state are the identifications
+            that led to it; threads may have begun others when the right one was found.
+
+        Raises
+        ------
+        ValueError
+            If the image is not accepted, `expected` is not an integer of at least 0, or the
+            detector or the refinement returns anything but a list of targets at finite places.
+        """
+        started = self._clock()
+        check_image(image)
+        _check_expected(expected)
+        trials = _Trials(image, self._detector, expected, self._settings.filter)
+        threads = self._settings.threads or os.cpu_count() or 1
+        with ThreadPoolExecutor(threads) if threads > 1 else nullcontext() as executor:
+            chosen, evaluations = self._choose(trials, executor)
+        targets = trials.targets[chosen]
+        if self._refine and (chosen or image.dtype != np.uint8):
+            targets = _checked(self._refine(image, targets), 'refine')
+        state = FilterState(
+            evaluations=evaluations,
+            generations=self.last_search.generations if self.last_search else 0,
+            duration=self._clock() - started,
+        )
+        if chosen:
+            state = replace(state, applied=True, **asdict(transfer(image.shape, *chosen)))
+        ordered = tuple(sorted(targets, key=lambda target: target.id))
+        return Identification(ordered, expected, state)
+
+    def _choose(self, trials: _Trials, executor: Executor | None) -> tuple[Values | None, int]:
+        """Return the best filter, None for the image as received, and the evaluations."""
+        self.last_search = None
+        remembered = self._remembered
+        searching = self._settings.ahf and trials.expected > 0
+        if searching and remembered and trials.discrepancy(remembered, executor) == 0:
+            return remembered, 1
+        unfiltered = trials.discrepancy(None, executor)
+        if not searching or unfiltered == 0:
+            self._remembered = None if searching else remembered
+            return None, len(trials.targets)
+        genetic = self._settings.genetic
+        self.last_search = result = search(
+            trials.discrepancy,
+            self._settings.genes,
+            genetic,
+            np.random.default_rng(genetic.seed),
+            initial=[remembered] if remembered else [],
+            executor=executor,
+            clock=self._clock,
+        )
+        self._remembered = result.values if result.discrepancy < unfiltered else None
+        return self._remembered, 1 + result.evaluations
+
+
+class _Trials:
+    """The targets of one image, as received and through every filter tried."""
+
+    def __init__(
+        self, image: np.ndarray, detector: AnyDetector, expected: int, settings: FilterSettings
+    ) -> None:
+        self.expected = expected
+        self.targets: dict[Values | None, list[Target]] = {}
+        self._image = image
+        self._detector = detector
+        self._settings = settings
+        self._lock = Lock()
+        self._prepared: HomomorphicFilter | None = None
+
+    def discrepancy(self, values: Values | None, executor: Executor | None = None) -> int:
+        """Return |N - n| through a filter; None is the image as received."""
+        if values not in self.targets:
+            found = self._detector(self._shown(values, executor))
+            self.targets[values] = _checked(found, 'detector')
+        return abs(self.expected - count_codes(self.targets[values]))
+
+    def _shown(self, values: Values | None, executor: Executor | None) -> np.ndarray:
+        if values is None and self._image.dtype == np.uint8:
+            return self._image
+        with self._lock:
+            if self._prepared is None:
+                self._prepared = HomomorphicFilter(self._image, self._settings)
+        # equal gains leave the image as it is, but for the mapping to 8 bit
+        gamma_high, gamma_low = values or (1.0, 1.0)
+        return self._prepared.filtered(gamma_high, gamma_low, executor=executor)
+
+
+def _checked(found: Any, source: str) -> list[Target]:
+    if not isinstance(found, (list, tuple)) or not all(isinstance(it, Target) for it in found):
+        raise ValueError(f'{source} returned {found!r}, accepted is a list of targets')
+    for target in found:
+        if not (math.isfinite(target.x) and math.isfinite(target.y)):
+            raise ValueError(
+                f'{source} returned target {target.id} at ({target.x}, {target.y}), '
+                'accepted are finite coordinates'
+            )
+    return list(found)
+
+
+def _check_expected(expected: Any) -> None:
+    if isinstance(expected, bool) or not isinstance(expected, Integral) or expected < 0:
+        raise ValueError(f'expected is {expected!r}, accepted is an integer of at least 0')
+
+
+def _check_order(settings: AdaptiveSettings, lower: str, upper: str) -> None:
+    lowest, highest = getattr(settings, lower), getattr(settings, upper)
+    if lowest > highest:
+        raise ValueError(
+            f'{lower} is {lowest!r}, accepted is a number of at most {upper}, {highest!r}'
+        )
