@@ -113,7 +113,7 @@ class TraditionalDetector:
             for start in range(0, len(candidates), CHUNK):
                 chunk = candidates[start : start + CHUNK]
                 found += _identified(image, chunk, sign, self.settings)
-        targets = _settled(found)
+        targets = _settled(found, family(self.settings.family))
         if not self.settings.report_undecoded:
             targets = [target for target in targets if target.id != UNDECODED]
         return sorted(targets, key=lambda target: (target.id, target.y, target.x))
@@ -288,13 +288,23 @@ def _sectors(profiles: np.ndarray, bits: int) -> tuple[np.ndarray, np.ndarray, n
     return means, np.sqrt((errors**2).mean(axis=(1, 2))), coherence
 
 
-def _settled(targets: list[Target]) -> list[Target]:
-    """Return the targets with each ID left to the most certain of those that claim it."""
-    settled = sorted(targets, key=lambda target: (-target.confidence, target.y, target.x))
-    taken = set()
-    for i, target in enumerate(settled):
-        if target.id in taken:
-            settled[i] = replace(target, id=UNDECODED, code=0, confidence=0.0)
-        elif target.id != UNDECODED:
-            taken.add(target.id)
-    return settled
+def _settled(targets: list[Target], code_family: Family) -> list[Target]:
+    """Return the targets with each ID left to the most certain of those that claim it.
+
+    Undecoded blobs in the band of a decoded target are its sectors, and left out.
+    """
+    settled: dict[int, Target] = {}
+    others = []
+    for target in sorted(targets, key=lambda target: (-target.confidence, target.y, target.x)):
+        if target.id == UNDECODED or target.id in settled:
+            others.append(replace(target, id=UNDECODED, code=0, confidence=0.0))
+        else:
+            settled[target.id] = target
+    decoded = list(settled.values())
+    centres = np.array([(target.x, target.y) for target in decoded]).reshape(-1, 2)
+    reach = np.array([code_family.band_outer * target.semi_major for target in decoded])
+    for target in others:
+        distances = np.hypot(centres[:, 0] - target.x, centres[:, 1] - target.y)
+        if (distances > reach).all():
+            decoded.append(target)
+    return decoded
