@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable
+from collections.abc import Collection
 
 import cv2
 import numpy as np
 
-from ahf_ros.target import UNDECODED, Target
+from ahf_ros.target import UNDECODED, Identification, Target
 
 DECODED_COLOUR = (60, 230, 60)
 """Blue, green, red of a decoded target."""
@@ -20,26 +20,28 @@ UNDECODED_COLOUR = (0, 190, 255)
 """Blue, green, red of a target without a code word."""
 
 _OUTLINE_COLOUR = (0, 0, 0)
+_TEXT_COLOUR = (255, 255, 255)
 _SHIFT = 4  # fractional bits of the coordinates that OpenCV draws
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 _FONT_HEIGHT = 22.0  # px of a capital at scale 1
 
 
-def overlay(
-    image: np.ndarray, targets: Iterable[Target], wrong: Collection[Target] = ()
+def draw(
+    image: np.ndarray, identification: Identification, wrong: Collection[Target] = ()
 ) -> np.ndarray:
     """Return the image in colour with the dot, the centre and the ID of every target.
 
-    Lines and letters grow with the image, so that they can be read where it is shown as a whole.
+    A line at the top says how many were identified, and through which filter. Lines and letters
+    grow with the image, so that they can be read where it is shown as a whole.
 
     Parameters
     ----------
     image : ndarray, shape (height, width)
         Gray values; those of more than 8 bit are scaled, extremes to 0 and 255.
-    targets : iterable of Target
+    identification : Identification
         What to draw.
     wrong : collection of Target
-        Those of them to draw as wrong.
+        Those of its targets that are known to be wrong.
 
     Returns
     -------
@@ -48,7 +50,7 @@ def overlay(
     """
     canvas = cv2.cvtColor(_eight_bit(image), cv2.COLOR_GRAY2BGR)
     unit = max(1, round(math.hypot(*image.shape) / 2400))
-    for target in targets:
+    for target in identification.targets:
         colour = DECODED_COLOUR
         if target.id == UNDECODED:
             colour = UNDECODED_COLOUR
@@ -58,7 +60,19 @@ def overlay(
         _draw_cross(canvas, target, colour, unit)
         if target.id != UNDECODED:
             _draw_label(canvas, target, colour, unit)
+    _draw_text(canvas, summary(identification), (8 * unit, 30 * unit), _TEXT_COLOUR, unit, unit)
     return canvas
+
+
+def summary(identification: Identification) -> str:
+    """Return n, N and the filter of an identification in words."""
+    words = f'{identification.count} identified'
+    if identification.expected:
+        words += f' of {identification.expected}'
+    used = identification.filter
+    if not used.applied:
+        return f'{words}, no filter'
+    return f'{words}, gamma_high {used.gamma_high:g}, gamma_low {used.gamma_low:g}'
 
 
 def _eight_bit(image: np.ndarray) -> np.ndarray:
@@ -102,11 +116,22 @@ def _draw_label(
         left = target.x - offset - width
     if bottom - height < 0:
         bottom = target.y + offset + height
+    _draw_text(canvas, text, (round(left), round(bottom)), colour, scale, unit)
+
+
+def _draw_text(
+    canvas: np.ndarray,
+    text: str,
+    place: tuple[int, int],
+    colour: tuple[int, int, int],
+    scale: float,
+    unit: int,
+) -> None:
     # The outline is the text, displaced: a wider stroke is not the same in all versions of OpenCV.
     places = [(unit * i, unit * j, _OUTLINE_COLOUR) for i in (-1, 0, 1) for j in (-1, 0, 1)]
     for across, down, shade in (*places, (0, 0, colour)):
-        place = (round(left) + across, round(bottom) + down)
-        cv2.putText(canvas, text, place, _FONT, scale, shade, 2 * unit, cv2.LINE_AA)
+        corner = (place[0] + across, place[1] + down)
+        cv2.putText(canvas, text, corner, _FONT, scale, shade, 2 * unit, cv2.LINE_AA)
 
 
 def _fixed(coordinate: float) -> int:
