@@ -1,0 +1,1 @@
+"""The ROS 2 nodes, and nothing but them: what they do is done by the rooms below."""

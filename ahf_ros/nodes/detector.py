@@ -1,0 +1,157 @@
+"""The node `detector`: images in, identified targets out."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+import traceback
+from collections.abc import Callable, Sequence
+from concurrent.futures import CancelledError
+from contextlib import suppress
+from functools import partial
+from typing import TypeVar
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from sensor_msgs.msg import Image
+from std_msgs.msg import Header
+from std_srvs.srv import Trigger
+
+from ahf_ros.drawing import draw
+from ahf_ros.msg import CodedTargetArray
+from ahf_ros.nodes.diagnostics import Diagnostics, Tally
+from ahf_ros.nodes.image_msg import image_message
+from ahf_ros.nodes.parameters import ParameterSettings
+from ahf_ros.nodes.pipeline import Pipeline, Refused
+from ahf_ros.nodes.process import ProcessNode, run
+from ahf_ros.nodes.settings import DetectorNodeSettings
+from ahf_ros.nodes.worker import Worker
+from ahf_ros.srv import Identify
+
+Result = TypeVar('Result')
+
+DIAGNOSTICS_PERIOD = 1.0
+"""Time between two statements on /diagnostics, s."""
+
+LOG_PERIOD = 5.0
+"""Shortest time between two log lines about images that are refused, s."""
+
+
+class DetectorNode(ProcessNode):
+    """Identifies the targets of the latest image, one image at a time.
+
+    Parameters and services are answered meanwhile. Every image that is accepted gets an answer,
+    unless a later one comes in before its turn; one that is not is counted and named in the log.
+    """
+
+    def __init__(self) -> None:
+        super().__init__('detector')
+        self._stopping = threading.Event()
+        self._settings = ParameterSettings(self, DetectorNodeSettings, self._renew)
+        self._renew()
+        self._worker = Worker()
+        self._tally = Tally()
+        name = self.get_fully_qualified_name().lstrip('/')
+        self._diagnostics = Diagnostics(f'{name}: identification', self._tally)
+
+        self._targets = self.publisher(CodedTargetArray, 'coded_targets')
+        self._debug_image = self.publisher(Image, '~/debug_image')
+        self._filtered_image = self.publisher(Image, '~/filtered_image')
+        self._diagnostic_array = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        self.create_timer(DIAGNOSTICS_PERIOD, self._publish_diagnostics)
+        self.subscribe(Image, 'image', self._on_image)
+        requests = MutuallyExclusiveCallbackGroup()
+        self.create_service(Identify, '~/identify', self._on_identify, callback_group=requests)
+        self.create_service(Trigger, '~/reset', self._on_reset, callback_group=requests)
+
+    def close(self) -> None:
+        """Break off the identification that is going on."""
+        self._stopping.set()
+        self._worker.stop()
+
+    def _renew(self) -> None:
+        """Work on the images from now on as the parameters say now."""
+        self._pipeline = Pipeline(self._settings.current, self._stopping)
+
+    def _on_image(self, message: Image) -> None:
+        self._tally.received += 1
+        job = partial(self._process, message, self._pipeline, time.monotonic())
+        if self._worker.offer(job):
+            self._tally.dropped += 1
+
+    def _on_identify(
+        self, request: Identify.Request, response: Identify.Response
+    ) -> Identify.Response:
+        pipeline = self._pipeline
+        expected = request.expected or pipeline.settings.expected_targets
+        try:
+            answer = self._worker.call(
+                partial(self._attempt, partial(pipeline.answer, request.image, expected))
+            )
+        except (Refused, CancelledError) as error:
+            response.message = str(error)
+            return response
+        response.success = True
+        response.coded_targets = answer.message
+        return response
+
+    def _on_reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self._worker.call(self._pipeline.reset)
+        response.success = True
+        return response
+
+    def _process(self, message: Image, pipeline: Pipeline, received: float) -> None:
+        """Identify the targets of an image and publish everything about it."""
+        with suppress(Refused):
+            self._attempt(partial(self._answer, message, pipeline, received))
+
+    def _answer(self, message: Image, pipeline: Pipeline, received: float) -> None:
+        answer = pipeline.answer(message, pipeline.settings.expected_targets)
+        self._targets.publish(answer.message)
+        self._tally.answered += 1
+        self._tally.latency = time.monotonic() - received
+        self._tally.last = answer.identification
+        if self._debug_image.get_subscription_count():
+            drawn = draw(answer.image, answer.identification)
+            self._debug_image.publish(image_message(drawn, message.header))
+        if self._filtered_image.get_subscription_count():
+            filtered = pipeline.filtered(answer)
+            self._filtered_image.publish(image_message(filtered, message.header))
+
+    def _attempt(self, job: Callable[[], Result]) -> Result:
+        """Return the result of a job on an image, or count and log why there is none.
+
+        Raises
+        ------
+        Refused
+            Whatever the job raises.
+        """
+        try:
+            return job()
+        except Refused:
+            raise
+        except ValueError as error:
+            reason = str(error)
+        except Exception as error:
+            # A node does not die of an image, whatever it does to a detector.
+            reason = f'{type(error).__name__}: {error}'
+            self.get_logger().error(traceback.format_exc())
+        self._tally.rejected += 1
+        self._tally.reason = reason
+        self.get_logger().warning(f'image refused: {reason}', throttle_duration_sec=LOG_PERIOD)
+        raise Refused(reason)
+
+    def _publish_diagnostics(self) -> None:
+        status = self._diagnostics.status(DIAGNOSTICS_PERIOD)
+        header = Header(stamp=self.get_clock().now().to_msg())
+        self._diagnostic_array.publish(DiagnosticArray(header=header, status=[status]))
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the node."""
+    return run(DetectorNode, arguments)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,76 @@
+"""What the node `detector` says about itself on /diagnostics."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+
+from ahf_ros.target import Identification
+
+
+@dataclass(slots=True)
+class Tally:
+    """What became of the images.
+
+    Attributes
+    ----------
+    received, answered, dropped, rejected : int
+        Images from the start: come in; identified, whatever was found; overtaken by a later one
+        before their turn; not accepted.
+    reason : str
+        Why the last one that was rejected was.
+    latency : float
+        Time from an image in to its targets out, s, of the last one.
+    last : Identification
+        The last one.
+    """
+
+    received: int = 0
+    answered: int = 0
+    dropped: int = 0
+    rejected: int = 0
+    reason: str = ''
+    latency: float = 0.0
+    last: Identification = field(default_factory=lambda: Identification(()))
+
+
+class Diagnostics:
+    """Turns a tally into one status a period; rates and the level are those of the period."""
+
+    def __init__(self, name: str, tally: Tally) -> None:
+        self._name = name
+        self._tally = tally
+        self._answered = 0
+        self._rejected = 0
+
+    def status(self, period: float) -> DiagnosticStatus:
+        """Return the status of the last `period` seconds."""
+        tally = self._tally
+        answered, rejected = tally.answered - self._answered, tally.rejected - self._rejected
+        self._answered, self._rejected = tally.answered, tally.rejected
+        level, message = DiagnosticStatus.OK, f'{answered} images identified'
+        if rejected:
+            level, message = DiagnosticStatus.WARN, f'{rejected} images rejected: {tally.reason}'
+        used = tally.last.filter
+        values = {
+            'rate (Hz)': f'{answered / period:.2f}',
+            'latency (s)': f'{tally.latency:.3f}',
+            'received': tally.received,
+            'answered': tally.answered,
+            'dropped': tally.dropped,
+            'rejected': tally.rejected,
+            'last reason for rejection': tally.reason,
+            'identified (n)': tally.last.count,
+            'expected (N)': tally.last.expected,
+            'filter applied': used.applied,
+            'gamma_high': f'{used.gamma_high:.2f}',
+            'gamma_low': f'{used.gamma_low:.2f}',
+            'evaluations': used.evaluations,
+        }
+        return DiagnosticStatus(
+            level=level,
+            name=self._name,
+            message=message,
+            values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
+        )

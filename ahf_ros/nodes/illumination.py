@@ -1,0 +1,125 @@
+"""The node `illumination`: synthetic images of targets under projected light, with their truth."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from sensor_msgs.msg import CameraInfo, Image
+from std_msgs.msg import Header
+
+from ahf_ros.msg import CodedTargetArray
+from ahf_ros.nodes.image_msg import image_message
+from ahf_ros.nodes.parameters import ParameterSettings
+from ahf_ros.nodes.process import ProcessNode, run
+from ahf_ros.nodes.settings import IlluminationNodeSettings
+from ahf_ros.nodes.target_msg import coded_target_array
+from ahf_ros.nodes.worker import Worker
+from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
+from ahf_ros.target import Identification
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """The messages of one image, which share a header."""
+
+    image: Image
+    camera_info: CameraInfo
+    ground_truth: CodedTargetArray
+
+
+class IlluminationNode(ProcessNode):
+    """Publishes rendered images in turn, each with what it truly shows."""
+
+    def __init__(self) -> None:
+        super().__init__('illumination')
+        self._settings = ParameterSettings(self, IlluminationNodeSettings, self._restart)
+        self._scenes: list[SceneSettings] = []
+        self._frames: list[Frame] = []
+        self._published = 0
+        self._image = self.publisher(Image, 'image')
+        self._camera_info = self.publisher(CameraInfo, 'camera_info')
+        self._ground_truth = self.publisher(CodedTargetArray, 'ground_truth')
+        self._timer = self.create_timer(1 / self._settings.current.rate, self._publish)
+        self._worker = Worker()
+        self._restart()
+
+    def close(self) -> None:
+        """Return when the image that is being rendered is done."""
+        self._frames = []
+        self._worker.stop()
+
+    def _restart(self) -> None:
+        """Render what the parameters say now and publish it as often as they say."""
+        settings = self._settings.current
+        self._timer.timer_period_ns = round(1e9 / settings.rate)
+        self._timer.reset()
+        if settings.scenes() == self._scenes:
+            return
+        self._scenes = settings.scenes()
+        self._frames = []
+        self._published = 0
+        self._worker.offer(partial(self._render, self._scenes, self._frames))
+
+    def _render(self, scenes: list[SceneSettings], frames: list[Frame]) -> None:
+        """Append every frame of the cycle, until other frames are wanted or none."""
+        for scene in scenes:
+            if self._frames is not frames:
+                return
+            try:
+                frames.append(make_frame(render(scene)))
+            except ValueError as error:
+                self.get_logger().error(f'nothing to publish: {error}')
+                return
+
+    def _publish(self) -> None:
+        """Publish the frame whose turn it is, if it is rendered already."""
+        turn = self._published % len(self._scenes)
+        if turn >= len(self._frames):
+            return
+        frame = self._frames[turn]
+        frame_id = self._settings.current.frame_id
+        header = Header(stamp=self.get_clock().now().to_msg(), frame_id=frame_id)
+        for message in (frame.ground_truth, frame.camera_info, frame.image):
+            message.header = header
+        self._ground_truth.publish(frame.ground_truth)
+        self._camera_info.publish(frame.camera_info)
+        self._image.publish(frame.image)
+        self._published += 1
+
+
+def make_frame(rendering: Rendering) -> Frame:
+    """Return the messages of a rendered image."""
+    settings = rendering.settings
+    truth = Identification(rendering.targets, expected=len(rendering.targets))
+    return Frame(
+        image_message(rendering.image, Header()),
+        camera_info(rendering),
+        coded_target_array(truth, settings.family, rendering.image.shape, Header()),
+    )
+
+
+def camera_info(rendering: Rendering) -> CameraInfo:
+    """Return the calibration of the camera of a rendered image."""
+    projection = np.hstack((rendering.intrinsics, np.zeros((3, 1))))
+    return CameraInfo(
+        width=rendering.settings.width,
+        height=rendering.settings.height,
+        distortion_model='plumb_bob',
+        d=[rendering.settings.distortion, 0.0, 0.0, 0.0, 0.0],
+        k=rendering.intrinsics.ravel(),
+        r=np.eye(3).ravel(),
+        p=projection.ravel(),
+    )
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the node."""
+    return run(IlluminationNode, arguments)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,94 @@
+"""From an image message to the message that answers it."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass
+
+import numpy as np
+from sensor_msgs.msg import Image
+
+from ahf_ros.adaptive import AdaptiveIdentifier
+from ahf_ros.detectors import create
+from ahf_ros.homomorphic import HomomorphicFilter
+from ahf_ros.msg import CodedTargetArray
+from ahf_ros.nodes.image_msg import gray_image
+from ahf_ros.nodes.settings import DetectorNodeSettings
+from ahf_ros.nodes.target_msg import coded_target_array
+from ahf_ros.target import Identification, Target
+
+
+class Refused(Exception):
+    """There is no answer for an image; the text says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What an image shows.
+
+    Attributes
+    ----------
+    image : ndarray of uint8, shape (height, width)
+        The image as received, in gray.
+    identification : Identification
+        What was identified in it.
+    message : CodedTargetArray
+        The same, to be sent.
+    """
+
+    image: np.ndarray
+    identification: Identification
+    message: CodedTargetArray
+
+
+class Pipeline:
+    """Detector and adaptive filter, as long as the settings that they are made from are in force.
+
+    Parameters
+    ----------
+    settings : DetectorNodeSettings
+        Of the node.
+    stopping : threading.Event
+        Breaks off what is going on, also a search, at its next step.
+    """
+
+    def __init__(self, settings: DetectorNodeSettings, stopping: threading.Event) -> None:
+        self.settings = settings
+        self._stopping = stopping
+        self._detector = create(settings.detector, settings.target)
+        self._identifier = AdaptiveIdentifier(self._detect, settings.adaptive)
+
+    def answer(self, message: Image, expected: int) -> Answer:
+        """Identify the targets of an image.
+
+        Raises
+        ------
+        ValueError
+            If the image is not accepted.
+        Refused
+            If the node stops before.
+        """
+        image = gray_image(message)
+        identification = self._identifier.identify(image, expected)
+        sent = coded_target_array(
+            identification, self.settings.target.family, image.shape, message.header
+        )
+        return Answer(image, identification, sent)
+
+    def filtered(self, answer: Answer) -> np.ndarray:
+        """Return the image in which the targets of an answer were found."""
+        used = answer.identification.filter
+        if not used.applied:
+            return answer.image
+        return HomomorphicFilter(answer.image, self.settings.adaptive.filter).filtered(
+            used.gamma_high, used.gamma_low, used.cutoff, used.attenuation
+        )
+
+    def reset(self) -> None:
+        """Forget what was learnt from earlier images."""
+        self._identifier.reset()
+
+    def _detect(self, image: np.ndarray) -> list[Target]:
+        if self._stopping.is_set():
+            raise Refused('the node stops')
+        return self._detector(image)

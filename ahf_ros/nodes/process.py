@@ -1,0 +1,113 @@
+"""How a node is entered and left."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import rclpy
+from rclpy.exceptions import ParameterException
+from rclpy.executors import MultiThreadedExecutor
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import QoSProfile
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
+
+ENDING = {signal.SIGINT, signal.SIGTERM}
+"""Signals that end a node."""
+
+
+class ProcessNode(Node):
+    """A node that is the whole of a process.
+
+    Attributes
+    ----------
+    ended : rclpy.task.Future
+        Done as soon as the node is to end, by a signal or of its own accord.
+    """
+
+    def __init__(self, name: str) -> None:
+        super().__init__(name)
+        self.ended = Future()
+
+    def close(self) -> None:
+        """End the threads of the node; topics and the log still work."""
+
+    def publisher(self, kind: type, topic: str) -> Publisher:
+        """Return a publisher, reliable and of depth 1 where `qos_overrides` do not say more."""
+        options = QoSOverridingOptions.with_default_policies()
+        return self.create_publisher(
+            kind, topic, QoSProfile(depth=1), qos_overriding_options=options
+        )
+
+    def subscribe(self, kind: type, topic: str, callback: Callable[[Any], None]) -> None:
+        """Subscribe to a topic, reliable and of depth 1 where `qos_overrides` do not say more."""
+        options = QoSOverridingOptions.with_default_policies()
+        self.create_subscription(
+            kind, topic, callback, QoSProfile(depth=1), qos_overriding_options=options
+        )
+
+
+def run(make_node: Callable[[], ProcessNode], arguments: Sequence[str] | None = None) -> int:
+    """Run a node until it has ended or gets SIGINT or SIGTERM, and return the exit status.
+
+    Parameters
+    ----------
+    make_node : callable
+        Makes the node, once rclpy is initialised.
+    arguments : sequence of str, optional
+        Of the command line; those of the process where not given.
+
+    Returns
+    -------
+    int
+        0, or 1 where a parameter given at the start is refused; stderr tells which and why.
+    """
+    signalled = _signalled()
+    rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        node = make_node()
+    except (ValueError, ParameterException) as error:
+        print(error, file=sys.stderr)
+        rclpy.shutdown()
+        return 1
+    threading.Thread(target=_end_at_signal, args=(node.ended, signalled), daemon=True).start()
+    # One thread for a service that takes as long as an identification, one for all that is short.
+    executor = MultiThreadedExecutor(num_threads=2)
+    executor.add_node(node)
+    try:
+        executor.spin_until_future_complete(node.ended)
+    finally:
+        node.close()
+        executor.shutdown()
+        node.destroy_node()
+        rclpy.shutdown()
+        for number in ENDING:
+            # What is left to do, Python and the middleware do, for some tenths of a second.
+            signal.signal(number, signal.SIG_IGN)
+    return 0
+
+
+def _signalled() -> int:
+    """Return a file descriptor that can be read from as soon as there was a signal.
+
+    A node then ends in order, and a second signal, as a terminal and a launch file send for the
+    same Ctrl-C, does not break that order off.
+    """
+    signalled, written = os.pipe()
+    os.set_blocking(written, False)
+    signal.set_wakeup_fd(written)
+    for number in ENDING:
+        signal.signal(number, lambda *_: None)
+    return signalled
+
+
+def _end_at_signal(ended: Future, signalled: int) -> None:
+    os.read(signalled, 1)
+    ended.set_result(None)

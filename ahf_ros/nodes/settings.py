@@ -1,0 +1,58 @@
+"""What can be set on the nodes; readable without ROS."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+from ahf_ros.adaptive import AdaptiveSettings
+from ahf_ros.detectors import DETECTOR, DetectorSettings
+from ahf_ros.parameter import check_parameters, parameter
+from ahf_ros.synthetic.scene import SceneSettings
+
+LARGEST_COUNT = 100000
+"""Largest number of targets that an image can be told to show."""
+
+
+@dataclass(frozen=True, slots=True)
+class DetectorNodeSettings:
+    """The node `detector`: which identification, of how many targets, driven by which search."""
+
+    detector: str = parameter(DETECTOR.default, DETECTOR.description, choices=DETECTOR.choices)
+    expected_targets: int = parameter(
+        0,
+        'N, the number of coded targets in every image; 0: unknown, no filter is searched.',
+        minimum=0,
+        maximum=LARGEST_COUNT,
+    )
+    target: DetectorSettings = field(default_factory=DetectorSettings)
+    adaptive: AdaptiveSettings = field(default_factory=AdaptiveSettings)
+
+    def __post_init__(self) -> None:
+        """Refuse values that are not accepted."""
+        check_parameters(self)
+
+
+@dataclass(frozen=True, slots=True)
+class IlluminationNodeSettings:
+    """The node `illumination`: which synthetic images, and how often."""
+
+    rate: float = parameter(1.0, 'Images per second.', minimum=0.001, maximum=1000.0)
+    frames: int = parameter(
+        3,
+        'Number of different images, published in turn; the seed grows by one with each.',
+        minimum=1,
+        maximum=1000,
+    )
+    frame_id: str = parameter('camera', 'Frame of the camera, in the header of every image.')
+    scene: SceneSettings = field(default_factory=SceneSettings)
+
+    def __post_init__(self) -> None:
+        """Refuse values that are not accepted."""
+        check_parameters(self)
+        self.scenes()
+
+    def scenes(self) -> list[SceneSettings]:
+        """Return the scene of every image, in the order in which they are published."""
+        return [
+            replace(self.scene, seed=self.scene.seed + number) for number in range(self.frames)
+        ]
