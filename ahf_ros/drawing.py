@@ -60,7 +60,7 @@ def draw(
         _draw_cross(canvas, target, colour, unit)
         if target.id != UNDECODED:
             _draw_label(canvas, target, colour, unit)
-    _draw_text(canvas, summary(identification), (8 * unit, 30 * unit), _TEXT_COLOUR, unit, unit)
+    _draw_title(canvas, summary(identification), unit)
     return canvas
 
 
@@ -117,6 +117,14 @@ def _draw_label(
     if bottom - height < 0:
         bottom = target.y + offset + height
     _draw_text(canvas, text, (round(left), round(bottom)), colour, scale, unit)
+
+
+def _draw_title(canvas: np.ndarray, text: str, unit: int) -> None:
+    """Write a line at the top left, smaller where the image is narrow."""
+    (width, _), _ = cv2.getTextSize(text, _FONT, 1.0, 2 * unit)
+    scale = min(float(unit), 0.95 * canvas.shape[1] / width)
+    place = (round(8 * scale), round(30 * scale))
+    _draw_text(canvas, text, place, _TEXT_COLOUR, scale, unit)
 
 
 def _draw_text(

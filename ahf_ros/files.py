@@ -1,11 +1,19 @@
-"""Images from files, and to files."""
+"""Images, truth and results in files."""
 
 from __future__ import annotations
 
-from pathlib import Path
+import csv
+import json
+import math
+from collections.abc import Iterable, Iterator
+from pathlib import Path, PurePath
+from typing import Any
 
 import cv2
 import numpy as np
+
+from ahf_ros.evaluation import TrueTarget, Truth
+from ahf_ros.target import Target
 
 SUFFIXES = ('.bmp', '.jpeg', '.jpg', '.png', '.tif', '.tiff')
 """Endings of the image files that are tested; others are tried."""
@@ -69,6 +77,157 @@ def write_image(path: str | Path, image: np.ndarray) -> None:
         path.write_bytes(encoded.tobytes())
     except OSError as error:
         raise ValueError(f'{path} cannot be written: {error.strerror}') from error
+
+
+def read_truth(path: str | Path) -> dict[str, tuple[TrueTarget, ...]]:
+    """Return what images show, from a table.
+
+    Parameters
+    ----------
+    path : str or Path
+        CSV file in UTF-8 with a header and the columns image, id, x, y and, if some targets are
+        not, confirmed (1 or 0), in any order; others are ignored. Folders before the name of an
+        image are left out.
+
+    Returns
+    -------
+    dict of str to tuple of TrueTarget
+        The targets of each image.
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be read or a line is not as described; the message names both.
+    """
+    try:
+        text = _read(Path(path)).decode('utf-8-sig')
+    except UnicodeDecodeError as error:
+        raise ValueError(f'{path} is not a text in UTF-8, accepted is a table') from error
+    rows = csv.DictReader(text.splitlines())
+    missing = {'image', 'id', 'x', 'y'} - set(rows.fieldnames or ())
+    if missing:
+        raise ValueError(f'{path} has no column {", ".join(sorted(missing))}')
+    truth: dict[str, list[TrueTarget]] = {}
+    images: dict[str, str] = {}
+    for row in rows:
+        where = f'{path}, line {rows.line_num}'
+        target = TrueTarget(
+            _integer(row['id'], f'{where}: id'),
+            _number(row['x'], f'{where}: x'),
+            _number(row['y'], f'{where}: y'),
+            _integer(row.get('confirmed', 1), f'{where}: confirmed') != 0,
+        )
+        name = _base_name(row['image'], where)
+        if images.setdefault(name, row['image']) != row['image']:
+            raise ValueError(f'{where}: {name} is in two folders, accepted is one image a name')
+        truth.setdefault(name, []).append(target)
+    return {name: tuple(targets) for name, targets in truth.items()}
+
+
+def write_truth(path: str | Path, truth: Truth) -> None:
+    """Write what images show as a table that `read_truth` reads.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file, replaced where it exists.
+    truth : mapping of str to sequence of TrueTarget
+        The targets of each image; coordinates are written to 0.0001 px.
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be written.
+    """
+    rows = [['image', 'id', 'x', 'y', 'confirmed']]
+    for name, targets in truth.items():
+        for item in targets:
+            place = [f'{item.x:.4f}', f'{item.y:.4f}']
+            rows.append([name, str(item.id), *place, str(int(item.confirmed))])
+    try:
+        with Path(path).open('w', encoding='utf-8', newline='') as file:
+            csv.writer(file, lineterminator='\n').writerows(rows)
+    except OSError as error:
+        raise ValueError(f'{path} cannot be written: {error.strerror}') from error
+
+
+def read_results(lines: Iterable[str], source: str) -> dict[str, tuple[Target, ...]]:
+    """Return what was identified, from the lines that `ahf identify --json` prints.
+
+    Parameters
+    ----------
+    lines : iterable of str
+        JSON objects with an image and its targets, of which id, x and y are needed; empty lines
+        are left out.
+    source : str
+        What errors call them.
+
+    Returns
+    -------
+    dict of str to tuple of Target
+        By the name of the image, without folders.
+
+    Raises
+    ------
+    ValueError
+        If a line is not as described, or two are about images of the same name.
+    """
+    results: dict[str, tuple[Target, ...]] = {}
+    for number, line in enumerate(lines, start=1):
+        if not line.strip():
+            continue
+        where = f'{source}, line {number}'
+        try:
+            record = json.loads(line)
+        except json.JSONDecodeError as error:
+            raise ValueError(f'{where} is not JSON: {error.msg}') from error
+        if not isinstance(record, dict) or not isinstance(record.get('targets'), list):
+            raise ValueError(f'{where} is not an object with an image and a list of targets')
+        name = _base_name(record.get('image'), where)
+        if name in results:
+            raise ValueError(f'{where}: {name} has appeared before, accepted is one line an image')
+        results[name] = tuple(_targets(record['targets'], where))
+    return results
+
+
+def _targets(records: list[Any], where: str) -> Iterator[Target]:
+    for record in records:
+        if not isinstance(record, dict):
+            raise ValueError(f'{where}: target is {record!r}, accepted is an object')
+        yield Target(
+            id=_integer(record.get('id'), f'{where}: id'),
+            code=_integer(record.get('code', 0), f'{where}: code'),
+            x=_number(record.get('x'), f'{where}: x'),
+            y=_number(record.get('y'), f'{where}: y'),
+            semi_major=_number(record.get('semi_major', 0), f'{where}: semi_major'),
+            semi_minor=_number(record.get('semi_minor', 0), f'{where}: semi_minor'),
+        )
+
+
+def _base_name(image: Any, where: str) -> str:
+    if not isinstance(image, str) or not PurePath(image).name:
+        raise ValueError(f'{where}: image is {image!r}, accepted is the name of a file')
+    return PurePath(image).name
+
+
+def _integer(value: Any, name: str) -> int:
+    try:
+        number = int(value)
+    except (OverflowError, TypeError, ValueError) as error:
+        raise ValueError(f'{name} is {value!r}, accepted is an integer') from error
+    if isinstance(value, float) and number != value:
+        raise ValueError(f'{name} is {value!r}, accepted is an integer')
+    return number
+
+
+def _number(value: Any, name: str) -> float:
+    try:
+        number = float(value)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f'{name} is {value!r}, accepted is a number') from error
+    if not math.isfinite(number):
+        raise ValueError(f'{name} is {value!r}, accepted is a finite number')
+    return number
 
 
 def _read(path: Path) -> bytes:
