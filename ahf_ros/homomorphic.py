@@ -54,7 +54,7 @@ class FilterSettings:
         maximum=1.0,
     )
     black_percentile: float = parameter(
-        0.5, 'Percentile of the filtered image that turns black.', minimum=0.0, maximum=49.0
+        0.1, 'Percentile of the filtered image that turns black.', minimum=0.0, maximum=49.0
     )
     white_percentile: float = parameter(
         99.5, 'Percentile of the filtered image that turns white.', minimum=51.0, maximum=100.0
