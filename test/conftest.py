@@ -26,12 +26,14 @@ class NodeProcess:
 
     def __init__(self, node: str, *arguments: str) -> None:
         command = [sys.executable, '-m', f'ahf_ros.nodes.{node}', '--ros-args', *arguments]
+        self.awaited = False
         self.process = subprocess.Popen(
             command, env={**os.environ, **ROS_ENVIRONMENT}, stderr=subprocess.PIPE, text=True
         )
 
     def wait(self) -> tuple[int, str]:
         """Return exit status and error output of the process when it has ended."""
+        self.awaited = True
         try:
             errors = self.process.communicate(timeout=PATIENCE)[1]
         except subprocess.TimeoutExpired:
@@ -70,6 +72,8 @@ class Graph:
         limit = time.monotonic() + PATIENCE
         while not (result := condition()):
             assert time.monotonic() < limit, 'waited in vain'
+            for item in self._processes:
+                assert item.awaited or item.process.poll() is None, item.wait()[1]
             rclpy.spin_once(self.node, timeout_sec=0.05)
         return result
 

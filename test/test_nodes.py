@@ -301,10 +301,16 @@ def test_parameters_are_answered_and_the_latest_image_waits_during_a_search(
     def answer(image: Image) -> CodedTargetArray | None:
         return next((it for it in detector.targets if it.header == image.header), None)
 
+    def received() -> int:
+        return int(values(diagnostics[-1])['received'])
+
     search = *ENDLESS, ('max_duration', 5.0), ('expected_targets', 50)
     assert detector.set(*search) == (True, '')
+    diagnostics = graph.listen(DiagnosticArray, '/diagnostics')
+    graph.until(lambda: diagnostics)
+    before = received()
     detector.image.publish(images[0])
-    graph.call(GetParameters, '/own/detector/get_parameters', GetParameters.Request())
+    graph.until(lambda: received() > before)
     for image in images[1:3]:
         detector.image.publish(image)
     assert detector.set(('expected_targets', 6)) == (True, '')
