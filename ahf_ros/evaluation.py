@@ -254,7 +254,7 @@ def table(scores: Mapping[str, Score]) -> str:
         Figures by the name of the image.
     """
     head = ('image', 'N', 'n', 'I', 'd', 'C %', 'R %', 'D %', 'wrong', 'false')
-    rows = [(*head, 'RMSE X px', 'Y', 'XY')]
+    rows: list[tuple[str, ...]] = [(*head, 'RMSE X px', 'Y', 'XY')]
     rows += [_row(name, item) for name, item in scores.items()]
     rows.append(_row('total', total(scores.values())))
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]

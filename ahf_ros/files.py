@@ -5,7 +5,8 @@ from __future__ import annotations
 import csv
 import json
 import math
-from collections.abc import Iterable, Iterator
+import sys
+from collections.abc import Iterator
 from pathlib import Path, PurePath
 from typing import Any
 
@@ -99,11 +100,7 @@ def read_truth(path: str | Path) -> dict[str, tuple[TrueTarget, ...]]:
     ValueError
         If the file cannot be read or a line is not as described; the message names both.
     """
-    try:
-        text = _read(Path(path)).decode('utf-8-sig')
-    except UnicodeDecodeError as error:
-        raise ValueError(f'{path} is not a text in UTF-8, accepted is a table') from error
-    rows = csv.DictReader(text.splitlines())
+    rows = csv.DictReader(_text(path).splitlines())
     missing = {'image', 'id', 'x', 'y'} - set(rows.fieldnames or ())
     if missing:
         raise ValueError(f'{path} has no column {", ".join(sorted(missing))}')
@@ -151,16 +148,14 @@ def write_truth(path: str | Path, truth: Truth) -> None:
         raise ValueError(f'{path} cannot be written: {error.strerror}') from error
 
 
-def read_results(lines: Iterable[str], source: str) -> dict[str, tuple[Target, ...]]:
-    """Return what was identified, from the lines that `ahf identify --json` prints.
+def read_results(path: str | Path) -> dict[str, tuple[Target, ...]]:
+    """Return what was identified, from what `ahf identify --json` printed.
 
     Parameters
     ----------
-    lines : iterable of str
-        JSON objects with an image and its targets, of which id, x and y are needed; empty lines
-        are left out.
-    source : str
-        What errors call them.
+    path : str or Path
+        JSON objects, one a line, each with an image and its targets, of which id, x and y are
+        needed; empty lines are left out. Standard input where it is '-'.
 
     Returns
     -------
@@ -170,13 +165,15 @@ def read_results(lines: Iterable[str], source: str) -> dict[str, tuple[Target, .
     Raises
     ------
     ValueError
-        If a line is not as described, or two are about images of the same name.
+        If the file cannot be read, a line is not as described, or two are about images of the
+        same name; the message names both.
     """
     results: dict[str, tuple[Target, ...]] = {}
-    for number, line in enumerate(lines, start=1):
+    text = sys.stdin.read() if path == '-' else _text(path)
+    for number, line in enumerate(text.splitlines(), start=1):
         if not line.strip():
             continue
-        where = f'{source}, line {number}'
+        where = f'{path}, line {number}'
         try:
             record = json.loads(line)
         except json.JSONDecodeError as error:
@@ -188,6 +185,13 @@ def read_results(lines: Iterable[str], source: str) -> dict[str, tuple[Target, .
             raise ValueError(f'{where}: {name} has appeared before, accepted is one line an image')
         results[name] = tuple(_targets(record['targets'], where))
     return results
+
+
+def _text(path: str | Path) -> str:
+    try:
+        return _read(Path(path)).decode('utf-8-sig')
+    except UnicodeDecodeError as error:
+        raise ValueError(f'{path} is not in UTF-8, accepted is a text') from error
 
 
 def _targets(records: list[Any], where: str) -> Iterator[Target]:

@@ -1,0 +1,81 @@
+"""`ahf evaluate`: what was identified against what is there."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from typing import Any
+
+from ahf_ros.cli.options import add_option
+from ahf_ros.evaluation import TOLERANCE, Score, evaluate, table, total
+from ahf_ros.files import read_results, read_truth
+from ahf_ros.parameter import Parameter
+
+DESCRIPTION = 'Compare what `ahf identify --json` printed with the truth.'
+
+TOLERANCE_PARAMETER = Parameter(
+    'tolerance', TOLERANCE, 'Largest distance of a target from the truth, px.', minimum=1e-3
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Give a parser the arguments of the command."""
+    parser.add_argument('truth', metavar='TRUTH.csv', help='Columns image, id, x, y[, confirmed].')
+    parser.add_argument(
+        'results', metavar='RESULTS.jsonl', help='One JSON object an image; - is standard input.'
+    )
+    parser.add_argument(
+        '--json',
+        action='store_true',
+        help='Print one JSON object an image on standard output, and a last one for all of them.',
+    )
+    add_option(parser, TOLERANCE_PARAMETER)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print the figures of every image and of all of them.
+
+    Returns
+    -------
+    int
+        0, or 1 where a file could not be read.
+    """
+    try:
+        truth = read_truth(options.truth)
+        results = read_results(options.results)
+    except ValueError as error:
+        print(f'ahf evaluate: {error}', file=sys.stderr)
+        return 1
+    for name in results:
+        if name not in truth:
+            told = f'ahf evaluate: {name} is not in {options.truth}; all that it shows is false'
+            print(told, file=sys.stderr)
+    scores = evaluate(truth, results, options.tolerance)
+    if options.json:
+        for name, item in scores.items():
+            print(json.dumps(record(name, item)))
+        print(json.dumps(record(None, total(scores.values()))))
+    else:
+        print(table(scores), file=sys.stderr)
+    return 0
+
+
+def record(image: str | None, item: Score) -> dict[str, Any]:
+    """Return the figures of an image as JSON; of all of them where its name is None."""
+    x, y, both = item.rmse or (None, None, None)
+    return {
+        'image': image,
+        'expected': item.expected,
+        'reported': item.reported,
+        'found': item.found,
+        'right': item.right,
+        'correctness': item.correctness,
+        'recall': item.recall,
+        'decoding': item.decoding,
+        'wrong': item.wrong,
+        'false_positives': item.false_positives,
+        'rmse_x': x,
+        'rmse_y': y,
+        'rmse_xy': both,
+    }

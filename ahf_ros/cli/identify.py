@@ -1,0 +1,164 @@
+"""`ahf identify`: the coded targets in image files."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.progress import Progress
+
+from ahf_ros.adaptive import AdaptiveSettings, identify
+from ahf_ros.cli.options import add_options, settings_from
+from ahf_ros.detectors import DETECTOR, DetectorSettings, create
+from ahf_ros.drawing import draw, summary
+from ahf_ros.files import read_image, write_image
+from ahf_ros.parameter import check_parameters, parameter
+from ahf_ros.target import Identification
+
+DESCRIPTION = 'Identify the coded targets in images.'
+
+
+@dataclass(frozen=True, slots=True)
+class IdentifySettings:
+    """What can be set: which identification, of how many targets, driven by which search."""
+
+    expected: int = parameter(
+        0,
+        'Coded targets that each image shows; 0: unknown, no filter is searched for.',
+        minimum=0,
+    )
+    detector: str = parameter(DETECTOR.default, DETECTOR.description, choices=DETECTOR.choices)
+    target: DetectorSettings = field(default_factory=DetectorSettings)
+    adaptive: AdaptiveSettings = field(default_factory=AdaptiveSettings)
+
+    def __post_init__(self) -> None:
+        """Refuse values that are not accepted."""
+        check_parameters(self)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Give a parser the arguments of the command."""
+    parser.add_argument('images', nargs='+', metavar='IMAGE', help='Image files.')
+    parser.add_argument(
+        '--json', action='store_true', help='Print one JSON object an image on standard output.'
+    )
+    parser.add_argument(
+        '--overlay',
+        type=Path,
+        metavar='DIR',
+        help='Write each image with what was identified to this folder, as NAME_overlay.png.',
+    )
+    add_options(parser, IdentifySettings)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Identify, print and draw; each image on its own, whatever came before it.
+
+    Returns
+    -------
+    int
+        0, or 1 where a file could not be read or written.
+
+    Raises
+    ------
+    ValueError
+        If options do not fit each other.
+    """
+    settings = settings_from(options, IdentifySettings)
+    overlays = _overlay_paths(options.images, options.overlay)
+    detector = create(settings.detector, settings.target)
+    failed = False
+    for path in _with_progress(options.images):
+        try:
+            image = read_image(path)
+            found = _named(path, image, detector, settings)
+            if options.json:
+                print(json.dumps(record(path, image, found, settings)), flush=True)
+            _tell(path, found, with_targets=not options.json)
+            if overlays:
+                write_image(overlays[path], draw(image, found))
+        except ValueError as error:
+            print(f'ahf identify: {error}', file=sys.stderr)
+            failed = True
+    return int(failed)
+
+
+def record(
+    path: str, image: np.ndarray, found: Identification, settings: IdentifySettings
+) -> dict[str, Any]:
+    """Return what is printed of an image as JSON.
+
+    Parameters
+    ----------
+    path : str
+        The image, as it was named on the command line.
+    image : ndarray, shape (height, width)
+    found : Identification
+    settings : IdentifySettings
+        What led to it.
+    """
+    height, width = image.shape
+    used = asdict(found.filter)
+    elapsed = used.pop('duration')
+    return {
+        'image': path,
+        'width': width,
+        'height': height,
+        'family': settings.target.family,
+        'detector': settings.detector,
+        'expected': found.expected,
+        'targets': [asdict(target) for target in found.targets],
+        'filter': used,
+        'elapsed_s': elapsed,
+    }
+
+
+def _named(
+    path: str, image: np.ndarray, detector: Any, settings: IdentifySettings
+) -> Identification:
+    try:
+        return identify(image, detector, settings.expected, settings.adaptive)
+    except ValueError as error:
+        raise ValueError(f'{path}: {error}') from error
+
+
+def _overlay_paths(images: list[str], folder: Path | None) -> dict[str, Path]:
+    """Return where the overlay of each image goes; none if there is no folder for them."""
+    if folder is None:
+        return {}
+    paths = {path: folder / f'{Path(path).stem}_overlay.png' for path in images}
+    if len(set(paths.values())) < len(paths):
+        raise ValueError('overlay would hold several images of one name, accepted is one of each')
+    return paths
+
+
+def _with_progress(images: list[str]) -> Iterator[str]:
+    """Yield the images, with a progress bar where people watch and there is something to see."""
+    shown = len(images) > 1 and sys.stderr.isatty()
+    # Standard output is not redirected, or JSON would end in the console of the progress bar.
+    with Progress(
+        console=Console(stderr=True), transient=True, redirect_stdout=False, disable=not shown
+    ) as progress:
+        yield from progress.track(images, description='identify')
+
+
+def _tell(path: str, found: Identification, with_targets: bool) -> None:
+    """Say to people what was identified."""
+    seconds = found.filter.duration
+    print(f'{path}: {summary(found)}, {seconds:.2f} s', file=sys.stderr)
+    if not with_targets:
+        return
+    for target in found.targets:
+        print(
+            f'{target.id:>8} {target.x:10.3f} {target.y:10.3f} px'
+            f'  semi-axes {target.semi_major:.2f} {target.semi_minor:.2f} px'
+            f'  confidence {target.confidence:.3f}',
+            file=sys.stderr,
+        )

@@ -1,0 +1,75 @@
+"""Options of the command line from settings that describe themselves."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from ahf_ros.parameter import Parameter
+from ahf_ros.settings import assemble, flat_parameters
+
+Settings = TypeVar('Settings')
+
+_METAVARS = {int: 'N', float: 'X', str: 'TEXT'}
+
+
+def add_options(parser: argparse.ArgumentParser, settings: type) -> None:
+    """Give a parser one option for every parameter of a settings dataclass.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Gets `--max-radius` for the parameter `max_radius`, and `--ahf` and `--no-ahf` where one is
+        true or false.
+    settings : type
+        Settings dataclass, as for `ahf_ros.settings.flat_parameters`.
+    """
+    for item in flat_parameters(settings):
+        add_option(parser, item)
+
+
+def add_option(parser: argparse.ArgumentParser, item: Parameter, **changes: Any) -> None:
+    """Give a parser the option of one parameter.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+    item : Parameter
+    **changes
+        Arguments of `add_argument` that are to be different.
+    """
+    text = f'{item.description} Default: {item.default}; accepted: {item.accepted}.'
+    arguments: dict[str, Any] = {'default': item.default, 'help': text.replace('%', '%%')}
+    if isinstance(item.default, bool):
+        arguments |= {'action': argparse.BooleanOptionalAction}
+    else:
+        arguments |= {'type': _converter(item), 'metavar': _METAVARS[type(item.default)]}
+    parser.add_argument(f'--{item.name.replace("_", "-")}', **(arguments | changes))
+
+
+def settings_from(options: argparse.Namespace, settings: type[Settings]) -> Settings:
+    """Return the settings that the options say.
+
+    Raises
+    ------
+    ValueError
+        If values do not fit each other.
+    """
+    names = [item.name for item in flat_parameters(settings)]
+    return assemble(settings, {name: getattr(options, name) for name in names})
+
+
+def _converter(item: Parameter) -> Callable[[str], Any]:
+    """Return what turns the text of an option into an accepted value."""
+
+    def convert(text: str) -> Any:
+        try:
+            value = type(item.default)(text)
+            item.check(value)
+        except ValueError as error:
+            told = f'{item.name} is {text!r}, accepted is {item.accepted}'
+            raise argparse.ArgumentTypeError(told) from error
+        return value
+
+    return convert

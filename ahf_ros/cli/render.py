@@ -1,0 +1,81 @@
+"""`ahf render`: synthetic images and their truth."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+from ahf_ros.cli.options import add_option, settings_from
+from ahf_ros.evaluation import TrueTarget
+from ahf_ros.files import read_truth, write_image, write_truth
+from ahf_ros.parameter import Parameter
+from ahf_ros.settings import flat_parameters
+from ahf_ros.synthetic.scene import SceneSettings, render
+
+DESCRIPTION = 'Render images of targets under projected light, with their truth.'
+
+COUNT = Parameter('count', 1, 'Images of each light, the seed grows by one.', minimum=1)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Give a parser the arguments of the command."""
+    parser.add_argument(
+        'folder',
+        type=Path,
+        metavar='DIR',
+        help='Folder for LIGHT_AMBIENT_SEED.png and truth.csv, made where it does not exist.',
+    )
+    add_option(parser, COUNT)
+    for item in flat_parameters(SceneSettings):
+        if item.name == 'light':
+            add_option(parser, item, nargs='+', default=[item.default])
+        else:
+            add_option(parser, item)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Render the images and add their truth to that of the folder.
+
+    Returns
+    -------
+    int
+        0, or 1 where a file could not be read or written, or a scene could not be made.
+
+    Raises
+    ------
+    ValueError
+        If options do not fit each other.
+    """
+    scenes = _scenes(options)
+    truth_path = options.folder / 'truth.csv'
+    try:
+        truth = dict(read_truth(truth_path)) if truth_path.exists() else {}
+        for scene in scenes:
+            rendering = render(scene)
+            name = f'{scene.light}_{scene.ambient:g}_{scene.seed}.png'
+            write_image(options.folder / name, rendering.image)
+            truth[name] = tuple(
+                TrueTarget(target.id, target.x, target.y) for target in rendering.targets
+            )
+            write_truth(truth_path, truth)
+            told = f'{options.folder / name}: {len(rendering.targets)} targets'
+            print(told, file=sys.stderr)
+    except ValueError as error:
+        print(f'ahf render: {error}', file=sys.stderr)
+        return 1
+    return 0
+
+
+def _scenes(options: argparse.Namespace) -> list[SceneSettings]:
+    lights = options.light
+    first = [
+        settings_from(argparse.Namespace(**vars(options) | {'light': light}), SceneSettings)
+        for light in lights
+    ]
+    return [
+        replace(scene, seed=scene.seed + number)
+        for scene in first
+        for number in range(options.count)
+    ]
