@@ -38,8 +38,8 @@ MINIMUM_CONTRAST = 20
 REDUCTION = 4
 """The darkest and the brightest are looked for in an image reduced by this."""
 
-MINIMUM_ROUNDNESS = 0.5
-"""Smallest 4 pi area / perimeter^2 of a dot; an ellipse seen at 70 degrees has 0.65."""
+MINIMUM_ROUNDNESS = 0.4
+"""Smallest 4 pi area / perimeter^2 of a dot; a circle seen at 70 degrees has 0.67, at 78 0.45."""
 
 MAXIMUM_MISFIT = 0.12
 """Largest relative difference between the area of a contour and that of its ellipse."""
@@ -50,7 +50,7 @@ MAXIMUM_SCATTER = 0.08
 SAMPLES_PER_SECTOR = 12
 """Directions in which the band of a target is sampled, per sector of the code."""
 
-MARGIN = 0.35
+MARGIN = 0.5
 """Distance from the band at which the margin of a target is tested, in radii of the dot."""
 
 LEVEL = 0.4
