@@ -1,5 +1,6 @@
 # make demo   two ROS 2 nodes, striped light, one line an image, an annotated picture in demo/
 # make test   every check: ruff, mypy, the import rules, the tests
+# make demo DEMO='--light lattice --detector traditional'   and so on: ahf_demo --help
 # Both set up .venv first; nothing is installed outside it.
 
 PYTHON ?= python3
@@ -15,7 +16,7 @@ unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 .DELETE_ON_ERROR:
 
 demo: $(READY)
-	$(BIN)/ahf_demo
+	$(BIN)/ahf_demo $(DEMO)
 
 test: $(READY)
 	$(BIN)/ruff check .

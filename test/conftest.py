@@ -27,15 +27,20 @@ class NodeProcess:
     def __init__(self, node: str, *arguments: str) -> None:
         command = [sys.executable, '-m', f'ahf_ros.nodes.{node}', '--ros-args', *arguments]
         self.awaited = False
+        self.output = ''
         self.process = subprocess.Popen(
-            command, env={**os.environ, **ROS_ENVIRONMENT}, stderr=subprocess.PIPE, text=True
+            command,
+            env={**os.environ, **ROS_ENVIRONMENT},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
         )
 
     def wait(self) -> tuple[int, str]:
         """Return exit status and error output of the process when it has ended."""
         self.awaited = True
         try:
-            errors = self.process.communicate(timeout=PATIENCE)[1]
+            self.output, errors = self.process.communicate(timeout=PATIENCE)
         except subprocess.TimeoutExpired:
             self.process.kill()
             raise

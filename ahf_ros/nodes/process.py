@@ -28,8 +28,8 @@ class ProcessNode(Node):
 
     Attributes
     ----------
-    ended : rclpy.task.Future
-        Done as soon as the node is to end, by a signal or of its own accord.
+    ended : rclpy.task.Future of int
+        The exit status, as soon as the node is to end, by a signal or of its own accord.
     """
 
     def __init__(self, name: str) -> None:
@@ -67,7 +67,8 @@ def run(make_node: Callable[[], ProcessNode], arguments: Sequence[str] | None = 
     Returns
     -------
     int
-        0, or 1 where a parameter given at the start is refused; stderr tells which and why.
+        That with which the node has ended, 0 where a signal ended it; 1 where a parameter given
+        at the start is refused: stderr tells which and why.
     """
     signalled = _signalled()
     rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
@@ -91,7 +92,7 @@ def run(make_node: Callable[[], ProcessNode], arguments: Sequence[str] | None = 
         for number in ENDING:
             # What is left to do, Python and the middleware do, for some tenths of a second.
             signal.signal(number, signal.SIG_IGN)
-    return 0
+    return node.ended.result()
 
 
 def _signalled() -> int:
@@ -110,4 +111,4 @@ def _signalled() -> int:
 
 def _end_at_signal(ended: Future, signalled: int) -> None:
     os.read(signalled, 1)
-    ended.set_result(None)
+    ended.set_result(0)
