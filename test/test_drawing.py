@@ -1,0 +1,75 @@
+"""Overlays: the image stays, each target gets the colour of what it is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ahf_ros.drawing import DECODED_COLOUR, UNDECODED_COLOUR, WRONG_COLOUR, draw, summary
+from ahf_ros.target import UNDECODED, FilterState, Identification, Target
+
+GRAY = np.full((240, 320), 120, np.uint8)
+
+
+def target(number: int, x: float = 160.0, y: float = 140.0) -> Target:
+    return Target(number, 0, x, y, 20.0, 12.0, 0.3)
+
+
+def shown(image: np.ndarray, colour: tuple[int, int, int]) -> np.ndarray:
+    """Return where the image has about that colour; lines are smooth."""
+    return np.abs(image.astype(int) - colour).max(axis=2) < 60
+
+
+def test_the_image_stays_where_nothing_is_drawn():
+    drawn = draw(GRAY, Identification((target(7),)))
+    assert (drawn.shape, drawn.dtype) == ((240, 320, 3), np.uint8)
+    assert (drawn[180:] == 120).all()
+    assert (drawn[120:160, 130:190] != 120).any()
+    assert (GRAY == 120).all()
+
+
+def test_colours_say_what_a_target_is():
+    undecoded, wrong, right = target(UNDECODED, 60.0), target(3, 160.0), target(4, 250.0)
+    drawn = draw(GRAY, Identification((undecoded, wrong, right)), wrong=[wrong])
+    for colour, x in ((UNDECODED_COLOUR, 60), (WRONG_COLOUR, 160), (DECODED_COLOUR, 250)):
+        columns = np.flatnonzero(shown(drawn, colour).any(axis=0))
+        assert abs(columns.mean() - x) < 20
+        assert shown(drawn, colour)[140, x]
+
+
+def test_an_undecoded_target_has_no_label():
+    drawn = draw(GRAY, Identification((target(UNDECODED),)))
+    other = draw(GRAY, Identification((target(5),)))
+    assert (other[100:125, 175:200] != drawn[100:125, 175:200]).any()
+    assert (drawn[100:125, 178:200] == 120).all()
+
+
+@pytest.mark.parametrize('place', [(2.0, 2.0), (318.0, 238.0), (318.0, 2.0), (-50.0, 900.0)])
+def test_targets_at_the_border_keep_their_label_inside(place):
+    drawn = draw(GRAY, Identification((target(88, *place),)))
+    assert drawn.shape == (240, 320, 3)
+    if 0 <= place[0] < 320:
+        assert shown(drawn, DECODED_COLOUR).sum() > 40
+
+
+@pytest.mark.parametrize(
+    'image', [GRAY.astype(np.uint16) * 100, np.linspace(0, 1, 76800).reshape(240, 320)]
+)
+def test_images_of_more_bits_are_scaled(image):
+    image[0, 0] = 0
+    drawn = draw(image, Identification(()))
+    assert drawn.dtype == np.uint8
+    assert drawn.max() == 255
+
+
+def test_lines_grow_with_the_image():
+    large = np.full((2656, 3984), 120, np.uint8)
+    small = shown(draw(GRAY, Identification((target(7),))), DECODED_COLOUR).sum()
+    assert shown(draw(large, Identification((target(7),))), DECODED_COLOUR).sum() > 1.5 * small
+
+
+def test_the_summary_says_how_many_and_through_what():
+    assert summary(Identification((target(7), target(UNDECODED)))) == '1 identified, no filter'
+    through = FilterState(applied=True, gamma_high=1.2, gamma_low=0.25)
+    told = summary(Identification((target(7),), 54, through))
+    assert told == '1 identified of 54, gamma_high 1.2, gamma_low 0.25'

@@ -1,0 +1,148 @@
+"""Figures against truth: what counts as what, on cases small enough to count by hand."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from ahf_ros.evaluation import (
+    FALSE,
+    FOUND,
+    RIGHT,
+    WRONG,
+    Score,
+    TrueTarget,
+    evaluate,
+    judge,
+    score,
+    table,
+    total,
+)
+from ahf_ros.target import UNDECODED, Target
+
+TRUTH = (TrueTarget(1, 10.0, 10.0), TrueTarget(2, 50.0, 10.0), TrueTarget(3, 90.0, 10.0))
+
+
+def report(number: int, x: float, y: float = 10.0) -> Target:
+    return Target(number, 0, x, y, 5.0, 5.0)
+
+
+def kinds(*reported: Target, truth: tuple[TrueTarget, ...] = TRUTH) -> list[str]:
+    return [verdict.kind for verdict in judge(truth, reported)]
+
+
+def test_all_right():
+    figures = score(TRUTH, [report(1, 10), report(2, 50), report(3, 90)])
+    assert (figures.expected, figures.reported, figures.found, figures.right) == (3, 3, 3, 3)
+    assert (figures.correctness, figures.recall, figures.decoding) == (1.0, 1.0, 1.0)
+    assert (figures.wrong, figures.false_positives, figures.rmse) == (0, 0, (0.0, 0.0, 0.0))
+
+
+def test_the_figures_of_the_paper():
+    # n = 4 reported: one right, one with another's ID, one undecoded, one where nothing is
+    reported = [report(1, 11), report(7, 51), report(UNDECODED, 89), report(8, 200)]
+    figures = score(TRUTH, reported)
+    assert (figures.reported, figures.found, figures.right) == (4, 3, 1)
+    assert (figures.correctness, figures.recall, figures.decoding) == (3 / 4, 1.0, 1 / 3)
+    assert (figures.wrong, figures.false_positives) == (1, 1)
+
+
+def test_errors_are_those_of_the_right_ones():
+    reported = [report(1, 13, 10), report(2, 50, 14), report(9, 90.5)]
+    figures = score(TRUTH, reported)
+    assert figures.errors == ((3.0, 0.0), (0.0, 4.0))
+    assert figures.rmse == pytest.approx((math.sqrt(4.5), math.sqrt(8), math.sqrt(12.5)))
+
+
+@pytest.mark.parametrize(('distance', 'kind'), [(4.9, RIGHT), (5.0, RIGHT), (5.1, FALSE)])
+def test_the_tolerance(distance, kind):
+    assert kinds(report(1, 10 + distance)) == [kind]
+
+
+def test_a_target_that_is_reported_twice_is_right_once():
+    assert kinds(report(1, 12), report(1, 11)) == [FALSE, RIGHT]
+    figures = score(TRUTH, [report(1, 12), report(1, 11)])
+    assert (figures.right, figures.false_positives, figures.errors) == (1, 1, ((1.0, 0.0),))
+
+
+def test_an_undecoded_report_beside_a_right_one_is_false():
+    assert kinds(report(UNDECODED, 10), report(1, 11)) == [FALSE, RIGHT]
+
+
+def test_a_wrong_id_is_wrong_even_where_the_right_one_is_reported_too():
+    assert kinds(report(5, 10), report(1, 11)) == [WRONG, RIGHT]
+
+
+def test_the_right_id_far_from_its_target_is_no_excuse():
+    assert kinds(report(2, 10), report(1, 300)) == [WRONG, FALSE]
+
+
+def test_neighbours_within_the_tolerance_each_keep_their_own():
+    near = (TrueTarget(1, 10.0, 10.0), TrueTarget(2, 13.0, 10.0))
+    assert kinds(report(2, 11.4), report(1, 11.6), truth=near) == [RIGHT, RIGHT]
+
+
+def test_an_id_that_is_there_twice_is_right_twice():
+    twins = (TrueTarget(1, 10.0, 10.0), TrueTarget(1, 50.0, 10.0))
+    assert kinds(report(1, 10), report(1, 50), truth=twins) == [RIGHT, RIGHT]
+
+
+@pytest.mark.parametrize('reported', [[], [report(2, 50)], [report(UNDECODED, 50)]])
+def test_what_is_not_confirmed_counts_neither_for_nor_against(reported):
+    truth = (TRUTH[0], TrueTarget(2, 50.0, 10.0, confirmed=False))
+    figures = score(truth, [report(1, 10), *reported])
+    assert figures == Score(1, 1, 1, 1, 0, 0, ((0.0, 0.0),))
+
+
+def test_a_wrong_id_in_the_place_of_one_that_is_not_confirmed_is_wrong():
+    truth = (TrueTarget(2, 50.0, 10.0, confirmed=False),)
+    figures = score(truth, [report(4, 50)])
+    assert (figures.wrong, figures.reported, figures.found) == (1, 1, 0)
+
+
+def test_nothing_there_and_nothing_reported():
+    figures = score((), ())
+    assert figures == Score(0, 0, 0, 0, 0, 0)
+    assert (figures.correctness, figures.recall, figures.decoding) == (None, None, None)
+    assert figures.rmse is None
+
+
+def test_images_add_up():
+    first = score(TRUTH, [report(1, 13)])
+    second = score(TRUTH, [report(2, 50, 14), report(9, 400)])
+    together = total([first, second])
+    assert together == Score(6, 3, 2, 2, 0, 1, ((3.0, 0.0), (0.0, 4.0)))
+    assert total([]) == Score(0, 0, 0, 0, 0, 0)
+
+
+def test_every_image_of_either_side_has_figures():
+    scores = evaluate({'a.png': TRUTH, 'b.png': TRUTH}, {'b.png': [], 'c.png': [report(1, 10)]})
+    assert list(scores) == ['a.png', 'b.png', 'c.png']
+    assert scores['a.png'].recall == scores['b.png'].recall == 0.0
+    assert (scores['c.png'].expected, scores['c.png'].false_positives) == (0, 1)
+
+
+def test_the_table_shows_wrong_and_false_ones():
+    lines = table({'a.png': score(TRUTH, [report(1, 10), report(7, 50)])}).splitlines()
+    assert ' '.join(lines[0].split()) == ('image N n I d C % R % D % wrong false RMSE X px Y XY')
+    assert ' '.join(lines[1].split()) == ('a.png 3 2 2 1 100.0 66.7 33.3 1 0 0.0000 0.0000 0.0000')
+    assert lines[2].split()[0] == 'total'
+    assert len({len(line) for line in lines}) == 1
+
+
+def test_the_table_of_nothing():
+    line = table({'a.png': score((), ())}).splitlines()[1]
+    assert ' '.join(line.split()) == 'a.png 0 0 0 0 - - - 0 0 - - -'
+
+
+@pytest.mark.parametrize('tolerance', [0, -1, math.nan])
+def test_a_tolerance_that_makes_no_sense_is_refused(tolerance):
+    with pytest.raises(ValueError, match=r'tolerance is .*, accepted is a number above 0'):
+        judge(TRUTH, [], tolerance)
+
+
+def test_verdicts_name_the_target():
+    verdicts = judge(TRUTH, [report(UNDECODED, 91), report(5, 300)])
+    assert [verdict.kind for verdict in verdicts] == [FOUND, FALSE]
+    assert [verdict.target for verdict in verdicts] == [TRUTH[2], None]
