@@ -11,8 +11,8 @@ import numpy as np
 SAMPLE_ROWS, SAMPLE_COLUMNS = 32, 1024
 """Rows and columns on whose crossings the output mapping looks at the filtered image."""
 
-MINIMUM_CONTRAST = 1e-4
-"""Smallest difference of s between black and white; a flatter image is not stretched further."""
+MINIMUM_CONTRAST = 1e-3
+"""Smallest difference of s between black and white; a flatter image stays gray."""
 
 
 def logarithm(image: np.ndarray, offset: float) -> np.ndarray:
@@ -55,8 +55,9 @@ def mapping(
     """
     percentiles = np.percentile(samples, (black_percentile, white_percentile))
     black, white = (float(value) for value in percentiles)
-    zero = 255 / math.expm1(max(white - black, MINIMUM_CONTRAST))
-    return math.log(zero) - black, zero
+    missing = max(MINIMUM_CONTRAST - (white - black), 0.0)
+    zero = 255 / math.expm1(white - black + missing)
+    return math.log(zero) - (black - missing / 2), zero
 
 
 @lru_cache(maxsize=16)

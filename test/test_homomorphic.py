@@ -146,6 +146,15 @@ def test_a_strong_filter_saturates_instead_of_overflowing():
     assert set(np.unique(filtered[scene(64, 64) >= 0])) >= {0, 255}
 
 
+@pytest.mark.parametrize('speck', [0, 255])
+def test_a_speck_on_even_ground_is_still_seen(speck):
+    image = np.full((300, 200), 128, np.uint8)
+    image[150, 100] = speck
+    filtered = HomomorphicFilter(image).filtered(1.2, 0.25).astype(int)
+    assert filtered[150, 100] == speck
+    assert abs(filtered[10, 10] - 128) < 10
+
+
 @pytest.mark.parametrize(
     ('image', 'words'),
     [
