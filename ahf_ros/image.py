@@ -56,3 +56,20 @@ def _check_values(image: np.ndarray, name: str) -> None:
         raise ValueError(
             f'{name} is constant, {highest:g} everywhere, accepted is one with contrast'
         )
+
+
+def as_gray(image: np.ndarray) -> np.ndarray:
+    """Return gray values from 0 to 255, of which an 8-bit image is its own.
+
+    Parameters
+    ----------
+    image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
+
+    Returns
+    -------
+    ndarray of uint8 or float32, shape (height, width)
+        Other images are scaled so that their largest value becomes 255.
+    """
+    if image.dtype == np.uint8:
+        return image
+    return image.astype(np.float32) * np.float32(255 / float(image.max()))

@@ -1,7 +1,8 @@
 """Settings that describe themselves: text, default and accepted values, stated once.
 
-A room that can be set has a frozen dataclass whose fields are made by `parameter`. The node declares
-its ROS parameters, the command line its options and the README its table from `parameters`.
+A room that can be set has a frozen dataclass whose fields are made by `parameter`. The node
+declares its ROS parameters, the command line its options and the README its table from
+`parameters`.
 """
 
 from __future__ import annotations
@@ -65,8 +66,8 @@ class Parameter:
             return False
         if isinstance(self.default, int) and not isinstance(value, Integral):
             return False
-        above = self.minimum is None or value >= self.minimum
-        return above and (self.maximum is None or value <= self.maximum)
+        above = self.minimum is None or float(value) >= self.minimum
+        return above and (self.maximum is None or float(value) <= self.maximum)
 
     def check(self, value: object) -> None:
         """Raise a ValueError that names the parameter, `value` and what is accepted."""

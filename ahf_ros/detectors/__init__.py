@@ -8,12 +8,14 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ahf_ros.detectors.detector import Detector, DetectorSettings
+from ahf_ros.detectors.ring import RingDetector
 from ahf_ros.detectors.traditional import TraditionalDetector
 from ahf_ros.parameter import Parameter
 
 __all__ = ['DETECTOR', 'DETECTOR_NAMES', 'Detector', 'DetectorSettings', 'create']
 
 _DETECTORS: dict[str, Callable[[DetectorSettings], Detector]] = {
+    'ring': RingDetector,
     'traditional': TraditionalDetector,
 }
 

@@ -1,0 +1,217 @@
+"""Identification of ring targets that light does not break.
+
+Dots are found as whole outlines first, then, in what those do not explain, as places where many
+gradients of the logarithm of the image point away from. Their ellipses are fitted, their bands
+read by likelihood, and dot and band refined together to a projective frame, whose origin is the
+image of the target's physical centre.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+from typing import ClassVar
+
+import numpy as np
+
+from ahf_ros import candidates, decoding, dots, frame, subpixel
+from ahf_ros.codes.ring import Family, family
+from ahf_ros.detectors.detector import DetectorSettings
+from ahf_ros.image import as_gray, check_image
+from ahf_ros.target import UNDECODED, Target
+
+_SIGNS = {'auto': (1, -1), 'dark': (1,), 'bright': (-1,)}
+_LEVELS = 3  # of the pyramid, besides the image
+_RAYS = 48  # about a dot
+_REACH = 0.45  # about an expected edge, dot radii
+_LEAST_SHARE = 0.5  # of the edge of a dot, for its band to be read
+_FAINTEST = 0.8  # contrast of a dot, for its band to be read
+_CERTAIN = 0.9  # confidence from which a word is reported
+_READINGS = 2  # of a band, each from a better frame
+_WHOLE = 0.9  # share of the edge of a dot that is reported without a word
+_CLEARLY = 2.0  # times the evidence of another claim to the same ID
+_QUIET = 0.4  # width of the margin round the band, dot radii
+
+
+@dataclass(frozen=True, slots=True)
+class RingDetector:
+    """Identify ring targets (Schneider type) of one family.
+
+    Attributes
+    ----------
+    settings : DetectorSettings
+    """
+
+    name: ClassVar[str] = 'ring'
+    settings: DetectorSettings = field(default_factory=DetectorSettings)
+
+    def __call__(self, image: np.ndarray) -> list[Target]:
+        """Identify the targets of one image; see `Detector`."""
+        check_image(image)
+        wanted, code = self.settings, family(self.settings.family)
+        gray = as_gray(image)
+        logs = [candidates.log_image(level) for level in candidates.pyramid(gray, _LEVELS)]
+        edges = [candidates.find_edges(log) for log in logs[1:]]
+        gray = gray.astype(np.float32, copy=False)
+
+        signs = _SIGNS[wanted.polarity]
+        whole, whole_signs = edges[0].outlines(wanted.min_radius / 2, wanted.max_radius / 2)
+        chosen = np.isin(whole_signs, signs)
+        start = frame.enlarged(whole[chosen], 1)
+        first = _identify(gray, *dots.refine_dots(logs[0], start, whole_signs[chosen]), code)
+
+        known = first.frames[first.confidence >= _CERTAIN]
+        rest = _without(edges, known, code.band_outer + _QUIET)
+        groups = candidates.find_candidates(rest, wanted.min_radius, wanted.max_radius, signs)
+        found = [first]
+        if groups:
+            fitted = zip(*(dots.fit_dots(logs, group) for group in groups), strict=True)
+            frames, dot_signs, inliers = (np.concatenate(parts) for parts in fitted)
+            found.append(_identify(gray, frames, dot_signs, inliers, code))
+        return _reported(_Found.joined(found), wanted, code)
+
+
+@dataclass(frozen=True, slots=True)
+class _Found:
+    """Dots, and what their bands were read as."""
+
+    frames: np.ndarray  # (k, 3, 3), px of the image
+    covariance: np.ndarray  # (k, 2, 2), px^2
+    words: np.ndarray  # (k,), in the rotation read; 0 where nothing was
+    confidence: np.ndarray  # (k,)
+    margin: np.ndarray  # (k,), evidence over the next best ID
+    share: np.ndarray  # (k,), of the edges in their place
+
+    @staticmethod
+    def unread(fit: subpixel.Fit) -> _Found:
+        """Return dots of which no band was read."""
+        nothing = np.zeros(len(fit.frames))
+        words = np.zeros(len(fit.frames), np.int64)
+        return _Found(fit.frames, fit.covariance, words, nothing, nothing.copy(), fit.share)
+
+    def update(self, which: np.ndarray, readings: decoding.Readings, fit: subpixel.Fit) -> None:
+        """Take over the readings of some of the dots."""
+        self.frames[which], self.covariance[which] = fit.frames, fit.covariance
+        self.words[which], self.margin[which] = readings.words, readings.margin
+        self.confidence[which] = decoding.confidence(readings, fit.share, fit.deviation)
+        self.share[which] = fit.share
+
+    def chosen(self, which: np.ndarray) -> _Found:
+        return _Found(*(getattr(self, item.name)[which] for item in fields(self)))
+
+    @staticmethod
+    def joined(parts: list[_Found]) -> _Found:
+        names = [item.name for item in fields(_Found)]
+        return _Found(*(np.concatenate([getattr(of, name) for of in parts]) for name in names))
+
+
+def _without(
+    edges: list[candidates.LogEdges], frames: np.ndarray, radius: float
+) -> dict[int, candidates.LogEdges]:
+    """Return the edges of the levels from 1 on that lie outside of circles of known targets."""
+    angles = np.linspace(0, 2 * np.pi, 32, endpoint=False)
+    outlines = frame.project(frames, frame.circle_points(angles, np.array([radius])))[:, :, 0]
+    return {
+        level: of_level.outside(list((outlines + 0.5) / 2**level - 0.5))
+        for level, of_level in enumerate(edges, start=1)
+    }
+
+
+def _identify(
+    gray: np.ndarray, frames: np.ndarray, signs: np.ndarray, inliers: np.ndarray, code: Family
+) -> _Found:
+    """Read the bands about dots, and refine dot and band together."""
+    kept = _distinct(frames, signs, inliers)
+    frames, signs = frames[kept], signs[kept]
+    circles = subpixel.dot_circles(signs, _RAYS)
+    fit = subpixel.fit_circles(gray, frames, circles, reach=_REACH, projective=False)
+    good = (fit.share >= _LEAST_SHARE) & (fit.contrast <= _FAINTEST)
+    fit = fit.chosen(good)
+    marks = decoding.Marks(signs[good], fit.contrast, fit.bright)
+    found = _Found.unread(fit)
+    # A band that was read right makes the frame better, and a better frame the reading.
+    read, frames = np.arange(len(fit.frames)), fit.frames
+    for _ in range(_READINGS):
+        readings = decoding.read_bands(gray, frames, marks, code)
+        good = readings.plausible
+        read, readings, marks = read[good], readings.chosen(good), marks.chosen(good)
+        circles = decoding.marked_circles(readings, marks.signs, _RAYS, code)
+        fit = subpixel.fit_circles(gray, frames[good], circles, reach=_REACH, projective=True)
+        frames = fit.frames
+    found.update(read, readings, fit)
+    return found
+
+
+def _distinct(frames: np.ndarray, signs: np.ndarray, quality: np.ndarray) -> np.ndarray:
+    """Return which frames to keep so that no two are the same dot, the best ones first."""
+    major, minor, _ = frame.ellipse_axes(frames)
+    size = np.sqrt(major * minor)
+    kept: list[int] = []
+    free = np.ones(len(frames), bool)
+    for index in np.argsort(-quality, kind='stable'):
+        if free[index]:
+            kept.append(int(index))
+            distance = np.hypot(*(frames[:, :2, 2] - frames[index, :2, 2]).T)
+            same = (distance < 0.3 * size[index]) & (signs == signs[index])
+            free &= ~(same & (np.abs(np.log(size / size[index])) < 0.3))
+    return np.array(kept, np.intp)
+
+
+def _reported(found: _Found, wanted: DetectorSettings, code: Family) -> list[Target]:
+    """Return the targets to report: one for each dot, and one for each ID at the most."""
+    major, _, _ = frame.ellipse_axes(found.frames)
+    sized = (major >= wanted.min_radius) & (major <= wanted.max_radius)
+    found = found.chosen(np.flatnonzero(sized))
+    found = found.chosen(np.lexsort((-found.margin, found.confidence < _CERTAIN)))
+    found = found.chosen(_first_of_each_dot(found, code))
+    certain = _uncontested(found, code)
+    if not wanted.report_undecoded:
+        found, certain = found.chosen(certain), certain[certain]
+    else:
+        shown = certain | (found.share >= _WHOLE)
+        found, certain = found.chosen(shown), certain[shown]
+    targets = _as_targets(found, certain, code)
+    return sorted(targets, key=lambda target: (target.id, target.y, target.x))
+
+
+def _first_of_each_dot(found: _Found, code: Family) -> np.ndarray:
+    """Return the first of all that lie on the same dot, or on a band that has been read."""
+    major, minor, _ = frame.ellipse_axes(found.frames)
+    reach = np.where(found.confidence >= _CERTAIN, code.band_outer * minor, major)
+    kept: list[int] = []
+    for index, centre in enumerate(found.frames[:, :2, 2]):
+        distance = np.hypot(*(found.frames[kept, :2, 2] - centre).T)
+        if not (distance < reach[kept]).any():
+            kept.append(index)
+    return np.array(kept, np.intp)
+
+
+def _uncontested(found: _Found, code: Family) -> np.ndarray:
+    """Return which readings are certain and clearly the best claim to their ID."""
+    certain = found.confidence >= _CERTAIN
+    _, numbers = decoding.canonical(found.words, code)
+    for number in np.unique(numbers[certain]):
+        claims = np.flatnonzero(certain & (numbers == number))
+        order = claims[np.argsort(-found.margin[claims], kind='stable')]
+        certain[order[1:]] = False
+        if len(order) > 1 and found.margin[order[1]] * _CLEARLY > found.margin[order[0]]:
+            certain[order[0]] = False
+    return certain
+
+
+def _as_targets(found: _Found, certain: np.ndarray, code: Family) -> list[Target]:
+    codes, numbers = decoding.canonical(found.words, code)
+    major, minor, angle = frame.ellipse_axes(found.frames)
+    return [
+        Target(
+            id=int(numbers[index]) if certain[index] else UNDECODED,
+            code=int(codes[index]) if certain[index] else 0,
+            x=float(found.frames[index, 0, 2]),
+            y=float(found.frames[index, 1, 2]),
+            semi_major=float(major[index]),
+            semi_minor=float(minor[index]),
+            angle=float(angle[index]),
+            confidence=float(found.confidence[index]),
+            covariance=tuple(found.covariance[index].ravel().tolist()),
+        )
+        for index in range(len(numbers))
+    ]

@@ -1,0 +1,208 @@
+"""Frames of circular targets: maps from the target's plane to the image.
+
+A frame is a homography, 3 x 3, from the plane of a target (dot radius 1, centre at the origin, the
+y axis pointing down) to pixels. All concentric circles of the target share it, so that measured
+displacements of their edges improve it by one linear least-squares problem: a circle of radius r
+that is displaced by the small frame change (t, E, p) moves outwards by
+
+    dr = t . u + r u . E u - r^2 p . u,        u = (cos a, sin a),
+
+with the translation t, the symmetric strain E and the projective part p. Circles of two radii
+separate t from p; with one, p is left alone and t carries the perspective bias.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import cv2
+import numpy as np
+
+_NO_MAP: Any = None  # coordinates come as pairs in one map
+_REMAP_ROWS = 16384  # cv2.remap takes maps of at most 32767 rows
+
+
+def affine_frames(
+    x: np.ndarray,
+    y: np.ndarray,
+    semi_major: np.ndarray,
+    semi_minor: np.ndarray,
+    angle: np.ndarray,
+) -> np.ndarray:
+    """Return the frames that map the unit circle onto ellipses.
+
+    Parameters
+    ----------
+    x, y, semi_major, semi_minor : array_like of float, shape (k,)
+        Centres and semi-axes, px.
+    angle : array_like of float, shape (k,)
+        Direction of the major axis from +x towards +y, rad.
+
+    Returns
+    -------
+    ndarray of float64, shape (k, 3, 3)
+    """
+    x, y, major, minor, angle = np.broadcast_arrays(
+        *(np.asarray(values, np.float64) for values in (x, y, semi_major, semi_minor, angle))
+    )
+    cosine, sine = np.cos(angle), np.sin(angle)
+    frames = np.zeros((x.size, 3, 3))
+    frames[:, 0, 0] = major * cosine**2 + minor * sine**2
+    frames[:, 1, 1] = major * sine**2 + minor * cosine**2
+    frames[:, 0, 1] = frames[:, 1, 0] = (major - minor) * cosine * sine
+    frames[:, 0, 2], frames[:, 1, 2], frames[:, 2, 2] = x, y, 1.0
+    return frames
+
+
+def circle_points(angles: np.ndarray, radii: np.ndarray) -> np.ndarray:
+    """Return points on concentric circles.
+
+    Parameters
+    ----------
+    angles : ndarray of float, shape (m,)
+        From +x towards +y, rad.
+    radii : ndarray of float, shape (..., n)
+        In dot radii.
+
+    Returns
+    -------
+    ndarray of float64, shape (..., m, n, 2)
+    """
+    directions = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    return radii[..., None, :, None] * directions[:, None, :]
+
+
+def project(frames: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return the images of points of the target's plane.
+
+    Parameters
+    ----------
+    frames : ndarray of float64, shape (k, 3, 3)
+    points : ndarray of float, shape (..., 2) or (k, ..., 2)
+        The same points for every frame, or with one more axis, points for each.
+
+    Returns
+    -------
+    ndarray of float64, shape (k, ..., 2)
+        Pixels.
+    """
+    spread = (slice(None),) + (None,) * (points.ndim - 1 - (points.ndim > 3))
+    x, y = points[..., 0], points[..., 1]
+    rows = [[element[spread] for element in row.T] for row in frames.transpose(1, 0, 2)]
+    across, down, scale = (row[0] * x + row[1] * y + row[2] for row in rows)
+    images = np.empty((*across.shape, 2))
+    np.divide(across, scale, out=images[..., 0])
+    np.divide(down, scale, out=images[..., 1])
+    return images
+
+
+def sample(image: np.ndarray, pixels: np.ndarray) -> np.ndarray:
+    """Return the bilinearly interpolated values of an image.
+
+    Parameters
+    ----------
+    image : ndarray of uint8, uint16, int16 or float32, shape (height, width)
+    pixels : ndarray of float, shape (..., 2)
+        Beyond the border the nearest pixel counts.
+
+    Returns
+    -------
+    ndarray of the image's dtype, shape (...)
+    """
+    columns = pixels.shape[-2]
+    maps = np.ascontiguousarray(pixels, np.float32).reshape(-1, columns, 2)
+    values = np.empty(maps.shape[:2], image.dtype)
+    for start in range(0, len(maps), _REMAP_ROWS):
+        rows = slice(start, start + _REMAP_ROWS)
+        values[rows] = cv2.remap(
+            image, maps[rows], _NO_MAP, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+        )
+    return values.reshape(pixels.shape[:-1])
+
+
+def displacement_basis(angles: np.ndarray, radii: np.ndarray) -> np.ndarray:
+    """Return how far each frame change moves an edge outwards, in dot radii.
+
+    Parameters
+    ----------
+    angles, radii : ndarray of float, shape (m,)
+        Where on the target the edges are, rad and dot radii.
+
+    Returns
+    -------
+    ndarray of float64, shape (m, 7)
+        Columns: translation x, y; strain 1, cos 2a, sin 2a; projective x, y.
+    """
+    cosine, sine = np.cos(angles), np.sin(angles)
+    return np.stack(
+        [
+            cosine,
+            sine,
+            radii,
+            radii * np.cos(2 * angles),
+            radii * np.sin(2 * angles),
+            -(radii**2) * cosine,
+            -(radii**2) * sine,
+        ],
+        axis=-1,
+    )
+
+
+def moved(frames: np.ndarray, changes: np.ndarray) -> np.ndarray:
+    """Return frames after small changes, as `displacement_basis` orders them.
+
+    Parameters
+    ----------
+    frames : ndarray of float64, shape (k, 3, 3)
+    changes : ndarray of float64, shape (k, 5) or (k, 7)
+
+    Returns
+    -------
+    ndarray of float64, shape (k, 3, 3)
+        Scaled so that the last element is one.
+    """
+    change = np.zeros_like(frames)
+    change[:, 0, 0] = 1 + changes[:, 2] + changes[:, 3]
+    change[:, 1, 1] = 1 + changes[:, 2] - changes[:, 3]
+    change[:, 0, 1] = change[:, 1, 0] = changes[:, 4]
+    change[:, :2, 2] = changes[:, :2]
+    change[:, 2, : changes.shape[1] - 5] = changes[:, 5:]
+    change[:, 2, 2] = 1.0
+    product = frames @ change
+    return product / product[:, 2:, 2:]
+
+
+def enlarged(frames: np.ndarray, level: int) -> np.ndarray:
+    """Return frames in the pixels of the image that was halved `level` times to give theirs."""
+    scale = 2.0**level
+    larger = frames.copy()
+    larger[:, :2] = scale * frames[:, :2] + (scale - 1) / 2 * frames[:, 2:]
+    return larger
+
+
+def ellipse_axes(frames: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the semi-axes of the dots and the direction of the major ones.
+
+    Parameters
+    ----------
+    frames : ndarray of float64, shape (k, 3, 3)
+
+    Returns
+    -------
+    semi_major, semi_minor : ndarray of float64, shape (k,)
+        px, of the affine part of the frame at its centre.
+    angle : ndarray of float64, shape (k,)
+        rad in (-pi/2, pi/2], from +x towards +y.
+    """
+    affine = local_affine(frames)
+    square = affine @ affine.transpose(0, 2, 1)
+    mean = (square[:, 0, 0] + square[:, 1, 1]) / 2
+    difference = (square[:, 0, 0] - square[:, 1, 1]) / 2
+    deviation = np.hypot(difference, square[:, 0, 1])
+    angle = np.arctan2(square[:, 0, 1], difference) / 2
+    return np.sqrt(mean + deviation), np.sqrt(np.maximum(mean - deviation, 0)), angle
+
+
+def local_affine(frames: np.ndarray) -> np.ndarray:
+    """Return the derivatives of the frames' maps at the centre, shape (k, 2, 2), px a radius."""
+    return frames[:, :2, :2] - frames[:, :2, 2:] * frames[:, 2:, :2]
