@@ -1,6 +1,6 @@
-# make demo   two ROS 2 nodes, striped light, one line an image, an annotated picture in demo/
-# make test   every check: ruff, mypy, the import rules, the tests
-# make demo DEMO='--light lattice --detector traditional'   and so on: ahf_demo --help
+# make demo    ROS 2 nodes under striped light: a line an image, annotated pictures in demo/
+#              DEMO='--light lattice --detector traditional' and so on; ahf_demo --help tells all
+# make test    every check: ruff, mypy, the import rules, the tests
 # Both set up .venv first; nothing is installed outside it.
 
 PYTHON ?= python3
@@ -29,7 +29,8 @@ clean:
 
 # The modules are used where they are; only the interfaces are generated and compiled.
 $(READY): pyproject.toml setup.py package.xml CMakeLists.txt $(wildcard msg/*.msg srv/*.srv)
-	$(PYTHON) scripts/prerequisites.py
+	@$(PYTHON) scripts/prerequisites.py
+	@echo 'Setting up $(VENV): ROS 2 from PyPI, and the messages compiled; takes 1 to 3 minutes.'
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test]'
 	touch $@
