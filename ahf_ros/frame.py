@@ -120,6 +120,12 @@ def sample(image: np.ndarray, pixels: np.ndarray) -> np.ndarray:
     return values.reshape(pixels.shape[:-1])
 
 
+def within(pixels: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """Return whether pixels, shape (..., 2), lie in an image of shape (height, width)."""
+    x, y = pixels[..., 0], pixels[..., 1]
+    return (x >= 0) & (y >= 0) & (x <= shape[1] - 1) & (y <= shape[0] - 1)
+
+
 def displacement_basis(angles: np.ndarray, radii: np.ndarray) -> np.ndarray:
     """Return how far each frame change moves an edge outwards, in dot radii.
 

@@ -133,6 +133,7 @@ class _Edges:
     inside: np.ndarray  # gray value
     outside: np.ndarray
     scale: np.ndarray  # px a dot radius, along the radius
+    visible: np.ndarray  # whether the profile lies in the image
 
 
 def _measure(gray: np.ndarray, frames: np.ndarray, circles: Circles, reach: float) -> _Edges:
@@ -144,16 +145,18 @@ def _measure(gray: np.ndarray, frames: np.ndarray, circles: Circles, reach: floa
     scale = np.linalg.norm(outwards, axis=-1)
     step = (outwards / scale[..., None]).astype(np.float32)
     place, inside, outside = (np.zeros(scale.shape) for _ in range(3))
+    visible = np.zeros(scale.shape, bool)
     which = np.searchsorted(_HALF_WIDTHS, reach * scale, side='right') - 1
     for index, half in enumerate(_HALF_WIDTHS[1:], start=1):
-        chosen = (which == index) & (circles.polarity != 0)
-        if not chosen.any():
-            continue
+        ends = half * step
+        whole = frame.within(centre - ends, gray.shape) & frame.within(centre + ends, gray.shape)
+        chosen = (which == index) & (circles.polarity != 0) & whole
+        visible |= chosen
         along = np.linspace(-half, half, _SAMPLES, dtype=np.float32)
         pixels = centre[chosen][:, None] + along[:, None] * step[chosen][:, None]
         steps = _fit_steps(frame.sample(gray, pixels), circles.polarity[chosen], half)
         place[chosen], inside[chosen], outside[chosen] = steps
-    return _Edges(place, inside, outside, scale)
+    return _Edges(place, inside, outside, scale, visible)
 
 
 def _fit_steps(
@@ -204,7 +207,7 @@ def _solve(
 ) -> tuple[np.ndarray, Fit]:
     """Return the changes of the frames that bring the circles onto the edges."""
     polarity = circles.polarity
-    expected = polarity != 0
+    expected = edges.visible
     inside, outside = np.maximum(edges.inside, 0), np.maximum(edges.outside, 0)
     step = polarity * np.log((outside + _OFFSET) / (inside + _OFFSET))
     usual = _median(step, expected)
