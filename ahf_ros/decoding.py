@@ -1,13 +1,11 @@
 """Reading the band of ring targets by likelihood, under light that is nowhere even.
 
-Every reading asks: is this place of the band marked (the colour of the dot) or not (the colour of
-the surround)? Three kinds of evidence that light cannot easily fake together are added, each a
-logarithm of the likelihood of marked over unmarked:
+Three kinds of evidence that light cannot easily fake together are added:
 
 - arcs: the step across the inner and the outer edge of the band, against the step that a mark
   makes at the gray value found beside it;
-- levels: the gray value itself, against those of the surround in the gap and the margin of the
-  same target, as they are and as a mark would turn them;
+- levels: the gray value itself, against those of bright places of the same target, as they are and
+  as a mark would turn them;
 - borders: the step along the band where two sectors meet, and its absence within them.
 
 All valid words compete at all rotations and phases.
@@ -15,18 +13,15 @@ All valid words compete at all rotations and phases.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from functools import cache
-from typing import TypeVar
 
 import numpy as np
 
 from ahf_ros import frame
-from ahf_ros.candidates import LOG_OFFSET
 from ahf_ros.codes.ring import Family, smallest_rotation
+from ahf_ros.evidence import Marks, border_evidence, level_evidence, log_ratio, step_evidence
 from ahf_ros.subpixel import Circles, dot_circles
-
-_Record = TypeVar('_Record', 'Readings', 'Marks')
 
 SAMPLES_PER_SECTOR = 10
 """Angles at which a sector is read."""
@@ -36,19 +31,8 @@ _NEAREST_ACROSS, _FARTHEST_ACROSS = 0.13, 0.36  # the same, dot radii
 _BAND_DEPTHS = (0.3, 0.5, 0.7)  # of the band, where its level is read
 _GAP_DEPTHS = (0.35, 0.65)
 _DOT_DEPTHS = (0.35, 0.7)  # of the dot
-_DEEPEST_SHADOW = 0.1  # of the light on the dot, elsewhere on the target
-_NOISE = 1.2  # gray values, of 255
-_SURROUND_SPREAD = 0.16  # of ln, of steps where there is no edge
-_MARK_SPREAD, _MARK_TAIL = 0.16, 0.35  # of ln, of the step of a mark, and towards more
-_BORDER_SPREAD = 0.2  # of steps along the band, in steps of a mark
-_LEVEL_SPREAD = 0.12  # of ln, of levels
-_FLOOR = 0.06  # density of what no hypothesis explains, such as an edge of light
-_LARGEST = 4.0  # evidence of one reading
 _AGREEMENT = 0.35  # of ln, between a step and what a word wants
-_LEAST_STEP = 0.2  # of ln, of a mark
 _CORRELATION = 2.5  # px between independent readings
-_LEVEL_BIN = 0.05  # of ln
-_LEVELS = np.arange(np.log(LOG_OFFSET), np.log(255 + LOG_OFFSET) + _LEVEL_BIN, _LEVEL_BIN)
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,42 +68,7 @@ class Readings:
 
     def chosen(self, which: np.ndarray) -> Readings:
         """Return some of the readings."""
-        return _chosen(self, which)
-
-
-def _chosen(record: _Record, which: np.ndarray) -> _Record:
-    """Return a record of arrays with some of its rows."""
-    return replace(record, **{of.name: getattr(record, of.name)[which] for of in fields(record)})
-
-
-@dataclass(frozen=True, slots=True)
-class Marks:
-    """How the marks of k targets look against their surround.
-
-    Attributes
-    ----------
-    signs : ndarray of int, shape (k,)
-        1 where marks are dark, -1 where they are bright.
-    contrast : ndarray of float64, shape (k,)
-        Gray value of dark over bright under the same light.
-    bright : ndarray of float64, shape (k,)
-        Usual gray value of the bright side of the dot's edge.
-    """
-
-    signs: np.ndarray
-    contrast: np.ndarray
-    bright: np.ndarray
-
-    def chosen(self, which: np.ndarray) -> Marks:
-        """Return the marks of some of the targets."""
-        return _chosen(self, which)
-
-    def step(self, values: np.ndarray) -> np.ndarray:
-        """Return the step of ln onto a mark where the bright side has gray values (k, ...)."""
-        spread = (slice(None),) + (None,) * (values.ndim - 1)
-        bright = np.maximum(values, _DEEPEST_SHADOW * self.bright[spread])
-        dark = self.contrast[spread] * bright
-        return self.signs[spread] * np.log((dark + LOG_OFFSET) / (bright + LOG_OFFSET))
+        return Readings(*(getattr(self, of.name)[which] for of in fields(self)))
 
 
 def read_bands(gray: np.ndarray, frames: np.ndarray, marks: Marks, family: Family) -> Readings:
@@ -152,120 +101,51 @@ def read_bands(gray: np.ndarray, frames: np.ndarray, marks: Marks, family: Famil
     )
     edges = np.array([inner, inner, outer, outer]) + across * np.array([-1, 1, -1, 1])
     radii = np.concatenate([edges, np.broadcast_to(fixed, (len(frames), len(fixed)))], axis=1)
-    values = frame.sample(gray, frame.project(frames, frame.circle_points(angles, radii)))
+    values = frame.sample_circles(gray, frames, angles, radii)
     values = np.moveaxis(np.maximum(values, 0), 2, 0)
     gap_in, band_in, band_out, outside = values[:4]
     of_band, of_gap, of_dot = values[4:7], values[7:9], values[9:11]
 
     arcs = [(gap_in, band_in), (outside, band_out)]
-    evidence = sum(_step_evidence(surround, inside, marks) for surround, inside in arcs)
+    evidence = sum(step_evidence(surround, inside, marks) for surround, inside in arcs)
     surround = np.concatenate([of_gap, [gap_in, outside]])
     bright = np.where((marks.signs > 0)[:, None], surround, np.concatenate([of_dot, of_dot]))
-    evidence += _level_evidence(bright, of_band, marks)
+    evidence += level_evidence(bright, of_band, marks)
     evidence *= np.clip(2 * np.pi * inner * size / count / _CORRELATION, 0.08, 1)[:, None]
+    limit = frame.circle_points(angles, np.array([outer + _FARTHEST_ACROSS]))[:, 0]
+    visible = frame.within(frame.project(frames, limit), gray.shape)
+    evidence *= visible
     depth = np.clip((outer - inner) * size / len(of_band) / _CORRELATION, 0.1, 1)[:, None]
-    rises, falls = (depth * borders for borders in _border_evidence(of_band, marks))
+    rises, falls = (depth * visible * borders for borders in border_evidence(of_band, marks))
     words, phases, margin, weakest = _best_words(evidence, rises, falls, family)
 
     samples = (np.arange(count) - phases[:, None]) % count // SAMPLES_PER_SECTOR
     bits = (words[:, None] >> samples & 1).astype(bool)
-    explained = np.stack(_explained(arcs, of_gap, marks, bits), axis=1)
+    explained = np.stack(_explained(arcs, of_gap, marks, bits & visible, ~bits & visible), axis=1)
     return Readings(words, phases, margin, weakest, explained)
 
 
-def _log_ratio(values: np.ndarray, others: np.ndarray) -> np.ndarray:
-    return np.log((values + LOG_OFFSET) / (others + LOG_OFFSET))
-
-
 def _explained(
-    arcs: list[tuple[np.ndarray, np.ndarray]], gap: np.ndarray, marks: Marks, bits: np.ndarray
+    arcs: list[tuple[np.ndarray, np.ndarray]],
+    gap: np.ndarray,
+    marks: Marks,
+    marked: np.ndarray,
+    unmarked: np.ndarray,
 ) -> tuple[np.ndarray, ...]:
     """Return the shares of steps that are as a word wants them."""
     agree = []
     for surround, values in arcs:
-        step = _log_ratio(values, surround)
+        step = log_ratio(values, surround)
         mark = marks.step(np.maximum(values, surround))
         # Where a mark would make no step, nothing tells it from the surround.
-        marked = (np.abs(step - mark) < _AGREEMENT) & (np.abs(mark) > _AGREEMENT)
-        agree.append(np.where(bits, marked, np.abs(step) < _AGREEMENT))
+        as_mark = (np.abs(step - mark) < _AGREEMENT) & (np.abs(mark) > _AGREEMENT)
+        agree.append(np.where(marked, as_mark, np.abs(step) < _AGREEMENT))
     shares = [
         (of_arc & which).sum(axis=1) / np.maximum(which.sum(axis=1), 1)
-        for which in (~bits, bits)
+        for which in (unmarked, marked)
         for of_arc in agree
     ]
-    return *shares, (np.abs(_log_ratio(gap[1], gap[0])) < _AGREEMENT).mean(axis=1)
-
-
-def _step_evidence(surround: np.ndarray, values: np.ndarray, marks: Marks) -> np.ndarray:
-    """Return the evidence that a step from the surround leads onto a mark."""
-    step = _log_ratio(values, surround)
-    noise = _NOISE * np.hypot(1 / (values + LOG_OFFSET), 1 / (surround + LOG_OFFSET))
-    unmarked = _normal(step, np.hypot(_SURROUND_SPREAD, noise))
-    wanted = marks.step(np.maximum(values, surround))
-    error = (step - wanted) * np.sign(wanted)
-    spread, tail = np.hypot(_MARK_SPREAD, noise), np.hypot(_MARK_TAIL, noise)
-    width = np.where(error > 0, tail, spread)
-    marked = _normal(error, width) * width / ((spread + tail) / 2)
-    evidence = np.log((marked + _FLOOR) / (unmarked + _FLOOR))
-    return np.clip(evidence, -_LARGEST, _LARGEST)
-
-
-def _level_evidence(bright: np.ndarray, values: np.ndarray, marks: Marks) -> np.ndarray:
-    """Return the evidence of the gray values of the band, given those of bright places.
-
-    Bright places of the target show under which light it lies: the density of their levels is that
-    of the bright parts of the band, and moved by the step of a mark that of the dark ones.
-    """
-    seen = _bins(_flat(np.moveaxis(bright, 0, 2)))
-    levels = np.broadcast_to(np.exp(_LEVELS) - LOG_OFFSET, (len(seen), len(_LEVELS)))
-    moved = _LEVELS - np.abs(marks.step(levels)) - _LEVELS[0]
-    moved = np.clip(np.rint(moved / _LEVEL_BIN).astype(np.intp), 0, len(_LEVELS) - 1)
-    dark = np.take_along_axis(moved, seen, axis=1)
-    table = np.log((_density(dark) + _FLOOR) / (_density(seen) + _FLOOR))
-    table *= marks.signs[:, None]
-    places = np.moveaxis(values, 0, 2)
-    evidence = np.take_along_axis(table, _bins(_flat(places)), axis=1).reshape(places.shape)
-    return np.clip(evidence, -_LARGEST, _LARGEST).mean(axis=2)
-
-
-def _flat(values: np.ndarray) -> np.ndarray:
-    """Return values of shape (k, ...) as (k, m), also where k is 0."""
-    return values.reshape(len(values), int(np.prod(values.shape[1:])))
-
-
-def _bins(values: np.ndarray) -> np.ndarray:
-    """Return the bins of gray values among `_LEVELS`."""
-    places = np.rint((np.log(np.maximum(values, 0) + LOG_OFFSET) - _LEVELS[0]) / _LEVEL_BIN)
-    return np.clip(places.astype(np.intp), 0, len(_LEVELS) - 1)
-
-
-def _density(bins: np.ndarray) -> np.ndarray:
-    """Return the smoothed densities of k sets of bins, shape (k, number of levels)."""
-    size = len(_LEVELS)
-    keys = (bins + size * np.arange(len(bins))[:, None]).ravel()
-    counts = np.bincount(keys, minlength=size * len(bins)).reshape(len(bins), size)
-    distance = np.arange(size)[:, None] - np.arange(size)
-    kernel = np.exp(-0.5 * (distance * _LEVEL_BIN / _LEVEL_SPREAD) ** 2)
-    kernel /= _LEVEL_SPREAD * np.sqrt(2 * np.pi)
-    return counts / max(bins.shape[1], 1) @ kernel
-
-
-def _border_evidence(band: np.ndarray, marks: Marks) -> tuple[np.ndarray, np.ndarray]:
-    """Return the evidence of borders onto a mark and off it, against none, after each angle."""
-    before, after = np.roll(band, 1, axis=2), np.roll(band, -2, axis=2)
-    bright = np.moveaxis(np.maximum(before, after), 0, 2)
-    mark = np.moveaxis(marks.step(bright), 2, 0)
-    # A mark that makes no step cannot be told by one.
-    mark = np.sign(mark) * np.maximum(np.abs(mark), _LEAST_STEP)
-    rise = _log_ratio(after, before) / mark
-    onto, none, off = (
-        np.log(_normal(rise - wanted, _BORDER_SPREAD) + _FLOOR) for wanted in (1, 0, -1)
-    )
-    return (onto - none).sum(axis=0), (off - none).sum(axis=0)
-
-
-def _normal(values: np.ndarray, spread: np.ndarray | float) -> np.ndarray:
-    return np.exp(-0.5 * (values / spread) ** 2) / (spread * np.sqrt(2 * np.pi))
+    return *shares, (np.abs(log_ratio(gap[1], gap[0])) < _AGREEMENT).mean(axis=1)
 
 
 @cache

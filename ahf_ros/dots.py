@@ -121,8 +121,7 @@ def _steps(
     log: np.ndarray, frames: np.ndarray, radii: np.ndarray, signs: np.ndarray
 ) -> np.ndarray:
     """Return the steps of ln outwards, from dark to bright, at all but the end radii."""
-    pixels = frame.project(frames, frame.circle_points(_ANGLES, radii))
-    values = frame.sample(log, pixels).astype(np.float32)
+    values = frame.sample_circles(log, frames, _ANGLES, radii).astype(np.float32)
     steps = (values[:, :, 2:] - values[:, :, :-2]) * (signs / LOG_SCALE)[:, None, None]
     return np.clip(steps, _LOWEST_STEP, _HIGHEST_STEP, dtype=np.float32)
 

@@ -120,6 +120,48 @@ def sample(image: np.ndarray, pixels: np.ndarray) -> np.ndarray:
     return values.reshape(pixels.shape[:-1])
 
 
+def sample_circles(
+    image: np.ndarray, frames: np.ndarray, angles: np.ndarray, radii: np.ndarray
+) -> np.ndarray:
+    """Return the values of an image on concentric circles of targets.
+
+    It does what `sample` does for the projected `circle_points`, in single precision and in parts
+    that stay in the cache.
+
+    Parameters
+    ----------
+    image : ndarray of uint8, uint16, int16 or float32, shape (height, width)
+    frames : ndarray of float64, shape (k, 3, 3)
+    angles : ndarray of float, shape (m,)
+        From +x towards +y, rad.
+    radii : ndarray of float, shape (n,) or (k, n)
+        The same for every frame, or those of each, dot radii.
+
+    Returns
+    -------
+    ndarray of the image's dtype, shape (k, m, n)
+    """
+    directions = np.stack([np.cos(angles), np.sin(angles)])
+    radii = np.broadcast_to(radii, (len(frames), np.shape(radii)[-1])).astype(np.float32)
+    values = np.empty((len(frames), len(angles), radii.shape[1]), image.dtype)
+    step = max(1, _REMAP_ROWS // len(angles))
+    for start in range(0, len(frames), step):
+        part = slice(start, start + step)
+        along = (frames[part, :, :2] @ directions).astype(np.float32)[..., None]
+        centre = frames[part, :, 2].astype(np.float32)[..., None, None]
+        lengths = radii[part, None, :]
+        across, down, scale = (centre[:, row] + along[:, row] * lengths for row in range(3))
+        rows = across.size // radii.shape[1]
+        values[part] = cv2.remap(
+            image,
+            (across / scale).reshape(rows, -1),
+            (down / scale).reshape(rows, -1),
+            cv2.INTER_LINEAR,
+            borderMode=cv2.BORDER_REPLICATE,
+        ).reshape(across.shape)
+    return values
+
+
 def within(pixels: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     """Return whether pixels, shape (..., 2), lie in an image of shape (height, width)."""
     x, y = pixels[..., 0], pixels[..., 1]

@@ -13,7 +13,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ahf_ros import candidates, decoding, dots, frame, subpixel
+from ahf_ros import candidates, decoding, dots, evidence, frame, subpixel
 from ahf_ros.codes.ring import Family, family
 from ahf_ros.detectors.detector import DetectorSettings
 from ahf_ros.image import as_gray, check_image
@@ -126,7 +126,7 @@ def _identify(
     fit = subpixel.fit_circles(gray, frames, circles, reach=_REACH, projective=False)
     good = (fit.share >= _LEAST_SHARE) & (fit.contrast <= _FAINTEST)
     fit = fit.chosen(good)
-    marks = decoding.Marks(signs[good], fit.contrast, fit.bright)
+    marks = evidence.Marks(signs[good], fit.contrast, fit.bright)
     found = _Found.unread(fit)
     # A band that was read right makes the frame better, and a better frame the reading.
     read, frames = np.arange(len(fit.frames)), fit.frames
@@ -145,31 +145,33 @@ def _distinct(frames: np.ndarray, signs: np.ndarray, quality: np.ndarray) -> np.
     """Return which frames to keep so that no two are the same dot, the best ones first."""
     major, minor, _ = frame.ellipse_axes(frames)
     size = np.sqrt(major * minor)
+    order = np.argsort(frames[:, 0, 2], kind='stable')  # neighbours are near in this order
+    x, y, size, signs = frames[order, 0, 2], frames[order, 1, 2], size[order], signs[order]
+    first, last = np.searchsorted(x, x - 0.3 * size), np.searchsorted(x, x + 0.3 * size)
     kept: list[int] = []
     free = np.ones(len(frames), bool)
-    for index in np.argsort(-quality, kind='stable'):
+    for index in np.argsort(-quality[order], kind='stable'):
         if free[index]:
-            kept.append(int(index))
-            distance = np.hypot(*(frames[:, :2, 2] - frames[index, :2, 2]).T)
-            same = (distance < 0.3 * size[index]) & (signs == signs[index])
-            free &= ~(same & (np.abs(np.log(size / size[index])) < 0.3))
+            kept.append(int(order[index]))
+            near = slice(first[index], last[index] + 1)
+            same = np.hypot(x[near] - x[index], y[near] - y[index]) < 0.3 * size[index]
+            same &= signs[near] == signs[index]
+            free[near] &= ~(same & (np.abs(np.log(size[near] / size[index])) < 0.3))
     return np.array(kept, np.intp)
 
 
 def _reported(found: _Found, wanted: DetectorSettings, code: Family) -> list[Target]:
     """Return the targets to report: one for each dot, and one for each ID at the most."""
     major, _, _ = frame.ellipse_axes(found.frames)
-    sized = (major >= wanted.min_radius) & (major <= wanted.max_radius)
-    found = found.chosen(np.flatnonzero(sized))
+    shown = (major >= wanted.min_radius) & (major <= wanted.max_radius)
+    shown &= (found.confidence >= _CERTAIN) | (wanted.report_undecoded & (found.share >= _WHOLE))
+    found = found.chosen(shown)
     found = found.chosen(np.lexsort((-found.margin, found.confidence < _CERTAIN)))
     found = found.chosen(_first_of_each_dot(found, code))
     certain = _uncontested(found, code)
-    if not wanted.report_undecoded:
-        found, certain = found.chosen(certain), certain[certain]
-    else:
-        shown = certain | (found.share >= _WHOLE)
-        found, certain = found.chosen(shown), certain[shown]
     targets = _as_targets(found, certain, code)
+    if not wanted.report_undecoded:
+        targets = [target for target in targets if target.id != UNDECODED]
     return sorted(targets, key=lambda target: (target.id, target.y, target.x))
 
 
