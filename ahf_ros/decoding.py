@@ -14,7 +14,6 @@ All valid words compete at all rotations and phases.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from functools import cache
 
 import numpy as np
 
@@ -22,6 +21,7 @@ from ahf_ros import frame
 from ahf_ros.codes.ring import Family, smallest_rotation
 from ahf_ros.evidence import Marks, border_evidence, level_evidence, log_ratio, step_evidence
 from ahf_ros.subpixel import Circles, dot_circles
+from ahf_ros.words import best_words
 
 SAMPLES_PER_SECTOR = 10
 """Angles at which a sector is read."""
@@ -117,12 +117,25 @@ def read_bands(gray: np.ndarray, frames: np.ndarray, marks: Marks, family: Famil
     evidence *= visible
     depth = np.clip((outer - inner) * size / len(of_band) / _CORRELATION, 0.1, 1)[:, None]
     rises, falls = (depth * visible * borders for borders in border_evidence(of_band, marks))
-    words, phases, margin, weakest = _best_words(evidence, rises, falls, family)
+    words, phases, margin, weakest = best_words(
+        *_by_phase(evidence, rises, falls, family.bits), family
+    )
 
     samples = (np.arange(count) - phases[:, None]) % count // SAMPLES_PER_SECTOR
     bits = (words[:, None] >> samples & 1).astype(bool)
     explained = np.stack(_explained(arcs, of_gap, marks, bits & visible, ~bits & visible), axis=1)
     return Readings(words, phases, margin, weakest, explained)
+
+
+def _by_phase(
+    marked: np.ndarray, rises: np.ndarray, falls: np.ndarray, bits: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the evidence of sectors and of borders for every phase, each (k, phases, bits)."""
+    count = bits * SAMPLES_PER_SECTOR
+    first = np.arange(SAMPLES_PER_SECTOR)[:, None] + SAMPLES_PER_SECTOR * np.arange(bits)
+    samples = (first[..., None] + np.arange(SAMPLES_PER_SECTOR)) % count
+    last = samples[..., -1]
+    return marked[:, samples].sum(axis=3), rises[:, last], falls[:, last]
 
 
 def _explained(
@@ -146,62 +159,6 @@ def _explained(
         for of_arc in agree
     ]
     return *shares, (np.abs(log_ratio(gap[1], gap[0])) < _AGREEMENT).mean(axis=1)
-
-
-@cache
-def _rotations(family: Family) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return all rotations of all words, sorted by word, their first places, and their bits.
-
-    The bits, shape (2 n, number of rotations), are followed by the products of neighbours.
-    """
-    number = np.arange(len(family.words))
-    rotated, numbers = [family.words], [number]
-    for _ in range(family.bits - 1):
-        last = rotated[-1]
-        rotated.append(last >> 1 | (last & 1) << (family.bits - 1))
-        numbers.append(number)
-    words, first = np.unique(np.concatenate(rotated), return_index=True)
-    number = np.concatenate(numbers)[first]
-    order = np.argsort(number, kind='stable')
-    words, number = words[order], number[order]
-    bits = (words >> np.arange(family.bits)[:, None] & 1).astype(np.float32)
-    starts = np.flatnonzero(np.diff(number, prepend=-1))
-    return words, starts, np.concatenate([bits, bits * np.roll(bits, -1, axis=0)])
-
-
-def _best_words(
-    marked: np.ndarray,
-    rises: np.ndarray,
-    falls: np.ndarray,
-    family: Family,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return word, phase, margin and weakest sector of the best reading of each band."""
-    count, bits = len(marked), family.bits
-    words, starts, features = _rotations(family)
-    phases = np.arange(SAMPLES_PER_SECTOR)
-    samples = phases[:, None] + np.arange(bits * SAMPLES_PER_SECTOR)
-    shape = (count, len(phases), bits, SAMPLES_PER_SECTOR)
-    sectors = marked[:, samples % samples.shape[1]].reshape(shape).sum(axis=3)
-    borders = phases[:, None] + SAMPLES_PER_SECTOR * np.arange(1, bits + 1) - 1
-    onto, off = (steps[:, borders % samples.shape[1]] for steps in (rises, falls))
-    # A border between the bits a and b gives: onto (1 - a) b + off a (1 - b).
-    single = sectors + off + np.roll(onto, 1, axis=2)
-    evidence = np.concatenate([single, -(onto + off)], axis=2).astype(np.float32)
-
-    best = np.zeros(count, np.int64)
-    phase, margin = np.zeros(count, np.intp), np.zeros(count)
-    for index in range(count):
-        scores = evidence[index] @ features
-        of_word = scores.max(axis=0)
-        of_number = np.maximum.reduceat(of_word, starts)
-        best[index] = of_word.argmax()
-        phase[index] = scores[:, best[index]].argmax()
-        second, first = np.partition(of_number, len(of_number) - 2)[-2:]
-        margin[index] = first - second
-    own = np.take_along_axis(sectors, phase[:, None, None], axis=1)[:, 0]
-    signs = 2 * features[:bits, best].T - 1
-    weakest = (own * signs).min(axis=1)
-    return words[best], phase, margin, weakest
 
 
 def marked_circles(readings: Readings, signs: np.ndarray, rays: int, family: Family) -> Circles:
