@@ -83,7 +83,7 @@ def shared_memory_profile() -> Path:
     return share / 'config' / 'fastdds_shm.xml'
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main(arguments: list[str] | None = None) -> int:
     """Show identification under projected light, by nodes in processes of their own."""
     options = parser().parse_args(arguments)
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')

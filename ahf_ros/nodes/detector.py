@@ -6,7 +6,7 @@ import sys
 import threading
 import time
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import CancelledError
 from contextlib import suppress
 from functools import partial
@@ -148,7 +148,7 @@ class DetectorNode(ProcessNode):
         self._diagnostic_array.publish(DiagnosticArray(header=header, status=[status]))
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main(arguments: list[str] | None = None) -> int:
     """Run the node."""
     return run(DetectorNode, arguments)
 

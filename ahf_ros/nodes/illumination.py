@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -116,7 +115,7 @@ def camera_info(rendering: Rendering) -> CameraInfo:
     )
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main(arguments: list[str] | None = None) -> int:
     """Run the node."""
     return run(IlluminationNode, arguments)
 

@@ -6,7 +6,7 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import rclpy
@@ -54,14 +54,14 @@ class ProcessNode(Node):
         )
 
 
-def run(make_node: Callable[[], ProcessNode], arguments: Sequence[str] | None = None) -> int:
+def run(make_node: Callable[[], ProcessNode], arguments: list[str] | None = None) -> int:
     """Run a node until it has ended or gets SIGINT or SIGTERM, and return the exit status.
 
     Parameters
     ----------
     make_node : callable
         Makes the node, once rclpy is initialised.
-    arguments : sequence of str, optional
+    arguments : list of str, optional
         Of the command line; those of the process where not given.
 
     Returns
