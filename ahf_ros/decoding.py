@@ -32,6 +32,7 @@ _BAND_DEPTHS = (0.3, 0.5, 0.7)  # of the band, where its level is read
 _GAP_DEPTHS = (0.35, 0.65)
 _DOT_DEPTHS = (0.35, 0.7)  # of the dot
 _AGREEMENT = 0.35  # of ln, between a step and what a word wants
+_INTERCEPT, _WEIGHTS = -28.5, np.array([2.89, 4.42, 8.56, 13.68, -4.53])  # of `confidence`
 _CORRELATION = 2.5  # px between independent readings
 
 
@@ -189,12 +190,29 @@ def marked_circles(readings: Readings, signs: np.ndarray, rays: int, family: Fam
 
 
 def confidence(readings: Readings, share: np.ndarray, deviation: np.ndarray) -> np.ndarray:
-    """Return the probability that readings are right."""
-    return np.where(
-        (readings.margin > 5) & (readings.weakest > 0) & (share > 0.7),
-        0.95,
-        0.1,
-    )
+    """Return the probabilities that readings are right.
+
+    Parameters
+    ----------
+    readings : Readings
+    share : ndarray of float, shape (k,)
+        Share of the expected edges that were found in their place.
+    deviation : ndarray of float, shape (k,)
+        Standard deviation of those edges, px.
+
+    Returns
+    -------
+    ndarray of float64, shape (k,)
+        Of a logistic regression on rendered scenes under all lights.
+    """
+    features = [
+        np.log1p(np.maximum(readings.margin, 0)),
+        readings.explained[:, :4].mean(axis=1),
+        readings.explained[:, 4],
+        share,
+        np.minimum(deviation, 1),
+    ]
+    return 1 / (1 + np.exp(-(_INTERCEPT + np.stack(features, axis=1) @ _WEIGHTS)))
 
 
 def canonical(words: np.ndarray, family: Family) -> tuple[np.ndarray, np.ndarray]:

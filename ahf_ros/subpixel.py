@@ -14,11 +14,16 @@ from math import erf, pi, sqrt
 import numpy as np
 
 from ahf_ros import frame
+from ahf_ros.codes.ring import Family
+
+SAMPLES_PER_SECTOR = 10
+"""Points on each edge of the band, a sector."""
 
 _HALF_WIDTHS = np.array([0.0, 1.0, 1.3, 1.6, 2.0, 2.5, 3.0])  # of an edge's profile, px
 _SAMPLES = 13  # of a profile
 _BLUR = 1.0  # standard deviation of the step, px; a wrong one costs precision, moves nothing
 _NOISE = 1.0  # of gray values, of 255; the fit scales it to what it finds
+_INNER_PART = 0.4  # of a sector, to either side; next to its ends the blur rounds an arc off
 _LEAST_CONTRAST = 0.3  # of an edge, in steps of ln of the usual edge of the target
 _OFFSET = 8.0  # added to gray values before the logarithm
 _PRIOR_SCALE = 0.003  # standard deviation of the printed proportions of band and dot
@@ -86,6 +91,36 @@ def dot_circles(signs: np.ndarray, rays: int) -> Circles:
     """
     angles = 2 * np.pi * np.arange(rays) / rays
     return Circles(angles, np.ones(rays), np.repeat(np.asarray(signs)[:, None], rays, axis=1))
+
+
+def ring_circles(
+    words: np.ndarray, starts: np.ndarray, signs: np.ndarray, rays: int, family: Family
+) -> Circles:
+    """Return the edges of ring targets: round the dots and along the marked sectors.
+
+    Parameters
+    ----------
+    words : ndarray of int64, shape (k,)
+        Code words, in any rotation.
+    starts : ndarray of float, shape (k,)
+        Where in the frame the sector of the lowest bit starts, rad counter-clockwise from +x.
+    signs : ndarray of int, shape (k,)
+        1 for a dark target, -1 for a bright one.
+    rays : int
+        Number of points round the dot.
+    family : Family
+    """
+    dot = dot_circles(signs, rays)
+    count = family.bits * SAMPLES_PER_SECTOR
+    angles = 2 * np.pi * (np.arange(count) + 0.5) / count
+    sector, place = np.divmod((angles - starts[:, None]) * family.bits / (2 * np.pi), 1)
+    bits = words[:, None] >> sector.astype(np.int64) % family.bits & 1
+    marked = np.where(np.abs(place - 0.5) < _INNER_PART, bits, 0) * signs[:, None]
+    return Circles(
+        np.concatenate([dot.angles, -angles, -angles]),
+        np.concatenate([dot.radii, np.repeat([family.band_inner, family.band_outer], count)]),
+        np.concatenate([dot.polarity, -marked, marked], axis=1),
+    )
 
 
 def fit_circles(

@@ -24,9 +24,9 @@ import numpy as np
 
 from ahf_ros.codes.ring import Family, family
 from ahf_ros.detectors.detector import DetectorSettings
-from ahf_ros.detectors.edges import refined
 from ahf_ros.frame import affine_frames, circle_points, ellipse_axes, project, sample
-from ahf_ros.image import check_image
+from ahf_ros.image import as_gray, check_image
+from ahf_ros.subpixel import dot_circles, fit_circles, ring_circles
 from ahf_ros.target import UNDECODED, Target
 
 THRESHOLD_WINDOW = 80
@@ -44,8 +44,14 @@ MINIMUM_ROUNDNESS = 0.4
 MAXIMUM_MISFIT = 0.12
 """Largest relative difference between the area of a contour and that of its ellipse."""
 
-MAXIMUM_SCATTER = 0.08
-"""Largest RMS distance of the edge from the ellipse, in radii of the dot."""
+RAYS = 48
+"""Directions in which the edge of a dot is measured."""
+
+REACH = 0.45
+"""Distance on either side over which an edge is looked for, dot radii: less than half a gap."""
+
+MINIMUM_SHARE = 0.75
+"""Smallest share of its edges that a dot shows in their place."""
 
 SAMPLES_PER_SECTOR = 12
 """Directions in which the band of a target is sampled, per sector of the code."""
@@ -108,11 +114,12 @@ class TraditionalDetector:
         """
         check_image(image)
         found: list[Target] = []
+        gray = as_gray(image).astype(np.float32, copy=False)
         for sign, mask in _masks(_eight_bit(image), self.settings.polarity):
             candidates = _candidates(mask, self.settings)
             for start in range(0, len(candidates), CHUNK):
                 chunk = candidates[start : start + CHUNK]
-                found += _identified(image, chunk, sign, self.settings)
+                found += _identified(gray, chunk, sign, self.settings)
         targets = _settled(found, family(self.settings.family))
         if not self.settings.report_undecoded:
             targets = [target for target in targets if target.id != UNDECODED]
@@ -172,27 +179,27 @@ def _candidates(mask: np.ndarray, settings: DetectorSettings) -> np.ndarray:
 
 
 def _identified(
-    image: np.ndarray, candidates: np.ndarray, sign: int, settings: DetectorSettings
+    gray: np.ndarray, candidates: np.ndarray, sign: int, settings: DetectorSettings
 ) -> list[Target]:
     """Return the targets among the candidates, those without a code word as undecoded."""
-    frames = candidates
-    for _ in range(2):
-        frames, covariances, scatter = refined(image, frames)
-        fits = scatter < MAXIMUM_SCATTER
-        frames, covariances = frames[fits], covariances[fits]
+    signs = np.full(len(candidates), -sign)
+    fit = fit_circles(gray, candidates, dot_circles(signs, RAYS), reach=REACH, projective=False)
+    fit = fit.chosen(fit.share >= MINIMUM_SHARE)
+    frames, covariances = fit.frames, fit.covariance
     if not len(frames):
         return []
     code_family = family(settings.family)
-    surrounded, words, certainties = _read(image, frames, sign, code_family)
+    surrounded, words, starts, certainties = _read(gray, frames, sign, code_family)
     numbers = [
         code_family.number(int(word)) if certainty else None
         for word, certainty in zip(words, certainties, strict=True)
     ]
     decoded = np.array([i for i, number in enumerate(numbers) if number is not None], int)
-    circles = (1.0, code_family.band_inner, code_family.band_outer)
-    joint, joint_covariances, scatter = refined(image, frames[decoded], circles)
-    fits = scatter < MAXIMUM_SCATTER
-    frames[decoded[fits]], covariances[decoded[fits]] = joint[fits], joint_covariances[fits]
+    circles = ring_circles(words[decoded], starts[decoded], signs[decoded], RAYS, code_family)
+    joint = fit_circles(gray, frames[decoded], circles, reach=REACH, projective=True)
+    fits = joint.share >= MINIMUM_SHARE
+    frames[decoded[fits]] = joint.frames[fits]
+    covariances[decoded[fits]] = joint.covariance[fits]
     semi_major, semi_minor, angles = ellipse_axes(frames)
     of_size = (settings.min_radius <= semi_major) & (semi_major <= settings.max_radius)
     return [
@@ -213,8 +220,8 @@ def _identified(
 
 
 def _read(
-    image: np.ndarray, frames: np.ndarray, sign: int, code_family: Family
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    gray: np.ndarray, frames: np.ndarray, sign: int, code_family: Family
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Read the bands of k targets.
 
     Returns
@@ -223,6 +230,8 @@ def _read(
         Whether a gap of one colour lies round the dot, in the image.
     words : ndarray of int64, shape (k,)
         The words read, in any rotation.
+    starts : ndarray of float64, shape (k,)
+        Where the sector of the lowest bit starts, rad counter-clockwise from +x of the frame.
     certainties : ndarray of float64, shape (k,)
         Probability that the word is right if the target is one, sectors being two gray values
         with normal errors; 0 where gap, band or margin are not those of a target.
@@ -234,8 +243,8 @@ def _read(
     samples = SAMPLES_PER_SECTOR * code_family.bits
     angles = -2 * np.pi * np.arange(samples) / samples  # counter-clockwise, y pointing down
     pixels = project(frames, circle_points(angles, radii))
-    values = sign * sample(image, pixels).astype(np.float32)
-    last = np.array(image.shape[::-1]) - 1
+    values = sign * sample(gray, pixels)
+    last = np.array(gray.shape[::-1]) - 1
     inside = np.all((pixels >= 0) & (pixels <= last), axis=(1, 3))
 
     dot = np.percentile(values[..., 0], 10, axis=1)
@@ -245,15 +254,15 @@ def _read(
     surrounded = (dot > ground) & inside[:, 2]
     whole = surrounded & inside[:, 5] & ((shares[..., 6] < LEVEL).mean(axis=1) > 0.85)
     profiles = np.clip(4 * (shares[..., 3:6].mean(axis=2) - LEVEL) + 0.5, 0, 1)
-    means, deviation, coherence = _sectors(profiles, code_family.bits)
+    means, starts, deviation, coherence = _sectors(profiles, code_family.bits)
     words = (means > 0.5) @ (1 << np.arange(code_family.bits))
     odds = np.abs(2 * means - 1) / (2 * np.maximum(deviation, 0.1)[:, None] ** 2)
     certainties = np.prod(1 / (1 + np.exp(-odds)), axis=1)
     whole &= (np.abs(means - 0.5).min(axis=1) > MINIMUM_CLARITY) & (coherence > MINIMUM_COHERENCE)
-    return surrounded, words, np.where(whole, certainties, 0.0)
+    return surrounded, words, starts, np.where(whole, certainties, 0.0)
 
 
-def _sectors(profiles: np.ndarray, bits: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _sectors(profiles: np.ndarray, bits: int) -> tuple[np.ndarray, ...]:
     """Divide the profiles of n bands into sectors at the phase of their grey gradient.
 
     Parameters
@@ -267,6 +276,8 @@ def _sectors(profiles: np.ndarray, bits: int) -> tuple[np.ndarray, np.ndarray, n
     -------
     means : ndarray, shape (n, bits)
         Mean of the middle half of each sector, counter-clockwise.
+    starts : ndarray, shape (n,)
+        Where the first sector starts, rad counter-clockwise.
     deviation : ndarray, shape (n,)
         RMS distance of the samples there from 0 or 1, whichever is nearer to the mean.
     coherence : ndarray, shape (n,)
@@ -285,7 +296,8 @@ def _sectors(profiles: np.ndarray, bits: int) -> tuple[np.ndarray, np.ndarray, n
     sectors = np.take_along_axis(profiles, places, axis=1).reshape(count, bits, middle.size)
     means = sectors.mean(axis=2)
     errors = sectors - (means > 0.5)[:, :, None]
-    return means, np.sqrt((errors**2).mean(axis=(1, 2))), coherence
+    deviation = np.sqrt((errors**2).mean(axis=(1, 2)))
+    return means, 2 * np.pi * first / samples, deviation, coherence
 
 
 def _settled(targets: list[Target], code_family: Family) -> list[Target]:
