@@ -56,8 +56,8 @@ class RingDetector:
         signs = _SIGNS[wanted.polarity]
         whole, whole_signs = edges[0].outlines(wanted.min_radius / 2, wanted.max_radius / 2)
         chosen = np.isin(whole_signs, signs)
-        start = frame.enlarged(whole[chosen], 1)
-        first = _identify(gray, *dots.refine_dots(logs[0], start, whole_signs[chosen]), code)
+        start, start_signs = frame.enlarged(whole[chosen], 1), whole_signs[chosen]
+        first = _identify(gray, start, start_signs, np.ones(len(start)), code)
 
         known = first.frames[first.confidence >= _CERTAIN]
         rest = _without(edges, known, code.band_outer + _QUIET)
