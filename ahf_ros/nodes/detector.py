@@ -23,7 +23,7 @@ from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.diagnostics import Diagnostics, Tally
 from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.nodes.parameters import ParameterSettings
-from ahf_ros.nodes.pipeline import Pipeline, Refused
+from ahf_ros.nodes.pipeline import STOPPING, Pipeline, Refused
 from ahf_ros.nodes.process import ProcessNode, run
 from ahf_ros.nodes.settings import DetectorNodeSettings
 from ahf_ros.nodes.worker import Worker
@@ -85,20 +85,22 @@ class DetectorNode(ProcessNode):
     ) -> Identify.Response:
         pipeline = self._pipeline
         expected = request.expected or pipeline.settings.expected_targets
+        job = partial(self._attempt, partial(pipeline.answer, request.image, expected))
         try:
-            answer = self._worker.call(
-                partial(self._attempt, partial(pipeline.answer, request.image, expected))
-            )
-        except (Refused, CancelledError) as error:
+            response.coded_targets = self._worker.call(job).message
+            response.success = True
+        except Refused as error:
             response.message = str(error)
-            return response
-        response.success = True
-        response.coded_targets = answer.message
+        except CancelledError:
+            response.message = STOPPING
         return response
 
     def _on_reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        self._worker.call(self._pipeline.reset)
-        response.success = True
+        try:
+            self._worker.call(self._pipeline.reset)
+            response.success = True
+        except CancelledError:
+            response.message = STOPPING
         return response
 
     def _process(self, message: Image, pipeline: Pipeline, received: float) -> None:

@@ -17,6 +17,9 @@ from ahf_ros.nodes.settings import DetectorNodeSettings
 from ahf_ros.nodes.target_msg import coded_target_array
 from ahf_ros.target import Identification, Target
 
+STOPPING = 'the node stops'
+"""Why there is no answer any more."""
+
 
 class Refused(Exception):
     """There is no answer for an image; the text says why."""
@@ -90,5 +93,5 @@ class Pipeline:
 
     def _detect(self, image: np.ndarray) -> list[Target]:
         if self._stopping.is_set():
-            raise Refused('the node stops')
+            raise Refused(STOPPING)
         return self._detector(image)

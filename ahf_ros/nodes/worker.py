@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TypeVar
 
 Result = TypeVar('Result')
@@ -34,7 +34,7 @@ class Worker:
             dropped = self._latest is not None
             self._latest = job
         if not dropped:
-            self._thread.submit(self._run_latest)
+            self._submit(self._run_latest)
         return dropped
 
     def call(self, job: Callable[[], Result]) -> Result:
@@ -45,11 +45,19 @@ class Worker:
         concurrent.futures.CancelledError
             If the worker is stopped before the turn of `job`.
         """
-        return self._thread.submit(job).result()
+        return self._submit(job).result()
 
     def stop(self) -> None:
         """Drop the jobs that wait and return when the one that runs has ended."""
         self._thread.shutdown(cancel_futures=True)
+
+    def _submit(self, job: Callable[[], Result]) -> Future[Result]:
+        try:
+            return self._thread.submit(job)
+        except RuntimeError:  # stopped
+            future: Future[Result] = Future()
+            future.cancel()
+            return future
 
     def _run_latest(self) -> None:
         with self._lock:

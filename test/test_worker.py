@@ -1,0 +1,81 @@
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from concurrent.futures import CancelledError
+
+import pytest
+
+from ahf_ros.nodes.worker import Worker
+
+PATIENCE = 60.0
+
+
+class Gate:
+    """A job that runs until it is let go."""
+
+    def __init__(self) -> None:
+        self.begun = threading.Event()
+        self.opened = threading.Event()
+
+    def __call__(self) -> None:
+        self.begun.set()
+        assert self.opened.wait(PATIENCE)
+
+
+@pytest.fixture
+def worker() -> Iterator[Worker]:
+    worker = Worker()
+    yield worker
+    worker.stop()
+
+
+def test_of_the_jobs_that_wait_only_the_latest_runs(worker: Worker) -> None:
+    gate, done = Gate(), list[int]()
+    assert not worker.offer(gate)
+    assert gate.begun.wait(PATIENCE)
+    dropped = [worker.offer(lambda number=number: done.append(number)) for number in range(4)]
+    gate.opened.set()
+    worker.call(lambda: None)
+    assert dropped == [False, True, True, True]
+    assert done == [3]
+
+
+def test_a_call_returns_the_result_or_raises_the_error(worker: Worker) -> None:
+    assert worker.call(lambda: 7) == 7
+    with pytest.raises(ZeroDivisionError):
+        worker.call(lambda: 1 // 0)
+    assert worker.call(lambda: 8) == 8
+
+
+def test_every_call_runs_while_jobs_are_offered(worker: Worker) -> None:
+    results = []
+    for number in range(20):
+        worker.offer(lambda: None)
+        results.append(worker.call(lambda number=number: number))
+    assert results == list(range(20))
+
+
+def test_one_job_at_a_time(worker: Worker) -> None:
+    running = threading.Lock()
+
+    def job() -> bool:
+        alone = running.acquire(blocking=False)
+        running.release()
+        return alone
+
+    assert all(worker.call(job) for _ in range(100))
+
+
+def test_stopping_waits_for_the_job_that_runs_and_drops_the_others() -> None:
+    worker, gate, done = Worker(), Gate(), list[int]()
+    worker.offer(gate)
+    assert gate.begun.wait(PATIENCE)
+    worker.offer(lambda: done.append(1))
+    threading.Timer(0.1, gate.opened.set).start()
+    worker.stop()
+    assert gate.opened.is_set()
+    worker.offer(lambda: done.append(2))
+    with pytest.raises(CancelledError):
+        worker.call(lambda: done.append(3))
+    assert done == []
