@@ -31,7 +31,7 @@ _NEAREST_ACROSS, _FARTHEST_ACROSS = 0.13, 0.36  # the same, dot radii
 _BAND_DEPTHS = (0.3, 0.5, 0.7)  # of the band, where its level is read
 _GAP_DEPTHS = (0.35, 0.65)
 _DOT_DEPTHS = (0.35, 0.7)  # of the dot
-_AGREEMENT = 0.35  # of ln, between a step and what a word wants
+_AGREEMENT = 0.35  # of ln, or of the step of a mark, between a step and what a word wants
 _INTERCEPT, _WEIGHTS = -28.5, np.array([2.89, 4.42, 8.56, 13.68, -4.53])  # of `confidence`
 _CORRELATION = 2.5  # px between independent readings
 
@@ -152,7 +152,8 @@ def _explained(
         step = log_ratio(values, surround)
         mark = marks.step(np.maximum(values, surround))
         # Where a mark would make no step, nothing tells it from the surround.
-        as_mark = (np.abs(step - mark) < _AGREEMENT) & (np.abs(mark) > _AGREEMENT)
+        allowed = _AGREEMENT * np.maximum(np.abs(mark), 1)
+        as_mark = (np.abs(step - mark) < allowed) & (np.abs(mark) > _AGREEMENT)
         agree.append(np.where(marked, as_mark, np.abs(step) < _AGREEMENT))
     shares = [
         (of_arc & which).sum(axis=1) / np.maximum(which.sum(axis=1), 1)

@@ -9,6 +9,7 @@ import numpy as np
 from ahf_ros.codes.ring import Family
 
 _EXHAUSTIVE = 50_000  # rotations of words, up to which all of them compete
+_LEAST_EVIDENCE = 10.0  # for ones, in units of ln
 _UNCERTAIN = 10  # sectors whose bits are varied where not all words compete
 
 
@@ -17,9 +18,10 @@ def best_words(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return the valid words with the most evidence.
 
-    Every rotation of every word competes at p phases, p ways to divide the band into sectors. In
-    families of more than 50000 rotations only those words do that differ from the sectors' own
-    evidence in no more than the ten least certain ones.
+    Bands without evidence for any one are not read. Of the others every rotation of every word
+    competes at p phases, p ways to divide the band into sectors. In families of more than 50000
+    rotations only those words do that differ from the sectors' own evidence in no more than the
+    ten least certain ones.
 
     Parameters
     ----------
@@ -33,7 +35,7 @@ def best_words(
     Returns
     -------
     words : ndarray of int64, shape (k,)
-        The best word, in the rotation read.
+        The best word, in the rotation read; 0 where there is none.
     phases : ndarray of int, shape (k,)
         Its phase.
     margins : ndarray of float64, shape (k,)
@@ -47,7 +49,8 @@ def best_words(
     words = np.zeros(len(sectors), np.int64)
     phases, margins = np.zeros(len(sectors), np.intp), np.zeros(len(sectors))
     everything = len(family.words) * family.bits <= _EXHAUSTIVE
-    for index in range(len(sectors)):
+    hopeful = np.maximum(sectors, 0).sum(axis=2).max(axis=1) > _LEAST_EVIDENCE
+    for index in np.flatnonzero(hopeful):
         competing, starts, features = (
             _all_rotations(family) if everything else _near_rotations(single[index], family)
         )

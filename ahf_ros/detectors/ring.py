@@ -59,8 +59,7 @@ class RingDetector:
         start, start_signs = frame.enlarged(whole[chosen], 1), whole_signs[chosen]
         first = _identify(gray, start, start_signs, np.ones(len(start)), code)
 
-        known = first.frames[first.confidence >= _CERTAIN]
-        rest = _without(edges, known, code.band_outer + _QUIET)
+        rest = _unexplained(edges, first, code)
         groups = candidates.find_candidates(rest, wanted.min_radius, wanted.max_radius, signs)
         found = [first]
         if groups:
@@ -104,12 +103,15 @@ class _Found:
         return _Found(*(np.concatenate([getattr(of, name) for of in parts]) for name in names))
 
 
-def _without(
-    edges: list[candidates.LogEdges], frames: np.ndarray, radius: float
+def _unexplained(
+    edges: list[candidates.LogEdges], found: _Found, code: Family
 ) -> dict[int, candidates.LogEdges]:
-    """Return the edges of the levels from 1 on that lie outside of circles of known targets."""
+    """Return the edges of the levels from 1 on that neither targets nor whole dots explain."""
     angles = np.linspace(0, 2 * np.pi, 32, endpoint=False)
-    outlines = frame.project(frames, frame.circle_points(angles, np.array([radius])))[:, :, 0]
+    certain = found.confidence >= _CERTAIN
+    hidden = certain | (found.share >= _WHOLE)
+    radii = np.where(certain, code.band_outer + _QUIET, 1 + _QUIET)[hidden, None]
+    outlines = frame.project(found.frames[hidden], frame.circle_points(angles, radii))[:, :, 0]
     return {
         level: of_level.outside(list((outlines + 0.5) / 2**level - 0.5))
         for level, of_level in enumerate(edges, start=1)
