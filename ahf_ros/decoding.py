@@ -32,8 +32,11 @@ _BAND_DEPTHS = (0.3, 0.5, 0.7)  # of the band, where its level is read
 _GAP_DEPTHS = (0.35, 0.65)
 _DOT_DEPTHS = (0.35, 0.7)  # of the dot
 _AGREEMENT = 0.35  # of ln, or of the step of a mark, between a step and what a word wants
-_INTERCEPT, _WEIGHTS = -28.5, np.array([2.89, 4.42, 8.56, 13.68, -4.53])  # of `confidence`
 _CORRELATION = 2.5  # px between independent readings
+_INTERCEPT, _WEIGHTS = -20.2, np.array([2.19, 2.49, 3.50, 13.3, -4.6])
+
+FEATURES = len(_WEIGHTS)
+"""Number of the features that `confidence` weighs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +46,7 @@ class Readings:
     Attributes
     ----------
     words : ndarray of int64, shape (k,)
-        The best valid word, in the rotation read from `start`.
+        The best valid word, in the rotation read from `phase`; 0 where there is none.
     phase : ndarray of int, shape (k,)
         Where the first sector begins, in samples counter-clockwise from +x of the frame.
     margin : ndarray of float64, shape (k,)
@@ -65,7 +68,7 @@ class Readings:
     def plausible(self) -> np.ndarray:
         """Whether it is worth a closer look, ndarray of bool, shape (k,)."""
         arcs = self.explained[:, :4].min(axis=1)
-        return (self.margin > 1) & (self.weakest > -15) & (arcs > 0.3)
+        return (self.margin > 3) & (self.weakest > -60) & (arcs > 0.25)
 
     def chosen(self, which: np.ndarray) -> Readings:
         """Return some of the readings."""
@@ -190,8 +193,10 @@ def marked_circles(readings: Readings, signs: np.ndarray, rays: int, family: Fam
     )
 
 
-def confidence(readings: Readings, share: np.ndarray, deviation: np.ndarray) -> np.ndarray:
-    """Return the probabilities that readings are right.
+def confidence_features(
+    readings: Readings, share: np.ndarray, deviation: np.ndarray
+) -> np.ndarray:
+    """Return what tells right readings from wrong ones.
 
     Parameters
     ----------
@@ -203,17 +208,29 @@ def confidence(readings: Readings, share: np.ndarray, deviation: np.ndarray) -> 
 
     Returns
     -------
-    ndarray of float64, shape (k,)
-        Of a logistic regression on rendered scenes under all lights.
+    ndarray of float64, shape (k, FEATURES)
+        ln(1 + margin), explained share of the steps at the band's edges, that of the gap, share of
+        the edges, and their deviation, 1 px at the most.
     """
-    features = [
-        np.log1p(np.maximum(readings.margin, 0)),
-        readings.explained[:, :4].mean(axis=1),
-        readings.explained[:, 4],
-        share,
-        np.minimum(deviation, 1),
-    ]
-    return 1 / (1 + np.exp(-(_INTERCEPT + np.stack(features, axis=1) @ _WEIGHTS)))
+    return np.stack(
+        [
+            np.log1p(np.maximum(readings.margin, 0)),
+            readings.explained[:, :4].mean(axis=1),
+            readings.explained[:, 4],
+            share,
+            np.minimum(deviation, 1),
+        ],
+        axis=1,
+    )
+
+
+def confidence(features: np.ndarray) -> np.ndarray:
+    """Return the probabilities that readings with given features are right.
+
+    They are those of a logistic regression on rendered scenes under all lights, which
+    benchmarks/confidence.py repeats.
+    """
+    return 1 / (1 + np.exp(-(_INTERCEPT + features @ _WEIGHTS)))
 
 
 def canonical(words: np.ndarray, family: Family) -> tuple[np.ndarray, np.ndarray]:

@@ -25,7 +25,7 @@ _RAYS = 48  # about a dot
 _REACH = 0.45  # about an expected edge, dot radii
 _LEAST_SHARE = 0.5  # of the edge of a dot, for its band to be read
 _FAINTEST = 0.8  # contrast of a dot, for its band to be read
-_CERTAIN = 0.98  # confidence from which a word is reported
+_CERTAIN = 0.99  # confidence from which a word is reported
 _READINGS = 2  # of a band, each from a better frame
 _WHOLE = 0.9  # share of the edge of a dot that is reported without a word
 _CLEARLY = 2.0  # times the evidence of another claim to the same ID
@@ -46,6 +46,21 @@ class RingDetector:
 
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image; see `Detector`."""
+        return _reported(self.hypotheses(image), self.settings, family(self.settings.family))
+
+    def hypotheses(self, image: np.ndarray) -> Hypotheses:
+        """Return all dots of one image and what their bands may say, before anything is decided.
+
+        Parameters
+        ----------
+        image : ndarray, shape (height, width)
+            As for `Detector`.
+
+        Raises
+        ------
+        ValueError
+            If the image is not accepted.
+        """
         check_image(image)
         wanted, code = self.settings, family(self.settings.family)
         gray = as_gray(image)
@@ -66,45 +81,75 @@ class RingDetector:
             fitted = zip(*(dots.fit_dots(logs, group) for group in groups), strict=True)
             frames, dot_signs, inliers = (np.concatenate(parts) for parts in fitted)
             found.append(_identify(gray, frames, dot_signs, inliers, code))
-        return _reported(_Found.joined(found), wanted, code)
+        return Hypotheses.joined(found)
 
 
 @dataclass(frozen=True, slots=True)
-class _Found:
-    """Dots, and what their bands were read as."""
+class Hypotheses:
+    """k dots, and what their bands were read as.
 
-    frames: np.ndarray  # (k, 3, 3), px of the image
-    covariance: np.ndarray  # (k, 2, 2), px^2
-    words: np.ndarray  # (k,), in the rotation read; 0 where nothing was
-    confidence: np.ndarray  # (k,)
-    margin: np.ndarray  # (k,), evidence over the next best ID
-    share: np.ndarray  # (k,), of the edges in their place
+    Attributes
+    ----------
+    frames : ndarray of float64, shape (k, 3, 3)
+        In px of the image.
+    covariance : ndarray of float64, shape (k, 2, 2)
+        Of the image of the centre, px^2.
+    share : ndarray of float64, shape (k,)
+        Share of the expected edges that are in their place.
+    words : ndarray of int64, shape (k,)
+        In the rotation read; 0 where no word is plausible.
+    margin : ndarray of float64, shape (k,)
+        Evidence over the best word of another ID, in units of ln.
+    features : ndarray of float64, shape (k, n)
+        What the confidence is computed from, see `decoding.confidence_features`.
+    confidence : ndarray of float64, shape (k,)
+        Probability that the word is right.
+    """
+
+    frames: np.ndarray
+    covariance: np.ndarray
+    share: np.ndarray
+    words: np.ndarray
+    margin: np.ndarray
+    features: np.ndarray
+    confidence: np.ndarray
 
     @staticmethod
-    def unread(fit: subpixel.Fit) -> _Found:
+    def unread(fit: subpixel.Fit) -> Hypotheses:
         """Return dots of which no band was read."""
-        nothing = np.zeros(len(fit.frames))
-        words = np.zeros(len(fit.frames), np.int64)
-        return _Found(fit.frames, fit.covariance, words, nothing, nothing.copy(), fit.share)
+        count = len(fit.frames)
+        return Hypotheses(
+            fit.frames.copy(),
+            fit.covariance.copy(),
+            fit.share.copy(),
+            words=np.zeros(count, np.int64),
+            margin=np.zeros(count),
+            features=np.zeros((count, decoding.FEATURES)),
+            confidence=np.zeros(count),
+        )
 
     def update(self, which: np.ndarray, readings: decoding.Readings, fit: subpixel.Fit) -> None:
         """Take over the readings of some of the dots."""
+        features = decoding.confidence_features(readings, fit.share, fit.deviation)
         self.frames[which], self.covariance[which] = fit.frames, fit.covariance
-        self.words[which], self.margin[which] = readings.words, readings.margin
-        self.confidence[which] = decoding.confidence(readings, fit.share, fit.deviation)
         self.share[which] = fit.share
+        self.words[which], self.margin[which] = readings.words, readings.margin
+        self.features[which] = features
+        self.confidence[which] = decoding.confidence(features)
 
-    def chosen(self, which: np.ndarray) -> _Found:
-        return _Found(*(getattr(self, item.name)[which] for item in fields(self)))
+    def chosen(self, which: np.ndarray) -> Hypotheses:
+        """Return some of the dots."""
+        return Hypotheses(*(getattr(self, item.name)[which] for item in fields(self)))
 
     @staticmethod
-    def joined(parts: list[_Found]) -> _Found:
-        names = [item.name for item in fields(_Found)]
-        return _Found(*(np.concatenate([getattr(of, name) for of in parts]) for name in names))
+    def joined(parts: list[Hypotheses]) -> Hypotheses:
+        """Return the dots of several finds."""
+        names = [item.name for item in fields(Hypotheses)]
+        return Hypotheses(*(np.concatenate([getattr(of, n) for of in parts]) for n in names))
 
 
 def _unexplained(
-    edges: list[candidates.LogEdges], found: _Found, code: Family
+    edges: list[candidates.LogEdges], found: Hypotheses, code: Family
 ) -> dict[int, candidates.LogEdges]:
     """Return the edges of the levels from 1 on that neither targets nor whole dots explain."""
     angles = np.linspace(0, 2 * np.pi, 32, endpoint=False)
@@ -120,7 +165,7 @@ def _unexplained(
 
 def _identify(
     gray: np.ndarray, frames: np.ndarray, signs: np.ndarray, inliers: np.ndarray, code: Family
-) -> _Found:
+) -> Hypotheses:
     """Read the bands about dots, and refine dot and band together."""
     kept = _distinct(frames, signs, inliers)
     frames, signs = frames[kept], signs[kept]
@@ -129,7 +174,7 @@ def _identify(
     good = (fit.share >= _LEAST_SHARE) & (fit.contrast <= _FAINTEST)
     fit = fit.chosen(good)
     marks = evidence.Marks(signs[good], fit.contrast, fit.bright)
-    found = _Found.unread(fit)
+    found = Hypotheses.unread(fit)
     # A band that was read right makes the frame better, and a better frame the reading.
     read, frames = np.arange(len(fit.frames)), fit.frames
     for _ in range(_READINGS):
@@ -162,7 +207,7 @@ def _distinct(frames: np.ndarray, signs: np.ndarray, quality: np.ndarray) -> np.
     return np.array(kept, np.intp)
 
 
-def _reported(found: _Found, wanted: DetectorSettings, code: Family) -> list[Target]:
+def _reported(found: Hypotheses, wanted: DetectorSettings, code: Family) -> list[Target]:
     """Return the targets to report: one for each dot, and one for each ID at the most."""
     major, _, _ = frame.ellipse_axes(found.frames)
     shown = (major >= wanted.min_radius) & (major <= wanted.max_radius)
@@ -177,7 +222,7 @@ def _reported(found: _Found, wanted: DetectorSettings, code: Family) -> list[Tar
     return sorted(targets, key=lambda target: (target.id, target.y, target.x))
 
 
-def _first_of_each_dot(found: _Found, code: Family) -> np.ndarray:
+def _first_of_each_dot(found: Hypotheses, code: Family) -> np.ndarray:
     """Return the first of all that lie on the same dot, or on a band that has been read."""
     major, minor, _ = frame.ellipse_axes(found.frames)
     reach = np.where(found.confidence >= _CERTAIN, code.band_outer * minor, major)
@@ -189,7 +234,7 @@ def _first_of_each_dot(found: _Found, code: Family) -> np.ndarray:
     return np.array(kept, np.intp)
 
 
-def _uncontested(found: _Found, code: Family) -> np.ndarray:
+def _uncontested(found: Hypotheses, code: Family) -> np.ndarray:
     """Return which readings are certain and clearly the best claim to their ID."""
     certain = found.confidence >= _CERTAIN
     _, numbers = decoding.canonical(found.words, code)
@@ -202,7 +247,7 @@ def _uncontested(found: _Found, code: Family) -> np.ndarray:
     return certain
 
 
-def _as_targets(found: _Found, certain: np.ndarray, code: Family) -> list[Target]:
+def _as_targets(found: Hypotheses, certain: np.ndarray, code: Family) -> list[Target]:
     codes, numbers = decoding.canonical(found.words, code)
     major, minor, angle = frame.ellipse_axes(found.frames)
     return [
