@@ -19,7 +19,14 @@ import numpy as np
 
 from ahf_ros import frame
 from ahf_ros.codes.ring import Family, smallest_rotation
-from ahf_ros.evidence import Marks, border_evidence, level_evidence, log_ratio, step_evidence
+from ahf_ros.evidence import (
+    Marks,
+    border_evidence,
+    level_evidence,
+    log_ratio,
+    see_light,
+    step_evidence,
+)
 from ahf_ros.subpixel import Circles, dot_circles
 from ahf_ros.words import best_words
 
@@ -111,10 +118,11 @@ def read_bands(gray: np.ndarray, frames: np.ndarray, marks: Marks, family: Famil
     of_band, of_gap, of_dot = values[4:7], values[7:9], values[9:11]
 
     arcs = [(gap_in, band_in), (outside, band_out)]
-    evidence = sum(step_evidence(surround, inside, marks) for surround, inside in arcs)
     surround = np.concatenate([of_gap, [gap_in, outside]])
     bright = np.where((marks.signs > 0)[:, None], surround, np.concatenate([of_dot, of_dot]))
-    evidence += level_evidence(bright, of_band, marks)
+    light = see_light(np.moveaxis(bright, 0, 2), of_gap, marks)
+    evidence = sum(step_evidence(surround, inside, marks, light) for surround, inside in arcs)
+    evidence += level_evidence(of_band, light)
     evidence *= np.clip(2 * np.pi * inner * size / count / _CORRELATION, 0.08, 1)[:, None]
     limit = frame.circle_points(angles, np.array([outer + _FARTHEST_ACROSS]))[:, 0]
     visible = frame.within(frame.project(frames, limit), gray.shape)

@@ -21,6 +21,8 @@ _BORDER_SPREAD = 0.2  # of steps along the band, in steps of a mark
 _LEVEL_SPREAD = 0.12  # of ln, of levels
 _FLOOR = 0.06  # density of what no hypothesis explains
 _LARGEST = 4.0  # evidence of one reading
+_EDGE_STEP = 0.35  # of ln, of an edge of light
+_FEWEST_EDGES, _MOST_EDGES = 0.02, 0.5  # probability of one between neighbouring places
 _LEAST_STEP = 0.2  # of ln, of a mark
 _DEEPEST_SHADOW = 0.1  # of the light on the dot, elsewhere on the target
 _LEVEL_BIN = 0.05  # of ln
@@ -62,8 +64,68 @@ def log_ratio(values: np.ndarray, others: np.ndarray) -> np.ndarray:
     return np.log((values + LOG_OFFSET) / (others + LOG_OFFSET))
 
 
-def step_evidence(surround: np.ndarray, values: np.ndarray, marks: Marks) -> np.ndarray:
-    """Return the evidence that a step from the surround leads onto a mark."""
+@dataclass(frozen=True, slots=True)
+class Light:
+    """The light on k targets, as it shows in their bright places.
+
+    Attributes
+    ----------
+    unmarked, marked : ndarray of float64, shape (k, n)
+        Densities of n levels of ln I, of unmarked and of marked places.
+    edges : ndarray of float64, shape (k,)
+        Probability that an edge of light lies between two neighbouring places.
+    """
+
+    unmarked: np.ndarray
+    marked: np.ndarray
+    edges: np.ndarray
+
+    def densities(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the densities of gray values (k, ...) where unmarked and where marked."""
+        places = _bins(_flat(values))
+        tables = (self.unmarked, self.marked)
+        unmarked, marked = (
+            np.take_along_axis(table, places, axis=1).reshape(values.shape) for table in tables
+        )
+        return unmarked, marked
+
+
+def see_light(bright: np.ndarray, gap: np.ndarray, marks: Marks) -> Light:
+    """Return the light on targets.
+
+    Bright places show under which light a target lies: the density of their levels is that of all
+    its bright parts, and moved by the step of a mark that of the dark ones.
+
+    Parameters
+    ----------
+    bright : ndarray of float, shape (k, ...)
+        Gray values of places that are bright: the surround of dark marks, or a bright dot.
+    gap : ndarray of float, shape (2, k, m)
+        Gray values on two circles in the gap.
+    marks : Marks
+    """
+    seen = _bins(_flat(bright))
+    levels = np.broadcast_to(np.exp(_LEVELS) - LOG_OFFSET, (len(seen), len(_LEVELS)))
+    moved = _LEVELS - np.abs(marks.step(levels)) - _LEVELS[0]
+    moved = np.clip(np.rint(moved / _LEVEL_BIN).astype(np.intp), 0, len(_LEVELS) - 1)
+    dark, light = _density(np.take_along_axis(moved, seen, axis=1)), _density(seen)
+    of_dark_marks = (marks.signs > 0)[:, None]
+    edges = (np.abs(log_ratio(gap[1], gap[0])) > _EDGE_STEP).mean(axis=1)
+    return Light(
+        np.where(of_dark_marks, light, dark),
+        np.where(of_dark_marks, dark, light),
+        np.clip(edges, _FEWEST_EDGES, _MOST_EDGES),
+    )
+
+
+def step_evidence(
+    surround: np.ndarray, values: np.ndarray, marks: Marks, light: Light
+) -> np.ndarray:
+    """Return the evidence that a step from the surround leads onto a mark.
+
+    Either the light is the same on both sides, and the step is that of a mark or none, or an edge
+    of light lies between them, and any level of the light may follow.
+    """
     step = log_ratio(values, surround)
     noise = _NOISE * np.hypot(1 / (values + LOG_OFFSET), 1 / (surround + LOG_OFFSET))
     unmarked = _normal(step, np.hypot(_SURROUND_SPREAD, noise))
@@ -72,26 +134,22 @@ def step_evidence(surround: np.ndarray, values: np.ndarray, marks: Marks) -> np.
     spread, tail = np.hypot(_MARK_SPREAD, noise), np.hypot(_MARK_TAIL, noise)
     width = np.where(error > 0, tail, spread)
     marked = _normal(error, width) * width / ((spread + tail) / 2)
+    edges = light.edges[:, None]
+    other_unmarked, other_marked = light.densities(values)
+    marked = (1 - edges) * marked + edges * other_marked
+    unmarked = (1 - edges) * unmarked + edges * other_unmarked
+    return _limited(marked, unmarked)
+
+
+def level_evidence(values: np.ndarray, light: Light) -> np.ndarray:
+    """Return the evidence of the gray values of the band, by the light on the target."""
+    unmarked, marked = light.densities(np.moveaxis(values, 0, 2))
+    return _limited(marked, unmarked).mean(axis=2)
+
+
+def _limited(marked: np.ndarray, unmarked: np.ndarray) -> np.ndarray:
     evidence = np.log((marked + _FLOOR) / (unmarked + _FLOOR))
     return np.clip(evidence, -_LARGEST, _LARGEST)
-
-
-def level_evidence(bright: np.ndarray, values: np.ndarray, marks: Marks) -> np.ndarray:
-    """Return the evidence of the gray values of the band, given those of bright places.
-
-    Bright places of the target show under which light it lies: the density of their levels is that
-    of the bright parts of the band, and moved by the step of a mark that of the dark ones.
-    """
-    seen = _bins(_flat(np.moveaxis(bright, 0, 2)))
-    levels = np.broadcast_to(np.exp(_LEVELS) - LOG_OFFSET, (len(seen), len(_LEVELS)))
-    moved = _LEVELS - np.abs(marks.step(levels)) - _LEVELS[0]
-    moved = np.clip(np.rint(moved / _LEVEL_BIN).astype(np.intp), 0, len(_LEVELS) - 1)
-    dark = np.take_along_axis(moved, seen, axis=1)
-    table = np.log((_density(dark) + _FLOOR) / (_density(seen) + _FLOOR))
-    table *= marks.signs[:, None]
-    places = np.moveaxis(values, 0, 2)
-    evidence = np.take_along_axis(table, _bins(_flat(places)), axis=1).reshape(places.shape)
-    return np.clip(evidence, -_LARGEST, _LARGEST).mean(axis=2)
 
 
 def _flat(values: np.ndarray) -> np.ndarray:
