@@ -128,7 +128,9 @@ def read_bands(gray: np.ndarray, frames: np.ndarray, marks: Marks, family: Famil
     visible = frame.within(frame.project(frames, limit), gray.shape)
     evidence *= visible
     depth = np.clip((outer - inner) * size / len(of_band) / _CORRELATION, 0.1, 1)[:, None]
-    rises, falls = (depth * visible * borders for borders in border_evidence(of_band, marks))
+    rises, falls = (
+        depth * visible * borders for borders in border_evidence(of_band, marks, light)
+    )
     words, phases, margin, weakest = best_words(
         *_by_phase(evidence, rises, falls, family.bits), family
     )

@@ -18,6 +18,7 @@ _NOISE = 1.2  # gray values, of 255
 _SURROUND_SPREAD = 0.16  # of ln, of steps where there is no edge
 _MARK_SPREAD, _MARK_TAIL = 0.16, 0.35  # of ln, of the step of a mark, and towards more
 _BORDER_SPREAD = 0.2  # of steps along the band, in steps of a mark
+_BORDER_FLOOR = 0.5  # density of them where an edge of light lies between
 _LEVEL_SPREAD = 0.12  # of ln, of levels
 _FLOOR = 0.06  # density of what no hypothesis explains
 _LARGEST = 4.0  # evidence of one reading
@@ -174,7 +175,7 @@ def _density(bins: np.ndarray) -> np.ndarray:
     return counts / max(bins.shape[1], 1) @ kernel
 
 
-def border_evidence(band: np.ndarray, marks: Marks) -> tuple[np.ndarray, np.ndarray]:
+def border_evidence(band: np.ndarray, marks: Marks, light: Light) -> tuple[np.ndarray, np.ndarray]:
     """Return the evidence of borders onto a mark and off it, against none, after each angle."""
     before, after = np.roll(band, 1, axis=2), np.roll(band, -2, axis=2)
     bright = np.moveaxis(np.maximum(before, after), 0, 2)
@@ -182,8 +183,9 @@ def border_evidence(band: np.ndarray, marks: Marks) -> tuple[np.ndarray, np.ndar
     # A mark that makes no step cannot be told by one.
     mark = np.sign(mark) * np.maximum(np.abs(mark), _LEAST_STEP)
     rise = log_ratio(after, before) / mark
+    floor = _FLOOR + _BORDER_FLOOR * light.edges[:, None]
     onto, none, off = (
-        np.log(_normal(rise - wanted, _BORDER_SPREAD) + _FLOOR) for wanted in (1, 0, -1)
+        np.log(_normal(rise - wanted, _BORDER_SPREAD) + floor) for wanted in (1, 0, -1)
     )
     return (onto - none).sum(axis=0), (off - none).sum(axis=0)
 
