@@ -40,7 +40,7 @@ _GAP_DEPTHS = (0.35, 0.65)
 _DOT_DEPTHS = (0.35, 0.7)  # of the dot
 _AGREEMENT = 0.35  # of ln, or of the step of a mark, between a step and what a word wants
 _CORRELATION = 2.5  # px between independent readings
-_INTERCEPT, _WEIGHTS = -20.2, np.array([2.19, 2.49, 3.50, 13.3, -4.6])
+_INTERCEPT, _WEIGHTS = -20.55, np.array([1.46, 10.12, 14.50, -4.53])
 
 FEATURES = len(_WEIGHTS)
 """Number of the features that `confidence` weighs."""
@@ -60,9 +60,9 @@ class Readings:
         Evidence for the best word over the best one of another ID, in units of ln.
     weakest : ndarray of float64, shape (k,)
         Evidence of the least certain sector for its own bit, in units of ln.
-    explained : ndarray of float64, shape (k, 5)
+    explained : ndarray of float64, shape (k, 4)
         Share of the steps that are as the word wants them: onto unmarked sectors at the inner and
-        the outer edge of the band, onto marked ones at both, and within the gap.
+        the outer edge of the band, and onto marked ones at both.
     """
 
     words: np.ndarray
@@ -74,7 +74,7 @@ class Readings:
     @property
     def plausible(self) -> np.ndarray:
         """Whether it is worth a closer look, ndarray of bool, shape (k,)."""
-        arcs = self.explained[:, :4].min(axis=1)
+        arcs = self.explained.min(axis=1)
         return (self.margin > 3) & (self.weakest > -60) & (arcs > 0.25)
 
     def chosen(self, which: np.ndarray) -> Readings:
@@ -137,7 +137,7 @@ def read_bands(gray: np.ndarray, frames: np.ndarray, marks: Marks, family: Famil
 
     samples = (np.arange(count) - phases[:, None]) % count // SAMPLES_PER_SECTOR
     bits = (words[:, None] >> samples & 1).astype(bool)
-    explained = np.stack(_explained(arcs, of_gap, marks, bits & visible, ~bits & visible), axis=1)
+    explained = _explained(arcs, marks, bits & visible, ~bits & visible)
     return Readings(words, phases, margin, weakest, explained)
 
 
@@ -154,12 +154,11 @@ def _by_phase(
 
 def _explained(
     arcs: list[tuple[np.ndarray, np.ndarray]],
-    gap: np.ndarray,
     marks: Marks,
     marked: np.ndarray,
     unmarked: np.ndarray,
-) -> tuple[np.ndarray, ...]:
-    """Return the shares of steps that are as a word wants them."""
+) -> np.ndarray:
+    """Return the shares of steps that are as a word wants them, shape (k, 4)."""
     agree = []
     for surround, values in arcs:
         step = log_ratio(values, surround)
@@ -173,7 +172,7 @@ def _explained(
         for which in (unmarked, marked)
         for of_arc in agree
     ]
-    return *shares, (np.abs(log_ratio(gap[1], gap[0])) < _AGREEMENT).mean(axis=1)
+    return np.stack(shares, axis=1)
 
 
 def marked_circles(readings: Readings, signs: np.ndarray, rays: int, family: Family) -> Circles:
@@ -219,14 +218,13 @@ def confidence_features(
     Returns
     -------
     ndarray of float64, shape (k, FEATURES)
-        ln(1 + margin), explained share of the steps at the band's edges, that of the gap, share of
-        the edges, and their deviation, 1 px at the most.
+        ln(1 + margin), explained share of the steps at the band's edges, share of the edges in
+        their place, and their deviation, 1 px at the most.
     """
     return np.stack(
         [
             np.log1p(np.maximum(readings.margin, 0)),
-            readings.explained[:, :4].mean(axis=1),
-            readings.explained[:, 4],
+            readings.explained.mean(axis=1),
             share,
             np.minimum(deviation, 1),
         ],
