@@ -60,7 +60,7 @@ class GeneticSettings:
         0.1, 'Probability that a bit of a child flips.', minimum=0.0, maximum=1.0
     )
     max_evaluations: int = parameter(
-        200, 'Most filters tried in a search, 0: no limit.', minimum=0, maximum=1000000
+        100, 'Most filters tried in a search, 0: no limit.', minimum=0, maximum=1000000
     )
     max_duration: float = parameter(
         0.0,
