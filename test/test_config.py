@@ -11,4 +11,5 @@ ROOT = Path(__file__).parent.parent
 @pytest.mark.parametrize('node', ['detector', 'illumination'])
 def test_parameter_files_are_current(node: str) -> None:
     script = runpy.run_path(str(ROOT / 'scripts' / 'write_config.py'))
-    assert (ROOT / 'config' / f'{node}.yaml').read_text() == script['configuration'](node)
+    written = (ROOT / 'config' / f'{node}.yaml').read_text()
+    assert written == script['configuration'](node), 'run scripts/write_config.py'
