@@ -1,0 +1,313 @@
+"""How many targets are identified, how exactly and how fast: lights, families, views and sizes.
+
+Every row is a kind of scene, rendered with the given seeds. The seeds from 101 on are for tests:
+nothing in the package was chosen by looking at them. Those below are for development, and a table
+is of one kind or the other. The panel is a set of photographs and is shown where it is there.
+
+    python benchmarks/identification.py [--detector ring] [--ahf] [--quick] [--lights stripe ...]
+    python benchmarks/identification.py --command 'my_detector --family {family} {image}'
+
+A command gets the path of an image and prints what `ahf identify --json` does, of which it needs
+no more than "image" and "targets" with "id", "x" and "y"; with "elapsed_s" its time is that.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shlex
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from statistics import mean, median
+from typing import Any
+
+import cv2
+import numpy as np
+from filter import machine
+from rich.console import Console
+from rich.progress import track
+
+from ahf_ros.adaptive import AdaptiveSettings, identify
+from ahf_ros.codes.ring import FAMILY_NAMES
+from ahf_ros.detectors import DETECTOR_NAMES, DetectorSettings, create
+from ahf_ros.evaluation import RIGHT, Score, TrueTarget, judge, score, total
+from ahf_ros.files import read_image, read_results, read_truth, write_image
+from ahf_ros.synthetic.lights import LIGHT_NAMES, benchmark_lights
+from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.target import Target
+
+FIRST_TEST_SEED = 101
+"""Seeds below this one are for development."""
+
+PHOTOS = Path(__file__).resolve().parents[2] / 'shared' / 'photos'
+"""Where photographs are, unless the environment variable AHF_PHOTOS says otherwise."""
+
+PATIENCE = 600.0
+"""Longest time for one image, s, of a command."""
+
+QUICK = {'width': 1200, 'height': 900, 'targets': 6}
+
+Seen = tuple[Sequence[Target], float]
+"""What was identified in an image, and the time that it took, s."""
+
+Identify = Callable[[np.ndarray, str, int], Seen]
+"""From an image, the family of its targets and their number."""
+
+
+@dataclass(slots=True)
+class Row:
+    """What one kind of scene gave.
+
+    Attributes
+    ----------
+    group, name : str
+        What is varied, and its value.
+    scores : list of Score
+        One an image.
+    squares : list of float
+        Squared errors of the centres, each in units of its own covariance; 2 on average where
+        covariances are right.
+    seconds, contours : list of float
+        Times of identification, and of the plain search for contours and ellipses, one an image.
+    """
+
+    group: str
+    name: str
+    scores: list[Score] = field(default_factory=list)
+    squares: list[float] = field(default_factory=list)
+    seconds: list[float] = field(default_factory=list)
+    contours: list[float] = field(default_factory=list)
+
+    def add(self, image: np.ndarray, truth: Sequence[TrueTarget], seen: Seen) -> None:
+        """Add what was identified in one image."""
+        targets, seconds = seen
+        self.scores.append(score(truth, targets))
+        self.squares += normalised_squares(truth, targets)
+        self.seconds.append(seconds)
+        self.contours.append(contour_seconds(image))
+
+    def record(self) -> dict[str, Any]:
+        """Return the figures as JSON has them."""
+        figures = total(self.scores)
+        x, y, both = figures.rmse or (None, None, None)
+        return {
+            'group': self.group,
+            'name': self.name,
+            'images': len(self.scores),
+            'expected': figures.expected,
+            'right': figures.right,
+            'wrong': figures.wrong,
+            'false_positives': figures.false_positives,
+            'rmse_x': x,
+            'rmse_y': y,
+            'rmse_xy': both,
+            'nees': mean(self.squares) if self.squares else None,
+            'seconds': median(self.seconds),
+            'times_contours': median(
+                own / plain for own, plain in zip(self.seconds, self.contours, strict=True)
+            ),
+        }
+
+
+def scenes(options: argparse.Namespace) -> Iterator[tuple[str, str, SceneSettings]]:
+    """Yield group, name and scene of every row that is asked for."""
+    base = SceneSettings(**QUICK) if options.quick else SceneSettings()
+    for light, ambient in benchmark_lights():
+        yield 'light', f'{light} {ambient:g}', replace(base, light=light, ambient=ambient)
+    for family in FAMILY_NAMES[1:]:
+        yield 'family', f'{family} normal', replace(base, family=family)
+        for light in ('stripe', 'lattice'):
+            scene = replace(base, family=family, light=light, ambient=0.12)
+            yield 'family', f'{family} {light} 0.12', scene
+    for light in ('normal', 'stripe', 'lattice'):
+        yield 'polarity', f'bright {light} 0.3', replace(base, polarity='bright', light=light)
+    for tilt in (30, 45, 62, 70):
+        yield 'tilt', f'{tilt} deg', replace(base, tilt=float(tilt), focal_length=3.0)
+    for radius in (5, 7, 10, 30):
+        yield 'radius', f'{radius} px', replace(base, dot_radius=float(radius))
+    marks = 20 if options.quick else 100
+    for light in ('normal', 'stripe', 'lattice'):
+        scene = replace(base, targets=0, distractors=marks, light=light)
+        yield 'no targets', f'{light} 0.3', scene
+
+
+def chosen_scenes(options: argparse.Namespace) -> list[tuple[str, str, SceneSettings]]:
+    """Return the rows of the groups and lights that are asked for."""
+    return [
+        (group, name, scene)
+        for group, name, scene in scenes(options)
+        if group in options.groups and scene.light in options.lights
+    ]
+
+
+def with_detector(options: argparse.Namespace) -> Identify:
+    """Return identification by a detector of the package, driven by AHF or not."""
+
+    def run(image: np.ndarray, family: str, expected: int) -> Seen:
+        detector = create(options.detector, DetectorSettings(family=family))
+        detector(image[:400, :400])  # tables that are made once are not timed
+        settings = AdaptiveSettings(ahf=options.ahf)
+        found = identify(image, detector, expected if options.ahf else 0, settings)
+        return found.targets, found.filter.duration
+
+    return run
+
+
+def with_command(options: argparse.Namespace) -> Identify:
+    """Return identification by another program."""
+
+    def run(image: np.ndarray, family: str, expected: int) -> Seen:
+        with tempfile.TemporaryDirectory() as folder:
+            path, results = Path(folder, 'image.png'), Path(folder, 'results.jsonl')
+            write_image(path, image)
+            values = {'image': str(path), 'family': family, 'expected': str(expected)}
+            words = shlex.split(options.command)
+            if '{image}' not in options.command:
+                words.append('{image}')
+            command = [word.format(**values) for word in words]
+            started = time.perf_counter()
+            done = subprocess.run(
+                command, stdout=subprocess.PIPE, text=True, timeout=PATIENCE, check=True
+            )
+            elapsed = time.perf_counter() - started
+            results.write_text(done.stdout)
+            targets = read_results(results).get(path.name, ())
+        return targets, float(json.loads(done.stdout).get('elapsed_s', elapsed))
+
+    return run
+
+
+def normalised_squares(truth: Sequence[TrueTarget], targets: Sequence[Target]) -> list[float]:
+    """Return e C^-1 e of the errors e of the right targets that have a covariance C."""
+    squares = []
+    for verdict, target in zip(judge(truth, targets), targets, strict=True):
+        covariance = np.reshape(target.covariance, (2, 2))
+        if verdict.kind == RIGHT and verdict.target and np.linalg.det(covariance) > 0:
+            error = np.array((target.x - verdict.target.x, target.y - verdict.target.y))
+            squares.append(float(error @ np.linalg.solve(covariance, error)))
+    return squares
+
+
+def contour_seconds(image: np.ndarray) -> float:
+    """Return the time of the plain search for ellipses: edges, contours, a fit to each."""
+    started = time.perf_counter()
+    edges = cv2.Canny(image, 50, 150)
+    contours, _ = cv2.findContours(edges, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
+    for contour in contours:
+        if len(contour) >= 20:
+            cv2.fitEllipse(contour)
+    return time.perf_counter() - started
+
+
+def synthetic_rows(options: argparse.Namespace, run: Identify) -> list[Row]:
+    """Render and identify every scene with every seed."""
+    rows = [(Row(group, name), scene) for group, name, scene in chosen_scenes(options)]
+    jobs = [(row, replace(scene, seed=seed)) for row, scene in rows for seed in options.seeds]
+    for row, scene in track(jobs, 'scenes', console=Console(stderr=True)):
+        rendering = render(scene)
+        truth = [TrueTarget(target.id, target.x, target.y) for target in rendering.targets]
+        row.add(rendering.image, truth, run(rendering.image, scene.family, len(truth)))
+    return [row for row, _ in rows]
+
+
+def panel_rows(folder: Path, run: Identify) -> list[Row]:
+    """Identify the photographs of the panel, if they are there."""
+    truth_path = folder / 'panel' / 'truth.csv'
+    if not truth_path.exists():
+        return []
+    row = Row('photographs', 'panel aicon14')
+    truth = read_truth(truth_path)
+    for name, targets in track(truth.items(), 'panel', console=Console(stderr=True)):
+        image = read_image(truth_path.parent / name)
+        shown = sum(target.confirmed for target in targets)
+        row.add(image, targets, run(image, 'aicon14', shown))
+    return [row]
+
+
+def markdown(report: dict[str, Any]) -> str:
+    """Return the report as a table."""
+    facts = report['machine']
+    kind = 'Test' if report['test'] else 'Development'
+    seeds = ', '.join(map(str, report['seeds']))
+    head = ('', '', 'd of N', 'wrong', 'false', 'RMSE X', 'Y', 'XY', 'NEES', 's', '/ contours')
+    lines = [
+        f'{report["method"]}, {report["width"]} x {report["height"]} px. {kind} seeds: {seeds}. '
+        f'{facts["processor"]}, {facts["cores"]} cores, Python {facts["python"]}, numpy '
+        f'{facts["numpy"]}, OpenCV {facts["opencv"]}.',
+        '',
+        f'| {" | ".join(head)} |',
+        '|---' * len(head) + '|',
+    ]
+    for row in report['rows']:
+        numbers = [
+            '-' if row[name] is None else f'{row[name]:.{digits}f}'
+            for name, digits in (
+                ('rmse_x', 3),
+                ('rmse_y', 3),
+                ('rmse_xy', 3),
+                ('nees', 1),
+                ('seconds', 2),
+                ('times_contours', 1),
+            )
+        ]
+        counts = f'{row["right"]} of {row["expected"]}'
+        cells = [row['group'], row['name'], counts, row['wrong'], row['false_positives'], *numbers]
+        lines.append(f'| {" | ".join(map(str, cells))} |')
+    return '\n'.join(lines)
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return what can be chosen."""
+    made = argparse.ArgumentParser(
+        description=__doc__.split('\n\n')[0],
+        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+    )
+    groups = ('light', 'family', 'polarity', 'tilt', 'radius', 'no targets', 'photographs')
+    method = made.add_mutually_exclusive_group()
+    method.add_argument('--detector', choices=DETECTOR_NAMES, default='ring')
+    method.add_argument('--command', help='another program; {image}, {family}, {expected}')
+    made.add_argument('--ahf', action='store_true', help='search for filters, N being given')
+    made.add_argument('--quick', action='store_true', help='small images with nine targets')
+    made.add_argument('--lights', nargs='+', choices=LIGHT_NAMES, default=LIGHT_NAMES)
+    made.add_argument('--groups', nargs='+', choices=groups, default=groups)
+    made.add_argument('--seeds', nargs='+', type=int, default=[FIRST_TEST_SEED])
+    made.add_argument('--json', type=Path, metavar='FILE', help='also write a JSON object')
+    return made
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Measure and print."""
+    options = parser().parse_args(arguments)
+    test = [seed >= FIRST_TEST_SEED for seed in options.seeds]
+    if len(set(test)) > 1:
+        told = f'seeds are {options.seeds}, accepted are all below {FIRST_TEST_SEED} or none'
+        print(told, file=sys.stderr)
+        return 2
+    run = with_command(options) if options.command else with_detector(options)
+    rows = synthetic_rows(options, run)
+    if 'photographs' in options.groups:
+        rows += panel_rows(Path(os.environ.get('AHF_PHOTOS', PHOTOS)), run)
+    size = asdict(SceneSettings(**QUICK) if options.quick else SceneSettings())
+    report = {
+        'method': options.command or options.detector + (' with AHF' if options.ahf else ''),
+        'width': size['width'],
+        'height': size['height'],
+        'seeds': options.seeds,
+        'test': test[0],
+        'machine': machine(),
+        'rows': [row.record() for row in rows],
+    }
+    if options.json:
+        options.json.write_text(json.dumps(report, indent=1))
+    print(markdown(report))
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
