@@ -10,6 +10,7 @@ projected stripes.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import ceil, log2
 
 import cv2
 import numpy as np
@@ -73,6 +74,11 @@ def log_image(gray: np.ndarray) -> np.ndarray:
         table = LOG_SCALE * np.log(np.arange(256) + LOG_OFFSET)
         return cv2.LUT(gray, table.astype(np.int16))
     return (LOG_SCALE * cv2.log(gray + np.float32(LOG_OFFSET))).astype(np.int16)
+
+
+def halvings(max_radius: float) -> int:
+    """Return how often an image is halved until dots of `max_radius` px can be voted for."""
+    return max(1, ceil(log2(max_radius / _RANGES[-1][1])))
 
 
 def pyramid(image: np.ndarray, levels: int) -> list[np.ndarray]:

@@ -18,7 +18,8 @@ _LOWEST_STEP, _HIGHEST_STEP = -0.3, 0.6  # of ln; higher steps count no more
 _LEAST_SCORE = 0.15  # mean step of ln along the ellipse
 _WINDOWS = (0.35, 0.22, 0.14)  # about the ellipse, in its own radius
 _LEAST_STEP = 0.1  # of ln, for a ray to count in the fit
-_INLIER = 0.06  # of the radius
+_LEAST_WINDOW = 2.0  # the same, px
+_INLIER, _PIXEL_INLIER = 0.06, 0.4  # of the radius, or px
 _LEAST_INLIERS = 0.45
 _LEAST_ASPECT = 0.28
 
@@ -130,7 +131,10 @@ def _refined(
     log: np.ndarray, frames: np.ndarray, signs: np.ndarray, window: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return frames moved onto the strongest steps near their circle, and the inliers' share."""
-    radii = 1 + np.linspace(-1.15, 1.15, 13) * window
+    major, minor, _ = frame.ellipse_axes(frames)
+    size = np.sqrt(major * minor)[:, None]
+    windows = np.clip(_LEAST_WINDOW / size, window, 0.5)
+    radii = 1 + np.linspace(-1.15, 1.15, 13) * windows
     steps = _steps(log, frames, radii, signs)
     best = np.clip(steps.argmax(axis=2), 1, steps.shape[2] - 2)
     before, step, after = (
@@ -139,14 +143,16 @@ def _refined(
     )
     curvature = np.minimum(before - 2 * step + after, -1e-3)
     shift = np.clip(0.5 * (before - after) / curvature, -1, 1)
-    displacement = radii[1:-1][best] + shift * (radii[1] - radii[0]) - 1
+    spacing = radii[:, 1:2] - radii[:, :1]
+    displacement = np.take_along_axis(radii, best + 1, axis=1) + shift * spacing - 1
     usual = np.maximum(np.median(step, axis=1, keepdims=True), _LEAST_STEP)
     seen = np.clip(step / usual, 0, 1) * (step > _LEAST_STEP)
     changes, errors = fit_robustly(
         displacement, seen, frame.displacement_basis(_ANGLES, np.ones(_RAYS))[:, :5], window / 5
     )
-    inliers = ((np.abs(errors) < _INLIER) & (step > 1.5 * _LEAST_STEP)).mean(axis=1)
-    return frame.moved(frames, np.clip(changes, -window, window)), inliers
+    inlying = np.abs(errors) < np.maximum(_INLIER, _PIXEL_INLIER / size)
+    inliers = (inlying & (step > 1.5 * _LEAST_STEP)).mean(axis=1)
+    return frame.moved(frames, np.clip(changes, -windows, windows)), inliers
 
 
 def fit_robustly(

@@ -20,13 +20,14 @@ from ahf_ros.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, Target
 
 _SIGNS = {'auto': (1, -1), 'dark': (1,), 'bright': (-1,)}
-_LEVELS = 3  # of the pyramid, besides the image
 _RAYS = 48  # about a dot
 _REACH = 0.45  # about an expected edge, dot radii
 _LEAST_SHARE = 0.5  # of the edge of a dot, for its band to be read
 _FAINTEST = 0.8  # contrast of a dot, for its band to be read
 _CERTAIN = 0.99  # confidence from which a word is reported
 _READINGS = 2  # of a band, each from a better frame
+_SHIFT = 0.4  # of an edge towards the dark side, px, at the most
+_SMALL = 7.0  # radius of dots that such a shift spoils the reading of, px
 _WHOLE = 0.9  # share of the edge of a dot that is reported without a word
 _CLEARLY = 2.0  # times the evidence of another claim to the same ID
 _QUIET = 0.4  # width of the margin round the band, dot radii
@@ -64,7 +65,8 @@ class RingDetector:
         check_image(image)
         wanted, code = self.settings, family(self.settings.family)
         gray = as_gray(image)
-        logs = [candidates.log_image(level) for level in candidates.pyramid(gray, _LEVELS)]
+        levels = candidates.pyramid(gray, candidates.halvings(wanted.max_radius))
+        logs = [candidates.log_image(level) for level in levels]
         edges = [candidates.find_edges(log) for log in logs[1:]]
         gray = gray.astype(np.float32, copy=False)
 
@@ -172,11 +174,13 @@ def _identify(
     circles = subpixel.dot_circles(signs, _RAYS)
     fit = subpixel.fit_circles(gray, frames, circles, reach=_REACH, projective=False)
     good = (fit.share >= _LEAST_SHARE) & (fit.contrast <= _FAINTEST)
-    fit = fit.chosen(good)
-    marks = evidence.Marks(signs[good], fit.contrast, fit.bright)
+    fit, signs = fit.chosen(good), signs[good]
+    which, frames = _unshifted(fit, signs)
+    fit = fit.chosen(which)
+    marks = evidence.Marks(signs[which], fit.contrast, fit.bright)
     found = Hypotheses.unread(fit)
+    read = np.arange(len(which))
     # A band that was read right makes the frame better, and a better frame the reading.
-    read, frames = np.arange(len(fit.frames)), fit.frames
     for _ in range(_READINGS):
         readings = decoding.read_bands(gray, frames, marks, code)
         good = readings.plausible
@@ -186,6 +190,25 @@ def _identify(
         frames = fit.frames
     found.update(read, readings, fit)
     return found
+
+
+def _unshifted(fit: subpixel.Fit, signs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return which dots to read, and their frames without the shift of the dot's edge.
+
+    A camera's gamma makes a dark dot smaller and a bright one larger, by a third of a pixel at
+    usual blur; a linear camera does not. The band, up to 3.5 radii away, needs the scale: small
+    dots are read with either, others with the mean.
+    """
+    major, minor, _ = frame.ellipse_axes(fit.frames)
+    size = np.sqrt(major * minor)
+    every, small = np.arange(len(size)), np.flatnonzero(size < _SMALL)
+    which = np.concatenate([every, small])
+    shift = np.full(len(size), _SHIFT / 2)
+    shift[small] = 0.0
+    shift = np.concatenate([shift, np.full(len(small), _SHIFT)])
+    changes = np.zeros((len(which), 5))
+    changes[:, 2] = signs[which] * shift / size[which]
+    return which, frame.moved(fit.frames[which], changes)
 
 
 def _distinct(frames: np.ndarray, signs: np.ndarray, quality: np.ndarray) -> np.ndarray:
