@@ -30,6 +30,7 @@ _WEAK_EDGE, _STRONG_EDGE = 0.15, 0.22  # steps of ln, of the thresholds with hys
 _MINIMUM_VOTES = 0.9  # a unit of the circumference
 _FIRST_RANGES = ((2.0, 3.4, 1), (3.4, 5.8, 1), (5.8, 11.2, 2))  # radii and accumulator cell, px
 _RANGES = ((5.8, 11.2, 2),)
+_REGION = 16  # cells
 _STRAIGHT = 0.97  # cosine between the directions of an edge and of its continuation
 _OUTLINE_SPREAD = 0.15  # of the radius, of the points of a whole ellipse
 _OUTLINE_SIGN = 0.7  # mean agreement of their gradients with the outward direction
@@ -252,20 +253,28 @@ def _vote(
     low, high = radii
     count = max(2, int(np.ceil((high - low) / (0.8 * cell))))
     steps = low + (np.arange(count) + 0.5) * (high - low) / count
-    keys = []
-    for step in steps * sign:
-        column = ((x - step * unit_x + 0.5) / cell).astype(np.int32)
-        row = ((y - step * unit_y + 0.5) / cell).astype(np.int32)
-        inside = (column >= 0) & (row >= 0) & (column < width) & (row < height)
-        keys.append((row * width + column)[inside])
-    cast = np.bincount(np.concatenate(keys), minlength=height * width)
-    votes = cv2.blur(cast.reshape(height, width).astype(np.float32), (3, 3)) * 9
+    distance = sign * steps[:, None]
+    columns = ((x - distance * unit_x + 0.5) / cell).astype(np.int32).ravel()
+    rows = ((y - distance * unit_y + 0.5) / cell).astype(np.int32).ravel()
+    inside = (columns >= 0) & (rows >= 0) & (columns < width) & (rows < height)
+    columns, rows = columns[inside], rows[inside]
+    needed = _MINIMUM_VOTES * 2 * np.pi * low
+    # Where few edges are left, no region holds as many votes as one place needs.
+    regions = (size // _REGION + 1 for size in (width, height))
+    if _votes(columns // _REGION, rows // _REGION, *regions).max() <= needed:
+        return np.zeros((0, 2))
+    votes = _votes(columns, rows, width, height)
     reach = 2 * max(1, round(low / cell / 2)) + 1
     highest = cv2.dilate(votes, np.ones((reach, reach), np.uint8))
-    needed = _MINIMUM_VOTES * 2 * np.pi * low
     peaks = np.flatnonzero((votes >= highest) & (votes > needed))
     if len(peaks) > MAXIMUM_CANDIDATES:
         order = np.argsort(-votes.ravel()[peaks], kind='stable')[:MAXIMUM_CANDIDATES]
         peaks = np.sort(peaks[order])
     rows, columns = np.divmod(peaks, width)
     return (np.stack([columns, rows], axis=-1) + 0.5) * cell - 0.5
+
+
+def _votes(columns: np.ndarray, rows: np.ndarray, width: int, height: int) -> np.ndarray:
+    """Return the votes in the nine cells about each cell, ndarray of float32."""
+    cast = np.bincount(rows * width + columns, minlength=height * width)
+    return cv2.blur(cast.reshape(height, width).astype(np.float32), (3, 3)) * 9
