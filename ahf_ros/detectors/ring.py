@@ -8,7 +8,7 @@ image of the target's physical centre.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
@@ -16,6 +16,7 @@ import numpy as np
 from ahf_ros import candidates, decoding, dots, evidence, frame, subpixel
 from ahf_ros.codes.ring import Family, family
 from ahf_ros.detectors.detector import DetectorSettings
+from ahf_ros.hypotheses import CERTAIN, Hypotheses, settled_dots, settled_numbers
 from ahf_ros.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, Target
 
@@ -24,12 +25,10 @@ _RAYS = 48  # about a dot
 _REACH = 0.45  # about an expected edge, dot radii
 _LEAST_SHARE = 0.5  # of the edge of a dot, for its band to be read
 _FAINTEST = 0.8  # contrast of a dot, for its band to be read
-_CERTAIN = 0.99  # confidence from which a word is reported
 _READINGS = 2  # of a band, each from a better frame
 _SHIFT = 0.4  # of an edge towards the dark side, px, at the most
 _SMALL = 7.0  # radius of dots that such a shift spoils the reading of, px
 _WHOLE = 0.9  # share of the edge of a dot that is reported without a word
-_CLEARLY = 2.0  # times the evidence of another claim to the same ID
 _QUIET = 0.4  # width of the margin round the band, dot radii
 
 
@@ -86,76 +85,12 @@ class RingDetector:
         return Hypotheses.joined(found)
 
 
-@dataclass(frozen=True, slots=True)
-class Hypotheses:
-    """k dots, and what their bands were read as.
-
-    Attributes
-    ----------
-    frames : ndarray of float64, shape (k, 3, 3)
-        In px of the image.
-    covariance : ndarray of float64, shape (k, 2, 2)
-        Of the image of the centre, px^2.
-    share : ndarray of float64, shape (k,)
-        Share of the expected edges that are in their place.
-    words : ndarray of int64, shape (k,)
-        In the rotation read; 0 where no word is plausible.
-    margin : ndarray of float64, shape (k,)
-        Evidence over the best word of another ID, in units of ln.
-    features : ndarray of float64, shape (k, n)
-        What the confidence is computed from, see `decoding.confidence_features`.
-    confidence : ndarray of float64, shape (k,)
-        Probability that the word is right.
-    """
-
-    frames: np.ndarray
-    covariance: np.ndarray
-    share: np.ndarray
-    words: np.ndarray
-    margin: np.ndarray
-    features: np.ndarray
-    confidence: np.ndarray
-
-    @staticmethod
-    def unread(fit: subpixel.Fit) -> Hypotheses:
-        """Return dots of which no band was read."""
-        count = len(fit.frames)
-        return Hypotheses(
-            fit.frames.copy(),
-            fit.covariance.copy(),
-            fit.share.copy(),
-            words=np.zeros(count, np.int64),
-            margin=np.zeros(count),
-            features=np.zeros((count, decoding.FEATURES)),
-            confidence=np.zeros(count),
-        )
-
-    def update(self, which: np.ndarray, readings: decoding.Readings, fit: subpixel.Fit) -> None:
-        """Take over the readings of some of the dots."""
-        features = decoding.confidence_features(readings, fit.share, fit.deviation)
-        self.frames[which], self.covariance[which] = fit.frames, fit.covariance
-        self.share[which] = fit.share
-        self.words[which], self.margin[which] = readings.words, readings.margin
-        self.features[which] = features
-        self.confidence[which] = decoding.confidence(features)
-
-    def chosen(self, which: np.ndarray) -> Hypotheses:
-        """Return some of the dots."""
-        return Hypotheses(*(getattr(self, item.name)[which] for item in fields(self)))
-
-    @staticmethod
-    def joined(parts: list[Hypotheses]) -> Hypotheses:
-        """Return the dots of several finds."""
-        names = [item.name for item in fields(Hypotheses)]
-        return Hypotheses(*(np.concatenate([getattr(of, n) for of in parts]) for n in names))
-
-
 def _unexplained(
     edges: list[candidates.LogEdges], found: Hypotheses, code: Family
 ) -> dict[int, candidates.LogEdges]:
     """Return the edges of the levels from 1 on that neither targets nor whole dots explain."""
     angles = np.linspace(0, 2 * np.pi, 32, endpoint=False)
-    certain = found.confidence >= _CERTAIN
+    certain = found.confidence >= CERTAIN
     hidden = certain | (found.share >= _WHOLE)
     radii = np.where(certain, code.band_outer + _QUIET, 1 + _QUIET)[hidden, None]
     outlines = frame.project(found.frames[hidden], frame.circle_points(angles, radii))[:, :, 0]
@@ -234,40 +169,17 @@ def _reported(found: Hypotheses, wanted: DetectorSettings, code: Family) -> list
     """Return the targets to report: one for each dot, and one for each ID at the most."""
     major, _, _ = frame.ellipse_axes(found.frames)
     shown = (major >= wanted.min_radius) & (major <= wanted.max_radius)
-    shown &= (found.confidence >= _CERTAIN) | (wanted.report_undecoded & (found.share >= _WHOLE))
+    shown &= (found.confidence >= CERTAIN) | (wanted.report_undecoded & (found.share >= _WHOLE))
     found = found.chosen(shown)
-    found = found.chosen(np.lexsort((-found.margin, found.confidence < _CERTAIN)))
-    found = found.chosen(_first_of_each_dot(found, code))
-    certain = _uncontested(found, code)
-    targets = _as_targets(found, certain, code)
+    found = found.chosen(np.lexsort((-found.margin, found.confidence < CERTAIN)))
+    _, numbers = decoding.canonical(found.words, code)
+    certain = found.confidence >= CERTAIN
+    dots_kept, uncontested = settled_dots(found, numbers, certain, code)
+    certain = settled_numbers(found, numbers, certain & uncontested)
+    targets = _as_targets(found.chosen(dots_kept), certain[dots_kept], code)
     if not wanted.report_undecoded:
         targets = [target for target in targets if target.id != UNDECODED]
     return sorted(targets, key=lambda target: (target.id, target.y, target.x))
-
-
-def _first_of_each_dot(found: Hypotheses, code: Family) -> np.ndarray:
-    """Return the first of all that lie on the same dot, or on a band that has been read."""
-    major, minor, _ = frame.ellipse_axes(found.frames)
-    reach = np.where(found.confidence >= _CERTAIN, code.band_outer * minor, major)
-    kept: list[int] = []
-    for index, centre in enumerate(found.frames[:, :2, 2]):
-        distance = np.hypot(*(found.frames[kept, :2, 2] - centre).T)
-        if not (distance < reach[kept]).any():
-            kept.append(index)
-    return np.array(kept, np.intp)
-
-
-def _uncontested(found: Hypotheses, code: Family) -> np.ndarray:
-    """Return which readings are certain and clearly the best claim to their ID."""
-    certain = found.confidence >= _CERTAIN
-    _, numbers = decoding.canonical(found.words, code)
-    for number in np.unique(numbers[certain]):
-        claims = np.flatnonzero(certain & (numbers == number))
-        order = claims[np.argsort(-found.margin[claims], kind='stable')]
-        certain[order[1:]] = False
-        if len(order) > 1 and found.margin[order[1]] * _CLEARLY > found.margin[order[0]]:
-            certain[order[0]] = False
-    return certain
 
 
 def _as_targets(found: Hypotheses, certain: np.ndarray, code: Family) -> list[Target]:
