@@ -48,12 +48,13 @@ class Parameter:
             return f'one of {", ".join(self.choices)}'
         kind = {bool: 'true or false', int: 'an integer', float: 'a number', str: 'a text'}
         words = kind[type(self.default)]
+        form = 'd' if isinstance(self.default, int) else 'g'
         if self.minimum is not None and self.maximum is not None:
-            return f'{words} from {self.minimum:g} to {self.maximum:g}'
+            return f'{words} from {self.minimum:{form}} to {self.maximum:{form}}'
         if self.minimum is not None:
-            return f'{words} of at least {self.minimum:g}'
+            return f'{words} of at least {self.minimum:{form}}'
         if self.maximum is not None:
-            return f'{words} of at most {self.maximum:g}'
+            return f'{words} of at most {self.maximum:{form}}'
         return words
 
     def accepts(self, value: object) -> bool:
