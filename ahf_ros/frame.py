@@ -168,6 +168,44 @@ def within(pixels: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     return (x >= 0) & (y >= 0) & (x <= shape[1] - 1) & (y <= shape[0] - 1)
 
 
+def circle_geometry(
+    frames: np.ndarray, angles: np.ndarray, radii: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return where points of circles are in the image, and how the circles run there.
+
+    Parameters
+    ----------
+    frames : ndarray of float64, shape (k, 3, 3)
+    angles, radii : ndarray of float, shape (m,)
+        Of the points, rad and dot radii.
+
+    Returns
+    -------
+    points : ndarray of float64, shape (k, m, 2)
+        px.
+    normals : ndarray of float64, shape (k, m, 2)
+        Unit vectors outwards.
+    scale : ndarray of float64, shape (k, m)
+        How far the circle moves along its normal where its radius grows, px a dot radius.
+    curvature : ndarray of float64, shape (k, m)
+        Of the circle's image, 1/px.
+    """
+    radial = np.stack([np.cos(angles), np.sin(angles)])
+    tangential = np.stack([-radial[1], radial[0]])
+    linear, shift = frames[:, :, :2], frames[:, :, 2:]
+    images = radii * (linear @ radial) + shift
+    depth = images[:, 2:]
+    points = images[:, :2] / depth
+    outwards, along = (
+        (moved[:, :2] - points * moved[:, 2:]) / depth
+        for moved in (linear @ radial, linear @ tangential)
+    )
+    length = np.hypot(along[:, 0], along[:, 1])
+    area = outwards[:, 0] * along[:, 1] - outwards[:, 1] * along[:, 0]
+    normals = np.stack([along[:, 1], -along[:, 0]], axis=2) / length[..., None]
+    return points.transpose(0, 2, 1), normals, area / length, area / (radii * length**3)
+
+
 def displacement_basis(angles: np.ndarray, radii: np.ndarray) -> np.ndarray:
     """Return how far each frame change moves an edge outwards, in dot radii.
 

@@ -1,51 +1,41 @@
 """Sub-pixel frames of targets, from the edges of their circles in the original image.
 
-Along each radius a blurred step is fitted to the gray values, and the frame is moved onto the
-steps by robust weighted least squares. An edge of light that crosses a target leaves steps that do
-not fit the circles, or have the wrong contrast: they lose their weight.
+Frames are moved onto measured edges by robust weighted least squares. Edges of light that cross a
+target do not look like its own: the gray values beside them have another ratio, the profile is not
+a step, or it does not lie on the circles. They lose their weight. A slope of the light, which would
+move all edges to the same side, is taken from the profiles and corrected for.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from functools import cache
-from math import erf, pi, sqrt
 
 import numpy as np
 
 from ahf_ros import frame
-from ahf_ros.codes.ring import Family
+from ahf_ros.circles import Circles, dot_circles, ring_circles
+from ahf_ros.profiles import BLUR, Edges, measure_edges
 
-SAMPLES_PER_SECTOR = 10
-"""Points on each edge of the band, a sector."""
+__all__ = ['Circles', 'Fit', 'dot_circles', 'fit_circles', 'ring_circles']
 
-_HALF_WIDTHS = np.array([0.0, 1.0, 1.3, 1.6, 2.0, 2.5, 3.0])  # of an edge's profile, px
-_SAMPLES = 13  # of a profile
-_BLUR = 1.0  # standard deviation of the step, px; a wrong one costs precision, moves nothing
 _NOISE = 1.0  # of gray values, of 255; the fit scales it to what it finds
-_INNER_PART = 0.4  # of a sector, to either side; next to its ends the blur rounds an arc off
 _LEAST_CONTRAST = 0.3  # of an edge, in steps of ln of the usual edge of the target
 _OFFSET = 8.0  # added to gray values before the logarithm
+_RATIO_DOUBT = 1.5  # times the usual error of the ratio of the levels that halves the trust
+_LEAST_RATIO_ERROR = 0.01  # that counts as usual
+_RESIDUAL_DOUBT = 0.4  # times the usual residual, on top of it, that halves the trust
+_LEAST_RESIDUAL = 0.3  # that counts as usual, gray values
+_OUTLIER = 3.0  # times the usual distance from the circle that quarters the trust
+_ROUNDS = 4  # of robust least squares
+_LIGHT_REACH = 0.3  # standard deviation of the window in which the light is even, dot radii
+_LIGHT_PRIOR = 0.25  # weight of no slope of the light, as a share of that of a window
+_LEAST_SLOPE_ERROR = 0.002  # that counts as usual, 1/px
 _PRIOR_SCALE = 0.003  # standard deviation of the printed proportions of band and dot
 _PRIOR_PERSPECTIVE = 0.02  # of the projective part, in 1 a dot radius
 _PRIOR_SHIFT = 1.0  # of the shift of edges towards the dark side, px
-
-
-@dataclass(frozen=True, slots=True)
-class Circles:
-    """Points on the circles of k targets where edges are expected.
-
-    Attributes
-    ----------
-    angles, radii : ndarray of float64, shape (m,)
-        In the frame, rad and dot radii.
-    polarity : ndarray of int, shape (k, m)
-        1 where the outside is brighter, -1 where it is darker, 0 where there is no edge.
-    """
-
-    angles: np.ndarray
-    radii: np.ndarray
-    polarity: np.ndarray
+_WEAK_PRIOR = 1e-6
+_CORRELATION = 1.5  # px along an edge, from where on errors are independent
+_SYSTEMATIC = 0.001  # standard deviation of what pixels and interpolation do to a centre, px
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,50 +69,6 @@ class Fit:
         return Fit(*(getattr(self, item.name)[which] for item in fields(self)))
 
 
-def dot_circles(signs: np.ndarray, rays: int) -> Circles:
-    """Return the edges of dots.
-
-    Parameters
-    ----------
-    signs : ndarray of int, shape (k,)
-        1 for a dark dot, -1 for a bright one.
-    rays : int
-        Number of points.
-    """
-    angles = 2 * np.pi * np.arange(rays) / rays
-    return Circles(angles, np.ones(rays), np.repeat(np.asarray(signs)[:, None], rays, axis=1))
-
-
-def ring_circles(
-    words: np.ndarray, starts: np.ndarray, signs: np.ndarray, rays: int, family: Family
-) -> Circles:
-    """Return the edges of ring targets: round the dots and along the marked sectors.
-
-    Parameters
-    ----------
-    words : ndarray of int64, shape (k,)
-        Code words, in any rotation.
-    starts : ndarray of float, shape (k,)
-        Where in the frame the sector of the lowest bit starts, rad counter-clockwise from +x.
-    signs : ndarray of int, shape (k,)
-        1 for a dark target, -1 for a bright one.
-    rays : int
-        Number of points round the dot.
-    family : Family
-    """
-    dot = dot_circles(signs, rays)
-    count = family.bits * SAMPLES_PER_SECTOR
-    angles = 2 * np.pi * (np.arange(count) + 0.5) / count
-    sector, place = np.divmod((angles - starts[:, None]) * family.bits / (2 * np.pi), 1)
-    bits = words[:, None] >> sector.astype(np.int64) % family.bits & 1
-    marked = np.where(np.abs(place - 0.5) < _INNER_PART, bits, 0) * signs[:, None]
-    return Circles(
-        np.concatenate([dot.angles, -angles, -angles]),
-        np.concatenate([dot.radii, np.repeat([family.band_inner, family.band_outer], count)]),
-        np.concatenate([dot.polarity, -marked, marked], axis=1),
-    )
-
-
 def fit_circles(
     gray: np.ndarray,
     frames: np.ndarray,
@@ -154,151 +100,172 @@ def fit_circles(
     Fit
     """
     for _ in range(rounds):
-        edges = _measure(gray, frames, circles, reach)
+        edges = measure_edges(gray, frames, circles, reach)
         changes, fit = _solve(frames, circles, edges, projective)
         frames = frame.moved(frames, np.clip(changes[:, : 7 if projective else 5], -0.3, 0.3))
     affine = frame.local_affine(frames)
     covariance = affine @ fit.covariance @ affine.transpose(0, 2, 1)
-    return replace(fit, frames=frames, covariance=covariance)
-
-
-@dataclass(frozen=True, slots=True)
-class _Edges:
-    offset: np.ndarray  # outwards, px
-    inside: np.ndarray  # gray value
-    outside: np.ndarray
-    scale: np.ndarray  # px a dot radius, along the radius
-    visible: np.ndarray  # whether the profile lies in the image
-
-
-def _measure(gray: np.ndarray, frames: np.ndarray, circles: Circles, reach: float) -> _Edges:
-    """Fit a blurred step to the gray values along each radius."""
-    directions = np.stack([np.cos(circles.angles), np.sin(circles.angles)], axis=-1)
-    points = circles.radii[:, None] * directions
-    centre = frame.project(frames, points)
-    outwards = (frame.project(frames, points + 1e-3 * directions) - centre) / 1e-3
-    scale = np.linalg.norm(outwards, axis=-1)
-    step = (outwards / scale[..., None]).astype(np.float32)
-    place, inside, outside = (np.zeros(scale.shape) for _ in range(3))
-    visible = np.zeros(scale.shape, bool)
-    which = np.searchsorted(_HALF_WIDTHS, reach * scale, side='right') - 1
-    for index, half in enumerate(_HALF_WIDTHS[1:], start=1):
-        ends = half * step
-        whole = frame.within(centre - ends, gray.shape) & frame.within(centre + ends, gray.shape)
-        chosen = (which == index) & (circles.polarity != 0) & whole
-        visible |= chosen
-        along = np.linspace(-half, half, _SAMPLES, dtype=np.float32)
-        pixels = centre[chosen][:, None] + along[:, None] * step[chosen][:, None]
-        steps = _fit_steps(frame.sample(gray, pixels), circles.polarity[chosen], half)
-        place[chosen], inside[chosen], outside[chosen] = steps
-    return _Edges(place, inside, outside, scale, visible)
-
-
-def _fit_steps(
-    values: np.ndarray, polarity: np.ndarray, half: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Fit a blurred step to profiles, shape (k, n); return its place and the levels beside it.
-
-    The fit is linear about each of a row of places; the one with the least residual is taken.
-    """
-    places, projections, solutions = _step_filters(half)
-    energy = (values**2).sum(axis=1)[:, None]
-    explained = ((values @ projections).reshape(len(values), len(places), 2) ** 2).sum(axis=2)
-    solved = (values @ solutions).reshape(len(values), len(places), 3)
-    contrast = solved[:, :, 1] - solved[:, :, 0]
-    cost = energy - explained
-    cost[contrast * polarity[:, None] <= 0] = np.inf
-    best = cost.argmin(axis=1)
-    rows = np.arange(len(values))
-    low, high, moved = solved[rows, best].T
-    spacing = places[1] - places[0]
-    change = -moved / np.where(np.abs(high - low) < 1, 1, high - low)
-    return places[best] + np.clip(change, -spacing, spacing), low, high
-
-
-@cache
-def _step_filters(half: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the places tried, a basis of the steps at each, and the filters that fit them.
-
-    The filters' unknowns are the levels inside and outside, and minus the contrast times the
-    distance of the step from the place.
-    """
-    along = np.linspace(-half, half, _SAMPLES)
-    places = np.arange(-0.8 * half, 0.8 * half + 1e-9, 0.1 * half)
-    projections, solutions = [], []
-    for place in places:
-        scaled = (along - place) / _BLUR
-        rise = 0.5 * (1 + np.array([erf(value / sqrt(2)) for value in scaled]))
-        slope = np.exp(-0.5 * scaled**2) / (_BLUR * sqrt(2 * pi))
-        design = np.stack([1 - rise, rise, slope], axis=1)
-        projections.append(np.linalg.qr(design[:, :2])[0])
-        solutions.append(np.linalg.pinv(design).T)
-    basis, filters = (np.concatenate(of, axis=1) for of in (projections, solutions))
-    return places, basis.astype(np.float32), filters.astype(np.float32)
+    return replace(fit, frames=frames, covariance=covariance + _SYSTEMATIC**2 * np.eye(2))
 
 
 def _solve(
-    frames: np.ndarray, circles: Circles, edges: _Edges, projective: bool
+    frames: np.ndarray, circles: Circles, edges: Edges, projective: bool
 ) -> tuple[np.ndarray, Fit]:
     """Return the changes of the frames that bring the circles onto the edges."""
-    polarity = circles.polarity
     expected = edges.visible
-    inside, outside = np.maximum(edges.inside, 0), np.maximum(edges.outside, 0)
-    step = polarity * np.log((outside + _OFFSET) / (inside + _OFFSET))
-    usual = _median(step, expected)
-    seen = expected & (step > _LEAST_CONTRAST * usual[:, None]) & (step > 0)
-    dark, bright = np.minimum(inside, outside), np.maximum(inside, outside)
-    contrast = _median(dark / np.maximum(bright, 1.0), seen)
+    dark, bright = np.maximum(edges.dark, 0), np.maximum(edges.bright, 0)
+    step = np.log((bright + _OFFSET) / (dark + _OFFSET))
+    usual = _median(step, expected)[:, None]
+    seen = expected & (step > _LEAST_CONTRAST * usual) & (step > 0)
+    ratio = dark / np.maximum(bright, 1.0)
+    contrast = _median(ratio, seen)
 
-    noise = _NOISE * np.sqrt(2 * np.sqrt(np.pi) * _BLUR)
-    deviation = noise / np.maximum(np.abs(edges.outside - edges.inside), 1.0) / edges.scale
-    basis, prior = _basis(circles, edges.scale, projective)
-    displacement = edges.offset / edges.scale
-    weights = seen / deviation**2
+    trust = seen * _trust(ratio - contrast[:, None], edges.residual, seen)
+    light = _light(edges.slope, trust, circles)
+    displacement = (edges.offset - edges.sensitivity * light.slope) / edges.scale
+    noise = _NOISE * np.sqrt(2 * np.sqrt(np.pi) * BLUR)
+    deviation = noise / np.maximum(edges.bright - edges.dark, 1.0) / edges.scale
+    model = _Model(circles, edges.scale, projective)
+    weights = trust / deviation**2
     robust = weights
-    for _ in range(6):
-        changes, normal = _least_squares(displacement, robust, basis, prior)
-        errors = (displacement - (basis @ changes[..., None])[..., 0]) / deviation
-        spread = np.maximum(1.4826 * _median(np.abs(errors), seen), 0.5)[:, None]
-        trust = 1 / (1 + (errors / (3 * spread)) ** 2) ** 2
-        robust = weights * trust
-    placed = seen & (np.abs(errors) < 4 * spread) & (np.abs(errors * deviation) < 0.08)
+    for _ in range(_ROUNDS):
+        changes, normal = model.solve(displacement, robust)
+        errors = displacement - model.displacement(changes)
+        relative = np.abs(errors) / deviation
+        spread = np.maximum(1.4826 * _median(relative, seen), 0.5)[:, None]
+        doubt = (relative / (_OUTLIER * spread)) ** 2
+        robust = weights / (1 + doubt) ** 2
+    placed = seen & (relative < 4 * spread) & (np.abs(errors) < 0.08)
     share = placed.sum(axis=1) / np.maximum(expected.sum(axis=1), 1)
-    offsets = np.where(placed, errors * deviation * edges.scale, 0)
-    scatter = np.sqrt((offsets**2).sum(axis=1) / np.maximum(placed.sum(axis=1), 1))
-    free = np.maximum((trust * seen).sum(axis=1) - basis.shape[-1], 1)
-    unit = (trust * seen * errors**2).sum(axis=1) / free
-    correlated = np.maximum(len(circles.angles) / _lengths(circles, frames), 1)
-    covariance = np.linalg.inv(normal)[:, :2, :2] * (unit * correlated)[:, None, None]
+    squares = np.where(placed, errors * edges.scale, 0) ** 2
+    scatter = np.sqrt(squares.sum(axis=1) / np.maximum(placed.sum(axis=1), 1))
+    # What an error changes is not its weight times the error, but the derivative of that.
+    gain = (weights * (1 - 3 * doubt) / (1 + doubt) ** 3).sum(axis=1)
+    gain = np.maximum(gain / np.maximum(robust.sum(axis=1), 1e-9), 0.2)
+    influence = model.influence(normal) * (robust / gain[:, None])[:, None]
+    parts = influence * errors[:, None]
+    parts -= light.influence(influence * (edges.sensitivity / edges.scale)[:, None])
+    covariance = _covariance(parts, trust / (1 + doubt) ** 2, frames, circles, normal.shape[1])
     return changes, Fit(frames, contrast, _median(bright, seen), share, scatter, covariance)
 
 
-def _basis(circles: Circles, scale: np.ndarray, projective: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Return what moves edges, shape (k, m, n), and the prior precision of each unknown."""
-    shared = frame.displacement_basis(circles.angles, circles.radii)
-    count = len(scale)
-    if not projective:
-        return np.broadcast_to(shared[:, :5], (count, len(shared), 5)), np.full(5, 1e-6)
-    band = np.where(circles.radii > 1, circles.radii, 0)
-    columns = [
-        np.broadcast_to(shared, (count, *shared.shape)),
-        np.broadcast_to(band[:, None], (count, len(band), 1)),
-        (-circles.polarity / scale)[..., None],
-    ]
-    prior = np.full(9, 1e-6)
-    prior[5:7], prior[7] = _PRIOR_PERSPECTIVE**-2, _PRIOR_SCALE**-2
-    prior[8] = _PRIOR_SHIFT**-2
-    return np.concatenate(columns, axis=2), prior
+def _trust(ratio_errors: np.ndarray, residuals: np.ndarray, seen: np.ndarray) -> np.ndarray:
+    """Return how much edges look like those of the target, 0 to 1, shape (k, m)."""
+    errors = np.abs(ratio_errors)
+    usual = np.maximum(1.4826 * _median(errors, seen), _LEAST_RATIO_ERROR)[:, None]
+    trust = 1 / (1 + (errors / (_RATIO_DOUBT * usual)) ** 2)
+    usual = np.maximum(_median(residuals, seen), _LEAST_RESIDUAL)[:, None]
+    excess = np.maximum(residuals / usual - 1, 0)
+    return trust / (1 + (excess / _RESIDUAL_DOUBT) ** 2)
 
 
-def _least_squares(
-    values: np.ndarray, weights: np.ndarray, basis: np.ndarray, prior: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the solutions, shape (k, n), and the normal matrices of k weighted problems."""
-    weighted = basis * weights[..., None]
-    normal = weighted.transpose(0, 2, 1) @ basis + np.diag(prior)
-    right = (weighted * values[..., None]).sum(axis=1)
-    return np.linalg.solve(normal, right[..., None])[..., 0], normal
+@dataclass(frozen=True, slots=True)
+class _Light:
+    """The slope of the light along circles, smoothed."""
+
+    slope: np.ndarray  # (k, m), outwards, 1/px
+    errors: np.ndarray  # (k, m), of the slopes of the single profiles
+    weights: np.ndarray  # (k, m), of these
+    totals: np.ndarray  # (k, m), of the weights that a smoothed slope is made from
+    window: np.ndarray  # (m, m), what each profile adds to each smoothed slope
+
+    def influence(self, of_slopes: np.ndarray) -> np.ndarray:
+        """Return what the errors do, given what the smoothed slopes do, shape (k, n, m) both."""
+        of_profiles = (of_slopes / self.totals[:, None]) @ self.window.T
+        return of_profiles * (self.weights * self.errors)[:, None]
+
+
+def _light(slopes: np.ndarray, trust: np.ndarray, circles: Circles) -> _Light:
+    """Return the slope of the light, from the slopes of profiles, shape (k, m)."""
+    # What all edges have towards their bright side comes from their blur, not from the light.
+    common = (trust * circles.polarity * slopes).sum(axis=1) / np.maximum(trust.sum(axis=1), 1e-9)
+    slopes = slopes - circles.polarity * common[:, None]
+    apart = np.angle(np.exp(1j * (circles.angles[:, None] - circles.angles))) * circles.radii
+    window = np.exp(-0.5 * (apart / _LIGHT_REACH) ** 2)
+    window *= circles.radii[:, None] == circles.radii
+    window /= window.sum(axis=0)
+    seen = trust > 0
+    middle = _median(slopes, seen)[:, None]
+    usual = np.maximum(_median(np.abs(slopes - middle), seen), _LEAST_SLOPE_ERROR)[:, None]
+    weights = trust
+    for _ in range(2):
+        totals = weights @ window + _LIGHT_PRIOR
+        smooth = (weights * slopes) @ window / totals
+        errors = slopes - smooth
+        used, weights = weights, trust / (1 + (errors / (3 * usual)) ** 2)
+    return _Light(smooth, errors, used, totals, window)
+
+
+def _covariance(
+    parts: np.ndarray, trust: np.ndarray, frames: np.ndarray, circles: Circles, unknowns: int
+) -> np.ndarray:
+    """Return the covariance of centres, dot radii^2, from what each edge's error does to them.
+
+    Neighbours closer than `_CORRELATION` share pixels, so that their errors are alike. Their
+    products are not taken as they are: a fit leaves little of what they have in common.
+    """
+    along = np.stack([-np.sin(circles.angles), np.cos(circles.angles)])
+    stretch = np.linalg.norm(frame.local_affine(frames) @ along, axis=1)
+    distance = np.maximum(stretch * circles.spacing, _CORRELATION / 10)
+    alike = np.ones_like(distance)
+    for steps in range(1, 10):
+        alike += 2 * np.maximum(1 - steps * distance / _CORRELATION, 0)
+    count = trust.sum(axis=1) ** 2 / np.maximum((trust**2 * alike).sum(axis=1), 1e-9)
+    free = count / np.maximum(count - unknowns, 1)
+    return free[:, None, None] * ((parts * alike[:, None]) @ parts.transpose(0, 2, 1))
+
+
+class _Model:
+    """How changes of k frames, and of what else is unknown, move their edges outwards.
+
+    The unknowns are the changes in the order of `frame.displacement_basis`. In a projective model
+    the scale of the band, and the shift of all edges towards the dark side which the gamma of a
+    camera causes, follow.
+    """
+
+    def __init__(self, circles: Circles, scale: np.ndarray, projective: bool) -> None:
+        shared = frame.displacement_basis(circles.angles, circles.radii)
+        own = np.zeros((len(scale), len(shared), 0))
+        prior = np.full(9, _WEAK_PRIOR)
+        prior[5:7], prior[7:] = _PRIOR_PERSPECTIVE**-2, (_PRIOR_SCALE**-2, _PRIOR_SHIFT**-2)
+        if projective:
+            band = np.where(circles.radii > 1, circles.radii, 0)
+            self._shared = np.concatenate([shared, band[:, None]], axis=1)
+            own = (-circles.polarity / scale)[..., None]
+        else:
+            self._shared, prior = shared[:, :5], prior[:5]
+        self._own, self._prior = own, np.diag(prior)
+        products = self._shared[:, :, None] * self._shared[:, None]
+        self._products = products.reshape(len(shared), -1)
+
+    def solve(self, values: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the unknowns, shape (k, n), and the normal matrices of weighted least squares."""
+        count, known = len(values), self._shared.shape[1]
+        weighted = weights[..., None] * self._own
+        mixed = weighted.transpose(0, 2, 1) @ self._shared
+        normal = np.empty((count, *self._prior.shape))
+        normal[:, :known, :known] = (weights @ self._products).reshape(count, known, known)
+        normal[:, known:, :known] = mixed
+        normal[:, :known, known:] = mixed.transpose(0, 2, 1)
+        normal[:, known:, known:] = weighted.transpose(0, 2, 1) @ self._own
+        normal += self._prior
+        right = np.concatenate(
+            [(weights * values) @ self._shared, (weighted * values[..., None]).sum(axis=1)], axis=1
+        )
+        return np.linalg.solve(normal, right[..., None])[..., 0], normal
+
+    def displacement(self, unknowns: np.ndarray) -> np.ndarray:
+        """Return how far unknowns, shape (k, n), move the edges, dot radii, shape (k, m)."""
+        known = self._shared.shape[1]
+        own = (self._own @ unknowns[:, known:, None])[..., 0]
+        return unknowns[:, :known] @ self._shared.T + own
+
+    def influence(self, normal: np.ndarray) -> np.ndarray:
+        """Return what a weighted displacement does to the translation, shape (k, 2, m)."""
+        known = self._shared.shape[1]
+        inverse = np.linalg.inv(normal)[:, :2]
+        own = inverse[:, :, known:] @ self._own.transpose(0, 2, 1)
+        return inverse[:, :, :known] @ self._shared.T + own
 
 
 def _median(values: np.ndarray, chosen: np.ndarray) -> np.ndarray:
@@ -307,10 +274,3 @@ def _median(values: np.ndarray, chosen: np.ndarray) -> np.ndarray:
     ordered = np.sort(np.where(chosen, values, np.inf), axis=1)
     middle = np.take_along_axis(ordered, np.maximum(count - 1, 0)[:, None] // 2, axis=1)[:, 0]
     return np.where(count > 0, middle, 1.0)
-
-
-def _lengths(circles: Circles, frames: np.ndarray) -> np.ndarray:
-    """Return the lengths of the circles' edges in the image, px."""
-    major, minor, _ = frame.ellipse_axes(frames)
-    radii = np.unique(circles.radii)
-    return np.sqrt(major * minor) * 2 * np.pi * radii.sum()

@@ -8,9 +8,7 @@ image of the target's physical centre.
 
 from __future__ import annotations
 
-from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass, field
-from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -31,7 +29,7 @@ _READINGS = 2  # of a band, each from a better frame
 _SHIFT = 0.4  # of an edge towards the dark side, px, at the most
 _SMALL = 7.0  # radius of dots that such a shift spoils the reading of, px
 _WHOLE = 0.9  # share of the edge of a dot that is reported without a word
-_PART = 128  # dots read by one thread at a time
+_PART = 256  # dots read at a time
 _QUIET = 0.4  # width of the margin round the band, dot radii
 
 
@@ -76,33 +74,23 @@ class RingDetector:
         whole, whole_signs = edges[0].outlines(wanted.min_radius / 2, wanted.max_radius / 2)
         chosen = np.isin(whole_signs, signs)
         start, start_signs = frame.enlarged(whole[chosen], 1), whole_signs[chosen]
-        # Parts do not depend on the number of threads, and so neither do the results.
-        with ThreadPoolExecutor() as pool:
-            found = _identified(pool, gray, code, start, start_signs, np.ones(len(start)))
-            rest = _unexplained(edges, found, code)
-            groups = candidates.find_candidates(rest, wanted.min_radius, wanted.max_radius, signs)
-            if not groups:
-                return found
-            fitted = zip(*pool.map(partial(dots.fit_dots, logs), groups), strict=True)
-            dots_found = (np.concatenate(parts) for parts in fitted)
-            return Hypotheses.joined([found, _identified(pool, gray, code, *dots_found)])
+        found = _identified(gray, code, start, start_signs, np.ones(len(start)))
+        rest = _unexplained(edges, found, code)
+        groups = candidates.find_candidates(rest, wanted.min_radius, wanted.max_radius, signs)
+        if not groups:
+            return found
+        fitted = zip(*(dots.fit_dots(logs, group) for group in groups), strict=True)
+        dots_found = (np.concatenate(parts) for parts in fitted)
+        return Hypotheses.joined([found, _identified(gray, code, *dots_found)])
 
 
 def _identified(
-    pool: Executor,
-    gray: np.ndarray,
-    code: Family,
-    frames: np.ndarray,
-    signs: np.ndarray,
-    inliers: np.ndarray,
+    gray: np.ndarray, code: Family, frames: np.ndarray, signs: np.ndarray, inliers: np.ndarray
 ) -> Hypotheses:
-    """Return what the bands about distinct dots say."""
+    """Return what the bands about distinct dots say, read in parts, which bounds the memory."""
     kept = _distinct(frames, signs, inliers)
     parts = [kept[start : start + _PART] for start in range(0, max(len(kept), 1), _PART)]
-    read = partial(_read, gray, code)
-    return Hypotheses.joined(
-        list(pool.map(read, (frames[part] for part in parts), (signs[part] for part in parts)))
-    )
+    return Hypotheses.joined([_read(gray, code, frames[part], signs[part]) for part in parts])
 
 
 def _unexplained(
