@@ -13,6 +13,7 @@ import sys
 from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 
+import ahf_ros.blas  # noqa: F401  before numpy
 from ahf_ros.cli import evaluate, identify, render
 
 COMMANDS = {'identify': identify, 'render': render, 'evaluate': evaluate}
