@@ -1,0 +1,113 @@
+"""Write the tables in README.md: parameters from the code, figures from docs/figures/*.json.
+
+The commands that make these files are in docs/figures.md.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from ahf_ros.nodes.settings import DetectorNodeSettings
+from ahf_ros.parameter import Parameter
+from ahf_ros.settings import flat_parameters
+from ahf_ros.synthetic.lights import LIGHT_NAMES
+
+ROOT = Path(__file__).resolve().parent.parent
+README = ROOT / 'README.md'
+AMBIENT = ('0.3', '0.12', '0.04')
+AHF_LIGHTS = ('normal 0.3', 'stripe 0.3', 'stripe 0.12', 'lattice 0.3', 'lattice 0.12')
+
+
+def parameters() -> str:
+    """Return the parameters of the node `detector`."""
+    rows = [('parameter', 'default', 'accepted', '')]
+    rows += [parameter(item) for item in flat_parameters(DetectorNodeSettings)]
+    return table(rows)
+
+
+def parameter(item: Parameter) -> tuple[str, ...]:
+    """Return the cells of one parameter."""
+    default = json.dumps(round(item.default, 6) if type(item.default) is float else item.default)
+    return f'`{item.name}`', default, item.accepted, item.description
+
+
+def lights() -> str:
+    """Return what `ring` identifies under every light."""
+    figures = read('ring')
+    rows = [('light', *AMBIENT)]
+    for light in LIGHT_NAMES:
+        cells = [cell(figures.get(('light', f'{light} {ambient}'))) for ambient in AMBIENT]
+        rows.append((light, *cells))
+    return table(rows)
+
+
+def filters() -> str:
+    """Return what `traditional` identifies without and with AHF."""
+    alone, driven = read('traditional'), read('traditional_ahf')
+    rows = [('light', '`traditional`', 'with AHF')]
+    rows += [(of, cell(alone['light', of]), cell(driven['light', of])) for of in AHF_LIGHTS]
+    return table(rows)
+
+
+def others() -> str:
+    """Return what `ring` identifies in other views, of other sizes, and in photographs."""
+    names = {
+        'tilt': 'view from the side',
+        'radius': 'radius of the dots',
+        'polarity': 'bright targets',
+        'no targets': '100 marks that are no targets',
+        'photographs': 'ten photographs',
+    }
+    rows = [('', '', 'right', 'of', 'wrong', 'false', 'RMSE XY px')]
+    for (group, name), of in read('ring').items():
+        if group in names:
+            error = '' if of['rmse_xy'] is None else f'{of["rmse_xy"]:.3f}'
+            counts = (of['right'], of['expected'], of['wrong'], of['false_positives'])
+            rows.append((names[group], name, *map(str, counts), error))
+    return table(rows)
+
+
+def read(name: str) -> dict[tuple[str, str], dict[str, Any]]:
+    """Return the rows of a benchmark by group and name."""
+    report = json.loads((ROOT / 'docs' / 'figures' / f'{name}.json').read_text())
+    return {(row['group'], row['name']): row for row in report['rows']}
+
+
+def cell(of: dict[str, Any] | None) -> str:
+    """Return right IDs, wrong ones if there are any, and the RMSE."""
+    if of is None:
+        return ''
+    wrong = f', {of["wrong"]} wrong' if of['wrong'] else ''
+    error = '' if of['rmse_xy'] is None else f' ({of["rmse_xy"]:.3f})'
+    return f'{of["right"]}{wrong}{error}'
+
+
+def table(rows: list[tuple[str, ...]]) -> str:
+    """Return rows, the first of which is the head, as Markdown."""
+    head, *body = (f'| {" | ".join(row)} |\n' for row in rows)
+    return head + '|---' * len(rows[0]) + '|\n' + ''.join(body)
+
+
+TABLES: dict[str, Callable[[], str]] = {
+    'parameters': parameters,
+    'lights': lights,
+    'filters': filters,
+    'others': others,
+}
+
+
+def with_tables(text: str) -> str:
+    """Return the text of README.md with tables that are current."""
+    for name, make in TABLES.items():
+        begin, end = f'<!-- {name} -->\n', f'<!-- end of {name} -->\n'
+        before, rest = text.split(begin)
+        _, after = rest.split(end)
+        text = f'{before}{begin}{make()}{end}{after}'
+    return text
+
+
+if __name__ == '__main__':
+    README.write_text(with_tables(README.read_text()))
