@@ -235,8 +235,8 @@ def confidence_features(
 def confidence(features: np.ndarray) -> np.ndarray:
     """Return the probabilities that readings with given features are right.
 
-    They are those of a logistic regression on rendered scenes under all lights, which
-    benchmarks/confidence.py repeats.
+    The weights are those of a logistic regression on rendered scenes under all lights.
+    benchmarks/confidence.py fits them anew, and shows how far those in force can be trusted.
     """
     return 1 / (1 + np.exp(-(_INTERCEPT + features @ _WEIGHTS)))
 
