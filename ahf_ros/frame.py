@@ -13,6 +13,7 @@ separate t from p; with one, p is left alone and t carries the perspective bias.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import cv2
@@ -120,6 +121,41 @@ def sample(image: np.ndarray, pixels: np.ndarray) -> np.ndarray:
     return values.reshape(pixels.shape[:-1])
 
 
+def sample_lines(
+    image: np.ndarray, middles: np.ndarray, directions: np.ndarray, along: np.ndarray
+) -> np.ndarray:
+    """Return the values of an image on straight lines, as `sample` does.
+
+    Parameters
+    ----------
+    image : ndarray of uint8, uint16, int16 or float32, shape (height, width)
+    middles : ndarray of float, shape (k, 2)
+        px.
+    directions : ndarray of float, shape (k, 2)
+        Unit vectors.
+    along : ndarray of float, shape (n,)
+        Distances from the middle, px.
+
+    Returns
+    -------
+    ndarray of the image's dtype, shape (k, n)
+    """
+    x, y = middles.T.astype(np.float32)[..., None]
+    across, down = directions.T.astype(np.float32)[..., None]
+    along = along.astype(np.float32)
+    values = np.empty((len(middles), len(along)), image.dtype)
+    for start in range(0, len(values), _REMAP_ROWS):
+        rows = slice(start, start + _REMAP_ROWS)
+        values[rows] = cv2.remap(
+            image,
+            x[rows] + across[rows] * along,
+            y[rows] + down[rows] * along,
+            cv2.INTER_LINEAR,
+            borderMode=cv2.BORDER_REPLICATE,
+        )
+    return values
+
+
 def sample_circles(
     image: np.ndarray, frames: np.ndarray, angles: np.ndarray, radii: np.ndarray
 ) -> np.ndarray:
@@ -168,42 +204,55 @@ def within(pixels: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     return (x >= 0) & (y >= 0) & (x <= shape[1] - 1) & (y <= shape[0] - 1)
 
 
-def circle_geometry(
-    frames: np.ndarray, angles: np.ndarray, radii: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return where points of circles are in the image, and how the circles run there.
+@dataclass(frozen=True, slots=True)
+class CircleGeometry:
+    """Where m points of circles are in the images of k targets, and how the circles run there.
 
-    Parameters
+    Attributes
     ----------
-    frames : ndarray of float64, shape (k, 3, 3)
-    angles, radii : ndarray of float, shape (m,)
-        Of the points, rad and dot radii.
-
-    Returns
-    -------
     points : ndarray of float64, shape (k, m, 2)
         px.
     normals : ndarray of float64, shape (k, m, 2)
         Unit vectors outwards.
     scale : ndarray of float64, shape (k, m)
         How far the circle moves along its normal where its radius grows, px a dot radius.
+    stretch : ndarray of float64, shape (k, m)
+        Length of the circle in the image, px a dot radius.
     curvature : ndarray of float64, shape (k, m)
         Of the circle's image, 1/px.
     """
+
+    points: np.ndarray
+    normals: np.ndarray
+    scale: np.ndarray
+    stretch: np.ndarray
+    curvature: np.ndarray
+
+
+def circle_geometry(frames: np.ndarray, angles: np.ndarray, radii: np.ndarray) -> CircleGeometry:
+    """Return the geometry of points of circles.
+
+    Parameters
+    ----------
+    frames : ndarray of float64, shape (k, 3, 3)
+    angles, radii : ndarray of float, shape (m,)
+        Of the points, rad and dot radii.
+    """
     radial = np.stack([np.cos(angles), np.sin(angles)])
     tangential = np.stack([-radial[1], radial[0]])
-    linear, shift = frames[:, :, :2], frames[:, :, 2:]
-    images = radii * (linear @ radial) + shift
+    images = frames[:, :, :2] @ (radii * radial) + frames[:, :, 2:]
     depth = images[:, 2:]
     points = images[:, :2] / depth
     outwards, along = (
         (moved[:, :2] - points * moved[:, 2:]) / depth
-        for moved in (linear @ radial, linear @ tangential)
+        for moved in (frames[:, :, :2] @ radial, frames[:, :, :2] @ tangential)
     )
-    length = np.hypot(along[:, 0], along[:, 1])
+    stretch = np.hypot(along[:, 0], along[:, 1])
     area = outwards[:, 0] * along[:, 1] - outwards[:, 1] * along[:, 0]
-    normals = np.stack([along[:, 1], -along[:, 0]], axis=2) / length[..., None]
-    return points.transpose(0, 2, 1), normals, area / length, area / (radii * length**3)
+    normals = np.stack([along[:, 1], -along[:, 0]], axis=2) / stretch[..., None]
+    return CircleGeometry(
+        points.transpose(0, 2, 1), normals, area / stretch, stretch, area / (radii * stretch**3)
+    )
 
 
 def displacement_basis(angles: np.ndarray, radii: np.ndarray) -> np.ndarray:

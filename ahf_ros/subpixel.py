@@ -2,8 +2,8 @@
 
 Frames are moved onto measured edges by robust weighted least squares. Edges of light that cross a
 target do not look like its own: the gray values beside them have another ratio, the profile is not
-a step, or it does not lie on the circles. They lose their weight. A slope of the light, which would
-move all edges to the same side, is taken from the profiles and corrected for.
+a step, or it does not lie on the circles. They lose their weight. A slope of the light, which
+would move all edges to the same side, is taken from the profiles and corrected for.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 
 from ahf_ros import frame
 from ahf_ros.circles import Circles, dot_circles, ring_circles
-from ahf_ros.profiles import BLUR, Edges, measure_edges
+from ahf_ros.profiles import USUAL_BLUR, Edges, measure_edges
 
 __all__ = ['Circles', 'Fit', 'dot_circles', 'fit_circles', 'ring_circles']
 
@@ -28,13 +28,14 @@ _LEAST_RESIDUAL = 0.3  # that counts as usual, gray values
 _OUTLIER = 3.0  # times the usual distance from the circle that quarters the trust
 _ROUNDS = 4  # of robust least squares
 _LIGHT_REACH = 0.3  # standard deviation of the window in which the light is even, dot radii
-_LIGHT_PRIOR = 0.25  # weight of no slope of the light, as a share of that of a window
+_LIGHT_PRIOR = 5.0  # px of trusted edges that say as much of the slope as the prior, none, does
+_SHARPENED = 0.03  # slope of all edges that makes those of single ones doubtful, 1/px
 _LEAST_SLOPE_ERROR = 0.002  # that counts as usual, 1/px
 _PRIOR_SCALE = 0.003  # standard deviation of the printed proportions of band and dot
 _PRIOR_PERSPECTIVE = 0.02  # of the projective part, in 1 a dot radius
 _PRIOR_SHIFT = 1.0  # of the shift of edges towards the dark side, px
 _WEAK_PRIOR = 1e-6
-_CORRELATION = 1.5  # px along an edge, from where on errors are independent
+_CORRELATION = 1.9  # px along an edge, from where on errors are independent
 _SYSTEMATIC = 0.001  # standard deviation of what pixels and interpolation do to a centre, px
 
 
@@ -99,8 +100,10 @@ def fit_circles(
     -------
     Fit
     """
+    blur = np.full(len(frames), USUAL_BLUR)
     for _ in range(rounds):
-        edges = measure_edges(gray, frames, circles, reach)
+        edges = measure_edges(gray, frames, circles, blur, reach)
+        blur += _median(edges.softness, edges.visible, 0.0)
         changes, fit = _solve(frames, circles, edges, projective)
         frames = frame.moved(frames, np.clip(changes[:, : 7 if projective else 5], -0.3, 0.3))
     affine = frame.local_affine(frames)
@@ -121,9 +124,9 @@ def _solve(
     contrast = _median(ratio, seen)
 
     trust = seen * _trust(ratio - contrast[:, None], edges.residual, seen)
-    light = _light(edges.slope, trust, circles)
+    light = _light(edges, trust, circles)
     displacement = (edges.offset - edges.sensitivity * light.slope) / edges.scale
-    noise = _NOISE * np.sqrt(2 * np.sqrt(np.pi) * BLUR)
+    noise = _NOISE * np.sqrt(2 * np.sqrt(np.pi) * USUAL_BLUR)
     deviation = noise / np.maximum(edges.bright - edges.dark, 1.0) / edges.scale
     model = _Model(circles, edges.scale, projective)
     weights = trust / deviation**2
@@ -145,7 +148,7 @@ def _solve(
     influence = model.influence(normal) * (robust / gain[:, None])[:, None]
     parts = influence * errors[:, None]
     parts -= light.influence(influence * (edges.sensitivity / edges.scale)[:, None])
-    covariance = _covariance(parts, trust / (1 + doubt) ** 2, frames, circles, normal.shape[1])
+    covariance = _covariance(parts, trust / (1 + doubt) ** 2, edges.spacing, normal.shape[1])
     return changes, Fit(frames, contrast, _median(bright, seen), share, scatter, covariance)
 
 
@@ -175,41 +178,51 @@ class _Light:
         return of_profiles * (self.weights * self.errors)[:, None]
 
 
-def _light(slopes: np.ndarray, trust: np.ndarray, circles: Circles) -> _Light:
-    """Return the slope of the light, from the slopes of profiles, shape (k, m)."""
-    # What all edges have towards their bright side comes from their blur, not from the light.
-    common = (trust * circles.polarity * slopes).sum(axis=1) / np.maximum(trust.sum(axis=1), 1e-9)
-    slopes = slopes - circles.polarity * common[:, None]
-    apart = np.angle(np.exp(1j * (circles.angles[:, None] - circles.angles))) * circles.radii
-    window = np.exp(-0.5 * (apart / _LIGHT_REACH) ** 2)
-    window *= circles.radii[:, None] == circles.radii
-    window /= window.sum(axis=0)
+def _light(edges: Edges, trust: np.ndarray, circles: Circles) -> _Light:
+    """Return the slope of the light along the circles."""
+    # What all edges have towards their bright side is not the light's: the blur is another than
+    # that of the step, or edges were sharpened, and then none of their slopes is the light's.
+    common = (trust * circles.polarity * edges.slope).sum(axis=1)
+    common /= np.maximum(trust.sum(axis=1), 1e-9)
+    slopes = edges.slope - circles.polarity * common[:, None]
+    window = _window(circles)
     seen = trust > 0
     middle = _median(slopes, seen)[:, None]
     usual = np.maximum(_median(np.abs(slopes - middle), seen), _LEAST_SLOPE_ERROR)[:, None]
+    prior = _LIGHT_PRIOR / edges.scale.mean(axis=1, keepdims=True)
+    prior *= (1 + (common[:, None] / _SHARPENED) ** 2) ** 2
     weights = trust
     for _ in range(2):
-        totals = weights @ window + _LIGHT_PRIOR
+        totals = weights @ window + prior
         smooth = (weights * slopes) @ window / totals
         errors = slopes - smooth
         used, weights = weights, trust / (1 + (errors / (3 * usual)) ** 2)
     return _Light(smooth, errors, used, totals, window)
 
 
+def _window(circles: Circles) -> np.ndarray:
+    """Return the weights by which points see the light of others on the same circle, (m, m)."""
+    points = circles.radii[:, None] * np.stack(
+        [np.cos(circles.angles), np.sin(circles.angles)], axis=1
+    )
+    squares = 2 * (circles.radii**2 - points @ points.T)
+    squares[circles.radii[:, None] != circles.radii] = np.inf
+    window = np.exp(-0.5 * squares / _LIGHT_REACH**2)
+    return window / window.sum(axis=0)
+
+
 def _covariance(
-    parts: np.ndarray, trust: np.ndarray, frames: np.ndarray, circles: Circles, unknowns: int
+    parts: np.ndarray, trust: np.ndarray, spacing: np.ndarray, unknowns: int
 ) -> np.ndarray:
     """Return the covariance of centres, dot radii^2, from what each edge's error does to them.
 
     Neighbours closer than `_CORRELATION` share pixels, so that their errors are alike. Their
     products are not taken as they are: a fit leaves little of what they have in common.
     """
-    along = np.stack([-np.sin(circles.angles), np.cos(circles.angles)])
-    stretch = np.linalg.norm(frame.local_affine(frames) @ along, axis=1)
-    distance = np.maximum(stretch * circles.spacing, _CORRELATION / 10)
+    distance = np.maximum(spacing / _CORRELATION, 0.1)
     alike = np.ones_like(distance)
     for steps in range(1, 10):
-        alike += 2 * np.maximum(1 - steps * distance / _CORRELATION, 0)
+        alike += 2 * np.maximum(1 - steps * distance, 0)
     count = trust.sum(axis=1) ** 2 / np.maximum((trust**2 * alike).sum(axis=1), 1e-9)
     free = count / np.maximum(count - unknowns, 1)
     return free[:, None, None] * ((parts * alike[:, None]) @ parts.transpose(0, 2, 1))
@@ -268,9 +281,9 @@ class _Model:
         return inverse[:, :, :known] @ self._shared.T + own
 
 
-def _median(values: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-    """Return the medians over the last axis of the chosen values, 1 where there is none."""
+def _median(values: np.ndarray, chosen: np.ndarray, nothing: float = 1.0) -> np.ndarray:
+    """Return the medians over the last axis of the chosen values, `nothing` without any."""
     count = chosen.sum(axis=1)
     ordered = np.sort(np.where(chosen, values, np.inf), axis=1)
     middle = np.take_along_axis(ordered, np.maximum(count - 1, 0)[:, None] // 2, axis=1)[:, 0]
-    return np.where(count > 0, middle, 1.0)
+    return np.where(count > 0, middle, nothing)

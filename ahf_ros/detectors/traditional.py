@@ -195,9 +195,7 @@ def _identified(
         for word, certainty in zip(words, certainties, strict=True)
     ]
     decoded = np.array([i for i, number in enumerate(numbers) if number is not None], int)
-    circles = ring_circles(
-        words[decoded], starts[decoded], signs[decoded], 2 * RAYS, 20, code_family
-    )
+    circles = ring_circles(words[decoded], starts[decoded], signs[decoded], RAYS, 10, code_family)
     joint = fit_circles(gray, frames[decoded], circles, reach=REACH, projective=True)
     fits = joint.share >= MINIMUM_SHARE
     frames[decoded[fits]] = joint.frames[fits]
