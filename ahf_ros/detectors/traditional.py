@@ -306,17 +306,19 @@ def _settled(targets: list[Target], code_family: Family) -> list[Target]:
     Undecoded blobs in the band of a decoded target are its sectors, and left out.
     """
     settled: dict[int, Target] = {}
-    others = []
+    contested, others = [], []
     for target in sorted(targets, key=lambda target: (-target.confidence, target.y, target.x)):
-        if target.id == UNDECODED or target.id in settled:
-            others.append(replace(target, id=UNDECODED, code=0, confidence=0.0))
+        if target.id == UNDECODED:
+            others.append(target)
+        elif target.id in settled:
+            contested.append(replace(target, id=UNDECODED, code=0, confidence=0.0))
         else:
             settled[target.id] = target
-    decoded = list(settled.values())
-    centres = np.array([(target.x, target.y) for target in decoded]).reshape(-1, 2)
-    reach = np.array([code_family.band_outer * target.semi_major for target in decoded])
+    read = [*settled.values(), *contested]
+    centres = np.array([(target.x, target.y) for target in read]).reshape(-1, 2)
+    reach = np.array([code_family.band_outer * target.semi_major for target in read])
     for target in others:
         distances = np.hypot(centres[:, 0] - target.x, centres[:, 1] - target.y)
         if (distances > reach).all():
-            decoded.append(target)
-    return decoded
+            read.append(target)
+    return read
