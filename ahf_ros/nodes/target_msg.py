@@ -7,8 +7,8 @@ from typing import Any
 
 from std_msgs.msg import Header
 
-from ahf_ros import target
-from ahf_ros.msg import CodedTarget, CodedTargetArray, FilterState
+from ahf_ros import messages, msg, target
+from ahf_ros.msg import CodedTarget, CodedTargetArray
 
 
 def coded_target_array(
@@ -27,16 +27,7 @@ def coded_target_array(
     header : std_msgs.msg.Header
         Of the image.
     """
-    height, width = shape
-    return CodedTargetArray(
-        header=header,
-        width=width,
-        height=height,
-        family=family,
-        expected=identification.expected,
-        targets=[CodedTarget(**_values(target.Target, item)) for item in identification.targets],
-        filter=FilterState(**_values(target.FilterState, identification.filter)),
-    )
+    return messages.coded_target_array(identification, family, shape, header, msg)
 
 
 def identification(message: CodedTargetArray) -> target.Identification:
