@@ -27,7 +27,7 @@ MAXIMUM_CANDIDATES = 6000
 """Candidates kept at the most for one range of radii, those with the most votes."""
 
 _WEAK_EDGE, _STRONG_EDGE = 0.15, 0.22  # steps of ln, of the thresholds with hysteresis
-_MINIMUM_VOTES = 0.9  # a unit of the circumference
+_MINIMUM_VOTES = 1.5  # a unit of the circumference
 _FIRST_RANGES = ((2.0, 3.4, 1), (3.4, 5.8, 1), (5.8, 11.2, 2))  # radii and accumulator cell, px
 _RANGES = ((5.8, 11.2, 2),)
 _REGION = 16  # cells

@@ -27,11 +27,11 @@ from ahf_ros.evidence import (
     see_light,
     step_evidence,
 )
-from ahf_ros.subpixel import Circles, dot_circles
+from ahf_ros.subpixel import Fit
 from ahf_ros.words import best_words
 
 SAMPLES_PER_SECTOR = 10
-"""Angles at which a sector is read."""
+"""Usual number of angles at which a sector is read."""
 
 _ACROSS = 2.6  # distance of a reading from an edge, px
 _NEAREST_ACROSS, _FARTHEST_ACROSS = 0.13, 0.36  # the same, dot radii
@@ -40,9 +40,16 @@ _GAP_DEPTHS = (0.35, 0.65)
 _DOT_DEPTHS = (0.35, 0.7)  # of the dot
 _AGREEMENT = 0.35  # of ln, or of the step of a mark, between a step and what a word wants
 _CORRELATION = 2.5  # px between independent readings
-_INTERCEPT, _WEIGHTS = -20.55, np.array([1.46, 10.12, 14.50, -4.53])
+_LEAST_DEVIATION = 0.001  # dot radii
+_LEAST_CONTRAST = 0.25  # of prints; more speaks no more for a target
+# Intercepts and weights of `confidence`
+_OF_TARGET = np.array([-28.45, 7.46, 17.05, -0.97, -8.71])
+_OF_WORD = np.array([-9.29, 2.34, 6.53])
 
-FEATURES = len(_WEIGHTS)
+OF_TARGET = len(_OF_TARGET) - 1
+"""Number of the features that tell targets from patterns of light; the others tell words."""
+
+FEATURES = OF_TARGET + len(_OF_WORD) - 1
 """Number of the features that `confidence` weighs."""
 
 
@@ -53,9 +60,9 @@ class Readings:
     Attributes
     ----------
     words : ndarray of int64, shape (k,)
-        The best valid word, in the rotation read from `phase`; 0 where there is none.
-    phase : ndarray of int, shape (k,)
-        Where the first sector begins, in samples counter-clockwise from +x of the frame.
+        The best valid word, in the rotation read from `start`; 0 where there is none.
+    start : ndarray of float64, shape (k,)
+        Where in the frame the sector of the lowest bit starts, rad counter-clockwise from +x.
     margin : ndarray of float64, shape (k,)
         Evidence for the best word over the best one of another ID, in units of ln.
     weakest : ndarray of float64, shape (k,)
@@ -66,7 +73,7 @@ class Readings:
     """
 
     words: np.ndarray
-    phase: np.ndarray
+    start: np.ndarray
     margin: np.ndarray
     weakest: np.ndarray
     explained: np.ndarray
@@ -82,7 +89,13 @@ class Readings:
         return Readings(*(getattr(self, of.name)[which] for of in fields(self)))
 
 
-def read_bands(gray: np.ndarray, frames: np.ndarray, marks: Marks, family: Family) -> Readings:
+def read_bands(
+    gray: np.ndarray,
+    frames: np.ndarray,
+    marks: Marks,
+    family: Family,
+    samples: int = SAMPLES_PER_SECTOR,
+) -> Readings:
     """Read the bands of targets.
 
     Parameters
@@ -92,12 +105,14 @@ def read_bands(gray: np.ndarray, frames: np.ndarray, marks: Marks, family: Famil
     frames : ndarray of float64, shape (k, 3, 3)
     marks : Marks
     family : Family
+    samples : int
+        Angles at which a sector is read.
 
     Returns
     -------
     Readings
     """
-    count = family.bits * SAMPLES_PER_SECTOR
+    count = family.bits * samples
     angles = -2 * np.pi * (np.arange(count) + 0.5) / count  # counter-clockwise as seen
     major, minor, _ = frame.ellipse_axes(frames)
     size = np.sqrt(major * minor)
@@ -132,22 +147,22 @@ def read_bands(gray: np.ndarray, frames: np.ndarray, marks: Marks, family: Famil
         depth * visible * borders for borders in border_evidence(of_band, marks, light)
     )
     words, phases, margin, weakest = best_words(
-        *_by_phase(evidence, rises, falls, family.bits), family
+        *_by_phase(evidence, rises, falls, samples), family
     )
 
-    samples = (np.arange(count) - phases[:, None]) % count // SAMPLES_PER_SECTOR
-    bits = (words[:, None] >> samples & 1).astype(bool)
+    sector = (np.arange(count) - phases[:, None]) % count // samples
+    bits = (words[:, None] >> sector & 1).astype(bool)
     explained = _explained(arcs, marks, bits & visible, ~bits & visible)
-    return Readings(words, phases, margin, weakest, explained)
+    return Readings(words, 2 * np.pi * phases / count, margin, weakest, explained)
 
 
 def _by_phase(
-    marked: np.ndarray, rises: np.ndarray, falls: np.ndarray, bits: int
+    marked: np.ndarray, rises: np.ndarray, falls: np.ndarray, count: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the evidence of sectors and of borders for every phase, each (k, phases, bits)."""
-    count = bits * SAMPLES_PER_SECTOR
-    first = np.arange(SAMPLES_PER_SECTOR)[:, None] + SAMPLES_PER_SECTOR * np.arange(bits)
-    samples = (first[..., None] + np.arange(SAMPLES_PER_SECTOR)) % count
+    angles = marked.shape[1]
+    first = np.arange(count)[:, None] + np.arange(0, angles, count)
+    samples = (first[..., None] + np.arange(count)) % angles
     last = samples[..., -1]
     return marked[:, samples].sum(axis=3), rises[:, last], falls[:, last]
 
@@ -175,58 +190,33 @@ def _explained(
     return np.stack(shares, axis=1)
 
 
-def marked_circles(readings: Readings, signs: np.ndarray, rays: int, family: Family) -> Circles:
-    """Return where a reading expects edges: round the dot and along the marked sectors.
+def confidence_features(readings: Readings, fit: Fit) -> np.ndarray:
+    """Return what tells targets from patterns of light, and right readings from wrong ones.
 
     Parameters
     ----------
     readings : Readings
-    signs : ndarray of int, shape (k,)
-        1 for a dark dot, -1 for a bright one.
-    rays : int
-        Number of points round the dot.
-    family : Family
-    """
-    dot = dot_circles(signs, rays)
-    count = family.bits * SAMPLES_PER_SECTOR
-    angles = -2 * np.pi * (np.arange(count) + 0.5) / count
-    sample = (np.arange(count) - readings.phase[:, None]) % count
-    sector, place = np.divmod(sample, SAMPLES_PER_SECTOR)
-    # Next to its ends an arc is rounded off by the blur.
-    inner_part = (place > 0) & (place < SAMPLES_PER_SECTOR - 1)
-    marked = (readings.words[:, None] >> sector & 1 & inner_part) * signs[:, None]
-    return Circles(
-        np.concatenate([dot.angles, angles, angles]),
-        np.concatenate([dot.radii, np.repeat([family.band_inner, family.band_outer], count)]),
-        np.concatenate([dot.polarity, -marked, marked], axis=1),
-    )
-
-
-def confidence_features(
-    readings: Readings, share: np.ndarray, deviation: np.ndarray
-) -> np.ndarray:
-    """Return what tells right readings from wrong ones.
-
-    Parameters
-    ----------
-    readings : Readings
-    share : ndarray of float, shape (k,)
-        Share of the expected edges that were found in their place.
-    deviation : ndarray of float, shape (k,)
-        Standard deviation of those edges, px.
+    fit : Fit
+        Of the frames of the readings to the edges that these expect.
 
     Returns
     -------
     ndarray of float64, shape (k, FEATURES)
-        ln(1 + margin), explained share of the steps at the band's edges, share of the edges in
-        their place, and their deviation, 1 px at the most.
+        Of the target: the smaller explained share of the steps onto marks, at the inner and the
+        outer edge of the band; the share of the edges in their place; ln of their deviation in dot
+        radii; ln of the contrast. Of the word: ln(1 + margin), and the explained share of all
+        steps.
     """
+    major, minor, _ = frame.ellipse_axes(fit.frames)
+    deviation = fit.deviation / np.sqrt(major * minor)
     return np.stack(
         [
+            readings.explained[:, 2:].min(axis=1),
+            fit.share,
+            np.log(deviation + _LEAST_DEVIATION),
+            np.log(np.maximum(fit.contrast, _LEAST_CONTRAST)),
             np.log1p(np.maximum(readings.margin, 0)),
             readings.explained.mean(axis=1),
-            share,
-            np.minimum(deviation, 1),
         ],
         axis=1,
     )
@@ -235,10 +225,21 @@ def confidence_features(
 def confidence(features: np.ndarray) -> np.ndarray:
     """Return the probabilities that readings with given features are right.
 
-    The weights are those of a logistic regression on rendered scenes under all lights.
+    There has to be a target, no pattern of light that resembles one, and its word has to be right.
+    The weights are those of two logistic regressions on rendered scenes under all lights.
     benchmarks/confidence.py fits them anew, and shows how far those in force can be trusted.
+
+    Parameters
+    ----------
+    features : ndarray of float, shape (k, FEATURES)
+        As `confidence_features` gives them.
     """
-    return 1 / (1 + np.exp(-(_INTERCEPT + features @ _WEIGHTS)))
+    target, word = np.split(features, [OF_TARGET], axis=1)
+    return _logistic(target, _OF_TARGET) * _logistic(word, _OF_WORD)
+
+
+def _logistic(features: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    return 1 / (1 + np.exp(-(weights[0] + features @ weights[1:])))
 
 
 def canonical(words: np.ndarray, family: Family) -> tuple[np.ndarray, np.ndarray]:

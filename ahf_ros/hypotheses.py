@@ -9,7 +9,7 @@ import numpy as np
 from ahf_ros import decoding, frame, subpixel
 from ahf_ros.codes.ring import Family
 
-CERTAIN = 0.99
+CERTAIN = 0.98
 """Confidence from which a word is reported."""
 
 _CLEARLY = 2.0  # times the evidence of another claim to the same ID or dot
@@ -61,7 +61,7 @@ class Hypotheses:
 
     def update(self, which: np.ndarray, readings: decoding.Readings, fit: subpixel.Fit) -> None:
         """Take over the readings of some of the dots."""
-        features = decoding.confidence_features(readings, fit.share, fit.deviation)
+        features = decoding.confidence_features(readings, fit)
         self.frames[which], self.covariance[which] = fit.frames, fit.covariance
         self.share[which] = fit.share
         self.words[which], self.margin[which] = readings.words, readings.margin

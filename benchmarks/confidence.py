@@ -1,7 +1,7 @@
 """The weights of `ahf_ros.decoding.confidence`, and how far confidences can be trusted.
 
 Scenes under all lights are rendered, every plausible reading of the ring detector is compared with
-the truth, and a logistic regression is fitted to the readings of the development seeds. The
+the truth, and two logistic regressions are fitted to the readings of the development seeds. The
 reliability of the weights in force is that of the test seeds, which the fit never sees.
 
     python benchmarks/confidence.py [--development 1 2 3] [--test 101 102]
@@ -10,43 +10,73 @@ reliability of the weights in force is that of the test seeds, which the fit nev
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable
-from itertools import pairwise
+from collections.abc import Iterable, Iterator
+from itertools import pairwise, product
 
 import numpy as np
 from rich.progress import track
 
-from ahf_ros.codes.ring import family
-from ahf_ros.decoding import canonical, confidence
+from ahf_ros.codes.ring import FAMILY_NAMES, family
+from ahf_ros.decoding import OF_TARGET, canonical, confidence
+from ahf_ros.detectors.detector import DetectorSettings
 from ahf_ros.detectors.ring import RingDetector
-from ahf_ros.synthetic.lights import benchmark_lights
+from ahf_ros.synthetic.lights import LIGHT_NAMES, benchmark_lights
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 
 NEAR = 5.0
 """Largest distance of a target from its truth, px."""
 
+SHADOWS = (0.3, 0.08, 0.04, 0.02)
+"""Ambient light of the smaller scenes, as a share of the projector's."""
+
 CLASSES = (0.0, 0.5, 0.9, 0.95, 0.98, 0.99, 0.999, 1.0)
 """Bounds of the classes of confidence in the table."""
 
 
-def readings(scene: Rendering) -> tuple[np.ndarray, np.ndarray]:
-    """Return the features, shape (k, n), of all plausible readings, and whether each is right."""
-    found = RingDetector().hypotheses(scene.image)
+def readings(scene: Rendering) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the features of all plausible readings, and which are of targets, and right.
+
+    Returns
+    -------
+    features : ndarray of float64, shape (k, n)
+    of_target, right : ndarray of bool, shape (k,)
+    """
+    code = family(scene.settings.family)
+    found = RingDetector(DetectorSettings(family=code.name)).hypotheses(scene.image)
     found = found.chosen(found.words > 0)
-    _, numbers = canonical(found.words, family(scene.settings.family))
+    _, numbers = canonical(found.words, code)
     x, y, number = np.array([(target.x, target.y, target.id) for target in scene.targets]).T
-    distance = np.hypot(found.frames[:, :1, 2] - x, found.frames[:, 1:2, 2] - y)
-    return found.features, ((distance < NEAR) & (numbers[:, None] == number)).any(axis=1)
+    near = np.hypot(found.frames[:, :1, 2] - x, found.frames[:, 1:2, 2] - y) < NEAR
+    return found.features, near.any(axis=1), (near & (numbers[:, None] == number)).any(axis=1)
 
 
-def gathered(seeds: Iterable[int]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the readings of the scenes of some seeds under all lights."""
-    scenes = [(name, ambient, seed) for seed in seeds for name, ambient in benchmark_lights()]
-    parts = [
-        readings(render(SceneSettings(light=name, ambient=ambient, seed=seed)))
-        for name, ambient, seed in track(scenes, 'scenes')
-    ]
-    return tuple(np.concatenate(part) for part in zip(*parts, strict=True))
+def scenes(seed: int) -> Iterator[SceneSettings]:
+    """Yield scenes under all lights as in the figures, and smaller ones in deeper shadow."""
+    for light, ambient in benchmark_lights():
+        yield SceneSettings(light=light, ambient=ambient, seed=seed)
+    generator = np.random.default_rng(seed)
+    for light, ambient in product(LIGHT_NAMES[1:], SHADOWS):
+        radius = float(generator.choice([9, 14, 20, 24]))
+        yield SceneSettings(
+            width=2000,
+            height=1334,
+            targets=round(6400 / radius**2),
+            dot_radius=radius,
+            family=str(generator.choice(FAMILY_NAMES)),
+            polarity=str(generator.choice(['dark', 'bright'])),
+            tilt=float(generator.choice([0, 30, 50])),
+            light=light,
+            ambient=ambient,
+            seed=seed,
+        )
+
+
+def gathered(seeds: Iterable[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the readings of the scenes of some seeds."""
+    wanted = [scene for seed in seeds for scene in scenes(seed)]
+    parts = [readings(render(scene)) for scene in track(wanted, 'scenes')]
+    features, of_target, right = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return features, of_target, right
 
 
 def logistic_regression(features: np.ndarray, right: np.ndarray) -> np.ndarray:
@@ -71,10 +101,16 @@ def main() -> None:
     parser.add_argument('--test', type=int, nargs='*', default=[101, 102])
     options = parser.parse_args()
     if options.development:
-        fitted = logistic_regression(*gathered(options.development))
-        print('Intercept and weights:', ', '.join(f'{weight:.2f}' for weight in fitted), '\n')
+        features, of_target, right = gathered(options.development)
+        told = {
+            'target': logistic_regression(features[:, :OF_TARGET], of_target),
+            'word': logistic_regression(features[of_target, OF_TARGET:], right[of_target]),
+        }
+        for name, fitted in told.items():
+            weights = ', '.join(f'{weight:.2f}' for weight in fitted)
+            print(f'Intercept and weights that tell a {name}: {weights}\n')
     if options.test:
-        features, right = gathered(options.test)
+        features, _, right = gathered(options.test)
         stated = confidence(features)
         print('| confidence | readings | mean confidence | share right |\n|---|---|---|---|')
         for low, high in pairwise(CLASSES):

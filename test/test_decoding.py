@@ -11,6 +11,7 @@ import pytest
 from ahf_ros import decoding, frame
 from ahf_ros.codes.ring import FAMILY_NAMES, family
 from ahf_ros.evidence import Marks
+from ahf_ros.subpixel import Fit
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 
 SMALL = SceneSettings(width=800, height=600, targets=6, dot_radius=18.0, seed=7)
@@ -81,8 +82,16 @@ def test_some_of_the_readings():
 
 
 def test_confidence_is_a_probability_that_grows_with_the_evidence():
-    def confidence(readings, share=1.0, deviation=0.05):
-        features = decoding.confidence_features(readings, np.full(6, share), np.full(6, deviation))
+    def confidence(readings, share=1.0, deviation=0.05, contrast=0.25):
+        fit = Fit(
+            frame.affine_frames(np.zeros(6), 0, 12, 12, 0),
+            contrast=np.full(6, contrast),
+            bright=np.full(6, 200.0),
+            share=np.full(6, share),
+            deviation=np.full(6, deviation),
+            covariance=np.tile(1e-4 * np.eye(2), (6, 1, 1)),
+        )
+        features = decoding.confidence_features(readings, fit)
         assert features.shape == (6, decoding.FEATURES)
         return decoding.confidence(features)
 
@@ -95,6 +104,7 @@ def test_confidence_is_a_probability_that_grows_with_the_evidence():
         confidence(replace(readings, explained=readings.explained / 2)),
         confidence(readings, share=0.5),
         confidence(readings, deviation=0.5),
+        confidence(readings, contrast=0.7),
     ):
         assert (worse >= 0).all()
         assert (worse < sure).all()

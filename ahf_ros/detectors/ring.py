@@ -21,11 +21,12 @@ from ahf_ros.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, Target
 
 _SIGNS = {'auto': (1, -1), 'dark': (1,), 'bright': (-1,)}
-_RAYS = 48  # about a dot
+_DOT_RAYS, _RAYS = 24, 48  # about a dot, alone and with the band
 _REACH = 0.45  # about an expected edge, dot radii
 _LEAST_SHARE = 0.5  # of the edge of a dot, for its band to be read
 _FAINTEST = 0.8  # contrast of a dot, for its band to be read
-_READINGS = 2  # of a band, each from a better frame
+_SAMPLES = (5, 10)  # a sector, of the readings of a band, each from a better frame
+_ARC_SAMPLES = 10  # of the edges of a marked sector
 _SHIFT = 0.4  # of an edge towards the dark side, px, at the most
 _SMALL = 7.0  # radius of dots that such a shift spoils the reading of, px
 _WHOLE = 0.9  # share of the edge of a dot that is reported without a word
@@ -110,7 +111,7 @@ def _unexplained(
 
 def _read(gray: np.ndarray, code: Family, frames: np.ndarray, signs: np.ndarray) -> Hypotheses:
     """Read the bands about dots, and refine dot and band together."""
-    circles = subpixel.dot_circles(signs, _RAYS)
+    circles = subpixel.dot_circles(signs, _DOT_RAYS)
     fit = subpixel.fit_circles(gray, frames, circles, reach=_REACH, projective=False)
     good = (fit.share >= _LEAST_SHARE) & (fit.contrast <= _FAINTEST)
     fit, signs = fit.chosen(good), signs[good]
@@ -120,11 +121,13 @@ def _read(gray: np.ndarray, code: Family, frames: np.ndarray, signs: np.ndarray)
     found = Hypotheses.unread(fit)
     read = np.arange(len(which))
     # A band that was read right makes the frame better, and a better frame the reading.
-    for _ in range(_READINGS):
-        readings = decoding.read_bands(gray, frames, marks, code)
+    for samples in _SAMPLES:
+        readings = decoding.read_bands(gray, frames, marks, code, samples)
         good = readings.plausible
         read, readings, marks = read[good], readings.chosen(good), marks.chosen(good)
-        circles = decoding.marked_circles(readings, marks.signs, _RAYS, code)
+        circles = subpixel.ring_circles(
+            readings.words, readings.start, marks.signs, _RAYS, _ARC_SAMPLES, code
+        )
         fit = subpixel.fit_circles(gray, frames[good], circles, reach=_REACH, projective=True)
         frames = fit.frames
     found.update(read, readings, fit)
