@@ -25,8 +25,7 @@ _DOT_RAYS, _RAYS = 24, 48  # about a dot, alone and with the band
 _REACH = 0.45  # about an expected edge, dot radii
 _LEAST_SHARE = 0.5  # of the edge of a dot, for its band to be read
 _FAINTEST = 0.8  # contrast of a dot, for its band to be read
-_SAMPLES = (5, 10)  # a sector, of the readings of a band, each from a better frame
-_ARC_SAMPLES = 10  # of the edges of a marked sector
+_READINGS = ((5, 1), (10, 2))  # of a band: samples a sector, and rounds of the fit that follows
 _SHIFT = 0.4  # of an edge towards the dark side, px, at the most
 _SMALL = 7.0  # radius of dots that such a shift spoils the reading of, px
 _WHOLE = 0.9  # share of the edge of a dot that is reported without a word
@@ -121,14 +120,16 @@ def _read(gray: np.ndarray, code: Family, frames: np.ndarray, signs: np.ndarray)
     found = Hypotheses.unread(fit)
     read = np.arange(len(which))
     # A band that was read right makes the frame better, and a better frame the reading.
-    for samples in _SAMPLES:
+    for samples, rounds in _READINGS:
         readings = decoding.read_bands(gray, frames, marks, code, samples)
         good = readings.plausible
         read, readings, marks = read[good], readings.chosen(good), marks.chosen(good)
         circles = subpixel.ring_circles(
-            readings.words, readings.start, marks.signs, _RAYS, _ARC_SAMPLES, code
+            readings.words, readings.start, marks.signs, _RAYS, samples, code
         )
-        fit = subpixel.fit_circles(gray, frames[good], circles, reach=_REACH, projective=True)
+        fit = subpixel.fit_circles(
+            gray, frames[good], circles, reach=_REACH, projective=True, rounds=rounds
+        )
         frames = fit.frames
     found.update(read, readings, fit)
     return found
