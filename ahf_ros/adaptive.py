@@ -138,9 +138,10 @@ class AdaptiveIdentifier:
     settings : AdaptiveSettings, optional
         The limits of the search and the number of threads.
     refine : callable, optional
-        From the image as received and the targets to the same targets with better centres. It is
-        asked where the targets were found in another image: through a filter, or in the
-        8-bit version of an image with more bits.
+        From the image as received and the targets to the same targets with better centres; the
+        method `refine` of the detector where None, if it has one. It is asked where the targets
+        were found in another image: through a filter, or in the 8-bit version of an image with
+        more bits.
     clock : callable, optional
         Time in s.
 
@@ -160,7 +161,7 @@ class AdaptiveIdentifier:
         self.last_search: SearchResult | None = None
         self._detector = detector
         self._settings = settings or AdaptiveSettings()
-        self._refine = refine
+        self._refine = refine or getattr(detector, 'refine', None)
         self._clock = clock
         self._remembered: Values | None = None
 

@@ -16,9 +16,7 @@ import cv2
 import numpy as np
 
 from ahf_ros.frame import affine_frames
-
-LOG_OFFSET = 8.0
-"""Added to a gray value, of 255, before the logarithm: about where noise drowns contrast."""
+from ahf_ros.tone import LOG_OFFSET
 
 LOG_SCALE = 1000.0
 """Units of a logarithmic image of int16 in one unit of ln."""

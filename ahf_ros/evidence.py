@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ahf_ros.candidates import LOG_OFFSET
+from ahf_ros.tone import LOG_OFFSET
 
 _NOISE = 1.2  # gray values, of 255
 _SURROUND_SPREAD = 0.16  # of ln, of steps where there is no edge

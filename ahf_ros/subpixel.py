@@ -8,6 +8,7 @@ would move all edges to the same side, is taken from the profiles and corrected 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -15,12 +16,12 @@ import numpy as np
 from ahf_ros import frame
 from ahf_ros.circles import Circles, dot_circles, ring_circles
 from ahf_ros.profiles import USUAL_BLUR, Edges, measure_edges
+from ahf_ros.tone import LOG_OFFSET
 
 __all__ = ['Circles', 'Fit', 'dot_circles', 'fit_circles', 'ring_circles']
 
 _NOISE = 1.0  # of gray values, of 255; the fit scales it to what it finds
 _LEAST_CONTRAST = 0.3  # of an edge, in steps of ln of the usual edge of the target
-_OFFSET = 8.0  # added to gray values before the logarithm
 _RATIO_DOUBT = 1.5  # times the usual error of the ratio of the levels that halves the trust
 _LEAST_RATIO_ERROR = 0.01  # that counts as usual
 _RESIDUAL_DOUBT = 0.4  # times the usual residual, on top of it, that halves the trust
@@ -68,6 +69,12 @@ class Fit:
     def chosen(self, which: np.ndarray) -> Fit:
         """Return the fits of some of the frames."""
         return Fit(*(getattr(self, item.name)[which] for item in fields(self)))
+
+    @staticmethod
+    def joined(parts: Sequence[Fit]) -> Fit:
+        """Return the fits of all the frames, one part after the other."""
+        names = [item.name for item in fields(Fit)]
+        return Fit(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
 def fit_circles(
@@ -117,7 +124,7 @@ def _solve(
     """Return the changes of the frames that bring the circles onto the edges."""
     expected = edges.visible
     dark, bright = np.maximum(edges.dark, 0), np.maximum(edges.bright, 0)
-    step = np.log((bright + _OFFSET) / (dark + _OFFSET))
+    step = np.log((bright + LOG_OFFSET) / (dark + LOG_OFFSET))
     usual = _median(step, expected)[:, None]
     seen = expected & (step > _LEAST_CONTRAST * usual) & (step > 0)
     ratio = dark / np.maximum(bright, 1.0)

@@ -8,6 +8,10 @@ from functools import lru_cache
 import cv2
 import numpy as np
 
+LOG_OFFSET = 8.0
+"""Added to a gray value, of 255, before a logarithm in which edges are looked for: about where
+noise drowns contrast."""
+
 SAMPLE_ROWS, SAMPLE_COLUMNS = 32, 1024
 """Rows and columns on whose crossings the output mapping looks at the filtered image."""
 

@@ -21,6 +21,10 @@ class Detector(Protocol):
     A detector keeps nothing between calls, may be called from several threads at once and gives
     the same targets for the same image. Nothing but the image given is its input, so a filtered
     image is as good as one that a camera took.
+
+    A detector may also have a method `refine(image, targets)`. It is given the image as received
+    and what the detector found in a filtered version of it, and returns the same targets with the
+    places that the image as received gives them.
     """
 
     @property
@@ -74,6 +78,11 @@ class DetectorSettings:
     report_undecoded: bool = parameter(
         False, 'Whether to report targets whose code word is not certain, with the ID -1.'
     )
+
+    @property
+    def signs(self) -> tuple[int, ...]:
+        """1 where dots may be dark, -1 where they may be bright."""
+        return {'auto': (1, -1), 'dark': (1,), 'bright': (-1,)}[self.polarity]
 
     def __post_init__(self) -> None:
         """Refuse values that are not accepted."""

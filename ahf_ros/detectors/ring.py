@@ -8,26 +8,23 @@ image of the target's physical centre.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
 
-from ahf_ros import candidates, decoding, dots, evidence, frame, subpixel
+from ahf_ros import candidates, decoding, dots, frame, reading, subpixel
 from ahf_ros.codes.ring import Family, family
 from ahf_ros.detectors.detector import DetectorSettings
 from ahf_ros.hypotheses import CERTAIN, Hypotheses, settled_dots, settled_numbers
 from ahf_ros.image import as_gray, check_image
+from ahf_ros.refinement import refine_centres
 from ahf_ros.target import UNDECODED, Target
 
-_SIGNS = {'auto': (1, -1), 'dark': (1,), 'bright': (-1,)}
-_DOT_RAYS, _RAYS = 24, 48  # about a dot, alone and with the band
-_REACH = 0.45  # about an expected edge, dot radii
+_RAYS = 24  # about a dot
 _LEAST_SHARE = 0.5  # of the edge of a dot, for its band to be read
 _FAINTEST = 0.8  # contrast of a dot, for its band to be read
-_READINGS = ((5, 1), (10, 2))  # of a band: samples a sector, and rounds of the fit that follows
-_SHIFT = 0.4  # of an edge towards the dark side, px, at the most
-_SMALL = 7.0  # radius of dots that such a shift spoils the reading of, px
 _WHOLE = 0.9  # share of the edge of a dot that is reported without a word
 _PART = 256  # dots read at a time
 _QUIET = 0.4  # width of the margin round the band, dot radii
@@ -48,6 +45,11 @@ class RingDetector:
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image; see `Detector`."""
         return _reported(self.hypotheses(image), self.settings, family(self.settings.family))
+
+    def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
+        """Return targets with their places in an image; see `refine_centres`."""
+        wanted = self.settings
+        return refine_centres(image, targets, family(wanted.family), wanted.signs)
 
     def hypotheses(self, image: np.ndarray) -> Hypotheses:
         """Return all dots of one image and what their bands may say, before anything is decided.
@@ -70,7 +72,7 @@ class RingDetector:
         edges = [candidates.find_edges(log) for log in logs[1:]]
         gray = gray.astype(np.float32, copy=False)
 
-        signs = _SIGNS[wanted.polarity]
+        signs = wanted.signs
         whole, whole_signs = edges[0].outlines(wanted.min_radius / 2, wanted.max_radius / 2)
         chosen = np.isin(whole_signs, signs)
         start, start_signs = frame.enlarged(whole[chosen], 1), whole_signs[chosen]
@@ -109,49 +111,12 @@ def _unexplained(
 
 
 def _read(gray: np.ndarray, code: Family, frames: np.ndarray, signs: np.ndarray) -> Hypotheses:
-    """Read the bands about dots, and refine dot and band together."""
-    circles = subpixel.dot_circles(signs, _DOT_RAYS)
-    fit = subpixel.fit_circles(gray, frames, circles, reach=_REACH, projective=False)
+    """Fit the edges of dots, and read the bands of those that have one."""
+    circles = subpixel.dot_circles(signs, _RAYS)
+    fit = subpixel.fit_circles(gray, frames, circles, reach=reading.REACH, projective=False)
     good = (fit.share >= _LEAST_SHARE) & (fit.contrast <= _FAINTEST)
-    fit, signs = fit.chosen(good), signs[good]
-    which, frames = _unshifted(fit, signs)
-    fit = fit.chosen(which)
-    marks = evidence.Marks(signs[which], fit.contrast, fit.bright)
-    found = Hypotheses.unread(fit)
-    read = np.arange(len(which))
-    # A band that was read right makes the frame better, and a better frame the reading.
-    for samples, rounds in _READINGS:
-        readings = decoding.read_bands(gray, frames, marks, code, samples)
-        good = readings.plausible
-        read, readings, marks = read[good], readings.chosen(good), marks.chosen(good)
-        circles = subpixel.ring_circles(
-            readings.words, readings.start, marks.signs, _RAYS, samples, code
-        )
-        fit = subpixel.fit_circles(
-            gray, frames[good], circles, reach=_REACH, projective=True, rounds=rounds
-        )
-        frames = fit.frames
-    found.update(read, readings, fit)
+    found, _ = reading.read_dots(gray, fit.chosen(good), signs[good], code)
     return found
-
-
-def _unshifted(fit: subpixel.Fit, signs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return which dots to read, and their frames without the shift of the dot's edge.
-
-    A camera's gamma makes a dark dot smaller and a bright one larger, by a third of a pixel at
-    usual blur; a linear camera does not. The band, up to 3.5 radii away, needs the scale: small
-    dots are read with either, others with the mean.
-    """
-    major, minor, _ = frame.ellipse_axes(fit.frames)
-    size = np.sqrt(major * minor)
-    every, small = np.arange(len(size)), np.flatnonzero(size < _SMALL)
-    which = np.concatenate([every, small])
-    shift = np.full(len(size), _SHIFT / 2)
-    shift[small] = 0.0
-    shift = np.concatenate([shift, np.full(len(small), _SHIFT)])
-    changes = np.zeros((len(which), 5))
-    changes[:, 2] = signs[which] * shift / size[which]
-    return which, frame.moved(fit.frames[which], changes)
 
 
 def _distinct(frames: np.ndarray, signs: np.ndarray, quality: np.ndarray) -> np.ndarray:

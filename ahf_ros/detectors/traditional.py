@@ -16,7 +16,7 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import cv2
@@ -26,6 +26,7 @@ from ahf_ros.codes.ring import Family, family
 from ahf_ros.detectors.detector import DetectorSettings
 from ahf_ros.frame import affine_frames, circle_points, ellipse_axes, project, sample
 from ahf_ros.image import as_gray, check_image
+from ahf_ros.refinement import refine_centres
 from ahf_ros.subpixel import dot_circles, fit_circles, ring_circles
 from ahf_ros.target import UNDECODED, Target
 
@@ -124,6 +125,11 @@ class TraditionalDetector:
         if not self.settings.report_undecoded:
             targets = [target for target in targets if target.id != UNDECODED]
         return sorted(targets, key=lambda target: (target.id, target.y, target.x))
+
+    def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
+        """Return targets with their places in an image; see `refine_centres`."""
+        wanted = self.settings
+        return refine_centres(image, targets, family(wanted.family), wanted.signs)
 
 
 def _eight_bit(image: np.ndarray) -> np.ndarray:

@@ -59,7 +59,9 @@ class Pipeline:
         self.settings = settings
         self._stopping = stopping
         self._detector = create(settings.detector, settings.target)
-        self._identifier = AdaptiveIdentifier(self._detect, settings.adaptive)
+        self._identifier = AdaptiveIdentifier(
+            self._detect, settings.adaptive, getattr(self._detector, 'refine', None)
+        )
 
     def answer(self, message: Image, expected: int) -> Answer:
         """Identify the targets of an image.
