@@ -149,6 +149,9 @@ class AdaptiveIdentifier:
     ----------
     last_search : SearchResult or None
         The search for the last image; None where there was none.
+    remembered : tuple of float or None
+        The filter that the next image is begun with. All that lives from one image to the next:
+        set it to go on where another left off.
     """
 
     def __init__(
@@ -163,11 +166,11 @@ class AdaptiveIdentifier:
         self._settings = settings or AdaptiveSettings()
         self._refine = refine or getattr(detector, 'refine', None)
         self._clock = clock
-        self._remembered: Values | None = None
+        self.remembered: Values | None = None
 
     def reset(self) -> None:
         """Forget what worked for earlier images."""
-        self._remembered = None
+        self.remembered = None
 
     def identify(self, image: np.ndarray, expected: int) -> Identification:
         """Identify the targets of one image; call it from one thread at a time.
@@ -215,13 +218,13 @@ class AdaptiveIdentifier:
     def _choose(self, trials: _Trials, executor: Executor | None) -> tuple[Values | None, int]:
         """Return the best filter, None for the image as received, and the evaluations."""
         self.last_search = None
-        remembered = self._remembered
+        remembered = self.remembered
         searching = self._settings.ahf and trials.expected > 0
         if searching and remembered and trials.discrepancy(remembered, executor) == 0:
             return remembered, 1
         unfiltered = trials.discrepancy(None, executor)
         if not searching or unfiltered == 0:
-            self._remembered = None if searching else remembered
+            self.remembered = None if searching else remembered
             return None, len(trials.targets)
         genetic = self._settings.genetic
         self.last_search = result = search(
@@ -233,8 +236,8 @@ class AdaptiveIdentifier:
             executor=executor,
             clock=self._clock,
         )
-        self._remembered = result.values if result.discrepancy < unfiltered else None
-        return self._remembered, 1 + result.evaluations
+        self.remembered = result.values if result.discrepancy < unfiltered else None
+        return self.remembered, 1 + result.evaluations
 
 
 class _Trials:

@@ -14,9 +14,9 @@ from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 
 import ahf_ros.blas  # noqa: F401  before numpy
-from ahf_ros.cli import evaluate, identify, render
+from ahf_ros.cli import bag, evaluate, identify, render
 
-COMMANDS = {'identify': identify, 'render': render, 'evaluate': evaluate}
+COMMANDS = {'identify': identify, 'bag': bag, 'render': render, 'evaluate': evaluate}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -1,0 +1,142 @@
+"""From a recorded image to the messages about it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import cv2
+import numpy as np
+from rosbags.interfaces import Connection
+
+from ahf_ros.adaptive import AdaptiveIdentifier, AdaptiveSettings
+from ahf_ros.bag.definitions import (
+    CODED_TARGETS,
+    COMPRESSED_IMAGE,
+    IMAGE,
+    message_types,
+    typestore,
+)
+from ahf_ros.bag.journal import Answer, Frame
+from ahf_ros.bag.source import Source
+from ahf_ros.detectors import DETECTOR, DetectorSettings, create
+from ahf_ros.drawing import draw
+from ahf_ros.encodings import decode_compressed, decode_image
+from ahf_ros.messages import coded_target_array
+from ahf_ros.target import Identification
+
+DECODERS = {IMAGE: decode_image, COMPRESSED_IMAGE: decode_compressed}
+
+
+@dataclass(frozen=True, slots=True)
+class AnswerTopics:
+    """Where the answers to the images of a topic go.
+
+    Attributes
+    ----------
+    targets : str
+        Topic of the coded targets.
+    debug_image : str
+        Topic of the annotated images; empty where there are none.
+    """
+
+    targets: str
+    debug_image: str
+
+    @property
+    def types(self) -> dict[str, str]:
+        """The topics and their types."""
+        types = {self.targets: CODED_TARGETS}
+        return types | {self.debug_image: COMPRESSED_IMAGE} if self.debug_image else types
+
+
+class Answering:
+    """Identifies the images of each topic as a node of its own would.
+
+    Parameters
+    ----------
+    source : Source
+        That the images come from.
+    topics : mapping of str to AnswerTopics
+        By the topic of the images.
+    expected : int
+        N, the number of coded targets in every image; 0 where unknown.
+    detector : str
+        Name of the detector.
+    detection : DetectorSettings
+    adaptive : AdaptiveSettings
+    """
+
+    def __init__(
+        self,
+        source: Source,
+        topics: Mapping[str, AnswerTopics],
+        expected: int = 0,
+        detector: str = DETECTOR.default,
+        detection: DetectorSettings | None = None,
+        adaptive: AdaptiveSettings | None = None,
+    ) -> None:
+        detection = detection or DetectorSettings()
+        self._source = source
+        self._topics = topics
+        self._expected = expected
+        self._family = detection.family
+        self._identifiers = {
+            topic: AdaptiveIdentifier(create(detector, detection), adaptive) for topic in topics
+        }
+        self._store = typestore()
+        self._types = message_types(self._store)
+
+    def answer(
+        self, connection: Connection, timestamp: int, data: bytes
+    ) -> tuple[Frame, list[Answer]]:
+        """Return what becomes of an image, and the messages about it."""
+        topic = connection.topic
+        answers: list[Answer] = []
+        reason = ''
+        try:
+            answers = self._messages(connection, data)
+        except ValueError as error:
+            reason = str(error)
+        except Exception as error:
+            # The others go on, whatever an image does to a decoder or a detector.
+            reason = f'{type(error).__name__}: {error}'
+        memory = self._identifiers[topic].remembered
+        return Frame(topic, timestamp, memory, reason), answers
+
+    def resume(self, frame: Frame) -> None:
+        """Go on as if an image had just been answered."""
+        self._identifiers[frame.topic].remembered = frame.memory
+
+    def _messages(self, connection: Connection, data: bytes) -> list[Answer]:
+        received = self._source.deserialize(connection, data)
+        image = DECODERS[connection.msgtype](received)
+        found = self._identifiers[connection.topic].identify(image, self._expected)
+        # Time is the one thing about it that would be another one in a second run.
+        found = replace(found, filter=replace(found.filter, duration=0.0))
+        header = self._header(received)
+        message = coded_target_array(found, self._family, image.shape, header, self._types)
+        topics = self._topics[connection.topic]
+        answers = [self._serialized(topics.targets, CODED_TARGETS, message)]
+        if topics.debug_image:
+            drawn = self._drawn(image, found, header)
+            answers.append(self._serialized(topics.debug_image, COMPRESSED_IMAGE, drawn))
+        return answers
+
+    def _serialized(self, topic: str, kind: str, message: Any) -> Answer:
+        return topic, bytes(self._store.serialize_cdr(message, kind))
+
+    def _header(self, received: Any) -> Any:
+        """Return the header of an image, which in ROS 1 has one more field."""
+        types = self._store.types
+        stamp = received.header.stamp
+        time = types['builtin_interfaces/msg/Time'](sec=stamp.sec, nanosec=stamp.nanosec)
+        frame = received.header.frame_id
+        return types['std_msgs/msg/Header'](stamp=time, frame_id=frame)
+
+    def _drawn(self, image: np.ndarray, found: Identification, header: Any) -> Any:
+        _, encoded = cv2.imencode('.jpg', draw(image, found))
+        return self._store.types[COMPRESSED_IMAGE](
+            header=header, format='bgr8; jpeg compressed bgr8', data=encoded.ravel()
+        )

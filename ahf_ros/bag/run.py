@@ -1,0 +1,250 @@
+"""From a bag with images to a bag that holds the answers beside everything else.
+
+First all images are answered, one after the other, into a journal in the place of the bag
+(`ahf_ros.bag.journal`). Then the bag is written in one go, at the speed of the disk, and takes
+the place of the journal. What is killed on the way goes on from there.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from rosbags.rosbag2 import StoragePlugin, Writer
+
+from ahf_ros.adaptive import AdaptiveSettings
+from ahf_ros.bag.answering import Answering, AnswerTopics
+from ahf_ros.bag.copying import Copy
+from ahf_ros.bag.definitions import typestore
+from ahf_ros.bag.journal import METADATA, VERSION, Frame, Journal, custom_data, remove_parts
+from ahf_ros.bag.source import Source
+from ahf_ros.detectors import DETECTOR, DetectorSettings
+
+STORAGES = {'mcap': StoragePlugin.MCAP, 'sqlite3': StoragePlugin.SQLITE3}
+
+Report = Callable[[int, int, str], None]
+"""Gets the number of images that are done and that there are, 0 where unknown, and why the last
+one was refused, empty where it was not."""
+
+_ASSEMBLED = '.assembled'
+_IRRELEVANT = ('source', 'target', 'threads')  # to what is in the bag
+
+
+@dataclass(frozen=True, slots=True)
+class BagTask:
+    """What is to be done.
+
+    Attributes
+    ----------
+    source : Path
+        The bag with the images.
+    target : Path
+        The bag that is to be made.
+    topics : tuple of str
+        The topics of the images, all where empty.
+    output_topic : str
+        Topic of the answers; one without a slash at the beginning is below that of the images.
+    storage : str
+        One of `STORAGES`.
+    debug_images : bool
+        Whether annotated images are written, as JPEG.
+    expected, detector, detection, adaptive
+        As for `Answering`.
+    """
+
+    source: Path
+    target: Path
+    topics: tuple[str, ...] = ()
+    output_topic: str = 'coded_targets'
+    storage: str = 'mcap'
+    debug_images: bool = False
+    expected: int = 0
+    detector: str = DETECTOR.default
+    detection: DetectorSettings = field(default_factory=DetectorSettings)
+    adaptive: AdaptiveSettings = field(default_factory=AdaptiveSettings)
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What became of a bag.
+
+    Attributes
+    ----------
+    images : int
+        Number of images.
+    refused : int
+        Number of those that were not accepted.
+    cut : str
+        Why the end of the bag could not be read; empty where it could.
+    """
+
+    images: int
+    refused: int
+    cut: str
+
+
+def answer_bag(task: BagTask, report: Report) -> Outcome:
+    """Identify the targets of all images in a bag, or go on with it.
+
+    Parameters
+    ----------
+    task : BagTask
+    report : callable
+        Told of every image, also of those that an earlier run has answered.
+
+    Returns
+    -------
+    Outcome
+        The same, and the same bag byte for byte, for every run with the same task, however often
+        it was broken off.
+
+    Raises
+    ------
+    ValueError
+        If the bag cannot be read, has no such topics, or the target is something else already.
+    """
+    with Source(task.source) as source:
+        topics = _answer_topics(task, source)
+        told = _told(task, source, topics)
+        if task.target.exists():
+            _check_target(task.target, told)
+            if done := custom_data(task.target).get('ahf_ros_outcome'):
+                _tidy(task.target)
+                return Outcome(**json.loads(done))
+        types = {name: kind for to in topics.values() for name, kind in to.types.items()}
+        journal = Journal(task.target, types, typestore(), json.dumps(told))
+        _answer_images(task, source, topics, journal, report)
+        refused = sum(bool(frame.reason) for frame in journal.frames)
+        outcome = Outcome(len(journal.frames), refused, source.cut)
+        _assemble(task, source, topics, journal, outcome)
+        _tidy(task.target)
+    return outcome
+
+
+def _answer_topics(task: BagTask, source: Source) -> dict[str, AnswerTopics]:
+    """Return where the answers go, by the topic of the images."""
+    images = source.image_topics(task.topics)
+    if task.output_topic.startswith('/') and len(images) > 1:
+        raise ValueError(
+            f'output_topic is {task.output_topic}, accepted for several topics of images '
+            f'({", ".join(images)}) is a name without a slash at the beginning'
+        )
+    topics = {}
+    for image in images:
+        name = task.output_topic
+        targets = name if name.startswith('/') else f'{image}/{name}'
+        debug_image = f'{targets}/debug_image/compressed' if task.debug_images else ''
+        topics[image] = AnswerTopics(targets, debug_image)
+    taken = {item.topic for item in source.connections}
+    for name in (name for to in topics.values() for name in to.types):
+        if name in taken:
+            raise ValueError(f'{task.source} has a topic {name}, accepted is another output_topic')
+    return topics
+
+
+def _told(task: BagTask, source: Source, topics: dict[str, AnswerTopics]) -> dict[str, Any]:
+    """Return everything that the answers depend on."""
+    told = _flat(asdict(task))
+    told = {name: value for name, value in told.items() if name not in _IRRELEVANT}
+    told |= {'topics': list(topics), 'size of the bag': source.size()}
+    return told
+
+
+def _flat(values: dict[str, Any]) -> dict[str, Any]:
+    flat: dict[str, Any] = {}
+    for name, value in values.items():
+        flat |= _flat(value) if isinstance(value, dict) else {name: value}
+    return flat
+
+
+def _check_target(target: Path, told: dict[str, Any]) -> None:
+    """Refuse what is there unless it is a bag that was begun with the same task."""
+    begun = custom_data(target).get('ahf_ros')
+    if begun is None:
+        raise ValueError(f'{target} exists, accepted is a new name or a bag that was begun here')
+    before = json.loads(begun)
+    for name in before | told:
+        if before.get(name) != told.get(name):
+            raise ValueError(
+                f'{target} was begun with {name} {before.get(name)!r}, now it is '
+                f'{told.get(name)!r}; accepted is the same, or another name for the bag'
+            )
+
+
+def _answer_images(
+    task: BagTask,
+    source: Source,
+    topics: dict[str, AnswerTopics],
+    journal: Journal,
+    report: Report,
+) -> None:
+    """Answer the images that are not answered yet."""
+    answering = Answering(
+        source, topics, task.expected, task.detector, task.detection, task.adaptive
+    )
+    total = sum(item.msgcount for item in source.connections if item.topic in topics)
+    earlier = list(journal.frames)
+    for number, (connection, timestamp, data) in enumerate(source.messages(topics)):
+        if number < len(earlier):
+            frame = earlier[number]
+            _check_frame(task, frame, connection.topic, timestamp)
+            answering.resume(frame)
+        else:
+            frame, answers = answering.answer(connection, timestamp, data)
+            journal.append(frame, answers)
+        report(number + 1, total, _refusal(frame))
+
+
+def _refusal(frame: Frame) -> str:
+    if not frame.reason:
+        return ''
+    seconds, nanoseconds = divmod(frame.timestamp, 10**9)
+    return f'{frame.topic} at {seconds}.{nanoseconds:09} s: {frame.reason}'
+
+
+def _assemble(
+    task: BagTask,
+    source: Source,
+    topics: dict[str, AnswerTopics],
+    journal: Journal,
+    outcome: Outcome,
+) -> None:
+    """Write the bag from its source and the journal, and put it in the place of the journal."""
+    shutil.rmtree(task.target / _ASSEMBLED, ignore_errors=True)
+    bag = task.target / _ASSEMBLED / task.target.name
+    store = typestore()
+    with Writer(bag, version=VERSION, storage_plugin=STORAGES[task.storage]) as writer:
+        writer.set_custom_data('ahf_ros', custom_data(task.target)['ahf_ros'])
+        writer.set_custom_data('ahf_ros_outcome', json.dumps(asdict(outcome)))
+        copy = Copy(source, writer)
+        answered = {
+            name: writer.add_connection(name, kind, typestore=store)
+            for to in topics.values()
+            for name, kind in to.types.items()
+        }
+        frames = journal.answers()
+        for connection, timestamp, data in source.messages():
+            copy.write(connection, timestamp, data)
+            if connection.topic in topics:
+                frame, answers = next(frames)
+                _check_frame(task, frame, connection.topic, timestamp)
+                for name, message in answers:
+                    writer.write(answered[name], timestamp, message)
+    for file in sorted(bag.iterdir(), key=lambda file: file.name == METADATA):
+        # The metadata last: it says which files are the bag.
+        file.replace(task.target / file.name)
+
+
+def _check_frame(task: BagTask, frame: Frame, topic: str, timestamp: int) -> None:
+    if (frame.topic, frame.timestamp) != (topic, timestamp):
+        raise ValueError(f'{task.source} is not the bag that {task.target} was begun with')
+
+
+def _tidy(target: Path) -> None:
+    """Remove what is left of the way to a bag that is done."""
+    shutil.rmtree(target / _ASSEMBLED, ignore_errors=True)
+    remove_parts(target)

@@ -1,0 +1,195 @@
+"""`ahf bag`: the coded targets in recorded images."""
+
+from __future__ import annotations
+
+import argparse
+import multiprocessing
+import queue
+import sys
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from ahf_ros.cli.identify import IdentifySettings
+from ahf_ros.cli.options import add_option, add_options, settings_from
+from ahf_ros.parameter import Parameter
+
+if TYPE_CHECKING:
+    from ahf_ros.bag.run import BagTask, Outcome
+
+DESCRIPTION = 'Identify the coded targets in the images of bags, of ROS 1 and ROS 2.'
+
+JOBS = Parameter('jobs', 1, 'Bags that are worked on at the same time.', minimum=1)
+OUTPUT_TOPIC = Parameter(
+    'output_topic',
+    'coded_targets',
+    'Topic of the answers, below that of the images unless it begins with a slash.',
+)
+STORAGE = Parameter(
+    'storage', 'mcap', 'Format of the bag that is written.', choices=('mcap', 'sqlite3')
+)
+
+PATIENCE = 0.2
+"""Time between two looks at whether a process has ended, s."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Give a parser the arguments of the command."""
+    parser.add_argument(
+        'bags',
+        nargs='+',
+        type=Path,
+        metavar='IN',
+        help='Bags: folders of ROS 2, files .db3 and .mcap, files .bag of ROS 1.',
+    )
+    parser.add_argument(
+        'target',
+        type=Path,
+        metavar='OUT',
+        help='The bag that is written, a folder; for several bags the folder that they are '
+        'written into. One that is not finished is gone on with.',
+    )
+    parser.add_argument(
+        '--topic',
+        action='append',
+        default=[],
+        metavar='TOPIC',
+        help='Topic of images; can be given several times. Default: all.',
+    )
+    add_option(parser, OUTPUT_TOPIC)
+    add_option(parser, STORAGE)
+    parser.add_argument(
+        '--debug-images', action='store_true', help='Write annotated images, too, as JPEG.'
+    )
+    add_option(parser, JOBS)
+    add_options(parser, IdentifySettings)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Work through all bags.
+
+    Returns
+    -------
+    int
+        0, or 1 where a bag could not be read to its end or written, or an image was refused.
+
+    Raises
+    ------
+    ValueError
+        If options do not fit each other.
+    """
+    tasks = _tasks(options)
+    failed = False
+    with _progress() as progress:
+        bars = [progress.add_task(task.source.name, total=None) for task in tasks]
+
+        def report(number: int, done: int, total: int, refused: str) -> None:
+            progress.update(bars[number], completed=done, total=max(total, done))
+            if refused:
+                print(f'ahf bag: {tasks[number].source}: {refused}', file=sys.stderr)
+
+        for task, outcome in _outcomes(tasks, options.jobs, report):
+            _tell(task, outcome)
+            failed |= isinstance(outcome, Exception) or bool(outcome.refused or outcome.cut)
+    return int(failed)
+
+
+def _tasks(options: argparse.Namespace) -> list[BagTask]:
+    from ahf_ros.bag.run import BagTask
+
+    settings = settings_from(options, IdentifySettings)
+    targets = [options.target]
+    if len(options.bags) > 1:
+        targets = [options.target / bag.stem for bag in options.bags]
+        if len(set(targets)) < len(targets):
+            raise ValueError('OUT would hold several bags of one name, accepted is one of each')
+    return [
+        BagTask(
+            source=source,
+            target=target,
+            topics=tuple(options.topic),
+            output_topic=options.output_topic,
+            storage=options.storage,
+            debug_images=options.debug_images,
+            expected=settings.expected,
+            detector=settings.detector,
+            detection=settings.target,
+            adaptive=settings.adaptive,
+        )
+        for source, target in zip(options.bags, targets, strict=True)
+    ]
+
+
+def _outcomes(
+    tasks: Sequence[BagTask], jobs: int, report: Any
+) -> Iterator[tuple[BagTask, Outcome | Exception]]:
+    """Yield what becomes of each bag, or why nothing does, as soon as it is known."""
+    if min(jobs, len(tasks)) == 1:
+        for number, task in enumerate(tasks):
+            yield task, _attempt(task, partial(report, number))
+        return
+    context = multiprocessing.get_context('spawn')
+    with context.Manager() as manager, ProcessPoolExecutor(jobs, context) as pool:
+        reports = manager.Queue()
+        running = {
+            pool.submit(_attempt, task, partial(_put, reports, number)): task
+            for number, task in enumerate(tasks)
+        }
+        while running:
+            try:
+                report(*reports.get(timeout=PATIENCE))
+                continue
+            except queue.Empty:
+                ended = [future for future in running if future.done()]
+            for future in ended:
+                yield running.pop(future), _result(future)
+
+
+def _attempt(task: BagTask, report: Any) -> Outcome | Exception:
+    from ahf_ros.bag.run import answer_bag
+
+    try:
+        return answer_bag(task, report)
+    except (ValueError, OSError) as error:
+        return error
+
+
+def _put(reports: Any, *report: Any) -> None:
+    reports.put(report)
+
+
+def _result(future: Future[Outcome | Exception]) -> Outcome | Exception:
+    try:
+        return future.result()
+    except BrokenProcessPool as error:
+        return error
+
+
+def _progress() -> Progress:
+    return Progress(
+        TextColumn('{task.description}'),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+        console=Console(stderr=True),
+        transient=True,
+        redirect_stdout=False,
+        disable=not sys.stderr.isatty(),
+    )
+
+
+def _tell(task: BagTask, outcome: Outcome | Exception) -> None:
+    """Say to people what became of a bag."""
+    if isinstance(outcome, Exception):
+        print(f'ahf bag: {task.source}: {outcome}', file=sys.stderr)
+        return
+    refused = f', {outcome.refused} of them not accepted' if outcome.refused else ''
+    print(f'{task.target}: {outcome.images} images answered{refused}', file=sys.stderr)
+    if outcome.cut:
+        print(f'ahf bag: {task.source} is cut: {outcome.cut}', file=sys.stderr)
