@@ -12,6 +12,8 @@ from typing import Any
 
 import pytest
 
+import ahf_ros.blas  # noqa: F401  before numpy, as in processes that are ours
+
 PATIENCE = 60.0
 """Time after which something that does not happen is a failure, s; machines may be slow."""
 

@@ -8,7 +8,8 @@ pytest.importorskip('rclpy', reason='ROS 2 is not installed')
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
-from ahf_ros.nodes.image_msg import gray_image, image_message
+from ahf_ros.encodings import decode_image
+from ahf_ros.nodes.image_msg import image_message
 
 GRAY = np.arange(12, dtype=np.uint8).reshape(3, 4)
 RED, GREEN, BLUE = 76, 150, 29  # of gray in 255, ITU-R BT.601
@@ -21,7 +22,7 @@ def message(encoding: str = 'mono8', step: int = 4, data: bytes | None = None, *
 
 def test_gray_is_a_view_of_the_data() -> None:
     sent = message()
-    image = gray_image(sent)
+    image = decode_image(sent)
     assert np.array_equal(image, GRAY)
     sent.data[0] = 200
     assert image[0, 0] == 200
@@ -31,7 +32,7 @@ def test_gray_is_a_view_of_the_data() -> None:
 def test_padding_of_rows_is_left_out(step: int) -> None:
     padded = np.full((3, step), 255, np.uint8)
     padded[:, :4] = GRAY
-    assert np.array_equal(gray_image(message(step=step, data=padded.tobytes())), GRAY)
+    assert np.array_equal(decode_image(message(step=step, data=padded.tobytes())), GRAY)
 
 
 @pytest.mark.parametrize(
@@ -44,11 +45,11 @@ def test_colour_turns_gray_with_any_step(
     padded = np.full((2, step), 99, np.uint8)
     padded[:, :9] = 255 * np.eye(3, dtype=np.uint8).ravel()
     sent = message(encoding, step, padded.tobytes(), height=2, width=3)
-    assert np.array_equal(gray_image(sent), [gray, gray])
+    assert np.array_equal(decode_image(sent), [gray, gray])
 
 
 def test_data_may_be_longer_than_the_rows() -> None:
-    assert np.array_equal(gray_image(message(data=GRAY.tobytes() + bytes(3))), GRAY)
+    assert np.array_equal(decode_image(message(data=GRAY.tobytes() + bytes(3))), GRAY)
 
 
 @pytest.mark.parametrize(
@@ -71,7 +72,7 @@ def test_data_may_be_longer_than_the_rows() -> None:
 )
 def test_what_does_not_fit_is_named(fields: dict, error: str) -> None:
     with pytest.raises(ValueError, match=error):
-        gray_image(message(**fields))
+        decode_image(message(**fields))
 
 
 @pytest.mark.parametrize('image', [GRAY, GRAY.T, np.stack((GRAY, GRAY + 100, GRAY), axis=2)])

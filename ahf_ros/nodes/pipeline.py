@@ -10,9 +10,9 @@ from sensor_msgs.msg import Image
 
 from ahf_ros.adaptive import AdaptiveIdentifier
 from ahf_ros.detectors import create
+from ahf_ros.encodings import decode_image
 from ahf_ros.homomorphic import HomomorphicFilter
 from ahf_ros.msg import CodedTargetArray
-from ahf_ros.nodes.image_msg import gray_image
 from ahf_ros.nodes.settings import DetectorNodeSettings
 from ahf_ros.nodes.target_msg import coded_target_array
 from ahf_ros.target import Identification, Target
@@ -73,7 +73,7 @@ class Pipeline:
         Refused
             If the node stops before.
         """
-        image = gray_image(message)
+        image = decode_image(message)
         identification = self._identifier.identify(image, expected)
         sent = coded_target_array(
             identification, self.settings.target.family, image.shape, message.header

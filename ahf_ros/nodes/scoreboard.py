@@ -11,10 +11,10 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
 from ahf_ros.drawing import draw, summary
+from ahf_ros.encodings import decode_image
 from ahf_ros.evaluation import FALSE, WRONG, TrueTarget, judge, score
 from ahf_ros.files import write_image
 from ahf_ros.msg import CodedTargetArray
-from ahf_ros.nodes.image_msg import gray_image
 from ahf_ros.nodes.parameters import ParameterSettings
 from ahf_ros.nodes.process import ProcessNode, run
 from ahf_ros.nodes.settings import ScoreboardSettings
@@ -74,7 +74,7 @@ class Scoreboard(ProcessNode):
             picture = Path(settings.pictures, f'image_{self.count}.jpg')
             verdicts = zip(judge(true, found.targets), found.targets, strict=True)
             wrong = [target for verdict, target in verdicts if verdict.kind in (WRONG, FALSE)]
-            write_image(picture, draw(gray_image(image), found, wrong))
+            write_image(picture, draw(decode_image(image), found, wrong))
         if self.count == settings.images:
             self.ended.set_result(0)
 
