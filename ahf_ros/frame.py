@@ -79,8 +79,8 @@ def project(frames: np.ndarray, points: np.ndarray) -> np.ndarray:
     Parameters
     ----------
     frames : ndarray of float64, shape (k, 3, 3)
-    points : ndarray of float, shape (..., 2) or (k, ..., 2)
-        The same points for every frame, or with one more axis, points for each.
+    points : ndarray of float, shape (..., 2) of up to three axes, or (k, m, n, 2)
+        The same points for every frame, or those of each.
 
     Returns
     -------

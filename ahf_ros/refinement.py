@@ -103,9 +103,7 @@ def _fitted_dots(
     return every.chosen(best * len(frames) + np.arange(len(frames))), np.array(signs)[best]
 
 
-def _moved(
-    target: Target, centre: np.ndarray, axes: np.ndarray, covariance: np.ndarray
-) -> Target:
+def _moved(target: Target, centre: np.ndarray, axes: np.ndarray, covariance: np.ndarray) -> Target:
     return replace(
         target,
         x=float(centre[0]),

@@ -36,9 +36,7 @@ def found(scene: SceneSettings) -> list[Target]:
 
 def distances(targets: list[Target], scene: SceneSettings) -> np.ndarray:
     truth = {target.id: target for target in rendered(scene).targets}
-    return np.array(
-        [np.hypot(it.x - truth[it.id].x, it.y - truth[it.id].y) for it in targets]
-    )
+    return np.array([np.hypot(it.x - truth[it.id].x, it.y - truth[it.id].y) for it in targets])
 
 
 @pytest.mark.parametrize('polarity', ['dark', 'bright'])
