@@ -32,6 +32,7 @@ _LIGHT_REACH = 0.3  # standard deviation of the window in which the light is eve
 _LIGHT_PRIOR = 5.0  # px of trusted edges that say as much of the slope as the prior, none, does
 _SHARPENED = 0.03  # slope of all edges that makes those of single ones doubtful, 1/px
 _LEAST_SLOPE_ERROR = 0.002  # that counts as usual, 1/px
+_UNEVEN_LIGHT = 0.011  # usual error of slopes that doubles the variance of a centre, 1/px
 _PRIOR_SCALE = 0.003  # standard deviation of the printed proportions of band and dot
 _PRIOR_PERSPECTIVE = 0.02  # of the projective part, in 1 a dot radius
 _PRIOR_SHIFT = 1.0  # of the shift of edges towards the dark side, px
@@ -155,7 +156,11 @@ def _solve(
     influence = model.influence(normal) * (robust / gain[:, None])[:, None]
     parts = influence * errors[:, None]
     parts -= light.influence(influence * (edges.sensitivity / edges.scale)[:, None])
-    covariance = _covariance(parts, trust / (1 + doubt) ** 2, edges.spacing, normal.shape[1])
+    used = trust / (1 + doubt) ** 2
+    covariance = _covariance(parts, used, edges.spacing, normal.shape[1])
+    # Where slopes differ that much from their neighbours, light is no slope within a profile.
+    uneven = (used * light.errors**2).sum(axis=1) / np.maximum(used.sum(axis=1), 1e-9)
+    covariance *= (1 + uneven / _UNEVEN_LIGHT**2)[:, None, None]
     return changes, Fit(frames, contrast, _median(bright, seen), share, scatter, covariance)
 
 
