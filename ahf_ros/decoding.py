@@ -34,6 +34,7 @@ SAMPLES_PER_SECTOR = 10
 """Usual number of angles at which a sector is read."""
 
 _ACROSS = 2.6  # distance of a reading from an edge, px
+_SOFT, _ACROSS_SOFT = 1.0, 3.0  # blur of an edge, px, from where on it grows, and how fast
 _NEAREST_ACROSS, _FARTHEST_ACROSS = 0.13, 0.36  # the same, dot radii
 _BAND_DEPTHS = (0.3, 0.5, 0.7)  # of the band, where its level is read
 _GAP_DEPTHS = (0.35, 0.65)
@@ -117,7 +118,8 @@ def read_bands(
     major, minor, _ = frame.ellipse_axes(frames)
     size = np.sqrt(major * minor)
     inner, outer = family.band_inner, family.band_outer
-    across = np.clip(_ACROSS / size, _NEAREST_ACROSS, _FARTHEST_ACROSS)[:, None]
+    across = _ACROSS + _ACROSS_SOFT * np.maximum(marks.blur - _SOFT, 0)
+    across = np.clip(across / size, _NEAREST_ACROSS, _FARTHEST_ACROSS)[:, None]
     fixed = np.concatenate(
         [
             inner + (outer - inner) * np.array(_BAND_DEPTHS),

@@ -8,7 +8,7 @@ bounds what one reading can claim.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -42,15 +42,18 @@ class Marks:
         Gray value of dark over bright under the same light.
     bright : ndarray of float64, shape (k,)
         Usual gray value of the bright side of the dot's edge.
+    blur : ndarray of float64, shape (k,)
+        Of their edges, standard deviation in px.
     """
 
     signs: np.ndarray
     contrast: np.ndarray
     bright: np.ndarray
+    blur: np.ndarray
 
     def chosen(self, which: np.ndarray) -> Marks:
         """Return the marks of some of the targets."""
-        return Marks(self.signs[which], self.contrast[which], self.bright[which])
+        return Marks(*(getattr(self, of.name)[which] for of in fields(self)))
 
     def step(self, values: np.ndarray) -> np.ndarray:
         """Return the step of ln onto a mark where the bright side has gray values (k, ...)."""

@@ -19,10 +19,12 @@ from ahf_ros.circles import Circles
 USUAL_BLUR = 0.8
 """Standard deviation of a step, px: a sharp lens, the area of a pixel and the interpolation."""
 
+BLURS = (0.5, 2.0)
+"""Sharpest and softest step that is fitted, standard deviation in px."""
+
 _HALF_WIDTHS = np.array([0.0, 1.0, 1.3, 1.6, 2.0, 2.5, 3.0])  # of a profile, px
 _SAMPLES = 13  # of a profile
 _LARGEST_ASIDE = 0.8  # of the two lines of a profile, from its middle, px
-_BLURS = (0.5, 2.0)  # sharpest and softest step that is fitted, standard deviation in px
 _BLUR_STEP = 0.1
 _CONTRAST = 0.25  # usual gray value of dark over bright
 _LEAST_STEP = 1.0  # gray values, that a place is computed from
@@ -91,7 +93,7 @@ def measure_edges(
     ends = _HALF_WIDTHS[which, None] * places.normals
     for end in (places.points - ends, places.points + ends):
         which[~frame.within(end, gray.shape)] = 0
-    blurs = np.rint(np.clip(blur, *_BLURS) / _BLUR_STEP).astype(int)
+    blurs = np.rint(np.clip(blur, *BLURS) / _BLUR_STEP).astype(int)
     groups = np.where(which > 0, which + len(_HALF_WIDTHS) * blurs[:, None], 0)
     steps = np.zeros((7, *which.shape))
     for group in np.unique(groups[groups > 0]):

@@ -13,7 +13,10 @@ REACH = 0.45
 
 _RAYS = 48  # about a dot
 _READINGS = ((5, 1), (10, 2))  # of a band: samples a sector, and rounds of the fit that follows
-_SHIFT = 0.4  # of an edge towards the dark side, px, at the most
+_LEVELS = (0.75, 1.4)  # dot radii, where the levels of dot and gap are read
+_LEVEL_RAYS = 24
+_PRINTED = 0.25  # usual contrast of prints
+_SHIFT = 0.5  # of an edge towards the dark side, in its blur, at the most
 _SMALL = 7.0  # radius of dots that such a shift spoils the reading of, px
 
 
@@ -41,7 +44,8 @@ def read_dots(
     """
     which, frames = _unshifted(fit, signs)
     fit = fit.chosen(which)
-    marks = evidence.Marks(signs[which], fit.contrast, fit.bright)
+    contrast = _contrast(gray, fit, signs[which])
+    marks = evidence.Marks(signs[which], contrast, fit.bright, fit.blur)
     found = Hypotheses.unread(fit)
     read = np.arange(len(which))
     # A band that was read right makes the frame better, and a better frame the reading.
@@ -60,20 +64,33 @@ def read_dots(
     return found, which
 
 
+def _contrast(gray: np.ndarray, fit: subpixel.Fit, signs: np.ndarray) -> np.ndarray:
+    """Return the contrast that marks are expected to have.
+
+    It is that of the dot's edge. Where a camera sharpens, that edge is darker than marks are; the
+    levels beside it then tell more, up to the usual contrast of prints.
+    """
+    angles = 2 * np.pi * np.arange(_LEVEL_RAYS) / _LEVEL_RAYS
+    values = frame.sample_circles(gray, fit.frames, angles, np.array(_LEVELS))
+    inside, outside = np.moveaxis(np.maximum(values, 1.0), 2, 0)
+    ratio = np.median(inside / outside, axis=1) ** signs
+    return np.maximum(fit.contrast, np.minimum(ratio, _PRINTED))
+
+
 def _unshifted(fit: subpixel.Fit, signs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return which dots to read, and their frames without the shift of the dot's edge.
 
-    A camera's gamma makes a dark dot smaller and a bright one larger, by a third of a pixel at
-    usual blur; a linear camera does not. The band, up to 3.5 radii away, needs the scale: small
-    dots are read with either, others with the mean.
+    A camera's gamma makes a dark dot smaller and a bright one larger, by up to half of the
+    standard deviation of the blur; a linear camera does not. The band, up to 3.5 radii away, needs
+    the scale: small dots are read with either, others with the mean.
     """
     major, minor, _ = frame.ellipse_axes(fit.frames)
     size = np.sqrt(major * minor)
     every, small = np.arange(len(size)), np.flatnonzero(size < _SMALL)
     which = np.concatenate([every, small])
-    shift = np.full(len(size), _SHIFT / 2)
-    shift[small] = 0.0
-    shift = np.concatenate([shift, np.full(len(small), _SHIFT)])
+    share = np.full(len(size), 0.5)
+    share[small] = 0.0
+    share = np.concatenate([share, np.ones(len(small))])
     changes = np.zeros((len(which), 5))
-    changes[:, 2] = signs[which] * shift / size[which]
+    changes[:, 2] = signs[which] * _SHIFT * share * fit.blur[which] / size[which]
     return which, frame.moved(fit.frames[which], changes)

@@ -15,7 +15,7 @@ import numpy as np
 
 from ahf_ros import frame
 from ahf_ros.circles import Circles, dot_circles, ring_circles
-from ahf_ros.profiles import USUAL_BLUR, Edges, measure_edges
+from ahf_ros.profiles import BLURS, USUAL_BLUR, Edges, measure_edges
 from ahf_ros.tone import LOG_OFFSET
 
 __all__ = ['Circles', 'Fit', 'dot_circles', 'fit_circles', 'ring_circles']
@@ -58,6 +58,8 @@ class Fit:
         Standard deviation of the edges that were, px.
     covariance : ndarray of float64, shape (k, 2, 2)
         Of the image of the centre, px^2.
+    blur : ndarray of float64, shape (k,)
+        Of the edges, standard deviation in px.
     """
 
     frames: np.ndarray
@@ -66,6 +68,7 @@ class Fit:
     share: np.ndarray
     deviation: np.ndarray
     covariance: np.ndarray
+    blur: np.ndarray
 
     def chosen(self, which: np.ndarray) -> Fit:
         """Return the fits of some of the frames."""
@@ -111,16 +114,17 @@ def fit_circles(
     blur = np.full(len(frames), USUAL_BLUR)
     for _ in range(rounds):
         edges = measure_edges(gray, frames, circles, blur, reach)
-        blur += _median(edges.softness, edges.visible, 0.0)
-        changes, fit = _solve(frames, circles, edges, projective)
+        blur = np.clip(blur + _median(edges.softness, edges.visible, 0.0), *BLURS)
+        changes, fit = _solve(frames, circles, edges, blur, projective)
         frames = frame.moved(frames, np.clip(changes[:, : 7 if projective else 5], -0.3, 0.3))
     affine = frame.local_affine(frames)
     covariance = affine @ fit.covariance @ affine.transpose(0, 2, 1)
-    return replace(fit, frames=frames, covariance=covariance + _SYSTEMATIC**2 * np.eye(2))
+    covariance += _SYSTEMATIC**2 * np.eye(2)
+    return replace(fit, frames=frames, covariance=covariance)
 
 
 def _solve(
-    frames: np.ndarray, circles: Circles, edges: Edges, projective: bool
+    frames: np.ndarray, circles: Circles, edges: Edges, blur: np.ndarray, projective: bool
 ) -> tuple[np.ndarray, Fit]:
     """Return the changes of the frames that bring the circles onto the edges."""
     expected = edges.visible
@@ -161,7 +165,8 @@ def _solve(
     # Where slopes differ that much from their neighbours, light is no slope within a profile.
     uneven = (used * light.errors**2).sum(axis=1) / np.maximum(used.sum(axis=1), 1e-9)
     covariance *= (1 + uneven / _UNEVEN_LIGHT**2)[:, None, None]
-    return changes, Fit(frames, contrast, _median(bright, seen), share, scatter, covariance)
+    fit = Fit(frames, contrast, _median(bright, seen), share, scatter, covariance, blur)
+    return changes, fit
 
 
 def _trust(ratio_errors: np.ndarray, residuals: np.ndarray, seen: np.ndarray) -> np.ndarray:

@@ -25,7 +25,9 @@ def marks_of(rendering: Rendering, count: int) -> Marks:
     sign = 1 if scene.polarity == 'dark' else -1
     contrast = scene.black ** (1 / scene.gamma)
     bright = np.percentile(rendering.image, 90 if sign > 0 else 99)
-    return Marks(np.full(count, sign), np.full(count, contrast), np.full(count, bright))
+    return Marks(
+        np.full(count, sign), np.full(count, contrast), np.full(count, bright), np.full(count, 0.8)
+    )
 
 
 def read(rendering: Rendering) -> decoding.Readings:
@@ -62,14 +64,14 @@ def test_light_changes_the_margin_and_not_the_words(light):
 def test_a_band_of_plain_paper_is_no_word():
     gray = np.full((200, 200), 200, np.float32)
     frames = frame.affine_frames([100], [100], [15], [15], [0])
-    marks = Marks(np.array([1]), np.array([0.25]), np.array([200.0]))
+    marks = Marks(np.array([1]), np.array([0.25]), np.array([200.0]), np.array([0.8]))
     readings = decoding.read_bands(gray, frames, marks, family('metashape12'))
     assert not readings.plausible.any()
 
 
 def test_no_band_no_reading():
     gray = np.full((50, 60), 200, np.float32)
-    nothing = Marks(np.zeros(0, int), np.zeros(0), np.zeros(0))
+    nothing = Marks(np.zeros(0, int), np.zeros(0), np.zeros(0), np.zeros(0))
     readings = decoding.read_bands(gray, np.zeros((0, 3, 3)), nothing, family('aicon14'))
     assert len(readings.words) == len(readings.plausible) == 0
 
@@ -90,6 +92,7 @@ def test_confidence_is_a_probability_that_grows_with_the_evidence():
             share=np.full(6, share),
             deviation=np.full(6, deviation),
             covariance=np.tile(1e-4 * np.eye(2), (6, 1, 1)),
+            blur=np.full(6, 0.8),
         )
         features = decoding.confidence_features(readings, fit)
         assert features.shape == (6, decoding.FEATURES)

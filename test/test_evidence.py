@@ -7,7 +7,7 @@ ANGLES = 40
 
 
 def marks(sign, contrast=0.25, bright=200.0):
-    return Marks(np.array([sign]), np.array([contrast]), np.array([bright]))
+    return Marks(np.array([sign]), np.array([contrast]), np.array([bright]), np.array([0.8]))
 
 
 def light(levels, of=None):
