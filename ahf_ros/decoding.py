@@ -115,8 +115,7 @@ def read_bands(
     """
     count = family.bits * samples
     angles = -2 * np.pi * (np.arange(count) + 0.5) / count  # counter-clockwise as seen
-    major, minor, _ = frame.ellipse_axes(frames)
-    size = np.sqrt(major * minor)
+    size = frame.mean_radii(frames)
     inner, outer = family.band_inner, family.band_outer
     across = _ACROSS + _ACROSS_SOFT * np.maximum(marks.blur - _SOFT, 0)
     across = np.clip(across / size, _NEAREST_ACROSS, _FARTHEST_ACROSS)[:, None]
@@ -209,8 +208,7 @@ def confidence_features(readings: Readings, fit: Fit) -> np.ndarray:
         radii; ln of the contrast. Of the word: ln(1 + margin), and the explained share of all
         steps.
     """
-    major, minor, _ = frame.ellipse_axes(fit.frames)
-    deviation = fit.deviation / np.sqrt(major * minor)
+    deviation = fit.deviation / frame.mean_radii(fit.frames)
     return np.stack(
         [
             readings.explained[:, 2:].min(axis=1),

@@ -131,8 +131,7 @@ def _refined(
     log: np.ndarray, frames: np.ndarray, signs: np.ndarray, window: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return frames moved onto the strongest steps near their circle, and the inliers' share."""
-    major, minor, _ = frame.ellipse_axes(frames)
-    size = np.sqrt(major * minor)[:, None]
+    size = frame.mean_radii(frames)[:, None]
     windows = np.clip(_LEAST_WINDOW / size, window, 0.5)
     radii = 1 + np.linspace(-1.15, 1.15, 13) * windows
     steps = _steps(log, frames, radii, signs)

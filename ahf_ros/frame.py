@@ -338,6 +338,12 @@ def ellipse_axes(frames: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray
     return np.sqrt(mean + deviation), np.sqrt(np.maximum(mean - deviation, 0)), angle
 
 
+def mean_radii(frames: np.ndarray) -> np.ndarray:
+    """Return the radii of circles with the areas of the dots, px, shape (k,)."""
+    major, minor, _ = ellipse_axes(frames)
+    return np.sqrt(major * minor)
+
+
 def local_affine(frames: np.ndarray) -> np.ndarray:
     """Return the derivatives of the frames' maps at the centre, shape (k, 2, 2), px a radius."""
     return frames[:, :2, :2] - frames[:, :2, 2:] * frames[:, 2:, :2]

@@ -67,14 +67,16 @@ def read_dots(
 def _contrast(gray: np.ndarray, fit: subpixel.Fit, signs: np.ndarray) -> np.ndarray:
     """Return the contrast that marks are expected to have.
 
-    It is that of the dot's edge. Where a camera sharpens, that edge is darker than marks are; the
-    levels beside it then tell more, up to the usual contrast of prints.
+    It is that of the dot's edge. Where a camera sharpens, that edge is darker than marks are, and
+    where marks are small blur makes them less dark. The levels beside the edge then tell more; at
+    large dots only up to the usual contrast of prints, because the light may change between them.
     """
     angles = 2 * np.pi * np.arange(_LEVEL_RAYS) / _LEVEL_RAYS
     values = frame.sample_circles(gray, fit.frames, angles, np.array(_LEVELS))
     inside, outside = np.moveaxis(np.maximum(values, 1.0), 2, 0)
     ratio = np.median(inside / outside, axis=1) ** signs
-    return np.maximum(fit.contrast, np.minimum(ratio, _PRINTED))
+    small = frame.mean_radii(fit.frames) < _SMALL
+    return np.maximum(fit.contrast, np.where(small, ratio, np.minimum(ratio, _PRINTED)))
 
 
 def _unshifted(fit: subpixel.Fit, signs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -84,8 +86,7 @@ def _unshifted(fit: subpixel.Fit, signs: np.ndarray) -> tuple[np.ndarray, np.nda
     standard deviation of the blur; a linear camera does not. The band, up to 3.5 radii away, needs
     the scale: small dots are read with either, others with the mean.
     """
-    major, minor, _ = frame.ellipse_axes(fit.frames)
-    size = np.sqrt(major * minor)
+    size = frame.mean_radii(fit.frames)
     every, small = np.arange(len(size)), np.flatnonzero(size < _SMALL)
     which = np.concatenate([every, small])
     share = np.full(len(size), 0.5)

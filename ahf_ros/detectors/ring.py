@@ -121,8 +121,7 @@ def _read(gray: np.ndarray, code: Family, frames: np.ndarray, signs: np.ndarray)
 
 def _distinct(frames: np.ndarray, signs: np.ndarray, quality: np.ndarray) -> np.ndarray:
     """Return which frames to keep so that no two are the same dot, the best ones first."""
-    major, minor, _ = frame.ellipse_axes(frames)
-    size = np.sqrt(major * minor)
+    size = frame.mean_radii(frames)
     order = np.argsort(frames[:, 0, 2], kind='stable')  # neighbours are near in this order
     x, y, size, signs = frames[order, 0, 2], frames[order, 1, 2], size[order], signs[order]
     first, last = np.searchsorted(x, x - 0.3 * size), np.searchsorted(x, x + 0.3 * size)
