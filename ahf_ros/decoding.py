@@ -44,8 +44,8 @@ _CORRELATION = 2.5  # px between independent readings
 _LEAST_DEVIATION = 0.001  # dot radii
 _LEAST_CONTRAST = 0.25  # of prints; more speaks no more for a target
 # Intercepts and weights of `confidence`
-_OF_TARGET = np.array([-28.45, 7.46, 17.05, -0.97, -8.71])
-_OF_WORD = np.array([-9.29, 2.34, 6.53])
+_OF_TARGET = np.array([-30.33, 6.69, 16.19, -2.11, -7.95])
+_OF_WORD = np.array([-9.97, 2.26, 7.92])
 
 OF_TARGET = len(_OF_TARGET) - 1
 """Number of the features that tell targets from patterns of light; the others tell words."""
