@@ -94,6 +94,7 @@ def test_readings_are_taken_over_where_they_belong():
         share=np.array([0.8, 0.9]),
         deviation=np.full(2, 0.1),
         covariance=np.tile(np.eye(2), (2, 1, 1)),
+        blur=np.full(2, 0.8),
     )
     found = Hypotheses.unread(fit)
     assert not found.words.any() and not found.confidence.any()
@@ -104,6 +105,7 @@ def test_readings_are_taken_over_where_they_belong():
         share=np.array([1.0]),
         deviation=np.full(1, 0.02),
         covariance=0.1 * np.eye(2)[None],
+        blur=np.full(1, 0.8),
     )
     one = np.ones(1)
     readings = decoding.Readings(np.array([71]), 0 * one, 100 * one, 5 * one, np.ones((1, 4)))
