@@ -1,0 +1,347 @@
+"""The experiment of the paper on rendered images: C, R, D, RMSE and filters, a table a light.
+
+Shang & Liu, Remote Sens. 2023, 15, 3151, identify 54 targets in 50 images a light, without AHF and
+with it (Tables 3 to 6). Here every method sees the same images, rendered with known truth; rival
+preprocessors stand beside AHF. The paper's own figures are those of its photographs.
+
+    python benchmarks/paper.py [--images 2] [--json paper.json] [--plots plots]
+
+50 images a light and ratio take hours; each is a process of its own. With --read, tables and plots
+come from an earlier --json.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import multiprocessing
+import os
+import sys
+import time
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import ahf_ros.blas  # noqa: F401  before numpy
+
+# isort: split
+import cv2
+import numpy as np
+from filter import machine
+from preprocessors import PREPROCESSORS
+from rich.console import Console
+from rich.progress import track
+
+from ahf_ros.adaptive import AdaptiveIdentifier, AdaptiveSettings
+from ahf_ros.detectors import DETECTOR_NAMES, DetectorSettings, create
+from ahf_ros.evaluation import RIGHT, Score, TrueTarget, judge, score, total
+from ahf_ros.genetic import GeneticSettings
+from ahf_ros.parameter import parameters
+from ahf_ros.synthetic.lights import LIGHT_NAMES
+from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
+from ahf_ros.target import Identification, Target, count_codes
+
+RING = 'metashape12'
+"""Family of the targets of the paper."""
+
+QUICK = {'width': 1200, 'height': 900, 'targets': 6}
+
+PAPER_LIGHTS = ('normal', 'stripe', 'lattice')
+
+PAPER: dict[str, dict[str, str]] = {
+    'AM': {
+        'normal': '100 / 100 / 100 (truth)',
+        'stripe': '0 / 0 / 0',
+        'lattice': '100 / 22 / 22 (0.238)',
+    },
+    'AHF-AM': {
+        'stripe': '100 / 100 / 100 (0.116)',
+        'lattice': '100 / 78 / 78 (0.137)',
+    },
+    'TI': {
+        'normal': '53 / 62 / 62 (0.378)',
+        'stripe': '0 / 0 / 0',
+        'lattice': '0 / 0 / 0',
+    },
+    'AHF-TI': {
+        'normal': '63 / 68 / 68 (0.263)',
+        'stripe': '80 / 83 / 83 (0.247)',
+        'lattice': '35 / 26 / 26 (0.337)',
+    },
+}
+"""What the paper reports: C / R / D in percent, and RMSE XY in px."""
+
+PAPER_FILTERS = {
+    'AHF-AM': {'stripe': '(2.8, 0.82)', 'lattice': '(2.6, 0.44)'},
+    'AHF-TI': {'stripe': '(3.8, 0.70)', 'lattice': '(3.7, 0.66)'},
+}
+"""The filters (gH, gL) that the paper reports."""
+
+
+@dataclass(frozen=True, slots=True)
+class Method:
+    """A way to identify targets.
+
+    Attributes
+    ----------
+    name : str
+    detector : str
+        Name in the registry.
+    family : str
+        Of the targets in the images that it is given.
+    ahf : bool
+        Whether AHF drives the detector.
+    preprocessor : str
+        Name in `PREPROCESSORS`; '' for none.
+    """
+
+    name: str
+    detector: str
+    family: str = RING
+    ahf: bool = False
+    preprocessor: str = ''
+
+    def identify(
+        self, image: np.ndarray, expected: int, most: int
+    ) -> tuple[Identification, list[int]]:
+        """Return what an image shows, and n of every identification that was tried for it.
+
+        Places are taken from the image as it is, whatever the detector saw.
+        """
+        detector = create(self.detector, DetectorSettings(family=self.family))
+        refine = getattr(detector, 'refine', None)
+        if self.preprocessor:
+            found = detector(PREPROCESSORS[self.preprocessor](image))
+            return Identification(tuple(refine(image, found) if refine else found)), []
+        tried: list[int] = []
+
+        def counted(shown: np.ndarray) -> list[Target]:
+            targets = detector(shown)
+            tried.append(count_codes(targets))
+            return targets
+
+        genetic = GeneticSettings(max_evaluations=most)
+        settings = AdaptiveSettings(ahf=self.ahf, threads=1, genetic=genetic)
+        return AdaptiveIdentifier(counted, settings, refine).identify(image, expected), tried
+
+
+def methods() -> list[Method]:
+    """Return all methods whose detector, and whose targets, there are."""
+    accepted = next(it.choices for it in parameters(SceneSettings) if it.name == 'family')
+    square = next((name for name in accepted if name.startswith('aruco')), None)
+    made = []
+    for name, detector, family in (
+        ('traditional', 'traditional', RING),
+        ('ring', 'ring', RING),
+        ('aruco', 'aruco', square),
+    ):
+        if detector in DETECTOR_NAMES and family:
+            made += [Method(name, detector, family), Method(f'AHF-{name}', detector, family, True)]
+    rivals = [
+        Method(f'{name} + traditional', 'traditional', preprocessor=name) for name in PREPROCESSORS
+    ]
+    return made[:2] + rivals + made[2:]
+
+
+def run_scene(scene: SceneSettings, chosen: Sequence[Method], most: int) -> list[dict[str, Any]]:
+    """Identify one scene in every way.
+
+    Returns
+    -------
+    list of dict
+        One a method.
+    """
+    cv2.setNumThreads(1)  # every process has a core
+    renderings: dict[str, Rendering] = {}
+    records = []
+    for method in chosen:
+        if method.family not in renderings:
+            renderings[method.family] = render(replace(scene, family=method.family))
+        rendering = renderings[method.family]
+        truth = [TrueTarget(it.id, it.x, it.y) for it in rendering.targets]
+        started = time.perf_counter()
+        found, tried = method.identify(rendering.image, len(truth), most)
+        seconds = time.perf_counter() - started
+        used = found.filter
+        records.append(
+            {
+                'method': method.name,
+                'light': scene.light,
+                'ambient': scene.ambient,
+                'seed': scene.seed,
+                'score': asdict(score(truth, found.targets)),
+                'filter': [used.gamma_high, used.gamma_low] if used.applied else None,
+                'evaluations': used.evaluations,
+                'expected': len(truth),
+                'tried': tried,
+                'vectors': error_vectors(truth, found.targets),
+                'seconds': seconds,
+            }
+        )
+    return records
+
+
+def error_vectors(
+    truth: Sequence[TrueTarget], targets: Sequence[Target]
+) -> list[tuple[float, float, float, float]]:
+    """Return the places of the targets identified right, and their errors, px."""
+    return [
+        (verdict.target.x, verdict.target.y, it.x - verdict.target.x, it.y - verdict.target.y)
+        for verdict, it in zip(judge(truth, targets), targets, strict=True)
+        if verdict.kind == RIGHT and verdict.target
+    ]
+
+
+def scenes(options: argparse.Namespace) -> list[SceneSettings]:
+    """Return the scenes; normal light, which has no ratio that matters, at the first one only."""
+    base = SceneSettings(**QUICK) if options.quick else SceneSettings()
+    kinds = [
+        (light, ambient)
+        for ambient in options.ambients
+        for light in options.lights
+        if light != 'normal' or ambient == options.ambients[0]
+    ]
+    seeds = range(options.seed, options.seed + options.images)
+    return [
+        replace(base, light=light, ambient=ambient, seed=seed)
+        for seed in seeds
+        for light, ambient in kinds
+    ]
+
+
+def run(options: argparse.Namespace) -> list[dict[str, Any]]:
+    """Return the records of all scenes and methods, in the order of the scenes."""
+    chosen, todo = methods(), scenes(options)
+    context = multiprocessing.get_context('spawn')
+    with ProcessPoolExecutor(options.jobs, mp_context=context) as executor:
+        futures = [executor.submit(run_scene, it, chosen, options.evaluations) for it in todo]
+        console = Console(stderr=True)
+        for future in track(as_completed(futures), 'scenes', len(futures), console=console):
+            future.result()
+    return [record for future in futures for record in future.result()]
+
+
+def as_score(record: dict[str, Any]) -> Score:
+    """Return the figures of a record, which may come from a file."""
+    return Score(**{**record['score'], 'errors': tuple(map(tuple, record['score']['errors']))})
+
+
+def cell(records: Sequence[dict[str, Any]]) -> str:
+    """Return C / R / D in percent, RMSE XY in px and wrong IDs as a table has them."""
+    figures = total(map(as_score, records))
+    shares = (figures.correctness, figures.recall, figures.decoding)
+    text = ' / '.join('-' if share is None else f'{100 * share:.0f}' for share in shares)
+    if figures.rmse:
+        text += f' ({figures.rmse[2]:.3f})'
+    return text + (f', {figures.wrong} wrong' if figures.wrong else '')
+
+
+def filters_found(records: Sequence[dict[str, Any]]) -> str:
+    """Return the median filter, how many images needed one, and evaluations an image."""
+    used = [record['filter'] for record in records if record['filter']]
+    if not used:
+        return 'none'
+    high, low = (median(values) for values in zip(*used, strict=True))
+    tried = median(record['evaluations'] for record in records)
+    return f'({high:.1f}, {low:.2f}), {len(used)} of {len(records)} images, {tried:.0f} tried'
+
+
+def markdown(report: dict[str, Any]) -> str:
+    """Return the report as tables."""
+    records, facts = report['records'], report['machine']
+    names = list(dict.fromkeys(record['method'] for record in records))
+    searching = [name for name in names if name.startswith('AHF-')]
+    lines = [
+        f'{report["images"]} images a light, {report["width"]} x {report["height"]} px, seeds '
+        f'from {report["seed"]}, at most {report["evaluations"]} filters. {facts["processor"]}, '
+        f'Python {facts["python"]}, numpy {facts["numpy"]}, OpenCV {facts["opencv"]}.',
+    ]
+    ambients = list(dict.fromkeys(record['ambient'] for record in records))
+    for ambient in ambients:
+        here = [record for record in records if record['ambient'] == ambient]
+        first = ambient == ambients[0]
+        lines += [
+            '',
+            f'Ambient light {ambient:g} of the projected: C / R / D in % (RMSE XY in px)',
+            '',
+        ]
+        lines += grid(here, names, cell, PAPER if first else {})
+        lines += ['', 'Filters (gH, gL), images that needed one, filters tried', '']
+        lines += grid(here, searching, filters_found, PAPER_FILTERS if first else {})
+        lines += ['', 'Seconds an image', '']
+        lines += grid(here, names, seconds, {})
+    return '\n'.join(lines)
+
+
+def grid(
+    records: Sequence[dict[str, Any]],
+    names: Iterable[str],
+    show: Callable[[list[dict[str, Any]]], str],
+    theirs: dict[str, dict[str, str]],
+) -> list[str]:
+    """Return the lines of a table with a row a method and a column a light."""
+    lights = list(dict.fromkeys(record['light'] for record in records))
+    rows = [('', *lights), ('---',) * (len(lights) + 1)]
+    for name, told in theirs.items():
+        rows.append((f'{name} in the paper', *(told.get(light, '') for light in lights)))
+    for name in names:
+        own = [it for it in records if it['method'] == name]
+        rows.append((name, *(show([it for it in own if it['light'] == at]) for at in lights)))
+    return [f'| {" | ".join(row)} |' for row in rows]
+
+
+def seconds(records: Sequence[dict[str, Any]]) -> str:
+    """Return the median time of one image, s."""
+    return f'{median(record["seconds"] for record in records):.2f}'
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return what can be chosen."""
+    made = argparse.ArgumentParser(
+        description=__doc__.split('\n\n')[0],
+        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+    )
+    made.add_argument('--images', type=int, default=50, help='images a light and ratio')
+    made.add_argument('--seed', type=int, default=101, help='seed of the first image')
+    made.add_argument('--lights', nargs='+', choices=LIGHT_NAMES, default=PAPER_LIGHTS)
+    made.add_argument('--ambients', nargs='+', type=float, default=[0.3, 0.12, 0.04])
+    made.add_argument('--evaluations', type=int, default=100, help='most filters tried an image')
+    made.add_argument('--jobs', type=int, default=os.cpu_count(), help='processes')
+    made.add_argument('--quick', action='store_true', help='small images with six targets')
+    made.add_argument('--json', type=Path, metavar='FILE', help='also write a JSON object')
+    made.add_argument('--plots', type=Path, metavar='DIR', help='also draw, needs matplotlib')
+    made.add_argument('--read', type=Path, metavar='FILE', help='what --json wrote; runs nothing')
+    return made
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run, print and draw."""
+    options = parser().parse_args(arguments)
+    if options.read:
+        report = json.loads(options.read.read_text())
+    else:
+        size = SceneSettings(**QUICK) if options.quick else SceneSettings()
+        report = {
+            'images': options.images,
+            'width': size.width,
+            'height': size.height,
+            'seed': options.seed,
+            'evaluations': options.evaluations,
+            'machine': machine(),
+            'records': run(options),
+        }
+    if options.json:
+        options.json.write_text(json.dumps(report))
+    print(markdown(report))
+    if options.plots:
+        from paper_plots import draw_all  # matplotlib is needed for nothing else
+
+        draw_all(report, options.plots)
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
