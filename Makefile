@@ -1,36 +1,58 @@
 # make demo    ROS 2 nodes under striped light: a line an image, annotated pictures in demo/
 #              DEMO='--light lattice --detector traditional' and so on; ahf_demo --help tells all
-# make test    every check: ruff, mypy, the import rules, the tests
-# Both set up .venv first; nothing is installed outside it.
+# make test    every check: ruff, mypy, the import rules, the tests, also with the oldest versions
+# Both set up .venv first; nothing is installed outside it. DISTRIBUTION=kilted takes the wheels of
+# ROS 2 Kilted instead of Jazzy, into .venv-kilted.
 
 PYTHON ?= python3
-VENV ?= .venv
+DISTRIBUTION ?= jazzy
+VENV ?= .venv$(if $(filter-out jazzy,$(DISTRIBUTION)),-$(DISTRIBUTION))
 BIN := $(VENV)/bin
 READY := $(VENV)/ready
+export AHF_ROS_DISTRIBUTION := $(DISTRIBUTION)
+
+# The first Python that is there is the oldest that numpy and OpenCV of test/oldest.txt are for.
+OLDEST_PYTHON ?= $(firstword $(foreach name,python3.10 python3.11,$(shell $(name) -c '' 2>/dev/null && echo $(name))) $(PYTHON))
+OLDEST := .venv-oldest
 
 # What a sourced ROS installation or another environment left behind does not belong in this one.
 unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: demo test clean
+.PHONY: demo test test-oldest test-kilted clean
 .DELETE_ON_ERROR:
 
 demo: $(READY)
 	$(BIN)/ahf_demo $(DEMO)
 
-test: $(READY)
+test: $(READY) test-oldest
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/python -m pytest
 
+# What needs no ROS, with the oldest versions of numpy and OpenCV that are to be had.
+test-oldest: $(OLDEST)/ready
+	$(OLDEST)/bin/python -m pytest
+
+# The nodes on ROS 2 Kilted.
+test-kilted:
+	$(MAKE) DISTRIBUTION=kilted .venv-kilted/ready
+	.venv-kilted/bin/python -m pytest $$(grep -l rclpy test/test_*.py)
+
 clean:
-	rm -rf $(VENV) build
+	rm -rf .venv* build
 
 # The modules are used where they are; only the interfaces are generated and compiled.
-$(READY): pyproject.toml setup.py package.xml CMakeLists.txt $(wildcard msg/*.msg srv/*.srv)
+$(READY): pyproject.toml setup.py distributions.ini package.xml CMakeLists.txt \
+		$(wildcard msg/*.msg srv/*.srv)
 	@$(PYTHON) scripts/prerequisites.py
 	@echo 'Setting up $(VENV): ROS 2 from PyPI, and the messages compiled; takes 1 to 3 minutes.'
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test]'
+	touch $@
+
+$(OLDEST)/ready: test/oldest.txt
+	$(OLDEST_PYTHON) -m venv $(OLDEST)
+	$(OLDEST)/bin/python -m pip install --quiet --disable-pip-version-check --requirement $<
 	touch $@

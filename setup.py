@@ -1,12 +1,13 @@
 """Install ahf_ros with pip on a machine without ROS 2.
 
 The same CMakeLists.txt that colcon uses generates and compiles the interfaces, against the ROS 2
-wheels that pyproject.toml lists. On a ROS 2 installation, build with colcon instead; this file is
-not used there.
+wheels that distributions.ini lists. On a ROS 2 installation, build with colcon instead; this file
+is not used there.
 """
 
 from __future__ import annotations
 
+import configparser
 import os
 import shutil
 import subprocess
@@ -20,7 +21,25 @@ from setuptools.command.build_ext import build_ext
 
 HERE = Path(__file__).resolve().parent
 NAME = 'ahf_ros'
+DISTRIBUTION = os.environ.get('AHF_ROS_DISTRIBUTION') or 'jazzy'
+REQUIREMENTS = [
+    'numpy>=1.21',
+    'opencv-python-headless>=4.5',
+    'rich>=12',
+    'rosbags>=0.11.7',
+    'ruamel.yaml',
+]
 SITE = Path(f'lib/python{sys.version_info[0]}.{sys.version_info[1]}/site-packages')
+
+
+def wheels(purpose: str) -> list[str]:
+    """Return the ROS 2 wheels of the distribution that are needed to `build` or to `run`."""
+    distributions = configparser.ConfigParser()
+    distributions.read(HERE / 'distributions.ini', encoding='utf-8')
+    if DISTRIBUTION not in distributions:
+        accepted = ', '.join(distributions.sections())
+        sys.exit(f'AHF_ROS_DISTRIBUTION is {DISTRIBUTION!r}, accepted is one of {accepted}')
+    return distributions[DISTRIBUTION][purpose].split()
 
 
 def ros_prefix() -> Path | None:
@@ -125,6 +144,8 @@ class BinaryDistribution(Distribution):
 
 setup(
     version=ElementTree.parse(HERE / 'package.xml').findtext('version'),
+    setup_requires=wheels('build'),
+    install_requires=REQUIREMENTS + wheels('run'),
     packages=find_packages(include=[NAME, f'{NAME}.*']),
     # With this an editable installation is one path to the sources, new modules included.
     package_dir={'': '.'},

@@ -30,7 +30,8 @@ def definition_folder() -> Path:
         If the installation lacks them.
     """
     package = Path(ahf_ros.__file__).resolve().parent
-    places = (package.parent / 'msg', package.parents[3] / 'share' / 'ahf_ros' / 'msg')
+    # The second is as in PREFIX/lib/python3.12/site-packages/ahf_ros.
+    places = [package.parent / 'msg', *(it / 'share/ahf_ros/msg' for it in package.parents[3:4])]
     for folder in places:
         if all((folder / f'{name}.msg').is_file() for name in _NAMES):
             return folder

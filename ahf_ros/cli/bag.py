@@ -172,15 +172,16 @@ def _result(future: Future[Outcome | Exception]) -> Outcome | Exception:
 
 
 def _progress() -> Progress:
+    shown = sys.stderr.isatty()
     return Progress(
         TextColumn('{task.description}'),
         BarColumn(),
         MofNCompleteColumn(),
         TimeRemainingColumn(),
-        console=Console(stderr=True),
+        console=Console(stderr=True, quiet=not shown),
         transient=True,
         redirect_stdout=False,
-        disable=not sys.stderr.isatty(),
+        disable=not shown,
     )
 
 

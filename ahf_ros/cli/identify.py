@@ -144,7 +144,10 @@ def _with_progress(images: list[str]) -> Iterator[str]:
     shown = len(images) > 1 and sys.stderr.isatty()
     # Standard output is not redirected, or JSON would end in the console of the progress bar.
     with Progress(
-        console=Console(stderr=True), transient=True, redirect_stdout=False, disable=not shown
+        console=Console(stderr=True, quiet=not shown),
+        transient=True,
+        redirect_stdout=False,
+        disable=not shown,
     ) as progress:
         yield from progress.track(images, description='identify')
 
