@@ -87,7 +87,7 @@ def refine_centres(
 def _fitted_dots(
     gray: np.ndarray, frames: np.ndarray, signs: Sequence[int]
 ) -> tuple[subpixel.Fit, np.ndarray]:
-    """Return the fits of dots, with the sign of each that more of its edge agrees with."""
+    """Return the fits of dots, with the sign of each that its edge has."""
     fits = [
         subpixel.fit_circles(
             gray,
@@ -98,7 +98,8 @@ def _fitted_dots(
         )
         for sign in signs
     ]
-    best = np.argmax([fit.share for fit in fits], axis=0)
+    # Of the wrong sign there are edges, too, within what is flat; but they are faint.
+    best = np.argmax([fit.share * (1 - fit.contrast) for fit in fits], axis=0)
     every = subpixel.Fit.joined(fits)
     return every.chosen(best * len(frames) + np.arange(len(frames))), np.array(signs)[best]
 

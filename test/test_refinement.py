@@ -51,6 +51,16 @@ def test_places_become_those_of_the_image(polarity):
         assert 0 < np.linalg.det(np.reshape(after.covariance, (2, 2))) < 1e-4
 
 
+@pytest.mark.parametrize('polarity', ['dark', 'bright'])
+def test_small_dots_are_not_taken_for_their_own_inside(polarity):
+    scene = replace(SCENE, targets=24, polarity=polarity, dot_radius=7.0, light='normal')
+    targets = rendered(scene).targets
+    refined = refine_centres(rendered(scene).image, targets, CODE)
+    for before, after in zip(targets, refined, strict=True):
+        assert after.semi_major == pytest.approx(before.semi_major, abs=0.7)
+    assert distances(refined, scene).max() < 0.04
+
+
 def test_images_of_16_bit_give_the_same():
     image, targets = rendered(SCENE).image, found(SCENE)
     expected = refine_centres(image, targets, CODE)
