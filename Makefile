@@ -33,7 +33,7 @@ test: $(READY) test-oldest
 
 # What needs no ROS, with the oldest versions of numpy and OpenCV that are to be had.
 test-oldest: $(OLDEST)/ready
-	$(OLDEST)/bin/python -m pytest
+	$(OLDEST)/bin/python -m pytest --ignore-glob 'test/test_benchmark_*'
 
 # The nodes on ROS 2 Kilted.
 test-kilted:

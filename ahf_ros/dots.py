@@ -74,7 +74,7 @@ def refine_dots(
     frames, signs, inliers
         As `fit_dots` has them, but in pixels of `log`.
     """
-    inliers = np.zeros(len(frames))
+    inliers: np.ndarray = np.zeros(len(frames))
     for window in _WINDOWS:
         frames, inliers = _refined(log, frames, signs, window)
         major, minor, _ = frame.ellipse_axes(frames)

@@ -72,7 +72,7 @@ def decode_image(message: Any) -> np.ndarray:
             f'data is of {len(message.data)} bytes, accepted are at least {size}: '
             f'{message.height} rows of {message.step} bytes'
         )
-    pixels = np.ndarray(
+    pixels: np.ndarray = np.ndarray(
         (message.height, message.width, encoding.channels),
         np.uint8,
         message.data,

@@ -256,7 +256,7 @@ class _Model:
     def __init__(self, circles: Circles, scale: np.ndarray, projective: bool) -> None:
         shared = frame.displacement_basis(circles.angles, circles.radii)
         own = np.zeros((len(scale), len(shared), 0))
-        prior = np.full(9, _WEAK_PRIOR)
+        prior: np.ndarray = np.full(9, _WEAK_PRIOR)
         prior[5:7], prior[7:] = _PRIOR_PERSPECTIVE**-2, (_PRIOR_SCALE**-2, _PRIOR_SHIFT**-2)
         if projective:
             band = np.where(circles.radii > 1, circles.radii, 0)

@@ -34,7 +34,7 @@ def _stamp_cover(stamp: np.ndarray, turn: float) -> Cover:
     """Return the ink of a stamp that fills the square round the unit circle, turned."""
     cosine, sine = np.float32(math.cos(turn)), np.float32(math.sin(turn))
     half = np.float32(_SIDE / 2)
-    ink = np.float32(stamp) / np.float32(255)
+    ink = stamp.astype(np.float32) / np.float32(255)
 
     def cover(x: np.ndarray, y: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
         sample = float(np.sqrt(abs(np.linalg.det(jacobian)))) * float(half)

@@ -53,10 +53,10 @@ def white_light(
     white = lit + surroundings
     scale = min(average / white.mean(), highest / white.max())
     shape = camera.height, camera.width
-    light = _enlarge(np.float32(lit * scale), _FIELD_STEP, shape)
-    floor = _enlarge(np.float32(surroundings * scale), _FIELD_STEP, shape)
+    light = _enlarge((lit * scale).astype(np.float32), _FIELD_STEP, shape)
+    floor = _enlarge((surroundings * scale).astype(np.float32), _FIELD_STEP, shape)
 
-    to_projector = np.float32(projector.homography @ np.linalg.inv(camera.pose))
+    to_projector = (projector.homography @ np.linalg.inv(camera.pose)).astype(np.float32)
     columns = np.arange(camera.width, dtype=float)[None, :]
     for top in range(0, camera.height, _STRIP):
         rows = np.arange(top, min(top + _STRIP, camera.height), dtype=float)[:, None]

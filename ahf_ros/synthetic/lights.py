@@ -86,7 +86,8 @@ def spots(generator: np.random.Generator, defocus: float) -> Pattern:
 
     def pattern(u: np.ndarray, v: np.ndarray) -> np.ndarray:
         brightest = np.zeros_like(u)
-        for u_centre, v_centre, radius in np.float32(np.stack((u_centres, v_centres, radii), 1)):
+        spots = np.stack((u_centres, v_centres, radii), 1).astype(np.float32)
+        for u_centre, v_centre, radius in spots:
             distance = np.sqrt((u - u_centre) ** 2 + (v - v_centre) ** 2)
             np.maximum(brightest, _soft_step(radius - distance, softness), out=brightest)
         return brightest

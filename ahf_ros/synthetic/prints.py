@@ -116,7 +116,7 @@ def print_mark(
     jacobian[1] *= -1
     for rows, columns, kept in _blocks(mark, camera, spread):
         x, y = _places(back, camera, rows, columns)
-        inked = mark.cover(x, y, np.float32(jacobian))
+        inked = mark.cover(x, y, jacobian.astype(np.float32))
         lit = cv2.resize(light[rows, columns], inked.shape[::-1], interpolation=cv2.INTER_CUBIC)
         inked *= lit
         if sigma:

@@ -186,7 +186,7 @@ def render(settings: SceneSettings) -> Rendering:
     if settings.texture:
         light *= paper_texture(light.shape, settings.texture, settings.dot_radius, wall)
     ground, inked = (1.0, settings.black) if settings.polarity == 'dark' else (settings.black, 1.0)
-    image = light * np.float32(ground)
+    image: np.ndarray = light * np.float32(ground)
     if settings.blur:
         image = cv2.GaussianBlur(image, (0, 0), settings.blur, borderType=cv2.BORDER_REPLICATE)
     for mark in marks:
