@@ -85,7 +85,7 @@ def markdown(report: dict[str, Any]) -> str:
         lines += grid(here, names, cell, PAPER if first else {})
         lines += ['', 'Filters (gH, gL), images that needed one, filters tried', '']
         lines += grid(here, searching, filters_found, PAPER_FILTERS if first else {})
-        lines += ['', 'Seconds an image', '']
+        lines += ['', 'Processor seconds an image, in one thread', '']
         lines += grid(here, names, seconds, {})
     return '\n'.join(lines)
 
@@ -108,5 +108,5 @@ def grid(
 
 
 def seconds(records: Sequence[dict[str, Any]]) -> str:
-    """Return the median time of one image, s."""
+    """Return the median processor time of one image, s."""
     return f'{median(record["seconds"] for record in records):.2f}'
