@@ -32,7 +32,7 @@ _LIGHT_REACH = 0.3  # standard deviation of the window in which the light is eve
 _LIGHT_PRIOR = 5.0  # px of trusted edges that say as much of the slope as the prior, none, does
 _SHARPENED = 0.03  # slope of all edges that makes those of single ones doubtful, 1/px
 _LEAST_SLOPE_ERROR = 0.002  # that counts as usual, 1/px
-_UNEVEN_LIGHT = 0.011  # usual error of slopes that doubles the variance of a centre, 1/px
+_UNEVEN_LIGHT = 0.011  # usual error of slopes from which the variance of a centre is twice, 1/px
 _PRIOR_SCALE = 0.003  # standard deviation of the printed proportions of band and dot
 _PRIOR_PERSPECTIVE = 0.02  # of the projective part, in 1 a dot radius
 _PRIOR_SHIFT = 1.0  # of the shift of edges towards the dark side, px
@@ -164,7 +164,7 @@ def _solve(
     covariance = _covariance(parts, used, edges.spacing, normal.shape[1])
     # Where slopes differ that much from their neighbours, light is no slope within a profile.
     uneven = (used * light.errors**2).sum(axis=1) / np.maximum(used.sum(axis=1), 1e-9)
-    covariance *= (1 + uneven / _UNEVEN_LIGHT**2)[:, None, None]
+    covariance *= (1 + np.minimum(uneven / _UNEVEN_LIGHT**2, 1))[:, None, None]
     fit = Fit(frames, contrast, _median(bright, seen), share, scatter, covariance, blur)
     return changes, fit
 
