@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-import math
 import sys
-from collections.abc import Iterator
 from pathlib import Path, PurePath
 from typing import Any
 
@@ -14,6 +12,7 @@ import cv2
 import numpy as np
 
 from ahf_ros.evaluation import TrueTarget, Truth
+from ahf_ros.record import checked_integer, checked_number, targets_of
 from ahf_ros.target import Target
 
 SUFFIXES = ('.bmp', '.jpeg', '.jpg', '.png', '.tif', '.tiff')
@@ -109,10 +108,10 @@ def read_truth(path: str | Path) -> dict[str, tuple[TrueTarget, ...]]:
     for row in rows:
         where = f'{path}, line {rows.line_num}'
         target = TrueTarget(
-            _integer(row['id'], f'{where}: id'),
-            _number(row['x'], f'{where}: x'),
-            _number(row['y'], f'{where}: y'),
-            _integer(row.get('confirmed', 1), f'{where}: confirmed') != 0,
+            checked_integer(row['id'], f'{where}: id'),
+            checked_number(row['x'], f'{where}: x'),
+            checked_number(row['y'], f'{where}: y'),
+            checked_integer(row.get('confirmed', 1), f'{where}: confirmed') != 0,
         )
         name = _base_name(row['image'], where)
         if images.setdefault(name, row['image']) != row['image']:
@@ -178,12 +177,11 @@ def read_results(path: str | Path) -> dict[str, tuple[Target, ...]]:
             record = json.loads(line)
         except json.JSONDecodeError as error:
             raise ValueError(f'{where} is not JSON: {error.msg}') from error
-        if not isinstance(record, dict) or not isinstance(record.get('targets'), list):
-            raise ValueError(f'{where} is not an object with an image and a list of targets')
+        targets = tuple(targets_of(record, where))
         name = _base_name(record.get('image'), where)
         if name in results:
             raise ValueError(f'{where}: {name} has appeared before, accepted is one line an image')
-        results[name] = tuple(_targets(record['targets'], where))
+        results[name] = targets
     return results
 
 
@@ -194,44 +192,10 @@ def _text(path: str | Path) -> str:
         raise ValueError(f'{path} is not in UTF-8, accepted is a text') from error
 
 
-def _targets(records: list[Any], where: str) -> Iterator[Target]:
-    for record in records:
-        if not isinstance(record, dict):
-            raise ValueError(f'{where}: target is {record!r}, accepted is an object')
-        yield Target(
-            id=_integer(record.get('id'), f'{where}: id'),
-            code=_integer(record.get('code', 0), f'{where}: code'),
-            x=_number(record.get('x'), f'{where}: x'),
-            y=_number(record.get('y'), f'{where}: y'),
-            semi_major=_number(record.get('semi_major', 0), f'{where}: semi_major'),
-            semi_minor=_number(record.get('semi_minor', 0), f'{where}: semi_minor'),
-        )
-
-
 def _base_name(image: Any, where: str) -> str:
     if not isinstance(image, str) or not PurePath(image).name:
         raise ValueError(f'{where}: image is {image!r}, accepted is the name of a file')
     return PurePath(image).name
-
-
-def _integer(value: Any, name: str) -> int:
-    try:
-        number = int(value)
-    except (OverflowError, TypeError, ValueError) as error:
-        raise ValueError(f'{name} is {value!r}, accepted is an integer') from error
-    if isinstance(value, float) and number != value:
-        raise ValueError(f'{name} is {value!r}, accepted is an integer')
-    return number
-
-
-def _number(value: Any, name: str) -> float:
-    try:
-        number = float(value)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f'{name} is {value!r}, accepted is a number') from error
-    if not math.isfinite(number):
-        raise ValueError(f'{name} is {value!r}, accepted is a finite number')
-    return number
 
 
 def _read(path: Path) -> bytes:

@@ -7,8 +7,7 @@ is of one kind or the other. The panel is a set of photographs and is shown wher
     python benchmarks/identification.py [--detector ring] [--ahf] [--quick] [--lights stripe ...]
     python benchmarks/identification.py --command 'my_detector --family {family} {image}'
 
-A command gets the path of an image and prints what `ahf identify --json` does, of which it needs
-no more than "image" and "targets" with "id", "x" and "y"; with "elapsed_s" its time is that.
+A command is used as the detector `command` does; its time includes its start.
 """
 
 from __future__ import annotations
@@ -16,10 +15,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import shlex
-import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -36,8 +32,9 @@ from rich.progress import track
 from ahf_ros.adaptive import AdaptiveSettings, identify
 from ahf_ros.codes.ring import FAMILY_NAMES
 from ahf_ros.detectors import DETECTOR_NAMES, DetectorSettings, create
+from ahf_ros.detectors.detector import ProgramSettings
 from ahf_ros.evaluation import RIGHT, Score, TrueTarget, judge, score, total
-from ahf_ros.files import read_image, read_results, read_truth, write_image
+from ahf_ros.files import read_image, read_truth
 from ahf_ros.synthetic.lights import LIGHT_NAMES, benchmark_lights
 from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import Target
@@ -163,22 +160,11 @@ def with_command(options: argparse.Namespace) -> Identify:
     """Return identification by another program."""
 
     def run(image: np.ndarray, family: str, expected: int) -> Seen:
-        with tempfile.TemporaryDirectory() as folder:
-            path, results = Path(folder, 'image.png'), Path(folder, 'results.jsonl')
-            write_image(path, image)
-            values = {'image': str(path), 'family': family, 'expected': str(expected)}
-            words = shlex.split(options.command)
-            if '{image}' not in options.command:
-                words.append('{image}')
-            command = [word.format(**values) for word in words]
-            started = time.perf_counter()
-            done = subprocess.run(
-                command, stdout=subprocess.PIPE, text=True, timeout=PATIENCE, check=True
-            )
-            elapsed = time.perf_counter() - started
-            results.write_text(done.stdout)
-            targets = read_results(results).get(path.name, ())
-        return targets, float(json.loads(done.stdout).get('elapsed_s', elapsed))
+        command = options.command.replace('{family}', family).replace('{expected}', str(expected))
+        program = ProgramSettings(command=command, command_timeout=PATIENCE)
+        detector = create('command', DetectorSettings(program=program))
+        started = time.perf_counter()
+        return detector(image), time.perf_counter() - started
 
     return run
 

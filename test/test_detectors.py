@@ -2,14 +2,26 @@
 
 from __future__ import annotations
 
+import runpy
+from pathlib import Path
+
+import cv2
+import numpy as np
 import pytest
 
-from ahf_ros.detectors import DETECTOR, DETECTOR_NAMES, DetectorSettings, create
+from ahf_ros import detectors
+from ahf_ros.adaptive import identify
+from ahf_ros.detectors import DETECTOR, DETECTOR_NAMES, GROUP, DetectorSettings, create
+from ahf_ros.detectors.detector import ProgramSettings
+
+EXAMPLE = Path(__file__).parents[1] / 'docs' / 'examples' / 'my_detector.py'
 
 
 @pytest.mark.parametrize('name', DETECTOR_NAMES)
 def test_every_detector_is_called_as_it_is_registered(name):
-    assert create(name).name == name
+    made = create(name, DetectorSettings(program=ProgramSettings(command='program')))
+    assert made.name == name
+    assert made.family
 
 
 def test_the_default_is_registered():
@@ -39,3 +51,32 @@ def test_settings_reach_the_detector():
 def test_settings_that_make_no_sense_are_refused(change, message):
     with pytest.raises(ValueError, match=message):
         DetectorSettings(**change)
+
+
+def added(tmp_path, monkeypatch, module: str, body: str):
+    """Return the registry of a process in which another package has added a detector."""
+    (tmp_path / f'{module}.py').write_text(body)
+    told = tmp_path / f'{module}-1.0.dist-info'
+    told.mkdir()
+    (told / 'METADATA').write_text(f'Metadata-Version: 2.1\nName: {module}\nVersion: 1.0\n')
+    (told / 'entry_points.txt').write_text(f'[{GROUP}]\nmine = {module}:MyDetector\n')
+    monkeypatch.syspath_prepend(str(tmp_path))
+    return runpy.run_path(detectors.__file__)
+
+
+def test_a_detector_of_another_package(tmp_path, monkeypatch):
+    registry = added(tmp_path, monkeypatch, 'package_with_detector', EXAMPLE.read_text())
+    assert registry['DETECTOR_NAMES'] == (*DETECTOR_NAMES, 'mine')
+    detector = registry['create']('mine', DetectorSettings(min_radius=5.0))
+    image = np.full((100, 120), 200, np.uint8)
+    cv2.circle(image, (40, 50), 8, 20, -1)
+    (target,) = detector(image)
+    assert (target.x, target.y) == pytest.approx((40, 50), abs=0.1)
+    assert identify(image, detector, expected=1).count == 1
+
+
+def test_a_detector_of_another_package_that_cannot_be_imported(tmp_path, monkeypatch):
+    registry = added(tmp_path, monkeypatch, 'package_that_is_broken', 'import nothing_like_this')
+    assert registry['create']('ring').name == 'ring'
+    with pytest.raises(ValueError, match="detector is 'mine', but package_that_is_broken:MyDet"):
+        registry['create']('mine')

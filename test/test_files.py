@@ -149,8 +149,8 @@ def test_results_from_standard_input(monkeypatch):
     ('line', 'message'),
     [
         ('{"image": ', 'line 1 is not JSON'),
-        ('[]', 'line 1 is not an object with an image and a list of targets'),
-        ('{"image": "a", "targets": {}}', 'line 1 is not an object with an image and a list'),
+        ('[]', 'line 1 is not an object with a list of targets'),
+        ('{"image": "a", "targets": {}}', 'line 1 is not an object with a list of targets'),
         ('{"targets": []}', 'line 1: image is None, accepted is the name of a file'),
         ('{"image": "a", "targets": [3]}', 'line 1: target is 3, accepted is an object'),
         ('{"image": "a", "targets": [{"id": 1, "x": 2}]}', 'line 1: y is None'),

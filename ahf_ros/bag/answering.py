@@ -77,13 +77,13 @@ class Answering:
         detection: DetectorSettings | None = None,
         adaptive: AdaptiveSettings | None = None,
     ) -> None:
-        detection = detection or DetectorSettings()
+        made = create(detector, detection)
         self._source = source
         self._topics = topics
         self._expected = expected
-        self._family = detection.family
+        self._family = made.family
         self._identifiers = {
-            topic: AdaptiveIdentifier(create(detector, detection), adaptive) for topic in topics
+            topic: AdaptiveIdentifier(made, adaptive) for topic in topics
         }
         self._store = typestore()
         self._types = message_types(self._store)

@@ -34,9 +34,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     options = _parser().parse_args(arguments)
     try:
-        return COMMANDS[options.command].run(options)
+        return COMMANDS[options.subcommand].run(options)
     except ValueError as error:
-        print(f'ahf {options.command}: error: {error}', file=sys.stderr)
+        print(f'ahf {options.subcommand}: error: {error}', file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         return 130
@@ -51,7 +51,7 @@ def _parser() -> argparse.ArgumentParser:
         prog='ahf', description='Coded photogrammetric targets under difficult light.'
     )
     parser.add_argument('--version', action='version', version=_version())
-    commands = parser.add_subparsers(dest='command', metavar='COMMAND', required=True)
+    commands = parser.add_subparsers(dest='subcommand', metavar='COMMAND', required=True)
     for name, command in COMMANDS.items():
         told = command.DESCRIPTION
         command.add_arguments(commands.add_parser(name, description=told, help=told))

@@ -16,7 +16,7 @@ from rich.progress import Progress
 
 from ahf_ros.adaptive import AdaptiveSettings, identify
 from ahf_ros.cli.options import add_options, settings_from
-from ahf_ros.detectors import DETECTOR, DetectorSettings, create
+from ahf_ros.detectors import DETECTOR, Detector, DetectorSettings, create
 from ahf_ros.drawing import draw, summary
 from ahf_ros.files import read_image, write_image
 from ahf_ros.parameter import check_parameters, parameter
@@ -80,7 +80,7 @@ def run(options: argparse.Namespace) -> int:
             image = read_image(path)
             found = _named(path, image, detector, settings)
             if options.json:
-                print(json.dumps(record(path, image, found, settings)), flush=True)
+                print(json.dumps(record(path, image, found, detector)), flush=True)
             _tell(path, found, with_targets=not options.json)
             if overlays:
                 write_image(overlays[path], draw(image, found))
@@ -91,7 +91,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def record(
-    path: str, image: np.ndarray, found: Identification, settings: IdentifySettings
+    path: str, image: np.ndarray, found: Identification, detector: Detector
 ) -> dict[str, Any]:
     """Return what is printed of an image as JSON.
 
@@ -101,8 +101,8 @@ def record(
         The image, as it was named on the command line.
     image : ndarray, shape (height, width)
     found : Identification
-    settings : IdentifySettings
-        What led to it.
+    detector : Detector
+        That identified it.
     """
     height, width = image.shape
     used = asdict(found.filter)
@@ -111,8 +111,8 @@ def record(
         'image': path,
         'width': width,
         'height': height,
-        'family': settings.target.family,
-        'detector': settings.detector,
+        'family': detector.family,
+        'detector': detector.name,
         'expected': found.expected,
         'targets': [asdict(target) for target in found.targets],
         'filter': used,
@@ -121,7 +121,7 @@ def record(
 
 
 def _named(
-    path: str, image: np.ndarray, detector: Any, settings: IdentifySettings
+    path: str, image: np.ndarray, detector: Detector, settings: IdentifySettings
 ) -> Identification:
     try:
         return identify(image, detector, settings.expected, settings.adaptive)

@@ -1,26 +1,41 @@
 """Detectors, and the registry that makes one from its name.
 
-A detector is one file here, with a class made from `DetectorSettings`, and one line below.
+A detector is one file here, with a class made from `DetectorSettings`, and one line below. Other
+packages add theirs by entry points of the group `ahf_ros.detectors`: the name of a detector, and a
+callable that makes it from `DetectorSettings`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib.metadata import EntryPoint, entry_points
 
+from ahf_ros.detectors.command import CommandDetector
 from ahf_ros.detectors.detector import Detector, DetectorSettings
 from ahf_ros.detectors.ring import RingDetector
+from ahf_ros.detectors.square import AprilTagDetector, ArucoDetector
 from ahf_ros.detectors.traditional import TraditionalDetector
 from ahf_ros.parameter import Parameter
 
-__all__ = ['DETECTOR', 'DETECTOR_NAMES', 'Detector', 'DetectorSettings', 'create']
+__all__ = ['DETECTOR', 'DETECTOR_NAMES', 'GROUP', 'Detector', 'DetectorSettings', 'create']
+
+GROUP = 'ahf_ros.detectors'
+"""Group of the entry points by which other packages add detectors."""
 
 _DETECTORS: dict[str, Callable[[DetectorSettings], Detector]] = {
     'ring': RingDetector,
     'traditional': TraditionalDetector,
+    'aruco': ArucoDetector,
+    'apriltag': AprilTagDetector,
+    'command': CommandDetector,
 }
 
-DETECTOR_NAMES = tuple(_DETECTORS)
-"""The accepted names of detectors."""
+_ADDED: dict[str, EntryPoint] = {
+    point.name: point for point in entry_points(group=GROUP) if point.name not in _DETECTORS
+}
+
+DETECTOR_NAMES = (*_DETECTORS, *sorted(_ADDED))
+"""The accepted names of detectors, those of this package first."""
 
 DETECTOR = Parameter('detector', 'ring', 'How targets are identified.', choices=DETECTOR_NAMES)
 """The choice of a detector as a parameter, for the node and the command line."""
@@ -39,7 +54,20 @@ def create(name: str, settings: DetectorSettings | None = None) -> Detector:
     Raises
     ------
     ValueError
-        If there is no such detector, naming those that there are.
+        If there is no such detector, naming those that there are; if that of another package
+        cannot be loaded; or if the detector does not accept the settings.
     """
     DETECTOR.check(name)
-    return _DETECTORS[name](DetectorSettings() if settings is None else settings)
+    make = _DETECTORS.get(name) or _loaded(_ADDED[name])
+    return make(DetectorSettings() if settings is None else settings)
+
+
+def _loaded(point: EntryPoint) -> Callable[[DetectorSettings], Detector]:
+    try:
+        made: Callable[[DetectorSettings], Detector] = point.load()
+    except Exception as error:  # whatever the other package does when it is imported
+        raise ValueError(
+            f'detector is {point.name!r}, but {point.value} cannot be loaded: '
+            f'{type(error).__name__}: {error}'
+        ) from error
+    return made

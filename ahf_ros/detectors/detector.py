@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
 
 from ahf_ros.codes.ring import FAMILY_NAMES
+from ahf_ros.codes.square import APRILTAG_NAMES, ARUCO_NAMES
 from ahf_ros.parameter import check_parameters, parameter
 from ahf_ros.target import Target
 
@@ -32,6 +33,11 @@ class Detector(Protocol):
         """Name in the registry, and in results."""
         ...
 
+    @property
+    def family(self) -> str:
+        """Family of the targets that it identifies, in results."""
+        ...
+
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image.
 
@@ -54,6 +60,52 @@ class Detector(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
+class SquareSettings:
+    """Which square markers the detectors `aruco` and `apriltag` look for.
+
+    Attributes
+    ----------
+    aruco_dictionary, apriltag_dictionary : str
+        Names of `ahf_ros.codes.square`.
+    """
+
+    aruco_dictionary: str = parameter(
+        '4x4_50', 'Dictionary of the detector aruco.', choices=ARUCO_NAMES
+    )
+    apriltag_dictionary: str = parameter(
+        '36h11', 'Dictionary of the detector apriltag.', choices=APRILTAG_NAMES
+    )
+
+    def __post_init__(self) -> None:
+        """Refuse values that are not accepted."""
+        check_parameters(self)
+
+
+@dataclass(frozen=True, slots=True)
+class ProgramSettings:
+    """Which program the detector `command` runs.
+
+    Attributes
+    ----------
+    command : str
+        Program and arguments, as for a shell, which is not used.
+    command_timeout : float
+        Time that it has for an image, s.
+    """
+
+    command: str = parameter(
+        '', 'Program of the detector command, with arguments; {image} is the path of a PNG file.'
+    )
+    command_timeout: float = parameter(
+        60.0, 'Longest time of the command for one image, s.', minimum=0.01, maximum=86400.0
+    )
+
+    def __post_init__(self) -> None:
+        """Refuse values that are not accepted."""
+        check_parameters(self)
+
+
+@dataclass(frozen=True, slots=True)
 class DetectorSettings:
     """What the targets in the image look like.
 
@@ -67,6 +119,10 @@ class DetectorSettings:
         Bounds of the semi-major axis of the dot, px.
     report_undecoded : bool
         Whether targets whose code word is not certain are reported, with the ID `UNDECODED`.
+    square : SquareSettings
+        Of detectors of square markers.
+    program : ProgramSettings
+        Of the detector that is another program.
     """
 
     family: str = parameter('metashape12', 'Family of the coded targets.', choices=FAMILY_NAMES)
@@ -78,6 +134,8 @@ class DetectorSettings:
     report_undecoded: bool = parameter(
         False, 'Whether to report targets whose code word is not certain, with the ID -1.'
     )
+    square: SquareSettings = field(default_factory=SquareSettings)
+    program: ProgramSettings = field(default_factory=ProgramSettings)
 
     @property
     def signs(self) -> tuple[int, ...]:

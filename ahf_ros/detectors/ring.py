@@ -42,6 +42,11 @@ class RingDetector:
     name: ClassVar[str] = 'ring'
     settings: DetectorSettings = field(default_factory=DetectorSettings)
 
+    @property
+    def family(self) -> str:
+        """Family of the codes."""
+        return self.settings.family
+
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image; see `Detector`."""
         return _reported(self.hypotheses(image), self.settings, family(self.settings.family))

@@ -90,6 +90,11 @@ class TraditionalDetector:
     """
 
     settings: DetectorSettings = field(default_factory=DetectorSettings)
+
+    @property
+    def family(self) -> str:
+        """Family of the codes."""
+        return self.settings.family
     name: str = field(default='traditional', init=False)
 
     def __call__(self, image: np.ndarray) -> list[Target]:

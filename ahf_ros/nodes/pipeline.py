@@ -76,7 +76,7 @@ class Pipeline:
         image = decode_image(message)
         identification = self._identifier.identify(image, expected)
         sent = coded_target_array(
-            identification, self.settings.target.family, image.shape, message.header
+            identification, self._detector.family, image.shape, message.header
         )
         return Answer(image, identification, sent)
 

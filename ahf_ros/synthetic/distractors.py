@@ -8,7 +8,7 @@ import string
 import cv2
 import numpy as np
 
-from ahf_ros.synthetic.prints import Cover
+from ahf_ros.synthetic.prints import Cover, stamp_cover
 
 _SIDE = 256  # px of a stamp
 _FINE = 3  # fractional bits of drawing coordinates
@@ -27,23 +27,7 @@ def distractor_cover(generator: np.random.Generator) -> tuple[Cover, float]:
     stamp = np.zeros((_SIDE, _SIDE), np.uint8)
     draw(stamp, generator)
     turned = generator.uniform(0, 2 * math.pi)
-    return _stamp_cover(stamp, turned), radius * generator.uniform(0.6, 1.3)
-
-
-def _stamp_cover(stamp: np.ndarray, turn: float) -> Cover:
-    """Return the ink of a stamp that fills the square round the unit circle, turned."""
-    cosine, sine = np.float32(math.cos(turn)), np.float32(math.sin(turn))
-    half = np.float32(_SIDE / 2)
-    ink = stamp.astype(np.float32) / np.float32(255)
-
-    def cover(x: np.ndarray, y: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
-        sample = float(np.sqrt(abs(np.linalg.det(jacobian)))) * float(half)
-        smooth = cv2.GaussianBlur(ink, (0, 0), max(sample / 2, 0.5))
-        columns = (x * cosine + y * sine) * half + (half - np.float32(0.5))
-        rows = (x * sine - y * cosine) * half + (half - np.float32(0.5))
-        return cv2.remap(smooth, columns, rows, cv2.INTER_LINEAR)
-
-    return cover
+    return stamp_cover(stamp, 1.0, turned), radius * generator.uniform(0.6, 1.3)
 
 
 def _fixed(points: np.ndarray) -> np.ndarray:

@@ -10,10 +10,12 @@ import cv2
 import numpy as np
 
 from ahf_ros.codes.ring import Family, sectors
+from ahf_ros.codes.square import marker
 from ahf_ros.synthetic.camera import Camera
 
 _SUPERSAMPLING = 3  # samples a pixel and axis
 _EDGE = 2.0  # samples that an edge is spread over, which takes off the blur that follows
+_CELL = 32  # px of the picture of a square marker
 _BLOCK_PIXELS = 1 << 18  # supersampled at a time
 
 Cover = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
@@ -79,6 +81,53 @@ def ring_cover(family: Family, word: int, turn: float, pinhole: float) -> Cover:
         ring *= _sector_cover(sectors(word, family.bits), np.arctan2(y, x) - turn, around)
         inked[band] += ring
         return inked
+
+    return cover
+
+
+def square_cover(name: str, number: int, half_side: float, turn: float) -> Cover:
+    """Return the ink of a square marker.
+
+    Parameters
+    ----------
+    name : str
+        Dictionary, one of `ahf_ros.codes.square.SQUARE_NAMES`.
+    number : int
+        ID of the marker.
+    half_side : float
+        Half of its side, in radii of the mark.
+    turn : float
+        Direction that its upper side is turned by, rad.
+    """
+    ink = 255 - marker(name, number, _CELL)
+    side = len(ink)
+    ink = np.pad(ink, _CELL)
+    return stamp_cover(ink, half_side * len(ink) / side, turn)
+
+
+def stamp_cover(stamp: np.ndarray, half_side: float, turn: float) -> Cover:
+    """Return the ink of a picture.
+
+    Parameters
+    ----------
+    stamp : ndarray of uint8, shape (side, side)
+        255 where there is ink.
+    half_side : float
+        Half of its side, in radii of the mark.
+    turn : float
+        Direction that its upper side is turned by, rad.
+    """
+    cosine, sine = np.float32(math.cos(turn)), np.float32(math.sin(turn))
+    half = np.float32(len(stamp) / 2)
+    scale = half / np.float32(half_side)
+    ink = stamp.astype(np.float32) / np.float32(255)
+
+    def cover(x: np.ndarray, y: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
+        sample = float(np.sqrt(abs(np.linalg.det(jacobian)))) * float(scale)
+        smooth = cv2.GaussianBlur(ink, (0, 0), max(sample / 2, 0.5))
+        columns = (x * cosine + y * sine) * scale + (half - np.float32(0.5))
+        rows = (x * sine - y * cosine) * scale + (half - np.float32(0.5))
+        return cv2.remap(smooth, columns, rows, cv2.INTER_LINEAR)
 
     return cover
 

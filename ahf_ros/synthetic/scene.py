@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
 from ahf_ros.codes.ring import FAMILY_NAMES, family
+from ahf_ros.codes.square import SQUARE_NAMES, dictionary
 from ahf_ros.parameter import check_parameters, parameter
 from ahf_ros.synthetic.camera import Camera, Sensor, tilted_camera
 from ahf_ros.synthetic.distractors import distractor_cover
@@ -21,13 +23,14 @@ from ahf_ros.synthetic.layout import (
 )
 from ahf_ros.synthetic.lighting import paper_texture, white_light
 from ahf_ros.synthetic.lights import LIGHT_NAMES, light_pattern
-from ahf_ros.synthetic.prints import Cover, Mark, print_mark, ring_cover
+from ahf_ros.synthetic.prints import Cover, Mark, print_mark, ring_cover, square_cover
 from ahf_ros.synthetic.projector import rig_projector
 from ahf_ros.target import Target
 
 _PROJECTOR_PIXELS = 6.4  # in the radius of a dot
 _PIXEL_DEVIATION = 12**-0.5  # of a place in a pixel, px
 _STRIP = 128  # rows exposed at a time
+_HALF_SIDE = 2.4  # of a square marker, in radii of the dot of a ring target as large
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +40,9 @@ class SceneSettings:
     width: int = parameter(3984, 'Width of the image, px.', minimum=16, maximum=20000)
     height: int = parameter(2656, 'Height of the image, px.', minimum=16, maximum=20000)
     targets: int = parameter(54, 'Number of coded targets in the image.', minimum=0)
-    family: str = parameter('metashape12', 'Family of the codes.', choices=FAMILY_NAMES)
+    family: str = parameter(
+        'metashape12', 'Family of the codes.', choices=(*FAMILY_NAMES, *SQUARE_NAMES)
+    )
     polarity: str = parameter(
         'dark', 'Dark targets on white, or bright ones on black.', choices=('dark', 'bright')
     )
@@ -210,27 +215,61 @@ def _coded_targets(
     The prints are larger where the wall is further away, so that every dot is about
     `dot_radius` in the image. Codes repeat only where there are more targets than codes.
     """
-    table = family(settings.family)
+    design = _square_design if settings.family in SQUARE_NAMES else _ring_design
+    every, printed = design(settings)
     count = settings.targets
     semi_major = settings.dot_radius * (
         1 + settings.radius_spread * generator.uniform(-1, 1, count)
     )
     turns = generator.uniform(0, 2 * math.pi, count)
-    rounds = -(-count // table.words.size)
-    shuffled = [generator.permutation(table.words.size) + 1 for _ in range(rounds)]
+    rounds = -(-count // len(every))
+    shuffled = [generator.permutation(every) for _ in range(rounds)]
     numbers = np.concatenate([np.empty(0, int), *shuffled])[:count].tolist()
     reach = quiet_radius(semi_major, float(camera.intrinsics[0, 0]))
     places = grid_places(camera, reach, generator)
 
     marks, targets = [], []
     for number, pixel, size, turn in zip(numbers, places.centres, semi_major, turns, strict=True):
+        design_of = printed(number, turn)
+        mark = _mark(camera, pixel, size, design_of.reach, design_of.cover)
+        x, y = camera.project(mark.centre[None])[0].tolist()
+        ellipse = camera.circle(mark.centre, design_of.radius * mark.radius)
+        marks.append(mark)
+        targets.append(Target(number, design_of.code, x, y, *ellipse))
+    return marks, targets, places
+
+
+@dataclass(frozen=True, slots=True)
+class _Design:
+    """A target as it is printed, in units of the radius of a dot."""
+
+    code: int
+    cover: Cover
+    reach: float  # of the ink
+    radius: float  # of the circle that is reported as its ellipse
+
+
+_Designs = tuple[np.ndarray, Callable[[int, float], _Design]]
+"""The IDs that there are, and what is printed of one that is turned by an angle, rad."""
+
+
+def _ring_design(settings: SceneSettings) -> _Designs:
+    table = family(settings.family)
+
+    def printed(number: int, turn: float) -> _Design:
         word = table.word(number)
         cover = ring_cover(table, word, turn, settings.pinhole)
-        mark = _mark(camera, pixel, size, table.band_outer, cover)
-        x, y = camera.project(mark.centre[None])[0].tolist()
-        marks.append(mark)
-        targets.append(Target(number, word, x, y, *camera.circle(mark.centre, mark.radius)))
-    return marks, targets, places
+        return _Design(word, cover, table.band_outer, 1.0)
+
+    return np.arange(1, table.words.size + 1), printed
+
+
+def _square_design(settings: SceneSettings) -> _Designs:
+    def printed(number: int, turn: float) -> _Design:
+        cover = square_cover(settings.family, number, _HALF_SIDE, turn)
+        return _Design(number, cover, _HALF_SIDE * 2**0.5, _HALF_SIDE)
+
+    return np.arange(len(dictionary(settings.family).bytesList)), printed
 
 
 def _distractors(

@@ -1,0 +1,84 @@
+"""Square markers: the ArUco and AprilTag dictionaries that OpenCV holds."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import cv2
+
+APRILTAG_NAMES = ('16h5', '25h9', '36h10', '36h11')
+"""Dictionaries of AprilTag."""
+
+ARUCO_NAMES = (
+    *(f'{side}x{side}_{count}' for side in (4, 5, 6, 7) for count in (50, 100, 250, 1000)),
+    'original',
+)
+"""Dictionaries of ArUco: cells a side, and number of markers."""
+
+SQUARE_NAMES = (
+    *(f'aruco_{name}' for name in ARUCO_NAMES),
+    *(f'apriltag_{name}' for name in APRILTAG_NAMES),
+)
+"""Dictionaries by their names as families of targets."""
+
+
+def dictionary(name: str) -> Any:
+    """Return a dictionary of OpenCV.
+
+    Parameters
+    ----------
+    name : str
+        One of `SQUARE_NAMES`.
+
+    Returns
+    -------
+    cv2.aruco.Dictionary
+
+    Raises
+    ------
+    ValueError
+        If there is no such dictionary, or this OpenCV has none at all.
+    """
+    if name not in SQUARE_NAMES:
+        raise ValueError(f'dictionary is {name!r}, accepted is one of {", ".join(SQUARE_NAMES)}')
+    if not hasattr(cv2, 'aruco') or not hasattr(cv2.aruco, 'ArucoDetector'):
+        raise ValueError(
+            f'dictionary is {name!r}, accepted where OpenCV has square markers: '
+            f'opencv-python-headless of at least 4.7, this is {cv2.__version__}'
+        )
+    kind, _, wanted = name.partition('_')
+    member = {'aruco': 'DICT_', 'apriltag': 'DICT_APRILTAG_'}[kind] + wanted
+    if name == 'aruco_original':
+        member = 'DICT_ARUCO_ORIGINAL'
+    if kind == 'aruco':
+        member = member.upper()
+    return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, member))
+
+
+def marker(name: str, number: int, cell: int) -> Any:
+    """Return the print of a marker, with its black border and without a margin.
+
+    Parameters
+    ----------
+    name : str
+        One of `SQUARE_NAMES`.
+    number : int
+        ID of the marker.
+    cell : int
+        Side of a cell, px.
+
+    Returns
+    -------
+    ndarray of uint8, shape (side, side)
+        0 where there is ink.
+
+    Raises
+    ------
+    ValueError
+        If there is no such marker.
+    """
+    table = dictionary(name)
+    count = table.bytesList.shape[0]
+    if not 0 <= number < count:
+        raise ValueError(f'number is {number}, accepted is an integer from 0 to {count - 1}')
+    return cv2.aruco.generateImageMarker(table, number, cell * (table.markerSize + 2))

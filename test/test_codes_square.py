@@ -1,0 +1,41 @@
+"""The dictionaries of square markers."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from ahf_ros.codes.square import SQUARE_NAMES, dictionary, marker
+
+
+@pytest.mark.parametrize('name', SQUARE_NAMES)
+def test_every_dictionary_is_there_and_as_large_as_its_name_says(name):
+    table = dictionary(name)
+    kind, _, wanted = name.partition('_')
+    if kind == 'aruco' and wanted != 'original':
+        side, _, count = wanted.partition('_')
+        assert (table.markerSize, len(table.bytesList)) == (int(side[0]), int(count))
+    if kind == 'apriltag':
+        assert table.markerSize**2 == int(wanted.partition('h')[0])
+
+
+def test_a_marker_has_a_black_border_and_its_own_bits():
+    prints = [marker('aruco_4x4_50', number, 5) for number in range(50)]
+    assert all(of.shape == (30, 30) for of in prints)
+    for of in prints:
+        assert not of[:5].any() and not of[-5:].any() and not of[:, :5].any()
+    assert len(np.unique([of.ravel() for of in prints], axis=0)) == 50
+
+
+def test_what_is_not_there_is_named():
+    with pytest.raises(ValueError, match=r"dictionary is 'aruco_9x9', accepted is one of aruco_4"):
+        dictionary('aruco_9x9')
+    with pytest.raises(ValueError, match='number is 50, accepted is an integer from 0 to 49'):
+        marker('aruco_4x4_50', 50, 5)
+
+
+def test_an_opencv_without_markers_is_named(monkeypatch):
+    monkeypatch.delattr(cv2.aruco, 'ArucoDetector')
+    with pytest.raises(ValueError, match=r'at least 4\.7, this is'):
+        dictionary('aruco_4x4_50')

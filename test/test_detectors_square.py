@@ -1,0 +1,76 @@
+"""Identification of square markers on rendered scenes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ahf_ros.adaptive import AdaptiveSettings, identify
+from ahf_ros.detectors import DetectorSettings, create
+from ahf_ros.detectors.detector import SquareSettings
+from ahf_ros.evaluation import TrueTarget, score
+from ahf_ros.genetic import GeneticSettings
+from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
+
+SCENE = SceneSettings(
+    width=1000, height=750, targets=6, family='aruco_4x4_50', dot_radius=16.0, seed=3
+)
+
+
+def scored(rendering: Rendering, targets):
+    truth = [TrueTarget(target.id, target.x, target.y) for target in rendering.targets]
+    return score(truth, targets)
+
+
+@pytest.mark.parametrize(
+    ('detector', 'family', 'square'),
+    [
+        ('aruco', 'aruco_4x4_50', SquareSettings()),
+        ('aruco', 'aruco_6x6_250', SquareSettings(aruco_dictionary='6x6_250')),
+        ('apriltag', 'apriltag_36h11', SquareSettings()),
+        ('apriltag', 'apriltag_25h9', SquareSettings(apriltag_dictionary='25h9')),
+    ],
+)
+@pytest.mark.parametrize('tilt', [0.0, 45.0])
+def test_markers_and_their_physical_centres(detector, family, square, tilt):
+    rendering = render(replace(SCENE, family=family, tilt=tilt, targets=4))
+    made = create(detector, DetectorSettings(square=square))
+    assert (made.name, made.family) == (detector, family)
+    figures = scored(rendering, made(rendering.image))
+    assert (figures.right, figures.wrong, figures.false_positives) == (4, 0, 0)
+    assert figures.rmse[2] < 0.15
+
+
+def test_the_ellipse_is_inscribed_in_the_marker():
+    rendering = render(SCENE)
+    true = {target.id: target for target in rendering.targets}
+    for target in create('aruco')(rendering.image):
+        assert target.semi_major == pytest.approx(true[target.id].semi_major, rel=0.03)
+        assert target.semi_minor == pytest.approx(true[target.id].semi_minor, rel=0.03)
+
+
+def test_markers_of_another_dictionary_are_not_seen():
+    rendering = render(SCENE)
+    other = DetectorSettings(square=SquareSettings(aruco_dictionary='7x7_50'))
+    assert create('aruco', other)(rendering.image) == []
+
+
+def test_the_filter_finds_markers_that_stripes_hide():
+    rendering = render(replace(SCENE, light='stripe', ambient=0.12))
+    detector = create('aruco')
+    without = scored(rendering, detector(rendering.image))
+    settings = AdaptiveSettings(genetic=GeneticSettings(max_evaluations=40))
+    found = scored(rendering, identify(rendering.image, detector, 6, settings).targets)
+    assert found.right >= 2 * max(without.right, 1)
+    assert (found.wrong, found.false_positives) == (0, 0)
+
+
+def test_any_kind_of_image():
+    rendering = render(SCENE)
+    same = create('aruco')(rendering.image)
+    for image in (rendering.image.astype(np.uint16) * 16, rendering.image[:, ::-1][:, ::-1]):
+        assert [target.id for target in create('aruco')(image)] == [it.id for it in same]
+    with pytest.raises(ValueError, match='image has shape'):
+        create('aruco')(np.zeros((50, 50, 3), np.uint8))
