@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from rosbags import rosbag2
 
+from ahf_ros.bag import run
 from ahf_ros.bag.definitions import COMPRESSED_IMAGE, IMAGE, typestore
 from ahf_ros.cli import main
 
@@ -183,8 +184,6 @@ def test_killed_readable_and_finished_the_same(
 def test_a_kill_while_the_bag_is_assembled(
     recording: Path, answered: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from ahf_ros.bag import run
-
     def killed(*_: Any) -> None:
         raise KeyboardInterrupt
 
@@ -287,7 +286,7 @@ def test_bags_that_are_none_are_named_and_the_others_go_on(
     assert status(*bad, recording, tmp_path / 'made') == 1
     errors = capfd.readouterr().err
     for path in bad:
-        assert f'ahf bag: {path}: {path} ' in errors
+        assert f'ahf bag: {path} ' in errors
     assert 'notes has no images, accepted are topics of sensor_msgs/msg/Image' in errors
     assert len(bags.answers(tmp_path / 'made' / 'in')) == 6
 
@@ -306,6 +305,22 @@ def test_what_is_something_else_is_left_alone(
     assert status(recording, other) == 1
     assert f'{other} exists, accepted is a new name' in capfd.readouterr().err
     assert contents(other) == before
+
+
+def test_two_at_once_do_not_mix(
+    recording: Path, answered: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    with run.locked(answered):
+        assert status(recording, answered, *SEARCH, '--debug-images') == 1
+    assert f'{answered} is being written by another process' in capfd.readouterr().err
+
+
+def test_a_folder_that_cannot_be_written_is_named(
+    recording: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / 'file').touch()
+    assert status(recording, tmp_path / 'file' / 'out') == 1
+    assert f'{tmp_path / "file" / "out"} cannot be written: ' in capfd.readouterr().err
 
 
 def test_bags_of_one_name_are_refused(

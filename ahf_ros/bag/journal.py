@@ -22,9 +22,10 @@ from typing import Any, Final
 from urllib.parse import quote
 
 from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys.store import Typestore
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
+
+from ahf_ros.bag.definitions import typestore
 
 VERSION: Final = 9
 """Of the format of bags that are written."""
@@ -71,19 +72,40 @@ Answer = tuple[str, bytes]
 _Row = tuple[str, int, bytes]  # topic, time in ns, message
 
 
+def begin(folder: Path, topics: Mapping[str, str], told: str) -> None:
+    """Make a bag without messages, all at once.
+
+    Parameters
+    ----------
+    folder : Path
+        The bag, which does not exist.
+    topics : mapping of str to str
+        The topics of the answers and their types.
+    told : str
+        What the bag is made from, kept with it.
+    """
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    store = typestore()
+    with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f'.{folder.name}.') as made:
+        bag = Path(made) / 'bag'
+        with Writer(bag, version=VERSION, storage_plugin=StoragePlugin.SQLITE3) as writer:
+            writer.set_custom_data('ahf_ros', told)
+            for topic, kind in {**topics, PROGRESS: _STRING}.items():
+                writer.add_connection(topic, kind, typestore=store)
+        (bag / f'{bag.name}.db3').rename(bag / _EMPTY)
+        content = _metadata(bag)
+        content[_INFORMATION]['relative_file_paths'] = [_EMPTY]
+        _replace(bag / METADATA, content)
+        bag.rename(folder)
+
+
 class Journal:
     """The answers of a bag that is being made.
 
     Parameters
     ----------
     folder : Path
-        The bag: begun earlier, or new where it does not exist.
-    topics : mapping of str to str
-        The topics of the answers and their types.
-    store : Typestore
-        That defines the types.
-    told : str
-        What the bag is made from, kept with it.
+        The bag, made by `begin`.
 
     Attributes
     ----------
@@ -91,14 +113,9 @@ class Journal:
         Of all images so far, in their order.
     """
 
-    def __init__(
-        self, folder: Path, topics: Mapping[str, str], store: Typestore, told: str
-    ) -> None:
+    def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._topics = {**topics, PROGRESS: _STRING}
-        self._store = store
-        if not folder.exists():
-            self._create(told)
+        self._store = typestore()
         self._content = _metadata(folder)
         self._parts: list[str] = self._content[_INFORMATION]['relative_file_paths']
         self._remove_others()
@@ -132,23 +149,6 @@ class Journal:
                 continue
             yield next(frames), answers
             answers = []
-
-    def _create(self, told: str) -> None:
-        """Make the bag, with one part that has no messages, all at once."""
-        self._folder.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(
-            dir=self._folder.parent, prefix=f'.{self._folder.name}.'
-        ) as made:
-            bag = Path(made) / 'bag'
-            with Writer(bag, version=VERSION, storage_plugin=StoragePlugin.SQLITE3) as writer:
-                writer.set_custom_data('ahf_ros', told)
-                for topic, kind in self._topics.items():
-                    writer.add_connection(topic, kind, typestore=self._store)
-            (bag / f'{bag.name}.db3').rename(bag / _EMPTY)
-            content = _metadata(bag)
-            content[_INFORMATION]['relative_file_paths'] = [_EMPTY]
-            _replace(bag / METADATA, content)
-            bag.rename(self._folder)
 
     def _write_part(self, first: int, size: int, rows: Iterable[_Row]) -> str:
         """Write a file of the bag and return its name."""

@@ -7,24 +7,31 @@ the place of the journal. What is killed on the way goes on from there.
 
 from __future__ import annotations
 
+import fcntl
 import json
+import os
 import shutil
-from collections.abc import Callable
+import sqlite3
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
 
 from ahf_ros.adaptive import AdaptiveSettings
 from ahf_ros.bag.answering import Answering, AnswerTopics
 from ahf_ros.bag.copying import Copy
 from ahf_ros.bag.definitions import typestore
-from ahf_ros.bag.journal import METADATA, VERSION, Frame, Journal, custom_data, remove_parts
+from ahf_ros.bag.journal import METADATA, VERSION, Frame, Journal, begin, custom_data, remove_parts
 from ahf_ros.bag.source import Source
 from ahf_ros.detectors import DETECTOR, DetectorSettings
 
 STORAGES = {'mcap': StoragePlugin.MCAP, 'sqlite3': StoragePlugin.SQLITE3}
+
+WRITING_ERRORS = (OSError, sqlite3.Error, WriterError)
+"""What it means when a bag cannot be written: a full disk, a folder of somebody else."""
 
 Report = Callable[[int, int, str], None]
 """Gets the number of images that are done and that there are, 0 where unknown, and why the last
@@ -110,19 +117,40 @@ def answer_bag(task: BagTask, report: Report) -> Outcome:
     with Source(task.source) as source:
         topics = _answer_topics(task, source)
         told = _told(task, source, topics)
-        if task.target.exists():
+        if not task.target.exists():
+            types = {name: kind for to in topics.values() for name, kind in to.types.items()}
+            begin(task.target, types, json.dumps(told))
+        with locked(task.target):
             _check_target(task.target, told)
-            if done := custom_data(task.target).get('ahf_ros_outcome'):
-                _tidy(task.target)
-                return Outcome(**json.loads(done))
-        types = {name: kind for to in topics.values() for name, kind in to.types.items()}
-        journal = Journal(task.target, types, typestore(), json.dumps(told))
-        _answer_images(task, source, topics, journal, report)
-        refused = sum(bool(frame.reason) for frame in journal.frames)
-        outcome = Outcome(len(journal.frames), refused, source.cut)
-        _assemble(task, source, topics, journal, outcome)
-        _tidy(task.target)
+            done = custom_data(task.target).get('ahf_ros_outcome')
+            outcome = Outcome(**json.loads(done)) if done else _made(task, source, topics, report)
+            _tidy(task.target)
     return outcome
+
+
+def _made(
+    task: BagTask, source: Source, topics: dict[str, AnswerTopics], report: Report
+) -> Outcome:
+    """Make the bag from its journal."""
+    journal = Journal(task.target)
+    _answer_images(task, source, topics, journal, report)
+    refused = sum(bool(frame.reason) for frame in journal.frames)
+    outcome = Outcome(len(journal.frames), refused, source.cut)
+    _assemble(task, source, topics, journal, outcome)
+    return outcome
+
+
+@contextmanager
+def locked(target: Path) -> Iterator[None]:
+    """Keep other processes from a bag; whatever ends this one ends that, too."""
+    descriptor = os.open(target, os.O_RDONLY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield
+    except BlockingIOError as error:
+        raise ValueError(f'{target} is being written by another process') from error
+    finally:
+        os.close(descriptor)
 
 
 def _answer_topics(task: BagTask, source: Source) -> dict[str, AnswerTopics]:

@@ -96,7 +96,7 @@ def run(options: argparse.Namespace) -> int:
 
         for task, outcome in _outcomes(tasks, options.jobs, report):
             _tell(task, outcome)
-            failed |= isinstance(outcome, Exception) or bool(outcome.refused or outcome.cut)
+            failed |= isinstance(outcome, ValueError) or bool(outcome.refused or outcome.cut)
     return int(failed)
 
 
@@ -128,7 +128,7 @@ def _tasks(options: argparse.Namespace) -> list[BagTask]:
 
 def _outcomes(
     tasks: Sequence[BagTask], jobs: int, report: Any
-) -> Iterator[tuple[BagTask, Outcome | Exception]]:
+) -> Iterator[tuple[BagTask, Outcome | ValueError]]:
     """Yield what becomes of each bag, or why nothing does, as soon as it is known."""
     if min(jobs, len(tasks)) == 1:
         for number, task in enumerate(tasks):
@@ -148,27 +148,30 @@ def _outcomes(
             except queue.Empty:
                 ended = [future for future in running if future.done()]
             for future in ended:
-                yield running.pop(future), _result(future)
+                task = running.pop(future)
+                yield task, _result(task, future)
 
 
-def _attempt(task: BagTask, report: Any) -> Outcome | Exception:
-    from ahf_ros.bag.run import answer_bag
+def _attempt(task: BagTask, report: Any) -> Outcome | ValueError:
+    from ahf_ros.bag.run import WRITING_ERRORS, answer_bag
 
     try:
         return answer_bag(task, report)
-    except (ValueError, OSError) as error:
+    except ValueError as error:
         return error
+    except WRITING_ERRORS as error:
+        return ValueError(f'{task.target} cannot be written: {error}')
 
 
 def _put(reports: Any, *report: Any) -> None:
     reports.put(report)
 
 
-def _result(future: Future[Outcome | Exception]) -> Outcome | Exception:
+def _result(task: BagTask, future: Future[Outcome | ValueError]) -> Outcome | ValueError:
     try:
         return future.result()
-    except BrokenProcessPool as error:
-        return error
+    except BrokenProcessPool:
+        return ValueError(f'{task.source}: the process that was at it has died')
 
 
 def _progress() -> Progress:
@@ -185,10 +188,10 @@ def _progress() -> Progress:
     )
 
 
-def _tell(task: BagTask, outcome: Outcome | Exception) -> None:
+def _tell(task: BagTask, outcome: Outcome | ValueError) -> None:
     """Say to people what became of a bag."""
-    if isinstance(outcome, Exception):
-        print(f'ahf bag: {task.source}: {outcome}', file=sys.stderr)
+    if isinstance(outcome, ValueError):
+        print(f'ahf bag: {outcome}', file=sys.stderr)
         return
     refused = f', {outcome.refused} of them not accepted' if outcome.refused else ''
     print(f'{task.target}: {outcome.images} images answered{refused}', file=sys.stderr)
