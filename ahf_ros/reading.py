@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ahf_ros import decoding, evidence, frame, subpixel
@@ -11,8 +13,10 @@ from ahf_ros.hypotheses import Hypotheses
 REACH = 0.45
 """Distance from an expected edge to look for it, dot radii."""
 
+PASSES = ((5, 1), (10, 2))
+"""Over a band, each in a better frame: samples a sector, and rounds of the fit that follows."""
+
 _RAYS = 48  # about a dot
-_READINGS = ((5, 1), (10, 2))  # of a band: samples a sector, and rounds of the fit that follows
 _LEVELS = (0.75, 1.4)  # dot radii, where the levels of dot and gap are read
 _LEVEL_RAYS = 24
 _PRINTED = 0.25  # usual contrast of prints
@@ -21,7 +25,11 @@ _SMALL = 7.0  # radius of dots that such a shift spoils the reading of, px
 
 
 def read_dots(
-    gray: np.ndarray, fit: subpixel.Fit, signs: np.ndarray, code: Family
+    gray: np.ndarray,
+    fit: subpixel.Fit,
+    signs: np.ndarray,
+    code: Family,
+    passes: Sequence[tuple[int, int]] = PASSES,
 ) -> tuple[Hypotheses, np.ndarray]:
     """Read the bands about dots, and refine dot and band together.
 
@@ -34,6 +42,8 @@ def read_dots(
     signs : ndarray of int, shape (k,)
         1 for a dark target, -1 for a bright one.
     code : Family
+    passes : sequence of (int, int)
+        As `PASSES` has them; one is enough where frames are right to a tenth of a pixel.
 
     Returns
     -------
@@ -49,7 +59,7 @@ def read_dots(
     found = Hypotheses.unread(fit)
     read = np.arange(len(which))
     # A band that was read right makes the frame better, and a better frame the reading.
-    for samples, rounds in _READINGS:
+    for samples, rounds in passes:
         readings = decoding.read_bands(gray, frames, marks, code, samples)
         good = readings.plausible
         read, readings, marks = read[good], readings.chosen(good), marks.chosen(good)

@@ -14,10 +14,10 @@ import numpy as np
 from ahf_ros import decoding, frame, subpixel
 from ahf_ros.codes.ring import Family
 from ahf_ros.image import as_gray, check_image
-from ahf_ros.reading import REACH, read_dots
+from ahf_ros.reading import PASSES, REACH, read_dots
 from ahf_ros.target import UNDECODED, Target
 
-_RAYS = 48  # about a dot
+_FIRST_RAYS, _RAYS = 24, 48  # about a dot, for its sign and a first frame, and for its place
 _LEAST_SHARE = 0.5  # of the expected edges, for a fit to count
 _FARTHEST, _FARTHEST_SHARE = 1.0, 0.2  # that a centre is moved: px, or radii of its dot
 
@@ -57,21 +57,7 @@ def refine_centres(
     gray = as_gray(image).astype(np.float32, copy=False)
     columns = [(it.x, it.y, it.semi_major, it.semi_minor, it.angle) for it in targets]
     start = frame.affine_frames(*np.array(columns).T)
-    dots, dot_signs = _fitted_dots(gray, start, signs)
-    frames, covariance, share = dots.frames, dots.covariance, dots.share
-
-    decoded = np.array([target.id != UNDECODED for target in targets])
-    decoded = np.flatnonzero(decoded & (share >= _LEAST_SHARE))
-    found, of_decoded = read_dots(gray, dots.chosen(decoded), dot_signs[decoded], code)
-    codes, _ = decoding.canonical(found.words, code)
-    which = decoded[of_decoded]
-    agreed = (found.words > 0) & (codes == np.array([target.code for target in targets])[which])
-    agreed &= found.share >= _LEAST_SHARE
-    # Of two that agree on one target, the one with the larger margin is written last.
-    best = np.flatnonzero(agreed)[np.argsort(found.margin[agreed], kind='stable')]
-    frames[which[best]], share[which[best]] = found.frames[best], found.share[best]
-    covariance[which[best]] = found.covariance[best]
-
+    frames, covariance, share = _fitted(gray, start, targets, code, signs)
     axes = np.stack(frame.ellipse_axes(frames), axis=1)
     moved = np.hypot(*(frames[:, :2, 2] - start[:, :2, 2]).T)
     reach = np.maximum(_FARTHEST, _FARTHEST_SHARE * frame.ellipse_axes(start)[1])
@@ -84,17 +70,47 @@ def refine_centres(
     ]
 
 
+def _fitted(
+    gray: np.ndarray,
+    start: np.ndarray,
+    targets: Sequence[Target],
+    code: Family,
+    signs: Sequence[int],
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return frames, covariances and shares of edges, by dot and band where the band agrees."""
+    dots, dot_signs = _fitted_dots(gray, start, signs)
+    decoded = np.array([target.id != UNDECODED for target in targets])
+    decoded = np.flatnonzero(decoded & (dots.share >= _LEAST_SHARE))
+    found, of_decoded = read_dots(
+        gray, dots.chosen(decoded), dot_signs[decoded], code, passes=PASSES[-1:]
+    )
+    codes, _ = decoding.canonical(found.words, code)
+    which = decoded[of_decoded]
+    agreed = (found.words > 0) & (codes == np.array([target.code for target in targets])[which])
+    agreed &= found.share >= _LEAST_SHARE
+    # Of two that agree on one target, the one with the larger margin is written last.
+    best = np.flatnonzero(agreed)[np.argsort(found.margin[agreed], kind='stable')]
+    rest = np.setdiff1d(np.arange(len(targets)), which[best])
+    circles = subpixel.dot_circles(dot_signs[rest], _RAYS)
+    alone = subpixel.fit_circles(gray, start[rest], circles, reach=REACH, projective=False)
+    frames, covariance, share = dots.frames, dots.covariance, dots.share
+    for these, of in ((rest, alone), (which[best], found.chosen(best))):
+        frames[these], covariance[these], share[these] = of.frames, of.covariance, of.share
+    return frames, covariance, share
+
+
 def _fitted_dots(
     gray: np.ndarray, frames: np.ndarray, signs: Sequence[int]
 ) -> tuple[subpixel.Fit, np.ndarray]:
-    """Return the fits of dots, with the sign of each that its edge has."""
+    """Return first fits of dots, with the sign of each that its edge has."""
     fits = [
         subpixel.fit_circles(
             gray,
             frames,
-            subpixel.dot_circles(np.full(len(frames), sign), _RAYS),
+            subpixel.dot_circles(np.full(len(frames), sign), _FIRST_RAYS),
             reach=REACH,
             projective=False,
+            rounds=1,
         )
         for sign in signs
     ]
