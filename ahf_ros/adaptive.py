@@ -39,6 +39,9 @@ Refinement = Callable[[np.ndarray, Sequence[Target]], Sequence[Target]]
 """From the image as received and targets found in a filtered one to the same targets, with centres
 taken from the image as received."""
 
+Estimate = Callable[[np.ndarray], int]
+"""From the image as received to the number of coded targets that it seems to show."""
+
 
 @dataclass(frozen=True, slots=True)
 class AdaptiveSettings:
@@ -103,6 +106,7 @@ def identify(
     expected: int,
     settings: AdaptiveSettings | None = None,
     refine: Refinement | None = None,
+    estimate: Estimate | None = None,
 ) -> Identification:
     """Identify the targets of one image through the filter that suits the detector.
 
@@ -110,7 +114,7 @@ def identify(
     ----------
     image, expected
         As for `AdaptiveIdentifier.identify`.
-    detector, settings, refine
+    detector, settings, refine, estimate
         As for `AdaptiveIdentifier`.
 
     Returns
@@ -122,7 +126,7 @@ def identify(
     ValueError
         As `AdaptiveIdentifier.identify` does.
     """
-    return AdaptiveIdentifier(detector, settings, refine).identify(image, expected)
+    return AdaptiveIdentifier(detector, settings, refine, estimate).identify(image, expected)
 
 
 class AdaptiveIdentifier:
@@ -142,6 +146,11 @@ class AdaptiveIdentifier:
         method `refine` of the detector where None, if it has one. It is asked where the targets
         were found in another image: through a filter, or in the 8-bit version of an image with
         more bits.
+    estimate : callable, optional
+        From the image as received to N, asked where N is unknown. Not for every image: while the
+        filter that worked last, or none, goes on to show the n codes of the image before, the
+        light and the targets are taken to be the same, and so is N; no filter is searched for,
+        either. What it raises, `identify` raises.
     clock : callable, optional
         Time in s.
 
@@ -159,18 +168,22 @@ class AdaptiveIdentifier:
         detector: AnyDetector,
         settings: AdaptiveSettings | None = None,
         refine: Refinement | None = None,
+        estimate: Estimate | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.last_search: SearchResult | None = None
         self._detector = detector
         self._settings = settings or AdaptiveSettings()
         self._refine = refine or getattr(detector, 'refine', None)
+        self._estimate = estimate
         self._clock = clock
         self.remembered: Values | None = None
+        self._settled: tuple[int, int] | None = None  # n and N of the last image, N estimated
 
     def reset(self) -> None:
         """Forget what worked for earlier images."""
         self.remembered = None
+        self._settled = None
 
     def identify(self, image: np.ndarray, expected: int) -> Identification:
         """Identify the targets of one image; call it from one thread at a time.
@@ -180,7 +193,9 @@ class AdaptiveIdentifier:
         image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
             The image as received.
         expected : int
-            N, the number of coded targets that it shows; 0 where unknown: no filter is tried then.
+            N, the number of coded targets that it shows; 0 where unknown: N is then estimated, or
+            no filter tried where nothing estimates it. Codes that the detector shows at once are
+            targets: no estimate is below their number.
 
         Returns
         -------
@@ -193,16 +208,22 @@ class AdaptiveIdentifier:
         ------
         ValueError
             If the image is not accepted, `expected` is not an integer of at least 0, or the
-            detector or the refinement returns anything but a list of targets at finite places.
+            detector or the refinement returns anything but a list of targets at finite places, or
+            the estimate is no integer of at least 0.
         """
         started = self._clock()
         check_image(image)
-        _check_expected(expected)
+        _check_count('expected', expected)
+        estimate = None if expected else self._estimate
         trials = _Trials(image, self._detector, expected, self._settings.filter)
         threads = self._settings.threads or os.cpu_count() or 1
         with ThreadPoolExecutor(threads) if threads > 1 else nullcontext() as executor:
-            chosen, evaluations = self._choose(trials, executor)
+            if estimate and self._unchanged(trials, estimate, executor):
+                chosen, evaluations = self.remembered, 1
+            else:
+                chosen, evaluations = self._choose(trials, executor)
         targets = trials.targets[chosen]
+        self._settled = (count_codes(targets), trials.expected) if estimate else None
         if self._refine and (chosen or image.dtype != np.uint8):
             targets = _checked(self._refine(image, targets), 'refine')
         state = FilterState(
@@ -213,7 +234,19 @@ class AdaptiveIdentifier:
         if chosen:
             state = replace(state, applied=True, **asdict(transfer(image.shape, *chosen)))
         ordered = tuple(sorted(targets, key=lambda target: target.id))
-        return Identification(ordered, expected, state)
+        return Identification(ordered, trials.expected, state, estimate is not None)
+
+    def _unchanged(self, trials: _Trials, estimate: Estimate, executor: Executor | None) -> bool:
+        """Return whether an image shows what the last one did; tell the trials what N is."""
+        self.last_search = None
+        shown = trials.count(self.remembered, executor)
+        if shown and self._settled and self._settled[0] == shown:
+            trials.expected = self._settled[1]
+            return True
+        estimated = estimate(trials.image)
+        _check_count('estimate', estimated)
+        trials.expected = max(int(estimated), shown)
+        return False
 
     def _choose(self, trials: _Trials, executor: Executor | None) -> tuple[Values | None, int]:
         """Return the best filter, None for the image as received, and the evaluations."""
@@ -221,7 +254,7 @@ class AdaptiveIdentifier:
         remembered = self.remembered
         searching = self._settings.ahf and trials.expected > 0
         if searching and remembered and trials.discrepancy(remembered, executor) == 0:
-            return remembered, 1
+            return remembered, len(trials.targets)
         unfiltered = trials.discrepancy(None, executor)
         if not searching or unfiltered == 0:
             self.remembered = None if searching else remembered
@@ -246,9 +279,9 @@ class _Trials:
     def __init__(
         self, image: np.ndarray, detector: AnyDetector, expected: int, settings: FilterSettings
     ) -> None:
+        self.image = image
         self.expected = expected
         self.targets: dict[Values | None, list[Target]] = {}
-        self._image = image
         self._detector = detector
         self._settings = settings
         self._lock = Lock()
@@ -256,17 +289,21 @@ class _Trials:
 
     def discrepancy(self, values: Values | None, executor: Executor | None = None) -> int:
         """Return |N - n| through a filter; None is the image as received."""
+        return abs(self.expected - self.count(values, executor))
+
+    def count(self, values: Values | None, executor: Executor | None = None) -> int:
+        """Return n through a filter."""
         if values not in self.targets:
             found = self._detector(self._shown(values, executor))
             self.targets[values] = _checked(found, 'detector')
-        return abs(self.expected - count_codes(self.targets[values]))
+        return count_codes(self.targets[values])
 
     def _shown(self, values: Values | None, executor: Executor | None) -> np.ndarray:
-        if values is None and self._image.dtype == np.uint8:
-            return self._image
+        if values is None and self.image.dtype == np.uint8:
+            return self.image
         with self._lock:
             if self._prepared is None:
-                self._prepared = HomomorphicFilter(self._image, self._settings)
+                self._prepared = HomomorphicFilter(self.image, self._settings)
         # equal gains leave the image as it is, but for the mapping to 8 bit
         gamma_high, gamma_low = values or (1.0, 1.0)
         return self._prepared.filtered(gamma_high, gamma_low, executor=executor)
@@ -284,9 +321,9 @@ def _checked(found: Any, source: str) -> list[Target]:
     return list(found)
 
 
-def _check_expected(expected: Any) -> None:
-    if isinstance(expected, bool) or not isinstance(expected, Integral) or expected < 0:
-        raise ValueError(f'expected is {expected!r}, accepted is an integer of at least 0')
+def _check_count(name: str, count: Any) -> None:
+    if isinstance(count, bool) or not isinstance(count, Integral) or count < 0:
+        raise ValueError(f'{name} is {count!r}, accepted is an integer of at least 0')
 
 
 def _check_order(settings: AdaptiveSettings, lower: str, upper: str) -> None:

@@ -67,8 +67,9 @@ def draw(
 def summary(identification: Identification) -> str:
     """Return n, N and the filter of an identification in words."""
     words = f'{identification.count} identified'
-    if identification.expected:
-        words += f' of {identification.expected}'
+    if identification.expected or identification.estimated:
+        estimated = 'an estimated ' if identification.estimated else ''
+        words += f' of {estimated}{identification.expected}'
     used = identification.filter
     if not used.applied:
         return f'{words}, no filter'

@@ -57,6 +57,7 @@ def coded_target_array(
         height=height,
         family=family,
         expected=identification.expected,
+        estimated=identification.estimated,
         targets=targets,
         filter=types.FilterState(**asdict(identification.filter)),
     )

@@ -83,11 +83,14 @@ class Identification:
         N, the number of coded targets that the image shows; 0 where unknown.
     filter : FilterState
         The filter that gave the targets.
+    estimated : bool
+        Whether `expected` was estimated from the image.
     """
 
     targets: tuple[Target, ...]
     expected: int = 0
     filter: FilterState = field(default_factory=FilterState)
+    estimated: bool = False
 
     @property
     def count(self) -> int:

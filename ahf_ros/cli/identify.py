@@ -114,6 +114,7 @@ def record(
         'family': detector.family,
         'detector': detector.name,
         'expected': found.expected,
+        'estimated': found.estimated,
         'targets': [asdict(target) for target in found.targets],
         'filter': used,
         'elapsed_s': elapsed,

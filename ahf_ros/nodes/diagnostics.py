@@ -63,6 +63,7 @@ class Diagnostics:
             'last reason for rejection': tally.reason,
             'identified (n)': tally.last.count,
             'expected (N)': tally.last.expected,
+            'N estimated': tally.last.estimated,
             'filter applied': used.applied,
             'gamma_high': f'{used.gamma_high:.2f}',
             'gamma_low': f'{used.gamma_low:.2f}',

@@ -36,6 +36,7 @@ def identification(message: CodedTargetArray) -> target.Identification:
         tuple(_target(item) for item in message.targets),
         message.expected,
         target.FilterState(**_values(target.FilterState, message.filter)),
+        message.estimated,
     )
 
 
