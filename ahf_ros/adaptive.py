@@ -159,8 +159,8 @@ class AdaptiveIdentifier:
     last_search : SearchResult or None
         The search for the last image; None where there was none.
     remembered : tuple of float or None
-        The filter that the next image is begun with. All that lives from one image to the next:
-        set it to go on where another left off.
+        The filter that the next image is begun with. All that lives from one image to the next,
+        unless N is estimated: set it to go on where another left off.
     """
 
     def __init__(

@@ -128,6 +128,76 @@ def test_without_an_expected_number_nothing_is_filtered():
     assert (result.expected, detector.calls, result.filter.applied) == (0, 1, False)
 
 
+class Estimate:
+    """An estimate that is always the same."""
+
+    def __init__(self, count):
+        self.count = count
+        self.calls = 0
+
+    def __call__(self, image):
+        self.calls += 1
+        return self.count
+
+
+def test_an_estimate_stands_in_for_an_unknown_number():
+    given = identify(DIM, Dots(), COUNT, SHORT)
+    estimated = identify(DIM, Dots(), 0, SHORT, estimate=Estimate(COUNT))
+    assert (given.expected, given.estimated) == (COUNT, False)
+    assert (estimated.expected, estimated.estimated) == (COUNT, True)
+    assert estimated.targets == given.targets
+    assert replace(estimated.filter, duration=0.0) == replace(given.filter, duration=0.0)
+
+
+def test_a_given_number_is_not_estimated():
+    estimate = Estimate(3)
+    result = identify(BRIGHT, Dots(), COUNT, estimate=estimate)
+    assert (result.expected, result.estimated, estimate.calls) == (COUNT, False, 0)
+
+
+def test_no_estimate_is_below_what_is_identified_at_once():
+    result = identify(BRIGHT, Dots(), 0, estimate=Estimate(7))
+    assert (result.expected, result.filter.applied) == (COUNT, False)
+
+
+def test_an_estimate_of_none_filters_nothing():
+    ramp = np.arange(96, dtype=np.uint8) + np.zeros((96, 1), np.uint8)
+    result = identify(ramp, Dots(), 0, SHORT, estimate=Estimate(0))
+    assert (result.expected, result.estimated, result.filter.evaluations) == (0, True, 1)
+
+
+@pytest.mark.parametrize('surplus', [0, 1])
+def test_a_steady_stream_is_estimated_once_and_not_searched_again(surplus):
+    detector, estimate = Dots(), Estimate(COUNT + surplus)
+    identifier = AdaptiveIdentifier(detector, SHORT, estimate=estimate)
+    first = identifier.identify(DIM, 0)
+    assert first.filter.applied
+    calls = detector.calls
+    second = identifier.identify(DIM, 0)
+    assert (detector.calls - calls, estimate.calls) == (1, 1)
+    assert (second.targets, second.expected) == (first.targets, COUNT + surplus)
+    assert (second.filter.evaluations, identifier.last_search) == (1, None)
+
+
+def test_other_results_are_estimated_again():
+    estimate = Estimate(COUNT)
+    identifier = AdaptiveIdentifier(Dots(), SHORT, estimate=estimate)
+    fewer = DIM.copy()
+    fewer[:40, :40] = DIM[0, :40]
+    for image, calls in ((DIM, 1), (fewer, 2), (fewer, 2)):
+        identifier.identify(image, 0)
+        assert estimate.calls == calls
+    identifier.reset()
+    identifier.identify(fewer, 0)
+    assert estimate.calls == 3
+
+
+@pytest.mark.parametrize('estimate', [-1, 2.0, None])
+def test_an_estimate_that_is_no_number_is_refused(estimate):
+    with pytest.raises(ValueError, match=r'estimate is .*, accepted is an integer of at least 0'):
+        identify(DIM, Dots(), 0, SHORT, estimate=Estimate(estimate))
+
+
 def test_switched_off_nothing_is_filtered():
     detector = Dots()
     result = identify(DIM, detector, COUNT, AdaptiveSettings(ahf=False))

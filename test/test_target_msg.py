@@ -21,6 +21,7 @@ FOUND = Identification(
     ),
     54,
     FilterState(True, 2.75, 0.5, 1700.25, 2.25, 200, 12, 3.5),
+    True,
 )
 
 

@@ -7,6 +7,7 @@ import json
 import sys
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +15,9 @@ import numpy as np
 from rich.console import Console
 from rich.progress import Progress
 
-from ahf_ros.adaptive import AdaptiveSettings, identify
-from ahf_ros.cli.options import add_options, settings_from
+from ahf_ros.adaptive import AdaptiveSettings, Estimate, identify
+from ahf_ros.cli.options import add_option, add_options, settings_from
+from ahf_ros.counting import ESTIMATE_EXPECTED, estimate_count
 from ahf_ros.detectors import DETECTOR, Detector, DetectorSettings, create
 from ahf_ros.drawing import draw, summary
 from ahf_ros.files import read_image, write_image
@@ -31,7 +33,8 @@ class IdentifySettings:
 
     expected: int = parameter(
         0,
-        'Coded targets that each image shows; 0: unknown, no filter is searched for.',
+        'Coded targets that each image shows; 0: unknown, no filter is searched for unless their '
+        'number is estimated.',
         minimum=0,
     )
     detector: str = parameter(DETECTOR.default, DETECTOR.description, choices=DETECTOR.choices)
@@ -55,6 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='DIR',
         help='Write each image with what was identified to this folder, as NAME_overlay.png.',
     )
+    add_option(parser, ESTIMATE_EXPECTED)
     add_options(parser, IdentifySettings)
 
 
@@ -74,11 +78,13 @@ def run(options: argparse.Namespace) -> int:
     settings = settings_from(options, IdentifySettings)
     overlays = _overlay_paths(options.images, options.overlay)
     detector = create(settings.detector, settings.target)
+    count = partial(estimate_count, settings=settings.target)
+    estimate = count if options.estimate_expected else None
     failed = False
     for path in _with_progress(options.images):
         try:
             image = read_image(path)
-            found = _named(path, image, detector, settings)
+            found = _named(path, image, detector, settings, estimate)
             if options.json:
                 print(json.dumps(record(path, image, found, detector)), flush=True)
             _tell(path, found, with_targets=not options.json)
@@ -122,10 +128,14 @@ def record(
 
 
 def _named(
-    path: str, image: np.ndarray, detector: Detector, settings: IdentifySettings
+    path: str,
+    image: np.ndarray,
+    detector: Detector,
+    settings: IdentifySettings,
+    estimate: Estimate | None,
 ) -> Identification:
     try:
-        return identify(image, detector, settings.expected, settings.adaptive)
+        return identify(image, detector, settings.expected, settings.adaptive, estimate=estimate)
     except ValueError as error:
         raise ValueError(f'{path}: {error}') from error
 

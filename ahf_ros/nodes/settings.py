@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from ahf_ros.adaptive import AdaptiveSettings
+from ahf_ros.counting import ESTIMATE_EXPECTED
 from ahf_ros.detectors import DETECTOR, DetectorSettings
 from ahf_ros.parameter import check_parameters, parameter
 from ahf_ros.synthetic.scene import SceneSettings
@@ -20,10 +21,12 @@ class DetectorNodeSettings:
     detector: str = parameter(DETECTOR.default, DETECTOR.description, choices=DETECTOR.choices)
     expected_targets: int = parameter(
         0,
-        'N, the number of coded targets in every image; 0: unknown, no filter is searched.',
+        'N, the number of coded targets in every image; 0: unknown, no filter is searched for '
+        'unless N is estimated.',
         minimum=0,
         maximum=LARGEST_COUNT,
     )
+    estimate_expected: bool = parameter(ESTIMATE_EXPECTED.default, ESTIMATE_EXPECTED.description)
     target: DetectorSettings = field(default_factory=DetectorSettings)
     adaptive: AdaptiveSettings = field(default_factory=AdaptiveSettings)
 
