@@ -17,6 +17,7 @@ from ahf_ros.evidence import Marks, level_evidence, log_ratio, see_light, step_e
 from ahf_ros.hypotheses import Hypotheses, settled_dots
 from ahf_ros.image import as_gray
 from ahf_ros.parameter import Parameter
+from ahf_ros.profiles import USUAL_BLUR
 
 ESTIMATE_EXPECTED = Parameter(
     'estimate_expected',
@@ -35,9 +36,26 @@ _FAINTEST = 0.9  # gray value of dark over bright
 _LEAST_CONTRAST = 0.05
 _CLEAR = 1.0  # evidence, in units of ln, that is more than noise
 _WHOLE_STEP = 0.5  # of the usual step of the dot's edge
-_COUNTED = 0.75  # probability of being a target, from which a dot counts
-# Intercept and weights of `target_probability`
-_WEIGHTS = np.array([0.22, -2.17, -3.60, -4.32, 0.94, -6.77, -0.94, 1.20, 29.02, -14.49, -0.51])
+_LARGEST = 4.0  # scaled feature; more says no more
+_COUNTED = 0.9  # probability of being a target, from which a dot counts
+# Of `target_probability`; a row of weights holds those of a factor with itself and all after it.
+_MEANS = np.array([0.913, 0.977, -0.787, 1.98, 0.168, 3.638, 0.252, 0.039, 0.238, 6.623])
+_SPREADS = np.array([0.14, 0.079, 0.279, 0.57, 0.133, 0.757, 0.745, 0.084, 0.1, 1.055])
+# fmt: off
+_WEIGHTS = np.array([
+    -11.96, -0.92, -0.44, -1.02, 1.0, -0.03, -0.5, 3.27, 2.02, -1.29, -2.19,
+    -0.21, 0.15, 0.06, -0.19, 0.15, -0.33, 0.21, 0.05, 0.12, 0.12,
+    -0.23, -0.15, 0.05, 0.29, 0.52, 0.15, 0.71, 0.09, -0.38,
+    0.13, 0.1, 0.21, -0.13, -0.05, -0.3, -0.03, 0.36,
+    0.08, -0.03, 0.13, -0.12, 0.09, 0.27, 0.05,
+    0.13, -0.1, -0.22, -0.02, 0.12, 0.13,
+    -0.19, 0.25, -0.55, 0.13, 0.24,
+    0.01, -0.13, 0.46, 0.12,
+    0.28, 0.08, 0.66,
+    0.25, -0.48,
+    -0.25,
+])
+# fmt: on
 
 
 def estimate_count(image: np.ndarray, settings: DetectorSettings | None = None) -> int:
@@ -85,7 +103,27 @@ def target_probability(features: np.ndarray) -> np.ndarray:
     features : ndarray of float, shape (k, n)
         As `target_features` gives them.
     """
-    return 1 / (1 + np.exp(-(_WEIGHTS[0] + features @ _WEIGHTS[1:])))
+    return 1 / (1 + np.exp(-(terms(features, _MEANS, _SPREADS) @ _WEIGHTS)))
+
+
+def terms(features: np.ndarray, means: np.ndarray, spreads: np.ndarray) -> np.ndarray:
+    """Return what the regression weighs: one, scaled features, and their products two by two.
+
+    Parameters
+    ----------
+    features : ndarray of float, shape (k, n)
+    means, spreads : ndarray of float, shape (n,)
+        Usual value and standard deviation of each.
+
+    Returns
+    -------
+    ndarray of float64, shape (k, (n + 1) (n + 2) / 2)
+        The ones come first.
+    """
+    scaled = np.clip((features - means) / spreads, -_LARGEST, _LARGEST)
+    factors = np.column_stack([np.ones(len(scaled)), scaled])
+    first, second = np.triu_indices(factors.shape[1])
+    return factors[:, first] * factors[:, second]
 
 
 def target_features(gray: np.ndarray, found: Hypotheses, code: Family) -> np.ndarray:
@@ -165,7 +203,9 @@ def _marks(dot: np.ndarray, around: np.ndarray, step: np.ndarray) -> Marks:
     dark_dot = (signs > 0)[:, None]
     dark, bright = np.where(dark_dot, dot, around), np.where(dark_dot, around, dot)
     contrast = np.median(dark / np.maximum(bright, 1), axis=1)
-    return Marks(signs, np.minimum(contrast, _FAINTEST), np.median(bright, axis=1))
+    usual = np.median(bright, axis=1)
+    blur = np.full(len(signs), USUAL_BLUR)
+    return Marks(signs, np.minimum(contrast, _FAINTEST), usual, blur)
 
 
 def _of_sectors(evidence: np.ndarray) -> np.ndarray:

@@ -29,7 +29,7 @@ from rich.progress import track
 from ahf_ros import frame
 from ahf_ros.adaptive import identify
 from ahf_ros.codes.ring import FAMILY_NAMES, family
-from ahf_ros.counting import estimate_count, target_features
+from ahf_ros.counting import estimate_count, target_features, terms
 from ahf_ros.detectors import DETECTOR_NAMES, DetectorSettings, create
 from ahf_ros.detectors.ring import RingDetector
 from ahf_ros.evaluation import TrueTarget, score
@@ -116,12 +116,14 @@ def dots(scene: Rendering) -> tuple[np.ndarray, np.ndarray]:
     return target_features(image.astype(np.float32), found, code), near.any(axis=1)
 
 
-def fitted(seeds: Iterable[int]) -> np.ndarray:
-    """Return intercept and weights of the regression on the scenes of some seeds."""
+def fitted(seeds: Iterable[int]) -> dict[str, np.ndarray]:
+    """Return the constants of the regression on the scenes of some seeds, by their names."""
     wanted = [scene for seed in seeds for scene in training_scenes(seed)]
     parts = [dots(render(scene)) for scene in progress(wanted)]
     features, of_target = (np.concatenate(part) for part in zip(*parts, strict=True))
-    return logistic_regression(features, of_target)
+    means, spreads = (np.round(of(features, axis=0), 3) for of in (np.mean, np.std))
+    weights = logistic_regression(terms(features, means, spreads)[:, 1:], of_target)
+    return {'_MEANS': means, '_SPREADS': spreads, '_WEIGHTS': np.round(weights, 2)}
 
 
 def counted(seeds: Sequence[int]) -> list[str]:
@@ -201,8 +203,8 @@ def main() -> None:
     parser.add_argument('--detector', nargs='*', choices=DETECTOR_NAMES, default=['traditional'])
     options = parser.parse_args()
     if options.fit:
-        weights = ', '.join(f'{weight:.2f}' for weight in fitted(options.fit))
-        print(f'Intercept and weights: {weights}')
+        for name, values in fitted(options.fit).items():
+            print(f'{name} = np.array({values.tolist()})')
         return
     facts = machine()
     seeds = ', '.join(map(str, options.seeds))
