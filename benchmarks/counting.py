@@ -51,6 +51,9 @@ NEAR = 0.25
 LEAST_NEAR = 2.0
 """The same for small dots, px."""
 
+ALIKE = 0.3
+"""Largest difference of the sizes of a dot and of the true one, of ln."""
+
 SIZES = (5.0, 7.0, 10.0, 14.0, 20.0, 20.0)
 """Radii of dots in the scenes that weights are fitted to, px."""
 
@@ -109,10 +112,12 @@ def dots(scene: Rendering) -> tuple[np.ndarray, np.ndarray]:
     image = half_covered(scene)
     code = family(scene.settings.family)
     found = RingDetector(DetectorSettings(family=code.name)).hypotheses(image)
-    _, minor, _ = frame.ellipse_axes(found.frames)
-    x, y = np.array([(target.x, target.y) for target in scene.targets]).reshape(-1, 2).T
+    major, minor, _ = frame.ellipse_axes(found.frames)
+    true = [(target.x, target.y, target.semi_major) for target in scene.targets]
+    x, y, size = np.array(true).reshape(-1, 3).T
     distance = np.hypot(found.frames[:, :1, 2] - x, found.frames[:, 1:2, 2] - y)
     near = distance < np.maximum(LEAST_NEAR, NEAR * minor)[:, None]
+    near &= np.abs(np.log(major[:, None] / size)) < ALIKE
     return target_features(image.astype(np.float32), found, code), near.any(axis=1)
 
 

@@ -102,6 +102,20 @@ def test_json_tells_the_truth(folder, results):
         assert len(target['covariance']) == 4
 
 
+def test_an_unknown_number_is_estimated_where_that_is_asked_for(folder, capsys):
+    command = ('identify', folder / 'normal_0.3_4.png', '--detector', 'traditional', '--json')
+    found = []
+    for more in ((), ('--estimate-expected',), ('--estimate-expected', '--expected', 6)):
+        assert status(*command, *more) == 0
+        found.append(json.loads(capsys.readouterr().out))
+    assert [(it['expected'], it['estimated']) for it in found] == [
+        (0, False),
+        (6, True),
+        (6, False),
+    ]
+    assert found[0]['targets'] == found[1]['targets']
+
+
 def test_without_json_standard_output_stays_empty(folder):
     done = ahf('identify', folder / 'normal_0.3_4.png', '--detector', 'traditional')
     assert (done.returncode, done.stdout) == (0, '')

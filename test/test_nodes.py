@@ -181,6 +181,15 @@ def test_an_image_without_targets_is_answered(detector: Detector) -> None:
     assert (answer.width, answer.height, answer.expected) == (300, 200, 0)
 
 
+def test_an_unknown_number_is_estimated(detector: Detector, message: Image) -> None:
+    assert detector.set(('estimate_expected', True)) == (True, '')
+    answer = detector.answer(message)
+    given = detector.identify(message, expected=6).coded_targets
+    assert detector.set(('estimate_expected', False)) == (True, '')
+    assert (answer.expected, answer.estimated) == (SCENE['targets'], True)
+    assert (given.expected, given.estimated) == (6, False)
+
+
 def test_colour_and_padding_make_no_difference(detector: Detector, rendering: Rendering) -> None:
     image = rendering.image
     gray = detector.answer(image_message(image, header()))
