@@ -7,11 +7,14 @@ a margin. No word has to be read: a target counts also where its band is half hi
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 
 from ahf_ros import frame
-from ahf_ros.codes.ring import Family, family
-from ahf_ros.detectors.detector import DetectorSettings
+from ahf_ros.codes.ring import FAMILY_NAMES, Family, family
+from ahf_ros.detectors.detector import Detector, DetectorSettings
 from ahf_ros.detectors.ring import RingDetector
 from ahf_ros.evidence import Marks, level_evidence, log_ratio, see_light, step_evidence
 from ahf_ros.hypotheses import Hypotheses, settled_dots
@@ -43,17 +46,17 @@ _MEANS = np.array([0.913, 0.977, -0.787, 1.98, 0.168, 3.638, 0.252, 0.039, 0.238
 _SPREADS = np.array([0.14, 0.079, 0.279, 0.57, 0.133, 0.757, 0.745, 0.084, 0.1, 1.055])
 # fmt: off
 _WEIGHTS = np.array([
-    -11.96, -0.92, -0.44, -1.02, 1.0, -0.03, -0.5, 3.27, 2.02, -1.29, -2.19,
-    -0.21, 0.15, 0.06, -0.19, 0.15, -0.33, 0.21, 0.05, 0.12, 0.12,
-    -0.23, -0.15, 0.05, 0.29, 0.52, 0.15, 0.71, 0.09, -0.38,
-    0.13, 0.1, 0.21, -0.13, -0.05, -0.3, -0.03, 0.36,
-    0.08, -0.03, 0.13, -0.12, 0.09, 0.27, 0.05,
-    0.13, -0.1, -0.22, -0.02, 0.12, 0.13,
-    -0.19, 0.25, -0.55, 0.13, 0.24,
-    0.01, -0.13, 0.46, 0.12,
-    0.28, 0.08, 0.66,
-    0.25, -0.48,
-    -0.25,
+    -10.77, -0.48, -0.03, -1.15, 0.24, -0.0, -1.47, 3.76, 1.61, -1.67, -1.51,
+    -0.38, 0.56, 0.23, -0.1, 0.11, 0.11, 0.39, 0.43, 0.22, -0.04,
+    -0.01, -0.65, -0.37, 0.47, 0.03, 0.22, 0.62, -0.25, -0.26,
+    -0.23, -0.85, 0.08, 0.28, -0.21, 0.19, 0.11, 0.51,
+    -0.83, 0.16, 0.31, -0.08, 0.11, -0.28, -0.01,
+    0.02, -0.21, -0.5, -0.1, -0.05, 0.42,
+    -0.52, 0.56, -1.14, -0.07, 0.18,
+    -0.23, 0.31, 0.31, -0.03,
+    0.35, 0.1, 0.61,
+    -0.08, -0.33,
+    -0.24,
 ])
 # fmt: on
 
@@ -90,6 +93,28 @@ def estimate_count(image: np.ndarray, settings: DetectorSettings | None = None) 
     count = len(targets.words)
     distinct, _ = settled_dots(targets, np.zeros(count), np.ones(count, bool), code)
     return len(distinct)
+
+
+def estimator(detector: Detector, settings: DetectorSettings) -> Callable[[np.ndarray], int]:
+    """Return the estimate of how many targets an image shows of those that a detector looks for.
+
+    Parameters
+    ----------
+    detector : Detector
+    settings : DetectorSettings
+        What its targets look like.
+
+    Raises
+    ------
+    ValueError
+        If it looks for others than ring targets.
+    """
+    if detector.family not in FAMILY_NAMES:
+        raise ValueError(
+            f'{ESTIMATE_EXPECTED.name} is True, accepted is False where targets are of the family '
+            f'{detector.family}: only ring targets are counted'
+        )
+    return partial(estimate_count, settings=settings)
 
 
 def target_probability(features: np.ndarray) -> np.ndarray:

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from ahf_ros.codes.ring import family
-from ahf_ros.counting import estimate_count
+from ahf_ros.counting import estimate_count, estimator
 from ahf_ros.detectors import DetectorSettings, create
+from ahf_ros.nodes.settings import DetectorNodeSettings
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 
 SMALL = {'width': 900, 'height': 640, 'targets': 6}
@@ -96,3 +97,12 @@ def test_the_same_image_gives_the_same_count():
 def test_what_is_no_image_is_refused(image, words):
     with pytest.raises(ValueError, match=words):
         estimate_count(image)
+
+
+def test_only_ring_targets_are_estimated():
+    wanted = DetectorSettings()
+    assert estimator(create('traditional', wanted), wanted)(scene(seed=11).image) == 6
+    with pytest.raises(ValueError, match=r'estimate_expected is True, accepted is False where'):
+        estimator(create('aruco', wanted), wanted)
+    with pytest.raises(ValueError, match='estimate_expected is True'):
+        DetectorNodeSettings(detector='aruco', estimate_expected=True)

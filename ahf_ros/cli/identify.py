@@ -7,7 +7,6 @@ import json
 import sys
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,7 @@ from rich.progress import Progress
 
 from ahf_ros.adaptive import AdaptiveSettings, Estimate, identify
 from ahf_ros.cli.options import add_option, add_options, settings_from
-from ahf_ros.counting import ESTIMATE_EXPECTED, estimate_count
+from ahf_ros.counting import ESTIMATE_EXPECTED, estimator
 from ahf_ros.detectors import DETECTOR, Detector, DetectorSettings, create
 from ahf_ros.drawing import draw, summary
 from ahf_ros.files import read_image, write_image
@@ -78,8 +77,7 @@ def run(options: argparse.Namespace) -> int:
     settings = settings_from(options, IdentifySettings)
     overlays = _overlay_paths(options.images, options.overlay)
     detector = create(settings.detector, settings.target)
-    count = partial(estimate_count, settings=settings.target)
-    estimate = count if options.estimate_expected else None
+    estimate = estimator(detector, settings.target) if options.estimate_expected else None
     failed = False
     for path in _with_progress(options.images):
         try:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import threading
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from sensor_msgs.msg import Image
 
 from ahf_ros.adaptive import AdaptiveIdentifier
-from ahf_ros.counting import estimate_count
+from ahf_ros.counting import estimator
 from ahf_ros.detectors import create
 from ahf_ros.encodings import decode_image
 from ahf_ros.homomorphic import HomomorphicFilter
@@ -61,12 +60,14 @@ class Pipeline:
         self.settings = settings
         self._stopping = stopping
         self._detector = create(settings.detector, settings.target)
-        count = partial(estimate_count, settings=settings.target)
+        estimate = None
+        if settings.estimate_expected:
+            estimate = estimator(self._detector, settings.target)
         self._identifier = AdaptiveIdentifier(
             self._detect,
             settings.adaptive,
             getattr(self._detector, 'refine', None),
-            count if settings.estimate_expected else None,
+            estimate,
         )
 
     def answer(self, message: Image, expected: int) -> Answer:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from ahf_ros.adaptive import AdaptiveSettings
-from ahf_ros.counting import ESTIMATE_EXPECTED
-from ahf_ros.detectors import DETECTOR, DetectorSettings
+from ahf_ros.counting import ESTIMATE_EXPECTED, estimator
+from ahf_ros.detectors import DETECTOR, DetectorSettings, create
 from ahf_ros.parameter import check_parameters, parameter
 from ahf_ros.synthetic.scene import SceneSettings
 
@@ -33,6 +33,8 @@ class DetectorNodeSettings:
     def __post_init__(self) -> None:
         """Refuse values that are not accepted."""
         check_parameters(self)
+        if self.estimate_expected:
+            estimator(create(self.detector, self.target), self.target)
 
 
 @dataclass(frozen=True, slots=True)
