@@ -1,4 +1,9 @@
-"""Image messages without a copy where there need not be one, from ROS or from a bag."""
+"""Image messages as gray images, from ROS or from a bag, without a copy where none is needed.
+
+The encodings are those of sensor_msgs/image_encodings.hpp that hold an image. Values keep their
+range: what a camera of 12 bit or a scanner in float sends is scaled by nobody before the logarithm
+of the image is taken.
+"""
 
 from __future__ import annotations
 
@@ -15,36 +20,83 @@ class Encoding:
 
     Attributes
     ----------
-    channels : int
-        Bytes per pixel.
+    kind : str
+        Type of a sample, as numpy names it.
+    samples : int
+        Samples a pixel in a row of the image.
     to_gray : int or None
-        Code of `cv2.cvtColor` for the conversion to gray; None where the pixel is gray.
+        Code of `cv2.cvtColor` for the conversion to gray; None where one sample is the gray value.
+    gray : int
+        That sample.
     """
 
-    channels: int
+    kind: str
+    samples: int = 1
     to_gray: int | None = None
+    gray: int = 0
+
+    @property
+    def size(self) -> int:
+        """Bytes a pixel in a row of the image."""
+        return self.samples * np.dtype(self.kind).itemsize
 
 
-ENCODINGS = {
-    'mono8': Encoding(1),
-    'bgr8': Encoding(3, cv2.COLOR_BGR2GRAY),
-    'rgb8': Encoding(3, cv2.COLOR_RGB2GRAY),
-}
-"""The accepted encodings, named as in sensor_msgs/image_encodings.hpp."""
+def _encodings() -> dict[str, Encoding]:
+    found = {'mono8': Encoding('u1'), 'mono16': Encoding('u2')}
+    colours = {
+        'rgb': (3, cv2.COLOR_RGB2GRAY),
+        'bgr': (3, cv2.COLOR_BGR2GRAY),
+        'rgba': (4, cv2.COLOR_RGBA2GRAY),
+        'bgra': (4, cv2.COLOR_BGRA2GRAY),
+    }
+    # OpenCV names a pattern by the second row and column of it, ROS by the first ones.
+    patterns = {
+        'rggb': cv2.COLOR_BayerBG2GRAY,
+        'bggr': cv2.COLOR_BayerRG2GRAY,
+        'gbrg': cv2.COLOR_BayerGR2GRAY,
+        'grbg': cv2.COLOR_BayerGB2GRAY,
+    }
+    for bits, kind in ((8, 'u1'), (16, 'u2')):
+        for name, (samples, code) in colours.items():
+            found[f'{name}{bits}'] = Encoding(kind, samples, code)
+        for name, code in patterns.items():
+            found[f'bayer_{name}{bits}'] = Encoding(kind, 1, code)
+    # Channels without a name are blue, green, red, as in cv_bridge; of two, the first is gray.
+    generic = {2: None, 3: cv2.COLOR_BGR2GRAY, 4: cv2.COLOR_BGRA2GRAY}
+    for name, kind in (('8U', 'u1'), ('16U', 'u2'), ('32F', 'f4'), ('64F', 'f8')):
+        found[f'{name}C1'] = Encoding(kind)
+        for samples, to_gray in generic.items():
+            found[f'{name}C{samples}'] = Encoding(kind, samples, to_gray)
+    for name in ('yuv422', 'uyvy'):
+        found[name] = Encoding('u1', 2, gray=1)
+    for name in ('yuv422_yuy2', 'yuyv'):
+        found[name] = Encoding('u1', 2)
+    # The gray values of these come first, the colours in planes behind them.
+    for name in ('nv21', 'nv24'):
+        found[name] = Encoding('u1')
+    return found
+
+
+ENCODINGS = _encodings()
+"""The accepted encodings, by their names in sensor_msgs/image_encodings.hpp."""
 
 
 def decode_image(message: Any) -> np.ndarray:
     """Return the gray image of a message.
 
+    Colours are weighted as in ITU-R BT.601, in the values that they are sent in, linear or not.
+
     Parameters
     ----------
     message : sensor_msgs/Image
-        Of one of `ENCODINGS`; rows may be padded (`step`).
+        Of one of `ENCODINGS`; in either byte order; rows may be padded (`step`).
 
     Returns
     -------
-    ndarray of uint8, shape (height, width)
-        A view of the data of a gray message, not a copy.
+    ndarray of uint8, uint16, float32 or float64, shape (height, width)
+        With the values that were sent; a view of the data of a gray message in the byte order of
+        the machine, not a copy. What is not finite in a float image, as scanners mark pixels
+        without a value, is 0, unless nothing is finite.
 
     Raises
     ------
@@ -58,9 +110,9 @@ def decode_image(message: Any) -> np.ndarray:
             f'encoding is {message.encoding!r}, accepted is one of {", ".join(ENCODINGS)}'
         )
     for name, size in (('width', message.width), ('height', message.height)):
-        if size == 0:
-            raise ValueError(f'{name} is 0, accepted is an integer of at least 1')
-    row = message.width * encoding.channels
+        if size <= 0:
+            raise ValueError(f'{name} is {size}, accepted is an integer of at least 1')
+    row = message.width * encoding.size
     if message.step < row:
         raise ValueError(
             f'step is {message.step}, accepted is an integer of at least {row}: '
@@ -72,15 +124,40 @@ def decode_image(message: Any) -> np.ndarray:
             f'data is of {len(message.data)} bytes, accepted are at least {size}: '
             f'{message.height} rows of {message.step} bytes'
         )
-    pixels: np.ndarray = np.ndarray(
-        (message.height, message.width, encoding.channels),
-        np.uint8,
+    return _finite(_gray(_samples(message, encoding), encoding))
+
+
+def _samples(message: Any, encoding: Encoding) -> np.ndarray:
+    """Return the samples of an image in the byte order of the machine, aligned."""
+    kind = np.dtype(encoding.kind)
+    sent = kind.newbyteorder('>' if message.is_bigendian else '<')
+    samples = np.ndarray(
+        (message.height, message.width, encoding.samples),
+        sent,
         message.data,
-        strides=(message.step, encoding.channels, 1),
+        strides=(message.step, encoding.size, kind.itemsize),
     )
+    aligned: np.ndarray = np.require(samples.astype(kind, copy=False), requirements='A')
+    return aligned
+
+
+def _gray(samples: np.ndarray, encoding: Encoding) -> np.ndarray:
     if encoding.to_gray is None:
-        return pixels[:, :, 0]
-    return cv2.cvtColor(pixels, encoding.to_gray)
+        return samples[:, :, encoding.gray]
+    if samples.dtype == np.float64:  # which cv2.cvtColor does not take
+        weights = np.array([0.114, 0.587, 0.299])
+        return samples[:, :, :3] @ weights
+    return cv2.cvtColor(np.ascontiguousarray(samples), encoding.to_gray)
+
+
+def _finite(image: np.ndarray) -> np.ndarray:
+    """Return an image in which pixels without a value are black."""
+    if image.dtype.kind != 'f':
+        return image
+    finite = np.isfinite(image)
+    if finite.all() or not finite.any():
+        return image
+    return np.where(finite, image, image.dtype.type(0))
 
 
 def decode_compressed(message: Any) -> np.ndarray:

@@ -9,6 +9,9 @@ import numpy as np
 MINIMUM_SIDE = 16
 """Smallest width and height of an image, px: less cannot hold one readable target."""
 
+HOT_SHARE = 100_000
+"""One pixel of so many may be hot, brighter than any light in the image."""
+
 IMAGE_TYPES = (np.uint8, np.uint16, np.float32, np.float64)
 """Accepted types of a pixel, in the byte order of the machine."""
 
@@ -58,6 +61,12 @@ def _check_values(image: np.ndarray, name: str) -> None:
         )
 
 
+def brightest(image: np.ndarray) -> float:
+    """Return the gray value of the brightest light in an image, hot pixels left out."""
+    rank = image.size - 1 - image.size // HOT_SHARE
+    return float(np.partition(image, rank, axis=None)[rank]) or float(image.max())
+
+
 def as_gray(image: np.ndarray) -> np.ndarray:
     """Return gray values from 0 to 255, of which an 8-bit image is its own.
 
@@ -68,8 +77,11 @@ def as_gray(image: np.ndarray) -> np.ndarray:
     Returns
     -------
     ndarray of uint8 or float32, shape (height, width)
-        Other images are scaled so that their largest value becomes 255.
+        Other images are scaled by their brightest light, so that it does not matter how many bits
+        of a type are used, or whether a pixel is hot.
     """
     if image.dtype == np.uint8:
         return image
-    return image.astype(np.float32) * np.float32(255 / float(image.max()))
+    kind = np.float64 if image.dtype == np.float64 else np.float32
+    share = image / kind(brightest(image))
+    return np.minimum(255 * share, 255).astype(np.float32)

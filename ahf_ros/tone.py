@@ -8,6 +8,8 @@ from functools import lru_cache
 import cv2
 import numpy as np
 
+from ahf_ros.image import brightest
+
 LOG_OFFSET = 8.0
 """Added to a gray value, of 255, before a logarithm in which edges are looked for: about where
 noise drowns contrast."""
@@ -34,13 +36,13 @@ def logarithm(image: np.ndarray, offset: float) -> np.ndarray:
     ndarray of float32, shape (height, width)
         From ln(offset) to ln(1 + offset). The range is 255 for 8-bit images; the largest number
         of the bit depth for 16-bit images, the depth being the smallest from 8 to 16 that holds
-        every pixel; and the largest pixel for float images.
+        the brightest pixel; and that pixel for float images, hot pixels left out.
     """
     if image.dtype.kind == 'f':
-        share = (image / image.max()).astype(np.float32)
+        share = (image / brightest(image)).astype(np.float32)
         return np.log(share + np.float32(offset))
-    depth = 8 if image.dtype == np.uint8 else max(8, int(image.max()).bit_length())
-    share = np.arange(2**depth) / (2**depth - 1)
+    depth = 8 if image.dtype == np.uint8 else max(8, int(brightest(image)).bit_length())
+    share = np.arange(np.iinfo(image.dtype).max + 1) / (2**depth - 1)
     table = np.log(share + offset).astype(np.float32)
     return cv2.LUT(image, table) if image.dtype == np.uint8 else table[image]
 

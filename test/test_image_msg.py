@@ -55,7 +55,7 @@ def test_data_may_be_longer_than_the_rows() -> None:
 @pytest.mark.parametrize(
     ('fields', 'error'),
     [
-        ({'encoding': 'yuv422'}, "encoding is 'yuv422', accepted is one of mono8, bgr8, rgb8"),
+        ({'encoding': '8SC1'}, "encoding is '8SC1', accepted is one of mono8, mono16, rgb8"),
         ({'encoding': ''}, "encoding is '', accepted is one of"),
         ({'width': 0}, 'width is 0, accepted is an integer of at least 1'),
         ({'height': 0}, 'height is 0, accepted is an integer of at least 1'),

@@ -31,6 +31,6 @@ def image_message(image: np.ndarray, header: Header) -> Image:
         height=height,
         width=width,
         encoding=encoding,
-        step=width * ENCODINGS[encoding].channels,
+        step=width * ENCODINGS[encoding].size,
         data=data,
     )
