@@ -36,16 +36,16 @@ from rich.console import Console
 from rich.progress import track
 
 from ahf_ros.adaptive import AdaptiveIdentifier, AdaptiveSettings
-from ahf_ros.detectors import DETECTOR_NAMES, DetectorSettings, create
+from ahf_ros.detectors import DetectorSettings, create
+from ahf_ros.detectors.detector import SquareSettings
 from ahf_ros.evaluation import RIGHT, TrueTarget, judge, score
 from ahf_ros.genetic import GeneticSettings
-from ahf_ros.parameter import parameters
 from ahf_ros.synthetic.lights import LIGHT_NAMES
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 from ahf_ros.target import Identification, Target, count_codes
 
-RING = 'metashape12'
-"""Family of the targets of the paper."""
+TARGETS = DetectorSettings(family='metashape12', square=SquareSettings(aruco_dictionary='4x4_100'))
+"""Ring targets as in the paper, and a dictionary with as many markers as there are targets."""
 
 QUICK = {'width': 1200, 'height': 900, 'targets': 6}
 
@@ -61,8 +61,6 @@ class Method:
     name : str
     detector : str
         Name in the registry.
-    family : str
-        Of the targets in the images that it is given.
     ahf : bool
         Whether AHF drives the detector.
     preprocessor : str
@@ -71,7 +69,6 @@ class Method:
 
     name: str
     detector: str
-    family: str = RING
     ahf: bool = False
     preprocessor: str = ''
 
@@ -82,7 +79,7 @@ class Method:
 
         Places are taken from the image as it is, whatever the detector saw.
         """
-        detector = create(self.detector, DetectorSettings(family=self.family))
+        detector = create(self.detector, TARGETS)
         refine = getattr(detector, 'refine', None)
         if self.preprocessor:
             found = detector(PREPROCESSORS[self.preprocessor](image))
@@ -99,25 +96,19 @@ class Method:
         return AdaptiveIdentifier(counted, settings, refine).identify(image, expected), tried
 
 
-def methods() -> list[Method]:
-    """Return all methods whose detector, and whose targets, there are."""
-    accepted = next(it.choices for it in parameters(SceneSettings) if it.name == 'family')
-    square = next((name for name in accepted if name.startswith('aruco')), None)
-    made = []
-    for name, detector, family in (
-        ('traditional', 'traditional', RING),
-        ('ring', 'ring', RING),
-        ('aruco', 'aruco', square),
-    ):
-        if detector in DETECTOR_NAMES and family:
-            made += [Method(name, detector, family), Method(f'AHF-{name}', detector, family, True)]
-    rivals = [
-        Method(f'{name} + traditional', 'traditional', preprocessor=name) for name in PREPROCESSORS
-    ]
-    return made[:2] + rivals + made[2:]
+METHODS = (
+    Method('traditional', 'traditional'),
+    Method('AHF-traditional', 'traditional', ahf=True),
+    *(Method(f'{name} + traditional', 'traditional', preprocessor=name) for name in PREPROCESSORS),
+    Method('ring', 'ring'),
+    Method('AHF-ring', 'ring', ahf=True),
+    Method('aruco', 'aruco'),
+    Method('AHF-aruco', 'aruco', ahf=True),
+)
+"""All that is compared. TI of the paper is `traditional`."""
 
 
-def run_scene(scene: SceneSettings, chosen: Sequence[Method], most: int) -> list[dict[str, Any]]:
+def run_scene(scene: SceneSettings, most: int) -> list[dict[str, Any]]:
     """Identify one scene in every way.
 
     Returns
@@ -128,10 +119,11 @@ def run_scene(scene: SceneSettings, chosen: Sequence[Method], most: int) -> list
     cv2.setNumThreads(1)  # every process has a core
     renderings: dict[str, Rendering] = {}
     records = []
-    for method in chosen:
-        if method.family not in renderings:
-            renderings[method.family] = render(replace(scene, family=method.family))
-        rendering = renderings[method.family]
+    for method in METHODS:
+        family = create(method.detector, TARGETS).family
+        if family not in renderings:
+            renderings[family] = render(replace(scene, family=family))
+        rendering = renderings[family]
         truth = [TrueTarget(it.id, it.x, it.y) for it in rendering.targets]
         method.identify(rendering.image[:400, :400], 0, most)  # tables that are made once
         started = time.process_time()
@@ -186,10 +178,10 @@ def scenes(options: argparse.Namespace) -> list[SceneSettings]:
 
 def run(options: argparse.Namespace) -> list[dict[str, Any]]:
     """Return the records of all scenes and methods, in the order of the scenes."""
-    chosen, todo = methods(), scenes(options)
+    todo = scenes(options)
     context = multiprocessing.get_context('spawn')
     with ProcessPoolExecutor(options.jobs, mp_context=context) as executor:
-        futures = [executor.submit(run_scene, it, chosen, options.evaluations) for it in todo]
+        futures = [executor.submit(run_scene, it, options.evaluations) for it in todo]
         console = Console(stderr=True)
         for future in track(as_completed(futures), 'scenes', len(futures), console=console):
             future.result()

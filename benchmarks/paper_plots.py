@@ -83,7 +83,7 @@ def fitness(report: dict[str, Any]) -> Figure:
 
 
 def errors(report: dict[str, Any]) -> Figure:
-    """Return the errors of the centres as vectors, all images together, a panel a method."""
+    """Return the errors of the centres of all images, a panel with a scale of its own a method."""
     vectors = {
         method: np.array([row for it in report['records'] if it['method'] == method
                           for row in it['vectors']]).reshape(-1, 4)
@@ -92,10 +92,9 @@ def errors(report: dict[str, Any]) -> Figure:
     vectors = {method: rows for method, rows in vectors.items() if len(rows)}
     width, height = report['width'], report['height']
     figure, panels = _panels(len(vectors) or 1, 3.2, columns=4, ratio=height / width + 0.15)
-    lengths = [np.hypot(rows[:, 2], rows[:, 3]) for rows in vectors.values()]
-    shown = float(np.percentile(np.concatenate(lengths), 95)) if lengths else 1.0
     for panel, (method, rows) in zip(panels, vectors.items(), strict=False):
         x, y, across, down = rows.T
+        shown = max(float(np.percentile(np.hypot(across, down), 95)), 1e-6)
         style = {'angles': 'xy', 'scale_units': 'xy', 'scale': shown / (0.08 * width)}
         arrows = panel.quiver(x, y, across, down, **style, width=0.004)
         rmse = float(np.sqrt((rows[:, 2:] ** 2).sum(axis=1).mean()))

@@ -47,7 +47,7 @@ def test_the_figures_of_the_paper_stand_beside_ours(measured):
         '63 / 68 / 68 (0.263)',
         '80 / 83 / 83 (0.247)',
     ]
-    for name in ('traditional', 'ring', 'AHF-ring'):
+    for name in ('traditional', 'ring', 'AHF-ring', 'aruco'):
         assert row(text, name)[0].startswith('100 / 100 / 100 (0.0'), name
     plain, driven = (row(text, name)[1] for name in ('traditional', 'AHF-traditional'))
     assert float(plain.split('/')[1]) < 50 < float(driven.split('/')[1].split()[0])
@@ -57,7 +57,7 @@ def test_every_method_is_in_the_json(measured):
     text, path = measured
     records = json.loads(path.read_text())['records']
     names = {record['method'] for record in records}
-    assert {'CLAHE + traditional', 'retinex + traditional', 'AHF-ring'} <= names
+    assert {'CLAHE + traditional', 'retinex + traditional', 'AHF-ring', 'AHF-aruco'} <= names
     assert len(records) == 2 * len(names)
     striped = next(
         it for it in records if (it['method'], it['light']) == ('AHF-traditional', 'stripe')
