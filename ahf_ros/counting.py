@@ -40,7 +40,7 @@ _LEAST_CONTRAST = 0.05
 _CLEAR = 1.0  # evidence, in units of ln, that is more than noise
 _WHOLE_STEP = 0.5  # of the usual step of the dot's edge
 _LARGEST = 4.0  # scaled feature; more says no more
-_COUNTED = 0.9  # probability of being a target, from which a dot counts
+_COUNTED = 0.75  # probability of being a target, from which a dot counts
 # Of `target_probability`; a row of weights holds those of a factor with itself and all after it.
 _MEANS = np.array([0.913, 0.977, -0.787, 1.98, 0.168, 3.638, 0.252, 0.039, 0.238, 6.623])
 _SPREADS = np.array([0.14, 0.079, 0.279, 0.57, 0.133, 0.757, 0.745, 0.084, 0.1, 1.055])

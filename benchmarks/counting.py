@@ -30,7 +30,7 @@ from ahf_ros import frame
 from ahf_ros.adaptive import identify
 from ahf_ros.codes.ring import FAMILY_NAMES, family
 from ahf_ros.counting import estimate_count, target_features, terms
-from ahf_ros.detectors import DETECTOR_NAMES, DetectorSettings, create
+from ahf_ros.detectors import DetectorSettings, create
 from ahf_ros.detectors.ring import RingDetector
 from ahf_ros.evaluation import TrueTarget, score
 from ahf_ros.synthetic.lights import benchmark_lights
@@ -38,6 +38,9 @@ from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 
 SEARCHED = (('normal', 0.3), ('stripe', 0.3), ('stripe', 0.12), ('lattice', 0.3))
 """Lights under which AHF is driven."""
+
+SEARCHING = ('traditional', 'ring')
+"""Detectors of ring targets, which AHF drives."""
 
 EMPTY = (('normal', 0.3), ('stripe', 0.3), ('stripe', 0.04), ('lattice', 0.3), ('lattice', 0.04))
 """Lights on walls without targets."""
@@ -135,22 +138,17 @@ def counted(seeds: Sequence[int]) -> list[str]:
     """Return the table of estimates, and what they come to."""
     lines = ['| light | N | estimates | times `ring` |', '|---|---|---|---|']
     errors, ratios = [], []
-    rows = [(f'{name} {ambient:g}', SceneSettings(light=name, ambient=ambient))
-            for name, ambient in benchmark_lights()]  # fmt: skip
-    rows += [
-        (
-            f'{name} {ambient:g}, no targets',
-            SceneSettings(light=name, ambient=ambient, targets=0, distractors=DISTRACTORS),
-        )
-        for name, ambient in EMPTY
-    ]
-    for name, scene in progress(rows):
+    usual, empty = SceneSettings(), SceneSettings(targets=0, distractors=DISTRACTORS)
+    rows = [(usual, *light) for light in benchmark_lights()]
+    rows += [(empty, *light) for light in EMPTY]
+    for kind, light, ambient in progress(rows):
+        scene = replace(kind, light=light, ambient=ambient)
         seen = [measured(render(replace(scene, seed=seed)).image) for seed in seeds]
         estimates, times = zip(*seen, strict=True)
         errors += [abs(estimate - scene.targets) for estimate in estimates]
         ratios += times
         told = ', '.join(map(str, estimates))
-        lines.append(f'| {name} | {scene.targets} | {told} | {median(times):.2f} |')
+        lines.append(f'| {light} {ambient:g} | {scene.targets} | {told} | {median(times):.2f} |')
     exact = sum(error == 0 for error in errors)
     lines += [
         '',
@@ -205,7 +203,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument('--fit', type=int, nargs='+', metavar='SEED', help='fit the weights anew')
     parser.add_argument('--seeds', type=int, nargs='+', default=[101])
-    parser.add_argument('--detector', nargs='*', choices=DETECTOR_NAMES, default=['traditional'])
+    parser.add_argument('--detector', nargs='*', choices=SEARCHING, default=SEARCHING[:1])
     options = parser.parse_args()
     if options.fit:
         for name, values in fitted(options.fit).items():

@@ -71,8 +71,9 @@ def test_targets_count_whose_bands_are_half_hidden():
     assert estimate_count(image) == 6
 
 
-def test_radii_bound_what_counts():
+def test_radii_and_polarity_bound_what_counts():
     image = scene(seed=15).image
+    assert estimate_count(image, DetectorSettings(polarity='bright')) == 0
     assert estimate_count(image, DetectorSettings(max_radius=12.0)) == 0
 
 
