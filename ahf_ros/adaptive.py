@@ -129,6 +129,22 @@ def identify(
     return AdaptiveIdentifier(detector, settings, refine, estimate).identify(image, expected)
 
 
+@dataclass(frozen=True, slots=True)
+class Memory:
+    """What lives from one image to the next.
+
+    Attributes
+    ----------
+    filter : tuple of float or None
+        The filter that the next image is begun with; None for none.
+    settled : tuple of 2 int or None
+        n and N of the last image; None unless N was estimated.
+    """
+
+    filter: Values | None = None
+    settled: tuple[int, int] | None = None
+
+
 class AdaptiveIdentifier:
     """Identifies one image after the other and begins each with the filter that worked last.
 
@@ -158,9 +174,8 @@ class AdaptiveIdentifier:
     ----------
     last_search : SearchResult or None
         The search for the last image; None where there was none.
-    remembered : tuple of float or None
-        The filter that the next image is begun with. All that lives from one image to the next,
-        unless N is estimated: set it to go on where another left off.
+    memory : Memory
+        What earlier images leave to the next one; set it to go on where another left off.
     """
 
     def __init__(
@@ -177,13 +192,11 @@ class AdaptiveIdentifier:
         self._refine = refine or getattr(detector, 'refine', None)
         self._estimate = estimate
         self._clock = clock
-        self.remembered: Values | None = None
-        self._settled: tuple[int, int] | None = None  # n and N of the last image, N estimated
+        self.memory = Memory()
 
     def reset(self) -> None:
         """Forget what worked for earlier images."""
-        self.remembered = None
-        self._settled = None
+        self.memory = Memory()
 
     def identify(self, image: np.ndarray, expected: int) -> Identification:
         """Identify the targets of one image; call it from one thread at a time.
@@ -219,11 +232,12 @@ class AdaptiveIdentifier:
         threads = self._settings.threads or os.cpu_count() or 1
         with ThreadPoolExecutor(threads) if threads > 1 else nullcontext() as executor:
             if estimate and self._unchanged(trials, estimate, executor):
-                chosen, evaluations = self.remembered, 1
+                chosen, evaluations = self.memory.filter, 1
             else:
                 chosen, evaluations = self._choose(trials, executor)
         targets = trials.targets[chosen]
-        self._settled = (count_codes(targets), trials.expected) if estimate else None
+        settled = (count_codes(targets), trials.expected) if estimate else None
+        self.memory = replace(self.memory, settled=settled)
         if self._refine and (chosen or image.dtype != np.uint8):
             targets = _checked(self._refine(image, targets), 'refine')
         state = FilterState(
@@ -239,9 +253,10 @@ class AdaptiveIdentifier:
     def _unchanged(self, trials: _Trials, estimate: Estimate, executor: Executor | None) -> bool:
         """Return whether an image shows what the last one did; tell the trials what N is."""
         self.last_search = None
-        shown = trials.count(self.remembered, executor)
-        if shown and self._settled and self._settled[0] == shown:
-            trials.expected = self._settled[1]
+        shown = trials.count(self.memory.filter, executor)
+        settled = self.memory.settled
+        if shown and settled and settled[0] == shown:
+            trials.expected = settled[1]
             return True
         estimated = estimate(trials.image)
         _check_count('estimate', estimated)
@@ -251,13 +266,13 @@ class AdaptiveIdentifier:
     def _choose(self, trials: _Trials, executor: Executor | None) -> tuple[Values | None, int]:
         """Return the best filter, None for the image as received, and the evaluations."""
         self.last_search = None
-        remembered = self.remembered
+        remembered = self.memory.filter
         searching = self._settings.ahf and trials.expected > 0
         if searching and remembered and trials.discrepancy(remembered, executor) == 0:
             return remembered, len(trials.targets)
         unfiltered = trials.discrepancy(None, executor)
         if not searching or unfiltered == 0:
-            self.remembered = None if searching else remembered
+            self.memory = replace(self.memory, filter=None if searching else remembered)
             return None, len(trials.targets)
         genetic = self._settings.genetic
         self.last_search = result = search(
@@ -269,8 +284,9 @@ class AdaptiveIdentifier:
             executor=executor,
             clock=self._clock,
         )
-        self.remembered = result.values if result.discrepancy < unfiltered else None
-        return self.remembered, 1 + result.evaluations
+        chosen = result.values if result.discrepancy < unfiltered else None
+        self.memory = replace(self.memory, filter=chosen)
+        return chosen, 1 + result.evaluations
 
 
 class _Trials:

@@ -20,6 +20,7 @@ from ahf_ros.bag.definitions import (
 )
 from ahf_ros.bag.journal import Answer, Frame
 from ahf_ros.bag.source import Source
+from ahf_ros.counting import estimator
 from ahf_ros.detectors import DETECTOR, DetectorSettings, create
 from ahf_ros.drawing import draw
 from ahf_ros.encodings import decode_compressed, decode_image
@@ -62,6 +63,8 @@ class Answering:
         By the topic of the images.
     expected : int
         N, the number of coded targets in every image; 0 where unknown.
+    estimate_expected : bool
+        Whether to estimate N where it is unknown.
     detector : str
         Name of the detector.
     detection : DetectorSettings
@@ -73,17 +76,20 @@ class Answering:
         source: Source,
         topics: Mapping[str, AnswerTopics],
         expected: int = 0,
+        estimate_expected: bool = False,
         detector: str = DETECTOR.default,
         detection: DetectorSettings | None = None,
         adaptive: AdaptiveSettings | None = None,
     ) -> None:
+        detection = detection or DetectorSettings()
         made = create(detector, detection)
         self._source = source
         self._topics = topics
         self._expected = expected
         self._family = made.family
+        estimate = estimator(made, detection) if estimate_expected else None
         self._identifiers = {
-            topic: AdaptiveIdentifier(made, adaptive) for topic in topics
+            topic: AdaptiveIdentifier(made, adaptive, estimate=estimate) for topic in topics
         }
         self._store = typestore()
         self._types = message_types(self._store)
@@ -102,12 +108,12 @@ class Answering:
         except Exception as error:
             # The others go on, whatever an image does to a decoder or a detector.
             reason = f'{type(error).__name__}: {error}'
-        memory = self._identifiers[topic].remembered
+        memory = self._identifiers[topic].memory
         return Frame(topic, timestamp, memory, reason), answers
 
     def resume(self, frame: Frame) -> None:
         """Go on as if an image had just been answered."""
-        self._identifiers[frame.topic].remembered = frame.memory
+        self._identifiers[frame.topic].memory = frame.memory
 
     def _messages(self, connection: Connection, data: bytes) -> list[Answer]:
         received = self._source.deserialize(connection, data)

@@ -25,6 +25,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
+from ahf_ros.adaptive import Memory
 from ahf_ros.bag.definitions import typestore
 
 VERSION: Final = 9
@@ -40,6 +41,7 @@ JOINED = 10
 
 _STRING = 'std_msgs/msg/String'
 _INFORMATION = 'rosbag2_bagfile_information'
+_NEW = 'metadata.new'
 _SUFFIX = '.part.db3'
 _EMPTY = f'{0:09}-0{_SUFFIX}'
 
@@ -54,7 +56,7 @@ class Frame:
         That it was recorded from.
     timestamp : int
         When it was recorded, ns.
-    memory : tuple of float or None
+    memory : Memory
         What its identification leaves to the next one of its topic.
     reason : str
         Why it was refused; empty where it was not.
@@ -62,7 +64,7 @@ class Frame:
 
     topic: str
     timestamp: int
-    memory: tuple[float, ...] | None
+    memory: Memory
     reason: str
 
 
@@ -184,7 +186,8 @@ class Journal:
     def _frame(self, data: bytes) -> Frame:
         text: Any = self._store.deserialize_cdr(data, _STRING)
         fields = json.loads(text.data)
-        return Frame(**fields | {'memory': fields['memory'] and tuple(fields['memory'])})
+        memory = {name: value and tuple(value) for name, value in fields['memory'].items()}
+        return Frame(**fields | {'memory': Memory(**memory)})
 
     def _write_metadata(self) -> None:
         """Say which files count, how many messages there are and when."""
@@ -215,7 +218,7 @@ def custom_data(folder: Path) -> dict[str, str]:
 
 def remove_parts(folder: Path) -> None:
     """Remove all files of a journal from a bag that is finished."""
-    for file in folder.glob(f'*{_SUFFIX}'):
+    for file in (*folder.glob(f'*{_SUFFIX}'), *folder.glob(_NEW)):
         file.unlink()
 
 
@@ -233,6 +236,6 @@ def _metadata(folder: Path) -> Any:
 
 def _replace(path: Path, content: Any) -> None:
     """Write a file of which readers see the old or the new one, never a part."""
-    new = path.with_suffix('.new')
+    new = path.with_name(_NEW)
     new.write_text(json.dumps(content, indent=1), encoding='utf-8')  # JSON is YAML
     new.replace(path)

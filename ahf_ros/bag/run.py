@@ -59,7 +59,7 @@ class BagTask:
         One of `STORAGES`.
     debug_images : bool
         Whether annotated images are written, as JPEG.
-    expected, detector, detection, adaptive
+    expected, estimate_expected, detector, detection, adaptive
         As for `Answering`.
     """
 
@@ -70,6 +70,7 @@ class BagTask:
     storage: str = 'mcap'
     debug_images: bool = False
     expected: int = 0
+    estimate_expected: bool = False
     detector: str = DETECTOR.default
     detection: DetectorSettings = field(default_factory=DetectorSettings)
     adaptive: AdaptiveSettings = field(default_factory=AdaptiveSettings)
@@ -212,7 +213,13 @@ def _answer_images(
 ) -> None:
     """Answer the images that are not answered yet."""
     answering = Answering(
-        source, topics, task.expected, task.detector, task.detection, task.adaptive
+        source,
+        topics,
+        task.expected,
+        task.estimate_expected,
+        task.detector,
+        task.detection,
+        task.adaptive,
     )
     total = sum(item.msgcount for item in source.connections if item.topic in topics)
     earlier = list(journal.frames)

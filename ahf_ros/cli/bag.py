@@ -18,6 +18,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from ahf_ros.cli.identify import IdentifySettings
 from ahf_ros.cli.options import add_option, add_options, settings_from
+from ahf_ros.counting import ESTIMATE_EXPECTED
 from ahf_ros.parameter import Parameter
 
 if TYPE_CHECKING:
@@ -68,6 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--debug-images', action='store_true', help='Write annotated images, too, as JPEG.'
     )
     add_option(parser, JOBS)
+    add_option(parser, ESTIMATE_EXPECTED)
     add_options(parser, IdentifySettings)
 
 
@@ -118,6 +120,7 @@ def _tasks(options: argparse.Namespace) -> list[BagTask]:
             storage=options.storage,
             debug_images=options.debug_images,
             expected=settings.expected,
+            estimate_expected=options.estimate_expected,
             detector=settings.detector,
             detection=settings.target,
             adaptive=settings.adaptive,
