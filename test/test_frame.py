@@ -52,7 +52,7 @@ def test_samples_of_a_slope_are_those_of_the_slope():
     lines = frame.sample_lines(
         image, np.array([[10.0, 8.0]]), np.array([[0.6, 0.8]]), np.array([-1.0, 0.0, 2.0])
     )
-    assert lines[0] == pytest.approx([44 - 3.6, 44, 44 + 7.2], abs=1e-4)
+    assert lines[0] == pytest.approx([44 - 3.6, 44, 44 + 7.2], abs=0.08)  # cv2.remap: 1/32 px
 
 
 def test_the_border_goes_on_beyond_the_image():
