@@ -14,7 +14,8 @@ from typing import TypeVar
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
-from sensor_msgs.msg import Image
+from rclpy.subscription import Subscription
+from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
@@ -23,9 +24,9 @@ from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.diagnostics import Diagnostics, Tally
 from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.nodes.parameters import ParameterSettings
-from ahf_ros.nodes.pipeline import STOPPING, Pipeline, Refused
+from ahf_ros.nodes.pipeline import STOPPING, ImageMessage, Pipeline, Refused
 from ahf_ros.nodes.process import ProcessNode, run
-from ahf_ros.nodes.settings import DetectorNodeSettings
+from ahf_ros.nodes.settings import LOSSLESS, DetectorNodeSettings
 from ahf_ros.nodes.worker import Worker
 from ahf_ros.srv import Identify
 
@@ -33,6 +34,9 @@ Result = TypeVar('Result')
 
 DIAGNOSTICS_PERIOD = 1.0
 """Time between two statements on /diagnostics, s."""
+
+TOPICS = {'raw': (Image, 'image'), 'compressed': (CompressedImage, 'image/compressed')}
+"""Where images come in, by the way that they are sent."""
 
 LOG_PERIOD = 5.0
 """Shortest time between two log lines about images that are refused, s."""
@@ -48,8 +52,6 @@ class DetectorNode(ProcessNode):
     def __init__(self) -> None:
         super().__init__('detector')
         self._stopping = threading.Event()
-        self._settings = ParameterSettings(self, DetectorNodeSettings, self._renew)
-        self._renew()
         self._worker = Worker()
         self._tally = Tally()
         name = self.get_fully_qualified_name().lstrip('/')
@@ -60,7 +62,10 @@ class DetectorNode(ProcessNode):
         self._filtered_image = self.publisher(Image, '~/filtered_image')
         self._diagnostic_array = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self.create_timer(DIAGNOSTICS_PERIOD, self._publish_diagnostics)
-        self.subscribe(Image, 'image', self._on_image)
+        self._images: Subscription | None = None
+        self._subscribed = ('', '')
+        self._settings = ParameterSettings(self, DetectorNodeSettings, self._renew)
+        self._renew()
         requests = MutuallyExclusiveCallbackGroup()
         self.create_service(Identify, '~/identify', self._on_identify, callback_group=requests)
         self.create_service(Trigger, '~/reset', self._on_reset, callback_group=requests)
@@ -72,12 +77,26 @@ class DetectorNode(ProcessNode):
 
     def _renew(self) -> None:
         """Work on the images from now on as the parameters say now."""
-        self._pipeline = Pipeline(self._settings.current, self._stopping)
+        settings = self._settings.current
+        self._pipeline = Pipeline(settings, self._stopping)
+        if self._subscribed != (settings.image_transport, settings.queue):
+            self._subscribed = (settings.image_transport, settings.queue)
+            if self._images:
+                self.destroy_subscription(self._images)
+            kind, topic = TOPICS[settings.image_transport]
+            lossless = settings.queue == LOSSLESS
+            subscribe = self.subscribe_to_all if lossless else self.subscribe
+            # It may wait for room, which must not keep anything else waiting.
+            group = MutuallyExclusiveCallbackGroup()
+            self._images = subscribe(kind, topic, self._on_image, group)
 
-    def _on_image(self, message: Image) -> None:
+    def _on_image(self, message: ImageMessage) -> None:
         self._tally.received += 1
         job = partial(self._process, message, self._pipeline, time.monotonic())
-        if self._worker.offer(job):
+        settings = self._pipeline.settings
+        if settings.queue == LOSSLESS:
+            self._worker.append(job, len(message.data), settings.queue_memory * 2**20)
+        elif self._worker.offer(job):
             self._tally.dropped += 1
 
     def _on_identify(
@@ -103,12 +122,12 @@ class DetectorNode(ProcessNode):
             response.message = STOPPING
         return response
 
-    def _process(self, message: Image, pipeline: Pipeline, received: float) -> None:
+    def _process(self, message: ImageMessage, pipeline: Pipeline, received: float) -> None:
         """Identify the targets of an image and publish everything about it."""
         with suppress(Refused):
             self._attempt(partial(self._answer, message, pipeline, received))
 
-    def _answer(self, message: Image, pipeline: Pipeline, received: float) -> None:
+    def _answer(self, message: ImageMessage, pipeline: Pipeline, received: float) -> None:
         answer = pipeline.answer(message, pipeline.settings.expected_targets)
         self._targets.publish(answer.message)
         self._tally.answered += 1

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
-from sensor_msgs.msg import Image
+from sensor_msgs.msg import CompressedImage, Image
 
 from ahf_ros.adaptive import AdaptiveIdentifier
 from ahf_ros.counting import estimator
 from ahf_ros.detectors import create
-from ahf_ros.encodings import decode_image
+from ahf_ros.encodings import decode_compressed, decode_image
 from ahf_ros.homomorphic import HomomorphicFilter
 from ahf_ros.msg import CodedTargetArray
-from ahf_ros.nodes.settings import DetectorNodeSettings
+from ahf_ros.nodes.settings import LOSSLESS, DetectorNodeSettings
 from ahf_ros.nodes.target_msg import coded_target_array
 from ahf_ros.target import Identification, Target
+
+ImageMessage: TypeAlias = Image | CompressedImage
+"""What images come in as."""
 
 STOPPING = 'the node stops'
 """Why there is no answer any more."""
@@ -70,7 +74,7 @@ class Pipeline:
             estimate,
         )
 
-    def answer(self, message: Image, expected: int) -> Answer:
+    def answer(self, message: ImageMessage, expected: int) -> Answer:
         """Identify the targets of an image.
 
         Raises
@@ -80,8 +84,12 @@ class Pipeline:
         Refused
             If the node stops before.
         """
-        image = decode_image(message)
+        image = (decode_compressed if hasattr(message, 'format') else decode_image)(message)
         identification = self._identifier.identify(image, expected)
+        if self.settings.queue == LOSSLESS:
+            # Time is the one thing about it that would be another one in a second run.
+            used = replace(identification.filter, duration=0.0)
+            identification = replace(identification, filter=used)
         sent = coded_target_array(
             identification, self._detector.family, image.shape, message.header
         )

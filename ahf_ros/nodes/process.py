@@ -10,13 +10,15 @@ from collections.abc import Callable
 from typing import Any
 
 import rclpy
+from rclpy.callback_groups import CallbackGroup
 from rclpy.exceptions import ParameterException
 from rclpy.executors import MultiThreadedExecutor
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.qos import QoSProfile
+from rclpy.qos import HistoryPolicy, QoSProfile
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.signals import SignalHandlerOptions
+from rclpy.subscription import Subscription
 from rclpy.task import Future
 
 ENDING = {signal.SIGINT, signal.SIGTERM}
@@ -46,11 +48,39 @@ class ProcessNode(Node):
             kind, topic, QoSProfile(depth=1), qos_overriding_options=options
         )
 
-    def subscribe(self, kind: type, topic: str, callback: Callable[[Any], None]) -> None:
+    def subscribe(
+        self,
+        kind: type,
+        topic: str,
+        callback: Callable[[Any], None],
+        group: CallbackGroup | None = None,
+    ) -> Subscription:
         """Subscribe to a topic, reliable and of depth 1 where `qos_overrides` do not say more."""
         options = QoSOverridingOptions.with_default_policies()
-        self.create_subscription(
-            kind, topic, callback, QoSProfile(depth=1), qos_overriding_options=options
+        return self.create_subscription(
+            kind,
+            topic,
+            callback,
+            QoSProfile(depth=1),
+            callback_group=group,
+            qos_overriding_options=options,
+        )
+
+    def subscribe_to_all(
+        self, kind: type, topic: str, callback: Callable[[Any], None], group: CallbackGroup
+    ) -> Subscription:
+        """Subscribe to every message of a topic: those that wait are kept, and hold back others.
+
+        `qos_overrides` name it `subscription_lossless`.
+        """
+        options = QoSOverridingOptions.with_default_policies(entity_id='lossless')
+        return self.create_subscription(
+            kind,
+            topic,
+            callback,
+            QoSProfile(history=HistoryPolicy.KEEP_ALL),
+            callback_group=group,
+            qos_overriding_options=options,
         )
 
 
@@ -79,8 +109,9 @@ def run(make_node: Callable[[], ProcessNode], arguments: list[str] | None = None
         rclpy.shutdown()
         return 1
     threading.Thread(target=_end_at_signal, args=(node.ended, signalled), daemon=True).start()
-    # One thread for a service that takes as long as an identification, one for all that is short.
-    executor = MultiThreadedExecutor(num_threads=2)
+    # One thread for a service that takes as long as an identification, one for images that wait
+    # for room in a queue, one for all that is short.
+    executor = MultiThreadedExecutor(num_threads=3)
     executor.add_node(node)
     try:
         executor.spin_until_future_complete(node.ended)

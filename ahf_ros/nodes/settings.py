@@ -10,6 +10,9 @@ from ahf_ros.detectors import DETECTOR, DetectorSettings, create
 from ahf_ros.parameter import check_parameters, parameter
 from ahf_ros.synthetic.scene import SceneSettings
 
+LATEST, LOSSLESS = 'latest', 'lossless'
+"""What becomes of images that come in while another is worked on."""
+
 LARGEST_COUNT = 100000
 """Largest number of targets that an image can be told to show."""
 
@@ -27,14 +30,33 @@ class DetectorNodeSettings:
         maximum=LARGEST_COUNT,
     )
     estimate_expected: bool = parameter(ESTIMATE_EXPECTED.default, ESTIMATE_EXPECTED.description)
+    image_transport: str = parameter(
+        'raw',
+        'raw: sensor_msgs/Image on image; compressed: CompressedImage on image/compressed.',
+        choices=('raw', 'compressed'),
+    )
+    queue: str = parameter(
+        LATEST,
+        'latest: an image that waits is dropped for a later one; lossless: all are answered in '
+        'order, and the duration in answers is 0.',
+        choices=(LATEST, LOSSLESS),
+    )
+    queue_memory: int = parameter(
+        1024,
+        'Most memory for images that wait in a lossless queue, MB; what is full holds back the '
+        'publisher.',
+        minimum=1,
+        maximum=10**6,
+    )
     target: DetectorSettings = field(default_factory=DetectorSettings)
     adaptive: AdaptiveSettings = field(default_factory=AdaptiveSettings)
 
     def __post_init__(self) -> None:
         """Refuse values that are not accepted."""
         check_parameters(self)
+        detector = create(self.detector, self.target)
         if self.estimate_expected:
-            estimator(create(self.detector, self.target), self.target)
+            estimator(detector, self.target)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""One thread that works off jobs, of which only the latest may wait."""
+"""One thread that works off jobs, of which all may wait or only the latest."""
 
 from __future__ import annotations
 
@@ -13,13 +13,17 @@ Result = TypeVar('Result')
 class Worker:
     """Runs jobs one at a time, beside the threads that answer parameters and services.
 
-    A live stream offers its jobs: while one runs, only the latest waits. A request calls its job:
-    it runs in any case, and its caller gets the result.
+    A live stream offers its jobs: while one runs, only the latest waits. What must not lose any
+    appends its jobs: they run in their order. A request calls its job: it runs in any case, and
+    its caller gets the result.
     """
 
     def __init__(self) -> None:
         self._thread = ThreadPoolExecutor(max_workers=1)
         self._lock = threading.Lock()
+        self._room = threading.Condition()
+        self._waiting = 0
+        self._stopped = False
         self._latest: Callable[[], None] | None = None
 
     def offer(self, job: Callable[[], None]) -> bool:
@@ -37,6 +41,28 @@ class Worker:
             self._submit(self._run_latest)
         return dropped
 
+    def append(self, job: Callable[[], None], size: int, limit: int) -> None:
+        """Run `job`, which handles its own errors, after all that were appended before.
+
+        Return as soon as there is room for it, or the worker has been stopped.
+
+        Parameters
+        ----------
+        job : callable
+        size : int
+            What it takes while it waits.
+        limit : int
+            What all that wait may take together; one may always wait.
+        """
+        with self._room:
+            self._room.wait_for(
+                lambda: self._stopped or not self._waiting or self._waiting + size <= limit
+            )
+            if self._stopped:
+                return
+            self._waiting += size
+        self._submit(lambda: self._run_appended(job, size))
+
     def call(self, job: Callable[[], Result]) -> Result:
         """Run `job` and return its result, or raise its error.
 
@@ -49,6 +75,9 @@ class Worker:
 
     def stop(self) -> None:
         """Drop the jobs that wait and return when the one that runs has ended."""
+        with self._room:
+            self._stopped = True
+            self._room.notify_all()
         self._thread.shutdown(cancel_futures=True)
 
     def _submit(self, job: Callable[[], Result]) -> Future[Result]:
@@ -64,3 +93,9 @@ class Worker:
             job, self._latest = self._latest, None
         if job is not None:
             job()
+
+    def _run_appended(self, job: Callable[[], None], size: int) -> None:
+        with self._room:
+            self._waiting -= size
+            self._room.notify()
+        job()
