@@ -242,7 +242,8 @@ def test_the_service_answers_one_image(detector: Detector, message: Image) -> No
     message.encoding = 'jpeg'
     response = detector.identify(message)
     assert not response.success
-    assert response.message.startswith("encoding is 'jpeg', accepted is one of mono8, mono16, rgb8")
+    accepted = "encoding is 'jpeg', accepted is one of mono8, mono16, rgb8"
+    assert response.message.startswith(accepted)
 
 
 def test_every_parameter_says_what_it_is(graph: Any, detector: Detector) -> None:
