@@ -328,3 +328,15 @@ def test_bags_of_one_name_are_refused(
 ) -> None:
     assert status(recording, recording, tmp_path / 'made') == 2
     assert 'several bags of one name' in capfd.readouterr().err
+
+
+def test_a_missing_library_is_named(
+    recording: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.delitem(sys.modules, 'ahf_ros.bag.run')
+    monkeypatch.setitem(sys.modules, 'rosbags.rosbag2', None)
+    assert status(recording, tmp_path / 'out') == 2
+    assert 'is not installed, bags need it: pip install rosbags' in capfd.readouterr().err

@@ -241,7 +241,8 @@ def test_files_that_cannot_be_compared_are_named(tmp_path, capsys, missing):
 
 
 @pytest.mark.parametrize(
-    ('command', 'settings'), [('identify', IdentifySettings), ('render', SceneSettings)]
+    ('command', 'settings'),
+    [('identify', IdentifySettings), ('bag', IdentifySettings), ('render', SceneSettings)],
 )
 def test_help_describes_every_setting(monkeypatch, capsys, command, settings):
     monkeypatch.setenv('COLUMNS', '1000')

@@ -103,7 +103,12 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _tasks(options: argparse.Namespace) -> list[BagTask]:
-    from ahf_ros.bag.run import BagTask
+    try:
+        from ahf_ros.bag.run import BagTask
+    except ModuleNotFoundError as error:
+        raise ValueError(
+            f'{error.name} is not installed, bags need it: pip install rosbags'
+        ) from error
 
     settings = settings_from(options, IdentifySettings)
     targets = [options.target]
