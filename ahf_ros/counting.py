@@ -40,6 +40,8 @@ _LEAST_CONTRAST = 0.05
 _CLEAR = 1.0  # evidence, in units of ln, that is more than noise
 _WHOLE_STEP = 0.5  # of the usual step of the dot's edge
 _LARGEST = 4.0  # scaled feature; more says no more
+_MARKED = 7  # the feature that is the share of angles with a mark
+_LEAST_MARKED = 1.0  # sectors of a band with a mark at both edges
 _COUNTED = 0.75  # probability of being a target, from which a dot counts
 # Of `target_probability`; a row of weights holds those of a factor with itself and all after it.
 _MEANS = np.array([0.913, 0.977, -0.787, 1.98, 0.168, 3.638, 0.252, 0.039, 0.238, 6.623])
@@ -88,8 +90,10 @@ def estimate_count(image: np.ndarray, settings: DetectorSettings | None = None) 
     found = found.chosen((major >= wanted.min_radius) & (major <= wanted.max_radius))
     features = target_features(as_gray(image).astype(np.float32, copy=False), found, code)
     probability = target_probability(features)
+    # No regression knows all dots that have no band; every word has two marked sectors at least.
+    banded = features[:, _MARKED] * code.bits >= _LEAST_MARKED
     best_first = np.argsort(-probability, kind='stable')
-    targets = found.chosen(best_first[: np.count_nonzero(probability >= _COUNTED)])
+    targets = found.chosen(best_first[(banded & (probability >= _COUNTED))[best_first]])
     count = len(targets.words)
     distinct, _ = settled_dots(targets, np.zeros(count), np.ones(count, bool), code)
     return len(distinct)

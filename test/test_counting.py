@@ -115,3 +115,11 @@ def test_only_ring_targets_are_estimated():
         estimator(create('aruco', wanted), wanted)
     with pytest.raises(ValueError, match='estimate_expected is True'):
         DetectorNodeSettings(detector='aruco', estimate_expected=True)
+
+
+@pytest.mark.parametrize(('paper', 'ink'), [(200, 20), (20, 200)])
+def test_dots_without_a_band_are_no_targets(paper, ink):
+    image = np.full((400, 600), paper, np.uint8)
+    for x, radius in zip(range(80, 600, 110), (6, 9, 12, 16, 20), strict=True):
+        cv2.circle(image, (x, 200), radius, ink, -1, cv2.LINE_AA)
+    assert estimate_count(cv2.GaussianBlur(image, (0, 0), 0.8)) == 0
