@@ -9,6 +9,7 @@ projected stripes.
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 from math import ceil, log2
 
@@ -21,8 +22,13 @@ from ahf_ros.tone import LOG_OFFSET
 LOG_SCALE = 1000.0
 """Units of a logarithmic image of int16 in one unit of ln."""
 
+MAXIMUM_OUTLINES = 20_000
+"""Whole ellipses kept at the most, those that are most exactly ellipses."""
+
 MAXIMUM_CANDIDATES = 6000
 """Candidates kept at the most for one range of radii, those with the most votes."""
+
+_LOG = logging.getLogger(__name__)
 
 _WEAK_EDGE, _STRONG_EDGE = 0.15, 0.22  # steps of ln, of the thresholds with hysteresis
 _MINIMUM_VOTES = 1.5  # a unit of the circumference
@@ -184,9 +190,10 @@ class LogEdges:
         major, minor = np.sqrt(middle + half), np.sqrt(np.maximum(middle - half, 0))
         good = (spread < _OUTLINE_SPREAD) & (np.abs(outwards) > _OUTLINE_SIGN)
         good &= (major >= low) & (major <= high) & (minor >= 1.0)
+        kept = _first(np.flatnonzero(good), spread[good], MAXIMUM_OUTLINES, 'whole ellipses')
         angle = np.arctan2(xy, (xx - yy) / 2) / 2
         frames = affine_frames(centre_x, centre_y, major, minor, angle)
-        return frames[good], np.sign(outwards[good]).astype(int)
+        return frames[kept], np.sign(outwards[kept]).astype(int)
 
 
 def find_edges(log: np.ndarray) -> LogEdges:
@@ -265,11 +272,17 @@ def _vote(
     reach = 2 * max(1, round(low / cell / 2)) + 1
     highest = cv2.dilate(votes, np.ones((reach, reach), np.uint8))
     peaks = np.flatnonzero((votes >= highest) & (votes > needed))
-    if len(peaks) > MAXIMUM_CANDIDATES:
-        order = np.argsort(-votes.ravel()[peaks], kind='stable')[:MAXIMUM_CANDIDATES]
-        peaks = np.sort(peaks[order])
+    peaks = _first(peaks, -votes.ravel()[peaks], MAXIMUM_CANDIDATES, 'candidates of one size')
     rows, columns = np.divmod(peaks, width)
     return (np.stack([columns, rows], axis=-1) + 0.5) * cell - 0.5
+
+
+def _first(places: np.ndarray, ranks: np.ndarray, limit: int, what: str) -> np.ndarray:
+    """Return the places of the lowest ranks, in their order; say where some are left out."""
+    if len(places) <= limit:
+        return places
+    _LOG.warning('%d %s, of which the %d best are looked at', len(places), what, limit)
+    return np.sort(places[np.argsort(ranks, kind='stable')[:limit]])
 
 
 def _votes(columns: np.ndarray, rows: np.ndarray, width: int, height: int) -> np.ndarray:

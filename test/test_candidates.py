@@ -164,3 +164,17 @@ def test_candidates_are_bounded_where_dots_are_everywhere():
     gray = np.where(np.hypot(row % 12 - 6, column % 12 - 6) < 4.4, 30, 200).astype(np.uint8)
     groups = candidates.find_candidates(edges_of(gray), 4, 60, (1, -1))
     assert all(len(group.points) <= 2 * MAXIMUM_CANDIDATES for group in groups)
+
+
+def test_more_dots_than_are_looked_at_are_said_and_the_roundest_stay(monkeypatch, caplog):
+    image = np.full((400, 400), 200, np.uint8)
+    for row in range(20, 400, 40):
+        for column in range(20, 400, 40):
+            cv2.ellipse(image, (column, row), (9, 9 if row < 200 else 6), 30, 0, 360, 40, -1)
+    edges = candidates.find_edges(candidates.log_image(image))
+    everything, _ = edges.outlines(4.0, 20.0)
+    assert len(everything) == 100 and not caplog.records
+    monkeypatch.setattr('ahf_ros.candidates.MAXIMUM_OUTLINES', 30)
+    kept, signs = edges.outlines(4.0, 20.0)
+    assert len(kept) == len(signs) == 30
+    assert '100 whole ellipses, of which the 30 best are looked at' in caplog.text
