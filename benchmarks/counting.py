@@ -79,15 +79,13 @@ def training_scenes(seed: int) -> Iterator[SceneSettings]:
         if generator.random() < 0.5:
             radius = float(generator.choice(SIZES))
             steepest = {5.0: 30.0, 7.0: 45.0}.get(radius, 60.0)
-            tilt = min(float(generator.choice([0, 0, 30, 45, 60])), steepest)
-            clutter = int(generator.integers(5, 30)) if radius <= 14 and tilt <= 45 else 0
             scene = replace(
                 scene,
                 family=str(generator.choice(FAMILY_NAMES)),
                 polarity=str(generator.choice(['dark', 'bright'])),
                 dot_radius=radius,
-                tilt=tilt,
-                distractors=clutter,
+                tilt=min(float(generator.choice([0, 0, 30, 45, 60])), steepest),
+                distractors=scene.distractors if kind == 'empty' else 0,
                 focal_length=3.0,
             )
         yield scene
