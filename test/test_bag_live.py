@@ -26,22 +26,21 @@ def test_answers_of_the_node_are_those_of_the_bag(graph: Any, tmp_path: Path) ->
     assert main(['bag', str(source), str(tmp_path / 'out'), '--expected', '4', *options]) == 0
     recorded = [data for topic, _, data in bags.read(tmp_path / 'out') if 'coded' in topic]
 
-    parameters = {**SEARCH, 'expected_targets': 4}
+    parameters = {**SEARCH, 'expected_targets': 4, 'queue': 'lossless'}
     given = [text for name, value in parameters.items() for text in ('-p', f'{name}:={value}')]
     graph.start('detector', '-r', '__ns:=/replay', *given)
     answers = graph.listen(CodedTargetArray, '/replay/coded_targets')
     publisher = graph.publisher(Image, '/replay/image')
     images = [data for topic, _, data in bags.read(source) if topic == '/image']
-    for number, data in enumerate(images, start=1):
+    for data in images:  # faster than they are answered
         publisher.publish(deserialize_message(data, Image))
-        graph.until(lambda number=number: len(answers) == number)
+    graph.until(lambda: len(answers) == len(images))
     assert any(answer.filter.applied for answer in answers)
     assert [comparable(answer) for answer in answers] == recorded
 
 
 def comparable(answer: CodedTargetArray) -> bytes:
-    """Return an answer without the time that it took, and with zeros between its fields."""
+    """Return an answer with zeros between its fields, where ROS has what was in memory."""
     store = typestore()
     message: Any = store.deserialize_cdr(serialize_message(answer), CODED_TARGETS)
-    message.filter.duration = 0.0
     return bytes(store.serialize_cdr(message, CODED_TARGETS))
