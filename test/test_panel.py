@@ -12,8 +12,10 @@ import cv2
 import numpy as np
 import pytest
 
+from ahf_ros.counting import estimate_count
+from ahf_ros.detectors import DetectorSettings
 from ahf_ros.evaluation import FALSE, Truth, evaluate, judge, total
-from ahf_ros.files import read_results, read_truth
+from ahf_ros.files import read_image, read_results, read_truth
 
 ROOT = Path(__file__).parents[1]
 PHOTOS = Path(os.environ.get('AHF_PHOTOS', ROOT.parent / 'shared' / 'photos'))
@@ -79,6 +81,14 @@ def test_recall_and_wrong_ids_on_the_panel(panel):
     assert figures.wrong == 0
     assert figures.recall == figures.decoding >= 0.97  # 99.8 % were measured
     assert figures.rmse[2] < 0.05  # 0.024 px; the truth is good to 0.02
+
+
+@needs_panel
+def test_targets_on_the_panel_are_counted_among_dots_without_code():
+    truth = read_truth(PANEL / 'truth.csv')
+    for name in sorted(truth)[:4]:
+        count = estimate_count(read_image(PANEL / name), DetectorSettings(family='aicon14'))
+        assert abs(count - len(truth[name])) <= 3  # 2 at the most were measured in all ten
 
 
 @needs_panel
