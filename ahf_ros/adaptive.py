@@ -24,6 +24,7 @@ from typing import Any
 
 import numpy as np
 
+from ahf_ros.fusion import fused
 from ahf_ros.genetic import Gene, GeneticSettings, SearchResult, Values, search
 from ahf_ros.homomorphic import FilterSettings, HomomorphicFilter
 from ahf_ros.image import check_image
@@ -74,6 +75,10 @@ class AdaptiveSettings:
     )
     gamma_low_step: float = parameter(
         0.01, 'Step of the gain of the low frequencies.', minimum=0.001, maximum=20.0
+    )
+    fusion: bool = parameter(
+        False,
+        'Whether targets count that other filters than the best one show, after a search in vain.',
     )
     threads: int = parameter(
         0,
@@ -214,8 +219,10 @@ class AdaptiveIdentifier:
         -------
         Identification
             The result with the smallest |N - n|, of equally good ones that of the image as
-            received, then the first. The evaluations of its filter state are the identifications
-            that led to it; threads may have begun others when the right one was found.
+            received, then the first; with `fusion`, and after a search, what it and the other
+            filters show together, see `ahf_ros.fusion`. The evaluations of its filter state are
+            the identifications that led to it; threads may have begun others when the right one
+            was found.
 
         Raises
         ------
@@ -236,9 +243,12 @@ class AdaptiveIdentifier:
             else:
                 chosen, evaluations = self._choose(trials, executor)
         targets = trials.targets[chosen]
+        others = self.last_search.tried if self._settings.fusion and self.last_search else ()
+        if others:
+            targets = fused(trials.of([chosen, None, *others]))
         settled = (count_codes(targets), trials.expected) if estimate else None
         self.memory = replace(self.memory, settled=settled)
-        if self._refine and (chosen or image.dtype != np.uint8):
+        if self._refine and (chosen or others or image.dtype != np.uint8):
             targets = _checked(self._refine(image, targets), 'refine')
         state = FilterState(
             evaluations=evaluations,
@@ -313,6 +323,10 @@ class _Trials:
             found = self._detector(self._shown(values, executor))
             self.targets[values] = _checked(found, 'detector')
         return count_codes(self.targets[values])
+
+    def of(self, tried: Sequence[Values | None]) -> list[list[Target]]:
+        """Return the targets through filters that were tried, each filter once."""
+        return [self.targets[values] for values in dict.fromkeys(tried)]
 
     def _shown(self, values: Values | None, executor: Executor | None) -> np.ndarray:
         if values is None and self.image.dtype == np.uint8:

@@ -106,6 +106,8 @@ class SearchResult:
         Calls of the objective whose result counted.
     history : tuple of Generation
         One a generation, the last one perhaps not complete.
+    tried : tuple of tuple of float
+        What was evaluated, in the order in which it counted.
     reason : str
         Why the search ended: 'found', 'generations', 'stall', 'evaluations', 'duration', or
         'exhausted' where there is nothing left to try.
@@ -115,6 +117,7 @@ class SearchResult:
     discrepancy: float
     evaluations: int
     history: tuple[Generation, ...]
+    tried: tuple[Values, ...]
     reason: str
 
     @property
@@ -235,7 +238,8 @@ class _Objective:
 
     def result(self, history: tuple[Generation, ...], reason: str) -> SearchResult:
         """Return the result of the search."""
-        return SearchResult(self.best, self.best_discrepancy, len(self.known), history, reason)
+        best, tried = self.best_discrepancy, tuple(self.known)
+        return SearchResult(self.best, best, len(tried), history, tried, reason)
 
     def _learn(self, values: Values, result: float) -> None:
         if not result >= 0:
