@@ -28,9 +28,9 @@ from ahf_ros.fusion import fused
 from ahf_ros.genetic import Gene, GeneticSettings, SearchResult, Values, search
 from ahf_ros.homomorphic import FilterSettings, HomomorphicFilter
 from ahf_ros.image import check_image
-from ahf_ros.parameter import check_parameters, parameter
+from ahf_ros.parameter import check_parameters, numbers_in, parameter
 from ahf_ros.spectrum import transfer
-from ahf_ros.target import FilterState, Identification, Target, count_codes
+from ahf_ros.target import UNDECODED, FilterState, Identification, Target, count_codes
 
 AnyDetector = Callable[[np.ndarray], list[Target]]
 """From an 8-bit image, shape (height, width), to the targets in it. Called from several threads at
@@ -54,6 +54,11 @@ class AdaptiveSettings:
 
     ahf: bool = parameter(
         True, 'Whether to search for a filter where the image as received does not show N targets.'
+    )
+    expected_ids: str = parameter(
+        '',
+        'IDs of the coded targets in every image, as 1-54, 60; their number is N, and other IDs '
+        'are wrong.',
     )
     gamma_high_min: float = parameter(
         1.0, 'Smallest gain of the high frequencies.', minimum=0.1, maximum=20.0
@@ -92,9 +97,15 @@ class AdaptiveSettings:
     def __post_init__(self) -> None:
         """Check every parameter, and the ranges against each other."""
         check_parameters(self)
+        numbers_in('expected_ids', self.expected_ids)
         _check_order(self, 'gamma_high_min', 'gamma_high_max')
         _check_order(self, 'gamma_low_min', 'gamma_low_max')
         _check_order(self, 'gamma_low_max', 'gamma_high_min')
+
+    @property
+    def listed(self) -> frozenset[int]:
+        """The IDs that images may show; empty where any may be."""
+        return numbers_in('expected_ids', self.expected_ids)
 
     @property
     def genes(self) -> tuple[Gene, Gene]:
@@ -213,7 +224,9 @@ class AdaptiveIdentifier:
         expected : int
             N, the number of coded targets that it shows; 0 where unknown: N is then estimated, or
             no filter tried where nothing estimates it. Codes that the detector shows at once are
-            targets: no estimate is below their number.
+            targets: no estimate is below their number. Where the settings list the IDs, N is
+            their number, whatever is given here; a target with another ID is left out, and counts
+            as much against a filter as one that it misses.
 
         Returns
         -------
@@ -234,8 +247,10 @@ class AdaptiveIdentifier:
         started = self._clock()
         check_image(image)
         _check_count('expected', expected)
+        listed = self._settings.listed
+        expected = len(listed) or expected
         estimate = None if expected else self._estimate
-        trials = _Trials(image, self._detector, expected, self._settings.filter)
+        trials = _Trials(image, self._detector, expected, listed, self._settings.filter)
         threads = self._settings.threads or os.cpu_count() or 1
         with ThreadPoolExecutor(threads) if threads > 1 else nullcontext() as executor:
             if estimate and self._unchanged(trials, estimate, executor):
@@ -303,10 +318,17 @@ class _Trials:
     """The targets of one image, as received and through every filter tried."""
 
     def __init__(
-        self, image: np.ndarray, detector: AnyDetector, expected: int, settings: FilterSettings
+        self,
+        image: np.ndarray,
+        detector: AnyDetector,
+        expected: int,
+        listed: frozenset[int],
+        settings: FilterSettings,
     ) -> None:
         self.image = image
         self.expected = expected
+        self._listed = listed
+        self._strangers: dict[Values | None, int] = {}
         self.targets: dict[Values | None, list[Target]] = {}
         self._detector = detector
         self._settings = settings
@@ -315,13 +337,20 @@ class _Trials:
 
     def discrepancy(self, values: Values | None, executor: Executor | None = None) -> int:
         """Return |N - n| through a filter; None is the image as received."""
-        return abs(self.expected - self.count(values, executor))
+        missing = abs(self.expected - self.count(values, executor))
+        return missing + self._strangers[values]
 
     def count(self, values: Values | None, executor: Executor | None = None) -> int:
         """Return n through a filter."""
         if values not in self.targets:
-            found = self._detector(self._shown(values, executor))
-            self.targets[values] = _checked(found, 'detector')
+            found = _checked(self._detector(self._shown(values, executor)), 'detector')
+            known = [
+                target
+                for target in found
+                if not self._listed or target.id == UNDECODED or target.id in self._listed
+            ]
+            self._strangers[values] = count_codes(found) - count_codes(known)
+            self.targets[values] = known
         return count_codes(self.targets[values])
 
     def of(self, tried: Sequence[Values | None]) -> list[list[Target]]:

@@ -8,10 +8,14 @@ declares its ROS parameters, the command line its options and the README its tab
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields, replace
 from numbers import Integral, Real
 from typing import Any
+
+MOST_NUMBERS = 100_000
+"""Numbers that a text may list."""
 
 _KEY = 'ahf_ros.parameter'
 
@@ -108,3 +112,25 @@ def check_parameters(settings: Any) -> None:
     """
     for item in parameters(settings):
         item.check(getattr(settings, item.name))
+
+
+def numbers_in(name: str, text: str) -> frozenset[int]:
+    """Return the numbers that a text lists, such as '1-54, 60'; none where it is empty.
+
+    Raises
+    ------
+    ValueError
+        If it is no list of integers and ranges, or holds more than `MOST_NUMBERS`.
+    """
+    numbers: set[int] = set()
+    for part in filter(None, re.split(r'[,\s]+', text)):
+        found = re.fullmatch(r'(\d{1,9})(?:-(\d{1,9}))?', part)
+        first, last = (int(found[1]), int(found[2] or found[1])) if found else (1, 0)
+        if first > last:
+            raise ValueError(
+                f'{name} has {part!r}, accepted are integers and ranges such as 1-54, 60'
+            )
+        if len(numbers) + last - first >= MOST_NUMBERS:
+            raise ValueError(f'{name} is {text!r}, accepted are at most {MOST_NUMBERS} numbers')
+        numbers.update(range(first, last + 1))
+    return frozenset(numbers)

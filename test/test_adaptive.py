@@ -397,3 +397,23 @@ def test_no_name_stands_for_two_settings():
         for item in parameters(settings)
     ]
     assert len(names) == len(set(names))
+
+
+def test_ids_that_are_listed_beat_a_number():
+    """Through a filter the detector shows a listed ID more, and one that cannot be there less."""
+    image = np.arange(400, dtype=np.uint8).reshape(20, 20)
+
+    def detector(shown: np.ndarray) -> list[Target]:
+        numbers = [1, 2, 99] if shown is image else [1, 2, 3]
+        return [Target(number, number, 10.0 * number, 5.0, 3.0, 3.0) for number in numbers]
+
+    without = identify(image, detector, 3)
+    assert [target.id for target in without.targets] == [1, 2, 99]  # three, as expected
+    listed = AdaptiveSettings(expected_ids='1-3')
+    found = identify(image, detector, 50, listed)
+    assert [target.id for target in found.targets] == [1, 2, 3]
+    assert (found.expected, found.filter.applied) == (3, True)
+    only = identify(image, detector, 0, replace(listed, ahf=False))
+    assert [target.id for target in only.targets] == [1, 2]
+    with pytest.raises(ValueError, match="expected_ids has '3-1', accepted are integers"):
+        AdaptiveSettings(expected_ids='3-1')

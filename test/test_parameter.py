@@ -5,7 +5,7 @@ from dataclasses import FrozenInstanceError, dataclass
 import numpy as np
 import pytest
 
-from ahf_ros.parameter import Parameter, check_parameters, parameter, parameters
+from ahf_ros.parameter import Parameter, check_parameters, numbers_in, parameter, parameters
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,3 +120,20 @@ def test_a_parameter_is_a_field_like_any_other():
     with pytest.raises(FrozenInstanceError):
         Camera().gain = 3.0
     assert Camera(True, 2) == Camera(binning=2)
+
+
+def test_numbers_that_a_text_lists():
+    assert numbers_in('ids', '') == frozenset()
+    assert numbers_in('ids', '7') == {7}
+    assert numbers_in('ids', ' 1-3, 7,5-5 9 ') == {1, 2, 3, 5, 7, 9}
+
+
+@pytest.mark.parametrize('text', ['a', '3-1', '-1', '1-', '1.5', '1--2', '1;2'])
+def test_what_is_no_list_of_numbers_is_named(text):
+    with pytest.raises(ValueError, match=r'^ids has .*, accepted are integers and ranges'):
+        numbers_in('ids', f'4, {text}')
+
+
+def test_lists_are_bounded():
+    with pytest.raises(ValueError, match=r'^ids is .*, accepted are at most 100000 numbers'):
+        numbers_in('ids', '1-999999999')
