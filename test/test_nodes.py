@@ -434,3 +434,30 @@ def test_integers_are_accepted_where_numbers_are_meant(graph: Any) -> None:
     process = graph.start('detector', '-r', '__ns:=/whole', *overrides(max_radius=50, mutation=0))
     graph.listen(CodedTargetArray, '/whole/coded_targets')
     assert process.end() == (0, '')
+
+
+def test_a_service_is_a_detector_and_its_end_is_named(
+    graph: Any, detector: Detector, message: Image, rendering: Rendering
+) -> None:
+    other = graph.start('detector', '-r', '__ns:=/other')
+    graph.until(lambda: ('detector', '/other') in graph.node.get_node_names_and_namespaces())
+    chosen = ('detector', 'service'), ('service', '/other/detector/identify')
+    assert detector.set(('detector', 'service')) == (
+        False,
+        "service is '', accepted is the name of a service",
+    )
+    assert detector.set(*chosen, ('expected_targets', 0)) == (True, '')
+    found = detector.answer(message)
+    assert [it.id for it in found.targets] == [it.id for it in rendering.targets]
+    assert found.family == 'service'
+    other.awaited = True
+    other.process.kill()
+    response = detector.identify(image_message(rendering.image, header()))
+    assert not response.success
+    assert response.message == "service '/other/detector/identify' is not there"
+    graph.start('detector', '-r', '__ns:=/other')
+    again = graph.until(
+        lambda: (it := detector.identify(image_message(rendering.image, header()))).success and it
+    )
+    assert len(again.coded_targets.targets) == len(rendering.targets)
+    assert detector.set(('detector', 'ring')) == (True, '')

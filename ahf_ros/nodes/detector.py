@@ -26,7 +26,8 @@ from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.nodes.parameters import ParameterSettings
 from ahf_ros.nodes.pipeline import STOPPING, ImageMessage, Pipeline, Refused
 from ahf_ros.nodes.process import ProcessNode, run
-from ahf_ros.nodes.settings import LOSSLESS, DetectorNodeSettings
+from ahf_ros.nodes.service_detector import ServiceDetector
+from ahf_ros.nodes.settings import LOSSLESS, SERVICE, DetectorNodeSettings
 from ahf_ros.nodes.worker import Worker
 from ahf_ros.srv import Identify
 
@@ -64,6 +65,7 @@ class DetectorNode(ProcessNode):
         self.create_timer(DIAGNOSTICS_PERIOD, self._publish_diagnostics)
         self._images: Subscription | None = None
         self._subscribed = ('', '')
+        self._service: ServiceDetector | None = None
         self._settings = ParameterSettings(self, DetectorNodeSettings, self._renew)
         self._renew()
         requests = MutuallyExclusiveCallbackGroup()
@@ -78,7 +80,7 @@ class DetectorNode(ProcessNode):
     def _renew(self) -> None:
         """Work on the images from now on as the parameters say now."""
         settings = self._settings.current
-        self._pipeline = Pipeline(settings, self._stopping)
+        self._pipeline = Pipeline(settings, self._stopping, self._service_detector(settings))
         if self._subscribed != (settings.image_transport, settings.queue):
             self._subscribed = (settings.image_transport, settings.queue)
             if self._images:
@@ -89,6 +91,14 @@ class DetectorNode(ProcessNode):
             # It may wait for room, which must not keep anything else waiting.
             group = MutuallyExclusiveCallbackGroup()
             self._images = subscribe(kind, topic, self._on_image, group)
+
+    def _service_detector(self, settings: DetectorNodeSettings) -> ServiceDetector | None:
+        """Return the detector that is a service, where the settings ask for it."""
+        if settings.detector != SERVICE:
+            return None
+        if not self._service or self._service.settings != settings.service:
+            self._service = ServiceDetector(self, settings.service, self._stopping)
+        return self._service
 
     def _on_image(self, message: ImageMessage) -> None:
         self._tally.received += 1

@@ -11,7 +11,7 @@ from sensor_msgs.msg import CompressedImage, Image
 
 from ahf_ros.adaptive import AdaptiveIdentifier
 from ahf_ros.counting import estimator
-from ahf_ros.detectors import create
+from ahf_ros.detectors import Detector, create
 from ahf_ros.encodings import decode_compressed, decode_image
 from ahf_ros.homomorphic import HomomorphicFilter
 from ahf_ros.msg import CodedTargetArray
@@ -58,12 +58,19 @@ class Pipeline:
         Of the node.
     stopping : threading.Event
         Breaks off what is going on, also a search, at its next step.
+    detector : Detector, optional
+        Where it is not one that the settings name.
     """
 
-    def __init__(self, settings: DetectorNodeSettings, stopping: threading.Event) -> None:
+    def __init__(
+        self,
+        settings: DetectorNodeSettings,
+        stopping: threading.Event,
+        detector: Detector | None = None,
+    ) -> None:
         self.settings = settings
         self._stopping = stopping
-        self._detector = create(settings.detector, settings.target)
+        self._detector = detector or create(settings.detector, settings.target)
         estimate = None
         if settings.estimate_expected:
             estimate = estimator(self._detector, settings.target)

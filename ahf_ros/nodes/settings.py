@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field, replace
 
 from ahf_ros.adaptive import AdaptiveSettings
@@ -17,11 +18,35 @@ LARGEST_COUNT = 100000
 """Largest number of targets that an image can be told to show."""
 
 
+SERVICE = 'service'
+"""The detector that is a service of another node."""
+
+_SERVICE_NAME = re.compile(r'[~/]?/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*', re.ASCII)
+
+
+@dataclass(frozen=True, slots=True)
+class ServiceSettings:
+    """Which service the detector `service` calls."""
+
+    service: str = parameter('', 'Service of the detector service, an ahf_ros/srv/Identify.')
+    service_timeout: float = parameter(
+        60.0, 'Longest time of the service for one image, s.', minimum=0.1, maximum=86400.0
+    )
+
+    def __post_init__(self) -> None:
+        """Refuse values that are not accepted."""
+        check_parameters(self)
+        if self.service and not _SERVICE_NAME.fullmatch(self.service):
+            raise ValueError(f'service is {self.service!r}, accepted is the name of a service')
+
+
 @dataclass(frozen=True, slots=True)
 class DetectorNodeSettings:
     """The node `detector`: which identification, of how many targets, driven by which search."""
 
-    detector: str = parameter(DETECTOR.default, DETECTOR.description, choices=DETECTOR.choices)
+    detector: str = parameter(
+        DETECTOR.default, DETECTOR.description, choices=(*DETECTOR.choices, SERVICE)
+    )
     expected_targets: int = parameter(
         0,
         'N, the number of coded targets in every image; 0: unknown, no filter is searched for '
@@ -49,11 +74,18 @@ class DetectorNodeSettings:
         maximum=10**6,
     )
     target: DetectorSettings = field(default_factory=DetectorSettings)
+    service: ServiceSettings = field(default_factory=ServiceSettings)
     adaptive: AdaptiveSettings = field(default_factory=AdaptiveSettings)
 
     def __post_init__(self) -> None:
         """Refuse values that are not accepted."""
         check_parameters(self)
+        if self.detector == SERVICE:
+            if not self.service.service:
+                raise ValueError("service is '', accepted is the name of a service")
+            if self.estimate_expected:
+                raise ValueError(f'estimate_expected is True, accepted with {SERVICE} is False')
+            return
         detector = create(self.detector, self.target)
         if self.estimate_expected:
             estimator(detector, self.target)
