@@ -11,7 +11,6 @@ References
 
 from __future__ import annotations
 
-import math
 import os
 import time
 from collections.abc import Callable, Sequence
@@ -19,22 +18,18 @@ from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import nullcontext
 from dataclasses import asdict, dataclass, field, replace
 from numbers import Integral
-from threading import Lock
 from typing import Any
 
 import numpy as np
 
 from ahf_ros.fusion import fused
 from ahf_ros.genetic import Gene, GeneticSettings, SearchResult, Values, search
-from ahf_ros.homomorphic import FilterSettings, HomomorphicFilter
+from ahf_ros.homomorphic import FilterSettings
 from ahf_ros.image import check_image
 from ahf_ros.parameter import check_parameters, numbers_in, parameter
 from ahf_ros.spectrum import transfer
-from ahf_ros.target import UNDECODED, FilterState, Identification, Target, count_codes
-
-AnyDetector = Callable[[np.ndarray], list[Target]]
-"""From an 8-bit image, shape (height, width), to the targets in it. Called from several threads at
-once where `AdaptiveSettings.threads` is not 1."""
+from ahf_ros.target import FilterState, Identification, Target, count_codes
+from ahf_ros.trials import AnyDetector, Trials, checked_targets
 
 Refinement = Callable[[np.ndarray, Sequence[Target]], Sequence[Target]]
 """From the image as received and targets found in a filtered one to the same targets, with centres
@@ -250,7 +245,7 @@ class AdaptiveIdentifier:
         listed = self._settings.listed
         expected = len(listed) or expected
         estimate = None if expected else self._estimate
-        trials = _Trials(image, self._detector, expected, listed, self._settings.filter)
+        trials = Trials(image, self._detector, expected, listed, self._settings.filter)
         threads = self._settings.threads or os.cpu_count() or 1
         with ThreadPoolExecutor(threads) if threads > 1 else nullcontext() as executor:
             if estimate and self._unchanged(trials, estimate, executor):
@@ -264,7 +259,7 @@ class AdaptiveIdentifier:
         settled = (count_codes(targets), trials.expected) if estimate else None
         self.memory = replace(self.memory, settled=settled)
         if self._refine and (chosen or others or image.dtype != np.uint8):
-            targets = _checked(self._refine(image, targets), 'refine')
+            targets = checked_targets(self._refine(image, targets), 'refine')
         state = FilterState(
             evaluations=evaluations,
             generations=self.last_search.generations if self.last_search else 0,
@@ -275,7 +270,7 @@ class AdaptiveIdentifier:
         ordered = tuple(sorted(targets, key=lambda target: target.id))
         return Identification(ordered, trials.expected, state, estimate is not None)
 
-    def _unchanged(self, trials: _Trials, estimate: Estimate, executor: Executor | None) -> bool:
+    def _unchanged(self, trials: Trials, estimate: Estimate, executor: Executor | None) -> bool:
         """Return whether an image shows what the last one did; tell the trials what N is."""
         self.last_search = None
         shown = trials.count(self.memory.filter, executor)
@@ -288,7 +283,7 @@ class AdaptiveIdentifier:
         trials.expected = max(int(estimated), shown)
         return False
 
-    def _choose(self, trials: _Trials, executor: Executor | None) -> tuple[Values | None, int]:
+    def _choose(self, trials: Trials, executor: Executor | None) -> tuple[Values | None, int]:
         """Return the best filter, None for the image as received, and the evaluations."""
         self.last_search = None
         remembered = self.memory.filter
@@ -312,72 +307,6 @@ class AdaptiveIdentifier:
         chosen = result.values if result.discrepancy < unfiltered else None
         self.memory = replace(self.memory, filter=chosen)
         return chosen, 1 + result.evaluations
-
-
-class _Trials:
-    """The targets of one image, as received and through every filter tried."""
-
-    def __init__(
-        self,
-        image: np.ndarray,
-        detector: AnyDetector,
-        expected: int,
-        listed: frozenset[int],
-        settings: FilterSettings,
-    ) -> None:
-        self.image = image
-        self.expected = expected
-        self._listed = listed
-        self._strangers: dict[Values | None, int] = {}
-        self.targets: dict[Values | None, list[Target]] = {}
-        self._detector = detector
-        self._settings = settings
-        self._lock = Lock()
-        self._prepared: HomomorphicFilter | None = None
-
-    def discrepancy(self, values: Values | None, executor: Executor | None = None) -> int:
-        """Return |N - n| through a filter; None is the image as received."""
-        missing = abs(self.expected - self.count(values, executor))
-        return missing + self._strangers[values]
-
-    def count(self, values: Values | None, executor: Executor | None = None) -> int:
-        """Return n through a filter."""
-        if values not in self.targets:
-            found = _checked(self._detector(self._shown(values, executor)), 'detector')
-            known = [
-                target
-                for target in found
-                if not self._listed or target.id == UNDECODED or target.id in self._listed
-            ]
-            self._strangers[values] = count_codes(found) - count_codes(known)
-            self.targets[values] = known
-        return count_codes(self.targets[values])
-
-    def of(self, tried: Sequence[Values | None]) -> list[list[Target]]:
-        """Return the targets through filters that were tried, each filter once."""
-        return [self.targets[values] for values in dict.fromkeys(tried)]
-
-    def _shown(self, values: Values | None, executor: Executor | None) -> np.ndarray:
-        if values is None and self.image.dtype == np.uint8:
-            return self.image
-        with self._lock:
-            if self._prepared is None:
-                self._prepared = HomomorphicFilter(self.image, self._settings)
-        # equal gains leave the image as it is, but for the mapping to 8 bit
-        gamma_high, gamma_low = values or (1.0, 1.0)
-        return self._prepared.filtered(gamma_high, gamma_low, executor=executor)
-
-
-def _checked(found: Any, source: str) -> list[Target]:
-    if not isinstance(found, (list, tuple)) or not all(isinstance(it, Target) for it in found):
-        raise ValueError(f'{source} returned {found!r}, accepted is a list of targets')
-    for target in found:
-        if not (math.isfinite(target.x) and math.isfinite(target.y)):
-            raise ValueError(
-                f'{source} returned target {target.id} at ({target.x}, {target.y}), '
-                'accepted are finite coordinates'
-            )
-    return list(found)
 
 
 def _check_count(name: str, count: Any) -> None:

@@ -8,12 +8,13 @@ callable that makes it from `DetectorSettings`.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from importlib.metadata import EntryPoint, entry_points
 
 from ahf_ros.detectors.command import CommandDetector
 from ahf_ros.detectors.detector import Detector, DetectorSettings
 from ahf_ros.detectors.ring import RingDetector
-from ahf_ros.detectors.square import AprilTagDetector, ArucoDetector
+from ahf_ros.detectors.square import SquareDetector
 from ahf_ros.detectors.traditional import TraditionalDetector
 from ahf_ros.parameter import Parameter
 
@@ -25,8 +26,8 @@ GROUP = 'ahf_ros.detectors'
 _DETECTORS: dict[str, Callable[[DetectorSettings], Detector]] = {
     'ring': RingDetector,
     'traditional': TraditionalDetector,
-    'aruco': ArucoDetector,
-    'apriltag': AprilTagDetector,
+    'aruco': partial(SquareDetector, 'aruco'),
+    'apriltag': partial(SquareDetector, 'apriltag'),
     'command': CommandDetector,
 }
 

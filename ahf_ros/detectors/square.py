@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import ClassVar
 
 import cv2
 import numpy as np
@@ -18,54 +17,35 @@ _WINDOW = 5  # px to either side of a corner, for its refinement
 
 
 @dataclass(frozen=True, slots=True)
-class ArucoDetector:
-    """Identify the markers of one ArUco dictionary.
+class SquareDetector:
+    """Identify the markers of one dictionary.
 
     A target's centre is where the diagonals of its marker meet, which is the image of its physical
     centre at any view. Its ellipse is the one inscribed in the marker, its code the ID.
 
     Attributes
     ----------
+    name : str
+        'aruco' or 'apriltag'.
     settings : DetectorSettings
+
+    Raises
+    ------
+    ValueError
+        If OpenCV does not have the dictionary.
     """
 
-    name: ClassVar[str] = 'aruco'
+    name: str
     settings: DetectorSettings = field(default_factory=DetectorSettings)
 
     def __post_init__(self) -> None:
-        """Refuse a dictionary that OpenCV does not have."""
+        """Refuse a dictionary that is not there."""
         dictionary(self.family)
 
     @property
     def family(self) -> str:
         """Name of the dictionary as a family of targets."""
-        return f'aruco_{self.settings.square.aruco_dictionary}'
-
-    def __call__(self, image: np.ndarray) -> list[Target]:
-        """Identify the markers of one image; see `Detector`."""
-        return _identified(image, self.family)
-
-
-@dataclass(frozen=True, slots=True)
-class AprilTagDetector:
-    """Identify the markers of one AprilTag dictionary; all else is as for `ArucoDetector`.
-
-    Attributes
-    ----------
-    settings : DetectorSettings
-    """
-
-    name: ClassVar[str] = 'apriltag'
-    settings: DetectorSettings = field(default_factory=DetectorSettings)
-
-    def __post_init__(self) -> None:
-        """Refuse a dictionary that OpenCV does not have."""
-        dictionary(self.family)
-
-    @property
-    def family(self) -> str:
-        """Name of the dictionary as a family of targets."""
-        return f'apriltag_{self.settings.square.apriltag_dictionary}'
+        return f'{self.name}_{getattr(self.settings.square, f"{self.name}_dictionary")}'
 
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the markers of one image; see `Detector`."""
