@@ -14,6 +14,13 @@ import numpy as np
 
 from ahf_ros import frame
 from ahf_ros.codes.ring import FAMILY_NAMES, Family, family
+from ahf_ros.decoding import (
+    ACROSS,
+    BAND_DEPTHS,
+    FARTHEST_ACROSS,
+    GAP_DEPTHS,
+    NEAREST_ACROSS,
+)
 from ahf_ros.detectors.detector import Detector, DetectorSettings
 from ahf_ros.detectors.ring import RingDetector
 from ahf_ros.evidence import Marks, level_evidence, log_ratio, see_light, step_evidence
@@ -30,10 +37,6 @@ ESTIMATE_EXPECTED = Parameter(
 """The choice as a parameter, for the node and the command line."""
 
 _SAMPLES = 5  # angles a sector
-_ACROSS = 2.6  # distance of a place from an edge, px
-_NEAREST_ACROSS, _FARTHEST_ACROSS = 0.13, 0.36  # the same, dot radii
-_GAP_DEPTHS = (0.35, 0.65)  # of the gap
-_BAND_DEPTHS = (0.3, 0.5, 0.7)  # of the band
 _MARGIN = 0.45  # of a place in the margin from the band, dot radii
 _FAINTEST = 0.9  # gray value of dark over bright
 _LEAST_CONTRAST = 0.05
@@ -178,12 +181,12 @@ def target_features(gray: np.ndarray, found: Hypotheses, code: Family) -> np.nda
     major, minor, _ = frame.ellipse_axes(found.frames)
     size = np.sqrt(major * minor)
     inner, outer = code.band_inner, code.band_outer
-    across = np.clip(_ACROSS / size, _NEAREST_ACROSS, _FARTHEST_ACROSS)[:, None]
+    across = np.clip(ACROSS / size, NEAREST_ACROSS, FARTHEST_ACROSS)[:, None]
     beside = np.array([1, 1, inner, inner, outer, outer]) + across * np.array([-1, 1] * 3)
     depths = np.concatenate(
         [
-            1 + (inner - 1) * np.array(_GAP_DEPTHS),
-            inner + (outer - inner) * np.array(_BAND_DEPTHS),
+            1 + (inner - 1) * np.array(GAP_DEPTHS),
+            inner + (outer - inner) * np.array(BAND_DEPTHS),
             [outer + _MARGIN],
         ]
     )
@@ -198,7 +201,7 @@ def target_features(gray: np.ndarray, found: Hypotheses, code: Family) -> np.nda
     dark = (marks.signs > 0)[:, None]
     bright = np.where(dark, np.stack([*of_gap, gap_in, outside]), dot)
     light = see_light(np.moveaxis(bright, 0, 2), of_gap, marks)
-    limit = frame.circle_points(angles, np.array([outer + _FARTHEST_ACROSS]))[:, 0]
+    limit = frame.circle_points(angles, np.array([outer + FARTHEST_ACROSS]))[:, 0]
     visible = frame.within(frame.project(found.frames, limit), gray.shape)
 
     def mean(of_angles: np.ndarray) -> np.ndarray:

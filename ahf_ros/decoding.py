@@ -33,11 +33,19 @@ from ahf_ros.words import best_words
 SAMPLES_PER_SECTOR = 10
 """Usual number of angles at which a sector is read."""
 
-_ACROSS = 2.6  # distance of a reading from an edge, px
-_SOFT, _ACROSS_SOFT = 1.0, 3.0  # blur of an edge, px, from where on it grows, and how fast
-_NEAREST_ACROSS, _FARTHEST_ACROSS = 0.13, 0.36  # the same, dot radii
-_BAND_DEPTHS = (0.3, 0.5, 0.7)  # of the band, where its level is read
-_GAP_DEPTHS = (0.35, 0.65)
+ACROSS = 2.6
+"""Distance of a reading from an edge, px."""
+
+NEAREST_ACROSS, FARTHEST_ACROSS = 0.13, 0.36
+"""Bounds of that distance, dot radii."""
+
+BAND_DEPTHS = (0.3, 0.5, 0.7)
+"""Shares of the width of the band, where its level is read."""
+
+GAP_DEPTHS = (0.35, 0.65)
+"""Shares of the width of the gap, where its level is read."""
+
+_SOFT, _ACROSS_SOFT = 1.0, 3.0  # blur of an edge, px, from which that distance grows, and how fast
 _DOT_DEPTHS = (0.35, 0.7)  # of the dot
 _AGREEMENT = 0.35  # of ln, or of the step of a mark, between a step and what a word wants
 _CORRELATION = 2.5  # px between independent readings
@@ -117,12 +125,12 @@ def read_bands(
     angles = -2 * np.pi * (np.arange(count) + 0.5) / count  # counter-clockwise as seen
     size = frame.mean_radii(frames)
     inner, outer = family.band_inner, family.band_outer
-    across = _ACROSS + _ACROSS_SOFT * np.maximum(marks.blur - _SOFT, 0)
-    across = np.clip(across / size, _NEAREST_ACROSS, _FARTHEST_ACROSS)[:, None]
+    across = ACROSS + _ACROSS_SOFT * np.maximum(marks.blur - _SOFT, 0)
+    across = np.clip(across / size, NEAREST_ACROSS, FARTHEST_ACROSS)[:, None]
     fixed = np.concatenate(
         [
-            inner + (outer - inner) * np.array(_BAND_DEPTHS),
-            1 + (inner - 1) * np.array(_GAP_DEPTHS),
+            inner + (outer - inner) * np.array(BAND_DEPTHS),
+            1 + (inner - 1) * np.array(GAP_DEPTHS),
             np.array(_DOT_DEPTHS),
         ]
     )
@@ -140,7 +148,7 @@ def read_bands(
     evidence = sum(step_evidence(surround, inside, marks, light) for surround, inside in arcs)
     evidence += level_evidence(of_band, light)
     evidence *= np.clip(2 * np.pi * inner * size / count / _CORRELATION, 0.08, 1)[:, None]
-    limit = frame.circle_points(angles, np.array([outer + _FARTHEST_ACROSS]))[:, 0]
+    limit = frame.circle_points(angles, np.array([outer + FARTHEST_ACROSS]))[:, 0]
     visible = frame.within(frame.project(frames, limit), gray.shape)
     evidence *= visible
     depth = np.clip((outer - inner) * size / len(of_band) / _CORRELATION, 0.1, 1)[:, None]
