@@ -62,14 +62,14 @@ class Scoreboard(ProcessNode):
         settings = self._settings.current
         if settings.images and self.count >= settings.images:
             return
-        truth = self._truths.get(message.header)
-        if truth is None:
+        truth, image = self._truths.get(message.header), self._images.get(message.header)
+        # Where there is a picture of every image, one that was missed does not count.
+        if truth is None or (settings.pictures and image is None):
             return
         self.count += 1
         found = identification(message)
         true = [TrueTarget(item.id, item.x, item.y) for item in truth.targets]
         print(f'image {self.count}: {line(found, true)}', flush=True)
-        image = self._images.get(message.header)
         if image is not None:
             picture = Path(settings.pictures, f'image_{self.count}.jpg')
             verdicts = zip(judge(true, found.targets), found.targets, strict=True)
