@@ -39,6 +39,12 @@ DIAGNOSTICS_PERIOD = 1.0
 TOPICS = {'raw': (Image, 'image'), 'compressed': (CompressedImage, 'image/compressed')}
 """Where images come in, by the way that they are sent."""
 
+ANSWERS_KEPT = 1000
+"""Answers that are sent once more where they got lost on the way: those of many heartbeats.
+
+With fewer, the next answer takes the place of one that a subscriber still waits for.
+"""
+
 LOG_PERIOD = 5.0
 """Shortest time between two log lines about images that are refused, s."""
 
@@ -58,7 +64,7 @@ class DetectorNode(ProcessNode):
         name = self.get_fully_qualified_name().lstrip('/')
         self._diagnostics = Diagnostics(f'{name}: identification', self._tally)
 
-        self._targets = self.publisher(CodedTargetArray, 'coded_targets')
+        self._targets = self.publisher(CodedTargetArray, 'coded_targets', ANSWERS_KEPT)
         self._debug_image = self.publisher(Image, '~/debug_image')
         self._filtered_image = self.publisher(Image, '~/filtered_image')
         self._diagnostic_array = self.create_publisher(DiagnosticArray, '/diagnostics', 10)

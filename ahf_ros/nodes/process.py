@@ -41,11 +41,11 @@ class ProcessNode(Node):
     def close(self) -> None:
         """End the threads of the node; topics and the log still work."""
 
-    def publisher(self, kind: type, topic: str) -> Publisher:
-        """Return a publisher, reliable and of depth 1 where `qos_overrides` do not say more."""
+    def publisher(self, kind: type, topic: str, depth: int = 1) -> Publisher:
+        """Return a publisher, reliable and of this depth where `qos_overrides` do not say more."""
         options = QoSOverridingOptions.with_default_policies()
         return self.create_publisher(
-            kind, topic, QoSProfile(depth=1), qos_overriding_options=options
+            kind, topic, QoSProfile(depth=depth), qos_overriding_options=options
         )
 
     def subscribe(
