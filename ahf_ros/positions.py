@@ -33,6 +33,7 @@ NEIGHBOURHOOD = 3.0
 LEAST_POINTS = 12
 """Fewest points that a position is fitted to."""
 
+_LARGEST = float(np.finfo(np.float32).max)  # coordinate; its square is finite in float64
 _LEAST_REACH = 5.0  # px, of a neighbourhood, also of targets whose size is not known
 _MOST_POINTS = 2048  # about, of a neighbourhood; larger ones are thinned out
 _LEAST_SHARE = 0.2  # of the pixels of a neighbourhood, that must have points on its plane
@@ -81,8 +82,8 @@ def positions(
     Parameters
     ----------
     cloud : ndarray of shape (height, width), with the fields x, y and z
-        As `ahf_ros.points.organised_points` returns it. A point that is not finite, or that is
-        0, 0, 0, is none.
+        As `ahf_ros.points.organised_points` returns it. A point that is not finite in float32, or
+        that is 0, 0, 0, is none.
     targets : sequence of Target
         In the pixels of the image that the cloud belongs to.
     neighbourhood : float
@@ -123,7 +124,7 @@ def _neighbours(
     inside = (((offsets @ turn) / reach) ** 2).sum(axis=-1) <= 1
     near = cloud[window][inside]
     points = np.stack([near[name].astype(np.float64) for name in AXES], axis=-1)
-    real = np.isfinite(points).all(axis=1) & points.any(axis=1)
+    real = (np.abs(points) <= _LARGEST).all(axis=1) & points.any(axis=1)
     return offsets[inside][real], points[real], int(inside.sum())
 
 

@@ -15,13 +15,16 @@ from typing import TypeVar
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.subscription import Subscription
-from sensor_msgs.msg import CompressedImage, Image
+from sensor_msgs.msg import CompressedImage, Image, PointCloud2
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
+from visualization_msgs.msg import ImageMarker, MarkerArray
 
 from ahf_ros.drawing import draw
 from ahf_ros.msg import CodedTargetArray
-from ahf_ros.nodes.diagnostics import Diagnostics, Tally
+from ahf_ros.nodes.annotation_msg import target_annotations
+from ahf_ros.nodes.cloud import Seen, TargetPoints
+from ahf_ros.nodes.diagnostics import CloudTally, Diagnostics, Tally
 from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.nodes.parameters import ParameterSettings
 from ahf_ros.nodes.pipeline import STOPPING, ImageMessage, Pipeline, Refused
@@ -67,10 +70,14 @@ class DetectorNode(ProcessNode):
         self._targets = self.publisher(CodedTargetArray, 'coded_targets', ANSWERS_KEPT)
         self._debug_image = self.publisher(Image, '~/debug_image')
         self._filtered_image = self.publisher(Image, '~/filtered_image')
+        self._annotations = self.publisher(ImageMarker, '~/annotations')
+        self._target_points = self.publisher(PointCloud2, '~/target_points')
+        self._target_labels = self.publisher(MarkerArray, '~/target_labels')
         self._diagnostic_array = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self.create_timer(DIAGNOSTICS_PERIOD, self._publish_diagnostics)
         self._images: Subscription | None = None
         self._subscribed = ('', '')
+        self._clouds: TargetPoints | None = None
         self._service: ServiceDetector | None = None
         self._settings = ParameterSettings(self, DetectorNodeSettings, self._renew)
         self._renew()
@@ -86,6 +93,7 @@ class DetectorNode(ProcessNode):
     def _renew(self) -> None:
         """Work on the images from now on as the parameters say now."""
         settings = self._settings.current
+        self._renew_clouds(settings)
         self._pipeline = Pipeline(settings, self._stopping, self._service_detector(settings))
         if self._subscribed != (settings.image_transport, settings.queue):
             self._subscribed = (settings.image_transport, settings.queue)
@@ -97,6 +105,19 @@ class DetectorNode(ProcessNode):
             # It may wait for room, which must not keep anything else waiting.
             group = MutuallyExclusiveCallbackGroup()
             self._images = subscribe(kind, topic, self._on_image, group)
+
+    def _renew_clouds(self, settings: DetectorNodeSettings) -> None:
+        """Match clouds with images as the settings ask for it."""
+        if self._clouds and self._clouds.suits(settings):
+            return
+        clouds, self._clouds = self._clouds, None
+        if clouds:
+            clouds.close()
+        if settings.cloud.cloud:
+            self._tally.clouds = self._tally.clouds or CloudTally()
+            self._clouds = TargetPoints(
+                self, settings, self._tally.clouds, self._target_points, self._target_labels
+            )
 
     def _service_detector(self, settings: DetectorNodeSettings) -> ServiceDetector | None:
         """Return the detector that is a service, where the settings ask for it."""
@@ -149,6 +170,12 @@ class DetectorNode(ProcessNode):
         self._tally.answered += 1
         self._tally.latency = time.monotonic() - received
         self._tally.last = answer.identification
+        header, shape, targets = message.header, answer.image.shape, answer.identification.targets
+        if clouds := self._clouds:
+            clouds.see(Seen(header, shape, targets))
+        if self._annotations.get_subscription_count():
+            drawing = target_annotations(answer.identification, shape, header)
+            self._annotations.publish(drawing)
         if self._debug_image.get_subscription_count():
             drawn = draw(answer.image, answer.identification)
             self._debug_image.publish(image_message(drawn, message.header))

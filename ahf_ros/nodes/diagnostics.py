@@ -10,6 +10,43 @@ from ahf_ros.target import Identification
 
 
 @dataclass(slots=True)
+class CloudTally:
+    """What became of the clouds.
+
+    Attributes
+    ----------
+    received, used, rejected : int
+        Clouds from the start: come in; matched with an image, so that positions were published;
+        not accepted.
+    reason : str
+        Why the last one that was rejected was.
+    unmatched : list of int
+        Clouds without an image, and images without a cloud.
+    positions : str
+        How many of the targets of the last image have one.
+    """
+
+    received: int = 0
+    used: int = 0
+    rejected: int = 0
+    reason: str = ''
+    unmatched: list[int] = field(default_factory=lambda: [0, 0])
+    positions: str = ''
+
+    def values(self) -> dict[str, object]:
+        """Return what is said of them."""
+        return {
+            'clouds received': self.received,
+            'clouds used': self.used,
+            'clouds rejected': self.rejected,
+            'last reason for rejection of a cloud': self.reason,
+            'clouds without an image': self.unmatched[0],
+            'images without a cloud': self.unmatched[1],
+            'targets with a position': self.positions,
+        }
+
+
+@dataclass(slots=True)
 class Tally:
     """What became of the images.
 
@@ -24,6 +61,8 @@ class Tally:
         Time from an image in to its targets out, s, of the last one.
     last : Identification
         The last one.
+    clouds : CloudTally or None
+        Of the clouds, once there may be any.
     """
 
     received: int = 0
@@ -33,6 +72,7 @@ class Tally:
     reason: str = ''
     latency: float = 0.0
     last: Identification = field(default_factory=lambda: Identification(()))
+    clouds: CloudTally | None = None
 
 
 class Diagnostics:
@@ -43,6 +83,7 @@ class Diagnostics:
         self._tally = tally
         self._answered = 0
         self._rejected = 0
+        self._rejected_clouds = 0
 
     def status(self, period: float) -> DiagnosticStatus:
         """Return the status of the last `period` seconds."""
@@ -52,6 +93,12 @@ class Diagnostics:
         level, message = DiagnosticStatus.OK, f'{answered} images identified'
         if rejected:
             level, message = DiagnosticStatus.WARN, f'{rejected} images rejected: {tally.reason}'
+        clouds = tally.clouds or CloudTally()
+        rejected_clouds = clouds.rejected - self._rejected_clouds
+        self._rejected_clouds = clouds.rejected
+        if rejected_clouds and not rejected:
+            level = DiagnosticStatus.WARN
+            message = f'{rejected_clouds} clouds rejected: {clouds.reason}'
         used = tally.last.filter
         values = {
             'rate (Hz)': f'{answered / period:.2f}',
@@ -69,6 +116,8 @@ class Diagnostics:
             'gamma_low': f'{used.gamma_low:.2f}',
             'evaluations': used.evaluations,
         }
+        if tally.clouds:
+            values |= clouds.values()
         return DiagnosticStatus(
             level=level,
             name=self._name,

@@ -9,6 +9,7 @@ from ahf_ros.adaptive import AdaptiveSettings
 from ahf_ros.counting import ESTIMATE_EXPECTED, estimator
 from ahf_ros.detectors import DETECTOR, DetectorSettings, create
 from ahf_ros.parameter import check_parameters, parameter
+from ahf_ros.positions import NEIGHBOURHOOD
 from ahf_ros.synthetic.scene import SceneSettings
 
 LATEST, LOSSLESS = 'latest', 'lossless'
@@ -41,6 +42,31 @@ class ServiceSettings:
 
 
 @dataclass(frozen=True, slots=True)
+class CloudSettings:
+    """Positions of targets in space, from a cloud that belongs to the image."""
+
+    cloud: bool = parameter(
+        False, 'Whether to subscribe to clouds on points and to publish where targets are in them.'
+    )
+    cloud_tolerance: float = parameter(
+        0.0,
+        'Largest difference of the stamps of an image and its cloud, s; 0: they are equal.',
+        minimum=0.0,
+        maximum=10.0,
+    )
+    cloud_radius: float = parameter(
+        NEIGHBOURHOOD,
+        'Radius about a centre within which points of the cloud count, in radii of the dot.',
+        minimum=0.5,
+        maximum=10.0,
+    )
+
+    def __post_init__(self) -> None:
+        """Refuse values that are not accepted."""
+        check_parameters(self)
+
+
+@dataclass(frozen=True, slots=True)
 class DetectorNodeSettings:
     """The node `detector`: which identification, of how many targets, driven by which search."""
 
@@ -69,10 +95,11 @@ class DetectorNodeSettings:
     queue_memory: int = parameter(
         1024,
         'Most memory for images that wait in a lossless queue, MB; what is full holds back the '
-        'publisher.',
+        'publisher. As much again for clouds that wait for their image; the oldest make room.',
         minimum=1,
         maximum=10**6,
     )
+    cloud: CloudSettings = field(default_factory=CloudSettings)
     target: DetectorSettings = field(default_factory=DetectorSettings)
     service: ServiceSettings = field(default_factory=ServiceSettings)
     adaptive: AdaptiveSettings = field(default_factory=AdaptiveSettings)

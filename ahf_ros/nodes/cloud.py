@@ -1,0 +1,142 @@
+"""Where the targets of an image are in space, from the cloud of the same shot."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.publisher import Publisher
+from sensor_msgs.msg import PointCloud2
+from std_msgs.msg import Header
+
+from ahf_ros.nodes.diagnostics import CloudTally
+from ahf_ros.nodes.matching import Matcher
+from ahf_ros.nodes.point_msg import target_labels, target_points
+from ahf_ros.nodes.process import ProcessNode
+from ahf_ros.nodes.settings import LOSSLESS, DetectorNodeSettings
+from ahf_ros.points import organised_points
+from ahf_ros.positions import positions
+from ahf_ros.target import Target
+
+ANSWERS = 100
+"""Most answers that wait for the cloud of their image."""
+
+LOG_PERIOD = 5.0
+"""Shortest time between two log lines about clouds that are refused, s."""
+
+CLOUD, ANSWER = 0, 1
+"""Sides of the matcher."""
+
+
+class Seen(NamedTuple):
+    """What was identified in an image.
+
+    Attributes
+    ----------
+    header : std_msgs.msg.Header
+        Of the image.
+    shape : tuple of int
+        Height and width of the image, px.
+    targets : tuple of Target
+        In its pixels.
+    """
+
+    header: Header
+    shape: tuple[int, int]
+    targets: tuple[Target, ...]
+
+
+class TargetPoints:
+    """Publishes the positions of targets as soon as there are both an answer and its cloud.
+
+    Drivers of scanners give the image and the cloud of a shot the same stamp, and either may come
+    first. Of those that wait, all that came before a match are given up, and the oldest where they
+    take too much memory.
+
+    Parameters
+    ----------
+    node : ProcessNode
+        Subscribes to `points`.
+    settings : DetectorNodeSettings
+        Of the node.
+    tally : CloudTally
+        Goes on to be counted in.
+    points, labels : rclpy.publisher.Publisher
+        Of sensor_msgs/PointCloud2, and of visualization_msgs/MarkerArray.
+    """
+
+    def __init__(
+        self,
+        node: ProcessNode,
+        settings: DetectorNodeSettings,
+        tally: CloudTally,
+        points: Publisher,
+        labels: Publisher,
+    ) -> None:
+        self._node = node
+        self._settings = _relevant(settings)
+        self._radius = settings.cloud.cloud_radius
+        self._tally = tally
+        self._points = points
+        self._labels = labels
+        tolerance = round(settings.cloud.cloud_tolerance * 1e9)
+        limits = (settings.queue_memory * 2**20, ANSWERS)
+        self._matcher = Matcher(tolerance, limits, tally.unmatched)
+        subscribe = node.subscribe_to_all if settings.queue == LOSSLESS else node.subscribe
+        group = MutuallyExclusiveCallbackGroup()
+        self._clouds = subscribe(PointCloud2, 'points', self._on_cloud, group)
+
+    def suits(self, settings: DetectorNodeSettings) -> bool:
+        """Return whether clouds are matched as these settings of the node ask for it."""
+        return _relevant(settings) == self._settings
+
+    def close(self) -> None:
+        """Subscribe no more."""
+        self._node.destroy_subscription(self._clouds)
+
+    def see(self, seen: Seen) -> None:
+        """Publish the positions of what was identified, now or when the cloud comes."""
+        cloud = self._matcher.put(ANSWER, _nanoseconds(seen.header), seen)
+        if cloud is not None:
+            self._publish(seen, cloud)
+
+    def _on_cloud(self, cloud: PointCloud2) -> None:
+        self._tally.received += 1
+        try:
+            organised_points(cloud)
+        except ValueError as error:
+            self._refuse(str(error))
+            return
+        seen = self._matcher.put(CLOUD, _nanoseconds(cloud.header), cloud, len(cloud.data))
+        if seen is not None:
+            self._publish(seen, cloud)
+
+    def _publish(self, seen: Seen, cloud: PointCloud2) -> None:
+        height, width = seen.shape
+        if (cloud.height, cloud.width) != (height, width):
+            self._refuse(
+                f'cloud is of {cloud.width} x {cloud.height} points, '
+                f'accepted is {width} x {height}, the size of the image'
+            )
+            return
+        found = positions(organised_points(cloud), seen.targets, self._radius)
+        header = Header(stamp=seen.header.stamp, frame_id=cloud.header.frame_id)
+        self._points.publish(target_points(seen.targets, found, header))
+        if self._labels.get_subscription_count():
+            self._labels.publish(target_labels(seen.targets, found, header))
+        self._tally.used += 1
+        self._tally.positions = f'{found.known.sum()} of {len(seen.targets)}'
+
+    def _refuse(self, reason: str) -> None:
+        self._tally.rejected += 1
+        self._tally.reason = reason
+        logger = self._node.get_logger()
+        logger.warning(f'cloud refused: {reason}', throttle_duration_sec=LOG_PERIOD)
+
+
+def _relevant(settings: DetectorNodeSettings) -> tuple[object, ...]:
+    return settings.cloud, settings.queue, settings.queue_memory
+
+
+def _nanoseconds(header: Header) -> int:
+    return int(header.stamp.sec * 10**9 + header.stamp.nanosec)

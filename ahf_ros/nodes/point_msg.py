@@ -1,0 +1,93 @@
+"""Positions of targets as messages: a labelled cloud, and labels that RViz shows."""
+
+from __future__ import annotations
+
+import array
+from collections.abc import Sequence
+
+import numpy as np
+from geometry_msgs.msg import Point, Pose, Vector3
+from sensor_msgs.msg import PointCloud2, PointField
+from std_msgs.msg import ColorRGBA, Header
+from visualization_msgs.msg import Marker, MarkerArray
+
+from ahf_ros.nodes.annotation_msg import target_colour, target_name
+from ahf_ros.positions import Positions
+from ahf_ros.target import Target
+
+POINT = {
+    'x': PointField.FLOAT32,
+    'y': PointField.FLOAT32,
+    'z': PointField.FLOAT32,
+    'id': PointField.INT32,
+    'confidence': PointField.FLOAT32,
+    'deviation': PointField.FLOAT32,
+}
+"""Fields of a point of the labelled cloud; the last one is the deviation of `Positions`."""
+
+_KINDS = {PointField.FLOAT32: '<f4', PointField.INT32: '<i4'}
+_POINT_TYPE = np.dtype([(name, _KINDS[datatype]) for name, datatype in POINT.items()])
+_LABEL_HEIGHT = 3.0  # of the letters, in radii of the dot
+
+
+def target_points(targets: Sequence[Target], found: Positions, header: Header) -> PointCloud2:
+    """Return a cloud of one point a target, in their order, NaN where it has no position.
+
+    Parameters
+    ----------
+    targets : sequence of Target
+        Of one image.
+    found : Positions
+        Where they are.
+    header : std_msgs.msg.Header
+        With the frame of the cloud that they were found in.
+    """
+    points = np.empty(len(targets), _POINT_TYPE)
+    for axis, name in enumerate('xyz'):
+        points[name] = found.points[:, axis]
+    points['id'] = [target.id for target in targets]
+    points['confidence'] = [target.confidence for target in targets]
+    points['deviation'] = found.deviations
+    fields = [
+        PointField(name=name, offset=4 * number, datatype=datatype, count=1)
+        for number, (name, datatype) in enumerate(POINT.items())
+    ]
+    return PointCloud2(
+        header=header,
+        height=1,
+        width=len(points),
+        fields=fields,
+        point_step=_POINT_TYPE.itemsize,
+        row_step=points.nbytes,
+        data=array.array('B', points.tobytes()),
+        is_dense=bool(found.known.all()),
+    )
+
+
+def target_labels(targets: Sequence[Target], found: Positions, header: Header) -> MarkerArray:
+    """Return the IDs of targets as text at their positions, in place of all earlier text.
+
+    Parameters
+    ----------
+    targets, found, header
+        As for `target_points`.
+    """
+    markers = [Marker(header=header, action=Marker.DELETEALL)]
+    for number in np.flatnonzero(found.known).tolist():
+        target = targets[number]
+        x, y, z = found.points[number].tolist()
+        height = _LABEL_HEIGHT * target.semi_major * float(found.spacings[number])
+        markers.append(
+            Marker(
+                header=header,
+                ns='id',
+                id=number,
+                type=Marker.TEXT_VIEW_FACING,
+                action=Marker.ADD,
+                pose=Pose(position=Point(x=x, y=y, z=z)),
+                scale=Vector3(z=height),
+                color=ColorRGBA(**target_colour(target)),
+                text=target_name(target),
+            )
+        )
+    return MarkerArray(markers=markers)

@@ -1,0 +1,300 @@
+"""A rig over DDS: a scanner whose cloud belongs to its image, viewers, several cameras."""
+
+from __future__ import annotations
+
+import array
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy', reason='ROS 2 is not installed')
+
+from diagnostic_msgs.msg import DiagnosticArray
+from sensor_msgs.msg import Image, PointCloud2, PointField
+from std_msgs.msg import Header
+from test_nodes import Detector, header, overrides, values
+from visualization_msgs.msg import ImageMarker, Marker, MarkerArray
+
+from ahf_ros.msg import CodedTargetArray
+from ahf_ros.nodes.image_msg import image_message
+from ahf_ros.synthetic.camera import Camera, tilted_camera
+from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
+
+SCENE = SceneSettings(width=640, height=480, targets=6, dot_radius=10.0, tilt=30.0, seed=3)
+DISTANCE = 800.0  # mm, of the middle of the wall
+LARGEST_ERROR = 0.2  # mm, of which a tenth of a pixel is most
+DOT_WITHOUT_POINTS, WITHOUT_POINTS = 0, 5  # places of targets in the truth
+CLOUD_FRAME = 'scanner_optical_frame'
+
+
+@pytest.fixture(scope='module')
+def rendering() -> Rendering:
+    return render(SCENE)
+
+
+@pytest.fixture(scope='module')
+def camera() -> Camera:
+    """Return the camera of the rendering."""
+    setup = np.random.default_rng(np.random.SeedSequence(SCENE.seed).spawn(5)[0])
+    width, focal_length = SCENE.width, SCENE.focal_length * SCENE.width
+    tilt = math.radians(SCENE.tilt)
+    return tilted_camera(width, SCENE.height, focal_length, tilt, SCENE.distortion, setup)
+
+
+def in_space(camera: Camera, pixels: np.ndarray) -> np.ndarray:
+    """Return the points of the wall that pixels show, in the frame of the camera, mm."""
+    wall = np.column_stack((camera.wall(pixels), np.ones(len(pixels))))
+    return wall @ camera.pose.T * DISTANCE / camera.intrinsics[0, 0]
+
+
+@pytest.fixture(scope='module')
+def scanned(rendering: Rendering, camera: Camera) -> np.ndarray:
+    """Return what a scanner measures, shape (height, width, 3)."""
+    height, width = rendering.image.shape
+    rows, columns = np.mgrid[:height, :width]
+    pixels = np.column_stack((columns.ravel(), rows.ravel())).astype(float)
+    points = in_space(camera, pixels).reshape(height, width, 3)
+    points *= 1 + 0.05 / DISTANCE * np.random.default_rng(0).standard_normal((height, width, 1))
+    for number, dots in ((DOT_WITHOUT_POINTS, 1.2), (WITHOUT_POINTS, 5.0)):
+        target = rendering.targets[number]
+        away = np.hypot(columns - target.x, rows - target.y)
+        points[away < dots * target.semi_major] = np.nan
+    return points
+
+
+def cloud_message(points: np.ndarray, of: Header) -> PointCloud2:
+    """Return an organised cloud as drivers send it: x, y, z and a colour."""
+    height, width, _ = points.shape
+    sent = np.zeros((height, width, 4), np.float32)
+    sent[:, :, :3] = points
+    return PointCloud2(
+        header=Header(stamp=of.stamp, frame_id=CLOUD_FRAME),
+        height=height,
+        width=width,
+        fields=[
+            PointField(name=name, offset=4 * number, datatype=PointField.FLOAT32, count=1)
+            for number, name in enumerate(('x', 'y', 'z', 'rgb'))
+        ],
+        point_step=16,
+        row_step=16 * width,
+        data=array.array('B', sent.tobytes()),
+    )
+
+
+class Rig:
+    """A detector that is given clouds, and what it says."""
+
+    def __init__(self, graph: Any) -> None:
+        self.graph = graph
+        own = ('-r', '/diagnostics:=/own/diagnostics')
+        self.detector = Detector(graph, *own, *overrides(cloud='true'))
+        self.points = graph.listen(PointCloud2, '/own/detector/target_points')
+        self.diagnostics = graph.listen(DiagnosticArray, '/own/diagnostics')
+        self.cloud = graph.publisher(PointCloud2, '/own/points')
+        graph.until(lambda: self.diagnostics)
+
+    def told(self, name: str) -> int:
+        """Return a number of the diagnostics."""
+        return int(values(self.diagnostics[-1])[name])
+
+    def found(self, of: Header) -> PointCloud2:
+        """Return the positions of an image, once they are there."""
+        return self.graph.until(
+            lambda: next((it for it in self.points if it.header.stamp == of.stamp), None)
+        )
+
+    def send_cloud(self, message: PointCloud2) -> None:
+        """Publish a cloud, and return when the node has got it."""
+        before = self.told('clouds received')
+        self.cloud.publish(message)
+        self.graph.until(lambda: self.told('clouds received') > before)
+
+
+@pytest.fixture(scope='module')
+def rig(graph: Any) -> Rig:
+    return Rig(graph)
+
+
+def read(message: PointCloud2) -> np.ndarray:
+    """Return the points of a labelled cloud."""
+    kinds = {PointField.FLOAT32: '<f4', PointField.INT32: '<i4'}
+    return np.frombuffer(
+        message.data, [(field.name, kinds[field.datatype]) for field in message.fields]
+    )
+
+
+def assert_true(message: PointCloud2, rendering: Rendering, camera: Camera) -> None:
+    """Assert that a labelled cloud says where the targets of the rendering are."""
+    points = read(message)
+    assert points.dtype.names == ('x', 'y', 'z', 'id', 'confidence', 'deviation')
+    assert points['id'].tolist() == [target.id for target in rendering.targets]
+    pixels = np.array([(target.x, target.y) for target in rendering.targets])
+    true = in_space(camera, pixels)
+    errors = np.linalg.norm(np.stack([points[name] for name in 'xyz'], axis=1) - true, axis=1)
+    known = np.arange(len(pixels)) != WITHOUT_POINTS
+    assert errors[known].max() < LARGEST_ERROR
+    assert np.isnan(errors[WITHOUT_POINTS])
+    assert points['deviation'][known] == pytest.approx(0.05, rel=0.3)
+    assert points['confidence'].min() > 0.5
+
+
+@pytest.mark.parametrize('cloud_first', [True, False])
+def test_every_target_has_its_position_whatever_comes_first(
+    rig: Rig, rendering: Rendering, camera: Camera, scanned: np.ndarray, cloud_first: bool
+) -> None:
+    image = image_message(rendering.image, header())
+    cloud = cloud_message(scanned, image.header)
+    if cloud_first:
+        rig.send_cloud(cloud)
+    answer = rig.detector.answer(image)
+    if not cloud_first:
+        rig.cloud.publish(cloud)
+    message = rig.found(image.header)
+    assert message.header == Header(stamp=image.header.stamp, frame_id=CLOUD_FRAME)
+    assert (message.height, message.width, message.is_dense) == (1, len(answer.targets), False)
+    assert_true(message, rendering, camera)
+    rig.graph.until(lambda: values(rig.diagnostics[-1])['targets with a position'] == '5 of 6')
+
+
+def test_what_has_no_partner_is_counted(
+    rig: Rig, rendering: Rendering, scanned: np.ndarray
+) -> None:
+    names = ('clouds without an image', 'images without a cloud')
+    before = [rig.told(name) for name in names]
+    lonely, of = header(), header()
+    rig.send_cloud(cloud_message(scanned, lonely))
+    rig.detector.answer(image_message(rendering.image, header()))
+    rig.send_cloud(cloud_message(scanned, of))
+    rig.detector.answer(image_message(rendering.image, of))
+    rig.found(of)
+    rig.graph.until(lambda: [rig.told(name) for name in names] == [count + 1 for count in before])
+    assert not [it for it in rig.points if it.header.stamp == lonely.stamp]
+
+
+def test_stamps_may_differ_by_the_tolerance(
+    rig: Rig, rendering: Rendering, scanned: np.ndarray
+) -> None:
+    assert rig.detector.set(('cloud_tolerance', 0.01)) == (True, '')
+    rig.graph.until(lambda: rig.cloud.get_subscription_count() == 1)
+    image = image_message(rendering.image, header())
+    cloud = cloud_message(scanned, image.header)
+    cloud.header.stamp.nanosec += 9_000_000
+    rig.detector.answer(image)
+    rig.cloud.publish(cloud)
+    assert rig.found(image.header).width == SCENE.targets
+    assert rig.detector.set(('cloud_tolerance', 0)) == (True, '')
+
+
+def test_bad_clouds_are_named_and_the_node_goes_on(
+    rig: Rig, rendering: Rendering, camera: Camera, scanned: np.ndarray
+) -> None:
+    before = rig.told('clouds rejected')
+    flat = cloud_message(scanned, header())
+    flat.height, flat.width = 1, flat.height * flat.width
+    short = cloud_message(scanned[:9], header())
+    short.height = 10
+    huge = cloud_message(scanned[:9], header())
+    huge.height = huge.width = huge.row_step = 2**32 - 1
+    nameless = cloud_message(scanned[:9], header())
+    nameless.fields = nameless.fields[:2]
+    bad = [
+        (flat, 'height is 1, accepted is an integer of at least 2'),
+        (short, 'data is of 92160 bytes, accepted are at least 102400'),
+        (huge, 'row_step is 4294967295, accepted is an integer of at least 68719476720'),
+        (nameless, "fields are 'x', 'y', accepted are those with x, y and z"),
+        (PointCloud2(header=header()), 'height is 0, accepted'),
+    ]
+    for count, (message, words) in enumerate(bad, start=1):
+        rig.cloud.publish(message)
+        rig.graph.until(lambda count=count: rig.told('clouds rejected') == before + count)
+        reason = values(rig.diagnostics[-1])['last reason for rejection of a cloud']
+        assert reason.startswith(words)
+    image = image_message(rendering.image, header())
+    rig.detector.answer(image)
+    rig.cloud.publish(cloud_message(scanned[:, :-1], image.header))
+    rig.graph.until(lambda: rig.told('clouds rejected') == before + len(bad) + 1)
+    assert values(rig.diagnostics[-1])['last reason for rejection of a cloud'] == (
+        'cloud is of 639 x 480 points, accepted is 640 x 480, the size of the image'
+    )
+    image = image_message(rendering.image, header())
+    rig.detector.answer(image)
+    rig.cloud.publish(cloud_message(scanned, image.header))
+    assert_true(rig.found(image.header), rendering, camera)
+
+
+def test_labels_in_space_for_those_who_look(
+    rig: Rig, rendering: Rendering, scanned: np.ndarray
+) -> None:
+    labels = rig.graph.listen(MarkerArray, '/own/detector/target_labels')
+    image = image_message(rendering.image, header())
+    rig.cloud.publish(cloud_message(scanned, image.header))
+    rig.detector.answer(image)
+    found = read(rig.found(image.header))
+    rig.graph.until(lambda: labels)
+    first, *texts = labels[-1].markers
+    assert first.action == Marker.DELETEALL
+    assert [it.text for it in texts] == [str(it.id) for it in rendering.targets[:WITHOUT_POINTS]]
+    assert {it.header.frame_id for it in texts} == {CLOUD_FRAME}
+    for marker, point in zip(texts, found, strict=False):
+        place = marker.pose.position
+        assert (place.x, place.y, place.z) == pytest.approx(tuple(point)[:3], abs=1e-3)
+        assert 10 < marker.scale.z < 40  # mm; a dot is about 14 mm wide
+
+
+def test_annotations_of_the_image_for_those_who_look(rig: Rig, rendering: Rendering) -> None:
+    annotations = rig.graph.listen(ImageMarker, '/own/detector/annotations')
+    image = image_message(rendering.image, header())
+    rig.detector.image.publish(image)
+    rig.graph.until(lambda: annotations)
+    marker = annotations[-1]
+    assert marker.header == image.header
+    assert marker.type == ImageMarker.LINE_LIST
+    assert len(marker.points) == 2 * len(marker.outline_colors)
+    places = np.array([(point.x, point.y) for point in marker.points]) - 0.5
+    for target in rendering.targets:
+        away = np.hypot(*(places - (target.x, target.y)).T)
+        assert away.min() == pytest.approx(target.semi_minor, abs=0.3)
+
+
+def test_without_the_parameter_there_are_no_clouds(
+    rig: Rig, rendering: Rendering, scanned: np.ndarray
+) -> None:
+    assert rig.detector.set(('cloud', False)) == (True, '')
+    rig.graph.until(lambda: not rig.cloud.get_subscription_count())
+    count = len(rig.points)
+    rig.detector.answer(image_message(rendering.image, header()))
+    assert len(rig.points) == count
+    assert rig.detector.set(('cloud', True)) == (True, '')
+    rig.graph.until(rig.cloud.get_subscription_count)
+    image = image_message(rendering.image, header())
+    rig.send_cloud(cloud_message(scanned, image.header))
+    rig.detector.answer(image)
+    assert rig.found(image.header).width == SCENE.targets
+
+
+def test_cameras_in_namespaces_know_nothing_of_each_other(graph: Any) -> None:
+    scenes = {
+        'left': render(replace(SCENE, seed=5, tilt=0.0)),
+        'right': render(replace(SCENE, seed=6, tilt=0.0)),
+    }
+    expected = {'left': SCENE.targets, 'right': 0}
+    answers, images = {}, {}
+    for side in scenes:
+        given = overrides(expected_targets=expected[side])
+        graph.start('detector', '-r', f'__ns:=/{side}', *given)
+        answers[side] = graph.listen(CodedTargetArray, f'/{side}/coded_targets')
+        images[side] = graph.publisher(Image, f'/{side}/image')
+    sent: dict[str, list[Header]] = {side: [] for side in scenes}
+    for _ in range(3):
+        for side, scene in scenes.items():
+            sent[side].append(header())
+            images[side].publish(image_message(scene.image, sent[side][-1]))
+        graph.until(lambda: all(len(answers[side]) == len(sent[side]) for side in scenes))
+    for side, scene in scenes.items():
+        assert [answer.header for answer in answers[side]] == sent[side]
+        for answer in answers[side]:
+            assert [it.id for it in answer.targets] == [it.id for it in scene.targets]
+            assert answer.expected == expected[side]
