@@ -23,13 +23,13 @@ from typing import Any
 import numpy as np
 
 from ahf_ros.fusion import fused
-from ahf_ros.genetic import Gene, GeneticSettings, SearchResult, Values, search
+from ahf_ros.genetic import GeneticSettings, SearchResult, Values, search
 from ahf_ros.homomorphic import FilterSettings
 from ahf_ros.image import check_image
 from ahf_ros.parameter import check_parameters, numbers_in, parameter
-from ahf_ros.spectrum import transfer
 from ahf_ros.target import FilterState, Identification, Target, count_codes
 from ahf_ros.trials import AnyDetector, Trials, checked_targets
+from ahf_ros.tuning import TuningSettings, tuned
 
 Refinement = Callable[[np.ndarray, Sequence[Target]], Sequence[Target]]
 """From the image as received and targets found in a filtered one to the same targets, with centres
@@ -55,27 +55,6 @@ class AdaptiveSettings:
         'IDs of the coded targets in every image, as 1-54, 60; their number is N, and other IDs '
         'are wrong.',
     )
-    gamma_high_min: float = parameter(
-        1.0, 'Smallest gain of the high frequencies.', minimum=0.1, maximum=20.0
-    )
-    gamma_high_max: float = parameter(
-        4.0, 'Largest gain of the high frequencies.', minimum=0.1, maximum=20.0
-    )
-    gamma_high_step: float = parameter(
-        0.1, 'Step of the gain of the high frequencies.', minimum=0.001, maximum=20.0
-    )
-    gamma_low_min: float = parameter(
-        0.0, 'Smallest gain of the low frequencies.', minimum=0.0, maximum=20.0
-    )
-    gamma_low_max: float = parameter(
-        1.0,
-        'Largest gain of the low frequencies, at most gamma_high_min.',
-        minimum=0.0,
-        maximum=20.0,
-    )
-    gamma_low_step: float = parameter(
-        0.01, 'Step of the gain of the low frequencies.', minimum=0.001, maximum=20.0
-    )
     fusion: bool = parameter(
         False,
         'Whether targets count that other filters than the best one show, after a search in vain.',
@@ -86,29 +65,19 @@ class AdaptiveSettings:
         minimum=0,
         maximum=256,
     )
+    tuning: TuningSettings = field(default_factory=TuningSettings)
     filter: FilterSettings = field(default_factory=FilterSettings)
     genetic: GeneticSettings = field(default_factory=GeneticSettings)
 
     def __post_init__(self) -> None:
-        """Check every parameter, and the ranges against each other."""
+        """Check every parameter."""
         check_parameters(self)
         numbers_in('expected_ids', self.expected_ids)
-        _check_order(self, 'gamma_high_min', 'gamma_high_max')
-        _check_order(self, 'gamma_low_min', 'gamma_low_max')
-        _check_order(self, 'gamma_low_max', 'gamma_high_min')
 
     @property
     def listed(self) -> frozenset[int]:
         """The IDs that images may show; empty where any may be."""
         return numbers_in('expected_ids', self.expected_ids)
-
-    @property
-    def genes(self) -> tuple[Gene, Gene]:
-        """What is searched for, in the order of the arguments of the filter."""
-        return (
-            Gene('gamma_high', self.gamma_high_min, self.gamma_high_max, self.gamma_high_step),
-            Gene('gamma_low', self.gamma_low_min, self.gamma_low_max, self.gamma_low_step),
-        )
 
 
 def identify(
@@ -118,6 +87,7 @@ def identify(
     settings: AdaptiveSettings | None = None,
     refine: Refinement | None = None,
     estimate: Estimate | None = None,
+    draft: AnyDetector | None = None,
 ) -> Identification:
     """Identify the targets of one image through the filter that suits the detector.
 
@@ -125,7 +95,7 @@ def identify(
     ----------
     image, expected
         As for `AdaptiveIdentifier.identify`.
-    detector, settings, refine, estimate
+    detector, settings, refine, estimate, draft
         As for `AdaptiveIdentifier`.
 
     Returns
@@ -137,7 +107,8 @@ def identify(
     ValueError
         As `AdaptiveIdentifier.identify` does.
     """
-    return AdaptiveIdentifier(detector, settings, refine, estimate).identify(image, expected)
+    identifier = AdaptiveIdentifier(detector, settings, refine, estimate, draft)
+    return identifier.identify(image, expected)
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,6 +149,10 @@ class AdaptiveIdentifier:
         filter that worked last, or none, goes on to show the n codes of the image before, the
         light and the targets are taken to be the same, and so is N; no filter is searched for,
         either. What it raises, `identify` raises.
+    draft : callable, optional
+        The detector with centres good enough for `refine`, in less time; the method `draft` of
+        the detector where None, if it has one. It is asked instead of the detector wherever
+        `refine` is asked next.
     clock : callable, optional
         Time in s.
 
@@ -195,12 +170,14 @@ class AdaptiveIdentifier:
         settings: AdaptiveSettings | None = None,
         refine: Refinement | None = None,
         estimate: Estimate | None = None,
+        draft: AnyDetector | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.last_search: SearchResult | None = None
         self._detector = detector
         self._settings = settings or AdaptiveSettings()
         self._refine = refine or getattr(detector, 'refine', None)
+        self._draft = draft or getattr(detector, 'draft', None)
         self._estimate = estimate
         self._clock = clock
         self.memory = Memory()
@@ -245,7 +222,9 @@ class AdaptiveIdentifier:
         listed = self._settings.listed
         expected = len(listed) or expected
         estimate = None if expected else self._estimate
-        trials = Trials(image, self._detector, expected, listed, self._settings.filter)
+        # Without a refinement, centres are those of the detector.
+        draft = (self._refine and self._draft) or self._detector
+        trials = Trials(image, self._detector, draft, expected, listed, self._settings.filter)
         threads = self._settings.threads or os.cpu_count() or 1
         with ThreadPoolExecutor(threads) if threads > 1 else nullcontext() as executor:
             if estimate and self._unchanged(trials, estimate, executor):
@@ -266,7 +245,7 @@ class AdaptiveIdentifier:
             duration=self._clock() - started,
         )
         if chosen:
-            state = replace(state, applied=True, **asdict(transfer(image.shape, *chosen)))
+            state = replace(state, applied=True, **asdict(tuned(image.shape, chosen)))
         ordered = tuple(sorted(targets, key=lambda target: target.id))
         return Identification(ordered, trials.expected, state, estimate is not None)
 
@@ -297,7 +276,7 @@ class AdaptiveIdentifier:
         genetic = self._settings.genetic
         self.last_search = result = search(
             trials.discrepancy,
-            self._settings.genes,
+            self._settings.tuning.genes,
             genetic,
             np.random.default_rng(genetic.seed),
             initial=[remembered] if remembered else [],
@@ -312,11 +291,3 @@ class AdaptiveIdentifier:
 def _check_count(name: str, count: Any) -> None:
     if isinstance(count, bool) or not isinstance(count, Integral) or count < 0:
         raise ValueError(f'{name} is {count!r}, accepted is an integer of at least 0')
-
-
-def _check_order(settings: AdaptiveSettings, lower: str, upper: str) -> None:
-    lowest, highest = getattr(settings, lower), getattr(settings, upper)
-    if lowest > highest:
-        raise ValueError(
-            f'{lower} is {lowest!r}, accepted is a number of at most {upper}, {highest!r}'
-        )

@@ -110,7 +110,7 @@ def transfer(
     cutoff : float, optional
         D0, cycles per image, > 0; the median of D where not given.
     attenuation : float, optional
-        c, > 0; gamma_high - gamma_low (Eq. 8) where not given.
+        c, >= 0; gamma_high - gamma_low (Eq. 8) where not given.
 
     Raises
     ------
@@ -126,7 +126,7 @@ def transfer(
     if attenuation is None:
         attenuation = gamma_high - gamma_low
     else:
-        _check_number('attenuation', attenuation, attenuation > 0, 'above 0')
+        _check_number('attenuation', attenuation, attenuation >= 0, 'of at least 0')
     return Transfer(float(gamma_high), float(gamma_low), float(cutoff), float(attenuation))
 
 

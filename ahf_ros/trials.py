@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from ahf_ros.genetic import Values
+from ahf_ros.chromosome import Values
 from ahf_ros.homomorphic import FilterSettings, HomomorphicFilter
 from ahf_ros.target import UNDECODED, Target, count_codes
+from ahf_ros.tuning import tuned
 
 AnyDetector = Callable[[np.ndarray], list[Target]]
 """From an 8-bit image, shape (height, width), to the targets in it. Called from several threads at
@@ -27,6 +28,9 @@ class Trials:
     image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
         The image as received.
     detector : callable
+        For the image as received.
+    draft : callable
+        For images made from it.
     expected : int
         N; it may be set later.
     listed : frozenset of int
@@ -45,6 +49,7 @@ class Trials:
         self,
         image: np.ndarray,
         detector: AnyDetector,
+        draft: AnyDetector,
         expected: int,
         listed: frozenset[int],
         settings: FilterSettings,
@@ -55,6 +60,7 @@ class Trials:
         self._strangers: dict[Values | None, int] = {}
         self.targets: dict[Values | None, list[Target]] = {}
         self._detector = detector
+        self._draft = draft
         self._settings = settings
         self._lock = Lock()
         self._prepared: HomomorphicFilter | None = None
@@ -67,7 +73,7 @@ class Trials:
     def count(self, values: Values | None, executor: Executor | None = None) -> int:
         """Return n through a filter."""
         if values not in self.targets:
-            found = checked_targets(self._detector(self._shown(values, executor)), 'detector')
+            found = checked_targets(self._found(values, executor), 'detector')
             known = [
                 target
                 for target in found
@@ -81,15 +87,19 @@ class Trials:
         """Return the targets through filters that were tried, each filter once."""
         return [self.targets[values] for values in dict.fromkeys(tried)]
 
-    def _shown(self, values: Values | None, executor: Executor | None) -> np.ndarray:
+    def _found(self, values: Values | None, executor: Executor | None) -> Any:
         if values is None and self.image.dtype == np.uint8:
-            return self.image
+            return self._detector(self.image)
         with self._lock:
             if self._prepared is None:
                 self._prepared = HomomorphicFilter(self.image, self._settings)
         # equal gains leave the image as it is, but for the mapping to 8 bit
-        gamma_high, gamma_low = values or (1.0, 1.0)
-        return self._prepared.filtered(gamma_high, gamma_low, executor=executor)
+        chosen = tuned(self.image.shape, values or (1.0, 1.0))
+        return self._draft(
+            self._prepared.filtered(
+                chosen.gamma_high, chosen.gamma_low, chosen.cutoff, chosen.attenuation, executor
+            )
+        )
 
 
 def checked_targets(found: Any, source: str) -> list[Target]:

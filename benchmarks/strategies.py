@@ -18,13 +18,13 @@ import numpy as np
 from rich.console import Console
 from rich.progress import track
 
-from ahf_ros.adaptive import AdaptiveSettings
 from ahf_ros.chromosome import Gene
 from ahf_ros.detectors import DETECTOR_NAMES, create
 from ahf_ros.genetic import GeneticSettings, Values, search
 from ahf_ros.homomorphic import HomomorphicFilter
 from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import count_codes
+from ahf_ros.tuning import TuningSettings
 
 LIGHTS = (('stripe', 0.3), ('stripe', 0.12), ('lattice', 0.3), ('lattice', 0.12))
 TRIED = (5, 10, 25, 50, 100)
@@ -38,7 +38,7 @@ def table(detector: str, light: str, ambient: float) -> Table:
     scene = SceneSettings(width=1600, height=1066, targets=14, light=light, ambient=ambient)
     image = render(scene).image
     prepared, identify = HomomorphicFilter(image), create(detector)
-    genes = AdaptiveSettings().genes
+    genes = TuningSettings().genes
     every = list(product(*(map(gene.value, range(gene.count)) for gene in genes)))
 
     def discrepancy(values: Values) -> int:
@@ -57,7 +57,7 @@ def table(detector: str, light: str, ambient: float) -> Table:
 def genetic(known: Table, generator: np.random.Generator) -> list[int]:
     """Return what the genetic search finds, in its order."""
     settings = GeneticSettings(max_evaluations=max(TRIED))
-    result = search(known.__getitem__, AdaptiveSettings().genes, settings, generator)
+    result = search(known.__getitem__, TuningSettings().genes, settings, generator)
     return [known[values] for values in result.tried]
 
 
@@ -68,7 +68,7 @@ def at_random(known: Table, generator: np.random.Generator) -> list[int]:
 
 def on_a_grid(known: Table, generator: np.random.Generator) -> list[int]:
     """Return what a grid of ten by ten filters finds, in random order."""
-    high, low = ([_tenth(gene, step) for step in range(10)] for gene in AdaptiveSettings().genes)
+    high, low = ([_tenth(gene, step) for step in range(10)] for gene in TuningSettings().genes)
     return generator.permutation([known[values] for values in product(high, low)]).tolist()
 
 

@@ -1,6 +1,6 @@
 """Synthetic images under projected light, their identification, and how good it is.
 
-    ros2 launch ahf_ros demo.launch.py light:=lattice
+ros2 launch ahf_ros demo.launch.py light:=lattice
 """
 
 from ament_index_python.packages import get_package_share_directory

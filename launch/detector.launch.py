@@ -1,6 +1,6 @@
 """One detector on one image topic; several cameras are several of these in namespaces.
 
-    ros2 launch ahf_ros detector.launch.py namespace:=left image:=/left/image_raw
+ros2 launch ahf_ros detector.launch.py namespace:=left image:=/left/image_raw
 """
 
 from ament_index_python.packages import get_package_share_directory

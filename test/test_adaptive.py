@@ -12,6 +12,7 @@ from ahf_ros.homomorphic import FilterSettings, HomomorphicFilter
 from ahf_ros.parameter import parameters
 from ahf_ros.spectrum import median_distance
 from ahf_ros.target import UNDECODED, Target, count_codes
+from ahf_ros.tuning import EXTENDED, TuningSettings
 
 COUNT = 144
 SHORT = AdaptiveSettings(genetic=GeneticSettings(max_evaluations=30))
@@ -354,17 +355,6 @@ def test_what_is_not_an_image_is_refused_before_the_detector_sees_it(image):
 @pytest.mark.parametrize(
     ('values', 'words'),
     [
-        (
-            {'gamma_high_min': 3.0, 'gamma_high_max': 2.0},
-            'gamma_high_min is 3.0, accepted is a number of at most gamma_high_max, 2.0',
-        ),
-        ({'gamma_low_min': 0.8, 'gamma_low_max': 0.2}, 'gamma_low_min is 0.8'),
-        (
-            {'gamma_low_max': 1.5},
-            'gamma_low_max is 1.5, accepted is a number of at most gamma_high_min, 1.0',
-        ),
-        ({'gamma_high_step': 0.0}, 'gamma_high_step is 0.0, accepted is a number from 0.001'),
-        ({'gamma_low_min': float('nan')}, 'gamma_low_min is nan'),
         ({'threads': -1}, 'threads is -1'),
         ({'ahf': 1}, 'ahf is 1, accepted is true or false'),
     ],
@@ -375,9 +365,10 @@ def test_a_setting_out_of_range_is_refused(values, words):
 
 
 def test_one_filter_is_a_range_too():
-    settings = AdaptiveSettings(
+    one = TuningSettings(
         gamma_high_min=1.2, gamma_high_max=1.2, gamma_low_min=0.25, gamma_low_max=0.25
     )
+    settings = AdaptiveSettings(tuning=one)
     result = identify(DIM, lambda image: [target(1)] if image is not DIM else [], 5, settings)
     assert (result.filter.gamma_high, result.filter.gamma_low) == (1.2, 0.25)
     assert result.filter.evaluations == 2
@@ -393,7 +384,7 @@ def test_the_settings_of_the_filter_reach_it():
 def test_no_name_stands_for_two_settings():
     names = [
         item.name
-        for settings in (AdaptiveSettings, FilterSettings, GeneticSettings)
+        for settings in (AdaptiveSettings, TuningSettings, FilterSettings, GeneticSettings)
         for item in parameters(settings)
     ]
     assert len(names) == len(set(names))
@@ -417,3 +408,51 @@ def test_ids_that_are_listed_beat_a_number():
     assert [target.id for target in only.targets] == [1, 2]
     with pytest.raises(ValueError, match="expected_ids has '3-1', accepted are integers"):
         AdaptiveSettings(expected_ids='3-1')
+
+
+def test_an_extended_search_tries_other_cutoffs_and_says_which():
+    seen = []
+
+    def detector(image):
+        seen.append(image)
+        return [target(1)] if len(seen) == 20 else []
+
+    extended = AdaptiveSettings(tuning=TuningSettings(search=EXTENDED), threads=1)
+    state = identify(DIM, detector, 1, extended).filter
+    assert state.evaluations == 20
+    assert state.attenuation > 1.5 * (state.gamma_high - state.gamma_low)
+    chosen = state.gamma_high, state.gamma_low, state.cutoff, state.attenuation
+    assert np.array_equal(HomomorphicFilter(DIM).filtered(*chosen), seen[-1])
+
+
+class Drafting(Dots):
+    """A detector whose drafts are a pixel off, and which can put that right."""
+
+    def __init__(self):
+        super().__init__()
+        self.drafts = 0
+
+    def draft(self, image):
+        with self.lock:
+            self.drafts += 1
+        return [replace(it, x=it.x + 1) for it in Dots()(image)]
+
+    def refine(self, image, targets):
+        return [replace(it, x=it.x - 1) for it in targets]
+
+
+def test_filters_are_tried_with_drafts_where_centres_are_refined():
+    detector = Drafting()
+    result = identify(DIM, detector, COUNT)
+    plain = identify(DIM, Dots(), COUNT)
+    assert result.filter.applied
+    assert result.targets == plain.targets
+    assert (detector.calls, detector.drafts >= result.filter.evaluations - 1) == (1, True)
+
+
+def test_there_are_no_drafts_without_a_refinement_or_a_filter():
+    detector = Drafting()
+    assert identify(BRIGHT, detector, COUNT).targets == identify(BRIGHT, Dots(), COUNT).targets
+    detector.refine = None
+    assert identify(DIM, detector, COUNT).targets == identify(DIM, Dots(), COUNT).targets
+    assert detector.drafts == 0

@@ -44,6 +44,16 @@ def test_every_family_in_both_polarities(name, polarity):
     assert figures.rmse[2] < 0.05
 
 
+@pytest.mark.parametrize('polarity', ['dark', 'bright'])
+def test_a_draft_shows_the_same_ids_and_refinement_starts_from_it(polarity):
+    rendering = rendered(replace(SMALL, polarity=polarity, light='stripe', ambient=1.0))
+    detector = create('traditional')
+    draft = detector.draft(rendering.image)
+    assert [it.id for it in draft] == [it.id for it in detector(rendering.image)]
+    assert scored(rendering, draft).rmse[2] < 1.0
+    assert scored(rendering, detector.refine(rendering.image, draft)).rmse[2] < 0.05
+
+
 @pytest.mark.parametrize(
     'scene',
     [

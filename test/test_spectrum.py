@@ -55,7 +55,7 @@ def test_the_response_runs_from_the_low_to_the_high_gain():
         ({'gamma_low': float('nan')}, 'gamma_low is nan'),
         ({'cutoff': 0.0}, 'cutoff is 0.0, accepted is a number above 0'),
         ({'cutoff': float('nan')}, 'cutoff is nan'),
-        ({'attenuation': 0.0}, 'attenuation is 0.0, accepted is a number above 0'),
+        ({'attenuation': -0.1}, 'attenuation is -0.1, accepted is a number of at least 0'),
         ({'attenuation': float('inf')}, 'attenuation is inf'),
     ],
 )

@@ -25,7 +25,8 @@ class Detector(Protocol):
 
     A detector may also have a method `refine(image, targets)`. It is given the image as received
     and what the detector found in a filtered version of it, and returns the same targets with the
-    places that the image as received gives them.
+    places that the image as received gives them. With that it may have a method `draft(image)`: as
+    a call, but fast, with centres that `refine` can start from. AHF tries filters with it.
     """
 
     @property

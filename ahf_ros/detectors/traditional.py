@@ -73,6 +73,9 @@ MINIMUM_CLARITY = 0.15
 MINIMUM_COHERENCE = 0.6
 """Least agreement of the band's grey gradient with one division into sectors, 0 to 1."""
 
+CONTOUR_ERROR = 1.0
+"""Standard deviation of the centre of a contour, px."""
+
 CHUNK = 1024
 """Candidates measured at once, which bounds the memory."""
 
@@ -95,6 +98,7 @@ class TraditionalDetector:
     def family(self) -> str:
         """Family of the codes."""
         return self.settings.family
+
     name: str = field(default='traditional', init=False)
 
     def __call__(self, image: np.ndarray) -> list[Target]:
@@ -118,6 +122,28 @@ class TraditionalDetector:
         ValueError
             If `image` is not an image, see `ahf_ros.image.check_image`.
         """
+        return self._targets(image, fine=True)
+
+    def draft(self, image: np.ndarray) -> list[Target]:
+        """Identify the targets of one image, centres being those of contours, to about a pixel.
+
+        Parameters
+        ----------
+        image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
+
+        Returns
+        -------
+        list of Target
+            As a call returns it, in less than half of the time.
+        """
+        return self._targets(image, fine=False)
+
+    def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
+        """Return targets with their places in an image; see `refine_centres`."""
+        wanted = self.settings
+        return refine_centres(image, targets, family(wanted.family), wanted.signs)
+
+    def _targets(self, image: np.ndarray, fine: bool) -> list[Target]:
         check_image(image)
         found: list[Target] = []
         gray = as_gray(image).astype(np.float32, copy=False)
@@ -125,16 +151,11 @@ class TraditionalDetector:
             candidates = _candidates(mask, self.settings)
             for start in range(0, len(candidates), CHUNK):
                 chunk = candidates[start : start + CHUNK]
-                found += _identified(gray, chunk, sign, self.settings)
+                found += _identified(gray, chunk, sign, self.settings, fine)
         targets = _settled(found, family(self.settings.family))
         if not self.settings.report_undecoded:
             targets = [target for target in targets if target.id != UNDECODED]
         return sorted(targets, key=lambda target: (target.id, target.y, target.x))
-
-    def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
-        """Return targets with their places in an image; see `refine_centres`."""
-        wanted = self.settings
-        return refine_centres(image, targets, family(wanted.family), wanted.signs)
 
 
 def _eight_bit(image: np.ndarray) -> np.ndarray:
@@ -190,13 +211,16 @@ def _candidates(mask: np.ndarray, settings: DetectorSettings) -> np.ndarray:
 
 
 def _identified(
-    gray: np.ndarray, candidates: np.ndarray, sign: int, settings: DetectorSettings
+    gray: np.ndarray, candidates: np.ndarray, sign: int, settings: DetectorSettings, fine: bool
 ) -> list[Target]:
     """Return the targets among the candidates, those without a code word as undecoded."""
     signs = np.full(len(candidates), -sign)
-    fit = fit_circles(gray, candidates, dot_circles(signs, RAYS), reach=REACH, projective=False)
-    fit = fit.chosen(fit.share >= MINIMUM_SHARE)
-    frames, covariances = fit.frames, fit.covariance
+    frames = candidates
+    covariances = np.broadcast_to(CONTOUR_ERROR**2 * np.eye(2), (len(frames), 2, 2))
+    if fine:
+        fit = fit_circles(gray, frames, dot_circles(signs, RAYS), reach=REACH, projective=False)
+        fit = fit.chosen(fit.share >= MINIMUM_SHARE)
+        frames, covariances = fit.frames, fit.covariance
     if not len(frames):
         return []
     code_family = family(settings.family)
@@ -205,12 +229,14 @@ def _identified(
         code_family.number(int(word)) if certainty else None
         for word, certainty in zip(words, certainties, strict=True)
     ]
-    decoded = np.array([i for i, number in enumerate(numbers) if number is not None], int)
-    circles = ring_circles(words[decoded], starts[decoded], signs[decoded], RAYS, 10, code_family)
-    joint = fit_circles(gray, frames[decoded], circles, reach=REACH, projective=True)
-    fits = joint.share >= MINIMUM_SHARE
-    frames[decoded[fits]] = joint.frames[fits]
-    covariances[decoded[fits]] = joint.covariance[fits]
+    if fine:
+        decoded = np.array([i for i, number in enumerate(numbers) if number is not None], int)
+        polarity = signs[decoded]
+        circles = ring_circles(words[decoded], starts[decoded], polarity, RAYS, 10, code_family)
+        joint = fit_circles(gray, frames[decoded], circles, reach=REACH, projective=True)
+        fits = joint.share >= MINIMUM_SHARE
+        frames[decoded[fits]] = joint.frames[fits]
+        covariances[decoded[fits]] = joint.covariance[fits]
     semi_major, semi_minor, angles = ellipse_axes(frames)
     of_size = (settings.min_radius <= semi_major) & (semi_major <= settings.max_radius)
     return [

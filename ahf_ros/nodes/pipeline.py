@@ -18,6 +18,7 @@ from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.settings import LOSSLESS, DetectorNodeSettings
 from ahf_ros.nodes.target_msg import coded_target_array
 from ahf_ros.target import Identification, Target
+from ahf_ros.trials import AnyDetector
 
 ImageMessage: TypeAlias = Image | CompressedImage
 """What images come in as."""
@@ -75,10 +76,11 @@ class Pipeline:
         if settings.estimate_expected:
             estimate = estimator(self._detector, settings.target)
         self._identifier = AdaptiveIdentifier(
-            self._detect,
+            self._unless_stopping(self._detector),
             settings.adaptive,
             getattr(self._detector, 'refine', None),
             estimate,
+            self._unless_stopping(getattr(self._detector, 'draft', self._detector)),
         )
 
     def answer(self, message: ImageMessage, expected: int) -> Answer:
@@ -115,7 +117,12 @@ class Pipeline:
         """Forget what was learnt from earlier images."""
         self._identifier.reset()
 
-    def _detect(self, image: np.ndarray) -> list[Target]:
-        if self._stopping.is_set():
-            raise Refused(STOPPING)
-        return self._detector(image)
+    def _unless_stopping(self, detector: AnyDetector) -> AnyDetector:
+        """Return a detector that breaks off before its next image when the node stops."""
+
+        def detect(image: np.ndarray) -> list[Target]:
+            if self._stopping.is_set():
+                raise Refused(STOPPING)
+            return detector(image)
+
+        return detect
