@@ -10,17 +10,16 @@ from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
 
 CONFIG = PathJoinSubstitution([get_package_share_directory('ahf_ros'), 'config'])
+PROFILES = PathJoinSubstitution([CONFIG, 'fastdds_shm.xml'])
 
 
 def generate_launch_description():
     return LaunchDescription(
         [
             DeclareLaunchArgument('light', default_value='stripe', description='Projected light.'),
-            # Room for whole images in the memory that processes share.
-            SetEnvironmentVariable(
-                'FASTRTPS_DEFAULT_PROFILES_FILE',
-                PathJoinSubstitution([CONFIG, 'fastdds_shm.xml']),
-            ),
+            # Room for whole images in the memory that processes share; Jazzy, and Kilted.
+            SetEnvironmentVariable('FASTRTPS_DEFAULT_PROFILES_FILE', PROFILES),
+            SetEnvironmentVariable('FASTDDS_DEFAULT_PROFILES_FILE', PROFILES),
             Node(
                 package='ahf_ros',
                 executable='illumination',

@@ -16,7 +16,10 @@ def generate_launch_description():
     return LaunchDescription(
         [
             DeclareLaunchArgument('namespace', default_value='', description='Of the node.'),
-            DeclareLaunchArgument('image', default_value='image', description='Topic to read.'),
+            DeclareLaunchArgument('image', default_value='image', description='Topic of images.'),
+            DeclareLaunchArgument(
+                'points', default_value='points', description='Topic of clouds, with cloud.'
+            ),
             DeclareLaunchArgument(
                 'parameters',
                 default_value=PathJoinSubstitution([CONFIG, 'detector.yaml']),
@@ -27,7 +30,11 @@ def generate_launch_description():
                 executable='detector',
                 namespace=LaunchConfiguration('namespace'),
                 parameters=[LaunchConfiguration('parameters')],
-                remappings=[('image', LaunchConfiguration('image'))],
+                remappings=[
+                    ('image', LaunchConfiguration('image')),
+                    ('image/compressed', [LaunchConfiguration('image'), '/compressed']),
+                    ('points', LaunchConfiguration('points')),
+                ],
                 output='screen',
             ),
         ]
