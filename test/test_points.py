@@ -5,6 +5,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from ahf_ros.points import FLOAT32, FLOAT64, organised_points
 
@@ -107,3 +109,30 @@ def test_it_reads_what_sensor_msgs_py_writes() -> None:
     expected = point_cloud2.read_points(message, ['x', 'y', 'z']).reshape(3, 4)
     for name in 'xyz':
         assert (points[name] == expected[name]).all()
+
+
+def sizes(most: int = 2**32 - 1) -> Any:
+    return st.integers(0, 40) | st.integers(0, most)
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    height=sizes(),
+    width=sizes(),
+    fields=st.lists(
+        st.builds(field, st.sampled_from(['x', 'y', 'z', '']), sizes(), st.integers(5, 9)),
+        max_size=5,
+    ),
+    is_bigendian=st.booleans(),
+    point_step=sizes(),
+    row_step=sizes(),
+    data=st.binary(max_size=3000),
+)
+def test_what_is_no_cloud_is_named_and_nothing_is_read_beyond_the_data(**message: Any) -> None:
+    try:
+        points = organised_points(SimpleNamespace(**message))
+    except ValueError as error:
+        assert ', accepted ' in str(error)
+    else:
+        assert points.shape == (message['height'], message['width'])
+        assert all(points[name].tobytes() for name in 'xyz')

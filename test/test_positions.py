@@ -151,3 +151,19 @@ def test_a_cloud_that_is_the_same_everywhere_does_no_harm() -> None:
     result = found(np.ones((100, 120), KIND))
     assert result.points[0].tolist() == [1, 1, 1]
     assert (result.deviations[0], result.spacings[0]) == (0, 0)
+
+
+@pytest.mark.filterwarnings('error')
+@pytest.mark.parametrize('kind', ['<f4', '>f4', '<f8'])
+def test_garbage_does_no_harm(kind: str) -> None:
+    random = np.random.default_rng(0)
+    point = np.dtype([(name, kind) for name in 'xyz'])
+    for _ in range(100):
+        cloud = np.frombuffer(random.bytes(30 * 30 * point.itemsize), point).reshape(30, 30)
+        if random.random() < 0.5:  # a real surface with garbage in it
+            cloud = np.where(
+                random.random((30, 30)) < 0.3, cloud, scan(0.3)[:30, :30].astype(point)
+            )
+        x, y, major, minor = random.uniform(-5, 35, 4)
+        found = positions(cloud, [Target(1, 1, x, y, abs(major), abs(minor), random.normal())])
+        assert found.points.shape == (1, 3)
