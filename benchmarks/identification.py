@@ -161,8 +161,10 @@ def with_command(options: argparse.Namespace) -> Identify:
 
     def run(image: np.ndarray, family: str, expected: int) -> Seen:
         command = options.command.replace('{family}', family).replace('{expected}', str(expected))
-        program = ProgramSettings(command=command, command_timeout=PATIENCE)
-        detector = create('command', DetectorSettings(program=program))
+        settings = DetectorSettings(
+            program=ProgramSettings(command=command), detector_timeout=PATIENCE
+        )
+        detector = create('command', settings)
         started = time.perf_counter()
         return detector(image), time.perf_counter() - started
 

@@ -92,3 +92,55 @@ def test_a_detector_of_another_package_that_cannot_be_imported(tmp_path, monkeyp
     assert registry['create']('ring').name == 'ring'
     with pytest.raises(ValueError, match="detector is 'mine', but package_that_is_broken:MyDet"):
         registry['create']('mine')
+
+
+FAILING = """
+import time
+import numpy as np
+class MyDetector:
+    name = family = 'mine'
+    def __init__(self, settings):
+        pass
+    def __call__(self, image):
+        if image.max() == 1:
+            time.sleep(3600)
+        if image.max() == 2:
+            raise KeyError('weights')
+        if image.max() == 3:
+            raise ValueError('image is too dark')
+        return []
+    def refine(self, image, targets):
+        raise RuntimeError('no GPU')
+"""
+
+
+@pytest.mark.parametrize(
+    ('gray', 'words'),
+    [
+        (1, "detector 'mine' took longer than detector_timeout, 0.2 s"),
+        (2, "detector 'mine' failed: KeyError: 'weights'"),
+        (3, "detector 'mine' failed: ValueError: image is too dark"),
+    ],
+)
+def test_a_detector_of_another_package_may_fail_and_hang(tmp_path, monkeypatch, gray, words):
+    registry = added(tmp_path, monkeypatch, f'package_that_fails_{gray}', FAILING)
+    detector = registry['create']('mine', DetectorSettings(detector_timeout=0.2))
+    image = np.full((20, 20), gray, np.uint8)
+    image[0] = 0
+    with pytest.raises(ValueError) as raised:
+        identify(image, detector, expected=0)
+    assert str(raised.value) == words
+    with pytest.raises(ValueError, match="detector 'mine' failed: RuntimeError: no GPU"):
+        detector.refine(image, [])
+    assert detector.draft is None
+
+
+def test_a_search_ends_when_a_detector_hangs_in_it(tmp_path, monkeypatch):
+    body = FAILING.replace('image.max() == 1', 'image.max() > 100')
+    registry = added(tmp_path, monkeypatch, 'package_that_hangs', body)
+    detector = registry['create']('mine', DetectorSettings(detector_timeout=0.2))
+    image = np.full((20, 20), 60, np.uint8)
+    image[0] = 0
+    assert identify(image, detector, expected=0).targets == ()
+    with pytest.raises(ValueError, match='took longer than detector_timeout'):
+        identify(image, detector, expected=5)

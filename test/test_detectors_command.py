@@ -23,8 +23,9 @@ def detector(tmp_path, script: str, words: str = '', timeout: float = 20.0):
     path = tmp_path / 'program.py'
     path.write_text(script)
     command = f'{sys.executable} {path} {words}'
-    program = ProgramSettings(command=command, command_timeout=timeout)
-    return create('command', DetectorSettings(program=program))
+    program = ProgramSettings(command=command)
+    settings = DetectorSettings(program=program, detector_timeout=timeout)
+    return create('command', settings)
 
 
 def printing(text: str) -> str:
@@ -82,7 +83,7 @@ def test_a_program_that_hangs_is_ended_with_all_that_it_started(tmp_path):
         f'open({str(pid)!r}, "w").write(str(child.pid))\n'
         'time.sleep(60)\n'
     )
-    with pytest.raises(ValueError, match='took longer than command_timeout, 2 s'):
+    with pytest.raises(ValueError, match='took longer than detector_timeout, 2 s'):
         detector(tmp_path, script, timeout=2.0)(IMAGE)
     child = int(pid.read_text())
     for _ in range(100):

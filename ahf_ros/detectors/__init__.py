@@ -13,6 +13,7 @@ from importlib.metadata import EntryPoint, entry_points
 
 from ahf_ros.detectors.command import CommandDetector
 from ahf_ros.detectors.detector import Detector, DetectorSettings
+from ahf_ros.detectors.guarded import GuardedDetector
 from ahf_ros.detectors.ring import RingDetector
 from ahf_ros.detectors.square import SquareDetector
 from ahf_ros.detectors.traditional import TraditionalDetector
@@ -59,8 +60,10 @@ def create(name: str, settings: DetectorSettings | None = None) -> Detector:
         cannot be loaded; or if the detector does not accept the settings.
     """
     DETECTOR.check(name)
-    make = _DETECTORS.get(name) or _loaded(_ADDED[name])
-    return make(DetectorSettings() if settings is None else settings)
+    settings = settings or DetectorSettings()
+    if name in _DETECTORS:
+        return _DETECTORS[name](settings)
+    return GuardedDetector(_loaded(_ADDED[name])(settings), settings.detector_timeout)
 
 
 def _loaded(point: EntryPoint) -> Callable[[DetectorSettings], Detector]:

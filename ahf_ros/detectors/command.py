@@ -99,7 +99,7 @@ class CommandDetector:
     def _printed(self, words: list[str], folder: Path) -> str:
         """Return what the command printed on standard output."""
         output, errors = folder / 'output', folder / 'errors'
-        limit = self.settings.program.command_timeout
+        limit = self.settings.detector_timeout
         with output.open('wb') as out, errors.open('wb') as err:
             try:
                 process = subprocess.Popen(
@@ -111,7 +111,7 @@ class CommandDetector:
                 status = process.wait(limit)
             except subprocess.TimeoutExpired as error:
                 raise ValueError(
-                    f'{self._named} took longer than command_timeout, {limit:g} s'
+                    f'{self._named} took longer than detector_timeout, {limit:g} s'
                 ) from error
             finally:
                 _end(process)

@@ -90,15 +90,10 @@ class ProgramSettings:
     ----------
     command : str
         Program and arguments, as for a shell, which is not used.
-    command_timeout : float
-        Time that it has for an image, s.
     """
 
     command: str = parameter(
         '', 'Program of the detector command, with arguments; {image} is the path of a PNG file.'
-    )
-    command_timeout: float = parameter(
-        60.0, 'Longest time of the command for one image, s.', minimum=0.01, maximum=86400.0
     )
 
     def __post_init__(self) -> None:
@@ -120,6 +115,8 @@ class DetectorSettings:
         Bounds of the semi-major axis of the dot, px.
     report_undecoded : bool
         Whether targets whose code word is not certain are reported, with the ID `UNDECODED`.
+    detector_timeout : float
+        Time that a detector from elsewhere has for an image, s.
     square : SquareSettings
         Of detectors of square markers.
     program : ProgramSettings
@@ -134,6 +131,13 @@ class DetectorSettings:
     max_radius: float = parameter(60.0, 'Largest radius of a dot, px.', minimum=1.0, maximum=1e4)
     report_undecoded: bool = parameter(
         False, 'Whether to report targets whose code word is not certain, with the ID -1.'
+    )
+    detector_timeout: float = parameter(
+        60.0,
+        'Longest time for one image of a detector that is a command, a service or of another '
+        'package, s.',
+        minimum=0.01,
+        maximum=86400.0,
     )
     square: SquareSettings = field(default_factory=SquareSettings)
     program: ProgramSettings = field(default_factory=ProgramSettings)

@@ -123,8 +123,9 @@ class DetectorNode(ProcessNode):
         """Return the detector that is a service, where the settings ask for it."""
         if settings.detector != SERVICE:
             return None
-        if not self._service or self._service.settings != settings.service:
-            self._service = ServiceDetector(self, settings.service, self._stopping)
+        wanted = settings.service, settings.target.detector_timeout
+        if not self._service or (self._service.service, self._service.timeout) != wanted:
+            self._service = ServiceDetector(self, *wanted, self._stopping)
         return self._service
 
     def _on_image(self, message: ImageMessage) -> None:

@@ -80,7 +80,7 @@ class Pipeline:
             settings.adaptive,
             getattr(self._detector, 'refine', None),
             estimate,
-            self._unless_stopping(getattr(self._detector, 'draft', self._detector)),
+            self._unless_stopping(getattr(self._detector, 'draft', None) or self._detector),
         )
 
     def answer(self, message: ImageMessage, expected: int) -> Answer:

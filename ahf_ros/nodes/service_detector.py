@@ -15,7 +15,6 @@ from std_msgs.msg import Header
 
 from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.nodes.pipeline import STOPPING, Refused
-from ahf_ros.nodes.settings import ServiceSettings
 from ahf_ros.nodes.target_msg import identification
 from ahf_ros.srv import Identify
 from ahf_ros.target import Target
@@ -33,7 +32,9 @@ class ServiceDetector:
     ----------
     node : rclpy.node.Node
         Whose client it is.
-    settings : ServiceSettings
+    service : str
+    timeout : float
+        Longest time for an image, s.
     stopping : threading.Event
         Breaks off waiting for an answer.
     """
@@ -41,11 +42,14 @@ class ServiceDetector:
     name: ClassVar[str] = 'service'
     family: ClassVar[str] = 'service'
 
-    def __init__(self, node: Node, settings: ServiceSettings, stopping: threading.Event) -> None:
-        self.settings = settings
+    def __init__(
+        self, node: Node, service: str, timeout: float, stopping: threading.Event
+    ) -> None:
+        self.service = service
+        self.timeout = timeout
         self._stopping = stopping
         self._client: Client = node.create_client(
-            Identify, settings.service, callback_group=ReentrantCallbackGroup()
+            Identify, service, callback_group=ReentrantCallbackGroup()
         )
 
     def __call__(self, image: np.ndarray) -> list[Target]:
@@ -60,7 +64,7 @@ class ServiceDetector:
             If the node stops before.
         """
         # What is sent before the service is known to this node gets lost.
-        if not self._client.wait_for_service(min(_GONE, self.settings.service_timeout)):
+        if not self._client.wait_for_service(min(_GONE, self.timeout)):
             raise ValueError(f'{self._named} is not there')
         future = self._client.call_async(Identify.Request(image=image_message(image, Header())))
         try:
@@ -73,12 +77,12 @@ class ServiceDetector:
 
     @property
     def _named(self) -> str:
-        return f'service {self.settings.service!r}'
+        return f'service {self.service!r}'
 
     def _awaited(self, future: Future) -> Identify.Response:
         answered = threading.Event()
         future.add_done_callback(lambda _: answered.set())
-        patience = self.settings.service_timeout
+        patience = self.timeout
         limit = time.monotonic() + patience
         seen = time.monotonic()
         while not answered.wait(_POLL):
@@ -90,6 +94,8 @@ class ServiceDetector:
             elif now - seen > min(_GONE, patience):
                 raise ValueError(f'{self._named} is not there')
             if now > limit:
-                raise ValueError(f'{self._named} took longer than service_timeout, {patience:g} s')
+                raise ValueError(
+                    f'{self._named} took longer than detector_timeout, {patience:g} s'
+                )
         response: Identify.Response = future.result()
         return response

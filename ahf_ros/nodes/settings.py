@@ -26,22 +26,6 @@ _SERVICE_NAME = re.compile(r'[~/]?/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*', re.ASCII)
 
 
 @dataclass(frozen=True, slots=True)
-class ServiceSettings:
-    """Which service the detector `service` calls."""
-
-    service: str = parameter('', 'Service of the detector service, an ahf_ros/srv/Identify.')
-    service_timeout: float = parameter(
-        60.0, 'Longest time of the service for one image, s.', minimum=0.1, maximum=86400.0
-    )
-
-    def __post_init__(self) -> None:
-        """Refuse values that are not accepted."""
-        check_parameters(self)
-        if self.service and not _SERVICE_NAME.fullmatch(self.service):
-            raise ValueError(f'service is {self.service!r}, accepted is the name of a service')
-
-
-@dataclass(frozen=True, slots=True)
 class CloudSettings:
     """Positions of targets in space, from a cloud that belongs to the image."""
 
@@ -73,6 +57,7 @@ class DetectorNodeSettings:
     detector: str = parameter(
         DETECTOR.default, DETECTOR.description, choices=(*DETECTOR.choices, SERVICE)
     )
+    service: str = parameter('', 'Service of the detector service, an ahf_ros/srv/Identify.')
     expected_targets: int = parameter(
         0,
         'N, the number of coded targets in every image; 0: unknown, no filter is searched for '
@@ -101,14 +86,15 @@ class DetectorNodeSettings:
     )
     cloud: CloudSettings = field(default_factory=CloudSettings)
     target: DetectorSettings = field(default_factory=DetectorSettings)
-    service: ServiceSettings = field(default_factory=ServiceSettings)
     adaptive: AdaptiveSettings = field(default_factory=AdaptiveSettings)
 
     def __post_init__(self) -> None:
         """Refuse values that are not accepted."""
         check_parameters(self)
+        if self.service and not _SERVICE_NAME.fullmatch(self.service):
+            raise ValueError(f'service is {self.service!r}, accepted is the name of a service')
         if self.detector == SERVICE:
-            if not self.service.service:
+            if not self.service:
                 raise ValueError("service is '', accepted is the name of a service")
             if self.estimate_expected:
                 raise ValueError(f'estimate_expected is True, accepted with {SERVICE} is False')

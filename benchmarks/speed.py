@@ -1,0 +1,141 @@
+"""What AHF costs, against the published algorithm in the same run.
+
+The published algorithm is that of the paper: every filter by numpy's Fourier transforms, in double
+precision, one chromosome after the other, a generation of 50 before it looks whether to stop
+(Table 1). Both drive the same detector on the same image.
+
+- One candidate: a filter and an identification through it; ours with all threads at work.
+- The whole of AHF, from the image to its targets.
+- A stream: an image under unchanged light, against one filter and one identification.
+
+    python benchmarks/speed.py [--light stripe] [--ambient 0.3] [--seed 101]
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import statistics
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from typing import Any
+
+import numpy as np
+from filter import Recipe, machine
+
+import ahf_ros.blas  # noqa: F401  before numpy
+from ahf_ros.adaptive import AdaptiveIdentifier, identify
+from ahf_ros.detectors import create
+from ahf_ros.genetic import GeneticSettings, search
+from ahf_ros.homomorphic import FilterSettings, HomomorphicFilter
+from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.target import count_codes
+from ahf_ros.tuning import TuningSettings
+
+ROUNDS = 7
+FRAMES = 6
+
+
+def seconds(work: Callable[[], Any]) -> tuple[float, Any]:
+    """Return the time that `work` takes, s, and its result."""
+    started = time.perf_counter()
+    result = work()
+    return time.perf_counter() - started, result
+
+
+def published(recipe: Recipe, image: np.ndarray, detector: Any, expected: int) -> tuple[int, int]:
+    """Return n and the number of identifications of the published algorithm."""
+    found = [count_codes(detector(image))]
+    settings = GeneticSettings(max_evaluations=0)
+
+    def discrepancy(gains: tuple[float, ...]) -> int:
+        found.append(count_codes(detector(recipe(image, *gains))))
+        return abs(expected - found[-1])
+
+    genes, generator = TuningSettings().genes, np.random.default_rng(settings.seed)
+    result = search(discrepancy, genes, settings, generator)
+    for _ in range(settings.population * result.generations - result.evaluations):
+        # the rest of the last generation, which that algorithm evaluates as well
+        discrepancy(result.values)
+    return expected - int(result.discrepancy), len(found)
+
+
+def candidates(image: np.ndarray, detector: Any, recipe: Recipe) -> tuple[float, float]:
+    """Return the median time of one candidate, published and ours, s."""
+    prepared, threads = HomomorphicFilter(image), os.cpu_count() or 1
+    draft = getattr(detector, 'draft', detector)
+    generator = np.random.default_rng(0)
+    low, high = generator.uniform(0, 1, 4 * threads), generator.uniform(1, 4, 4 * threads)
+    gains = list(zip(high.tolist(), low.tolist(), strict=True))
+    times: list[tuple[float, float]] = []
+    with ThreadPoolExecutor(threads) as executor:
+        for turn in range(ROUNDS):
+            chosen = gains[turn % len(gains)]
+            theirs, _ = seconds(lambda chosen=chosen: detector(recipe(image, *chosen)))
+            ours, _ = seconds(
+                lambda: list(executor.map(lambda it: draft(prepared.filtered(*it)), gains))
+            )
+            times.append((theirs, ours / len(gains)))
+    theirs, ours = (statistics.median(column) for column in zip(*times, strict=True))
+    return theirs, ours
+
+
+def stream(image: np.ndarray, detector: Any, expected: int) -> tuple[float, float]:
+    """Return the median time of an image of a stream, and of its filter and identification, s."""
+    identifier = AdaptiveIdentifier(detector)
+    state = identifier.identify(image, expected).filter
+    times = []
+    with ThreadPoolExecutor(os.cpu_count()) as executor:
+        for _ in range(FRAMES):
+            whole, result = seconds(lambda: identifier.identify(image, expected))
+            assert result.filter.evaluations == 1
+            parts, _ = seconds(
+                lambda: detector(
+                    HomomorphicFilter(image).filtered(
+                        state.gamma_high, state.gamma_low, executor=executor
+                    )
+                )
+            )
+            times.append((whole, parts))
+    whole, parts = (statistics.median(column) for column in zip(*times, strict=True))
+    return whole, parts
+
+
+def main() -> None:
+    """Measure and print as Markdown."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument('--light', default='stripe')
+    parser.add_argument('--ambient', type=float, default=0.3)
+    parser.add_argument('--seed', type=int, default=101)
+    options = parser.parse_args()
+    scene = SceneSettings(light=options.light, ambient=options.ambient, seed=options.seed)
+    image, expected = render(scene).image, scene.targets
+    detector, recipe = create('traditional'), Recipe(image.shape, FilterSettings())
+    theirs, ours = candidates(image, detector, recipe)
+    facts = machine()
+    print(
+        f'{scene.light} {scene.ambient:g}, {scene.width} x {scene.height} px, {expected} targets; '
+        f'{facts["processor"]}, {facts["cores"]} cores, numpy {facts["numpy"]}, '
+        f'OpenCV {facts["opencv"]}\n'
+    )
+    print('| | s | against | s | times faster |\n|---|---|---|---|---|')
+
+    def row(name: str, own: float, other: str, others: float) -> None:
+        print(f'| {name} | {own:.3f} | {other} | {others:.3f} | {others / own:.1f} |', flush=True)
+
+    row('one candidate, traditional', ours, 'published', theirs)
+    duration, (count, evaluations) = seconds(lambda: published(recipe, image, detector, expected))
+    other = f'published, traditional: {count} in {evaluations} identifications'
+    for name in ('traditional', 'ring'):
+        times = [seconds(partial(identify, image, create(name), expected)) for _ in range(3)]
+        result = times[0][1]
+        words = f'AHF, {name}: {result.count} in {result.filter.evaluations}'
+        row(words, statistics.median(it[0] for it in times), other, duration)
+    whole, parts = stream(image, detector, expected)
+    row('an image of a stream, traditional', whole, 'a filter and an identification', parts)
+
+
+if __name__ == '__main__':
+    main()
