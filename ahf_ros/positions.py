@@ -6,14 +6,16 @@ badly or not at all, lies on a plane, and the image of a plane is a homography: 
 
     P(u, v) = (a + b u + c v) / (1 + g u + h v),
 
-and P(0, 0) = a is the position. This holds in any frame of the cloud, for any pinhole camera; the
-distortion of a lens is as good as linear across a target. Eleven numbers are fitted to about a
-thousand points by least squares, without the outliers of a first plane, the best in the median.
+and P(0, 0) = a is the position. This holds in any frame of the cloud, for any pinhole camera; of
+the distortion of a lens only what is linear across a target is in it. Eleven numbers are fitted to
+about a thousand points by least squares, without the outliers of a first plane, the best in the
+median.
 
 `benchmarks/positions.py` compares: with noise of 0.1 mm at a metre, a dot of 20 px and 45 degrees
 of tilt, positions are 0.005 mm off, those of the four nearest points 0.08 mm, and those of a fit
 without g and h 0.32 mm, for want of the perspective. With ink that is four times as noisy and a
-dot without any points the homography is 0.007 mm off; four neighbours give nothing then.
+dot without any points the homography is 0.007 mm off; four neighbours give nothing then. For such
+a dot, seen at 17 degrees from the axis, distortion of k1 = 0.1 adds 0.01 mm.
 """
 
 from __future__ import annotations

@@ -225,6 +225,30 @@ def test_bad_clouds_are_named_and_the_node_goes_on(
     assert_true(rig.found(image.header), rendering, camera)
 
 
+def test_no_cloud_is_lost_in_a_lossless_queue(
+    rig: Rig, rendering: Rendering, scanned: np.ndarray
+) -> None:
+    assert rig.detector.set(('queue', 'lossless')) == (True, '')
+    # The subscriptions that there were go when the node gets round to it.
+    first = image_message(rendering.image, header())
+    rig.detector.answer(first)
+    rig.cloud.publish(cloud_message(scanned, first.header))
+    rig.found(first.header)
+    clouds = rig.graph.node.create_publisher(PointCloud2, '/own/points', 10)
+    images = rig.graph.node.create_publisher(Image, '/own/image', 10)
+    for publisher in (clouds, images):
+        rig.graph.until(lambda publisher=publisher: publisher.get_subscription_count() == 1)
+    before = len(rig.points)
+    headers = [header() for _ in range(8)]
+    for of in headers:
+        clouds.publish(cloud_message(scanned, of))
+        images.publish(image_message(rendering.image, of))
+    rig.graph.until(lambda: len(rig.points) == before + len(headers))
+    assert [it.header.stamp for it in rig.points[before:]] == [of.stamp for of in headers]
+    assert rig.detector.set(('queue', 'latest')) == (True, '')
+    rig.graph.until(lambda: clouds.get_subscription_count() == 1)
+
+
 def test_labels_in_space_for_those_who_look(
     rig: Rig, rendering: Rendering, scanned: np.ndarray
 ) -> None:
