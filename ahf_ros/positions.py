@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -86,7 +87,7 @@ def positions(
     cloud : ndarray of shape (height, width), with the fields x, y and z
         As `ahf_ros.points.organised_points` returns it. A point that is not finite in float32, or
         that is 0, 0, 0, is none.
-    targets : sequence of Target
+    targets : sequence of Target, or of ahf_ros/CodedTarget
         In the pixels of the image that the cloud belongs to.
     neighbourhood : float
         Radius about a centre within which points count, in radii of its dot, which is taken as
@@ -97,7 +98,8 @@ def positions(
         for row, target in zip(rows, targets, strict=True):
             offsets, points, pixels = _neighbours(cloud, target, neighbourhood)
             if len(points) >= max(LEAST_POINTS, _LEAST_SHARE * pixels):
-                row[:] = _position(offsets, points, _LEAST_SHARE * pixels)
+                with suppress(np.linalg.LinAlgError):
+                    row[:] = _position(offsets, points, _LEAST_SHARE * pixels)
     rows[~np.isfinite(rows).all(axis=1)] = np.nan
     return Positions(rows[:, :3], rows[:, 3], rows[:, 4])
 

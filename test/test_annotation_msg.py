@@ -10,8 +10,10 @@ pytest.importorskip('visualization_msgs', reason='ROS 2 is not installed')
 from std_msgs.msg import Header
 from visualization_msgs.msg import ImageMarker, Marker
 
+from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.annotation_msg import target_annotations
 from ahf_ros.nodes.point_msg import target_labels, target_points
+from ahf_ros.nodes.target_msg import coded_target_array
 from ahf_ros.positions import Positions
 from ahf_ros.target import UNDECODED, Identification, Target
 
@@ -20,13 +22,17 @@ LOST = Target(UNDECODED, 0, 10.0, 20.0, 5.0, 5.0)
 HEADER = Header(frame_id='scanner')
 
 
+def answer(*targets: Target) -> CodedTargetArray:
+    return coded_target_array(Identification(targets), 'metashape12', (100, 200), HEADER)
+
+
 def lines(marker: ImageMarker) -> np.ndarray:
     """Return both ends of the lines of a marker, shape (n, 2, 2)."""
     return np.array([(point.x, point.y) for point in marker.points]).reshape(-1, 2, 2)
 
 
 def test_a_dot_is_outlined_in_the_coordinates_of_viewers() -> None:
-    drawn = lines(target_annotations(Identification((LOST,)), (100, 200), HEADER))
+    drawn = lines(target_annotations(answer(LOST)))
     away = np.hypot(*(drawn - (10.5, 20.5)).reshape(-1, 2).T)
     assert away == pytest.approx(np.full(len(away), 5.0))
     assert (drawn[1:, 0] == drawn[:-1, 1]).all()  # closed
@@ -34,7 +40,7 @@ def test_a_dot_is_outlined_in_the_coordinates_of_viewers() -> None:
 
 
 def test_the_ellipse_is_turned_and_the_id_beside_it() -> None:
-    marker = target_annotations(Identification((SEEN,)), (100, 200), HEADER)
+    marker = target_annotations(answer(SEEN))
     drawn = lines(marker)
     outline, letters = drawn[:24], drawn[24:]
     assert outline[:, :, 1].max() == pytest.approx(70.5)
@@ -48,14 +54,14 @@ def test_the_ellipse_is_turned_and_the_id_beside_it() -> None:
 
 
 def test_colours_tell_undecoded_targets() -> None:
-    marker = target_annotations(Identification((LOST, SEEN)), (100, 200), HEADER)
+    marker = target_annotations(answer(LOST, SEEN))
     first, last = marker.outline_colors[0], marker.outline_colors[-1]
     assert first.r > first.g > first.b
     assert last.g > max(last.r, last.b)
 
 
 def test_without_targets_there_are_no_lines() -> None:
-    marker = target_annotations(Identification(()), (100, 200), HEADER)
+    marker = target_annotations(answer())
     assert (marker.points, marker.outline_colors) == ([], [])
     assert marker.action == ImageMarker.ADD
 
@@ -66,7 +72,7 @@ FOUND = Positions(
 
 
 def test_points_carry_ids_and_are_nan_where_they_are_not_known() -> None:
-    message = target_points((SEEN, LOST), FOUND, HEADER)
+    message = target_points(answer(SEEN, LOST).targets, FOUND, HEADER)
     assert (message.header, message.width, message.is_dense) == (HEADER, 2, False)
     first, second = np.frombuffer(message.data, 'f4,f4,f4,i4,f4,f4').tolist()
     assert first == pytest.approx((1, 2, 3, 18, 0.75, 0.1))
@@ -79,7 +85,7 @@ def test_points_carry_ids_and_are_nan_where_they_are_not_known() -> None:
 
 
 def test_labels_stand_where_positions_are_known() -> None:
-    clear, label = target_labels((SEEN, LOST), FOUND, HEADER).markers
+    clear, label = target_labels(answer(SEEN, LOST).targets, FOUND, HEADER).markers
     assert clear.action == Marker.DELETEALL
     place = label.pose.position
     assert (label.text, place.x, place.y, place.z) == ('18', 1.0, 2.0, 3.0)

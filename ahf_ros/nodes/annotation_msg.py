@@ -12,11 +12,12 @@ import math
 
 import numpy as np
 from geometry_msgs.msg import Point
-from std_msgs.msg import ColorRGBA, Header
+from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import ImageMarker
 
 from ahf_ros.drawing import DECODED_COLOUR, UNDECODED_COLOUR
-from ahf_ros.target import UNDECODED, Identification, Target
+from ahf_ros.msg import CodedTarget, CodedTargetArray
+from ahf_ros.target import UNDECODED
 
 CORNER = 0.5
 """Added to coordinates, px: viewers have (0, 0) at the corner of the first pixel."""
@@ -49,23 +50,17 @@ _DIGITS = {
 }
 
 
-def target_annotations(
-    identification: Identification, shape: tuple[int, int], header: Header
-) -> ImageMarker:
+def target_annotations(answer: CodedTargetArray) -> ImageMarker:
     """Return the outlines of the dots and the IDs of targets, as lines of one marker.
 
     Parameters
     ----------
-    identification : Identification
-        What to draw.
-    shape : tuple of int
-        Height and width of the image, px; lines grow with it.
-    header : std_msgs.msg.Header
-        Of the image.
+    answer : CodedTargetArray
+        What was identified in an image; lines grow with the image.
     """
-    width = max(1.0, math.hypot(*shape) / 2400)
+    width = max(1.0, math.hypot(answer.height, answer.width) / 2400)
     marker = ImageMarker(
-        header=header,
+        header=answer.header,
         ns='targets',
         type=ImageMarker.LINE_LIST,
         action=ImageMarker.ADD,
@@ -73,7 +68,7 @@ def target_annotations(
         outline_color=ColorRGBA(**_rgba(DECODED_COLOUR)),
     )
     points, colours = [], []
-    for target in identification.targets:
+    for target in answer.targets:
         lines = np.concatenate((_outline(target), _letters(target, width))) + CORNER
         points += [Point(x=x, y=y) for x, y in lines.reshape(-1, 2).tolist()]
         colours += [ColorRGBA(**target_colour(target))] * len(lines)
@@ -82,12 +77,12 @@ def target_annotations(
     return marker
 
 
-def target_colour(target: Target) -> dict[str, float]:
+def target_colour(target: CodedTarget) -> dict[str, float]:
     """Return the red, green, blue and opacity of a target, 0 to 1."""
     return _rgba(UNDECODED_COLOUR if target.id == UNDECODED else DECODED_COLOUR)
 
 
-def target_name(target: Target) -> str:
+def target_name(target: CodedTarget) -> str:
     """Return what a target is called: its ID, or a question mark."""
     return '?' if target.id == UNDECODED else str(target.id)
 
@@ -97,7 +92,7 @@ def _rgba(colour: tuple[int, int, int]) -> dict[str, float]:
     return {'r': red / 255, 'g': green / 255, 'b': blue / 255, 'a': 1.0}
 
 
-def _outline(target: Target) -> np.ndarray:
+def _outline(target: CodedTarget) -> np.ndarray:
     """Return the sides of the ellipse of a dot, shape (n, 2, 2): x, y of both ends."""
     turn = np.linspace(0, 2 * math.pi, _SIDES + 1)
     along = target.semi_major * np.cos(turn)
@@ -113,7 +108,7 @@ def _outline(target: Target) -> np.ndarray:
     return np.stack((corners[:-1], corners[1:]), axis=1)
 
 
-def _letters(target: Target, width: float) -> np.ndarray:
+def _letters(target: CodedTarget, width: float) -> np.ndarray:
     """Return the lines of an ID above to the right of its dot, shape (n, 2, 2)."""
     if target.id == UNDECODED:
         return np.empty((0, 2, 2))

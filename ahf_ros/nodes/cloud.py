@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.publisher import Publisher
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 
+from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.diagnostics import CloudTally
 from ahf_ros.nodes.matching import Matcher
 from ahf_ros.nodes.point_msg import target_labels, target_points
@@ -16,7 +15,6 @@ from ahf_ros.nodes.process import ProcessNode
 from ahf_ros.nodes.settings import LOSSLESS, DetectorNodeSettings
 from ahf_ros.points import organised_points
 from ahf_ros.positions import positions
-from ahf_ros.target import Target
 
 ANSWERS = 100
 """Most answers that wait for the cloud of their image."""
@@ -26,24 +24,6 @@ LOG_PERIOD = 5.0
 
 CLOUD, ANSWER = 0, 1
 """Sides of the matcher."""
-
-
-class Seen(NamedTuple):
-    """What was identified in an image.
-
-    Attributes
-    ----------
-    header : std_msgs.msg.Header
-        Of the image.
-    shape : tuple of int
-        Height and width of the image, px.
-    targets : tuple of Target
-        In its pixels.
-    """
-
-    header: Header
-    shape: tuple[int, int]
-    targets: tuple[Target, ...]
 
 
 class TargetPoints:
@@ -94,11 +74,11 @@ class TargetPoints:
         """Subscribe no more."""
         self._node.destroy_subscription(self._clouds)
 
-    def see(self, seen: Seen) -> None:
-        """Publish the positions of what was identified, now or when the cloud comes."""
-        cloud = self._matcher.put(ANSWER, _nanoseconds(seen.header), seen)
+    def locate(self, answer: CodedTargetArray) -> None:
+        """Publish where the targets of an answer are, now or when the cloud comes."""
+        cloud = self._matcher.put(ANSWER, _nanoseconds(answer.header), answer)
         if cloud is not None:
-            self._publish(seen, cloud)
+            self._publish(answer, cloud)
 
     def _on_cloud(self, cloud: PointCloud2) -> None:
         self._tally.received += 1
@@ -107,25 +87,24 @@ class TargetPoints:
         except ValueError as error:
             self._refuse(str(error))
             return
-        seen = self._matcher.put(CLOUD, _nanoseconds(cloud.header), cloud, len(cloud.data))
-        if seen is not None:
-            self._publish(seen, cloud)
+        answer = self._matcher.put(CLOUD, _nanoseconds(cloud.header), cloud, len(cloud.data))
+        if answer is not None:
+            self._publish(answer, cloud)
 
-    def _publish(self, seen: Seen, cloud: PointCloud2) -> None:
-        height, width = seen.shape
-        if (cloud.height, cloud.width) != (height, width):
+    def _publish(self, answer: CodedTargetArray, cloud: PointCloud2) -> None:
+        if (cloud.width, cloud.height) != (answer.width, answer.height):
             self._refuse(
                 f'cloud is of {cloud.width} x {cloud.height} points, '
-                f'accepted is {width} x {height}, the size of the image'
+                f'accepted is {answer.width} x {answer.height}, the size of the image'
             )
             return
-        found = positions(organised_points(cloud), seen.targets, self._radius)
-        header = Header(stamp=seen.header.stamp, frame_id=cloud.header.frame_id)
-        self._points.publish(target_points(seen.targets, found, header))
+        found = positions(organised_points(cloud), answer.targets, self._radius)
+        header = Header(stamp=answer.header.stamp, frame_id=cloud.header.frame_id)
+        self._points.publish(target_points(answer.targets, found, header))
         if self._labels.get_subscription_count():
-            self._labels.publish(target_labels(seen.targets, found, header))
+            self._labels.publish(target_labels(answer.targets, found, header))
         self._tally.used += 1
-        self._tally.positions = f'{found.known.sum()} of {len(seen.targets)}'
+        self._tally.positions = f'{found.known.sum()} of {len(answer.targets)}'
 
     def _refuse(self, reason: str) -> None:
         self._tally.rejected += 1

@@ -23,7 +23,7 @@ from visualization_msgs.msg import ImageMarker, MarkerArray
 from ahf_ros.drawing import draw
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.annotation_msg import target_annotations
-from ahf_ros.nodes.cloud import Seen, TargetPoints
+from ahf_ros.nodes.cloud import TargetPoints
 from ahf_ros.nodes.diagnostics import CloudTally, Diagnostics, Tally
 from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.nodes.parameters import ParameterSettings
@@ -71,7 +71,7 @@ class DetectorNode(ProcessNode):
         self._debug_image = self.publisher(Image, '~/debug_image')
         self._filtered_image = self.publisher(Image, '~/filtered_image')
         self._annotations = self.publisher(ImageMarker, '~/annotations')
-        self._target_points = self.publisher(PointCloud2, '~/target_points')
+        self._target_points = self.publisher(PointCloud2, '~/target_points', ANSWERS_KEPT)
         self._target_labels = self.publisher(MarkerArray, '~/target_labels')
         self._diagnostic_array = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self.create_timer(DIAGNOSTICS_PERIOD, self._publish_diagnostics)
@@ -171,12 +171,10 @@ class DetectorNode(ProcessNode):
         self._tally.answered += 1
         self._tally.latency = time.monotonic() - received
         self._tally.last = answer.identification
-        header, shape, targets = message.header, answer.image.shape, answer.identification.targets
         if clouds := self._clouds:
-            clouds.see(Seen(header, shape, targets))
+            clouds.locate(answer.message)
         if self._annotations.get_subscription_count():
-            drawing = target_annotations(answer.identification, shape, header)
-            self._annotations.publish(drawing)
+            self._annotations.publish(target_annotations(answer.message))
         if self._debug_image.get_subscription_count():
             drawn = draw(answer.image, answer.identification)
             self._debug_image.publish(image_message(drawn, message.header))

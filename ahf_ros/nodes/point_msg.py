@@ -11,9 +11,9 @@ from sensor_msgs.msg import PointCloud2, PointField
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
+from ahf_ros.msg import CodedTarget
 from ahf_ros.nodes.annotation_msg import target_colour, target_name
 from ahf_ros.positions import Positions
-from ahf_ros.target import Target
 
 POINT = {
     'x': PointField.FLOAT32,
@@ -30,12 +30,12 @@ _POINT_TYPE = np.dtype([(name, _KINDS[datatype]) for name, datatype in POINT.ite
 _LABEL_HEIGHT = 3.0  # of the letters, in radii of the dot
 
 
-def target_points(targets: Sequence[Target], found: Positions, header: Header) -> PointCloud2:
+def target_points(targets: Sequence[CodedTarget], found: Positions, header: Header) -> PointCloud2:
     """Return a cloud of one point a target, in their order, NaN where it has no position.
 
     Parameters
     ----------
-    targets : sequence of Target
+    targets : sequence of CodedTarget
         Of one image.
     found : Positions
         Where they are.
@@ -64,7 +64,7 @@ def target_points(targets: Sequence[Target], found: Positions, header: Header) -
     )
 
 
-def target_labels(targets: Sequence[Target], found: Positions, header: Header) -> MarkerArray:
+def target_labels(targets: Sequence[CodedTarget], found: Positions, header: Header) -> MarkerArray:
     """Return the IDs of targets as text at their positions, in place of all earlier text.
 
     Parameters
