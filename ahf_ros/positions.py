@@ -114,11 +114,12 @@ def _neighbours(
     reach = [max(_LEAST_REACH, neighbourhood * axis) for axis in shape[2:4]]
     places = []
     for centre, size in ((target.y, cloud.shape[0]), (target.x, cloud.shape[1])):
-        first = max(0, math.ceil(centre - reach[0]))
-        places.append((first, min(size, math.floor(centre + reach[0]) + 1)))
-    count = math.prod(max(0, last - first) for first, last in places)
+        first = math.ceil(min(size, max(0, centre - reach[0])))
+        last = math.floor(min(size - 1, max(-1, centre + reach[0])))
+        places.append((first, max(first, last + 1)))
+    count = math.prod(end - first for first, end in places)
     step = max(1, math.ceil(math.sqrt(count / _MOST_POINTS)))
-    window = tuple(slice(first, max(first, last), step) for first, last in places)
+    window = tuple(slice(first, end, step) for first, end in places)
     rows, columns = np.mgrid[window]
     offsets = np.stack((columns - target.x, rows - target.y), axis=-1)
     turn = np.array(

@@ -118,14 +118,15 @@ def test_few_points_or_none_give_no_position() -> None:
 
 @pytest.mark.parametrize(
     ('x', 'y', 'radius'),
-    [(-500, 50, 8), (60, 1e9, 8), (math.nan, 50, 8), (60, 50, math.inf), (60, 50, math.nan)],
+    [(-500, 50, 8), (60, 1e300, 8), (math.nan, 50, 8), (60, 50, math.inf), (60, 50, math.nan)],
 )
 def test_a_target_out_of_the_cloud_has_no_position(x: float, y: float, radius: float) -> None:
     assert not positions(scan(), [target(x, y, radius)]).known[0]
 
 
-def test_a_target_of_unknown_size_has_a_neighbourhood() -> None:
-    result = positions(scan(), [target(radius=0.0)])
+@pytest.mark.parametrize('radius', [0.0, 1e308])
+def test_a_target_of_no_known_size_has_a_neighbourhood(radius: float) -> None:
+    result = positions(scan(), [target(radius=radius)])
     assert result.points[0] == pytest.approx(on_plane(np.array(CENTRE), 0), abs=1e-3)
 
 

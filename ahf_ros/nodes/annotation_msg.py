@@ -26,7 +26,7 @@ _SIDES = 24  # of the outline of a dot
 _SMALLEST_DIGIT = 12.0  # px, height at a line width of 1
 _DIGIT = 0.9  # height of a digit in radii of its dot
 _ADVANCE = 0.8  # from digit to digit, in heights
-_PLACES = {  # of the seven lines of a digit, a to g, in heights: x, y of both ends
+_STROKES = {  # the seven lines of a digit, in heights: x, y of both ends
     'a': ((0.0, -1.0), (0.5, -1.0)),
     'b': ((0.5, -1.0), (0.5, -0.5)),
     'c': ((0.5, -0.5), (0.5, 0.0)),
@@ -114,7 +114,7 @@ def _letters(target: CodedTarget, width: float) -> np.ndarray:
         return np.empty((0, 2, 2))
     height = max(_SMALLEST_DIGIT * width, _DIGIT * target.semi_major)
     name = str(target.id)
-    lines = np.array([_PLACES[line] for digit in name for line in _DIGITS[digit]])
+    lines = np.array([_STROKES[line] for digit in name for line in _DIGITS[digit]])
     counts = [len(_DIGITS[digit]) for digit in name]
     lines[:, :, 0] += _ADVANCE * np.repeat(np.arange(len(name)), counts)[:, None]
     offset = 0.8 * target.semi_major + 2 * width

@@ -15,7 +15,7 @@ from ahf_ros.msg import CodedTarget
 from ahf_ros.nodes.annotation_msg import target_colour, target_name
 from ahf_ros.positions import Positions
 
-POINT = {
+POINT_FIELDS = {
     'x': PointField.FLOAT32,
     'y': PointField.FLOAT32,
     'z': PointField.FLOAT32,
@@ -26,7 +26,7 @@ POINT = {
 """Fields of a point of the labelled cloud; the last one is the deviation of `Positions`."""
 
 _KINDS = {PointField.FLOAT32: '<f4', PointField.INT32: '<i4'}
-_POINT_TYPE = np.dtype([(name, _KINDS[datatype]) for name, datatype in POINT.items()])
+_POINT_TYPE = np.dtype([(name, _KINDS[datatype]) for name, datatype in POINT_FIELDS.items()])
 _LABEL_HEIGHT = 3.0  # of the letters, in radii of the dot
 
 
@@ -50,7 +50,7 @@ def target_points(targets: Sequence[CodedTarget], found: Positions, header: Head
     points['deviation'] = found.deviations
     fields = [
         PointField(name=name, offset=4 * number, datatype=datatype, count=1)
-        for number, (name, datatype) in enumerate(POINT.items())
+        for number, (name, datatype) in enumerate(POINT_FIELDS.items())
     ]
     return PointCloud2(
         header=header,
