@@ -7,6 +7,7 @@ of the image is taken.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -146,7 +147,8 @@ def _gray(samples: np.ndarray, encoding: Encoding) -> np.ndarray:
         return samples[:, :, encoding.gray]
     if samples.dtype == np.float64:  # which cv2.cvtColor does not take
         weights = np.array([0.114, 0.587, 0.299])
-        return samples[:, :, :3] @ weights
+        with np.errstate(invalid='ignore', over='ignore'):  # of pixels without a value
+            return samples[:, :, :3] @ weights
     return cv2.cvtColor(np.ascontiguousarray(samples), encoding.to_gray)
 
 
@@ -179,7 +181,11 @@ def decode_compressed(message: Any) -> np.ndarray:
     """
     encoded = np.frombuffer(message.data, np.uint8)
     flags = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
-    image = cv2.imdecode(encoded, flags) if encoded.size else None
+    image = None
+    if encoded.size:
+        # It raises where the header tells of a size that it does not accept.
+        with suppress(cv2.error):
+            image = cv2.imdecode(encoded, flags)
     if image is None:
         raise ValueError(
             f'data is {encoded.size} bytes of format {message.format!r} that are no image, '

@@ -6,13 +6,13 @@ import sys
 from types import SimpleNamespace
 
 import cv2
+import fuzz
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from ahf_ros.detectors import create
-from ahf_ros.encodings import ENCODINGS, decode_compressed, decode_image
+from ahf_ros.encodings import decode_compressed, decode_image
 from ahf_ros.image import as_gray
 from ahf_ros.synthetic.scene import SceneSettings, render
 
@@ -208,23 +208,21 @@ def test_compressed_images_keep_their_depth():
 
 
 @settings(max_examples=400, deadline=None)
-@given(
-    encoding=st.sampled_from([*ENCODINGS, '8SC1', 'nonsense']),
-    height=st.one_of(st.integers(0, 9), st.integers(0, 2**32 - 1)),
-    width=st.one_of(st.integers(0, 9), st.integers(0, 2**32 - 1)),
-    step=st.one_of(st.integers(0, 80), st.integers(0, 2**32 - 1)),
-    big=st.integers(0, 255),
-    data=st.binary(max_size=400),
-)
-def test_any_message_is_an_image_or_refused(encoding, height, width, step, big, data):
-    sent = SimpleNamespace(
-        encoding=encoding, height=height, width=width, step=step, is_bigendian=big, data=data
-    )
-    try:
-        image = decode_image(sent)
-    except ValueError as error:
-        assert str(error).split()[0] in ('encoding', 'height', 'width', 'step', 'data')
-    else:
-        assert image.shape == (height, width)
-        assert image.dtype in (np.uint8, np.uint16, np.float32, np.float64)
-        image.sum()  # reads every value
+@given(fuzz.images())
+def test_any_message_is_an_image_or_refused(fields):
+    fuzz.check(fields)
+
+
+@settings(max_examples=200, deadline=None)
+@given(fuzz.compressed_images())
+def test_any_compressed_message_is_an_image_or_refused(fields):
+    fuzz.check_compressed(fields)
+
+
+def test_a_compressed_header_of_too_many_pixels():
+    _, data = cv2.imencode('.bmp', GRAY)
+    data = data.ravel().copy()
+    data[25] = 127  # the highest byte of the height
+    told = SimpleNamespace(format='bmp', data=data)
+    with pytest.raises(ValueError, match='are no image, accepted is JPEG or PNG'):
+        decode_compressed(told)

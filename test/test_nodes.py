@@ -445,12 +445,6 @@ def test_a_refused_parameter_stops_a_node_at_the_start(
     assert all(word in errors for word in words), errors
 
 
-def test_integers_are_accepted_where_numbers_are_meant(graph: Any) -> None:
-    process = graph.start('detector', '-r', '__ns:=/whole', *overrides(max_radius=50, mutation=0))
-    graph.listen(CodedTargetArray, '/whole/coded_targets')
-    assert process.end() == (0, '')
-
-
 def test_a_service_is_a_detector_and_its_end_is_named(
     graph: Any, detector: Detector, message: Image, rendering: Rendering
 ) -> None:
@@ -465,8 +459,7 @@ def test_a_service_is_a_detector_and_its_end_is_named(
     found = detector.answer(message)
     assert [it.id for it in found.targets] == [it.id for it in rendering.targets]
     assert found.family == 'service'
-    other.awaited = True
-    other.process.kill()
+    other.kill()
     response = detector.identify(image_message(rendering.image, header()))
     assert not response.success
     assert response.message == "service '/other/detector/identify' is not there"

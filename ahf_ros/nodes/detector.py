@@ -14,6 +14,7 @@ from typing import TypeVar
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.clock import Clock, ClockType
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import CompressedImage, Image, PointCloud2
 from std_msgs.msg import Header
@@ -49,7 +50,7 @@ With fewer, the next answer takes the place of one that a subscriber still waits
 """
 
 LOG_PERIOD = 5.0
-"""Shortest time between two log lines about images that are refused, s."""
+"""Shortest time between two log lines about images of the same kind of fault, s."""
 
 
 class DetectorNode(ProcessNode):
@@ -74,7 +75,10 @@ class DetectorNode(ProcessNode):
         self._target_points = self.publisher(PointCloud2, '~/target_points', ANSWERS_KEPT)
         self._target_labels = self.publisher(MarkerArray, '~/target_labels')
         self._diagnostic_array = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
-        self.create_timer(DIAGNOSTICS_PERIOD, self._publish_diagnostics)
+        # With use_sim_time the node's clock stands still while a replay does.
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(DIAGNOSTICS_PERIOD, self._publish_diagnostics, clock=steady)
+        self._last = Header()
         self._images: Subscription | None = None
         self._subscribed = ('', '')
         self._clouds: TargetPoints | None = None
@@ -130,12 +134,25 @@ class DetectorNode(ProcessNode):
 
     def _on_image(self, message: ImageMessage) -> None:
         self._tally.received += 1
+        self._compare_stamps(message.header)
         job = partial(self._process, message, self._pipeline, time.monotonic())
         settings = self._pipeline.settings
         if settings.queue == LOSSLESS:
             self._worker.append(job, len(message.data), settings.queue_memory * 2**20)
         elif self._worker.offer(job):
             self._tally.dropped += 1
+
+    def _compare_stamps(self, header: Header) -> None:
+        """Tell where time goes backwards; a replay that starts over is answered all the same."""
+        now, before = header.stamp, self._last.stamp
+        self._last = header
+        if (now.sec, now.nanosec) < (before.sec, before.nanosec):
+            self._tally.backwards += 1
+            self.get_logger().warning(
+                f'stamp is {now.sec}.{now.nanosec:09} s, that of the image before is '
+                f'{before.sec}.{before.nanosec:09} s',
+                throttle_duration_sec=LOG_PERIOD,
+            )
 
     def _on_identify(
         self, request: Identify.Request, response: Identify.Response

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
@@ -52,9 +52,9 @@ class Tally:
 
     Attributes
     ----------
-    received, answered, dropped, rejected : int
+    received, answered, dropped, rejected, backwards : int
         Images from the start: come in; identified, whatever was found; overtaken by a later one
-        before their turn; not accepted.
+        before their turn; not accepted; with a stamp earlier than that of the image before.
     reason : str
         Why the last one that was rejected was.
     latency : float
@@ -69,6 +69,7 @@ class Tally:
     answered: int = 0
     dropped: int = 0
     rejected: int = 0
+    backwards: int = 0
     reason: str = ''
     latency: float = 0.0
     last: Identification = field(default_factory=lambda: Identification(()))
@@ -81,18 +82,21 @@ class Diagnostics:
     def __init__(self, name: str, tally: Tally) -> None:
         self._name = name
         self._tally = tally
-        self._answered = 0
-        self._rejected = 0
+        self._before = replace(tally)
         self._rejected_clouds = 0
 
     def status(self, period: float) -> DiagnosticStatus:
         """Return the status of the last `period` seconds."""
-        tally = self._tally
-        answered, rejected = tally.answered - self._answered, tally.rejected - self._rejected
-        self._answered, self._rejected = tally.answered, tally.rejected
+        tally = replace(self._tally)
+        answered = tally.answered - self._before.answered
+        rejected = tally.rejected - self._before.rejected
+        backwards = tally.backwards - self._before.backwards
+        self._before = tally
         level, message = DiagnosticStatus.OK, f'{answered} images identified'
         if rejected:
             level, message = DiagnosticStatus.WARN, f'{rejected} images rejected: {tally.reason}'
+        elif backwards:
+            level, message = DiagnosticStatus.WARN, f'{backwards} stamps went backwards'
         clouds = tally.clouds or CloudTally()
         rejected_clouds = clouds.rejected - self._rejected_clouds
         self._rejected_clouds = clouds.rejected
@@ -108,6 +112,7 @@ class Diagnostics:
             'dropped': tally.dropped,
             'rejected': tally.rejected,
             'last reason for rejection': tally.reason,
+            'stamps that went backwards': tally.backwards,
             'identified (n)': tally.last.count,
             'expected (N)': tally.last.expected,
             'N estimated': tally.last.estimated,

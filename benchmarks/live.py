@@ -1,0 +1,145 @@
+"""Real node processes, and a node of one's own to talk to them with: for benchmarks and tests."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import IO, Any
+from unittest import mock
+
+import ahf_ros.blas  # noqa: F401  before numpy, as in processes that are ours
+
+PATIENCE = 60.0
+"""Time after which something that does not happen is a failure, s; machines may be slow."""
+
+ROS_ENVIRONMENT = {
+    'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
+    'ROS_DOMAIN_ID': str(1 + os.getpid() % 100),  # others on this machine may be testing, too
+}
+
+
+class NodeProcess:
+    """A node of this package that runs in a process of its own."""
+
+    def __init__(self, node: str, *arguments: str) -> None:
+        command = [sys.executable, '-m', f'ahf_ros.nodes.{node}', '--ros-args', *arguments]
+        self.awaited = False
+        self.output = ''
+        # Not pipes, which hold up a process of which nobody reads the log.
+        self._written = [tempfile.TemporaryFile('w+') for _ in range(2)]  # noqa: SIM115
+        self.process = subprocess.Popen(
+            command,
+            env={**os.environ, **ROS_ENVIRONMENT},
+            stdout=self._written[0],
+            stderr=self._written[1],
+        )
+
+    def wait(self) -> tuple[int, str]:
+        """Return exit status and error output of the process when it has ended."""
+        self.awaited = True
+        try:
+            self.process.wait(PATIENCE)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            raise
+        self.output, errors = (self._read(it) for it in self._written)
+        return self.process.returncode, errors
+
+    def kill(self) -> None:
+        """End the process without notice."""
+        self.process.kill()
+        self.wait()
+
+    @staticmethod
+    def _read(written: IO[str]) -> str:
+        with written:
+            written.seek(0)
+            return written.read()
+
+    def end(self, number: signal.Signals = signal.SIGINT) -> tuple[int, str]:
+        """Send a signal, then `wait`."""
+        self.process.send_signal(number)
+        return self.wait()
+
+
+class Graph:
+    """The ROS graph as seen by a node of one's own."""
+
+    def __init__(self, node: Any) -> None:
+        self.node = node
+        self._processes: list[NodeProcess] = []
+
+    def start(self, node: str, *arguments: str) -> NodeProcess:
+        """Start a node of this package; it ends with the graph."""
+        self._processes.append(NodeProcess(node, *arguments))
+        return self._processes[-1]
+
+    def close(self) -> None:
+        """End every process that is still running."""
+        for item in self._processes:
+            if item.process.poll() is None:
+                item.end()
+
+    def until(self, condition: Callable[[], Any]) -> Any:
+        """Return what the condition gives as soon as it gives something."""
+        import rclpy
+
+        limit = time.monotonic() + PATIENCE
+        while not (result := condition()):
+            assert time.monotonic() < limit, 'waited in vain'
+            for item in self._processes:
+                assert item.awaited or item.process.poll() is None, item.wait()[1]
+            rclpy.spin_once(self.node, timeout_sec=0.05)
+        return result
+
+    def listen(self, kind: type, topic: str, depth: int = 100) -> list:
+        """Return a list that messages come into, once there is somebody to send them."""
+        received: list = []
+        self.node.create_subscription(kind, topic, received.append, depth)
+        self.until(lambda: self.node.count_publishers(topic))
+        return received
+
+    def publisher(self, kind: type, topic: str) -> Any:
+        """Return a publisher, once there is somebody to receive its messages."""
+        publisher = self.node.create_publisher(kind, topic, 10)
+        self.until(publisher.get_subscription_count)
+        return publisher
+
+    def call(self, kind: type, service: str, request: Any) -> Any:
+        """Return the response of a service."""
+        client = self.node.create_client(kind, service)
+        try:
+            self.until(client.service_is_ready)
+            future = client.call_async(request)
+            self.until(future.done)
+            return future.result()
+        finally:
+            self.node.destroy_client(client)
+
+
+@contextmanager
+def opened() -> Iterator[Graph]:
+    """Yield a graph on this machine only, in which nobody else is.
+
+    Raises
+    ------
+    ModuleNotFoundError
+        If ROS 2 is not installed.
+    """
+    import rclpy
+
+    with mock.patch.dict(os.environ, ROS_ENVIRONMENT):
+        rclpy.init()
+        graph = Graph(rclpy.create_node('test'))
+        try:
+            yield graph
+        finally:
+            graph.close()
+            graph.node.destroy_node()
+            rclpy.shutdown()
