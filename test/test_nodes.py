@@ -73,7 +73,8 @@ class Detector:
 
     def __init__(self, graph: Any, *arguments: str) -> None:
         self.graph = graph
-        self.process = graph.start('detector', '-r', '__ns:=/own', *arguments)
+        places = '-r', '__ns:=/own', '-r', '/diagnostics:=/own/diagnostics'
+        self.process = graph.start('detector', *places, *arguments)
         self.targets = graph.listen(CodedTargetArray, '/own/coded_targets')
         self.image = graph.publisher(Image, '/own/image')
 
@@ -177,8 +178,8 @@ def test_two_processes_identify_what_is_there(graph: Any) -> None:
 
 def test_the_scoreboard_compares_with_the_truth(graph: Any, tmp_path: Path) -> None:
     others = ('-r', '__ns:=/match')
-    graph.start('illumination', *others, *overrides(**SCENE, rate=4))
-    graph.start('detector', *others, *overrides(expected_targets=6))
+    camera = graph.start('illumination', *others, *overrides(**SCENE, rate=4))
+    detector = graph.start('detector', *others, *overrides(expected_targets=6))
     board = graph.start(
         'scoreboard', *others, *overrides(images=2, pictures=tmp_path / 'pictures')
     )
@@ -190,6 +191,8 @@ def test_the_scoreboard_compares_with_the_truth(graph: Any, tmp_path: Path) -> N
         assert 0 < float(re.search(r'RMSE (.*) px', line).group(1)) < LARGEST_ERROR
     pictures = [read_image(path) for path in sorted((tmp_path / 'pictures').iterdir())]
     assert [picture.shape for picture in pictures] == [(700, 1000)] * 2
+    for process in (detector, camera):
+        assert process.end() == (0, '')
 
 
 def test_an_image_without_targets_is_answered(detector: Detector) -> None:
@@ -223,7 +226,7 @@ def test_colour_and_padding_make_no_difference(detector: Detector, rendering: Re
 def test_what_is_refused_is_counted_and_the_node_goes_on(
     graph: Any, detector: Detector, message: Image
 ) -> None:
-    diagnostics = graph.listen(DiagnosticArray, '/diagnostics')
+    diagnostics = graph.listen(DiagnosticArray, '/own/diagnostics')
 
     def rejected() -> tuple[int, str]:
         told = values(diagnostics[-1])
@@ -353,7 +356,7 @@ def test_parameters_are_answered_and_the_latest_image_waits_during_a_search(
 
     search = *ENDLESS, ('max_duration', 5.0), ('expected_targets', 50)
     assert detector.set(*search) == (True, '')
-    diagnostics = graph.listen(DiagnosticArray, '/diagnostics')
+    diagnostics = graph.listen(DiagnosticArray, '/own/diagnostics')
     graph.until(lambda: diagnostics)
     before = received()
     detector.image.publish(images[0])
