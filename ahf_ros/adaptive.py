@@ -28,7 +28,7 @@ from ahf_ros.homomorphic import FilterSettings
 from ahf_ros.image import check_image
 from ahf_ros.parameter import check_parameters, numbers_in, parameter
 from ahf_ros.target import FilterState, Identification, Target, count_codes
-from ahf_ros.trials import AnyDetector, Trials, checked_targets
+from ahf_ros.trials import AnyDetector, Trials, checked_targets, confirmed
 from ahf_ros.tuning import TuningSettings, tuned
 
 Refinement = Callable[[np.ndarray, Sequence[Target]], Sequence[Target]]
@@ -58,6 +58,11 @@ class AdaptiveSettings:
     fusion: bool = parameter(
         False,
         'Whether targets count that other filters than the best one show, after a search in vain.',
+    )
+    coarse: bool = parameter(
+        False,
+        'Whether to search on the image at half its size, and to confirm the best few filters at '
+        'full size.',
     )
     threads: int = parameter(
         0,
@@ -174,6 +179,7 @@ class AdaptiveIdentifier:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.last_search: SearchResult | None = None
+        self._tried: tuple[Values, ...] = ()
         self._detector = detector
         self._settings = settings or AdaptiveSettings()
         self._refine = refine or getattr(detector, 'refine', None)
@@ -232,7 +238,7 @@ class AdaptiveIdentifier:
             else:
                 chosen, evaluations = self._choose(trials, executor)
         targets = trials.targets[chosen]
-        others = self.last_search.tried if self._settings.fusion and self.last_search else ()
+        others = self._tried if self._settings.fusion else ()
         if others:
             targets = fused(trials.of([chosen, None, *others]))
         settled = (count_codes(targets), trials.expected) if estimate else None
@@ -251,7 +257,7 @@ class AdaptiveIdentifier:
 
     def _unchanged(self, trials: Trials, estimate: Estimate, executor: Executor | None) -> bool:
         """Return whether an image shows what the last one did; tell the trials what N is."""
-        self.last_search = None
+        self.last_search, self._tried = None, ()
         shown = trials.count(self.memory.filter, executor)
         settled = self.memory.settled
         if shown and settled and settled[0] == shown:
@@ -264,7 +270,7 @@ class AdaptiveIdentifier:
 
     def _choose(self, trials: Trials, executor: Executor | None) -> tuple[Values | None, int]:
         """Return the best filter, None for the image as received, and the evaluations."""
-        self.last_search = None
+        self.last_search, self._tried = None, ()
         remembered = self.memory.filter
         searching = self._settings.ahf and trials.expected > 0
         if searching and remembered and trials.discrepancy(remembered, executor) == 0:
@@ -274,8 +280,9 @@ class AdaptiveIdentifier:
             self.memory = replace(self.memory, filter=None if searching else remembered)
             return None, len(trials.targets)
         genetic = self._settings.genetic
+        searched = trials.reduced() if self._settings.coarse else trials
         self.last_search = result = search(
-            trials.discrepancy,
+            searched.discrepancy,
             self._settings.tuning.genes,
             genetic,
             np.random.default_rng(genetic.seed),
@@ -283,9 +290,15 @@ class AdaptiveIdentifier:
             executor=executor,
             clock=self._clock,
         )
-        chosen = result.values if result.discrepancy < unfiltered else None
+        evaluations = 1 + result.evaluations
+        self._tried = result.tried
+        if searched is not trials:
+            self._tried = confirmed(result.tried, searched, trials, executor)
+            evaluations += len(self._tried)
+        best = min(self._tried, key=trials.discrepancy)
+        chosen = best if trials.discrepancy(best) < unfiltered else None
         self.memory = replace(self.memory, filter=chosen)
-        return chosen, 1 + result.evaluations
+        return chosen, evaluations
 
 
 def _check_count(name: str, count: Any) -> None:

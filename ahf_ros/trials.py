@@ -8,6 +8,7 @@ from concurrent.futures import Executor
 from threading import Lock
 from typing import Any
 
+import cv2
 import numpy as np
 
 from ahf_ros.chromosome import Values
@@ -18,6 +19,10 @@ from ahf_ros.tuning import tuned
 AnyDetector = Callable[[np.ndarray], list[Target]]
 """From an 8-bit image, shape (height, width), to the targets in it. Called from several threads at
 once where several filters are tried at a time."""
+
+
+CONFIRMED = 5
+"""Filters of a reduced image that are tried on the whole one."""
 
 
 class Trials:
@@ -83,6 +88,13 @@ class Trials:
             self.targets[values] = known
         return count_codes(self.targets[values])
 
+    def reduced(self) -> Trials:
+        """Return trials of the image at half its size."""
+        height, width = self.image.shape
+        size = (max(width // 2, 1), max(height // 2, 1))
+        image = cv2.resize(self.image, size, interpolation=cv2.INTER_AREA)
+        return Trials(image, self._draft, self._draft, self.expected, self._listed, self._settings)
+
     def of(self, tried: Sequence[Values | None]) -> list[list[Target]]:
         """Return the targets through filters that were tried, each filter once."""
         return [self.targets[values] for values in dict.fromkeys(tried)]
@@ -100,6 +112,31 @@ class Trials:
                 chosen.gamma_high, chosen.gamma_low, chosen.cutoff, chosen.attenuation, executor
             )
         )
+
+
+def confirmed(
+    tried: Sequence[Values], reduced: Trials, whole: Trials, executor: Executor | None
+) -> tuple[Values, ...]:
+    """Try the best filters of a reduced image on the whole one, up to the first that shows N.
+
+    Parameters
+    ----------
+    tried : sequence of tuple of float
+        Filters of the reduced image.
+    reduced, whole : Trials
+    executor : concurrent.futures.Executor or None
+        Threads that share the strips of an image.
+
+    Returns
+    -------
+    tuple of tuple of float
+        What was tried on the whole image, the best of the reduced one first.
+    """
+    best = sorted(tried, key=reduced.discrepancy)[:CONFIRMED]
+    for count, values in enumerate(best, 1):
+        if whole.discrepancy(values, executor) == 0:
+            return tuple(best[:count])
+    return tuple(best)
 
 
 def checked_targets(found: Any, source: str) -> list[Target]:

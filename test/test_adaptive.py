@@ -12,6 +12,7 @@ from ahf_ros.homomorphic import FilterSettings, HomomorphicFilter
 from ahf_ros.parameter import parameters
 from ahf_ros.spectrum import median_distance
 from ahf_ros.target import UNDECODED, Target, count_codes
+from ahf_ros.trials import CONFIRMED
 from ahf_ros.tuning import EXTENDED, TuningSettings
 
 COUNT = 144
@@ -456,3 +457,44 @@ def test_there_are_no_drafts_without_a_refinement_or_a_filter():
     detector.refine = None
     assert identify(DIM, detector, COUNT).targets == identify(DIM, Dots(), COUNT).targets
     assert detector.drafts == 0
+
+
+class Blocks(Dots):
+    """The same on paper with dots of two pixels by two, of which half an image shows one each."""
+
+    def __call__(self, image):
+        with self.lock:
+            self.calls += 1
+            self.images.append(image)
+        lit = image >= 128
+        if lit.mean() > 0.1:
+            return []
+        cell = image.shape[0] // 12
+        numbers = {int(row // cell * 12 + column // cell) for row, column in np.argwhere(lit)}
+        return [target(number + 1) for number in sorted(numbers)]
+
+
+def test_a_coarse_search_confirms_its_best_filters_on_the_whole_image():
+    large = np.kron(DIM, np.ones((2, 2), np.uint8))
+    detector = Blocks()
+    settings = replace(SHORT, coarse=True, threads=1)
+    result = identify(large, detector, COUNT, settings)
+    shapes = [image.shape for image in detector.images]
+    coarse = shapes.count((96, 96))
+    whole = shapes.count((192, 192))
+    assert result.count == COUNT
+    assert (shapes[0], shapes[-1]) == ((192, 192), (192, 192))
+    assert result.filter.evaluations == coarse + whole
+    assert coarse > 1
+    assert 2 <= whole <= 6
+
+
+@pytest.mark.parametrize('threads', [2, 4])
+def test_a_coarse_search_in_vain_does_not_depend_on_the_threads(threads):
+    def run(number):
+        settings = replace(SHORT, coarse=True, threads=number, fusion=True)
+        result = identify(DIM, Dots(), COUNT + 1, settings)
+        return replace(result, filter=replace(result.filter, duration=0.0))
+
+    assert run(threads) == run(1)
+    assert run(1).filter.evaluations == 1 + 30 + CONFIRMED
