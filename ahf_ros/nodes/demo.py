@@ -87,7 +87,9 @@ def main(arguments: list[str] | None = None) -> int:
     """Show identification under projected light, by nodes in processes of their own."""
     options = parser().parse_args(arguments)
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-    os.environ.setdefault('FASTRTPS_DEFAULT_PROFILES_FILE', str(shared_memory_profile()))
+    for distribution in ('FASTRTPS', 'FASTDDS'):  # up to Jazzy, and from Kilted on
+        profiles = f'{distribution}_DEFAULT_PROFILES_FILE'
+        os.environ.setdefault(profiles, str(shared_memory_profile()))
     print(f'{options.images} images under {options.light}, being rendered ...', flush=True)
     with ExitStack() as stack:
         processes = [
