@@ -44,7 +44,7 @@ class AdaptiveSettings:
     """Whether and where a filter is searched for, and how.
 
     The default of `max_evaluations` bounds what an image costs where no filter shows all N
-    targets: 100 identifications, a thirtieth of the 3131 filters there are.
+    targets: 100 identifications, a thirtieth of the 3131 filters of the published search.
     """
 
     ahf: bool = parameter(

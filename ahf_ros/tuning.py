@@ -1,7 +1,7 @@
 """What of the filter a search tunes.
 
 The published search [1]_ tunes the two gains and leaves the rest to Eq. (8) and the median of D.
-The extended one also tunes
+The extended one, which finds more with as many filters (`benchmarks/strategies.py`), also tunes
 
 - the cut-off. Cut-off and attenuation enter Eq. (4) as c / D0^2 alone, so that one of them is
   enough: a small D0 is a wide blur, which evens out light that changes slowly.
@@ -33,10 +33,10 @@ class TuningSettings:
     """Which filters are tried."""
 
     search: str = parameter(
-        PUBLISHED,
+        EXTENDED,
         'published: the gains are searched for, as in the paper; extended: also cut-off and '
         'output contrast.',
-        choices=(PUBLISHED, EXTENDED),
+        choices=(EXTENDED, PUBLISHED),
     )
     gamma_high_min: float = parameter(
         1.0, 'Smallest gain of the high frequencies.', minimum=0.1, maximum=20.0

@@ -18,7 +18,7 @@ import numpy as np
 from ahf_ros import genetic
 from ahf_ros.chromosome import Values
 from ahf_ros.genetic import GeneticSettings, search
-from ahf_ros.tuning import TuningSettings
+from ahf_ros.tuning import PUBLISHED, TuningSettings
 
 N = 54
 
@@ -81,7 +81,7 @@ def trial(objective: Callable, way: tuple[str, float, int], seed: int, most: int
     children = one_bit_children if kind == 'chromosome' else genetic._next_population
     with mock.patch.object(genetic, '_next_population', children):
         generator = np.random.default_rng(seed)
-        result = search(objective, TuningSettings().genes, settings, generator)
+        result = search(objective, TuningSettings(search=PUBLISHED).genes, settings, generator)
     return result.evaluations, result.discrepancy
 
 

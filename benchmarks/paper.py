@@ -21,6 +21,7 @@ import time
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +44,8 @@ from ahf_ros.genetic import GeneticSettings
 from ahf_ros.synthetic.lights import LIGHT_NAMES
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 from ahf_ros.target import Identification, Target, count_codes
+from ahf_ros.trials import AnyDetector
+from ahf_ros.tuning import EXTENDED, PUBLISHED, TuningSettings
 
 TARGETS = DetectorSettings(family='metashape12', square=SquareSettings(aruco_dictionary='4x4_100'))
 """Ring targets as in the paper, and a dictionary with as many markers as there are targets."""
@@ -65,12 +68,15 @@ class Method:
         Whether AHF drives the detector.
     preprocessor : str
         Name in `PREPROCESSORS`; '' for none.
+    search : str
+        What AHF tunes, see `ahf_ros.tuning`.
     """
 
     name: str
     detector: str
     ahf: bool = False
     preprocessor: str = ''
+    search: str = EXTENDED
 
     def identify(
         self, image: np.ndarray, expected: int, most: int
@@ -86,26 +92,33 @@ class Method:
             return Identification(tuple(refine(image, found) if refine else found)), []
         tried: list[int] = []
 
-        def counted(shown: np.ndarray) -> list[Target]:
-            targets = detector(shown)
+        def counted(identify: AnyDetector, shown: np.ndarray) -> list[Target]:
+            targets = identify(shown)
             tried.append(count_codes(targets))
             return targets
 
-        genetic = GeneticSettings(max_evaluations=most)
-        settings = AdaptiveSettings(ahf=self.ahf, threads=1, genetic=genetic)
-        return AdaptiveIdentifier(counted, settings, refine).identify(image, expected), tried
+        settings = AdaptiveSettings(
+            ahf=self.ahf,
+            threads=1,
+            tuning=TuningSettings(search=self.search),
+            genetic=GeneticSettings(max_evaluations=most),
+        )
+        draft = partial(counted, getattr(detector, 'draft', detector))
+        identifier = AdaptiveIdentifier(partial(counted, detector), settings, refine, draft=draft)
+        return identifier.identify(image, expected), tried
 
 
 METHODS = (
     Method('traditional', 'traditional'),
-    Method('AHF-traditional', 'traditional', ahf=True),
+    Method('AHF-traditional', 'traditional', ahf=True, search=PUBLISHED),
+    Method('AHF-traditional, extended', 'traditional', ahf=True),
     *(Method(f'{name} + traditional', 'traditional', preprocessor=name) for name in PREPROCESSORS),
     Method('ring', 'ring'),
     Method('AHF-ring', 'ring', ahf=True),
     Method('aruco', 'aruco'),
     Method('AHF-aruco', 'aruco', ahf=True),
 )
-"""All that is compared. TI of the paper is `traditional`."""
+"""All that is compared. TI of the paper is `traditional`, and its search `PUBLISHED`."""
 
 
 def run_scene(scene: SceneSettings, most: int) -> list[dict[str, Any]]:

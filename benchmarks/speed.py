@@ -32,7 +32,7 @@ from ahf_ros.genetic import GeneticSettings, search
 from ahf_ros.homomorphic import FilterSettings, HomomorphicFilter
 from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import count_codes
-from ahf_ros.tuning import TuningSettings
+from ahf_ros.tuning import PUBLISHED, TuningSettings
 
 ROUNDS = 7
 FRAMES = 6
@@ -54,7 +54,7 @@ def published(recipe: Recipe, image: np.ndarray, detector: Any, expected: int) -
         found.append(count_codes(detector(recipe(image, *gains))))
         return abs(expected - found[-1])
 
-    genes, generator = TuningSettings().genes, np.random.default_rng(settings.seed)
+    genes, generator = TuningSettings(search=PUBLISHED).genes, np.random.default_rng(settings.seed)
     result = search(discrepancy, genes, settings, generator)
     for _ in range(settings.population * result.generations - result.evaluations):
         # the rest of the last generation, which that algorithm evaluates as well
@@ -94,7 +94,11 @@ def stream(image: np.ndarray, detector: Any, expected: int) -> tuple[float, floa
             parts, _ = seconds(
                 lambda: detector(
                     HomomorphicFilter(image).filtered(
-                        state.gamma_high, state.gamma_low, executor=executor
+                        state.gamma_high,
+                        state.gamma_low,
+                        state.cutoff,
+                        state.attenuation,
+                        executor,
                     )
                 )
             )

@@ -13,7 +13,7 @@ from ahf_ros.parameter import parameters
 from ahf_ros.spectrum import median_distance
 from ahf_ros.target import UNDECODED, Target, count_codes
 from ahf_ros.trials import CONFIRMED
-from ahf_ros.tuning import EXTENDED, TuningSettings
+from ahf_ros.tuning import EXTENDED, PUBLISHED, TuningSettings
 
 COUNT = 144
 SHORT = AdaptiveSettings(genetic=GeneticSettings(max_evaluations=30))
@@ -66,7 +66,8 @@ def test_the_image_as_received_comes_first_and_may_be_enough():
 def test_a_filter_is_found_where_the_light_defeats_the_detector():
     assert count_codes(Dots()(DIM)) < COUNT / 2
     detector = Dots()
-    result = identify(DIM, detector, COUNT, replace(AdaptiveSettings(), threads=1))
+    published = AdaptiveSettings(tuning=TuningSettings(search=PUBLISHED), threads=1)
+    result = identify(DIM, detector, COUNT, published)
     state = result.filter
     assert result.count == COUNT
     assert state.applied
@@ -367,7 +368,11 @@ def test_a_setting_out_of_range_is_refused(values, words):
 
 def test_one_filter_is_a_range_too():
     one = TuningSettings(
-        gamma_high_min=1.2, gamma_high_max=1.2, gamma_low_min=0.25, gamma_low_max=0.25
+        search=PUBLISHED,
+        gamma_high_min=1.2,
+        gamma_high_max=1.2,
+        gamma_low_min=0.25,
+        gamma_low_max=0.25,
     )
     settings = AdaptiveSettings(tuning=one)
     result = identify(DIM, lambda image: [target(1)] if image is not DIM else [], 5, settings)
@@ -485,8 +490,8 @@ def test_a_coarse_search_confirms_its_best_filters_on_the_whole_image():
     assert result.count == COUNT
     assert (shapes[0], shapes[-1]) == ((192, 192), (192, 192))
     assert result.filter.evaluations == coarse + whole
-    assert coarse > 1
-    assert 2 <= whole <= 6
+    assert coarse >= 1
+    assert 2 <= whole <= 1 + CONFIRMED
 
 
 @pytest.mark.parametrize('threads', [2, 4])
