@@ -16,7 +16,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rcl_interfaces.srv import ListParameters
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Image
-from std_msgs.msg import Header
+from std_msgs.msg import Header, String
 
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.image_msg import image_message
@@ -116,6 +116,26 @@ def test_stamps_that_go_backwards_are_told_and_answered(graph: Any, pixels: np.n
     assert status == 0
     assert log.count('stamp') == 1
     assert 'stamp is 7.000000000 s, that of the image before is 7.000000001 s' in log
+
+
+def test_a_topic_of_another_type_is_named_and_images_are_answered(graph: Any) -> None:
+    bench = Bench(graph, 'mistaken')
+    other = graph.node.create_publisher(String, '/mistaken/image', 1)
+    named = 'image is of type std_msgs/msg/String, accepted is sensor_msgs/msg/Image'
+
+    def status() -> tuple[bytes, str]:
+        said = bench.diagnostics[-1].status[0]
+        return said.level, said.message
+
+    graph.until(lambda: bench.diagnostics and status() == (DiagnosticStatus.WARN, named))
+    other.publish(String(data='no image'))
+    camera = graph.start('illumination', '-r', '__ns:=/mistaken', *overrides(**SCENE, rate=20))
+    graph.until(lambda: bench.answers)
+    graph.node.destroy_publisher(other)
+    graph.until(lambda: status()[0] == DiagnosticStatus.OK)
+    assert camera.end() == (0, '')
+    ended, log = bench.process.end()
+    assert (ended, named in log) == (0, True)
 
 
 def test_simulated_time_that_has_not_begun_stands_still_or_jumps(

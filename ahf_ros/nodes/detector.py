@@ -222,7 +222,20 @@ class DetectorNode(ProcessNode):
         self.get_logger().warning(f'image refused: {reason}', throttle_duration_sec=LOG_PERIOD)
         raise Refused(reason)
 
+    def _compare_types(self) -> None:
+        """Tell where what is published on the topic of the images is of another type."""
+        kind, topic = TOPICS[self._subscribed[0]]
+        accepted = f'sensor_msgs/msg/{kind.__name__}'
+        found = {it.topic_type for it in self.get_publishers_info_by_topic(topic)} - {accepted}
+        self._tally.mistaken = ''
+        if found:
+            self._tally.mistaken = (
+                f'{topic} is of type {", ".join(sorted(found))}, accepted is {accepted}'
+            )
+            self.get_logger().warning(self._tally.mistaken, throttle_duration_sec=LOG_PERIOD)
+
     def _publish_diagnostics(self) -> None:
+        self._compare_types()
         status = self._diagnostics.status(DIAGNOSTICS_PERIOD)
         header = Header(stamp=self.get_clock().now().to_msg())
         self._diagnostic_array.publish(DiagnosticArray(header=header, status=[status]))

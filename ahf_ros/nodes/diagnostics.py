@@ -57,6 +57,8 @@ class Tally:
         before their turn; not accepted; with a stamp earlier than that of the image before.
     reason : str
         Why the last one that was rejected was.
+    mistaken : str
+        What else than images is published on their topic; nothing where empty.
     latency : float
         Time from an image in to its targets out, s, of the last one.
     last : Identification
@@ -71,6 +73,7 @@ class Tally:
     rejected: int = 0
     backwards: int = 0
     reason: str = ''
+    mistaken: str = ''
     latency: float = 0.0
     last: Identification = field(default_factory=lambda: Identification(()))
     clouds: CloudTally | None = None
@@ -103,6 +106,8 @@ class Diagnostics:
         if rejected_clouds and not rejected:
             level = DiagnosticStatus.WARN
             message = f'{rejected_clouds} clouds rejected: {clouds.reason}'
+        if tally.mistaken:
+            level, message = DiagnosticStatus.WARN, tally.mistaken
         used = tally.last.filter
         values = {
             'rate (Hz)': f'{answered / period:.2f}',
