@@ -283,9 +283,9 @@ class Soak:
                 lambda: self._set(True, detector='ring', polarity='dark'),
                 lambda: self._set(True, detector='traditional', seed=7),
                 lambda: self._set(False, population=1, seed=8),
-                # One more than there are: filters are tried.
-                lambda: self._set(True, expected_targets=4, max_evaluations=4, population=2),
                 self._identify,
+                # One more than there are: filters are tried.
+                lambda: self._set(True, expected_targets=4, max_evaluations=2, population=2),
                 lambda: self._set(True, expected_targets=3, threads=1),
                 self._leave,
                 lambda: self._set(True, expected_targets=0, polarity='auto', threads=0),

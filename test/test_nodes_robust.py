@@ -20,6 +20,7 @@ from std_msgs.msg import Header, String
 
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.image_msg import image_message
+from ahf_ros.nodes.process import Ending
 from ahf_ros.nodes.settings import DetectorNodeSettings
 from ahf_ros.settings import flat_parameters
 from ahf_ros.synthetic.scene import SceneSettings, render
@@ -67,6 +68,14 @@ class Bench:
         """Return what the detector said last about something, nothing before it said anything."""
         said = self.diagnostics[-1].status[0].values if self.diagnostics else []
         return next((item.value for item in said if item.key == key), '')
+
+
+def test_the_end_of_a_node_does_not_gather_callbacks() -> None:
+    ended, called = Ending(), []
+    for _ in range(3):  # as an executor does with every spin
+        ended.add_done_callback(called.append)
+    ended.set_result(0)
+    assert called == [ended]
 
 
 @pytest.mark.parametrize('queue', ['latest', 'lossless'])

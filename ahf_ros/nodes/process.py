@@ -32,18 +32,35 @@ ENDING = {signal.SIGINT, signal.SIGTERM}
 """Signals that end a node."""
 
 
+class Ending(Future):
+    """A future for the one executor that waits for it; it keeps the first callback only.
+
+    Up to Jazzy an executor adds the same one with every spin, and would so grow for ever.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._waited_for = False
+
+    def add_done_callback(self, callback: Callable[[Future], None]) -> None:
+        """Call `callback` when done, unless another one is called already."""
+        if not self._waited_for:
+            self._waited_for = True
+            super().add_done_callback(callback)
+
+
 class ProcessNode(Node):
     """A node that is the whole of a process.
 
     Attributes
     ----------
-    ended : rclpy.task.Future of int
+    ended : Ending of int
         The exit status, as soon as the node is to end, by a signal or of its own accord.
     """
 
     def __init__(self, name: str) -> None:
         super().__init__(name)
-        self.ended = Future()
+        self.ended = Ending()
 
     def close(self) -> None:
         """End the threads of the node; topics and the log still work."""
