@@ -44,7 +44,8 @@ class AdaptiveSettings:
     """Whether and where a filter is searched for, and how.
 
     The default of `max_evaluations` bounds what an image costs where no filter shows all N
-    targets: 100 identifications, a thirtieth of the 3131 filters of the published search.
+    targets. With the extended genes, 50 filters find what 100 of the published search do
+    (`benchmarks/strategies.py`).
     """
 
     ahf: bool = parameter(

@@ -77,7 +77,9 @@ def one_bit_children(
 def trial(objective: Callable, way: tuple[str, float, int], seed: int, most: int) -> tuple:
     """Return the evaluations of one search and what it left."""
     kind, mutation, tournament = way
-    settings = GeneticSettings(mutation=mutation, tournament=tournament, max_evaluations=most)
+    settings = GeneticSettings(
+        population=50, mutation=mutation, tournament=tournament, max_evaluations=most
+    )
     children = one_bit_children if kind == 'chromosome' else genetic._next_population
     with mock.patch.object(genetic, '_next_population', children):
         generator = np.random.default_rng(seed)

@@ -48,7 +48,7 @@ def seconds(work: Callable[[], Any]) -> tuple[float, Any]:
 def published(recipe: Recipe, image: np.ndarray, detector: Any, expected: int) -> tuple[int, int]:
     """Return n and the number of identifications of the published algorithm."""
     found = [count_codes(detector(image))]
-    settings = GeneticSettings(max_evaluations=0)
+    settings = GeneticSettings(population=50, max_evaluations=0)
 
     def discrepancy(gains: tuple[float, ...]) -> int:
         found.append(count_codes(detector(recipe(image, *gains))))

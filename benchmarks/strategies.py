@@ -12,6 +12,7 @@ import argparse
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
+from functools import partial
 from itertools import islice, product
 
 import numpy as np
@@ -64,10 +65,14 @@ Strategy = Callable[[Scene, tuple[Gene, ...], np.random.Generator, Executor], li
 
 
 def genetic(
-    scene: Scene, genes: tuple[Gene, ...], generator: np.random.Generator, executor: Executor
+    scene: Scene,
+    genes: tuple[Gene, ...],
+    generator: np.random.Generator,
+    executor: Executor,
+    population: int = GeneticSettings().population,
 ) -> list[int]:
     """Try filters as the genetic search does."""
-    settings = GeneticSettings(max_evaluations=MOST)
+    settings = GeneticSettings(population=population, max_evaluations=MOST)
     result = search(scene.discrepancy, genes, settings, generator, executor=executor)
     return [scene.known[values] for values in result.tried]
 
@@ -110,7 +115,8 @@ def _part(gene: Gene, share: float) -> float:
 
 
 STRATEGIES: dict[str, Strategy] = {
-    'genetic': genetic,
+    f'genetic, population {GeneticSettings().population}': genetic,
+    'genetic, population 50': partial(genetic, population=50),
     'random': at_random,
     'grid': on_a_grid,
 }
