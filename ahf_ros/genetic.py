@@ -36,8 +36,8 @@ search does not depend on it."""
 class GeneticSettings:
     """Table 1 of the paper, and limits.
 
-    The paper has a population of 50. With 20, fifty filters are some generations, and find a little
-    more than as many drawn at random do.
+    The paper has a population of 50. With 20, fifty filters are some generations, and find a
+    little more than fifty drawn at random.
     """
 
     population: int = parameter(20, 'Chromosomes in a generation.', minimum=2, maximum=10000)
