@@ -12,7 +12,6 @@ to be counted as rejected; memory, threads and open files of the process are loo
 from __future__ import annotations
 
 import argparse
-import itertools
 import json
 import sys
 import time
@@ -199,7 +198,6 @@ class Soak:
         self.sent = self.answered = self.wrong = self.garbage = self.visits = 0
         self.changes = self.requests = 0
         self.looks: list[Look] = []
-        self._numbers = itertools.count(1)
         self._due: dict[int, tuple[int, ...]] = {}
         self._diagnostics: dict[str, str] = {}
         self._visitor: Visitor | None = None
@@ -267,8 +265,8 @@ class Soak:
 
     def _send(self, frame: Frame) -> None:
         self.sent += 1
-        frame.message.header.stamp.sec = number = next(self._numbers)
-        self._due[number] = frame.ids
+        frame.message.header.stamp.sec = self.sent
+        self._due[self.sent] = frame.ids
         self._image.publish(frame.message)
 
     def _quiet(self) -> None:

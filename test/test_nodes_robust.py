@@ -47,16 +47,17 @@ def pixels() -> np.ndarray:
 class Bench:
     """A detector in a namespace, and all that it says."""
 
-    def __init__(self, graph: Any, name: str, **given: Any) -> None:
+    def __init__(self, graph: Any, name: str, *places: str, **given: Any) -> None:
         self.graph = graph
         self.name = name
-        self.start(**given)
+        self.start(*places, **given)
         self.answers = graph.listen(CodedTargetArray, f'/{name}/coded_targets')
         self.diagnostics = graph.listen(DiagnosticArray, f'/{name}/diagnostics')
 
-    def start(self, **given: Any) -> None:
-        places = '-r', f'__ns:=/{self.name}', '-r', f'/diagnostics:=/{self.name}/diagnostics'
-        self.process = self.graph.start('detector', *places, *overrides(**given))
+    def start(self, *places: str, **given: Any) -> None:
+        own = f'__ns:=/{self.name}', f'/diagnostics:=/{self.name}/diagnostics'
+        remapped = [word for place in (*own, *places) for word in ('-r', place)]
+        self.process = self.graph.start('detector', *remapped, *overrides(**given))
 
     def kill(self) -> None:
         """End the detector without notice, and forget what it said."""
@@ -128,9 +129,9 @@ def test_stamps_that_go_backwards_are_told_and_answered(graph: Any, pixels: np.n
 
 
 def test_a_topic_of_another_type_is_named_and_images_are_answered(graph: Any) -> None:
-    bench = Bench(graph, 'mistaken')
-    other = graph.node.create_publisher(String, '/mistaken/image', 1)
-    named = 'image is of type std_msgs/msg/String, accepted is sensor_msgs/msg/Image'
+    bench = Bench(graph, 'mistaken', 'image:=camera/image')
+    other = graph.node.create_publisher(String, '/mistaken/camera/image', 1)
+    named = '/mistaken/camera/image is of type std_msgs/msg/String, accepted is sensor_msgs/msg/Image'
 
     def status() -> tuple[bytes, str]:
         said = bench.diagnostics[-1].status[0]
@@ -138,7 +139,9 @@ def test_a_topic_of_another_type_is_named_and_images_are_answered(graph: Any) ->
 
     graph.until(lambda: bench.diagnostics and status() == (DiagnosticStatus.WARN, named))
     other.publish(String(data='no image'))
-    camera = graph.start('illumination', '-r', '__ns:=/mistaken', *overrides(**SCENE, rate=20))
+    camera = graph.start(
+        'illumination', '-r', '__ns:=/mistaken/camera', *overrides(**SCENE, rate=20, frames=1)
+    )
     graph.until(lambda: bench.answers)
     graph.node.destroy_publisher(other)
     graph.until(lambda: status()[0] == DiagnosticStatus.OK)
