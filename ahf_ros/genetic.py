@@ -259,7 +259,17 @@ class _Objective:
         if self._executor is None:
             yield from map(self._discrepancy, fresh)
             return
-        futures = [self._executor.submit(self._discrepancy, values) for values in fresh]
+        successes: list[int] = []
+
+        def evaluate(place: int, values: Values) -> float:
+            if successes and min(successes) < place:
+                return math.nan  # nobody gets that far
+            result = self._discrepancy(values)
+            if result == 0:
+                successes.append(place)
+            return result
+
+        futures = [self._executor.submit(evaluate, *it) for it in enumerate(fresh)]
         try:
             for future in futures:
                 yield future.result()

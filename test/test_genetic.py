@@ -125,6 +125,26 @@ def test_it_stops_at_the_first_success_in_order_with_threads_too():
     assert result.evaluations == 11
 
 
+def test_nothing_is_begun_behind_a_success_that_waits_for_its_turn():
+    order = Recorder(unreachable)
+    run(order, max_evaluations=2)
+    first, second = order.asked
+    asked, succeeded = [], threading.Event()
+
+    def objective(values):
+        asked.append(values)
+        if values == second:
+            succeeded.set()
+            return 0
+        succeeded.wait()
+        time.sleep(0.05)  # so that the other thread could begin the third
+        return 1
+
+    with ThreadPoolExecutor(2) as executor:
+        assert run(objective, executor=executor).values == second
+    assert sorted(asked) == sorted([first, second])
+
+
 def test_when_it_returns_no_evaluation_is_under_way():
     under_way = []
 
