@@ -130,8 +130,9 @@ def test_stamps_that_go_backwards_are_told_and_answered(graph: Any, pixels: np.n
 
 def test_a_topic_of_another_type_is_named_and_images_are_answered(graph: Any) -> None:
     bench = Bench(graph, 'mistaken', 'image:=camera/image')
-    other = graph.node.create_publisher(String, '/mistaken/camera/image', 1)
-    named = '/mistaken/camera/image is of type std_msgs/msg/String, accepted is sensor_msgs/msg/Image'
+    topic = '/mistaken/camera/image'
+    other = graph.node.create_publisher(String, topic, 1)
+    named = f'{topic} is of type std_msgs/msg/String, accepted is sensor_msgs/msg/Image'
 
     def status() -> tuple[bytes, str]:
         said = bench.diagnostics[-1].status[0]
