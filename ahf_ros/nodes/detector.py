@@ -224,8 +224,8 @@ class DetectorNode(ProcessNode):
 
     def _compare_types(self) -> None:
         """Tell where what is published on the topic of the images is of another type."""
-        kind, _ = TOPICS[self._subscribed[0]]
-        topic = self._images.topic_name
+        kind, name = TOPICS[self._subscribed[0]]
+        topic = self.resolve_topic_name(name)
         accepted = f'sensor_msgs/msg/{kind.__name__}'
         found = {it.topic_type for it in self.get_publishers_info_by_topic(topic)} - {accepted}
         self._tally.mistaken = ''
