@@ -52,8 +52,8 @@ _CORRELATION = 2.5  # px between independent readings
 _LEAST_DEVIATION = 0.001  # dot radii
 _LEAST_CONTRAST = 0.25  # of prints; more speaks no more for a target
 # Intercepts and weights of `confidence`
-_OF_TARGET = np.array([-30.33, 6.69, 16.19, -2.11, -7.95])
-_OF_WORD = np.array([-9.97, 2.26, 7.92])
+_OF_TARGET = np.array([-28.85, 12.31, 16.04, -1.19, -6.95])
+_OF_WORD = np.array([-8.64, 2.39, -0.1, 6.31])
 
 OF_TARGET = len(_OF_TARGET) - 1
 """Number of the features that tell targets from patterns of light; the others tell words."""
@@ -76,6 +76,10 @@ class Readings:
         Evidence for the best word over the best one of another ID, in units of ln.
     weakest : ndarray of float64, shape (k,)
         Evidence of the least certain sector for its own bit, in units of ln.
+    contradiction : ndarray of float64, shape (k,)
+        Evidence for a mark in the steps of one unmarked sector that speak for one, in units of
+        ln; of the sector where it is largest. A spot of light can make a mark as gray as the
+        ground about it, but hardly up to its very edges.
     explained : ndarray of float64, shape (k, 4)
         Share of the steps that are as the word wants them: onto unmarked sectors at the inner and
         the outer edge of the band, and onto marked ones at both.
@@ -85,6 +89,7 @@ class Readings:
     start: np.ndarray
     margin: np.ndarray
     weakest: np.ndarray
+    contradiction: np.ndarray
     explained: np.ndarray
 
     @property
@@ -145,12 +150,11 @@ def read_bands(
     surround = np.concatenate([of_gap, [gap_in, outside]])
     bright = np.where((marks.signs > 0)[:, None], surround, np.concatenate([of_dot, of_dot]))
     light = see_light(np.moveaxis(bright, 0, 2), of_gap, marks)
-    evidence = sum(step_evidence(surround, inside, marks, light) for surround, inside in arcs)
-    evidence += level_evidence(of_band, light)
-    evidence *= np.clip(2 * np.pi * inner * size / count / _CORRELATION, 0.08, 1)[:, None]
     limit = frame.circle_points(angles, np.array([outer + FARTHEST_ACROSS]))[:, 0]
     visible = frame.within(frame.project(frames, limit), gray.shape)
-    evidence *= visible
+    weight = np.clip(2 * np.pi * inner * size / count / _CORRELATION, 0.08, 1)[:, None] * visible
+    steps = [weight * step_evidence(surround, inside, marks, light) for surround, inside in arcs]
+    evidence = sum(steps) + weight * level_evidence(of_band, light)
     depth = np.clip((outer - inner) * size / len(of_band) / _CORRELATION, 0.1, 1)[:, None]
     rises, falls = (
         depth * visible * borders for borders in border_evidence(of_band, marks, light)
@@ -162,7 +166,10 @@ def read_bands(
     sector = (np.arange(count) - phases[:, None]) % count // samples
     bits = (words[:, None] >> sector & 1).astype(bool)
     explained = _explained(arcs, marks, bits & visible, ~bits & visible)
-    return Readings(words, 2 * np.pi * phases / count, margin, weakest, explained)
+    against = np.where(bits, 0, sum(np.maximum(step, 0) for step in steps))
+    contradiction = _of_sectors(against, sector, family.bits).max(axis=1)
+    start = 2 * np.pi * phases / count
+    return Readings(words, start, margin, weakest, contradiction, explained)
 
 
 def _by_phase(
@@ -174,6 +181,13 @@ def _by_phase(
     samples = (first[..., None] + np.arange(count)) % angles
     last = samples[..., -1]
     return marked[:, samples].sum(axis=3), rises[:, last], falls[:, last]
+
+
+def _of_sectors(values: np.ndarray, sector: np.ndarray, bits: int) -> np.ndarray:
+    """Return the sums of values (k, angles) over the sectors that they are of, shape (k, bits)."""
+    keys = sector + bits * np.arange(len(sector))[:, None]
+    sums = np.bincount(keys.ravel(), values.ravel(), bits * len(sector))
+    return sums.reshape(len(sector), bits)
 
 
 def _explained(
@@ -213,8 +227,8 @@ def confidence_features(readings: Readings, fit: Fit) -> np.ndarray:
     ndarray of float64, shape (k, FEATURES)
         Of the target: the smaller explained share of the steps onto marks, at the inner and the
         outer edge of the band; the share of the edges in their place; ln of their deviation in dot
-        radii; ln of the contrast. Of the word: ln(1 + margin), and the explained share of all
-        steps.
+        radii; ln of the contrast. Of the word: ln(1 + margin), the contradiction, and the explained
+        share of all steps.
     """
     deviation = fit.deviation / frame.mean_radii(fit.frames)
     return np.stack(
@@ -224,6 +238,7 @@ def confidence_features(readings: Readings, fit: Fit) -> np.ndarray:
             np.log(deviation + _LEAST_DEVIATION),
             np.log(np.maximum(fit.contrast, _LEAST_CONTRAST)),
             np.log1p(np.maximum(readings.margin, 0)),
+            readings.contradiction,
             readings.explained.mean(axis=1),
         ],
         axis=1,

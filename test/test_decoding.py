@@ -61,6 +61,25 @@ def test_light_changes_the_margin_and_not_the_words(light):
     assert readings.margin.min() > 3
 
 
+def test_dark_spots_at_the_edge_of_an_unmarked_sector_contradict_the_word():
+    rendering = rendered(SMALL)
+    clean = read(rendering)
+    assert clean.contradiction.max() < 0.5
+
+    target, start, bits = rendering.targets[0], clean.start[0], family(SMALL.family).bits
+    unmarked = next(b for b in range(bits) if not clean.words[0] >> b & 1)
+    away = start + 2 * np.pi * (unmarked + 0.5) / bits
+    x = target.x + 2.4 * target.semi_major * np.cos(away)
+    y = target.y - 2.4 * target.semi_major * np.sin(away)
+    rows, columns = np.indices(rendering.image.shape)
+    spot = np.hypot(columns - x, rows - y) < 0.35 * target.semi_major
+    readings = read(replace(rendering, image=np.where(spot, np.uint8(60), rendering.image)))
+
+    assert readings.words.tolist() == clean.words.tolist()
+    assert readings.contradiction[0] > 3
+    assert readings.contradiction[1:].tolist() == clean.contradiction[1:].tolist()
+
+
 def test_a_band_of_plain_paper_is_no_word():
     gray = np.full((200, 200), 200, np.float32)
     frames = frame.affine_frames([100], [100], [15], [15], [0])
@@ -104,6 +123,7 @@ def test_confidence_is_a_probability_that_grows_with_the_evidence():
     assert (sure <= 1).all()
     for worse in (
         confidence(replace(readings, margin=readings.margin / 100)),
+        confidence(replace(readings, contradiction=readings.contradiction + 20)),
         confidence(replace(readings, explained=readings.explained / 2)),
         confidence(readings, share=0.5),
         confidence(readings, deviation=0.5),

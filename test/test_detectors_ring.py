@@ -241,9 +241,6 @@ def test_a_target_that_the_frame_cuts_is_not_guessed(name, kept):
     assert figures.right == figures.expected >= 3
 
 
-@pytest.mark.xfail(
-    reason='gray over two sectors of twelve can be taken for marks of another word', strict=True
-)
 def test_a_covered_sector_is_not_guessed():
     rendering = rendered(SMALL)
     band_inner, band_outer = family(SMALL.family).band_inner, family(SMALL.family).band_outer

@@ -108,7 +108,9 @@ def test_readings_are_taken_over_where_they_belong():
         blur=np.full(1, 0.8),
     )
     one = np.ones(1)
-    readings = decoding.Readings(np.array([71]), 0 * one, 100 * one, 5 * one, np.ones((1, 4)))
+    readings = decoding.Readings(
+        np.array([71]), 0 * one, 100 * one, 5 * one, 0 * one, np.ones((1, 4))
+    )
     found.update(np.array([1]), readings, better)
     assert found.words.tolist() == [0, 71]
     assert found.frames[:, 0, 2].tolist() == [10.0, 20.5]
