@@ -104,8 +104,6 @@ def errors(report: dict[str, Any]) -> Figure:
         )
     for panel in panels:
         panel.set(xlim=(0, width), ylim=(height, 0), aspect='equal', xticks=[], yticks=[])
-    for panel in panels[len(vectors) :]:
-        panel.set_visible(False)
     return figure
 
 
@@ -124,6 +122,8 @@ def _panels(
 ) -> tuple[Figure, list[Any]]:
     columns = min(count, columns)
     rows = -(-count // columns)
-    figure = Figure(figsize=(side * columns, side * ratio * rows))
-    panels = figure.subplots(rows, columns, squeeze=False)
-    return figure, list(panels.ravel())
+    figure = Figure(figsize=(side * columns, side * ratio * rows), layout='constrained')
+    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    for panel in panels[count:]:
+        panel.set_visible(False)
+    return figure, list(panels[:count])

@@ -78,6 +78,19 @@ def test_plots_come_from_an_earlier_run(measured, tmp_path):
         assert picture.std() > 10
 
 
+@pytest.mark.parametrize('count', [1, 2, 4, 5])
+def test_every_method_has_a_panel(measured, count):
+    pytest.importorskip('matplotlib')
+    report = json.loads(measured[1].read_text())
+    driven = [record for record in report['records'] if record['method'] == 'AHF-traditional']
+    names = [f'method {number}' for number in range(count)]
+    report['records'] = [{**record, 'method': name} for name in names for record in driven]
+    plots = runpy.run_path(str(FOLDER / 'paper_plots.py'))
+    for draw in ('fitness', 'errors'):
+        shown = [panel for panel in plots[draw](report).axes if panel.get_visible()]
+        assert [panel.get_title().split('\n')[0] for panel in shown] == names
+
+
 def test_rival_preprocessors_even_out_the_light():
     preprocessors = runpy.run_path(str(FOLDER / 'preprocessors.py'))['PREPROCESSORS']
     rows, columns = np.mgrid[:240, :320]
