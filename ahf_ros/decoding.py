@@ -227,8 +227,8 @@ def confidence_features(readings: Readings, fit: Fit) -> np.ndarray:
     ndarray of float64, shape (k, FEATURES)
         Of the target: the smaller explained share of the steps onto marks, at the inner and the
         outer edge of the band; the share of the edges in their place; ln of their deviation in dot
-        radii; ln of the contrast. Of the word: ln(1 + margin), the contradiction, and the explained
-        share of all steps.
+        radii; ln of the contrast. Of the word: ln(1 + margin), the contradiction, and the
+        explained share of all steps.
     """
     deviation = fit.deviation / frame.mean_radii(fit.frames)
     return np.stack(
