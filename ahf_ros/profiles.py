@@ -1,8 +1,8 @@
-"""Edges measured in gray values, on profiles across the circles of targets.
+"""Edges measured in gray values, on profiles across the outlines of targets.
 
-Across each point of a circle a blurred step is fitted to the gray values. What the fit says about
-more than the place of the step tells later whether to trust it: its levels, the slope of the light
-beside it, and what it leaves unexplained.
+Across each point of an outline a blurred step is fitted to the gray values. What the fit says
+about more than the place of the step tells later whether to trust it: its levels, the slope of the
+light beside it, and what it leaves unexplained.
 """
 
 from __future__ import annotations
@@ -31,13 +31,39 @@ _LEAST_STEP = 1.0  # gray values, that a place is computed from
 
 
 @dataclass(frozen=True, slots=True)
+class Places:
+    """Where the outlines of k targets have edges, at m points each.
+
+    Attributes
+    ----------
+    points, normals : ndarray of float64, shape (k, m, 2)
+        In px; normals point outwards and have the length 1.
+    polarity : ndarray of int, shape (k, m)
+        1 where the outside is brighter, -1 where it is darker, 0 where there is no edge.
+    scale : ndarray of float64, shape (k, m)
+        px a unit of the outline (the dot radius of a ring target), across the edge.
+    spacing : ndarray of float64, shape (k, m)
+        Distance from one point to the next along the edge, px.
+    curvature : ndarray of float64, shape (k, m)
+        Of the outline, 1/px, positive where its centre lies inside.
+    """
+
+    points: np.ndarray
+    normals: np.ndarray
+    polarity: np.ndarray
+    scale: np.ndarray
+    spacing: np.ndarray
+    curvature: np.ndarray
+
+
+@dataclass(frozen=True, slots=True)
 class Edges:
     """The edges of k targets at m points each, shape (k, m) all.
 
     Attributes
     ----------
     offset : ndarray of float64
-        Distance of the edge from the circle, outwards, px.
+        Distance of the edge from the outline, outwards, px.
     dark, bright : ndarray of float64
         Gray values beside it.
     slope : ndarray of float64
@@ -49,9 +75,8 @@ class Edges:
     residual : ndarray of float64
         Root mean square of what step, slope and blur do not explain, gray values.
     scale : ndarray of float64
-        px a dot radius, across the edge.
+        As in `Places`, as is the next.
     spacing : ndarray of float64
-        Distance from one point to the next along the edge, px.
     visible : ndarray of bool
         Whether an edge is expected and its profile lies in the image; what was measured is 0
         elsewhere.
@@ -85,11 +110,34 @@ def measure_edges(
     reach : float
         How far from a circle to look, dot radii.
     """
-    places = frame.circle_geometry(frames, circles.angles, circles.radii)
-    spacing = circles.spacing * places.stretch
-    aside = np.minimum(spacing / 4, _LARGEST_ASIDE)
+    circle = frame.circle_geometry(frames, circles.angles, circles.radii)
+    places = Places(
+        circle.points,
+        circle.normals,
+        circles.polarity,
+        circle.scale,
+        circles.spacing * circle.stretch,
+        circle.curvature,
+    )
+    return measure_places(gray, places, blur, reach)
+
+
+def measure_places(gray: np.ndarray, places: Places, blur: np.ndarray, reach: float) -> Edges:
+    """Fit blurred steps to the gray values across the outlines of k targets.
+
+    Parameters
+    ----------
+    gray : ndarray of float32, shape (height, width)
+        Gray values from 0 to 255.
+    places : Places
+    blur : ndarray of float64, shape (k,)
+        Standard deviation of the steps, px. A wrong one costs precision, and moves nothing.
+    reach : float
+        How far from an outline to look, in its units.
+    """
+    aside = np.minimum(places.spacing / 4, _LARGEST_ASIDE)
     which = np.searchsorted(_HALF_WIDTHS, reach * places.scale, side='right') - 1
-    which[circles.polarity == 0] = 0
+    which[places.polarity == 0] = 0
     ends = _HALF_WIDTHS[which, None] * places.normals
     for end in (places.points - ends, places.points + ends):
         which[~frame.within(end, gray.shape)] = 0
@@ -100,7 +148,7 @@ def measure_edges(
         blur_steps, index = divmod(int(group), len(_HALF_WIDTHS))
         half = float(_HALF_WIDTHS[index])
         chosen = np.nonzero(groups == group)
-        polarity = circles.polarity[chosen]
+        polarity = places.polarity[chosen]
         across = polarity[:, None] * places.normals[chosen]  # from dark to bright
         values = _profiles(gray, places.points[chosen], across, aside[chosen], half)
         fitted = _fit_steps(values, _step_filters(half, blur_steps * _BLUR_STEP))
@@ -119,7 +167,7 @@ def measure_edges(
         softness,
         residual,
         places.scale,
-        spacing,
+        places.spacing,
         which > 0,
     )
 

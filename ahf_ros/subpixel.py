@@ -16,16 +16,11 @@ import numpy as np
 from ahf_ros import frame
 from ahf_ros.circles import Circles, dot_circles, ring_circles
 from ahf_ros.profiles import BLURS, USUAL_BLUR, Edges, measure_edges
-from ahf_ros.tone import LOG_OFFSET
+from ahf_ros.trust import median, trust_edges
 
 __all__ = ['Circles', 'Fit', 'dot_circles', 'fit_circles', 'ring_circles']
 
 _NOISE = 1.0  # of gray values, of 255; the fit scales it to what it finds
-_LEAST_CONTRAST = 0.3  # of an edge, in steps of ln of the usual edge of the target
-_RATIO_DOUBT = 1.5  # times the usual error of the ratio of the levels that halves the trust
-_LEAST_RATIO_ERROR = 0.01  # that counts as usual
-_RESIDUAL_DOUBT = 0.4  # times the usual residual, on top of it, that halves the trust
-_LEAST_RESIDUAL = 0.3  # that counts as usual, gray values
 _OUTLIER = 3.0  # times the usual distance from the circle that quarters the trust
 _ROUNDS = 4  # of robust least squares
 _LIGHT_REACH = 0.3  # standard deviation of the window in which the light is even, dot radii
@@ -114,7 +109,7 @@ def fit_circles(
     blur = np.full(len(frames), USUAL_BLUR)
     for _ in range(rounds):
         edges = measure_edges(gray, frames, circles, blur, reach)
-        blur = np.clip(blur + _median(edges.softness, edges.visible, 0.0), *BLURS)
+        blur = np.clip(blur + median(edges.softness, edges.visible, 0.0), *BLURS)
         changes, fit = _solve(frames, circles, edges, blur, projective)
         frames = frame.moved(frames, np.clip(changes[:, : 7 if projective else 5], -0.3, 0.3))
     affine = frame.local_affine(frames)
@@ -128,14 +123,8 @@ def _solve(
 ) -> tuple[np.ndarray, Fit]:
     """Return the changes of the frames that bring the circles onto the edges."""
     expected = edges.visible
-    dark, bright = np.maximum(edges.dark, 0), np.maximum(edges.bright, 0)
-    step = np.log((bright + LOG_OFFSET) / (dark + LOG_OFFSET))
-    usual = _median(step, expected)[:, None]
-    seen = expected & (step > _LEAST_CONTRAST * usual) & (step > 0)
-    ratio = dark / np.maximum(bright, 1.0)
-    contrast = _median(ratio, seen)
-
-    trust = seen * _trust(ratio - contrast[:, None], edges.residual, seen)
+    trusted = trust_edges(edges)
+    seen, trust = trusted.seen, trusted.trust
     light = _light(edges, trust, circles)
     displacement = (edges.offset - edges.sensitivity * light.slope) / edges.scale
     noise = _NOISE * np.sqrt(2 * np.sqrt(np.pi) * USUAL_BLUR)
@@ -147,7 +136,7 @@ def _solve(
         changes, normal = model.solve(displacement, robust)
         errors = displacement - model.displacement(changes)
         relative = np.abs(errors) / deviation
-        spread = np.maximum(1.4826 * _median(relative, seen), 0.5)[:, None]
+        spread = np.maximum(1.4826 * median(relative, seen), 0.5)[:, None]
         doubt = (relative / (_OUTLIER * spread)) ** 2
         robust = weights / (1 + doubt) ** 2
     placed = seen & (relative < 4 * spread) & (np.abs(errors) < 0.08)
@@ -165,18 +154,9 @@ def _solve(
     # Where slopes differ that much from their neighbours, light is no slope within a profile.
     uneven = (used * light.errors**2).sum(axis=1) / np.maximum(used.sum(axis=1), 1e-9)
     covariance *= (1 + np.minimum(uneven / _UNEVEN_LIGHT**2, 1))[:, None, None]
-    fit = Fit(frames, contrast, _median(bright, seen), share, scatter, covariance, blur)
+    bright = median(np.maximum(edges.bright, 0), seen)
+    fit = Fit(frames, trusted.contrast, bright, share, scatter, covariance, blur)
     return changes, fit
-
-
-def _trust(ratio_errors: np.ndarray, residuals: np.ndarray, seen: np.ndarray) -> np.ndarray:
-    """Return how much edges look like those of the target, 0 to 1, shape (k, m)."""
-    errors = np.abs(ratio_errors)
-    usual = np.maximum(1.4826 * _median(errors, seen), _LEAST_RATIO_ERROR)[:, None]
-    trust = 1 / (1 + (errors / (_RATIO_DOUBT * usual)) ** 2)
-    usual = np.maximum(_median(residuals, seen), _LEAST_RESIDUAL)[:, None]
-    excess = np.maximum(residuals / usual - 1, 0)
-    return trust / (1 + (excess / _RESIDUAL_DOUBT) ** 2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,8 +184,8 @@ def _light(edges: Edges, trust: np.ndarray, circles: Circles) -> _Light:
     slopes = edges.slope - circles.polarity * common[:, None]
     window = _window(circles)
     seen = trust > 0
-    middle = _median(slopes, seen)[:, None]
-    usual = np.maximum(_median(np.abs(slopes - middle), seen), _LEAST_SLOPE_ERROR)[:, None]
+    middle = median(slopes, seen)[:, None]
+    usual = np.maximum(median(np.abs(slopes - middle), seen), _LEAST_SLOPE_ERROR)[:, None]
     prior = _LIGHT_PRIOR / edges.scale.mean(axis=1, keepdims=True)
     prior *= (1 + (common[:, None] / _SHARPENED) ** 2) ** 2
     weights = trust
@@ -296,11 +276,3 @@ class _Model:
         inverse = np.linalg.inv(normal)[:, :2]
         own = inverse[:, :, known:] @ self._own.transpose(0, 2, 1)
         return inverse[:, :, :known] @ self._shared.T + own
-
-
-def _median(values: np.ndarray, chosen: np.ndarray, nothing: float = 1.0) -> np.ndarray:
-    """Return the medians over the last axis of the chosen values, `nothing` without any."""
-    count = chosen.sum(axis=1)
-    ordered = np.sort(np.where(chosen, values, np.inf), axis=1)
-    middle = np.take_along_axis(ordered, np.maximum(count - 1, 0)[:, None] // 2, axis=1)[:, 0]
-    return np.where(count > 0, middle, nothing)

@@ -14,6 +14,7 @@ from ahf_ros.detectors.detector import SquareSettings
 from ahf_ros.evaluation import TrueTarget, score
 from ahf_ros.genetic import GeneticSettings
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
+from ahf_ros.target import Target
 
 pytestmark = pytest.mark.skipif(
     not hasattr(getattr(cv2, 'aruco', None), 'ArucoDetector'),
@@ -45,7 +46,7 @@ def test_markers_and_their_physical_centres(detector, family, square, tilt):
     assert (made.name, made.family) == (detector, family)
     figures = scored(rendering, made(rendering.image))
     assert (figures.right, figures.wrong, figures.false_positives) == (4, 0, 0)
-    assert figures.rmse[2] < 0.15
+    assert figures.rmse[2] < 0.03
 
 
 def test_the_ellipse_is_inscribed_in_the_marker():
@@ -70,6 +71,40 @@ def test_the_filter_finds_markers_that_stripes_hide():
     found = scored(rendering, identify(rendering.image, detector, 6, settings).targets)
     assert found.right >= 2 * max(without.right, 1)
     assert (found.wrong, found.false_positives) == (0, 0)
+
+
+@pytest.mark.parametrize('light', ['stripe', 'lattice', 'fringe'])
+def test_places_are_those_of_the_image_as_received(light):
+    rendering = render(replace(SCENE, light=light, ambient=0.3))
+    detector = create('aruco')
+    found = identify(rendering.image, detector, 6)
+    figures = scored(rendering, found.targets)
+    assert (figures.right, figures.wrong, figures.false_positives) == (6, 0, 0)
+    assert figures.rmse[2] < 0.08
+    again = detector.refine(rendering.image, found.targets)
+    for one, other in zip(found.targets, again, strict=True):
+        assert (other.x, other.y) == pytest.approx((one.x, one.y), abs=0.02)
+
+
+def test_corners_are_those_of_the_marker():
+    rendering = render(SCENE)
+    for target in create('aruco')(rendering.image):
+        corners = np.array(target.corners)
+        sides = np.roll(corners, -1, axis=0) - corners
+        assert np.hypot(*sides.T) == pytest.approx(np.full(4, 2 * target.semi_major), rel=0.15)
+        across, down = sides[:2]
+        assert across[0] * down[1] > across[1] * down[0]  # clockwise as seen, y pointing down
+
+
+def test_what_has_no_corners_or_no_sides_stays_where_it_is():
+    rendering = render(SCENE)
+    detector = create('aruco')
+    markers = detector(rendering.image)
+    others = [Target(1, 1, 50.0, 60.0, 5.0, 5.0), Target(2, 2, -900.0, 60.0, 5.0, 5.0)]
+    assert detector.refine(rendering.image, others) == others
+    plain = np.tile(np.arange(1000, dtype=np.uint8), (750, 1))
+    assert detector.refine(plain, markers) == markers
+    assert detector.refine(rendering.image, []) == []
 
 
 def test_any_kind_of_image():

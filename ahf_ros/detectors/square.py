@@ -1,7 +1,11 @@
-"""Identification of square markers, ArUco and AprilTag, by OpenCV's own detector."""
+"""Identification of square markers, ArUco and AprilTag, by OpenCV's own detector.
+
+OpenCV identifies; places come from `ahf_ros.sides`, in the image as received.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import cv2
@@ -10,18 +14,34 @@ import numpy as np
 from ahf_ros.codes.square import dictionary
 from ahf_ros.detectors.detector import DetectorSettings
 from ahf_ros.image import as_gray, check_image
+from ahf_ros.sides import centres, fit_sides
 from ahf_ros.target import Target
 
-_CORNER_DEVIATION = 0.04  # px, standard deviation of corners in even light, on renders
-_WINDOW = 5  # px to either side of a corner, for its refinement
+_DRAFT_DEVIATION = 0.3  # px, of a centre by corners that are those of contours
+_LEAST_SHARE = 0.3  # of the edges of each side, for a fit to count
+
+Corners = tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SquareMarker(Target):
+    """One identified square marker.
+
+    Its centre is where its diagonals meet, which is the image of its physical centre at any view.
+    Its ellipse is the one inscribed, its code the ID.
+
+    Attributes
+    ----------
+    corners : tuple of 4 tuples of 2 float
+        px, from the one that is top left where the marker is upright, clockwise.
+    """
+
+    corners: Corners = ()
 
 
 @dataclass(frozen=True, slots=True)
 class SquareDetector:
     """Identify the markers of one dictionary.
-
-    A target's centre is where the diagonals of its marker meet, which is the image of its physical
-    centre at any view. Its ellipse is the one inscribed in the marker, its code the ID.
 
     Attributes
     ----------
@@ -49,41 +69,83 @@ class SquareDetector:
 
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the markers of one image; see `Detector`."""
-        return _identified(image, self.family)
+        return self.refine(image, self.draft(image))
+
+    def draft(self, image: np.ndarray) -> list[Target]:
+        """Identify the markers of one image, corners being those of contours, to about a pixel."""
+        check_image(image)
+        gray = np.ascontiguousarray(as_gray(image).astype(np.uint8, copy=False))
+        parameters = cv2.aruco.DetectorParameters()
+        parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_CONTOUR
+        detector = cv2.aruco.ArucoDetector(dictionary(self.family), parameters)
+        corners, numbers, _ = detector.detectMarkers(gray)
+        if not corners:
+            return []
+        covariances = np.tile(_DRAFT_DEVIATION**2 * np.eye(2), (len(numbers), 1, 1))
+        found = _markers(numbers.ravel(), np.reshape(corners, (-1, 4, 2)), covariances)
+        return sorted(found, key=lambda target: (target.id, target.y, target.x))
+
+    def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
+        """Return markers with their places in an image, from all of their sides.
+
+        Parameters
+        ----------
+        image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
+            The image as received.
+        targets : sequence of Target
+            Found by this detector, to about two pixels. Those without sides in this image, and
+            others than `SquareMarker`, stay as they are.
+
+        Returns
+        -------
+        list of Target
+            In the order of `targets`.
+
+        Raises
+        ------
+        ValueError
+            If `image` is not an image, see `ahf_ros.image.check_image`.
+        """
+        check_image(image)
+        markers = [it for it in targets if isinstance(it, SquareMarker)]
+        if not markers:
+            return list(targets)
+        gray = as_gray(image).astype(np.float32, copy=False)
+        corners = np.array([it.corners for it in markers])
+        sides = fit_sides(gray, corners, dictionary(self.family).markerSize + 2)
+        numbers = np.array([it.id for it in markers])
+        moved = _markers(numbers, sides.corners, sides.covariance)
+        better: dict[Target, Target] = {
+            marker: by_sides
+            for marker, by_sides, share in zip(markers, moved, sides.share, strict=True)
+            if share >= _LEAST_SHARE
+        }
+        return [better.get(it, it) for it in targets]
 
 
-def _identified(image: np.ndarray, name: str) -> list[Target]:
-    check_image(image)
-    gray = np.ascontiguousarray(as_gray(image).astype(np.uint8, copy=False))
-    parameters = cv2.aruco.DetectorParameters()
-    parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
-    parameters.cornerRefinementWinSize = _WINDOW
-    corners, numbers, _ = cv2.aruco.ArucoDetector(dictionary(name), parameters).detectMarkers(gray)
-    numbers = np.zeros(0, int) if numbers is None else numbers.ravel()
-    found = zip(numbers.tolist(), corners, strict=True)
-    targets = [_target(number, of_marker.reshape(4, 2)) for number, of_marker in found]
-    return sorted(targets, key=lambda target: (target.id, target.y, target.x))
-
-
-def _target(number: int, corners: np.ndarray) -> Target:
-    """Return the target with corners, shape (4, 2), in their order round it."""
-    first, second, third, fourth = corners.astype(np.float64)
-    ways = np.stack([third - first, second - fourth], axis=1)
-    along, _ = np.linalg.solve(ways, second - first)
-    x, y = first + along * (third - first)
+def _markers(
+    numbers: np.ndarray, corners: np.ndarray, covariances: np.ndarray
+) -> list[SquareMarker]:
+    """Return the markers with corners, shape (k, 4, 2), in their order round each."""
+    corners = corners.astype(np.float64)
+    first, second, third, fourth = np.moveaxis(corners, 1, 0)
     across = (second + third - first - fourth) / 4
     down = (third + fourth - first - second) / 4
-    vectors, axes, _ = np.linalg.svd(np.stack([across, down], axis=1))
-    angle = np.arctan2(vectors[1, 0], vectors[0, 0])
-    # Each diagonal has two corners, and fixes the centre across itself.
-    variance = _CORNER_DEVIATION**2 / 2
-    return Target(
-        number,
-        number,
-        float(x),
-        float(y),
-        float(axes[0]),
-        float(axes[1]),
-        float(np.arctan(np.tan(angle))),
-        covariance=(variance, 0.0, 0.0, variance),
-    )
+    vectors, axes, _ = np.linalg.svd(np.stack([across, down], axis=2))
+    angles = np.arctan(np.tan(np.arctan2(vectors[:, 1, 0], vectors[:, 0, 0])))
+    return [
+        SquareMarker(
+            id=int(number),
+            code=int(number),
+            x=float(x),
+            y=float(y),
+            semi_major=float(major),
+            semi_minor=float(minor),
+            angle=float(angle),
+            covariance=tuple(covariance.ravel().tolist()),
+            corners=tuple((float(u), float(v)) for u, v in of_marker),
+        )
+        for number, (x, y), (major, minor), angle, covariance, of_marker in zip(
+            numbers, centres(corners), axes, angles, covariances, corners, strict=True
+        )
+    ]
