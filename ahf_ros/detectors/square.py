@@ -75,9 +75,7 @@ class SquareDetector:
         """Identify the markers of one image, corners being those of contours, to about a pixel."""
         check_image(image)
         gray = np.ascontiguousarray(as_gray(image).astype(np.uint8, copy=False))
-        parameters = cv2.aruco.DetectorParameters()
-        parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_CONTOUR
-        detector = cv2.aruco.ArucoDetector(dictionary(self.family), parameters)
+        detector = cv2.aruco.ArucoDetector(dictionary(self.family))
         corners, numbers, _ = detector.detectMarkers(gray)
         if not corners:
             return []
