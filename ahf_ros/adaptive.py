@@ -180,7 +180,6 @@ class AdaptiveIdentifier:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.last_search: SearchResult | None = None
-        self._tried: tuple[Values, ...] = ()
         self._detector = detector
         self._settings = settings or AdaptiveSettings()
         self._refine = refine or getattr(detector, 'refine', None)
@@ -232,14 +231,15 @@ class AdaptiveIdentifier:
         # Without a refinement, centres are those of the detector.
         draft = (self._refine and self._draft) or self._detector
         trials = Trials(image, self._detector, draft, expected, listed, self._settings.filter)
+        tried: tuple[Values, ...] = ()
         threads = self._settings.threads or os.cpu_count() or 1
         with ThreadPoolExecutor(threads) if threads > 1 else nullcontext() as executor:
             if estimate and self._unchanged(trials, estimate, executor):
                 chosen, evaluations = self.memory.filter, 1
             else:
-                chosen, evaluations = self._choose(trials, executor)
+                chosen, evaluations, tried = self._choose(trials, executor)
         targets = trials.targets[chosen]
-        others = self._tried if self._settings.fusion else ()
+        others = tried if self._settings.fusion else ()
         if others:
             targets = fused(trials.of([chosen, None, *others]))
         settled = (count_codes(targets), trials.expected) if estimate else None
@@ -258,7 +258,7 @@ class AdaptiveIdentifier:
 
     def _unchanged(self, trials: Trials, estimate: Estimate, executor: Executor | None) -> bool:
         """Return whether an image shows what the last one did; tell the trials what N is."""
-        self.last_search, self._tried = None, ()
+        self.last_search = None
         shown = trials.count(self.memory.filter, executor)
         settled = self.memory.settled
         if shown and settled and settled[0] == shown:
@@ -269,17 +269,22 @@ class AdaptiveIdentifier:
         trials.expected = max(int(estimated), shown)
         return False
 
-    def _choose(self, trials: Trials, executor: Executor | None) -> tuple[Values | None, int]:
-        """Return the best filter, None for the image as received, and the evaluations."""
-        self.last_search, self._tried = None, ()
+    def _choose(
+        self, trials: Trials, executor: Executor | None
+    ) -> tuple[Values | None, int, tuple[Values, ...]]:
+        """Return the best filter, the evaluations, and the filters that a search tried.
+
+        None is the image as received.
+        """
+        self.last_search = None
         remembered = self.memory.filter
         searching = self._settings.ahf and trials.expected > 0
         if searching and remembered and trials.discrepancy(remembered, executor) == 0:
-            return remembered, len(trials.targets)
+            return remembered, len(trials.targets), ()
         unfiltered = trials.discrepancy(None, executor)
         if not searching or unfiltered == 0:
             self.memory = replace(self.memory, filter=None if searching else remembered)
-            return None, len(trials.targets)
+            return None, len(trials.targets), ()
         genetic = self._settings.genetic
         searched = trials.reduced() if self._settings.coarse else trials
         self.last_search = result = search(
@@ -292,14 +297,14 @@ class AdaptiveIdentifier:
             clock=self._clock,
         )
         evaluations = 1 + result.evaluations
-        self._tried = result.tried
+        tried = result.tried
         if searched is not trials:
-            self._tried = confirmed(result.tried, searched, trials, executor)
-            evaluations += len(self._tried)
-        best = min(self._tried, key=trials.discrepancy)
+            tried = confirmed(tried, searched, trials, executor)
+            evaluations += len(tried)
+        best = min(tried, key=trials.discrepancy)
         chosen = best if trials.discrepancy(best) < unfiltered else None
         self.memory = replace(self.memory, filter=chosen)
-        return chosen, evaluations
+        return chosen, evaluations, tried
 
 
 def _check_count(name: str, count: Any) -> None:
