@@ -22,6 +22,9 @@ USUAL_BLUR = 0.8
 BLURS = (0.5, 2.0)
 """Sharpest and softest step that is fitted, standard deviation in px."""
 
+CORRELATION = 1.9
+"""Distance along an edge from where on the errors of profiles are independent, px."""
+
 _HALF_WIDTHS = np.array([0.0, 1.0, 1.3, 1.6, 2.0, 2.5, 3.0])  # of a profile, px
 _SAMPLES = 13  # of a profile
 _LARGEST_ASIDE = 0.8  # of the two lines of a profile, from its middle, px

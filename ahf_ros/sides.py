@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ahf_ros.profiles import BLURS, USUAL_BLUR, Edges, Places, measure_places
+from ahf_ros.profiles import BLURS, CORRELATION, USUAL_BLUR, Edges, Places, measure_places
 from ahf_ros.trust import median, trust_edges
 
 _PROFILES = 32  # across a side
@@ -23,7 +23,6 @@ _ROUNDS = 6  # of robust least squares
 _OUTLIER = 3.0  # times the usual distance from the line that quarters the trust
 _LEAST_DISTANCE = 0.02  # that counts as usual, px
 _PLACED = 0.25  # distance from the line within which an edge is in its place, px
-_CORRELATION = 1.9  # px along an edge, from where on errors are independent
 _LIGHT_REACH = 1.5  # standard deviation of the window in which the light is even, profiles
 _LIGHT_PRIOR = 1.0  # trusted profiles that say as much of the slope as the prior, none, does
 _WEAK_PRIOR = 1e-3  # of a side where it is, in gray values^2 / px^2
@@ -178,7 +177,7 @@ def _fit_lines(
         robust = weights / (1 + (errors / (_OUTLIER * spread)) ** 2) ** 2
     share = (seen & (errors < _PLACED)).mean(axis=2)
     influence = (robust[..., None] * basis) @ inverse
-    together = np.maximum(_CORRELATION / spacing, 1.0)
+    together = np.maximum(CORRELATION / spacing, 1.0)
     parts = influence * (errors * np.sqrt(together))[..., None]
     return _Lines(unknowns, np.swapaxes(parts, 2, 3) @ parts, share)
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from ahf_ros import frame
 from ahf_ros.circles import Circles, dot_circles, ring_circles
-from ahf_ros.profiles import BLURS, USUAL_BLUR, Edges, measure_edges
+from ahf_ros.profiles import BLURS, CORRELATION, USUAL_BLUR, Edges, measure_edges
 from ahf_ros.trust import median, trust_edges
 
 __all__ = ['Circles', 'Fit', 'dot_circles', 'fit_circles', 'ring_circles']
@@ -32,7 +32,6 @@ _PRIOR_SCALE = 0.003  # standard deviation of the printed proportions of band an
 _PRIOR_PERSPECTIVE = 0.02  # of the projective part, in 1 a dot radius
 _PRIOR_SHIFT = 1.0  # of the shift of edges towards the dark side, px
 _WEAK_PRIOR = 1e-6
-_CORRELATION = 1.9  # px along an edge, from where on errors are independent
 _SYSTEMATIC = 0.001  # standard deviation of what pixels and interpolation do to a centre, px
 
 
@@ -213,10 +212,10 @@ def _covariance(
 ) -> np.ndarray:
     """Return the covariance of centres, dot radii^2, from what each edge's error does to them.
 
-    Neighbours closer than `_CORRELATION` share pixels, so that their errors are alike. Their
+    Neighbours closer than `CORRELATION` share pixels, so that their errors are alike. Their
     products are not taken as they are: a fit leaves little of what they have in common.
     """
-    distance = np.maximum(spacing / _CORRELATION, 0.1)
+    distance = np.maximum(spacing / CORRELATION, 0.1)
     alike = np.ones_like(distance)
     for steps in range(1, 10):
         alike += 2 * np.maximum(1 - steps * distance, 0)
