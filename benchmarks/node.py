@@ -30,15 +30,13 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
 from ahf_ros.msg import CodedTargetArray
+from ahf_ros.nodes.demo import PROFILE_VARIABLES
 from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.nodes.settings import LATEST, LOSSLESS
 from ahf_ros.synthetic.scene import SceneSettings, render
 
 PROFILE = Path(__file__).resolve().parents[1] / 'config' / 'fastdds_shm.xml'
-VARIABLES = ('FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE')
-"""Where Fast DDS looks for a profile, in Jazzy and in Kilted."""
-
-TRANSPORTS = {'defaults': {}, PROFILE.name: dict.fromkeys(VARIABLES, str(PROFILE))}
+TRANSPORTS = {'defaults': {}, PROFILE.name: dict.fromkeys(PROFILE_VARIABLES, str(PROFILE))}
 """Environments by the names of what they set up."""
 
 Figures = dict[str, float]

@@ -27,6 +27,9 @@ PATIENCE = 180.0
 SHUTDOWN = 20.0
 """Time that a node gets to end, s."""
 
+PROFILE_VARIABLES = ('FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE')
+"""Where Fast DDS looks for its settings: up to Jazzy, and from Kilted on."""
+
 
 class Demo(Scoreboard):
     """A scoreboard that ends when a node that it depends on has ended, or does nothing.
@@ -87,9 +90,8 @@ def main(arguments: list[str] | None = None) -> int:
     """Show identification under projected light, by nodes in processes of their own."""
     options = parser().parse_args(arguments)
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-    for distribution in ('FASTRTPS', 'FASTDDS'):  # up to Jazzy, and from Kilted on
-        profiles = f'{distribution}_DEFAULT_PROFILES_FILE'
-        os.environ.setdefault(profiles, str(shared_memory_profile()))
+    for variable in PROFILE_VARIABLES:
+        os.environ.setdefault(variable, str(shared_memory_profile()))
     print(f'{options.images} images under {options.light}, being rendered ...', flush=True)
     with ExitStack() as stack:
         processes = [
