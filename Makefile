@@ -33,12 +33,12 @@ test: $(READY) test-oldest
 
 # What needs no ROS, with the oldest versions of numpy and OpenCV that are to be had.
 test-oldest: $(OLDEST)/ready
-	$(OLDEST)/bin/python -m pytest --ignore-glob 'test/test_benchmark_*'
+	$(OLDEST)/bin/python -m pytest --ignore test/benchmarks
 
 # The nodes on ROS 2 Kilted.
 test-kilted:
 	$(MAKE) DISTRIBUTION=kilted .venv-kilted/ready
-	.venv-kilted/bin/python -m pytest $$(grep -l rclpy test/test_*.py)
+	.venv-kilted/bin/python -m pytest $$(grep -lr rclpy test --include='test_*.py')
 
 clean:
 	rm -rf .venv* build

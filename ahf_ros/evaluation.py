@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ahf_ros.target import UNDECODED, Target
+from ahf_ros.target import UNDECODED, Target, TrueTarget, Truth
 
 TOLERANCE = 5.0
 """Distance within which a reported target is the one that is there, px."""
@@ -34,31 +34,6 @@ FOUND = 'found'
 
 FALSE = 'false'
 """Any other report: there is no target, or it has been reported already."""
-
-
-@dataclass(frozen=True, slots=True)
-class TrueTarget:
-    """A target that an image shows.
-
-    Attributes
-    ----------
-    id : int
-        Its ID.
-    x, y : float
-        Image of its centre, px.
-    confirmed : bool
-        Whether it can be seen for certain. One that cannot counts neither where it is identified
-        nor where it is not; a wrong ID in its place is a wrong ID.
-    """
-
-    id: int
-    x: float
-    y: float
-    confirmed: bool = True
-
-
-Truth = Mapping[str, Sequence[TrueTarget]]
-"""The targets of each image, by the name of its file without folders."""
 
 
 @dataclass(frozen=True, slots=True)

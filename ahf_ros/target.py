@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 UNDECODED = -1
@@ -39,6 +40,31 @@ class Target:
     angle: float = 0.0
     confidence: float = 1.0
     covariance: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class TrueTarget:
+    """A target that an image shows.
+
+    Attributes
+    ----------
+    id : int
+        Its ID.
+    x, y : float
+        Image of its centre, px.
+    confirmed : bool
+        Whether it can be seen for certain. One that cannot counts neither where it is identified
+        nor where it is not; a wrong ID in its place is a wrong ID.
+    """
+
+    id: int
+    x: float
+    y: float
+    confirmed: bool = True
+
+
+Truth = Mapping[str, Sequence[TrueTarget]]
+"""The targets of each image, by the name of its file without folders."""
 
 
 @dataclass(frozen=True, slots=True)

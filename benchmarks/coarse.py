@@ -1,6 +1,6 @@
 """Targets and time of AHF by the way it searches: genes of the paper or more, whole or coarse.
 
-python benchmarks/coarse.py [--detector traditional] [--seeds 1 2] [--lights stripe lattice ...]
+python -m benchmarks.coarse [--detector traditional] [--seeds 1 2] [--lights stripe lattice ...]
 """
 
 from __future__ import annotations
@@ -11,12 +11,13 @@ from collections import defaultdict
 from itertools import product
 
 import ahf_ros.blas  # noqa: F401  before numpy
-from ahf_ros.adaptive import AdaptiveSettings, identify
 from ahf_ros.detectors import DETECTOR_NAMES, create
-from ahf_ros.evaluation import TrueTarget, score
+from ahf_ros.evaluation import score
+from ahf_ros.filtering.genes import EXTENDED, PUBLISHED, TuningSettings
+from ahf_ros.filtering.identifier import AdaptiveSettings, identify
 from ahf_ros.synthetic.lights import LIGHT_NAMES
 from ahf_ros.synthetic.scene import SceneSettings, render
-from ahf_ros.tuning import EXTENDED, PUBLISHED, TuningSettings
+from ahf_ros.target import TrueTarget
 
 AMBIENTS = (0.3, 0.12)
 

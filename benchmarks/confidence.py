@@ -1,10 +1,10 @@
-"""The weights of `ahf_ros.decoding.confidence`, and how far confidences can be trusted.
+"""Fit the weights of the confidence of ring targets, and show how far it can be trusted.
 
 Scenes under all lights are rendered, every plausible reading of the ring detector is compared with
 the truth, and two logistic regressions are fitted to the readings of the development seeds. The
 reliability of the weights in force is that of the test seeds, which the fit never sees.
 
-    python benchmarks/confidence.py [--development 1 2 3] [--test 101 102]
+    python -m benchmarks.confidence [--development 1 2 3] [--test 101 102]
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ import numpy as np
 from rich.progress import track
 
 from ahf_ros.codes.ring import FAMILY_NAMES, family
-from ahf_ros.decoding import OF_TARGET, canonical, confidence
-from ahf_ros.detectors.detector import DetectorSettings
-from ahf_ros.detectors.ring import RingDetector
+from ahf_ros.detectors.contract import DetectorSettings
+from ahf_ros.detectors.ring.decoding import OF_TARGET, canonical, confidence
+from ahf_ros.detectors.ring.detector import RingDetector
 from ahf_ros.synthetic.lights import LIGHT_NAMES, benchmark_lights
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 

@@ -3,11 +3,11 @@
 The first table is of scenes under all lights, as in benchmarks/identification.py, and of walls
 without targets. The second one compares AHF with N given and with N estimated. With --fit, scenes
 of all kinds and sizes are rendered instead, some targets half covered, and a logistic regression
-is fitted to their dots: the weights of `ahf_ros.counting.target_probability`. Seeds from 101 on
-are for tests, those below for development.
+is fitted to their dots: the weights of `target_probability`. Seeds from 101 on are for tests,
+those below for development.
 
-    python benchmarks/counting.py [--seeds 101] [--detector traditional]
-    python benchmarks/counting.py --fit 1 2 3 4 5 6 7 8
+    python -m benchmarks.counting [--seeds 101] [--detector traditional]
+    python -m benchmarks.counting --fit 1 2 3 4 5 6 7 8
 """
 
 from __future__ import annotations
@@ -21,20 +21,21 @@ from statistics import mean, median
 
 import cv2
 import numpy as np
-from confidence import logistic_regression
-from filter import machine
 from rich.console import Console
 from rich.progress import track
 
-from ahf_ros import frame
-from ahf_ros.adaptive import identify
 from ahf_ros.codes.ring import FAMILY_NAMES, family
-from ahf_ros.counting import estimate_count, target_features, terms
 from ahf_ros.detectors import DetectorSettings, create
-from ahf_ros.detectors.ring import RingDetector
-from ahf_ros.evaluation import TrueTarget, score
+from ahf_ros.detectors.ring.counting import estimate_count, target_features, terms
+from ahf_ros.detectors.ring.detector import RingDetector
+from ahf_ros.evaluation import score
+from ahf_ros.features import frame
+from ahf_ros.filtering.identifier import identify
 from ahf_ros.synthetic.lights import benchmark_lights
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
+from ahf_ros.target import TrueTarget
+from benchmarks.confidence import logistic_regression
+from benchmarks.filter import machine
 
 SEARCHED = (('normal', 0.3), ('stripe', 0.3), ('stripe', 0.12), ('lattice', 0.3))
 """Lights under which AHF is driven."""

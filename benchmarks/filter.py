@@ -3,7 +3,7 @@
 The recipe is Eq. (1) to (7) as they stand: logarithm, `fft2`, H, `ifft2`, exponential, all in
 double precision; the distances D and their median are given to it. Both map to 8 bit alike.
 
-    python benchmarks/filter.py [--width 3984] [--height 2656] [--rounds 5] [--json]
+    python -m benchmarks.filter [--width 3984] [--height 2656] [--rounds 5] [--json]
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from typing import Any
 import cv2
 import numpy as np
 
-from ahf_ros.homomorphic import (
+from ahf_ros.filtering.homomorphic import (
     FilterSettings,
     HomomorphicFilter,
     filtered_fft,
     filtered_logarithm_fft,
 )
-from ahf_ros.spectrum import distances, median_distance
+from ahf_ros.filtering.transfer import distances, median_distance
+from ahf_ros.imaging.logarithm import logarithm, mapping, sampled
 from ahf_ros.synthetic.scene import SceneSettings, render
-from ahf_ros.tone import logarithm, mapping, sampled
 
 GAINS = [(1.0, 0.1), (1.2, 0.25), (1.5, 0.6), (2.8, 0.82), (3.7, 0.66)]
 """Filters that are timed and checked; the last two are those of the paper."""

@@ -4,7 +4,7 @@ Without ROS, `decode_image` and `decode_compressed` are called, and what they re
 as a detector would; with `--node`, as many messages as it says go through a real node, which has
 to answer or reject each.
 
-    python benchmarks/fuzz.py [--examples 10000] [--node 2000]
+    python -m benchmarks.fuzz [--examples 10000] [--node 2000]
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from types import SimpleNamespace
 from typing import Any
 
 import cv2
-import live
 import numpy as np
 from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
 
-from ahf_ros.encodings import ENCODINGS, decode_compressed, decode_image
-from ahf_ros.image import as_gray, check_image
+from ahf_ros.imaging.image import as_gray, check_image
+from ahf_ros.interchange.image_messages import ENCODINGS, decode_compressed, decode_image
+from support import live
 
 Fields = dict[str, Any]
 """The fields of a message by their names."""

@@ -2,7 +2,7 @@
 
 The objectives have the shape of |N - n| with 54 targets: zero at some filter, flat far from it.
 
-    python benchmarks/genetic.py [--seeds 40]
+    python -m benchmarks.genetic [--seeds 40]
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from unittest import mock
 
 import numpy as np
 
-from ahf_ros import genetic
-from ahf_ros.chromosome import Values
-from ahf_ros.genetic import GeneticSettings, search
-from ahf_ros.tuning import PUBLISHED, TuningSettings
+from ahf_ros.filtering import genetic
+from ahf_ros.filtering.chromosome import Values
+from ahf_ros.filtering.genes import PUBLISHED, TuningSettings
+from ahf_ros.filtering.genetic import GeneticSettings, search
 
 N = 54
 

@@ -4,8 +4,8 @@ Every row is a kind of scene, rendered with the given seeds. The seeds from 101 
 nothing in the package was chosen by looking at them. Those below are for development, and a table
 is of one kind or the other. The panel is a set of photographs and is shown where it is there.
 
-    python benchmarks/identification.py [--detector ring] [--ahf] [--quick] [--lights stripe ...]
-    python benchmarks/identification.py --command 'my_detector --family {family} {image}'
+    python -m benchmarks.identification [--detector ring] [--ahf] [--quick] [--lights stripe ...]
+    python -m benchmarks.identification --command 'my_detector --family {family} {image}'
 
 A command is used as the detector `command` does; its time includes its start.
 """
@@ -25,19 +25,19 @@ from typing import Any
 
 import cv2
 import numpy as np
-from filter import machine
 from rich.console import Console
 from rich.progress import track
 
-from ahf_ros.adaptive import AdaptiveSettings, identify
 from ahf_ros.codes.ring import FAMILY_NAMES
 from ahf_ros.detectors import DETECTOR_NAMES, DetectorSettings, create
-from ahf_ros.detectors.detector import ProgramSettings
-from ahf_ros.evaluation import RIGHT, Score, TrueTarget, judge, score, total
-from ahf_ros.files import read_image, read_truth
+from ahf_ros.detectors.contract import ProgramSettings
+from ahf_ros.evaluation import RIGHT, Score, judge, score, total
+from ahf_ros.filtering.identifier import AdaptiveSettings, identify
+from ahf_ros.interchange.files import read_image, read_truth
 from ahf_ros.synthetic.lights import LIGHT_NAMES, benchmark_lights
 from ahf_ros.synthetic.scene import SceneSettings, render
-from ahf_ros.target import Target
+from ahf_ros.target import Target, TrueTarget
+from benchmarks.filter import machine
 
 FIRST_TEST_SEED = 101
 """Seeds below this one are for development."""

@@ -7,7 +7,7 @@ left of the time from sending to answer is that of the transport there and back.
 sent as fast as they can be to a queue that is lossless, and at a steady rate to one that keeps the
 latest.
 
-    python benchmarks/node.py [--images 20] [--rate 10] [--json FILE]
+    python -m benchmarks.node [--images 20] [--rate 10] [--json FILE]
 """
 
 from __future__ import annotations
@@ -23,9 +23,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-import live
 from diagnostic_msgs.msg import DiagnosticArray
-from filter import machine
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
@@ -34,6 +32,8 @@ from ahf_ros.nodes.demo import PROFILE_VARIABLES
 from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.nodes.settings import LATEST, LOSSLESS
 from ahf_ros.synthetic.scene import SceneSettings, render
+from benchmarks.filter import machine
+from support import live
 
 PROFILE = Path(__file__).resolve().parents[1] / 'config' / 'fastdds_shm.xml'
 TRANSPORTS = {'defaults': {}, PROFILE.name: dict.fromkeys(PROFILE_VARIABLES, str(PROFILE))}

@@ -4,7 +4,7 @@ Shang & Liu, Remote Sens. 2023, 15, 3151, identify 54 targets in 50 images a lig
 with it (Tables 3 to 6). Here every method sees the same images, rendered with known truth; rival
 preprocessors stand beside AHF. The paper's own figures are those of its photographs.
 
-    python benchmarks/paper.py [--images 2] [--json paper.json] [--plots plots]
+    python -m benchmarks.paper [--images 2] [--json paper.json] [--plots plots]
 
 50 images a light and ratio take hours; each is a process of its own. With --read, tables and plots
 come from an earlier --json.
@@ -30,22 +30,22 @@ import ahf_ros.blas  # noqa: F401  before numpy
 # isort: split
 import cv2
 import numpy as np
-from filter import machine
-from paper_tables import markdown
-from preprocessors import PREPROCESSORS
 from rich.console import Console
 from rich.progress import track
 
-from ahf_ros.adaptive import AdaptiveIdentifier, AdaptiveSettings
 from ahf_ros.detectors import DetectorSettings, create
-from ahf_ros.detectors.detector import SquareSettings
-from ahf_ros.evaluation import RIGHT, TrueTarget, judge, score
-from ahf_ros.genetic import GeneticSettings
+from ahf_ros.detectors.contract import SquareSettings
+from ahf_ros.evaluation import RIGHT, judge, score
+from ahf_ros.filtering.genes import EXTENDED, PUBLISHED, TuningSettings
+from ahf_ros.filtering.genetic import GeneticSettings
+from ahf_ros.filtering.identifier import AdaptiveIdentifier, AdaptiveSettings
+from ahf_ros.filtering.trials import AnyDetector
 from ahf_ros.synthetic.lights import LIGHT_NAMES
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
-from ahf_ros.target import Identification, Target, count_codes
-from ahf_ros.trials import AnyDetector
-from ahf_ros.tuning import EXTENDED, PUBLISHED, TuningSettings
+from ahf_ros.target import Identification, Target, TrueTarget, count_codes
+from benchmarks.filter import machine
+from benchmarks.paper_tables import markdown
+from benchmarks.preprocessors import PREPROCESSORS
 
 TARGETS = DetectorSettings(family='metashape12', square=SquareSettings(aruco_dictionary='4x4_100'))
 """Ring targets as in the paper, and a dictionary with as many markers as there are targets."""
@@ -69,7 +69,7 @@ class Method:
     preprocessor : str
         Name in `PREPROCESSORS`; '' for none.
     search : str
-        What AHF tunes, see `ahf_ros.tuning`.
+        What AHF tunes, see `ahf_ros.filtering.genes`.
     """
 
     name: str

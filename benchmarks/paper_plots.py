@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from ahf_ros.genetic import DELTA
+from ahf_ros.filtering.genetic import DELTA
 
 DPI = 150
 

@@ -1,6 +1,6 @@
 """Errors of positions from a cloud: four neighbours, a plane without perspective, the homography.
 
-    python benchmarks/positions.py
+    python -m benchmarks.positions
 
 Flat targets before a pinhole camera at a metre; a structured-light scanner's noise along the ray,
 correlated over neighbouring pixels, more of it on ink, where points are also missing, and some
@@ -16,8 +16,8 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 
-from ahf_ros.points import AXES
-from ahf_ros.positions import NEIGHBOURHOOD, positions
+from ahf_ros.interchange.point_clouds import AXES
+from ahf_ros.localisation import NEIGHBOURHOOD, positions
 from ahf_ros.synthetic.camera import Camera, tilted_camera
 from ahf_ros.target import Target
 

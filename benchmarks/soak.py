@@ -6,7 +6,7 @@ subscribe anew, services are called, and other participants come, look at its im
 and go. Every image has to be answered with the IDs that it shows, every message that is none has
 to be counted as rejected; memory, threads and open files of the process are looked at all along.
 
-    python benchmarks/soak.py [--frames 20000] [--json FILE]
+    python -m benchmarks.soak [--frames 20000] [--json FILE]
 """
 
 from __future__ import annotations
@@ -22,11 +22,9 @@ from itertools import cycle
 from pathlib import Path
 from typing import Any
 
-import live
 import numpy as np
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
-from filter import machine
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
@@ -41,6 +39,8 @@ from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.srv import Identify
 from ahf_ros.synthetic.scene import SceneSettings, render
+from benchmarks.filter import machine
+from support import live
 
 SCENE = SceneSettings(width=320, height=240, targets=3, dot_radius=9.0)
 NAME = '/soak/detector'

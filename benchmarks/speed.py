@@ -8,7 +8,7 @@ precision, one chromosome after the other, a generation of 50 before it looks wh
 - The whole of AHF, from the image to its targets.
 - A stream: an image under unchanged light, against one filter and one identification.
 
-    python benchmarks/speed.py [--light stripe] [--ambient 0.3] [--seed 101]
+    python -m benchmarks.speed [--light stripe] [--ambient 0.3] [--seed 101]
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from filter import Recipe, machine
 
 import ahf_ros.blas  # noqa: F401  before numpy
-from ahf_ros.adaptive import AdaptiveIdentifier, identify
 from ahf_ros.detectors import create
-from ahf_ros.genetic import GeneticSettings, search
-from ahf_ros.homomorphic import FilterSettings, HomomorphicFilter
+from ahf_ros.filtering.genes import PUBLISHED, TuningSettings
+from ahf_ros.filtering.genetic import GeneticSettings, search
+from ahf_ros.filtering.homomorphic import FilterSettings, HomomorphicFilter
+from ahf_ros.filtering.identifier import AdaptiveIdentifier, identify
 from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import count_codes
-from ahf_ros.tuning import PUBLISHED, TuningSettings
+from benchmarks.filter import Recipe, machine
 
 ROUNDS = 7
 FRAMES = 6

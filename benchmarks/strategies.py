@@ -3,7 +3,7 @@
 Every strategy looks for a filter of the same scenes with many seeds, by the published genes and by
 the extended ones: the mean of the best |N - n| after so many filters.
 
-    python benchmarks/strategies.py [--detector traditional] [--seeds 20]
+    python -m benchmarks.strategies [--detector traditional] [--seeds 20]
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from rich.console import Console
 from rich.progress import track
 
 import ahf_ros.blas  # noqa: F401  before numpy
-from ahf_ros.chromosome import Gene, Values
 from ahf_ros.detectors import DETECTOR_NAMES, create
-from ahf_ros.genetic import GeneticSettings, search
-from ahf_ros.homomorphic import HomomorphicFilter
+from ahf_ros.filtering.chromosome import Gene, Values
+from ahf_ros.filtering.genes import EXTENDED, PUBLISHED, TuningSettings, tuned
+from ahf_ros.filtering.genetic import GeneticSettings, search
+from ahf_ros.filtering.homomorphic import HomomorphicFilter
 from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import count_codes
-from ahf_ros.tuning import EXTENDED, PUBLISHED, TuningSettings, tuned
 
 LIGHTS = (
     ('stripe', 0.3),

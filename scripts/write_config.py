@@ -7,8 +7,8 @@ import textwrap
 from pathlib import Path
 
 from ahf_ros.nodes.settings import DetectorNodeSettings, IlluminationNodeSettings
-from ahf_ros.parameter import Parameter
-from ahf_ros.settings import flat_parameters
+from ahf_ros.settings.nested import flat_parameters
+from ahf_ros.settings.parameter import Parameter
 
 CONFIG = Path(__file__).resolve().parent.parent / 'config'
 NODES = {'detector': DetectorNodeSettings, 'illumination': IlluminationNodeSettings}

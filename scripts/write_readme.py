@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from ahf_ros.nodes.settings import DetectorNodeSettings
-from ahf_ros.parameter import Parameter
-from ahf_ros.settings import flat_parameters
+from ahf_ros.settings.nested import flat_parameters
+from ahf_ros.settings.parameter import Parameter
 from ahf_ros.synthetic.lights import LIGHT_NAMES
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import live
 import pytest
+
+from support import live
 
 
 @pytest.fixture(scope='module')

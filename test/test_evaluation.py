@@ -12,14 +12,13 @@ from ahf_ros.evaluation import (
     RIGHT,
     WRONG,
     Score,
-    TrueTarget,
     evaluate,
     judge,
     score,
     table,
     total,
 )
-from ahf_ros.target import UNDECODED, Target
+from ahf_ros.target import UNDECODED, Target, TrueTarget
 
 TRUTH = (TrueTarget(1, 10.0, 10.0), TrueTarget(2, 50.0, 10.0), TrueTarget(3, 90.0, 10.0))
 

@@ -26,7 +26,7 @@ def test_everything_but_the_nodes_works_without_ros() -> None:
     command = [sys.executable, '-c', WITHOUT_ROS, str(ROOT / 'ahf_ros')]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    assert {'adaptive', 'cli', 'detectors', 'homomorphic', 'synthetic'} <= set(done.stdout.split())
+    assert {'bag', 'cli', 'detectors', 'filtering', 'synthetic'} <= set(done.stdout.split())
 
 
 def test_what_needs_no_ros_among_the_nodes_does_without() -> None:

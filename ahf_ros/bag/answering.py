@@ -10,7 +10,6 @@ import cv2
 import numpy as np
 from rosbags.interfaces import Connection
 
-from ahf_ros.adaptive import AdaptiveIdentifier, AdaptiveSettings
 from ahf_ros.bag.definitions import (
     CODED_TARGETS,
     COMPRESSED_IMAGE,
@@ -20,11 +19,12 @@ from ahf_ros.bag.definitions import (
 )
 from ahf_ros.bag.journal import Answer, Frame
 from ahf_ros.bag.source import Source
-from ahf_ros.counting import estimator
 from ahf_ros.detectors import DETECTOR, DetectorSettings, create
+from ahf_ros.detectors.ring.counting import estimator
 from ahf_ros.drawing import draw
-from ahf_ros.encodings import decode_compressed, decode_image
-from ahf_ros.messages import coded_target_array
+from ahf_ros.filtering.identifier import AdaptiveIdentifier, AdaptiveSettings
+from ahf_ros.interchange.image_messages import decode_compressed, decode_image
+from ahf_ros.interchange.target_messages import coded_target_array
 from ahf_ros.target import Identification
 
 DECODERS = {IMAGE: decode_image, COMPRESSED_IMAGE: decode_compressed}

@@ -10,7 +10,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 import ahf_ros
-from ahf_ros.messages import MessageTypes
+from ahf_ros.interchange.target_messages import MessageTypes
 
 CODED_TARGETS = 'ahf_ros/msg/CodedTargetArray'
 COMPRESSED_IMAGE = 'sensor_msgs/msg/CompressedImage'
@@ -50,6 +50,6 @@ def typestore() -> Typestore:
 
 
 def message_types(store: Typestore) -> MessageTypes:
-    """Return the classes that `ahf_ros.messages` makes messages of."""
+    """Return the classes that `ahf_ros.interchange.target_messages` makes messages of."""
     classes: Any = {name: store.types[f'ahf_ros/msg/{name}'] for name in _NAMES}
     return SimpleNamespace(**classes)

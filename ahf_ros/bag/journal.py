@@ -25,8 +25,8 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
-from ahf_ros.adaptive import Memory
 from ahf_ros.bag.definitions import typestore
+from ahf_ros.filtering.identifier import Memory
 
 VERSION: Final = 9
 """Of the format of bags that are written."""

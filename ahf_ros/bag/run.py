@@ -20,13 +20,13 @@ from typing import Any
 
 from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
 
-from ahf_ros.adaptive import AdaptiveSettings
 from ahf_ros.bag.answering import Answering, AnswerTopics
 from ahf_ros.bag.copying import Copy
 from ahf_ros.bag.definitions import typestore
 from ahf_ros.bag.journal import METADATA, VERSION, Frame, Journal, begin, custom_data, remove_parts
 from ahf_ros.bag.source import Source
 from ahf_ros.detectors import DETECTOR, DetectorSettings
+from ahf_ros.filtering.identifier import AdaptiveSettings
 
 STORAGES = {'mcap': StoragePlugin.MCAP, 'sqlite3': StoragePlugin.SQLITE3}
 

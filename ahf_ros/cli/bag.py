@@ -18,8 +18,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from ahf_ros.cli.identify import IdentifySettings
 from ahf_ros.cli.options import add_option, add_options, settings_from
-from ahf_ros.counting import ESTIMATE_EXPECTED
-from ahf_ros.parameter import Parameter
+from ahf_ros.detectors.ring.counting import ESTIMATE_EXPECTED
+from ahf_ros.settings.parameter import Parameter
 
 if TYPE_CHECKING:
     from ahf_ros.bag.run import BagTask, Outcome

@@ -14,13 +14,13 @@ import numpy as np
 from rich.console import Console
 from rich.progress import Progress
 
-from ahf_ros.adaptive import AdaptiveSettings, Estimate, identify
 from ahf_ros.cli.options import add_option, add_options, settings_from
-from ahf_ros.counting import ESTIMATE_EXPECTED, estimator
 from ahf_ros.detectors import DETECTOR, Detector, DetectorSettings, create
+from ahf_ros.detectors.ring.counting import ESTIMATE_EXPECTED, estimator
 from ahf_ros.drawing import draw, summary
-from ahf_ros.files import read_image, write_image
-from ahf_ros.parameter import check_parameters, parameter
+from ahf_ros.filtering.identifier import AdaptiveSettings, Estimate, identify
+from ahf_ros.interchange.files import read_image, write_image
+from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.target import Identification
 
 DESCRIPTION = 'Identify the coded targets in images.'

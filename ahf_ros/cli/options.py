@@ -6,8 +6,8 @@ import argparse
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from ahf_ros.parameter import Parameter
-from ahf_ros.settings import assemble, flat_parameters
+from ahf_ros.settings.nested import assemble, flat_parameters
+from ahf_ros.settings.parameter import Parameter
 
 Settings = TypeVar('Settings')
 
@@ -23,7 +23,7 @@ def add_options(parser: argparse.ArgumentParser, settings: type) -> None:
         Gets `--max-radius` for the parameter `max_radius`, and `--ahf` and `--no-ahf` where one is
         true or false.
     settings : type
-        Settings dataclass, as for `ahf_ros.settings.flat_parameters`.
+        Settings dataclass, as for `ahf_ros.settings.nested.flat_parameters`.
     """
     for item in flat_parameters(settings):
         add_option(parser, item)

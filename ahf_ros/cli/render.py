@@ -8,11 +8,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from ahf_ros.cli.options import add_option, settings_from
-from ahf_ros.evaluation import TrueTarget
-from ahf_ros.files import read_truth, write_image, write_truth
-from ahf_ros.parameter import Parameter
-from ahf_ros.settings import flat_parameters
+from ahf_ros.interchange.files import read_truth, write_image, write_truth
+from ahf_ros.settings.nested import flat_parameters
+from ahf_ros.settings.parameter import Parameter
 from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.target import TrueTarget
 
 DESCRIPTION = 'Render images of targets under projected light, with their truth.'
 

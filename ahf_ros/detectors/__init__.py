@@ -11,13 +11,13 @@ from collections.abc import Callable
 from functools import partial
 from importlib.metadata import EntryPoint, entry_points
 
-from ahf_ros.detectors.command import CommandDetector
-from ahf_ros.detectors.detector import Detector, DetectorSettings
-from ahf_ros.detectors.guarded import GuardedDetector
-from ahf_ros.detectors.ring import RingDetector
-from ahf_ros.detectors.square import SquareDetector
-from ahf_ros.detectors.traditional import TraditionalDetector
-from ahf_ros.parameter import Parameter
+from ahf_ros.detectors.contract import Detector, DetectorSettings
+from ahf_ros.detectors.external.command import CommandDetector
+from ahf_ros.detectors.external.guarded import GuardedDetector
+from ahf_ros.detectors.ring.detector import RingDetector
+from ahf_ros.detectors.ring.traditional import TraditionalDetector
+from ahf_ros.detectors.square.detector import SquareDetector
+from ahf_ros.settings.parameter import Parameter
 
 __all__ = ['DETECTOR', 'DETECTOR_NAMES', 'GROUP', 'Detector', 'DetectorSettings', 'create']
 

@@ -7,14 +7,14 @@ from rclpy.publisher import Publisher
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 
+from ahf_ros.interchange.point_clouds import organised_points
+from ahf_ros.localisation import positions
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.diagnostics import CloudTally
 from ahf_ros.nodes.matching import Matcher
 from ahf_ros.nodes.point_msg import target_labels, target_points
 from ahf_ros.nodes.process import ProcessNode
 from ahf_ros.nodes.settings import LOSSLESS, DetectorNodeSettings
-from ahf_ros.points import organised_points
-from ahf_ros.positions import positions
 
 ANSWERS = 100
 """Most answers that wait for the cloud of their image."""

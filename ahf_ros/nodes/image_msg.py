@@ -8,7 +8,7 @@ import numpy as np
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
-from ahf_ros.encodings import ENCODINGS
+from ahf_ros.interchange.image_messages import ENCODINGS
 
 
 def image_message(image: np.ndarray, header: Header) -> Image:

@@ -14,8 +14,8 @@ from rcl_interfaces.msg import (
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 
-from ahf_ros.parameter import Parameter
-from ahf_ros.settings import assemble, flat_parameters
+from ahf_ros.settings.nested import assemble, flat_parameters
+from ahf_ros.settings.parameter import Parameter
 
 Settings = TypeVar('Settings')
 

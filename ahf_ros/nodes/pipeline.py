@@ -9,16 +9,16 @@ from typing import TypeAlias
 import numpy as np
 from sensor_msgs.msg import CompressedImage, Image
 
-from ahf_ros.adaptive import AdaptiveIdentifier
-from ahf_ros.counting import estimator
 from ahf_ros.detectors import Detector, create
-from ahf_ros.encodings import decode_compressed, decode_image
-from ahf_ros.homomorphic import HomomorphicFilter
+from ahf_ros.detectors.ring.counting import estimator
+from ahf_ros.filtering.homomorphic import HomomorphicFilter
+from ahf_ros.filtering.identifier import AdaptiveIdentifier
+from ahf_ros.filtering.trials import AnyDetector
+from ahf_ros.interchange.image_messages import decode_compressed, decode_image
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.settings import LOSSLESS, DetectorNodeSettings
 from ahf_ros.nodes.target_msg import coded_target_array
 from ahf_ros.target import Identification, Target
-from ahf_ros.trials import AnyDetector
 
 ImageMessage: TypeAlias = Image | CompressedImage
 """What images come in as."""

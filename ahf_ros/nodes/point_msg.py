@@ -11,9 +11,9 @@ from sensor_msgs.msg import PointCloud2, PointField
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
+from ahf_ros.localisation import Positions
 from ahf_ros.msg import CodedTarget
 from ahf_ros.nodes.annotation_msg import target_colour, target_name
-from ahf_ros.positions import Positions
 
 POINT_FIELDS = {
     'x': PointField.FLOAT32,

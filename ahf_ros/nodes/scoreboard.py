@@ -11,15 +11,15 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
 from ahf_ros.drawing import draw, summary
-from ahf_ros.encodings import decode_image
-from ahf_ros.evaluation import FALSE, WRONG, TrueTarget, judge, score
-from ahf_ros.files import write_image
+from ahf_ros.evaluation import FALSE, WRONG, judge, score
+from ahf_ros.interchange.files import write_image
+from ahf_ros.interchange.image_messages import decode_image
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.parameters import ParameterSettings
 from ahf_ros.nodes.process import ProcessNode, run
 from ahf_ros.nodes.settings import ScoreboardSettings
 from ahf_ros.nodes.target_msg import identification
-from ahf_ros.target import Identification
+from ahf_ros.target import Identification, TrueTarget
 
 Message = TypeVar('Message', Image, CodedTargetArray)
 

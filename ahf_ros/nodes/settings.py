@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field, replace
 
-from ahf_ros.adaptive import AdaptiveSettings
-from ahf_ros.counting import ESTIMATE_EXPECTED, estimator
 from ahf_ros.detectors import DETECTOR, DetectorSettings, create
-from ahf_ros.parameter import check_parameters, parameter
-from ahf_ros.positions import NEIGHBOURHOOD
+from ahf_ros.detectors.ring.counting import ESTIMATE_EXPECTED, estimator
+from ahf_ros.filtering.identifier import AdaptiveSettings
+from ahf_ros.localisation import NEIGHBOURHOOD
+from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.synthetic.scene import SceneSettings
 
 LATEST, LOSSLESS = 'latest', 'lossless'

@@ -7,7 +7,8 @@ from typing import Any
 
 from std_msgs.msg import Header
 
-from ahf_ros import messages, msg, target
+from ahf_ros import msg, target
+from ahf_ros.interchange import target_messages
 from ahf_ros.msg import CodedTarget, CodedTargetArray
 
 
@@ -27,7 +28,7 @@ def coded_target_array(
     header : std_msgs.msg.Header
         Of the image.
     """
-    return messages.coded_target_array(identification, family, shape, header, msg)
+    return target_messages.coded_target_array(identification, family, shape, header, msg)
 
 
 def identification(message: CodedTargetArray) -> target.Identification:

@@ -11,7 +11,7 @@ import numpy as np
 
 from ahf_ros.codes.ring import FAMILY_NAMES, family
 from ahf_ros.codes.square import SQUARE_NAMES, dictionary
-from ahf_ros.parameter import check_parameters, parameter
+from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.synthetic.camera import Camera, Sensor, tilted_camera
 from ahf_ros.synthetic.distractors import distractor_cover
 from ahf_ros.synthetic.layout import (

@@ -1,0 +1,1 @@
+"""Ring coded targets (Schneider type)."""

@@ -1,0 +1,197 @@
+"""Evidence for marks in the band of a ring target, that light cannot easily fake.
+
+Each reading asks whether a place is marked (has the colour of the dot) or not (has that of the
+surround), and answers with the logarithm of the likelihood of marked over unmarked. The noise of
+ln(I + offset) is known from I; a density of what no hypothesis explains, such as an edge of light,
+bounds what one reading can claim.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from ahf_ros.imaging.logarithm import LOG_OFFSET
+
+_NOISE = 1.2  # gray values, of 255
+_SURROUND_SPREAD = 0.16  # of ln, of steps where there is no edge
+_MARK_SPREAD, _MARK_TAIL = 0.16, 0.35  # of ln, of the step of a mark, and towards more
+_BORDER_SPREAD = 0.2  # of steps along the band, in steps of a mark
+_BORDER_FLOOR = 0.5  # density of them where an edge of light lies between
+_LEVEL_SPREAD = 0.12  # of ln, of levels
+_FLOOR = 0.06  # density of what no hypothesis explains
+_LARGEST = 4.0  # evidence of one reading
+_EDGE_STEP = 0.35  # of ln, of an edge of light
+_FEWEST_EDGES, _MOST_EDGES = 0.02, 0.5  # probability of one between neighbouring places
+_LEAST_STEP = 0.2  # of ln, of a mark
+_DEEPEST_SHADOW = 0.1  # of the light on the dot, elsewhere on the target
+_LEVEL_BIN = 0.05  # of ln
+_LEVELS = np.arange(np.log(LOG_OFFSET), np.log(255 + LOG_OFFSET) + _LEVEL_BIN, _LEVEL_BIN)
+
+
+@dataclass(frozen=True, slots=True)
+class Marks:
+    """How the marks of k targets look against their surround.
+
+    Attributes
+    ----------
+    signs : ndarray of int, shape (k,)
+        1 where marks are dark, -1 where they are bright.
+    contrast : ndarray of float64, shape (k,)
+        Gray value of dark over bright under the same light.
+    bright : ndarray of float64, shape (k,)
+        Usual gray value of the bright side of the dot's edge.
+    blur : ndarray of float64, shape (k,)
+        Of their edges, standard deviation in px.
+    """
+
+    signs: np.ndarray
+    contrast: np.ndarray
+    bright: np.ndarray
+    blur: np.ndarray
+
+    def chosen(self, which: np.ndarray) -> Marks:
+        """Return the marks of some of the targets."""
+        return Marks(*(getattr(self, of.name)[which] for of in fields(self)))
+
+    def step(self, values: np.ndarray) -> np.ndarray:
+        """Return the step of ln onto a mark where the bright side has gray values (k, ...)."""
+        spread = (slice(None),) + (None,) * (values.ndim - 1)
+        bright = np.maximum(values, _DEEPEST_SHADOW * self.bright[spread])
+        dark = self.contrast[spread] * bright
+        return self.signs[spread] * np.log((dark + LOG_OFFSET) / (bright + LOG_OFFSET))
+
+
+def log_ratio(values: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Return the steps of ln from others to values, both gray values from 0 to 255."""
+    return np.log((values + LOG_OFFSET) / (others + LOG_OFFSET))
+
+
+@dataclass(frozen=True, slots=True)
+class Light:
+    """The light on k targets, as it shows in their bright places.
+
+    Attributes
+    ----------
+    unmarked, marked : ndarray of float64, shape (k, n)
+        Densities of n levels of ln I, of unmarked and of marked places.
+    edges : ndarray of float64, shape (k,)
+        Probability that an edge of light lies between two neighbouring places.
+    """
+
+    unmarked: np.ndarray
+    marked: np.ndarray
+    edges: np.ndarray
+
+    def densities(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the densities of gray values (k, ...) where unmarked and where marked."""
+        places = _bins(_flat(values))
+        tables = (self.unmarked, self.marked)
+        unmarked, marked = (
+            np.take_along_axis(table, places, axis=1).reshape(values.shape) for table in tables
+        )
+        return unmarked, marked
+
+
+def see_light(bright: np.ndarray, gap: np.ndarray, marks: Marks) -> Light:
+    """Return the light on targets.
+
+    Bright places show under which light a target lies: the density of their levels is that of all
+    its bright parts, and moved by the step of a mark that of the dark ones.
+
+    Parameters
+    ----------
+    bright : ndarray of float, shape (k, ...)
+        Gray values of places that are bright: the surround of dark marks, or a bright dot.
+    gap : ndarray of float, shape (2, k, m)
+        Gray values on two circles in the gap.
+    marks : Marks
+    """
+    seen = _bins(_flat(bright))
+    levels = np.broadcast_to(np.exp(_LEVELS) - LOG_OFFSET, (len(seen), len(_LEVELS)))
+    moved = _LEVELS - np.abs(marks.step(levels)) - _LEVELS[0]
+    moved = np.clip(np.rint(moved / _LEVEL_BIN).astype(np.intp), 0, len(_LEVELS) - 1)
+    dark, light = _density(np.take_along_axis(moved, seen, axis=1)), _density(seen)
+    of_dark_marks = (marks.signs > 0)[:, None]
+    edges = (np.abs(log_ratio(gap[1], gap[0])) > _EDGE_STEP).mean(axis=1)
+    return Light(
+        np.where(of_dark_marks, light, dark),
+        np.where(of_dark_marks, dark, light),
+        np.clip(edges, _FEWEST_EDGES, _MOST_EDGES),
+    )
+
+
+def step_evidence(
+    surround: np.ndarray, values: np.ndarray, marks: Marks, light: Light
+) -> np.ndarray:
+    """Return the evidence that a step from the surround leads onto a mark.
+
+    Either the light is the same on both sides, and the step is that of a mark or none, or an edge
+    of light lies between them, and any level of the light may follow.
+    """
+    step = log_ratio(values, surround)
+    noise = _NOISE * np.hypot(1 / (values + LOG_OFFSET), 1 / (surround + LOG_OFFSET))
+    unmarked = _normal(step, np.hypot(_SURROUND_SPREAD, noise))
+    wanted = marks.step(np.maximum(values, surround))
+    error = (step - wanted) * np.sign(wanted)
+    spread, tail = np.hypot(_MARK_SPREAD, noise), np.hypot(_MARK_TAIL, noise)
+    width = np.where(error > 0, tail, spread)
+    marked = _normal(error, width) * width / ((spread + tail) / 2)
+    edges = light.edges[:, None]
+    other_unmarked, other_marked = light.densities(values)
+    marked = (1 - edges) * marked + edges * other_marked
+    unmarked = (1 - edges) * unmarked + edges * other_unmarked
+    return _limited(marked, unmarked)
+
+
+def level_evidence(values: np.ndarray, light: Light) -> np.ndarray:
+    """Return the evidence of the gray values of the band, by the light on the target."""
+    unmarked, marked = light.densities(np.moveaxis(values, 0, 2))
+    return _limited(marked, unmarked).mean(axis=2)
+
+
+def _limited(marked: np.ndarray, unmarked: np.ndarray) -> np.ndarray:
+    evidence = np.log((marked + _FLOOR) / (unmarked + _FLOOR))
+    return np.clip(evidence, -_LARGEST, _LARGEST)
+
+
+def _flat(values: np.ndarray) -> np.ndarray:
+    """Return values of shape (k, ...) as (k, m), also where k is 0."""
+    return values.reshape(len(values), int(np.prod(values.shape[1:])))
+
+
+def _bins(values: np.ndarray) -> np.ndarray:
+    """Return the bins of gray values among `_LEVELS`."""
+    places = np.rint((np.log(np.maximum(values, 0) + LOG_OFFSET) - _LEVELS[0]) / _LEVEL_BIN)
+    return np.clip(places.astype(np.intp), 0, len(_LEVELS) - 1)
+
+
+def _density(bins: np.ndarray) -> np.ndarray:
+    """Return the smoothed densities of k sets of bins, shape (k, number of levels)."""
+    size = len(_LEVELS)
+    keys = (bins + size * np.arange(len(bins))[:, None]).ravel()
+    counts = np.bincount(keys, minlength=size * len(bins)).reshape(len(bins), size)
+    distance = np.arange(size)[:, None] - np.arange(size)
+    kernel = np.exp(-0.5 * (distance * _LEVEL_BIN / _LEVEL_SPREAD) ** 2)
+    kernel /= _LEVEL_SPREAD * np.sqrt(2 * np.pi)
+    return counts / max(bins.shape[1], 1) @ kernel
+
+
+def border_evidence(band: np.ndarray, marks: Marks, light: Light) -> tuple[np.ndarray, np.ndarray]:
+    """Return the evidence of borders onto a mark and off it, against none, after each angle."""
+    before, after = np.roll(band, 1, axis=2), np.roll(band, -2, axis=2)
+    bright = np.moveaxis(np.maximum(before, after), 0, 2)
+    mark = np.moveaxis(marks.step(bright), 2, 0)
+    # A mark that makes no step cannot be told by one.
+    mark = np.sign(mark) * np.maximum(np.abs(mark), _LEAST_STEP)
+    rise = log_ratio(after, before) / mark
+    floor = _FLOOR + _BORDER_FLOOR * light.edges[:, None]
+    onto, none, off = (
+        np.log(_normal(rise - wanted, _BORDER_SPREAD) + floor) for wanted in (1, 0, -1)
+    )
+    return (onto - none).sum(axis=0), (off - none).sum(axis=0)
+
+
+def _normal(values: np.ndarray, spread: np.ndarray | float) -> np.ndarray:
+    return np.exp(-0.5 * (values / spread) ** 2) / (spread * np.sqrt(2 * np.pi))

@@ -1,0 +1,1 @@
+"""Square markers (ArUco, AprilTag)."""

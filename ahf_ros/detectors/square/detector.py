@@ -1,0 +1,149 @@
+"""Identification of square markers, ArUco and AprilTag, by OpenCV's own detector.
+
+OpenCV identifies; places come from `ahf_ros.detectors.square.sides`, in the image as received.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+
+from ahf_ros.codes.square import dictionary
+from ahf_ros.detectors.contract import DetectorSettings
+from ahf_ros.detectors.square.sides import centres, fit_sides
+from ahf_ros.imaging.image import as_gray, check_image
+from ahf_ros.target import Target
+
+_DRAFT_DEVIATION = 0.3  # px, of a centre by corners that are those of contours
+_LEAST_SHARE = 0.3  # of the edges of each side, for a fit to count
+
+Corners = tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SquareMarker(Target):
+    """One identified square marker.
+
+    Its centre is where its diagonals meet, which is the image of its physical centre at any view.
+    Its ellipse is the one inscribed, its code the ID.
+
+    Attributes
+    ----------
+    corners : tuple of 4 tuples of 2 float
+        px, from the one that is top left where the marker is upright, clockwise.
+    """
+
+    corners: Corners = ()
+
+
+@dataclass(frozen=True, slots=True)
+class SquareDetector:
+    """Identify the markers of one dictionary.
+
+    Attributes
+    ----------
+    name : str
+        'aruco' or 'apriltag'.
+    settings : DetectorSettings
+
+    Raises
+    ------
+    ValueError
+        If OpenCV does not have the dictionary.
+    """
+
+    name: str
+    settings: DetectorSettings = field(default_factory=DetectorSettings)
+
+    def __post_init__(self) -> None:
+        """Refuse a dictionary that is not there."""
+        dictionary(self.family)
+
+    @property
+    def family(self) -> str:
+        """Name of the dictionary as a family of targets."""
+        return f'{self.name}_{getattr(self.settings.square, f"{self.name}_dictionary")}'
+
+    def __call__(self, image: np.ndarray) -> list[Target]:
+        """Identify the markers of one image; see `Detector`."""
+        return self.refine(image, self.draft(image))
+
+    def draft(self, image: np.ndarray) -> list[Target]:
+        """Identify the markers of one image, corners being those of contours, to about a pixel."""
+        check_image(image)
+        gray = np.ascontiguousarray(as_gray(image).astype(np.uint8, copy=False))
+        detector = cv2.aruco.ArucoDetector(dictionary(self.family))
+        corners, numbers, _ = detector.detectMarkers(gray)
+        if not corners:
+            return []
+        covariances = np.tile(_DRAFT_DEVIATION**2 * np.eye(2), (len(numbers), 1, 1))
+        found = _markers(numbers.ravel(), np.reshape(corners, (-1, 4, 2)), covariances)
+        return sorted(found, key=lambda target: (target.id, target.y, target.x))
+
+    def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
+        """Return markers with their places in an image, from all of their sides.
+
+        Parameters
+        ----------
+        image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
+            The image as received.
+        targets : sequence of Target
+            Found by this detector, to about two pixels. Those without sides in this image, and
+            others than `SquareMarker`, stay as they are.
+
+        Returns
+        -------
+        list of Target
+            In the order of `targets`.
+
+        Raises
+        ------
+        ValueError
+            If `image` is not an image, see `ahf_ros.imaging.image.check_image`.
+        """
+        check_image(image)
+        markers = [it for it in targets if isinstance(it, SquareMarker)]
+        if not markers:
+            return list(targets)
+        gray = as_gray(image).astype(np.float32, copy=False)
+        corners = np.array([it.corners for it in markers])
+        sides = fit_sides(gray, corners, dictionary(self.family).markerSize + 2)
+        numbers = np.array([it.id for it in markers])
+        moved = _markers(numbers, sides.corners, sides.covariance)
+        better: dict[Target, Target] = {
+            marker: by_sides
+            for marker, by_sides, share in zip(markers, moved, sides.share, strict=True)
+            if share >= _LEAST_SHARE
+        }
+        return [better.get(it, it) for it in targets]
+
+
+def _markers(
+    numbers: np.ndarray, corners: np.ndarray, covariances: np.ndarray
+) -> list[SquareMarker]:
+    """Return the markers with corners, shape (k, 4, 2), in their order round each."""
+    corners = corners.astype(np.float64)
+    first, second, third, fourth = np.moveaxis(corners, 1, 0)
+    across = (second + third - first - fourth) / 4
+    down = (third + fourth - first - second) / 4
+    vectors, axes, _ = np.linalg.svd(np.stack([across, down], axis=2))
+    angles = np.arctan(np.tan(np.arctan2(vectors[:, 1, 0], vectors[:, 0, 0])))
+    return [
+        SquareMarker(
+            id=int(number),
+            code=int(number),
+            x=float(x),
+            y=float(y),
+            semi_major=float(major),
+            semi_minor=float(minor),
+            angle=float(angle),
+            covariance=tuple(covariance.ravel().tolist()),
+            corners=tuple((float(u), float(v)) for u, v in of_marker),
+        )
+        for number, (x, y), (major, minor), angle, covariance, of_marker in zip(
+            numbers, centres(corners), axes, angles, covariances, corners, strict=True
+        )
+    ]

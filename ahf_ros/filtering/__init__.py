@@ -1,0 +1,1 @@
+"""Adaptive homomorphic filtering; no detector is known here."""

@@ -1,0 +1,158 @@
+"""One image, identified through one filter after the other and through none twice."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from threading import Lock
+from typing import Any
+
+import cv2
+import numpy as np
+
+from ahf_ros.filtering.chromosome import Values
+from ahf_ros.filtering.genes import tuned
+from ahf_ros.filtering.homomorphic import FilterSettings, HomomorphicFilter
+from ahf_ros.target import UNDECODED, Target, count_codes
+
+AnyDetector = Callable[[np.ndarray], list[Target]]
+"""From an 8-bit image, shape (height, width), to the targets in it. Called from several threads at
+once where several filters are tried at a time."""
+
+
+CONFIRMED = 5
+"""Filters of a reduced image that are tried on the whole one."""
+
+
+class Trials:
+    """The targets of one image, as received and through every filter tried.
+
+    Parameters
+    ----------
+    image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
+        The image as received.
+    detector : callable
+        For the image as received.
+    draft : callable
+        For images made from it.
+    expected : int
+        N; it may be set later.
+    listed : frozenset of int
+        The IDs that the image may show; empty where any may be.
+    settings : FilterSettings
+
+    Attributes
+    ----------
+    image, expected
+        As given.
+    targets : dict
+        From the gains of a filter to its targets; None stands for the image as received.
+    """
+
+    def __init__(
+        self,
+        image: np.ndarray,
+        detector: AnyDetector,
+        draft: AnyDetector,
+        expected: int,
+        listed: frozenset[int],
+        settings: FilterSettings,
+    ) -> None:
+        self.image = image
+        self.expected = expected
+        self._listed = listed
+        self._strangers: dict[Values | None, int] = {}
+        self.targets: dict[Values | None, list[Target]] = {}
+        self._detector = detector
+        self._draft = draft
+        self._settings = settings
+        self._lock = Lock()
+        self._prepared: HomomorphicFilter | None = None
+
+    def discrepancy(self, values: Values | None, executor: Executor | None = None) -> int:
+        """Return |N - n| through a filter; None is the image as received."""
+        missing = abs(self.expected - self.count(values, executor))
+        return missing + self._strangers[values]
+
+    def count(self, values: Values | None, executor: Executor | None = None) -> int:
+        """Return n through a filter."""
+        if values not in self.targets:
+            found = checked_targets(self._found(values, executor), 'detector')
+            known = [
+                target
+                for target in found
+                if not self._listed or target.id == UNDECODED or target.id in self._listed
+            ]
+            self._strangers[values] = count_codes(found) - count_codes(known)
+            self.targets[values] = known
+        return count_codes(self.targets[values])
+
+    def reduced(self) -> Trials:
+        """Return trials of the image at half its size."""
+        height, width = self.image.shape
+        size = (max(width // 2, 1), max(height // 2, 1))
+        image = cv2.resize(self.image, size, interpolation=cv2.INTER_AREA)
+        return Trials(image, self._draft, self._draft, self.expected, self._listed, self._settings)
+
+    def of(self, tried: Sequence[Values | None]) -> list[list[Target]]:
+        """Return the targets through filters that were tried, each filter once."""
+        return [self.targets[values] for values in dict.fromkeys(tried)]
+
+    def _found(self, values: Values | None, executor: Executor | None) -> Any:
+        if values is None and self.image.dtype == np.uint8:
+            return self._detector(self.image)
+        with self._lock:
+            if self._prepared is None:
+                self._prepared = HomomorphicFilter(self.image, self._settings)
+        # equal gains leave the image as it is, but for the mapping to 8 bit
+        chosen = tuned(self.image.shape, values or (1.0, 1.0))
+        return self._draft(
+            self._prepared.filtered(
+                chosen.gamma_high, chosen.gamma_low, chosen.cutoff, chosen.attenuation, executor
+            )
+        )
+
+
+def confirmed(
+    tried: Sequence[Values], reduced: Trials, whole: Trials, executor: Executor | None
+) -> tuple[Values, ...]:
+    """Try the best filters of a reduced image on the whole one, up to the first that shows N.
+
+    Parameters
+    ----------
+    tried : sequence of tuple of float
+        Filters of the reduced image.
+    reduced, whole : Trials
+    executor : concurrent.futures.Executor or None
+        Threads that share the strips of an image.
+
+    Returns
+    -------
+    tuple of tuple of float
+        What was tried on the whole image, the best of the reduced one first.
+    """
+    best = sorted(tried, key=reduced.discrepancy)[:CONFIRMED]
+    for count, values in enumerate(best, 1):
+        if whole.discrepancy(values, executor) == 0:
+            return tuple(best[:count])
+    return tuple(best)
+
+
+def checked_targets(found: Any, source: str) -> list[Target]:
+    """Return what a callable of others returned, if it is targets at finite places.
+
+    Raises
+    ------
+    ValueError
+        If it is not; the message calls it `source`.
+    """
+    if not isinstance(found, (list, tuple)) or not all(isinstance(it, Target) for it in found):
+        raise ValueError(f'{source} returned {found!r}, accepted is a list of targets')
+    for target in found:
+        if not (math.isfinite(target.x) and math.isfinite(target.y)):
+            raise ValueError(
+                f'{source} returned target {target.id} at ({target.x}, {target.y}), '
+                'accepted are finite coordinates'
+            )
+    return list(found)

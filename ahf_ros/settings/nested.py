@@ -1,0 +1,81 @@
+"""Settings made of settings: laid out flat by name, and put together again."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from typing import Any, TypeVar, get_type_hints
+
+from ahf_ros.settings.parameter import Parameter, parameters
+
+Settings = TypeVar('Settings')
+
+
+def flat_parameters(settings: type) -> tuple[Parameter, ...]:
+    """Return the parameters of a settings dataclass and of those that its fields hold.
+
+    Parameters
+    ----------
+    settings : type
+        Settings dataclass; a field of it is a parameter or again a settings dataclass.
+
+    Raises
+    ------
+    ValueError
+        If a name stands for two parameters that are not the same.
+    """
+    found: dict[str, Parameter] = {}
+    rooms = (parameters(settings), *map(flat_parameters, _parts(settings).values()))
+    for item in (item for room in rooms for item in room):
+        if found.setdefault(item.name, item) != item:
+            raise ValueError(f'{item.name} is the name of two different parameters')
+    return tuple(found.values())
+
+
+def assemble(settings: type[Settings], values: Mapping[str, Any]) -> Settings:
+    """Return the settings with the given values, the others at their defaults.
+
+    Parameters
+    ----------
+    settings : type
+        Settings dataclass, as for `flat_parameters`.
+    values : mapping of str to value
+        By name of the parameter; an integer is accepted where a number is meant.
+
+    Raises
+    ------
+    ValueError
+        If a name is unknown, or a value is not accepted or does not fit the others.
+    """
+    names = [item.name for item in flat_parameters(settings)]
+    for name in values:
+        if name not in names:
+            raise ValueError(f'{name} is not a parameter, accepted is one of {", ".join(names)}')
+    return _assembled(settings, values)
+
+
+def _assembled(settings: type[Settings], values: Mapping[str, Any]) -> Settings:
+    own = {
+        item.name: _typed(item, values[item.name])
+        for item in parameters(settings)
+        if item.name in values
+    }
+    parts: dict[str, Any] = {
+        name: _assembled(part, values) for name, part in _parts(settings).items()
+    }
+    return settings(**own, **parts)
+
+
+def _typed(item: Parameter, value: Any) -> Any:
+    """Return an accepted integer as the number that is meant, anything else as it is."""
+    if isinstance(item.default, float) and item.accepts(value):
+        return float(value)
+    return value
+
+
+def _parts(settings: type) -> dict[str, type]:
+    """Return the fields that hold settings, with the type of these."""
+    hints = get_type_hints(settings)
+    return {
+        item.name: hints[item.name] for item in fields(settings) if is_dataclass(hints[item.name])
+    }

@@ -1,0 +1,342 @@
+"""`ahf bag` on real bags: what is in them, what is missing, what was broken off."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rosbags import rosbag2
+
+from ahf_ros.bag import run
+from ahf_ros.bag.definitions import COMPRESSED_IMAGE, IMAGE, typestore
+from ahf_ros.cli import main
+from support import bags
+
+ROOT = Path(__file__).resolve().parents[2]
+PATIENCE = 100.0
+SEARCH = ('--detector', 'traditional', '--expected', '4', '--population', '6')
+"""A detector that needs a filter for what `bags.scenes` shows."""
+
+
+def status(*arguments: object) -> int:
+    """Return the exit status of `ahf bag` in this process."""
+    try:
+        return main(['bag', *map(str, arguments)])
+    except SystemExit as left:
+        return int(left.code or 0)
+
+
+@pytest.fixture(scope='module')
+def images() -> list[np.ndarray]:
+    return bags.scenes(6)
+
+
+@pytest.fixture(scope='module')
+def messages(images: list[np.ndarray]) -> list[bags.Recorded]:
+    return bags.recorded(typestore(), images)
+
+
+@pytest.fixture(scope='module')
+def recording(messages: list[bags.Recorded], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return bags.write_ros2(tmp_path_factory.mktemp('recording') / 'in', messages)
+
+
+@pytest.fixture(scope='module')
+def answered(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return what comes of the recording, by a search that remembers."""
+    target = tmp_path_factory.mktemp('answered') / 'out'
+    assert status(recording, target, *SEARCH, '--debug-images') == 0
+    return target
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {str(it.relative_to(folder)): it.read_bytes() for it in sorted(folder.rglob('*'))}
+
+
+def test_answers_are_beside_everything_else(recording: Path, answered: Path) -> None:
+    before, after = bags.read(recording), bags.read(answered)
+    assert [it for it in after if 'coded_targets' not in it[0]] == before
+    topics = [topic for topic, _, _ in after][:4]
+    assert topics == [
+        '/notes',
+        '/image',
+        '/image/coded_targets',
+        '/image/coded_targets/debug_image/compressed',
+    ]
+    assert len(after) == len(before) + 2 * 6
+    found = bags.answers(answered)
+    assert [time for time, _ in found] == [(1 + number) * 10**8 for number in range(6)]
+    for recorded, message in found:
+        stamp = message.header.stamp
+        assert stamp.sec * 10**9 + stamp.nanosec == recorded - 10**6
+        assert (message.header.frame_id, message.width, message.height) == ('camera', 400, 300)
+        assert (message.family, message.expected) == ('metashape12', 4)
+    assert any(message.filter.applied for _, message in found)
+    assert {message.filter.duration for _, message in found} == {0.0}
+
+
+def test_answers_are_true(images: list[np.ndarray], recording: Path, tmp_path: Path) -> None:
+    from ahf_ros.synthetic.scene import SceneSettings, render
+
+    assert status(recording, tmp_path / 'out') == 0
+    for seed, (_, message) in enumerate(bags.answers(tmp_path / 'out')):
+        truth = render(SceneSettings(**bags.SCENE, seed=seed)).targets
+        assert [it.id for it in message.targets] == [it.id for it in truth]
+        for one, true in zip(message.targets, truth, strict=True):
+            assert (one.x, one.y) == pytest.approx((true.x, true.y), abs=0.2)
+
+
+@pytest.mark.parametrize('storage', ['mcap', 'sqlite3'])
+def test_all_storages_give_the_same(
+    messages: list[bags.Recorded], answered: Path, tmp_path: Path, storage: str
+) -> None:
+    source = bags.write_ros2(tmp_path / 'in', messages, storage)
+    options = (*SEARCH, '--debug-images', '--storage', 'sqlite3', '--threads', 1)
+    assert status(source, tmp_path / 'out', *options) == 0
+    assert bags.read(tmp_path / 'out') == bags.read(answered)
+
+
+@pytest.mark.parametrize('mode', ['FILE', 'MESSAGE', 'STORAGE'])
+def test_compressed_bags_are_read(images: list[np.ndarray], tmp_path: Path, mode: str) -> None:
+    store = typestore()
+    writer = rosbag2.Writer(tmp_path / 'in', version=9, storage_plugin=rosbag2.StoragePlugin.MCAP)
+    writer.set_compression(rosbag2.CompressionMode[mode], rosbag2.CompressionFormat.ZSTD)
+    with writer:
+        connection = writer.add_connection('/image', IMAGE, typestore=store)
+        message = bags.image(store, images[0], 10**9)
+        writer.write(connection, 10**9, bytes(store.serialize_cdr(message, IMAGE)))
+    assert status(tmp_path / 'in', tmp_path / 'out') == 0
+    assert len(bags.answers(tmp_path / 'out')) == 1
+
+
+def test_bags_of_ros1_give_the_same(
+    images: list[np.ndarray], answered: Path, tmp_path: Path
+) -> None:
+    source = bags.write_ros1(tmp_path / 'in.bag', bags.recorded(bags.ros1(), images))
+    assert status(source, tmp_path / 'out', *SEARCH, '--debug-images') == 0
+    assert bags.read(tmp_path / 'out') == bags.read(answered)
+
+
+def test_topics_are_chosen_and_compressed_images_are_images_too(
+    images: list[np.ndarray], tmp_path: Path
+) -> None:
+    store = typestore()
+    messages = bags.recorded(store, images[:2], '/left')
+    messages += bags.recorded(store, images[2:4], '/right')
+    png = bags.compressed(store, images[0], 10**9)
+    messages.append(('/left/compressed', COMPRESSED_IMAGE, 10**9, png))
+    source = bags.write_ros2(tmp_path / 'in', sorted(messages, key=lambda it: it[2]))
+    assert status(source, tmp_path / 'all', '--output-topic', 'targets') == 0
+    left, right, same = (
+        bags.answers(tmp_path / 'all', f'{topic}/targets')
+        for topic in ('/left', '/right', '/left/compressed')
+    )
+    assert (len(left), len(right), len(same)) == (2, 2, 1)
+    assert [it.id for it in same[0][1].targets] == [it.id for it in left[0][1].targets]
+    one = tmp_path / 'one'
+    assert status(source, one, '--topic', '/right', '--output-topic', '/targets') == 0
+    ids = [[it.id for it in message.targets] for _, message in bags.answers(one, '/targets')]
+    assert ids == [[it.id for it in message.targets] for _, message in right]
+
+
+def test_several_bags_at_once(recording: Path, answered: Path, tmp_path: Path) -> None:
+    other = tmp_path / 'other'
+    other.symlink_to(recording)
+    folder = tmp_path / 'made'
+    options = (*SEARCH, '--debug-images', '--jobs', 2)
+    command = [sys.executable, '-m', 'ahf_ros.cli', 'bag', recording, other, folder, *options]
+    done = subprocess.run(
+        [str(it) for it in command], cwd=ROOT, capture_output=True, text=True, timeout=PATIENCE
+    )
+    assert (done.returncode, done.stdout) == (0, ''), done.stderr
+    for name in ('in', 'other'):
+        assert f'{folder / name}: 6 images answered' in done.stderr
+        assert bags.read(folder / name) == bags.read(answered)
+
+
+def test_killed_readable_and_finished_the_same(
+    recording: Path, answered: Path, tmp_path: Path
+) -> None:
+    target = tmp_path / 'out'
+    command = [sys.executable, '-m', 'ahf_ros.cli', 'bag', str(recording), str(target)]
+    complete = bags.read(answered)
+    answers = [it for it in complete if 'coded_targets' in it[0]]
+    for least in (3, 12):
+        process = subprocess.Popen([*command, *SEARCH, '--debug-images'], cwd=ROOT)
+        limit = time.monotonic() + PATIENCE
+        while not target.exists() or len(bags.read(target)) < least:
+            assert time.monotonic() < limit and process.poll() is None, 'it is not killed in time'
+            time.sleep(0.005)
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        found = [it for it in bags.read(target) if 'ahf_bag' not in it[0]]
+        assert found == answers[: len(found)] or found == complete
+    assert status(recording, target, *SEARCH, '--debug-images') == 0
+    assert contents(target) == contents(answered)
+
+
+def test_a_kill_while_the_bag_is_assembled(
+    recording: Path, answered: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def killed(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    target = tmp_path / 'out'
+    with monkeypatch.context() as patch:
+        patch.setattr(run.Copy, 'write', killed)
+        assert status(recording, target, *SEARCH, '--debug-images') == 130
+    assert len(bags.answers(target)) == 6
+    with monkeypatch.context() as patch:
+        patch.setattr(run, '_tidy', killed)
+        assert status(recording, target, *SEARCH, '--debug-images') == 130
+    assert bags.read(target) == bags.read(answered)
+    assert status(recording, target, *SEARCH, '--debug-images') == 0
+    assert contents(target) == contents(answered)
+
+
+def test_what_is_refused_is_named_and_the_others_go_on(
+    images: list[np.ndarray], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    store = typestore()
+    times = [1_700_000_000_000_000_001 + number for number in range(4)]
+    messages = [('/image', IMAGE, it, bags.image(store, images[0], it)) for it in times]
+    messages[1][3].encoding = 'unheard of'
+    messages[2][3].height = 10**6
+    source = bags.write_ros2(tmp_path / 'in', messages)
+    for _ in range(2):  # the second run finds it done, and says the same
+        assert status(source, tmp_path / 'out') == 1
+        assert '4 images answered, 2 of them not accepted' in capfd.readouterr().err
+    assert status(source, tmp_path / 'new') == 1
+    errors = capfd.readouterr().err
+    assert "/image at 1700000000.000000002 s: encoding is 'unheard of', accepted is" in errors
+    assert '/image at 1700000000.000000003 s: ' in errors
+    assert [time for time, _ in bags.answers(tmp_path / 'out')] == [times[0], times[3]]
+
+
+def cut(path: Path, share: float) -> None:
+    """Leave a share of a file."""
+    content = path.read_bytes()
+    path.write_bytes(content[: int(share * len(content))])
+
+
+@pytest.mark.parametrize('storage', ['mcap', 'sqlite3', 'ros1'])
+def test_a_bag_that_is_cut_is_answered_up_to_there(
+    images: list[np.ndarray], tmp_path: Path, capfd: pytest.CaptureFixture[str], storage: str
+) -> None:
+    many = images * 10  # several chunks
+    if storage == 'ros1':
+        source = bags.write_ros1(tmp_path / 'in.bag', bags.recorded(bags.ros1(), many))
+        cut(source, 0.5)
+    else:
+        source = bags.write_ros2(tmp_path / 'in', bags.recorded(typestore(), many), storage)
+        cut(next(it for it in source.iterdir() if it.suffix != '.yaml'), 0.5)
+    for _ in range(2):
+        assert status(source, tmp_path / 'out', '--detector', 'traditional') == 1
+        assert f'{source} is cut: ' in capfd.readouterr().err
+    times = [time for time, _ in bags.answers(tmp_path / 'out')]
+    assert 20 <= len(times) <= 30
+    assert times == [(1 + number) * 10**8 for number in range(len(times))]
+
+
+def test_a_bag_without_metadata_is_read(
+    messages: list[bags.Recorded], answered: Path, tmp_path: Path
+) -> None:
+    source = bags.write_ros2(tmp_path / 'in', messages)
+    (source / 'metadata.yaml').unlink()
+    assert status(source, tmp_path / 'out', *SEARCH, '--debug-images') == 1
+    assert bags.read(tmp_path / 'out') == bags.read(answered)
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'message'),
+    [
+        (['--topic', '/notes'], 'topic /notes is of std_msgs/msg/String, accepted is one of /im'),
+        (['--topic', '/magic'], 'topic /magic does not exist, accepted is one of /image'),
+        (['--output-topic', '/notes'], 'has a topic /notes, accepted is another output_topic'),
+    ],
+)
+def test_bad_topics_are_named(
+    recording: Path,
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    arguments: list[str],
+    message: str,
+) -> None:
+    assert status(recording, tmp_path / 'out', *arguments) == 1
+    assert message in capfd.readouterr().err
+    assert not (tmp_path / 'out').exists()
+
+
+def test_bags_that_are_none_are_named_and_the_others_go_on(
+    recording: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / 'text.mcap').write_text('not a bag')
+    (tmp_path / 'text.bag').write_text('not a bag')
+    (tmp_path / 'empty').mkdir()
+    notes = [('/notes', bags.STRING, 5, bags.text(typestore(), 'no image'))]
+    bags.write_ros2(tmp_path / 'notes', notes)
+    bad = [tmp_path / name for name in ('text.mcap', 'text.bag', 'empty', 'notes', 'missing')]
+    bad[1] = bad[1].rename(tmp_path / 'other.bag')
+    assert status(*bad, recording, tmp_path / 'made') == 1
+    errors = capfd.readouterr().err
+    for path in bad:
+        assert f'ahf bag: {path} ' in errors
+    assert 'notes has no images, accepted are topics of sensor_msgs/msg/Image' in errors
+    assert len(bags.answers(tmp_path / 'made' / 'in')) == 6
+
+
+def test_what_is_something_else_is_left_alone(
+    recording: Path, answered: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    before = contents(answered)
+    assert status(recording, answered, *SEARCH, '--debug-images', '--seed', 5) == 1
+    assert f'{answered} was begun with seed 0, now it is 5' in capfd.readouterr().err
+    assert contents(answered) == before
+    other = bags.write_ros2(
+        tmp_path / 'other', [('/a', bags.STRING, 5, bags.text(typestore(), ''))]
+    )
+    before = contents(other)
+    assert status(recording, other) == 1
+    assert f'{other} exists, accepted is a new name' in capfd.readouterr().err
+    assert contents(other) == before
+
+
+def test_two_at_once_do_not_mix(
+    recording: Path, answered: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    with run.locked(answered):
+        assert status(recording, answered, *SEARCH, '--debug-images') == 1
+    assert f'{answered} is being written by another process' in capfd.readouterr().err
+
+
+def test_a_folder_that_cannot_be_written_is_named(
+    recording: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / 'file').touch()
+    assert status(recording, tmp_path / 'file' / 'out') == 1
+    assert f'{tmp_path / "file" / "out"} cannot be written: ' in capfd.readouterr().err
+
+
+def test_bags_of_one_name_are_refused(
+    recording: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert status(recording, recording, tmp_path / 'made') == 2
+    assert 'several bags of one name' in capfd.readouterr().err
+
+
+def test_a_missing_library_is_named(
+    recording: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.delitem(sys.modules, 'ahf_ros.bag.run')
+    monkeypatch.setitem(sys.modules, 'rosbags.rosbag2', None)
+    assert status(recording, tmp_path / 'out') == 2
+    assert 'is not installed, bags need it: pip install rosbags' in capfd.readouterr().err

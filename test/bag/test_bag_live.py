@@ -1,0 +1,61 @@
+"""The node and `ahf bag` give the same answers to the same images."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from support import bags
+
+pytest.importorskip('rclpy', reason='ROS 2 is not installed')
+
+from rclpy.serialization import deserialize_message, serialize_message
+from rclpy.time import Time
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import Image
+
+from ahf_ros.bag.definitions import CODED_TARGETS, typestore
+from ahf_ros.cli import main
+from ahf_ros.msg import CodedTargetArray
+
+SEARCH = {'detector': 'traditional', 'population': 6, 'seed': 3}
+
+
+@pytest.mark.parametrize('simulated', [False, True], ids=['real time', 'simulated time'])
+def test_answers_of_the_node_are_those_of_the_bag(
+    graph: Any, tmp_path: Path, simulated: bool
+) -> None:
+    source = bags.write_ros2(tmp_path / 'in', bags.recorded(typestore(), bags.scenes(4)))
+    options = [text for name, value in SEARCH.items() for text in (f'--{name}', str(value))]
+    assert main(['bag', str(source), str(tmp_path / 'out'), '--expected', '4', *options]) == 0
+    recorded = [data for topic, _, data in bags.read(tmp_path / 'out') if 'coded' in topic]
+
+    parameters = {
+        **SEARCH,
+        'expected_targets': 4,
+        'queue': 'lossless',
+        'use_sim_time': str(simulated).lower(),
+    }
+    given = [text for name, value in parameters.items() for text in ('-p', f'{name}:={value}')]
+    node = graph.start('detector', '-r', '__ns:=/replay', *given)
+    answers = graph.listen(CodedTargetArray, '/replay/coded_targets')
+    publisher = graph.publisher(Image, '/replay/image')
+    images = [(time, data) for topic, time, data in bags.read(source) if topic == '/image']
+    clock = graph.publisher(Clock, '/clock') if simulated else None
+    for time, data in images:  # faster than they are answered
+        if clock:
+            clock.publish(Clock(clock=Time(nanoseconds=time).to_msg()))
+        publisher.publish(deserialize_message(data, Image))
+    graph.until(lambda: len(answers) == len(images))
+    assert any(answer.filter.applied for answer in answers)
+    assert [comparable(answer) for answer in answers] == recorded
+    assert node.end() == (0, '')
+
+
+def comparable(answer: CodedTargetArray) -> bytes:
+    """Return an answer with zeros between its fields, where ROS has what was in memory."""
+    store = typestore()
+    message: Any = store.deserialize_cdr(serialize_message(answer), CODED_TARGETS)
+    return bytes(store.serialize_cdr(message, CODED_TARGETS))

@@ -1,0 +1,24 @@
+"""The soak of `benchmarks/soak.py`, for seconds instead of an hour."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+pytest.importorskip('rclpy', reason='ROS 2 is not installed')
+
+from benchmarks import soak
+
+
+def test_every_image_is_answered_and_nothing_is_left_behind(graph: Any) -> None:
+    run = soak.Soak(graph, count=130, interval=10)  # everything happens once
+    run.run()
+    figures = soak.report(run, 1.0)
+    assert figures['answered'] == figures['images'] == 130
+    assert figures['other IDs than there are'] == 0
+    assert figures['rejected'] == figures['messages that are no images'] == 13 + 1
+    assert (figures['parameters set'], figures['participants come and gone']) == (10, 1)
+    assert figures['threads at last'] <= figures['threads when warm'] + 1
+    assert figures['open files at last'] == figures['open files when warm']
+    assert run.node.end()[0] == 0

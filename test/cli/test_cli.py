@@ -1,0 +1,274 @@
+"""The command line as its users call it: processes, files, exit statuses."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ahf_ros.cli import main
+from ahf_ros.cli.identify import IdentifySettings
+from ahf_ros.interchange.files import read_image, read_truth, write_image
+from ahf_ros.settings.nested import flat_parameters
+from ahf_ros.synthetic.scene import SceneSettings
+
+ROOT = Path(__file__).resolve().parents[2]
+SCENE = ['--width', '640', '--height', '480', '--targets', '6', '--dot-radius', '10']
+KEYS = (
+    'image width height family detector expected estimated targets filter elapsed_s',
+    'id code x y semi_major semi_minor angle confidence covariance',
+    'applied gamma_high gamma_low cutoff attenuation evaluations generations',
+)
+
+
+def ahf(*arguments: object, stdin: str = '') -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, '-m', 'ahf_ros.cli', *map(str, arguments)],
+        input=stdin,
+        capture_output=True,
+        text=True,
+        env={**os.environ, 'PYTHONPATH': str(ROOT)},
+        timeout=300,
+    )
+
+
+def status(*arguments: object) -> int:
+    """Return the exit status of the command line in this process."""
+    try:
+        return main([str(argument) for argument in arguments])
+    except SystemExit as left:
+        return int(left.code or 0)
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory) -> Path:
+    """Return a folder with two rendered images and their truth."""
+    folder = tmp_path_factory.mktemp('rendered')
+    done = ahf('render', folder, *SCENE, '--light', 'normal', 'shadow', '--seed', 4)
+    assert (done.returncode, done.stdout) == (0, '')
+    assert 'normal_0.3_4.png: 6 targets' in done.stderr
+    return folder
+
+
+@pytest.fixture(scope='module')
+def results(folder) -> str:
+    images = (folder / 'normal_0.3_4.png', folder / 'shadow_0.3_4.png')
+    done = ahf('identify', *images, '--detector', 'traditional', '--json')
+    assert done.returncode == 0
+    return done.stdout
+
+
+def test_rendered_images_have_their_truth(folder):
+    truth = read_truth(folder / 'truth.csv')
+    assert {name: len(targets) for name, targets in truth.items()} == {
+        'normal_0.3_4.png': 6,
+        'shadow_0.3_4.png': 6,
+    }
+    assert read_image(folder / 'shadow_0.3_4.png').shape == (480, 640)
+
+
+def test_a_series_grows_and_keeps_what_was_there(tmp_path):
+    assert status('render', tmp_path, *SCENE, '--seed', 1) == 0
+    first = (tmp_path / 'normal_0.3_1.png').read_bytes()
+    assert status('render', tmp_path, *SCENE, '--seed', 2, '--count', 2) == 0
+    assert (tmp_path / 'normal_0.3_1.png').read_bytes() == first
+    names = [f'normal_0.3_{seed}.png' for seed in (1, 2, 3)]
+    assert list(read_truth(tmp_path / 'truth.csv')) == names
+
+
+def test_json_is_one_object_an_image(folder, results):
+    first, second = map(json.loads, results.splitlines())
+    assert (' '.join(first), ' '.join(first['targets'][0]), ' '.join(first['filter'])) == KEYS
+    assert first['image'] == str(folder / 'normal_0.3_4.png')
+    assert second['image'] == str(folder / 'shadow_0.3_4.png')
+    assert (first['width'], first['height'], first['expected']) == (640, 480, 0)
+    assert (first['family'], first['detector']) == ('metashape12', 'traditional')
+    assert first['filter']['applied'] is False
+    assert 0 < first['elapsed_s'] < 100
+
+
+def test_json_tells_the_truth(folder, results):
+    truth = {item.id: item for item in read_truth(folder / 'truth.csv')['normal_0.3_4.png']}
+    targets = json.loads(results.splitlines()[0])['targets']
+    assert [target['id'] for target in targets] == sorted(truth)
+    for target in targets:
+        place = truth[target['id']].x, truth[target['id']].y
+        assert (target['x'], target['y']) == pytest.approx(place, abs=0.05)
+        assert len(target['covariance']) == 4
+
+
+def test_an_unknown_number_is_estimated_where_that_is_asked_for(folder, capsys):
+    command = ('identify', folder / 'normal_0.3_4.png', '--detector', 'traditional', '--json')
+    found = []
+    for more in ((), ('--estimate-expected',), ('--estimate-expected', '--expected', 6)):
+        assert status(*command, *more) == 0
+        found.append(json.loads(capsys.readouterr().out))
+    assert [(it['expected'], it['estimated']) for it in found] == [
+        (0, False),
+        (6, True),
+        (6, False),
+    ]
+    assert found[0]['targets'] == found[1]['targets']
+
+
+def test_without_json_standard_output_stays_empty(folder):
+    done = ahf('identify', folder / 'normal_0.3_4.png', '--detector', 'traditional')
+    assert (done.returncode, done.stdout) == (0, '')
+    head, *lines = done.stderr.splitlines()
+    assert '6 identified, no filter' in head
+    assert len(lines) == 6
+
+
+def test_evaluation_of_results_in_a_file_and_in_a_pipe(folder, results, tmp_path):
+    (tmp_path / 'results.jsonl').write_text(results)
+    table = ahf('evaluate', folder / 'truth.csv', tmp_path / 'results.jsonl')
+    assert (table.returncode, table.stdout) == (0, '')
+    assert 'wrong  false' in table.stderr
+    told = ahf('evaluate', folder / 'truth.csv', '-', '--json', stdin=results)
+    *_, together = map(json.loads, told.stdout.splitlines())
+    assert (together['image'], together['expected'], together['wrong']) == (None, 12, 0)
+    assert together['right'] >= 6
+    assert together['rmse_xy'] < 0.1
+
+
+def test_evaluation_names_images_without_truth(folder):
+    line = json.dumps({'image': 'other.png', 'targets': [{'id': 1, 'x': 5, 'y': 5}]})
+    told = ahf('evaluate', folder / 'truth.csv', '-', '--json', stdin=line)
+    assert 'other.png is not in' in told.stderr
+    *_, other, together = map(json.loads, told.stdout.splitlines())
+    assert (other['image'], other['false_positives'], other['recall']) == ('other.png', 1, None)
+    assert (together['expected'], together['recall']) == (12, 0.0)
+
+
+def test_overlays_are_written(folder, tmp_path):
+    drawn = tmp_path / 'drawn'
+    arguments = ('--overlay', drawn, '--detector', 'traditional')
+    assert status('identify', folder / 'normal_0.3_4.png', *arguments) == 0
+    assert [path.name for path in drawn.iterdir()] == ['normal_0.3_4_overlay.png']
+    overlay = read_image(drawn / 'normal_0.3_4_overlay.png')
+    assert (overlay != read_image(folder / 'normal_0.3_4.png')).mean() > 0.001
+
+
+def test_overlays_of_one_name_are_refused(folder, tmp_path, capsys):
+    other = tmp_path / 'normal_0.3_4.png'
+    other.write_bytes((folder / 'normal_0.3_4.png').read_bytes())
+    arguments = ('--overlay', tmp_path, '--detector', 'traditional')
+    assert status('identify', folder / other.name, other, *arguments) == 2
+    assert 'overlay would hold several images of one name' in capsys.readouterr().err
+
+
+def test_stripes_need_the_filter_and_a_search_repeats_itself(tmp_path, capsys):
+    size = ('--width', 960, '--height', 720, '--targets', 6)
+    assert status('render', tmp_path, *size, '--light', 'stripe', '--seed', 2) == 0
+    image = tmp_path / 'stripe_0.3_2.png'
+    search = ('--seed', 3, '--population', 10)
+    found = []
+    for more in (('--no-ahf',), search, (*search, '--threads', 1)):
+        command = ('identify', image, '--detector', 'traditional', '--expected', 6, '--json')
+        assert status(*command, *more) == 0
+        found.append(json.loads(capsys.readouterr().out))
+    plain, first, second = found
+    assert len(plain['targets']) < 6
+    assert plain['filter']['applied'] is False
+    assert len(first['targets']) == 6
+    assert first['filter']['applied'] is True
+    assert first['filter']['evaluations'] > 1
+    assert {**first, 'elapsed_s': 0} == {**second, 'elapsed_s': 0}
+
+
+def test_files_that_cannot_be_read_do_not_stop_the_others(folder, tmp_path):
+    (tmp_path / 'text.png').write_text('not an image')
+    write_image(tmp_path / 'flat.png', np.full((50, 50), 9, np.uint8))
+    images = ('missing.png', tmp_path, tmp_path / 'text.png', tmp_path / 'flat.png')
+    good = folder / 'normal_0.3_4.png'
+    done = ahf('identify', *images, good, '--detector', 'traditional', '--json')
+    assert done.returncode == 1
+    assert len(done.stdout.splitlines()) == 1
+    told = [line for line in done.stderr.splitlines() if line.startswith('ahf identify: ')]
+    assert len(told) == 4
+    for line, name in zip(
+        told, ('missing.png', str(tmp_path), 'text.png', 'flat.png'), strict=True
+    ):
+        assert name in line
+    assert 'constant' in told[3]
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'message'),
+    [
+        (['--expected', -1], "expected is '-1', accepted is an integer of at least 0"),
+        (['--population', 1], "population is '1', accepted is an integer from 2 to"),
+        (['--family', 'ring'], "family is 'ring', accepted is one of metashape12, metashape14"),
+        (['--detector', 'magic'], "detector is 'magic', accepted is one of"),
+        (['--min-radius', 'nan'], "min_radius is 'nan', accepted is a number from 1"),
+        (['--min-radius', 70], 'min_radius is 70.0, accepted is a number of at most max_radius'),
+        (['--gamma-high-min', 5], 'gamma_high_min is 5.0, accepted is a number of at most'),
+        (['--magic'], 'unrecognized arguments: --magic'),
+    ],
+)
+def test_bad_options_are_named(capsys, arguments, message):
+    assert status('identify', 'image.png', '--detector', 'traditional', *arguments) == 2
+    out, errors = capsys.readouterr()
+    assert (out, message in errors) == ('', True), errors
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'message'),
+    [
+        (['--light', 'dark'], "light is 'dark', accepted is one of normal, "),
+        (['--count', 0], "count is '0', accepted is an integer of at least 1"),
+        (['--targets', 100000], 'targets is 100000, accepted is an integer from 0 to'),
+    ],
+)
+def test_bad_scenes_are_named(tmp_path, capsys, arguments, message):
+    assert status('render', tmp_path / 'new', *arguments) == 2
+    assert message in capsys.readouterr().err
+    assert not (tmp_path / 'new').exists()
+
+
+@pytest.mark.parametrize('missing', ['truth.csv', 'results.jsonl'])
+def test_files_that_cannot_be_compared_are_named(tmp_path, capsys, missing):
+    (tmp_path / 'truth.csv').write_text('image,id,x,y\n')
+    (tmp_path / 'results.jsonl').touch()
+    (tmp_path / missing).unlink()
+    assert status('evaluate', tmp_path / 'truth.csv', tmp_path / 'results.jsonl') == 1
+    assert f'{missing} cannot be read: No such file' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ('command', 'settings'),
+    [('identify', IdentifySettings), ('bag', IdentifySettings), ('render', SceneSettings)],
+)
+def test_help_describes_every_setting(monkeypatch, capsys, command, settings):
+    monkeypatch.setenv('COLUMNS', '1000')
+    assert status(command, '--help') == 0
+    words = capsys.readouterr().out
+    for item in flat_parameters(settings):
+        assert f'--{item.name.replace("_", "-")}' in words
+        assert f'{item.description} Default: {item.default}; accepted: {item.accepted}.' in words
+
+
+def test_no_command_and_the_version():
+    assert status() == 2
+    assert ahf('--version').returncode == 0
+
+
+def test_a_reader_that_stops_reading_is_no_error_to_see(folder):
+    command = [sys.executable, '-m', 'ahf_ros.cli', 'identify', '--json', '--detector']
+    process = subprocess.Popen(
+        [*command, 'traditional', *[str(folder / 'normal_0.3_4.png')] * 3],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, 'PYTHONPATH': str(ROOT)},
+    )
+    process.stdout.close()
+    errors = process.stderr.read()
+    assert process.wait(timeout=100) == 1
+    assert 'Traceback' not in errors
+    assert 'Exception ignored' not in errors

@@ -1,0 +1,201 @@
+"""The traditional detector: what it reads, what it refuses, and that it needs the filter."""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from ahf_ros.codes.ring import FAMILY_NAMES
+from ahf_ros.detectors import DetectorSettings, create
+from ahf_ros.evaluation import Score, score
+from ahf_ros.filtering.homomorphic import HomomorphicFilter
+from ahf_ros.interchange.files import read_image, read_truth
+from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
+from ahf_ros.target import UNDECODED, Target, TrueTarget
+
+SMALL = SceneSettings(width=640, height=480, targets=6, dot_radius=10.0, seed=3)
+PHOTOS = Path(os.environ.get('AHF_PHOTOS', Path(__file__).parents[3] / 'shared' / 'photos'))
+
+rendered = lru_cache(render)
+
+
+def identified(image: np.ndarray, **settings: object) -> list[Target]:
+    return create('traditional', DetectorSettings(**settings))(image)
+
+
+def scored(rendering: Rendering, targets: list[Target]) -> Score:
+    truth = [TrueTarget(target.id, target.x, target.y) for target in rendering.targets]
+    return score(truth, targets)
+
+
+@pytest.mark.parametrize('polarity', ['dark', 'bright'])
+@pytest.mark.parametrize('name', FAMILY_NAMES)
+def test_every_family_in_both_polarities(name, polarity):
+    rendering = rendered(replace(SMALL, family=name, polarity=polarity))
+    figures = scored(rendering, identified(rendering.image, family=name))
+    assert (figures.right, figures.wrong, figures.false_positives) == (6, 0, 0)
+    assert figures.rmse[2] < 0.05
+
+
+@pytest.mark.parametrize('polarity', ['dark', 'bright'])
+def test_a_draft_shows_the_same_ids_and_refinement_starts_from_it(polarity):
+    rendering = rendered(replace(SMALL, polarity=polarity, light='stripe', ambient=1.0))
+    detector = create('traditional')
+    draft = detector.draft(rendering.image)
+    assert [it.id for it in draft] == [it.id for it in detector(rendering.image)]
+    assert scored(rendering, draft).rmse[2] < 1.0
+    assert scored(rendering, detector.refine(rendering.image, draft)).rmse[2] < 0.05
+
+
+@pytest.mark.parametrize(
+    'scene',
+    [
+        replace(SMALL, dot_radius=5.0, targets=12),
+        replace(SMALL, dot_radius=30.0, targets=2, width=800),
+        replace(SMALL, tilt=60.0, dot_radius=14.0, targets=4),
+    ],
+    ids=['small', 'large', 'oblique'],
+)
+def test_sizes_and_views(scene):
+    rendering = rendered(scene)
+    figures = scored(rendering, identified(rendering.image))
+    assert (figures.right, figures.wrong, figures.false_positives) == (scene.targets, 0, 0)
+    assert figures.rmse[2] < 0.08
+
+
+def test_the_centre_is_the_physical_one_and_the_covariance_honest():
+    scene = replace(SMALL, width=2000, height=1500, targets=40, tilt=55.0, dot_radius=16.0)
+    rendering = rendered(scene)
+    true = {target.id: np.array((target.x, target.y)) for target in rendering.targets}
+    squares = []
+    for target in identified(rendering.image):
+        error = np.array((target.x, target.y)) - true[target.id]
+        squares.append(error @ np.linalg.inv(np.reshape(target.covariance, (2, 2))) @ error)
+    assert len(squares) >= 38
+    assert 1 < np.mean(squares) < 4
+
+
+def test_stripes_defeat_it_and_the_filter_restores_it():
+    rendering = rendered(
+        SceneSettings(width=1600, height=1200, targets=12, light='stripe', ambient=0.3, seed=1)
+    )
+    unfiltered = scored(rendering, identified(rendering.image))
+    filtered = HomomorphicFilter(rendering.image).filtered(1.2, 0.25)
+    restored = scored(rendering, identified(filtered))
+    assert unfiltered.right <= 4
+    assert (restored.right, restored.wrong, restored.false_positives) == (12, 0, 0)
+
+
+@pytest.mark.parametrize(
+    'converted',
+    [
+        lambda image: image.astype(np.uint16) * 16,
+        lambda image: image.astype(np.float32) / 255,
+        lambda image: image.astype(np.float64) * 1e3,
+    ],
+    ids=['12 bit', 'float32', 'float64'],
+)
+def test_other_types_of_pixels_show_the_same(converted):
+    rendering = rendered(SMALL)
+    expected = identified(rendering.image)
+    found = identified(converted(rendering.image))
+    assert [target.id for target in found] == [target.id for target in expected]
+    for target, other in zip(found, expected, strict=True):
+        assert (target.x, target.y) == pytest.approx((other.x, other.y), abs=0.05)
+
+
+def test_a_mirrored_image_shows_other_codes():
+    rendering = rendered(SMALL)
+    mirrored = identified(np.ascontiguousarray(rendering.image[:, ::-1]))
+    assert {target.id for target in mirrored} != {target.id for target in rendering.targets}
+
+
+@pytest.mark.parametrize(
+    'settings',
+    [{'polarity': 'bright'}, {'min_radius': 12.0}, {'max_radius': 8.0}, {'family': 'metashape14'}],
+)
+def test_what_is_not_asked_for_is_not_reported(settings):
+    assert identified(rendered(SMALL).image, **settings) == []
+
+
+def test_dots_without_a_code_are_reported_on_request():
+    image = np.full((200, 300), 220, np.uint8)
+    cv2.circle(image, (90, 100), 10, 30, -1)
+    cv2.circle(image, (210, 100), 10, 30, -1)
+    assert identified(image) == []
+    left, right = identified(image, report_undecoded=True)
+    assert (left.id, left.code, left.confidence) == (UNDECODED, 0, 0.0)
+    assert (left.x, left.y) == pytest.approx((90, 100), abs=0.05)
+    assert (right.x, right.y) == pytest.approx((210, 100), abs=0.05)
+
+
+def test_sectors_of_a_decoded_target_are_not_reported():
+    rendering = rendered(replace(SMALL, dot_radius=14.0, targets=4))
+    found = identified(rendering.image, report_undecoded=True)
+    assert [target.id for target in found] == [target.id for target in rendering.targets]
+
+
+def test_an_id_is_reported_once():
+    rendering = rendered(SMALL)
+    twice = np.hstack([rendering.image, rendering.image])
+    ids = [target.id for target in identified(twice)]
+    assert ids == [target.id for target in rendering.targets]
+    found = identified(twice, report_undecoded=True)
+    assert [target.id for target in found] == [UNDECODED] * 6 + ids
+
+
+def test_a_target_cut_by_the_frame_is_not_decoded():
+    rendering = rendered(SMALL)
+    cut = min(rendering.targets, key=lambda target: target.x)
+    image = rendering.image[:, round(cut.x - 2.5 * cut.semi_major) :]
+    assert cut.id not in {target.id for target in identified(image)}
+
+
+def test_noise_shows_no_targets():
+    noise = np.random.default_rng(0).integers(0, 256, (600, 800)).astype(np.uint8)
+    assert identified(noise, report_undecoded=True) == []
+    assert identified(cv2.GaussianBlur(noise, (0, 0), 5) * 4) == []
+
+
+def test_the_result_does_not_depend_on_threads():
+    image = rendered(SMALL).image
+    with ThreadPoolExecutor(4) as executor:
+        results = list(executor.map(identified, [image] * 8))
+    assert all(result == results[0] for result in results)
+
+
+@pytest.mark.parametrize(
+    ('image', 'message'),
+    [
+        (np.zeros((0, 0), np.uint8), 'image'),
+        (np.zeros((1, 1), np.uint8), 'image'),
+        (np.full((50, 50), 7, np.uint8), 'constant'),
+        (np.full((50, 50), np.nan), 'NaN'),
+        (np.zeros((50, 50, 3), np.uint8), 'shape'),
+    ],
+)
+def test_what_is_no_image_is_refused(image, message):
+    with pytest.raises(ValueError, match=message):
+        identified(image)
+
+
+def test_the_smallest_image():
+    image = np.random.default_rng(0).integers(0, 256, (16, 16)).astype(np.uint8)
+    assert identified(image) == []
+
+
+@pytest.mark.skipif(not PHOTOS.is_dir(), reason=f'no photographs in {PHOTOS}')
+def test_a_real_panel():
+    truth = read_truth(PHOTOS / 'panel' / 'truth.csv')['043_0021.png']
+    image = read_image(PHOTOS / 'panel' / '043_0021.png')
+    figures = score(truth, identified(image, family='aicon14'))
+    assert (figures.wrong, figures.false_positives) == (0, 0)
+    assert figures.right >= 68  # of 71; 70 were measured
+    assert figures.rmse[2] < 0.1

@@ -1,0 +1,180 @@
+"""Candidates: edges in the logarithm, whole outlines, and votes for the centres of dots."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from ahf_ros.features import candidates, frame
+from ahf_ros.features.candidates import LOG_OFFSET, LOG_SCALE, MAXIMUM_CANDIDATES
+from ahf_ros.synthetic.scene import SceneSettings, render
+
+
+def drawn(dots: list[tuple[float, float, float]], paper: int = 200, ink: int = 30) -> np.ndarray:
+    """Return dots (x, y, radius) on paper, blurred as by a lens, in an image of 320 x 240 px."""
+    image = np.full((4 * 240, 4 * 320), paper, np.uint8)
+    for x, y, radius in dots:
+        centre = (round((4 * x + 1.5) * 16), round((4 * y + 1.5) * 16))
+        cv2.circle(image, centre, round(4 * radius * 16), ink, -1, cv2.LINE_AA, 4)
+    small = cv2.resize(image, (320, 240), interpolation=cv2.INTER_AREA)
+    return cv2.GaussianBlur(small, (0, 0), 0.7)
+
+
+def stripes(image: np.ndarray, period: int, shadow: float) -> np.ndarray:
+    """Return an image of which every other half period lies in the shadow."""
+    lit = np.arange(image.shape[1]) % period < period / 2
+    return np.rint(image * np.where(lit, 1, shadow)).astype(np.uint8)
+
+
+def edges_of(gray: np.ndarray, levels: int = 3) -> dict[int, candidates.LogEdges]:
+    halves = candidates.pyramid(gray, levels)[1:]
+    found = [candidates.find_edges(candidates.log_image(half)) for half in halves]
+    return dict(enumerate(found, start=1))
+
+
+def places(groups: list[candidates.Candidates]) -> tuple[np.ndarray, np.ndarray]:
+    """Return points in the pixels of the image, and their signs."""
+    points = [(group.points + 0.5) * 2.0**group.level - 0.5 for group in groups]
+    return np.concatenate(points), np.concatenate([group.signs for group in groups])
+
+
+def test_the_logarithm_of_bytes_and_of_numbers_is_the_same():
+    gray = np.arange(256, dtype=np.uint8).reshape(16, 16)
+    log = candidates.log_image(gray)
+    assert log.dtype == np.int16
+    assert log[0, 0] == int(LOG_SCALE * np.log(LOG_OFFSET))
+    assert np.abs(candidates.log_image(gray.astype(np.float32)) - log).max() <= 1
+
+
+def test_a_step_is_as_high_in_the_shadow_as_in_the_light():
+    dark, bright = np.float32([[20, 60]]), np.float32([[100, 220]])
+    offset = np.float32(LOG_OFFSET)
+    shadow = (np.concatenate([dark, bright]) + offset) * np.float32(0.4) - offset
+    light = candidates.log_image(np.concatenate([dark, bright]))
+    assert np.abs(np.diff(light, axis=0) - np.diff(candidates.log_image(shadow), axis=0)).max() < 3
+
+
+@pytest.mark.parametrize('shape', [(64, 48), (65, 49), (16, 17)])
+def test_a_pixel_of_the_pyramid_is_the_mean_of_four(shape):
+    image = np.random.default_rng(0).integers(0, 256, shape).astype(np.uint8)
+    first, second, third, _ = candidates.pyramid(image, 3)
+    height, width = shape[0] // 2, shape[1] // 2
+    assert first is image
+    assert second.shape == (height, width)
+    assert third.shape == (height // 2, width // 2)
+    even = image[: 2 * height, : 2 * width].astype(float)
+    means = even.reshape(height, 2, width, 2).mean(axis=(1, 3))
+    assert np.abs(second - means).max() <= 0.5
+
+
+def test_edges_lie_on_steps_and_point_to_the_bright_side():
+    gray = np.full((60, 80), 40, np.uint8)
+    gray[:, 41:] = 160
+    edges = candidates.find_edges(candidates.log_image(gray))
+    assert len(edges.x) >= 50
+    assert set(edges.x) <= {40, 41}
+    assert edges.unit_x == pytest.approx(1, abs=1e-6)
+    assert edges.unit_y == pytest.approx(0, abs=1e-6)
+
+
+def test_an_image_without_edges_has_no_candidates():
+    gray = np.full((60, 80), 40, np.uint8)
+    edges = edges_of(gray)
+    assert all(len(level.x) == 0 for level in edges.values())
+    frames, signs = edges[1].outlines(2, 30)
+    assert frames.shape == (0, 3, 3)
+    assert len(signs) == 0
+    points, _ = places(candidates.find_candidates(edges, 4, 60, (1, -1)))
+    assert points.shape == (0, 2)
+
+
+@pytest.mark.parametrize('sign', [1, -1])
+@pytest.mark.parametrize(('paper', 'ink'), [(200, 30), (70, 20)], ids=['lit', 'shadow'])
+def test_a_whole_outline_is_an_ellipse(sign, paper, ink):
+    colours = (paper, ink) if sign == 1 else (ink, paper)
+    gray = drawn([(100.3, 80.6, 14.0)], *colours)
+    frames, signs = edges_of(gray)[1].outlines(2, 30)
+    assert signs.tolist() == [sign]
+    whole = frame.enlarged(frames, 1)
+    assert whole[0, :2, 2] == pytest.approx((100.3, 80.6), abs=0.3)
+    major, minor, _ = frame.ellipse_axes(whole)
+    assert (major[0], minor[0]) == pytest.approx((14, 14), abs=1)
+
+
+def test_outlines_of_another_size_are_left_out():
+    edges = edges_of(drawn([(80, 80, 8.0), (200, 120, 24.0)]))[1]
+    small, _ = edges.outlines(2, 7)
+    large, _ = edges.outlines(7, 30)
+    assert frame.enlarged(small, 1)[:, :2, 2] == pytest.approx(np.array([[80, 80]]), abs=0.5)
+    assert frame.enlarged(large, 1)[:, :2, 2] == pytest.approx(np.array([[200, 120]]), abs=0.5)
+
+
+def test_edges_within_polygons_are_left_out():
+    edges = edges_of(drawn([(80, 80, 10.0), (200, 120, 10.0)]))[1]
+    square = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * 12.0
+    rest = edges.outside([square + 39.75])
+    assert 0 < len(rest.x) < len(edges.x)
+    assert rest.x.min() > 80
+    assert len(edges.outside([]).x) == len(edges.x)
+
+
+@pytest.mark.parametrize('radius', [5.0, 9.0, 18.0, 40.0])
+@pytest.mark.parametrize('sign', [1, -1])
+def test_votes_find_dots_of_all_sizes_under_stripes(radius, sign):
+    colours = (220, 40) if sign == 1 else (40, 220)
+    gray = stripes(drawn([(150.0, 120.0, radius)], *colours), round(2.2 * radius), 0.4)
+    points, signs = places(candidates.find_candidates(edges_of(gray), 4, 60, (sign,)))
+    assert set(signs) == {sign}
+    assert np.linalg.norm(points - (150, 120), axis=1).min() < 0.3 * radius
+
+
+def test_only_the_polarity_that_is_asked_for_votes():
+    edges = edges_of(drawn([(150.0, 120.0, 12.0)]))
+    points, signs = places(candidates.find_candidates(edges, 4, 60, (1,)))
+    near = np.linalg.norm(points - (150, 120), axis=1) < 3
+    assert near.any()
+    assert (signs == 1).all()
+    points, _ = places(candidates.find_candidates(edges, 4, 60, (-1,)))
+    assert not (np.linalg.norm(points - (150, 120), axis=1) < 3).any()
+
+
+def test_stripes_alone_get_no_votes():
+    gray = stripes(np.full((240, 320), 200, np.uint8), 26, 0.2)
+    points, _ = places(candidates.find_candidates(edges_of(gray), 4, 60, (1, -1)))
+    assert len(points) == 0
+
+
+@pytest.mark.parametrize('light', ['stripe', 'lattice', 'shadow'])
+def test_every_target_of_a_scene_is_a_candidate(light):
+    scene = SceneSettings(
+        width=1000, height=700, targets=9, dot_radius=18.0, light=light, ambient=0.12, seed=2
+    )
+    rendering = render(scene)
+    edges = edges_of(rendering.image)
+    points, _ = places(candidates.find_candidates(edges, 4, 60, (1,)))
+    whole = frame.enlarged(edges[1].outlines(2, 30)[0], 1)[:, :2, 2]
+    points = np.concatenate([points, whole])
+    for target in rendering.targets:
+        assert np.linalg.norm(points - (target.x, target.y), axis=1).min() < 0.35 * 18
+
+
+def test_candidates_are_bounded_where_dots_are_everywhere():
+    row, column = np.mgrid[:1200, :1600]
+    gray = np.where(np.hypot(row % 12 - 6, column % 12 - 6) < 4.4, 30, 200).astype(np.uint8)
+    groups = candidates.find_candidates(edges_of(gray), 4, 60, (1, -1))
+    assert all(len(group.points) <= 2 * MAXIMUM_CANDIDATES for group in groups)
+
+
+def test_more_dots_than_are_looked_at_are_said_and_the_roundest_stay(monkeypatch, caplog):
+    image = np.full((400, 400), 200, np.uint8)
+    for row in range(20, 400, 40):
+        for column in range(20, 400, 40):
+            cv2.ellipse(image, (column, row), (9, 9 if row < 200 else 6), 30, 0, 360, 40, -1)
+    edges = candidates.find_edges(candidates.log_image(image))
+    everything, _ = edges.outlines(4.0, 20.0)
+    assert len(everything) == 100 and not caplog.records
+    monkeypatch.setattr('ahf_ros.features.candidates.MAXIMUM_OUTLINES', 30)
+    kept, signs = edges.outlines(4.0, 20.0)
+    assert len(kept) == len(signs) == 30
+    assert '100 whole ellipses, of which the 30 best are looked at' in caplog.text

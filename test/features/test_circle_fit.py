@@ -1,0 +1,177 @@
+"""Frames fitted to edges: exact where the edges are, robust, and honest about their errors."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ahf_ros.codes.ring import family
+from ahf_ros.features import frame
+from ahf_ros.features.circle_fit import Fit, fit_circles
+from ahf_ros.features.circles import dot_circles, ring_circles
+
+CODE = family('metashape12')
+WORD = 0b000001000111
+START = 0.4
+BLUR = 0.7
+DARK, BRIGHT = 40.0, 200.0
+
+
+def through(frames: np.ndarray, side: int) -> tuple[np.ndarray, ...]:
+    """Return where pixels are on the target: radii, angles, and px a radius across a circle."""
+    rows, columns = np.mgrid[:side, :side]
+    pixels = np.stack([columns.ravel(), rows.ravel(), np.ones(rows.size)])
+    plane = np.linalg.inv(frames[0]) @ pixels
+    x, y = (plane[:2] / plane[2]).reshape(2, side, side)
+    radius, angle = np.hypot(x, y), np.arctan2(y, x)
+    return radius, angle, 1 / np.maximum(np.hypot(*np.gradient(radius)), 1e-3)
+
+
+def drawn(frames: np.ndarray, side: int = 100, band: bool = False) -> np.ndarray:
+    """Return a dark target whose edges are blurred steps across its circles.
+
+    A blurred step across a circle differs from a blurred disc: its level halfway stays on the
+    circle. `fit_circles` expects a disc, whose level halfway moves inwards by blur^2 / 2 radii.
+    """
+    radius, angle, scale = through(frames, side)
+
+    def rise(edge: float) -> np.ndarray:
+        outwards = (radius - edge) * scale
+        outwards = outwards + BLUR**2 / 2 / np.maximum(radius * scale, 1)  # as of a disc
+        return 1 / (1 + np.exp(-np.clip(1.702 * outwards / BLUR, -40, 40)))
+
+    light = rise(1.0)
+    if band:
+        sector = np.floor((-angle - START) / (2 * np.pi / CODE.bits)).astype(int) % CODE.bits
+        marked = WORD >> sector & 1
+        light *= 1 - marked * rise(CODE.band_inner) * (1 - rise(CODE.band_outer))
+    return DARK + (BRIGHT - DARK) * light
+
+
+def dot_frame(x: float, y: float, radius: float = 12.0) -> np.ndarray:
+    return frame.affine_frames([x], [y], [radius], [radius], [0.0])
+
+
+def fitted(image: np.ndarray, start: np.ndarray) -> Fit:
+    return fit_circles(
+        image.astype(np.float32), start, dot_circles([1], 48), reach=0.45, projective=False
+    )
+
+
+def centre(fit: Fit) -> np.ndarray:
+    return fit.frames[0, :2, 2]
+
+
+@pytest.mark.parametrize('place', [(50.0, 50.0), (50.37, 49.81), (49.5, 50.5)])
+def test_the_centre_and_the_radius_of_a_disc(place):
+    fit = fitted(drawn(dot_frame(*place)), dot_frame(51.0, 49.5, 12.7))
+    assert centre(fit) == pytest.approx(place, abs=0.005)
+    assert frame.ellipse_axes(fit.frames)[0] == pytest.approx([12.0], abs=0.03)
+    assert fit.share[0] == 1
+    assert fit.contrast[0] == pytest.approx(DARK / BRIGHT, abs=0.02)
+    assert fit.bright[0] == pytest.approx(BRIGHT, abs=3)
+    assert fit.deviation[0] < 0.05
+
+
+def test_an_ellipse():
+    shape = frame.affine_frames([50.3], [50.2], [15.0], [8.0], [0.6])
+    fit = fitted(drawn(shape), frame.affine_frames([50.0], [50.0], [14.5], [8.5], [0.55]))
+    major, minor, angle = frame.ellipse_axes(fit.frames)
+    assert centre(fit) == pytest.approx((50.3, 50.2), abs=0.01)
+    assert (major[0], minor[0], angle[0]) == pytest.approx((15.0, 8.0, 0.6), abs=0.05)
+
+
+def test_band_and_dot_give_the_image_of_the_centre():
+    """The centre of the dot's ellipse is 0.1 px beside it."""
+    oblique = np.array([[[11.0, 1.5, 60.3], [0.5, 7.0, 59.8], [0.012, -0.01, 1.0]]])
+    image = drawn(oblique, 120, band=True).astype(np.float32)
+    major, minor, angle = frame.ellipse_axes(oblique)
+    start = frame.affine_frames([60.5], [59.5], major, minor, angle)
+    by_dot = fitted(image, start)
+    circles = ring_circles(np.array([WORD]), np.array([START]), np.array([1]), 48, 10, CODE)
+    by_both = fit_circles(image, by_dot.frames, circles, reach=0.45, projective=True)
+    by_both = fit_circles(image, by_both.frames, circles, reach=0.45, projective=True)
+    errors = [np.hypot(*(centre(fit) - (60.3, 59.8))) for fit in (by_dot, by_both)]
+    assert errors[0] > 0.08
+    assert errors[1] < 0.015
+    assert by_both.share[0] > 0.9
+
+
+def test_a_slope_of_the_light_does_not_move_the_centre():
+    place = (50.2, 49.7)
+    light = np.exp(0.015 * (np.arange(100.0) - 50))  # a fifth brighter from side to side
+    even, sloping = (
+        fitted(image, dot_frame(50.0, 50.0))
+        for image in (drawn(dot_frame(*place)), drawn(dot_frame(*place)) * light)
+    )
+    assert centre(even) == pytest.approx(place, abs=0.005)
+    assert centre(sloping) == pytest.approx(place, abs=0.025)
+
+
+@pytest.mark.parametrize('colour', [DARK, 110.0, 255.0])
+def test_an_edge_that_is_hidden_is_left_out(colour):
+    """A bar over a quarter of the dot, whatever its colour, has edges that are not the dot's."""
+    place = (50.2, 49.7)
+    image = drawn(dot_frame(*place))
+    image[:, 57:] = colour
+    fit = fitted(image, dot_frame(50.0, 50.0))
+    assert centre(fit) == pytest.approx(place, abs=0.06)
+    assert 0.5 < fit.share[0] < 0.85
+    whole = fitted(drawn(dot_frame(*place)), dot_frame(50.0, 50.0))
+    assert fit.covariance[0, 0, 0] > 1.5 * whole.covariance[0, 0, 0]
+
+
+def test_an_edge_of_light_across_the_dot_hardly_moves_it():
+    place = (50.2, 49.7)
+    shadow = 0.3 + 0.7 / (1 + np.exp(-(np.arange(100.0) - 53.3) / 0.6))
+    fit = fitted(drawn(dot_frame(*place)) * shadow, dot_frame(50.0, 50.0))
+    assert centre(fit) == pytest.approx(place, abs=0.05)
+
+
+def test_where_there_is_no_edge_nothing_is_in_place():
+    image = np.full((100, 100), 90.0)
+    fit = fitted(image, dot_frame(50.0, 50.0))
+    assert fit.share[0] == 0
+    assert np.isfinite(fit.frames).all()
+
+
+def test_dots_do_not_depend_on_each_other():
+    image = drawn(dot_frame(30.2, 40.1)) + drawn(dot_frame(70.4, 60.3)) - BRIGHT
+    starts = [dot_frame(30.0, 40.0), dot_frame(70.0, 60.0)]
+    together = fit_circles(
+        image.astype(np.float32),
+        np.concatenate(starts),
+        dot_circles([1, 1], 48),
+        reach=0.45,
+        projective=False,
+    )
+    for index, start in enumerate(starts):
+        alone = fitted(image, start)
+        assert together.chosen(np.array([index])).frames == pytest.approx(alone.frames, abs=1e-9)
+    halves = [together.chosen(np.array([index])) for index in (0, 1)]
+    assert (Fit.joined(halves).frames == together.frames).all()
+
+
+@pytest.mark.parametrize('deviation, least', [(1.0, 1.5), (2.0, 1.4), (6.0, 0.7)])
+def test_the_covariance_is_that_of_the_errors(deviation, least):
+    """A hundred discs under noise: e' C^-1 e is 2 on average, with a standard error of 0.2.
+
+    Strong noise is taken for light that is uneven, which makes the covariance too large.
+    """
+    generator = np.random.default_rng(7)
+    corners = 40 * np.stack(np.divmod(np.arange(100), 10), axis=1)
+    places = 20 + generator.uniform(-0.5, 0.5, (100, 2))
+    image = generator.normal(0, deviation, (400, 400))
+    for (x, y), place in zip(corners, places, strict=True):
+        image[y : y + 40, x : x + 40] += drawn(dot_frame(*place), side=40)
+    starts = frame.affine_frames(*(corners.T + 20), 12.0, 12.0, 0.0)
+    fit = fit_circles(
+        image.astype(np.float32),
+        starts,
+        dot_circles(np.ones(100, int), 48),
+        reach=0.45,
+        projective=False,
+    )
+    errors = fit.frames[:, :2, 2] - corners - places
+    squares = np.einsum('ki,kij,kj->k', errors, np.linalg.inv(fit.covariance), errors)
+    assert least < np.mean(squares) < 2.6

@@ -1,0 +1,130 @@
+"""Ellipses of dots: fitted about candidates, refined, and lost where there is no edge."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from ahf_ros.features import candidates, dots, frame
+
+SHAPE = (200, 240)
+
+
+def drawn(
+    ellipses: list[tuple[float, float, float, float, float]], paper: int = 210, ink: int = 30
+) -> np.ndarray:
+    """Return ellipses (x, y, semi-axes, angle) on paper, blurred as by a lens."""
+    rows, columns = (np.mgrid[: 4 * SHAPE[0], : 4 * SHAPE[1]] + 0.5) / 4 - 0.5
+    image = np.full(rows.shape, paper, np.float32)
+    for x, y, major, minor, angle in ellipses:
+        along = (columns - x) * np.cos(angle) + (rows - y) * np.sin(angle)
+        across = (rows - y) * np.cos(angle) - (columns - x) * np.sin(angle)
+        image[(along / major) ** 2 + (across / minor) ** 2 < 1] = ink
+    small = cv2.resize(image, SHAPE[::-1], interpolation=cv2.INTER_AREA)
+    return np.rint(cv2.GaussianBlur(small, (0, 0), 0.7)).astype(np.uint8)
+
+
+def half_in_shadow(gray: np.ndarray, x: float, y: float, angle: float) -> np.ndarray:
+    """Return an image in shadow on one side of a line."""
+    rows, columns = np.mgrid[: gray.shape[0], : gray.shape[1]]
+    side = (columns - x) * np.cos(angle) + (rows - y) * np.sin(angle)
+    return np.rint(gray * np.clip(0.65 + side / 2, 0.3, 1)).astype(np.uint8)
+
+
+def logs_of(gray: np.ndarray) -> list[np.ndarray]:
+    return [candidates.log_image(level) for level in candidates.pyramid(gray, 3)]
+
+
+def frames_of(*ellipses: tuple[float, float, float, float, float]) -> np.ndarray:
+    return frame.affine_frames(*np.array(ellipses).T)
+
+
+ELLIPSES = [
+    (100.3, 90.6, 9.0, 9.0, 0.0),
+    (100.3, 90.6, 18.0, 12.0, 0.7),
+    (110.0, 95.5, 30.0, 12.0, -1.2),
+]
+
+
+@pytest.mark.parametrize('ellipse', ELLIPSES, ids=['round', 'tilted', 'oblique'])
+@pytest.mark.parametrize('sign', [1, -1])
+def test_a_start_that_is_near_comes_onto_the_edge(ellipse, sign):
+    colours = (210, 30) if sign == 1 else (30, 210)
+    log = candidates.log_image(drawn([ellipse], *colours))
+    x, y, major, minor, angle = ellipse
+    start = frames_of((x + 0.1 * minor, y - 0.1 * minor, 1.1 * major, 1.08 * minor, angle))
+    frames, signs, inliers = dots.refine_dots(log, start, np.array([sign]))
+    assert signs.tolist() == [sign]
+    assert inliers[0] > 0.9
+    assert frames[0, :2, 2] == pytest.approx((x, y), abs=0.2)
+    axes = [axis[0] for axis in frame.ellipse_axes(frames)]
+    # In the logarithm a blurred edge lies some way towards its dark side.
+    assert axes[:2] == pytest.approx((major, minor), abs=0.8)
+    if major > minor:
+        assert axes[2] == pytest.approx(angle, abs=0.05)
+
+
+@pytest.mark.parametrize('angle', [0.0, 0.8, 2.0])
+def test_an_edge_of_light_across_the_dot_moves_it_little(angle):
+    gray = half_in_shadow(drawn([(100.3, 90.6, 16.0, 14.0, 0.3)]), 104, 92, angle)
+    start = frames_of((101.0, 90.0, 15.0, 15.0, 0.0))
+    frames, _, inliers = dots.refine_dots(candidates.log_image(gray), start, np.array([1]))
+    assert inliers[0] > 0.7
+    assert frames[0, :2, 2] == pytest.approx((100.3, 90.6), abs=0.4)
+
+
+def test_what_the_edges_do_not_bear_out_is_left_out():
+    log = candidates.log_image(drawn([(60, 60, 12, 12, 0)]))
+    start = frames_of((60, 60, 12, 12, 0), (160, 120, 12, 12, 0), (60, 60, 12, 12, 0))
+    frames, signs, inliers = dots.refine_dots(log, start, np.array([1, 1, -1]))
+    assert len(frames) == len(signs) == len(inliers) == 1
+    assert frames[0, :2, 2] == pytest.approx((60, 60), abs=0.1)
+
+
+def test_nothing_in_nothing_out():
+    log = candidates.log_image(drawn([(60, 60, 12, 12, 0)]))
+    frames, signs, inliers = dots.refine_dots(log, np.zeros((0, 3, 3)), np.zeros(0, int))
+    assert (frames.shape, signs.shape, inliers.shape) == ((0, 3, 3), (0,), (0,))
+
+
+@pytest.mark.parametrize('level', [1, 2])
+@pytest.mark.parametrize('ellipse', ELLIPSES, ids=['round', 'tilted', 'oblique'])
+def test_an_ellipse_is_found_about_a_candidate(ellipse, level):
+    x, y, major, minor, _ = ellipse
+    scale = 2.0**level
+    size = np.sqrt(major * minor) / scale
+    points = (np.array([[x + 1.5, y - 1.5]]) + 0.5) / scale - 0.5
+    candidate = candidates.Candidates(level, points, (0.7 * size, 1.4 * size), np.array([1]))
+    frames, signs, _ = dots.fit_dots(logs_of(drawn([ellipse])), candidate)
+    assert signs.tolist() == [1]
+    assert frames[0, :2, 2] == pytest.approx((x, y), abs=0.3 * scale)
+    fitted = [axis[0] for axis in frame.ellipse_axes(frames)]
+    assert fitted[:2] == pytest.approx((major, minor), abs=scale)
+
+
+def test_a_candidate_on_even_ground_has_no_ellipse():
+    points, signs = np.array([[80.0, 20.0]]), np.array([1])
+    candidate = candidates.Candidates(1, points, (5.8, 11.2), signs)
+    frames, signs, inliers = dots.fit_dots(logs_of(drawn([(60, 60, 12, 12, 0)])), candidate)
+    assert len(frames) == len(signs) == len(inliers) == 0
+
+
+def test_a_linear_model_is_found_despite_outliers():
+    generator = np.random.default_rng(0)
+    basis = np.stack([np.ones(40), np.linspace(-1, 1, 40)], axis=1)
+    true = np.array([[0.2, 0.1], [-0.3, 0.05]])
+    values = true @ basis.T + 0.01 * generator.standard_normal((2, 40))
+    values[:, :10] += 1.0
+    found, residuals = dots.fit_robustly(values, np.ones((2, 40)), basis, scale=0.05, rounds=8)
+    assert found == pytest.approx(true, abs=0.02)
+    assert np.abs(residuals[:, :10]).min() > 0.8
+    assert residuals == pytest.approx(values - found @ basis.T)
+
+
+def test_values_without_weight_do_not_count():
+    basis = np.ones((6, 1))
+    values = np.array([[1.0, 1, 1, 9, 9, 9]])
+    weights = np.array([[1.0, 1, 1, 0, 0, 0]])
+    found, _ = dots.fit_robustly(values, weights, basis, scale=10.0)
+    assert found[0, 0] == pytest.approx(1, abs=1e-2)

@@ -1,0 +1,141 @@
+"""Frames: what they map where, how they change, what they say of ellipses."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ahf_ros.features import frame
+
+OBLIQUE = np.array([[[20.0, 3.0, 100.5], [-2.0, 12.0, 80.25], [0.02, -0.01, 1.0]]])
+"""A homography whose projected centre is (100.5, 80.25)."""
+
+ANGLES = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+
+
+def test_an_affine_frame_maps_the_unit_circle_onto_its_ellipse():
+    frames = frame.affine_frames([50], [40], [9], [6], [np.deg2rad(30)])
+    ends = np.array([[np.cos(np.pi / 6), np.sin(np.pi / 6)], [-0.5, np.sqrt(0.75)]])
+    major_end, minor_end = frame.project(frames, ends)[0]
+    assert major_end == pytest.approx((50 + 9 * np.sqrt(0.75), 44.5))
+    assert minor_end == pytest.approx((47, 40 + 6 * np.sqrt(0.75)))
+
+
+@pytest.mark.parametrize('degrees', [-89, -30, 0, 45, 90])
+def test_axes_of_an_affine_frame_are_those_it_was_made_of(degrees):
+    angle = np.deg2rad(degrees)
+    major, minor, direction = frame.ellipse_axes(frame.affine_frames([1], [2], [9], [6], [angle]))
+    assert (major[0], minor[0]) == pytest.approx((9, 6))
+    assert np.exp(2j * direction[0]) == pytest.approx(np.exp(2j * angle))
+
+
+def test_the_centre_of_a_homography_is_not_that_of_its_ellipse():
+    angles = np.linspace(0, 2 * np.pi, 3600)
+    outline = frame.project(OBLIQUE, frame.circle_points(angles, np.ones(1)))[0, :, 0]
+    assert frame.project(OBLIQUE, np.zeros(2))[0] == pytest.approx((100.5, 80.25))
+    middle = (outline.min(axis=0) + outline.max(axis=0)) / 2
+    assert np.hypot(*(middle - (100.5, 80.25))) > 0.3
+
+
+def test_each_frame_projects_points_of_its_own():
+    frames = np.concatenate([OBLIQUE, frame.affine_frames([5], [6], [2], [2], [0])])
+    points = np.array([[[[0.0, 0.0], [1.0, 0.0]]], [[[0.5, 0.0], [0.0, 1.0]]]])
+    for own, of_frame, images in zip(frames, points, frame.project(frames, points), strict=True):
+        assert images == pytest.approx(frame.project(own[None], of_frame)[0])
+
+
+def test_samples_of_a_slope_are_those_of_the_slope():
+    rows, columns = np.mgrid[:20, :30]
+    image = (2 * columns + 3 * rows).astype(np.float32)
+    pixels = np.array([[3.25, 4.5], [10.0, 11.75]])
+    assert frame.sample(image, pixels) == pytest.approx([20.0, 55.25])
+    lines = frame.sample_lines(
+        image, np.array([[10.0, 8.0]]), np.array([[0.6, 0.8]]), np.array([-1.0, 0.0, 2.0])
+    )
+    assert lines[0] == pytest.approx([44 - 3.6, 44, 44 + 7.2], abs=0.08)  # cv2.remap: 1/32 px
+
+
+def test_the_border_goes_on_beyond_the_image():
+    image = np.arange(12, dtype=np.float32).reshape(3, 4)
+    assert frame.sample(image, np.array([[-5.0, 0.0], [9.0, 2.0]])).tolist() == [0.0, 11.0]
+
+
+def test_more_lines_than_one_remap_takes():
+    image = np.tile(np.arange(40, dtype=np.float32), (20, 1))
+    middles = np.stack([np.linspace(5, 35, 40000), np.full(40000, 10.0)], axis=1)
+    directions = np.tile([1.0, 0.0], (40000, 1))
+    values = frame.sample_lines(image, middles, directions, np.array([0.0, 1.0]))
+    assert np.abs(values - middles[:, :1] - [0, 1]).max() < 0.02  # cv2.remap: 1/32 px
+
+
+def test_circles_are_sampled_where_they_are_projected():
+    rows, columns = np.mgrid[:160, :200]
+    image = (columns + 0.5 * rows).astype(np.float32)
+    radii = np.array([0.5, 1.0, 2.0])
+    sampled = frame.sample_circles(image, OBLIQUE, ANGLES, radii)
+    projected = frame.sample(image, frame.project(OBLIQUE, frame.circle_points(ANGLES, radii)))
+    assert sampled == pytest.approx(projected, abs=0.02)
+
+
+def test_what_lies_in_an_image():
+    pixels = np.array([[0.0, 0.0], [29.0, 19.0], [29.1, 5.0], [5.0, -0.1]])
+    assert frame.within(pixels, (20, 30)).tolist() == [True, True, False, False]
+
+
+def test_geometry_of_a_circle():
+    geometry = frame.circle_geometry(
+        frame.affine_frames([50], [40], [8], [8], [0]), ANGLES, np.full(24, 2.5)
+    )
+    normals = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
+    assert geometry.normals[0] == pytest.approx(normals)
+    assert geometry.points[0] == pytest.approx(np.array([50, 40]) + 20 * normals)
+    assert geometry.scale[0] == pytest.approx(np.full(24, 8.0))
+    assert geometry.stretch[0] == pytest.approx(np.full(24, 8.0))
+    assert geometry.curvature[0] == pytest.approx(np.full(24, 1 / 20))
+
+
+def test_geometry_of_an_oblique_circle_is_that_of_its_points():
+    step = 1e-4
+    before, at, after = (
+        frame.project(OBLIQUE, frame.circle_points(ANGLES + shift, np.ones(1)))[0, :, 0]
+        for shift in (-step, 0, step)
+    )
+    along, bend = (after - before) / (2 * step), (after - 2 * at + before) / step**2
+    speed = np.hypot(*along.T)
+    geometry = frame.circle_geometry(OBLIQUE, ANGLES, np.ones(24))
+    assert geometry.points[0] == pytest.approx(at)
+    assert geometry.stretch[0] == pytest.approx(speed, rel=1e-5)
+    curvature = (along[:, 0] * bend[:, 1] - along[:, 1] * bend[:, 0]) / speed**3
+    assert geometry.curvature[0] == pytest.approx(curvature, rel=1e-3)
+    wider = frame.project(OBLIQUE, frame.circle_points(ANGLES, np.array([1 + step])))[0, :, 0]
+    outwards = ((wider - at) * geometry.normals[0]).sum(axis=1) / step
+    assert geometry.scale[0] == pytest.approx(outwards, rel=1e-2)
+
+
+@pytest.mark.parametrize('unknown', range(7))
+def test_the_basis_says_how_circles_move(unknown):
+    changes = np.zeros((1, 7))
+    changes[0, unknown] = 1e-5
+    radii = np.array([1.0, 3.0])
+    moved = frame.project(
+        frame.moved(np.eye(3)[None], changes), frame.circle_points(ANGLES, radii)
+    )[0]
+    for number, radius in enumerate(radii):
+        outwards = np.hypot(*moved[:, number].T) - radius
+        basis = frame.displacement_basis(ANGLES, np.full(24, radius))[:, unknown]
+        assert outwards == pytest.approx(1e-5 * basis, abs=1e-8)
+
+
+def test_enlarged_frames_show_the_same_in_pixels_of_the_first_level():
+    small = frame.affine_frames([10.5], [7.0], [4], [3], [0.3])
+    large = frame.enlarged(small, 2)
+    # The centre of the first pixel of level 2 lies between the four innermost of sixteen.
+    assert large[0, :2, 2] == pytest.approx(((10.5 + 0.5) * 4 - 0.5, (7.0 + 0.5) * 4 - 0.5))
+    assert frame.ellipse_axes(large)[0] == pytest.approx([16])
+
+
+def test_the_local_map_is_the_derivative_at_the_centre():
+    step = 1e-6
+    ends = frame.project(OBLIQUE, step * np.array([[1.0, 0.0], [0.0, 1.0]]))[0]
+    numeric = (ends - OBLIQUE[0, :2, 2]).T / step
+    assert frame.local_affine(OBLIQUE)[0] == pytest.approx(numeric, rel=1e-4)

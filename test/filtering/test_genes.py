@@ -1,0 +1,73 @@
+import numpy as np
+import pytest
+
+from ahf_ros.filtering.genes import EXTENDED, PUBLISHED, TuningSettings, tuned
+from ahf_ros.filtering.homomorphic import HomomorphicFilter
+from ahf_ros.filtering.transfer import median_distance, transfer
+
+SHAPE = (48, 64)
+
+
+def test_the_published_search_tunes_the_gains_of_the_paper():
+    high, low = TuningSettings(search=PUBLISHED).genes
+    assert (high.count, high.bits, high.value(0), high.value(30)) == (31, 5, 1.0, 4.0)
+    assert (low.count, low.bits, low.value(0), low.value(100)) == (101, 7, 0.0, 1.0)
+    assert tuned(SHAPE, (2.8, 0.82)) == transfer(SHAPE, 2.8, 0.82)
+
+
+def test_an_extended_search_also_tunes_cutoff_and_exponent():
+    settings = TuningSettings(search=EXTENDED, cutoff_min=0.25, cutoff_max=2, exponent_min=0.3)
+    *gains, cutoff, exponent = settings.genes
+    assert tuple(gains) == TuningSettings(search=PUBLISHED).genes
+    assert [cutoff.value(index) for index in range(cutoff.count)] == [
+        -2,
+        -1.5,
+        -1,
+        -0.5,
+        0,
+        0.5,
+        1,
+    ]
+    assert [exponent.value(index) for index in range(exponent.count)] == [-1, 0]
+    assert tuned(SHAPE, (2.8, 0.82, 0.0, 0.0)) == transfer(SHAPE, 2.8, 0.82)
+    chosen = tuned(SHAPE, (3.0, 1.0, -1.0, -2.0))
+    assert (chosen.gamma_high, chosen.gamma_low, chosen.attenuation) == (0.75, 0.25, 2.0)
+    assert chosen.cutoff == median_distance(*SHAPE) / 2
+    assert tuned(SHAPE, (1.0, 1.0, -1.0, -2.0)).attenuation == 0
+
+
+def test_an_exponent_is_a_power_of_the_filtered_image():
+    image = np.random.default_rng(1).integers(20, 255, SHAPE).astype(np.uint8)
+    prepared = HomomorphicFilter(image)
+    whole, root = (
+        prepared.filtered_logarithm(it.gamma_high, it.gamma_low, it.cutoff, it.attenuation)
+        for it in (tuned(SHAPE, (2.0, 0.5, -0.5, 0.0)), tuned(SHAPE, (2.0, 0.5, -0.5, -1.0)))
+    )
+    assert np.allclose(np.exp(root), np.sqrt(np.exp(whole)), rtol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ('values', 'words'),
+    [
+        (
+            {'gamma_high_min': 3.0, 'gamma_high_max': 2.0},
+            'gamma_high_min is 3.0, accepted is a number of at most gamma_high_max, 2.0',
+        ),
+        ({'gamma_low_min': 0.8, 'gamma_low_max': 0.2}, 'gamma_low_min is 0.8'),
+        (
+            {'gamma_low_max': 1.5},
+            'gamma_low_max is 1.5, accepted is a number of at most gamma_high_min, 1.0',
+        ),
+        ({'gamma_high_step': 0.0}, 'gamma_high_step is 0.0, accepted is a number from 0.001'),
+        ({'gamma_low_min': float('nan')}, 'gamma_low_min is nan'),
+        (
+            {'cutoff_min': 1.5, 'cutoff_max': 0.5},
+            'cutoff_min is 1.5, accepted is a number of at most cutoff_max, 0.5',
+        ),
+        ({'search': 'full'}, "search is 'full', accepted is one of extended, published"),
+        ({'exponent_min': 0.0}, 'exponent_min is 0.0, accepted is a number from 0.01'),
+    ],
+)
+def test_a_setting_out_of_range_is_refused(values, words):
+    with pytest.raises(ValueError, match=words):
+        TuningSettings(**values)

@@ -1,0 +1,195 @@
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+
+import cv2
+import numpy as np
+import pytest
+
+from ahf_ros.filtering.homomorphic import (
+    FilterSettings,
+    HomomorphicFilter,
+    filtered_fft,
+    filtered_logarithm_fft,
+)
+from ahf_ros.imaging.logarithm import logarithm
+from ahf_ros.settings.parameter import parameters
+
+SHAPES = [(16, 16), (17, 31), (101, 64), (64, 101), (300, 211), (140, 140)]
+GAINS = [(1.0, 0.0), (1.2, 0.25), (2.8, 0.82), (3.7, 0.66), (4.0, 0.0), (1.0, 0.9)]
+
+
+def scene(height, width, seed=0):
+    """Return a striped scene with smooth edges and some noise, like a photograph."""
+    generator = np.random.default_rng(seed)
+    rows, columns = np.mgrid[:height, :width]
+    light = np.where(columns // 9 % 2 == 0, 1.0, 0.2) * (0.5 + rows / height)
+    paper = np.where(np.hypot(rows - height / 2, columns - width / 2) < height / 3, 0.1, 1.0)
+    image = cv2.GaussianBlur(light * paper, (0, 0), 1.0) * 140
+    return np.clip(image + generator.normal(0, 1, image.shape), 0, 255).astype(np.uint8)
+
+
+def noise(height, width, seed=0):
+    """Return black and white pixels at random, the worst case of a cut kernel."""
+    generator = np.random.default_rng(seed)
+    return (generator.random((height, width)) > 0.5).astype(np.uint8) * 255
+
+
+@pytest.mark.parametrize('gains', GAINS)
+@pytest.mark.parametrize('shape', SHAPES)
+@pytest.mark.parametrize(('image_of', 'bound'), [(scene, 0.0015), (noise, 0.008)])
+def test_the_spatial_form_is_the_fourier_form(shape, gains, image_of, bound):
+    image = image_of(*shape)
+    spread = np.ptp(logarithm(image, FilterSettings().log_offset))
+    spatial = HomomorphicFilter(image).filtered_logarithm(*gains)
+    assert np.abs(spatial - filtered_logarithm_fft(image, *gains)).max() < bound * spread
+
+
+@pytest.mark.parametrize('gains', GAINS)
+@pytest.mark.parametrize('shape', SHAPES)
+def test_the_filtered_image_is_that_of_the_fourier_form(shape, gains):
+    image = scene(*shape)
+    spatial = HomomorphicFilter(image).filtered(*gains)
+    assert spatial.dtype == np.uint8
+    assert spatial.shape == image.shape
+    assert np.abs(spatial.astype(int) - filtered_fft(image, *gains)).max() <= 2
+
+
+@pytest.mark.parametrize(
+    ('cutoff', 'attenuation'), [(None, 0.3), (10.0, None), (4.0, 2.0), (60.0, 5.0), (0.3, 1.0)]
+)
+@pytest.mark.parametrize('shape', [(64, 101), (300, 211)])
+def test_cutoff_and_attenuation_are_free(shape, cutoff, attenuation):
+    image = scene(*shape)
+    arguments = (2.0, 0.4, cutoff, attenuation)
+    spatial = HomomorphicFilter(image).filtered_logarithm(*arguments)
+    reference = filtered_logarithm_fft(image, *arguments)
+    assert np.abs(spatial - reference).max() < 0.02
+    assert np.ptp(reference) > 0.5
+
+
+@pytest.mark.parametrize('kind', [np.uint16, np.float32, np.float64])
+def test_every_type_of_pixel_gives_the_8_bit_result(kind):
+    image = scene(70, 90)
+    image[0, 0] = 255  # the range of the floats, too
+    wide = (image.astype(kind) * 257).astype(kind)
+    result = HomomorphicFilter(wide).filtered(1.4, 0.3)
+    expected = HomomorphicFilter(image).filtered(1.4, 0.3)
+    assert np.abs(result.astype(int) - expected).max() <= 1
+
+
+def test_equal_gains_only_stretch_the_image():
+    image = scene(30, 90)  # small enough for the mapping to see every pixel
+    settings = FilterSettings(black_percentile=0, white_percentile=100)
+    filtered = HomomorphicFilter(image, settings).filtered(1.0, 1.0)
+    expected = (image.astype(float) - image.min()) / np.ptp(image) * 255
+    assert np.abs(filtered - expected).max() <= 0.51
+
+
+def test_the_filter_flattens_light():
+    columns = np.arange(400)
+    paper = np.where(columns // 4 % 2 == 0, 1.0, 0.2)
+    light = np.exp(-columns / 130)
+    image = np.tile(paper * light * 255, (64, 1))
+    filtered = HomomorphicFilter(image).filtered(1.0, 0.1, cutoff=20.0, attenuation=1.0)
+    bright, dark = filtered[:, 40:360][:, paper[40:360] == 1], filtered[:, paper == 0.2][:, 20:-20]
+    assert image[:, 40:360][:, paper[40:360] == 1].min() < image[:, paper == 0.2].max()
+    assert bright.min() > dark.max()
+
+
+@pytest.mark.parametrize('threads', [1, 2, 4])
+def test_the_result_does_not_depend_on_the_threads(threads):
+    image = scene(600, 301)
+    expected = HomomorphicFilter(image).filtered(2.8, 0.82)
+    with ThreadPoolExecutor(threads) as executor:
+        prepared = HomomorphicFilter(image)
+        result = prepared.filtered(2.8, 0.82, executor=executor)
+        logarithms = prepared.filtered_logarithm(2.8, 0.82, executor=executor)
+    np.testing.assert_array_equal(result, expected)
+    np.testing.assert_array_equal(
+        logarithms, HomomorphicFilter(image).filtered_logarithm(2.8, 0.82)
+    )
+
+
+def test_one_image_is_filtered_from_several_threads_at_once():
+    prepared = HomomorphicFilter(scene(200, 301))
+    gains = [(1 + step / 10, step / 40) for step in range(30)]
+    expected = [prepared.filtered(*pair) for pair in gains]
+    with ThreadPoolExecutor(4) as executor:
+        for result, right in zip(
+            executor.map(lambda pair: prepared.filtered(*pair), gains), expected, strict=True
+        ):
+            np.testing.assert_array_equal(result, right)
+
+
+def test_the_image_is_not_kept():
+    image = scene(70, 90)
+    prepared = HomomorphicFilter(image)
+    before = prepared.filtered(2.0, 0.5)
+    image[:] = 0
+    np.testing.assert_array_equal(prepared.filtered(2.0, 0.5), before)
+
+
+@pytest.mark.parametrize('view', [np.s_[::-1], np.s_[:, ::-1], np.s_[::2, ::2], np.s_[5:40, 3:60]])
+@pytest.mark.parametrize('kind', [np.uint8, np.uint16, np.float32])
+def test_any_strides_will_do(view, kind):
+    image = scene(70, 90).astype(kind)
+    copied = np.ascontiguousarray(image[view])
+    np.testing.assert_array_equal(
+        HomomorphicFilter(image[view]).filtered(2.0, 0.5),
+        HomomorphicFilter(copied).filtered(2.0, 0.5),
+    )
+
+
+def test_a_strong_filter_saturates_instead_of_overflowing():
+    filtered = HomomorphicFilter(noise(64, 64)).filtered(40.0, 0.0)
+    assert set(np.unique(filtered[scene(64, 64) >= 0])) >= {0, 255}
+
+
+@pytest.mark.parametrize('speck', [0, 255])
+def test_a_speck_on_even_ground_is_still_seen(speck):
+    image = np.full((300, 200), 128, np.uint8)
+    image[150, 100] = speck
+    filtered = HomomorphicFilter(image).filtered(1.2, 0.25).astype(int)
+    assert filtered[150, 100] == speck
+    assert abs(filtered[10, 10] - 128) < 10
+
+
+@pytest.mark.parametrize(
+    ('image', 'words'),
+    [
+        (np.zeros((40, 40), np.uint8), 'image is constant'),
+        (np.ones((1, 1), np.uint8), 'image is 1 x 1 px'),
+        (np.zeros((40, 40, 3), np.uint8), 'image has shape'),
+    ],
+)
+def test_what_is_not_an_image_is_refused(image, words):
+    for function in (HomomorphicFilter, lambda it: filtered_fft(it, 2.0, 0.5)):
+        with pytest.raises(ValueError, match=words):
+            function(image)
+
+
+def test_a_filter_out_of_range_is_refused():
+    prepared = HomomorphicFilter(scene(32, 32))
+    with pytest.raises(ValueError, match='gamma_low is 3'):
+        prepared.filtered(2.0, 3.0)
+    with pytest.raises(ValueError, match='cutoff is -1'):
+        prepared.filtered_logarithm(2.0, 0.5, cutoff=-1.0)
+
+
+@pytest.mark.parametrize(
+    ('name', 'value'),
+    [('log_offset', 0.0), ('black_percentile', 50.0), ('white_percentile', 101.0)],
+)
+def test_a_setting_out_of_range_is_refused(name, value):
+    with pytest.raises(ValueError, match=f'^{name} is {value}, accepted is'):
+        FilterSettings(**{name: value})
+
+
+def test_every_setting_describes_itself():
+    assert [item.name for item in parameters(FilterSettings)] == [
+        'log_offset',
+        'black_percentile',
+        'white_percentile',
+    ]
+    assert all(item.description.endswith('.') for item in parameters(FilterSettings))

@@ -1,0 +1,505 @@
+from __future__ import annotations
+
+import threading
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ahf_ros.filtering.genes import EXTENDED, PUBLISHED, TuningSettings
+from ahf_ros.filtering.genetic import GeneticSettings
+from ahf_ros.filtering.homomorphic import FilterSettings, HomomorphicFilter
+from ahf_ros.filtering.identifier import AdaptiveIdentifier, AdaptiveSettings, identify
+from ahf_ros.filtering.transfer import median_distance
+from ahf_ros.filtering.trials import CONFIRMED
+from ahf_ros.settings.parameter import parameters
+from ahf_ros.target import UNDECODED, Target, count_codes
+
+COUNT = 144
+SHORT = AdaptiveSettings(genetic=GeneticSettings(max_evaluations=30))
+
+
+def dotted(fall_off):
+    """Return bright single pixels on gray paper in a light that falls off to the right."""
+    image = np.full((96, 96), 40.0)
+    image[4::8, 4::8] = 250
+    return np.rint(image * np.exp(-fall_off * np.arange(96) / 96)).astype(np.uint8)
+
+
+BRIGHT, DIM = dotted(0.1), dotted(3.0)
+
+
+def target(number, x=1.0, y=2.0):
+    return Target(number, number, x, y, 1.0, 1.0)
+
+
+class Dots:
+    """A detector that needs even light: it sees the dots above half of the range."""
+
+    def __init__(self):
+        self.calls = 0
+        self.images = []
+        self.lock = threading.Lock()
+
+    def __call__(self, image):
+        with self.lock:
+            self.calls += 1
+            self.images.append(image)
+        lit = image >= 128
+        if lit.mean() > 0.1:
+            return []
+        rows, columns = np.nonzero(lit)
+        return [
+            target(int(row // 8 * 12 + column // 8 + 1), float(column), float(row))
+            for row, column in zip(rows, columns, strict=True)
+        ]
+
+
+def test_the_image_as_received_comes_first_and_may_be_enough():
+    detector = Dots()
+    result = identify(BRIGHT, detector, COUNT)
+    assert result.count == result.expected == COUNT
+    assert (result.filter.applied, result.filter.evaluations, detector.calls) == (False, 1, 1)
+    assert detector.images[0] is BRIGHT
+
+
+def test_a_filter_is_found_where_the_light_defeats_the_detector():
+    assert count_codes(Dots()(DIM)) < COUNT / 2
+    detector = Dots()
+    published = AdaptiveSettings(tuning=TuningSettings(search=PUBLISHED), threads=1)
+    result = identify(DIM, detector, COUNT, published)
+    state = result.filter
+    assert result.count == COUNT
+    assert state.applied
+    assert state.evaluations == detector.calls
+    assert state.generations >= 1
+    assert state.cutoff == median_distance(96, 96)
+    assert state.attenuation == state.gamma_high - state.gamma_low
+    filtered = HomomorphicFilter(DIM).filtered(state.gamma_high, state.gamma_low)
+    assert tuple(Dots()(filtered)) == tuple(sorted(result.targets, key=lambda it: (it.y, it.x)))
+
+
+def test_targets_are_sorted_by_id_undecoded_first():
+    found = [target(5), target(UNDECODED), target(2)]
+    result = identify(DIM, lambda image: found, 2)
+    assert [it.id for it in result.targets] == [UNDECODED, 2, 5]
+    assert result.count == 2
+
+
+@pytest.mark.parametrize('threads', [2, 4])
+@pytest.mark.parametrize('expected', [COUNT, COUNT + 1])
+def test_the_result_does_not_depend_on_the_threads(threads, expected):
+    def run(number):
+        result = identify(DIM, Dots(), expected, replace(SHORT, threads=number))
+        return replace(result, filter=replace(result.filter, duration=0.0))
+
+    assert run(threads) == run(1)
+
+
+def test_the_best_result_wins_where_no_filter_shows_all():
+    results = []
+
+    def detector(image):
+        results.append(Dots()(image))
+        return results[-1]
+
+    result = identify(DIM, detector, COUNT + 1, replace(SHORT, threads=1))
+    smallest = min(abs(COUNT + 1 - count_codes(found)) for found in results)
+    assert COUNT + 1 - result.count == smallest
+    assert result.filter.evaluations == len(results) == 31
+
+
+def test_the_image_as_received_wins_a_tie():
+    result = identify(DIM, lambda image: [target(1)], 5, SHORT)
+    assert not result.filter.applied
+    assert (result.filter.gamma_high, result.filter.gamma_low) == (1.0, 1.0)
+    assert result.filter.evaluations == 31
+
+
+def test_too_many_targets_are_as_bad_as_too_few():
+    def detector(image):
+        number = 7 if image is DIM else 4
+        return [target(index) for index in range(number)]
+
+    result = identify(DIM, detector, 5, SHORT)
+    assert (result.count, result.filter.applied) == (4, True)
+
+
+def test_without_an_expected_number_nothing_is_filtered():
+    detector = Dots()
+    result = identify(DIM, detector, 0)
+    assert (result.expected, detector.calls, result.filter.applied) == (0, 1, False)
+
+
+class Estimate:
+    """An estimate that is always the same."""
+
+    def __init__(self, count):
+        self.count = count
+        self.calls = 0
+
+    def __call__(self, image):
+        self.calls += 1
+        return self.count
+
+
+def test_an_estimate_stands_in_for_an_unknown_number():
+    given = identify(DIM, Dots(), COUNT, SHORT)
+    estimated = identify(DIM, Dots(), 0, SHORT, estimate=Estimate(COUNT))
+    assert (given.expected, given.estimated) == (COUNT, False)
+    assert (estimated.expected, estimated.estimated) == (COUNT, True)
+    assert estimated.targets == given.targets
+    assert replace(estimated.filter, duration=0.0) == replace(given.filter, duration=0.0)
+
+
+def test_a_given_number_is_not_estimated():
+    estimate = Estimate(3)
+    result = identify(BRIGHT, Dots(), COUNT, estimate=estimate)
+    assert (result.expected, result.estimated, estimate.calls) == (COUNT, False, 0)
+
+
+def test_no_estimate_is_below_what_is_identified_at_once():
+    result = identify(BRIGHT, Dots(), 0, estimate=Estimate(7))
+    assert (result.expected, result.filter.applied) == (COUNT, False)
+
+
+def test_an_estimate_of_none_filters_nothing():
+    ramp = np.arange(96, dtype=np.uint8) + np.zeros((96, 1), np.uint8)
+    result = identify(ramp, Dots(), 0, SHORT, estimate=Estimate(0))
+    assert (result.expected, result.estimated, result.filter.evaluations) == (0, True, 1)
+
+
+@pytest.mark.parametrize('surplus', [0, 1])
+def test_a_steady_stream_is_estimated_once_and_not_searched_again(surplus):
+    detector, estimate = Dots(), Estimate(COUNT + surplus)
+    identifier = AdaptiveIdentifier(detector, SHORT, estimate=estimate)
+    first = identifier.identify(DIM, 0)
+    assert first.filter.applied
+    calls = detector.calls
+    second = identifier.identify(DIM, 0)
+    assert (detector.calls - calls, estimate.calls) == (1, 1)
+    assert (second.targets, second.expected) == (first.targets, COUNT + surplus)
+    assert (second.filter.evaluations, identifier.last_search) == (1, None)
+
+
+def test_other_results_are_estimated_again():
+    estimate = Estimate(COUNT)
+    identifier = AdaptiveIdentifier(Dots(), SHORT, estimate=estimate)
+    fewer = DIM.copy()
+    fewer[:40, :40] = DIM[0, :40]
+    for image, calls in ((DIM, 1), (fewer, 2), (fewer, 2)):
+        identifier.identify(image, 0)
+        assert estimate.calls == calls
+    identifier.reset()
+    identifier.identify(fewer, 0)
+    assert estimate.calls == 3
+
+
+@pytest.mark.parametrize('estimate', [-1, 2.0, None])
+def test_an_estimate_that_is_no_number_is_refused(estimate):
+    with pytest.raises(ValueError, match=r'estimate is .*, accepted is an integer of at least 0'):
+        identify(DIM, Dots(), 0, SHORT, estimate=Estimate(estimate))
+
+
+def test_switched_off_nothing_is_filtered():
+    detector = Dots()
+    result = identify(DIM, detector, COUNT, AdaptiveSettings(ahf=False))
+    assert (result.expected, detector.calls, result.filter.applied) == (COUNT, 1, False)
+
+
+@pytest.mark.parametrize('kind', [np.uint16, np.float32, np.float64])
+def test_a_detector_sees_8_bit_images_whatever_was_received(kind):
+    detector = Dots()
+    result = identify(DIM.astype(kind) * 100, detector, COUNT)
+    assert {image.dtype for image in detector.images} == {np.dtype(np.uint8)}
+    assert result.count == COUNT
+
+
+def test_centres_are_refined_in_the_image_as_received():
+    def refine(image, targets):
+        assert image is DIM
+        return [replace(it, x=it.x + 0.25) for it in targets]
+
+    result = identify(DIM, Dots(), COUNT, refine=refine)
+    assert result.filter.applied
+    assert [it.x for it in result.targets[:2]] == [4.25, 12.25]
+
+
+def test_centres_from_the_image_as_received_are_left_alone():
+    result = identify(BRIGHT, Dots(), COUNT, refine=lambda image, targets: [])
+    assert result.count == COUNT
+
+
+def test_centres_from_the_8_bit_version_of_an_image_are_refined():
+    image = BRIGHT.astype(np.uint16) * 100
+    result = identify(image, Dots(), 0, refine=lambda image, targets: [target(9)])
+    assert result.targets == (target(9),)
+
+
+def test_a_stream_begins_with_the_filter_that_worked_last():
+    detector = Dots()
+    identifier = AdaptiveIdentifier(detector)
+    first = identifier.identify(DIM, COUNT)
+    assert identifier.last_search.reason == 'found'
+    detector.calls = 0
+    second = identifier.identify(DIM, COUNT)
+    assert second.targets == first.targets
+    assert (second.filter.evaluations, second.filter.generations, detector.calls) == (1, 0, 1)
+    assert second.filter.gamma_low == first.filter.gamma_low
+    assert identifier.last_search is None
+
+
+def test_reset_forgets_what_worked():
+    identifier = AdaptiveIdentifier(Dots())
+    first = identifier.identify(DIM, COUNT)
+    identifier.reset()
+    again = identifier.identify(DIM, COUNT)
+    assert again.filter.evaluations == first.filter.evaluations > 1
+    assert again.targets == first.targets
+
+
+def test_a_filter_that_no_longer_works_is_given_up():
+    def detector(image):
+        return Dots()(image) if image is BRIGHT or even else []
+
+    even = True
+    identifier = AdaptiveIdentifier(detector, SHORT)
+    assert identifier.identify(DIM, COUNT).filter.applied
+    even = False
+    result = identifier.identify(BRIGHT, COUNT)
+    assert (result.count, result.filter.applied, result.filter.evaluations) == (COUNT, False, 2)
+    assert identifier.identify(BRIGHT, COUNT).filter.evaluations == 1
+
+
+def test_a_search_begins_with_the_filter_that_worked_last_and_does_not_repeat_it():
+    detector = Dots()
+    identifier = AdaptiveIdentifier(detector, replace(SHORT, threads=1))
+    identifier.identify(DIM, COUNT)
+    detector.images.clear()
+    result = identifier.identify(DIM, COUNT + 1)
+    assert result.count == COUNT
+    assert len(detector.images) == result.filter.evaluations == 31
+    shown = {image.tobytes() for image in detector.images if image is not DIM}
+    assert len(shown) == 30
+
+
+def test_the_clock_measures_the_duration_and_limits_the_search():
+    seconds = iter(range(1000))
+    settings = AdaptiveSettings(genetic=GeneticSettings(max_duration=5.0), threads=1)
+    identifier = AdaptiveIdentifier(lambda image: [], settings, clock=lambda: float(next(seconds)))
+    result = identifier.identify(DIM, COUNT)
+    assert identifier.last_search.reason == 'duration'
+    assert result.filter.evaluations == 6
+    assert result.filter.duration == 7.0
+
+
+@pytest.mark.parametrize('threads', [1, 2])
+@pytest.mark.parametrize('filtered_only', [False, True])
+def test_what_the_detector_raises_is_raised(threads, filtered_only):
+    def detector(image):
+        if image is DIM and filtered_only:
+            return []
+        raise RuntimeError('no licence')
+
+    with pytest.raises(RuntimeError, match='no licence'):
+        identify(DIM, detector, COUNT, replace(SHORT, threads=threads))
+
+
+def test_targets_with_the_same_id_count_once_and_are_passed_on():
+    found = [target(3), target(3, x=50.0), target(4)]
+    result = identify(DIM, lambda image: found, 2)
+    assert (result.count, len(result.targets), result.filter.evaluations) == (2, 3, 1)
+
+
+@pytest.mark.parametrize(
+    ('found', 'words'),
+    [
+        (None, 'detector returned None, accepted is a list of targets'),
+        ({1: 2}, 'detector returned {1: 2}'),
+        ([3], r'detector returned \[3\]'),
+        ([target(7, x=float('nan'))], r'detector returned target 7 at \(nan, 2.0\), accepted'),
+        ([target(7, y=float('inf'))], r'target 7 at \(1.0, inf\)'),
+    ],
+)
+def test_what_is_no_list_of_targets_is_refused(found, words):
+    with pytest.raises(ValueError, match=words):
+        identify(DIM, lambda image: found, COUNT)
+
+
+def test_a_refinement_is_held_to_the_same():
+    with pytest.raises(ValueError, match='refine returned None'):
+        identify(DIM, Dots(), COUNT, refine=lambda image, targets: None)
+
+
+@pytest.mark.parametrize('expected', [-1, 2.0, True, '54', None])
+def test_an_expected_number_that_is_none_is_refused(expected):
+    with pytest.raises(ValueError, match=r'expected is .*, accepted is an integer of at least 0'):
+        identify(DIM, Dots(), expected)
+
+
+@pytest.mark.parametrize(
+    'image',
+    [
+        np.zeros((96, 96), np.uint8),
+        np.zeros((1, 1), np.uint8),
+        np.zeros((0, 0), np.uint8),
+        np.full((96, 96), np.nan),
+        'photo.jpg',
+    ],
+)
+def test_what_is_not_an_image_is_refused_before_the_detector_sees_it(image):
+    detector = Dots()
+    with pytest.raises(ValueError, match=r'^image '):
+        identify(image, detector, COUNT)
+    assert detector.calls == 0
+
+
+@pytest.mark.parametrize(
+    ('values', 'words'),
+    [
+        ({'threads': -1}, 'threads is -1'),
+        ({'ahf': 1}, 'ahf is 1, accepted is true or false'),
+    ],
+)
+def test_a_setting_out_of_range_is_refused(values, words):
+    with pytest.raises(ValueError, match=words):
+        AdaptiveSettings(**values)
+
+
+def test_one_filter_is_a_range_too():
+    one = TuningSettings(
+        search=PUBLISHED,
+        gamma_high_min=1.2,
+        gamma_high_max=1.2,
+        gamma_low_min=0.25,
+        gamma_low_max=0.25,
+    )
+    settings = AdaptiveSettings(tuning=one)
+    result = identify(DIM, lambda image: [target(1)] if image is not DIM else [], 5, settings)
+    assert (result.filter.gamma_high, result.filter.gamma_low) == (1.2, 0.25)
+    assert result.filter.evaluations == 2
+
+
+def test_the_settings_of_the_filter_reach_it():
+    seen = []
+    settings = replace(SHORT, filter=FilterSettings(black_percentile=40.0), threads=1)
+    identify(DIM, lambda image: seen.append(image) or [], 5, settings)
+    assert all((image == 0).mean() > 0.3 for image in seen[1:])
+
+
+def test_no_name_stands_for_two_settings():
+    names = [
+        item.name
+        for settings in (AdaptiveSettings, TuningSettings, FilterSettings, GeneticSettings)
+        for item in parameters(settings)
+    ]
+    assert len(names) == len(set(names))
+
+
+def test_ids_that_are_listed_beat_a_number():
+    """Through a filter the detector shows a listed ID more, and one that cannot be there less."""
+    image = np.arange(400, dtype=np.uint8).reshape(20, 20)
+
+    def detector(shown: np.ndarray) -> list[Target]:
+        numbers = [1, 2, 99] if shown is image else [1, 2, 3]
+        return [Target(number, number, 10.0 * number, 5.0, 3.0, 3.0) for number in numbers]
+
+    without = identify(image, detector, 3)
+    assert [target.id for target in without.targets] == [1, 2, 99]  # three, as expected
+    listed = AdaptiveSettings(expected_ids='1-3')
+    found = identify(image, detector, 50, listed)
+    assert [target.id for target in found.targets] == [1, 2, 3]
+    assert (found.expected, found.filter.applied) == (3, True)
+    only = identify(image, detector, 0, replace(listed, ahf=False))
+    assert [target.id for target in only.targets] == [1, 2]
+    with pytest.raises(ValueError, match="expected_ids has '3-1', accepted are integers"):
+        AdaptiveSettings(expected_ids='3-1')
+
+
+def test_an_extended_search_tries_other_cutoffs_and_says_which():
+    seen = []
+
+    def detector(image):
+        seen.append(image)
+        return [target(1)] if len(seen) == 20 else []
+
+    extended = AdaptiveSettings(tuning=TuningSettings(search=EXTENDED), threads=1)
+    state = identify(DIM, detector, 1, extended).filter
+    assert state.evaluations == 20
+    assert state.attenuation > 1.5 * (state.gamma_high - state.gamma_low)
+    chosen = state.gamma_high, state.gamma_low, state.cutoff, state.attenuation
+    assert np.array_equal(HomomorphicFilter(DIM).filtered(*chosen), seen[-1])
+
+
+class Drafting(Dots):
+    """A detector whose drafts are a pixel off, and which can put that right."""
+
+    def __init__(self):
+        super().__init__()
+        self.drafts = 0
+
+    def draft(self, image):
+        with self.lock:
+            self.drafts += 1
+        return [replace(it, x=it.x + 1) for it in Dots()(image)]
+
+    def refine(self, image, targets):
+        return [replace(it, x=it.x - 1) for it in targets]
+
+
+def test_filters_are_tried_with_drafts_where_centres_are_refined():
+    detector = Drafting()
+    result = identify(DIM, detector, COUNT)
+    plain = identify(DIM, Dots(), COUNT)
+    assert result.filter.applied
+    assert result.targets == plain.targets
+    assert (detector.calls, detector.drafts >= result.filter.evaluations - 1) == (1, True)
+
+
+def test_there_are_no_drafts_without_a_refinement_or_a_filter():
+    detector = Drafting()
+    assert identify(BRIGHT, detector, COUNT).targets == identify(BRIGHT, Dots(), COUNT).targets
+    detector.refine = None
+    assert identify(DIM, detector, COUNT).targets == identify(DIM, Dots(), COUNT).targets
+    assert detector.drafts == 0
+
+
+class Blocks(Dots):
+    """The same on paper with dots of two pixels by two, of which half an image shows one each."""
+
+    def __call__(self, image):
+        with self.lock:
+            self.calls += 1
+            self.images.append(image)
+        lit = image >= 128
+        if lit.mean() > 0.1:
+            return []
+        cell = image.shape[0] // 12
+        numbers = {int(row // cell * 12 + column // cell) for row, column in np.argwhere(lit)}
+        return [target(number + 1) for number in sorted(numbers)]
+
+
+def test_a_coarse_search_confirms_its_best_filters_on_the_whole_image():
+    large = np.kron(DIM, np.ones((2, 2), np.uint8))
+    detector = Blocks()
+    settings = replace(SHORT, coarse=True, threads=1)
+    result = identify(large, detector, COUNT, settings)
+    shapes = [image.shape for image in detector.images]
+    coarse = shapes.count((96, 96))
+    whole = shapes.count((192, 192))
+    assert result.count == COUNT
+    assert (shapes[0], shapes[-1]) == ((192, 192), (192, 192))
+    assert result.filter.evaluations == coarse + whole
+    assert coarse >= 1
+    assert 2 <= whole <= 1 + CONFIRMED
+
+
+@pytest.mark.parametrize('threads', [2, 4])
+def test_a_coarse_search_in_vain_does_not_depend_on_the_threads(threads):
+    def run(number):
+        settings = replace(SHORT, coarse=True, threads=number, fusion=True)
+        result = identify(DIM, Dots(), COUNT + 1, settings)
+        return replace(result, filter=replace(result.filter, duration=0.0))
+
+    assert run(threads) == run(1)
+    assert run(1).filter.evaluations == 1 + 30 + CONFIRMED

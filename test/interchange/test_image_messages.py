@@ -1,0 +1,228 @@
+"""Image messages of every encoding, as ROS and rosbags have them."""
+
+from __future__ import annotations
+
+import sys
+from types import SimpleNamespace
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+from ahf_ros.detectors import create
+from ahf_ros.imaging.image import as_gray
+from ahf_ros.interchange.image_messages import decode_compressed, decode_image
+from ahf_ros.synthetic.scene import SceneSettings, render
+from benchmarks import fuzz
+
+GRAY = np.arange(40, 100, dtype=np.uint8).reshape(6, 10)
+COLOURS = np.dstack([GRAY, GRAY[::-1], 255 - GRAY])  # blue, green, red
+NATIVE = sys.byteorder == 'big'
+
+
+def message(encoding: str, pixels: np.ndarray, big: bool = NATIVE, padding: int = 0, **changes):
+    """Return a message as it is duck-typed: pixels of shape (height, width, ...)."""
+    height, width = pixels.shape[:2]
+    sent = pixels.astype(pixels.dtype.newbyteorder('>' if big else '<'))
+    rows = np.frombuffer(sent.tobytes(), np.uint8).reshape(height, -1)
+    data = np.pad(rows, ((0, 0), (0, padding)), constant_values=255)
+    fields = {
+        'height': height,
+        'width': width,
+        'encoding': encoding,
+        'is_bigendian': int(big),
+        'step': data.shape[1],
+        'data': data.ravel(),
+    }
+    return SimpleNamespace(**fields | changes)
+
+
+@pytest.mark.parametrize('big', [False, True])
+@pytest.mark.parametrize('padding', [0, 1, 3, 8])
+@pytest.mark.parametrize(
+    ('encoding', 'kind'),
+    [
+        ('mono8', np.uint8),
+        ('8UC1', np.uint8),
+        ('mono16', np.uint16),
+        ('16UC1', np.uint16),
+        ('32FC1', np.float32),
+        ('64FC1', np.float64),
+    ],
+)
+def test_gray_keeps_its_values_and_its_type(encoding, kind, padding, big):
+    pixels = GRAY.astype(kind) * (37 if kind != np.uint8 else 1)
+    image = decode_image(message(encoding, pixels, big, padding))
+    assert image.dtype == kind and image.dtype.isnative and image.flags.aligned
+    assert np.array_equal(image, pixels)
+
+
+@pytest.mark.parametrize(
+    ('encoding', 'kind'), [('mono8', 'u1'), ('mono16', 'u2'), ('32FC1', 'f4')]
+)
+def test_gray_in_the_byte_order_of_the_machine_is_a_view(encoding, kind):
+    sent = message(encoding, GRAY.astype(kind))
+    assert np.shares_memory(decode_image(sent), sent.data)
+
+
+@pytest.mark.parametrize('big', [False, True])
+@pytest.mark.parametrize('bits', [8, 16])
+@pytest.mark.parametrize('order', ['rgb', 'bgr', 'rgba', 'bgra'])
+def test_colours_are_weighted(order, bits, big):
+    scale, kind = {8: (1, np.uint8), 16: (257, np.uint16)}[bits]
+    channels = {'b': 0, 'g': 1, 'r': 2}
+    planes = [COLOURS[..., channels[name]] if name != 'a' else 0 * GRAY for name in order]
+    image = decode_image(message(f'{order}{bits}', np.dstack(planes).astype(kind) * scale, big, 5))
+    assert image.dtype == kind
+    expected = scale * (COLOURS @ [0.114, 0.587, 0.299])
+    assert np.abs(image - expected).max() <= scale
+
+
+@pytest.mark.parametrize('kind', ['8U', '16U', '32F', '64F'])
+def test_channels_without_a_name(kind):
+    dtype = {'8U': 'u1', '16U': 'u2', '32F': 'f4', '64F': 'f8'}[kind]
+    expected = COLOURS @ [0.114, 0.587, 0.299]
+    for samples in (3, 4):
+        pixels = np.dstack([COLOURS, GRAY])[..., :samples].astype(dtype)
+        image = decode_image(message(f'{kind}C{samples}', pixels))
+        assert image.dtype == dtype
+        assert np.abs(image - expected).max() <= 1
+    pair = np.dstack([GRAY, 0 * GRAY]).astype(dtype)
+    assert np.array_equal(decode_image(message(f'{kind}C2', pair)), GRAY)
+
+
+@pytest.mark.parametrize('bits', [8, 16])
+@pytest.mark.parametrize('pattern', ['rggb', 'bggr', 'gbrg', 'grbg'])
+def test_bayer_patterns_show_the_colour_that_they_are_of(pattern, bits):
+    """Only the red cells of an even red light are bright: 0.299 of white in every pixel."""
+    kind, white = {8: (np.uint8, 200), 16: (np.uint16, 50000)}[bits]
+    cell = np.array([of == 'r' for of in pattern]).reshape(2, 2) * white
+    image = decode_image(message(f'bayer_{pattern}{bits}', np.tile(cell, (8, 8)).astype(kind)))
+    assert image.dtype == kind
+    assert image[2:-2, 2:-2] == pytest.approx(0.299 * white, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ('encoding', 'first'),
+    [('yuv422', False), ('uyvy', False), ('yuv422_yuy2', True), ('yuyv', True)],
+)
+def test_brightness_of_yuv_in_both_orders(encoding, first):
+    colour = np.full_like(GRAY, 128)
+    pixels = np.dstack([GRAY, colour] if first else [colour, GRAY])
+    assert np.array_equal(decode_image(message(encoding, pixels, padding=3)), GRAY)
+
+
+@pytest.mark.parametrize(('encoding', 'more'), [('nv21', 3), ('nv24', 12)])
+def test_brightness_before_planes_of_colour(encoding, more):
+    planes = np.concatenate([GRAY, np.full((more, GRAY.shape[1]), 128, np.uint8)])
+    assert np.array_equal(decode_image(message(encoding, planes, height=len(GRAY))), GRAY)
+
+
+def test_pixels_without_a_value_are_black():
+    pixels = GRAY.astype(np.float32)
+    pixels[2, 3], pixels[0, 0] = np.nan, np.inf
+    image = decode_image(message('32FC1', pixels))
+    assert image[2, 3] == image[0, 0] == 0
+    assert image[5, 5] == GRAY[5, 5]
+    nothing = decode_image(message('32FC1', np.full((4, 4), np.nan, np.float32)))
+    assert np.isnan(nothing).all()  # which is refused where an image is meant
+
+
+@pytest.mark.parametrize('encoding', ['8SC1', '16SC1', '32SC1', 'compressedDepth', '', 'MONO8'])
+def test_encodings_that_hold_no_image_are_named(encoding):
+    with pytest.raises(ValueError, match=f"encoding is '{encoding}', accepted is one of mono8"):
+        decode_image(message(encoding, GRAY))
+
+
+def test_a_header_of_gigapixels_with_little_data():
+    huge = message('64FC4', GRAY, height=2**32 - 1, width=2**20, step=2**32 - 1)
+    with pytest.raises(ValueError, match=r'data is of 60 bytes, accepted are at least'):
+        decode_image(huge)
+
+
+SCENE = render(SceneSettings(width=800, height=600, targets=6, seed=5))
+IDS = [target.id for target in SCENE.targets]
+
+
+def identified(sent) -> list[int]:
+    return [target.id for target in create('ring')(decode_image(sent))]
+
+
+def with_hot_pixel(image: np.ndarray, value: float) -> np.ndarray:
+    changed = image.copy()
+    changed[7, 9] = value
+    return changed
+
+
+@pytest.mark.parametrize('value', [65535, 4095])
+def test_photoneo_texture_of_12_bit_in_16(value):
+    """phoxi_camera publishes textures as mono16 or 32FC1, 12 bit of a 16-bit range."""
+    pixels = with_hot_pixel(SCENE.image.astype(np.uint16) * 16, value)
+    assert identified(message('mono16', pixels)) == IDS
+
+
+def test_photoneo_texture_of_float_with_holes():
+    pixels = with_hot_pixel(SCENE.image.astype(np.float32) * 3.7, 1e6)
+    pixels[:50, :60] = np.nan
+    assert identified(message('32FC1', pixels)) == IDS
+
+
+def test_zivid_colour_image():
+    """zivid_camera publishes color/image_color as rgba8."""
+    pixels = np.dstack([SCENE.image] * 3 + [np.full_like(SCENE.image, 255)])
+    assert identified(message('rgba8', pixels)) == IDS
+
+
+def test_ensenso_raw_and_rectified_images():
+    """ensenso_camera publishes mono8, mono16 or rgb8, by camera and parameter set."""
+    assert identified(message('mono8', SCENE.image, padding=16)) == IDS
+    assert identified(message('mono16', SCENE.image.astype(np.uint16) * 256)) == IDS
+    assert identified(message('rgb8', np.dstack([SCENE.image] * 3))) == IDS
+
+
+@pytest.mark.parametrize('depth', [9, 10, 12, 16])
+def test_few_used_bits_make_the_same_gray_values(depth):
+    """An image needs 100000 pixels before one of them may be hot."""
+    image = (SCENE.image.astype(np.uint16) + 1) << (depth - 8)
+    gray = as_gray(with_hot_pixel(image, 2**depth - 1))
+    assert gray.max() == 255
+    expected = np.minimum(SCENE.image + 1.0, SCENE.image.max() + 1.0) / (SCENE.image.max() + 1.0)
+    error = np.abs(gray / 255 - expected)
+    error[7, 9] = 0
+    assert error.max() < 0.02
+
+
+def test_compressed_images_keep_their_depth():
+    for image in (GRAY, GRAY.astype(np.uint16) * 200):
+        _, data = cv2.imencode('.png', image)
+        told = SimpleNamespace(format='mono16; png compressed', data=data.ravel())
+        decoded = decode_compressed(told)
+        assert decoded.dtype == image.dtype
+        assert np.array_equal(decoded, image)
+    _, data = cv2.imencode('.jpg', COLOURS)
+    decoded = decode_compressed(SimpleNamespace(format='bgr8; jpeg compressed', data=data.ravel()))
+    assert np.abs(decoded - COLOURS @ [0.114, 0.587, 0.299]).mean() < 4
+    with pytest.raises(ValueError, match=r"data is 3 bytes of format 'jpeg' that are no image"):
+        decode_compressed(SimpleNamespace(format='jpeg', data=np.zeros(3, np.uint8)))
+
+
+@settings(max_examples=400, deadline=None)
+@given(fuzz.images())
+def test_any_message_is_an_image_or_refused(fields):
+    fuzz.check(fields)
+
+
+@settings(max_examples=200, deadline=None)
+@given(fuzz.compressed_images())
+def test_any_compressed_message_is_an_image_or_refused(fields):
+    fuzz.check_compressed(fields)
+
+
+def test_a_compressed_header_of_too_many_pixels():
+    _, data = cv2.imencode('.bmp', GRAY)
+    data = data.ravel().copy()
+    data[25] = 127  # the highest byte of the height
+    told = SimpleNamespace(format='bmp', data=data)
+    with pytest.raises(ValueError, match='are no image, accepted is JPEG or PNG'):
+        decode_compressed(told)

@@ -1,0 +1,475 @@
+"""The nodes as processes of their own, over DDS."""
+
+from __future__ import annotations
+
+import array
+import itertools
+import math
+import re
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy', reason='ROS 2 is not installed')
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rcl_interfaces.srv import (
+    DescribeParameters,
+    GetParameters,
+    SetParameters,
+    SetParametersAtomically,
+)
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+from std_msgs.msg import Header
+from std_srvs.srv import Trigger
+
+from ahf_ros.interchange.files import read_image
+from ahf_ros.msg import CodedTargetArray
+from ahf_ros.nodes.image_msg import image_message
+from ahf_ros.nodes.settings import DetectorNodeSettings
+from ahf_ros.settings.nested import flat_parameters
+from ahf_ros.srv import Identify
+from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
+
+CONFIG = Path(__file__).parents[2] / 'config' / 'detector.yaml'
+SCENE = {'width': 1000, 'height': 700, 'targets': 6}
+LARGEST_ERROR = 0.1  # px
+ENDLESS = ('max_evaluations', 0), ('population', 10000), ('generations', 100000)
+
+
+def overrides(**given: Any) -> list[str]:
+    """Return command line arguments that set parameters."""
+    return [word for name, value in given.items() for word in ('-p', f'{name}:={value}')]
+
+
+def stamp(header: Header) -> tuple[int, int]:
+    return header.stamp.sec, header.stamp.nanosec
+
+
+_numbers = itertools.count(1)
+
+
+def header() -> Header:
+    """Return a header unlike any other."""
+    made = Header(frame_id='bench')
+    made.stamp.sec = next(_numbers)
+    return made
+
+
+def values(message: DiagnosticArray) -> dict[str, str]:
+    """Return what a node says about itself."""
+    return {item.key: item.value for item in message.status[0].values}
+
+
+class Detector:
+    """A detector of the test's own, with nobody else's images."""
+
+    def __init__(self, graph: Any, *arguments: str) -> None:
+        self.graph = graph
+        places = '-r', '__ns:=/own', '-r', '/diagnostics:=/own/diagnostics'
+        self.process = graph.start('detector', *places, *arguments)
+        self.targets = graph.listen(CodedTargetArray, '/own/coded_targets')
+        self.image = graph.publisher(Image, '/own/image')
+
+    def answer(self, message: Image) -> CodedTargetArray:
+        """Return the answer to an image."""
+        self.image.publish(message)
+        return self.graph.until(
+            lambda: next((it for it in self.targets if it.header == message.header), None)
+        )
+
+    def identify(self, message: Image, expected: int = 0) -> Identify.Response:
+        """Return the answer of the service."""
+        request = Identify.Request(image=message, expected=expected)
+        return self.graph.call(Identify, '/own/detector/identify', request)
+
+    def set(self, *given: tuple[str, Any]) -> tuple[bool, str]:
+        """Set parameters together; return whether they are accepted, or why not."""
+        parameters = [Parameter(name, value=value).to_parameter_msg() for name, value in given]
+        response = self.graph.call(
+            SetParametersAtomically,
+            '/own/detector/set_parameters_atomically',
+            SetParametersAtomically.Request(parameters=parameters),
+        )
+        return response.result.successful, response.result.reason
+
+    @contextmanager
+    def resubscription(self) -> Iterator[None]:
+        """Wait until another subscription to images has taken the place of the one before.
+
+        That goes when the node gets round to it, and what it receives till then gets lost.
+        """
+        before = self._subscriptions()
+        yield
+        self.graph.until(lambda: len(now := self._subscriptions()) == 1 and not now & before)
+
+    def _subscriptions(self) -> set[tuple[int, ...]]:
+        known = self.graph.node.get_subscriptions_info_by_topic('/own/image')
+        return {tuple(it.endpoint_gid) for it in known}
+
+    def get(self, name: str) -> Any:
+        """Return the value of a parameter."""
+        response = self.graph.call(
+            GetParameters, '/own/detector/get_parameters', GetParameters.Request(names=[name])
+        )
+        return Parameter.from_parameter_msg(
+            type('Named', (), {'name': name, 'value': response.values[0]})
+        ).value
+
+
+@pytest.fixture(scope='module')
+def detector(graph: Any) -> Detector:
+    return Detector(graph, '--params-file', str(CONFIG))
+
+
+@pytest.fixture(scope='module')
+def rendering() -> Rendering:
+    return render(SceneSettings(**SCENE))
+
+
+@pytest.fixture
+def message(rendering: Rendering) -> Image:
+    return image_message(rendering.image, header())
+
+
+def assert_true(answer: CodedTargetArray, truth: CodedTargetArray) -> None:
+    """Assert that an answer holds the targets of the truth, at the right places."""
+    assert [it.id for it in answer.targets] == [it.id for it in truth.targets]
+    for found, true in zip(answer.targets, truth.targets, strict=True):
+        assert math.hypot(found.x - true.x, found.y - true.y) < LARGEST_ERROR
+        assert found.code == true.code
+        assert found.semi_major == pytest.approx(true.semi_major, abs=0.5)
+
+
+def test_two_processes_identify_what_is_there(graph: Any) -> None:
+    illumination = graph.start('illumination', *overrides(**SCENE, rate=4, frames=2, tilt=10))
+    detector = graph.start('detector', *overrides(expected_targets=6))
+    truths = graph.listen(CodedTargetArray, '/ground_truth')
+    answers = graph.listen(CodedTargetArray, '/coded_targets')
+    cameras = graph.listen(CameraInfo, '/camera_info')
+
+    def known() -> list[tuple[CodedTargetArray, CodedTargetArray]]:
+        true = {stamp(it.header): it for it in truths}
+        return [(it, true[stamp(it.header)]) for it in answers if stamp(it.header) in true]
+
+    graph.until(lambda: len(known()) >= 4 and cameras)
+    pairs = known()
+    assert len({truth.targets[0].id for _, truth in pairs}) == 2  # two different images
+    for answer, truth in pairs:
+        assert_true(answer, truth)
+        assert answer.header == truth.header
+        assert answer.header.frame_id == 'camera'
+        assert (answer.width, answer.height, answer.expected) == (1000, 700, 6)
+        assert answer.family == truth.family == 'metashape12'
+        assert not answer.filter.applied
+        assert answer.filter.evaluations == 1
+    assert (cameras[0].width, cameras[0].height) == (1000, 700)
+    assert cameras[0].k[0] == cameras[0].k[4] == pytest.approx(1800)
+    for process in (detector, illumination):
+        assert process.end() == (0, '')
+
+
+def test_the_scoreboard_compares_with_the_truth(graph: Any, tmp_path: Path) -> None:
+    others = ('-r', '__ns:=/match')
+    camera = graph.start('illumination', *others, *overrides(**SCENE, rate=4))
+    detector = graph.start('detector', *others, *overrides(expected_targets=6))
+    board = graph.start(
+        'scoreboard', *others, *overrides(images=2, pictures=tmp_path / 'pictures')
+    )
+    assert board.wait() == (0, '')
+    lines = board.output.splitlines()
+    assert len(lines) == 2
+    for number, line in enumerate(lines, start=1):
+        assert line.startswith(f'image {number}: 6 identified of 6, no filter, 0 wrong, 0 false, ')
+        assert 0 < float(re.search(r'RMSE (.*) px', line).group(1)) < LARGEST_ERROR
+    pictures = [read_image(path) for path in sorted((tmp_path / 'pictures').iterdir())]
+    assert [picture.shape for picture in pictures] == [(700, 1000)] * 2
+    for process in (detector, camera):
+        assert process.end() == (0, '')
+
+
+def test_an_image_without_targets_is_answered(detector: Detector) -> None:
+    noise = np.random.default_rng(0).integers(100, 120, (200, 300), np.uint8)
+    answer = detector.answer(image_message(noise, header()))
+    assert answer.targets == []
+    assert (answer.width, answer.height, answer.expected) == (300, 200, 0)
+
+
+def test_an_unknown_number_is_estimated(detector: Detector, message: Image) -> None:
+    assert detector.set(('estimate_expected', True)) == (True, '')
+    answer = detector.answer(message)
+    given = detector.identify(message, expected=6).coded_targets
+    assert detector.set(('estimate_expected', False)) == (True, '')
+    assert (answer.expected, answer.estimated) == (SCENE['targets'], True)
+    assert (given.expected, given.estimated) == (6, False)
+
+
+def test_colour_and_padding_make_no_difference(detector: Detector, rendering: Rendering) -> None:
+    image = rendering.image
+    gray = detector.answer(image_message(image, header()))
+    colour = detector.answer(image_message(np.repeat(image[:, :, None], 3, axis=2), header()))
+    padded = np.pad(image, ((0, 0), (0, 24)))
+    message = image_message(padded, header())
+    message.width = image.shape[1]
+    assert len(gray.targets) == SCENE['targets']
+    assert colour.targets == gray.targets
+    assert detector.answer(message).targets == gray.targets
+
+
+def test_what_is_refused_is_counted_and_the_node_goes_on(
+    graph: Any, detector: Detector, message: Image
+) -> None:
+    diagnostics = graph.listen(DiagnosticArray, '/own/diagnostics')
+
+    def rejected() -> tuple[int, str]:
+        told = values(diagnostics[-1])
+        return int(told['rejected']), told['last reason for rejection']
+
+    graph.until(lambda: diagnostics)
+    before = rejected()[0]
+    flat = image_message(np.zeros((100, 100), np.uint8), header())
+    short = image_message(np.zeros((100, 100), np.uint8), header())
+    short.height = 200
+    refused: list[Header] = []
+    for count, bad, error in (
+        (1, Image(header=header(), encoding='8SC1', height=4, width=4), "encoding is '8SC1'"),
+        (2, short, 'data is of 10000 bytes, accepted are at least 20000'),
+        (3, flat, 'image is constant, 0 everywhere'),
+    ):
+        detector.image.publish(bad)
+        graph.until(lambda count=count: rejected()[0] == before + count)
+        assert rejected()[1].startswith(error)
+        assert diagnostics[-1].status[0].name == 'own/detector: identification'
+        refused.append(bad.header)
+    assert len(detector.answer(message).targets) == SCENE['targets']
+    assert not [it for it in detector.targets if it.header in refused]
+
+
+def test_the_service_answers_one_image(detector: Detector, message: Image) -> None:
+    response = detector.identify(message, expected=6)
+    assert (response.success, response.message) == (True, '')
+    assert response.coded_targets.header == message.header
+    assert response.coded_targets.expected == 6
+    assert response.coded_targets.targets == detector.answer(message).targets
+    message.encoding = 'jpeg'
+    response = detector.identify(message)
+    assert not response.success
+    accepted = "encoding is 'jpeg', accepted is one of mono8, mono16, rgb8"
+    assert response.message.startswith(accepted)
+
+
+def test_every_parameter_says_what_it_is(graph: Any, detector: Detector) -> None:
+    items = flat_parameters(DetectorNodeSettings)
+    described = graph.call(
+        DescribeParameters,
+        '/own/detector/describe_parameters',
+        DescribeParameters.Request(names=[item.name for item in items]),
+    ).descriptors
+    for item, descriptor in zip(items, described, strict=True):
+        assert descriptor.description == item.description
+        assert descriptor.additional_constraints == item.accepted
+    by_name = {descriptor.name: descriptor for descriptor in described}
+    population = by_name['population'].integer_range[0]
+    assert (population.from_value, population.to_value) == (2, 10000)
+    assert by_name['crossover'].floating_point_range[0].to_value == 1.0
+
+
+@pytest.mark.parametrize(
+    ('name', 'value', 'words'),
+    [
+        ('population', 1, ('population', '1', '2')),
+        ('population', 'many', ("population is 'many', accepted is an integer from 2",)),
+        ('crossover', 1.5, ('crossover', '1.5', '1.0')),
+        ('family', 'qr', ("family is 'qr', accepted is one of metashape12",)),
+        ('detector', 'magic', ("detector is 'magic', accepted is one of",)),
+        ('ahf', 1, ('ahf is 1, accepted is true or false',)),
+        ('expected_targets', -1, ('expected_targets', '-1', '0')),
+        ('max_radius', math.nan, ('max_radius', 'nan')),
+        ('max_radius', 3, ('min_radius is 4.0, accepted is', 'at most max_radius, 3.0')),
+    ],
+)
+def test_a_refused_parameter_is_named(
+    detector: Detector, name: str, value: Any, words: tuple[str, ...]
+) -> None:
+    before = detector.get(name)
+    accepted, reason = detector.set((name, value))
+    assert not accepted
+    assert all(word in reason for word in words), reason
+    assert detector.get(name) == before
+
+
+def test_parameters_are_checked_and_applied_together(detector: Detector, message: Image) -> None:
+    lower = ('gamma_high_min', 0.5)
+    assert not detector.set(lower)[0]
+    assert detector.set(lower, ('gamma_low_max', 0.5)) == (True, '')
+    assert not detector.set(('polarity', 'bright'), ('min_radius', 1000.0))[0]
+    assert detector.get('polarity') == 'auto'
+    # all back to the defaults, integers where numbers are meant
+    assert detector.set(('gamma_high_min', 1), ('gamma_low_max', 1)) == (True, '')
+    assert detector.set(('polarity', 'bright')) == (True, '')
+    assert detector.answer(message).targets == []
+    assert detector.set(('polarity', 'auto')) == (True, '')
+
+
+def test_one_refused_parameter_of_a_list_leaves_the_others(graph: Any, detector: Detector) -> None:
+    before = detector.get('population')
+    pair = [Parameter('seed', value=7), Parameter('population', value=1)]
+    response = graph.call(
+        SetParameters,
+        '/own/detector/set_parameters',
+        SetParameters.Request(parameters=[it.to_parameter_msg() for it in pair]),
+    )
+    assert [result.successful for result in response.results] == [True, False]
+    assert (detector.get('seed'), detector.get('population')) == (7, before)
+
+
+def test_images_for_those_who_look(graph: Any, detector: Detector, rendering: Rendering) -> None:
+    topics = '/own/detector/debug_image', '/own/detector/filtered_image'
+    debug, filtered = (graph.listen(Image, topic) for topic in topics)
+    message = image_message(rendering.image, header())
+    detector.image.publish(message)
+    graph.until(lambda: debug and filtered)
+    assert debug[0].header == filtered[0].header == message.header
+    assert (debug[0].encoding, filtered[0].encoding) == ('bgr8', 'mono8')
+    assert (debug[0].width, debug[0].height) == (message.width, message.height)
+    assert filtered[0].data == message.data  # no filter was needed
+    drawn = np.frombuffer(debug[0].data, np.uint8).reshape(*rendering.image.shape, 3)
+    assert (drawn != rendering.image[:, :, None]).any()
+
+
+def test_parameters_are_answered_and_the_latest_image_waits_during_a_search(
+    graph: Any, detector: Detector, rendering: Rendering
+) -> None:
+    images = [image_message(rendering.image, header()) for _ in range(4)]
+
+    def answer(image: Image) -> CodedTargetArray | None:
+        return next((it for it in detector.targets if it.header == image.header), None)
+
+    def received() -> int:
+        return int(values(diagnostics[-1])['received'])
+
+    search = *ENDLESS, ('max_duration', 5.0), ('expected_targets', 50)
+    assert detector.set(*search) == (True, '')
+    diagnostics = graph.listen(DiagnosticArray, '/own/diagnostics')
+    graph.until(lambda: diagnostics)
+    before = received()
+    detector.image.publish(images[0])
+    graph.until(lambda: received() > before)
+    for image in images[1:3]:
+        detector.image.publish(image)
+    assert detector.set(('expected_targets', 6)) == (True, '')
+    assert answer(images[0]) is None
+    detector.image.publish(images[3])
+    last = graph.until(lambda: answer(images[3]))
+    first = answer(images[0])
+    assert first is not None
+    assert (first.expected, last.expected) == (50, 6)
+    assert first.filter.evaluations > last.filter.evaluations == 1
+    assert (answer(images[1]), answer(images[2])) == (None, None)
+    assert graph.call(Trigger, '/own/detector/reset', Trigger.Request()).success
+
+
+def test_no_image_is_lost_in_a_lossless_queue(
+    graph: Any, detector: Detector, rendering: Rendering
+) -> None:
+    with detector.resubscription():
+        assert detector.set(('queue', 'lossless'), ('queue_memory', 1)) == (True, '')
+    publisher = graph.node.create_publisher(Image, '/own/image', 30)
+    graph.until(publisher.get_subscription_count)
+    images = [image_message(rendering.image, header()) for _ in range(30)]
+    for image in images:
+        publisher.publish(image)
+    sent = {stamp(image.header) for image in images}
+
+    def answers() -> list[CodedTargetArray]:
+        return [it for it in detector.targets if stamp(it.header) in sent]
+
+    graph.until(lambda: len(answers()) == 30)
+    assert [it.header for it in answers()] == [image.header for image in images]
+    assert {it.filter.duration for it in answers()} == {0.0}
+    with detector.resubscription():
+        assert detector.set(('queue', 'latest')) == (True, '')
+
+
+def test_compressed_images(graph: Any, detector: Detector, rendering: Rendering) -> None:
+    assert detector.set(('image_transport', 'compressed')) == (True, '')
+    publisher = graph.publisher(CompressedImage, '/own/image/compressed')
+    _, data = cv2.imencode('.png', rendering.image)
+    sent = CompressedImage(header=header(), format='mono8; png compressed')
+    sent.data = array.array('B', data.tobytes())
+    publisher.publish(sent)
+    found = graph.until(
+        lambda: next((it for it in detector.targets if it.header == sent.header), None)
+    )
+    assert [it.id for it in found.targets] == [it.id for it in rendering.targets]
+    assert detector.set(('image_transport', 'raw')) == (True, '')
+    graph.until(detector.image.get_subscription_count)
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_the_node_in_the_middle_of_a_search(
+    graph: Any, message: Image, number: signal.Signals
+) -> None:
+    process = graph.start(
+        'detector',
+        *('-r', '__ns:=/ending', '-r', '/diagnostics:=/ending/diagnostics'),
+        *overrides(expected_targets=50, **dict(ENDLESS)),
+    )
+    diagnostics = graph.listen(DiagnosticArray, '/ending/diagnostics')
+    answers = graph.listen(CodedTargetArray, '/ending/coded_targets')
+    graph.publisher(Image, '/ending/image').publish(message)
+    graph.until(lambda: diagnostics and values(diagnostics[-1])['received'] == '1')
+    assert process.end(number) == (0, '')
+    assert answers == []
+
+
+@pytest.mark.parametrize(
+    ('node', 'given', 'words'),
+    [
+        ('detector', {'population': 1}, ('population', '1', '2')),
+        ('detector', {'family': 'qr'}, ("family is 'qr', accepted is one of metashape12",)),
+        ('detector', {'min_radius': 70}, ('min_radius is 70.0', 'max_radius, 60.0')),
+        ('illumination', {'light': 'moon'}, ("light is 'moon', accepted is one of normal",)),
+        ('illumination', {'rate': 0}, ('rate', '0', '0.001')),
+    ],
+)
+def test_a_refused_parameter_stops_a_node_at_the_start(
+    graph: Any, node: str, given: dict[str, Any], words: tuple[str, ...]
+) -> None:
+    status, errors = graph.start(node, *overrides(**given)).wait()
+    assert status == 1
+    assert 'Traceback' not in errors
+    assert all(word in errors for word in words), errors
+
+
+def test_a_service_is_a_detector_and_its_end_is_named(
+    graph: Any, detector: Detector, message: Image, rendering: Rendering
+) -> None:
+    other = graph.start('detector', '-r', '__ns:=/other')
+    graph.until(lambda: ('detector', '/other') in graph.node.get_node_names_and_namespaces())
+    chosen = ('detector', 'service'), ('service', '/other/detector/identify')
+    assert detector.set(('detector', 'service')) == (
+        False,
+        "service is '', accepted is the name of a service",
+    )
+    assert detector.set(*chosen, ('expected_targets', 0)) == (True, '')
+    found = detector.answer(message)
+    assert [it.id for it in found.targets] == [it.id for it in rendering.targets]
+    assert found.family == 'service'
+    other.kill()
+    response = detector.identify(image_message(rendering.image, header()))
+    assert not response.success
+    assert response.message == "service '/other/detector/identify' is not there"
+    graph.start('detector', '-r', '__ns:=/other')
+    again = graph.until(
+        lambda: (it := detector.identify(image_message(rendering.image, header()))).success and it
+    )
+    assert len(again.coded_targets.targets) == len(rendering.targets)
+    assert detector.set(('detector', 'ring')) == (True, '')

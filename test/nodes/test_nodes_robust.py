@@ -1,0 +1,201 @@
+"""The detector where what it talks to does not behave: processes that die, clocks that jump."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from benchmarks import fuzz
+
+pytest.importorskip('rclpy', reason='ROS 2 is not installed')
+
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rcl_interfaces.srv import ListParameters
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import Image
+from std_msgs.msg import Header, String
+
+from ahf_ros.msg import CodedTargetArray
+from ahf_ros.nodes.image_msg import image_message
+from ahf_ros.nodes.process import Ending
+from ahf_ros.nodes.settings import DetectorNodeSettings
+from ahf_ros.settings.nested import flat_parameters
+from ahf_ros.synthetic.scene import SceneSettings, render
+
+SCENE = {'width': 320, 'height': 240, 'targets': 3, 'dot_radius': 9.0}
+ENDLESS = {
+    'expected_targets': 50,
+    'max_evaluations': 0,
+    'population': 10000,
+    'generations': 100000,
+}
+
+
+def overrides(**given: Any) -> list[str]:
+    """Return command line arguments that set parameters."""
+    return [word for name, value in given.items() for word in ('-p', f'{name}:={value}')]
+
+
+@pytest.fixture(scope='module')
+def pixels() -> np.ndarray:
+    return render(SceneSettings(**SCENE)).image
+
+
+class Bench:
+    """A detector in a namespace, and all that it says."""
+
+    def __init__(self, graph: Any, name: str, *places: str, **given: Any) -> None:
+        self.graph = graph
+        self.name = name
+        self.start(*places, **given)
+        self.answers = graph.listen(CodedTargetArray, f'/{name}/coded_targets')
+        self.diagnostics = graph.listen(DiagnosticArray, f'/{name}/diagnostics')
+        # The node then knows who listens to its answers, too.
+        graph.until(lambda: self.diagnostics)
+
+    def start(self, *places: str, **given: Any) -> None:
+        own = f'__ns:=/{self.name}', f'/diagnostics:=/{self.name}/diagnostics'
+        remapped = [word for place in (*own, *places) for word in ('-r', place)]
+        self.process = self.graph.start('detector', *remapped, *overrides(**given))
+
+    def kill(self) -> None:
+        """End the detector without notice, and forget what it said."""
+        self.process.kill()
+        self.diagnostics.clear()
+        self.answers.clear()
+
+    def told(self, key: str) -> str:
+        """Return what the detector said last about something, nothing before it said anything."""
+        said = self.diagnostics[-1].status[0].values if self.diagnostics else []
+        return next((item.value for item in said if item.key == key), '')
+
+
+def test_the_end_of_a_node_does_not_gather_callbacks() -> None:
+    ended, called = Ending(), []
+    for _ in range(3):  # as an executor does with every spin
+        ended.add_done_callback(called.append)
+    ended.set_result(0)
+    assert called == [ended]
+
+
+@pytest.mark.parametrize('queue', ['latest', 'lossless'])
+def test_a_camera_that_is_killed_and_comes_again(graph: Any, queue: str) -> None:
+    bench = Bench(graph, f'camera_{queue}', queue=queue)
+    # An image takes many packets, so that one or another is on its way at any moment.
+    scene = {**SCENE, 'width': 1200, 'height': 900, 'rate': 50, 'frames': 1}
+    for _ in range(2):
+        camera = graph.start('illumination', '-r', f'__ns:=/{bench.name}', *overrides(**scene))
+        graph.until(lambda: len(bench.answers) >= 3)
+        camera.kill()
+        bench.answers.clear()
+    assert bench.told('rejected') == '0'
+    assert bench.process.end() == (0, '')
+
+
+def test_a_detector_that_is_killed_in_the_middle_of_a_search_and_comes_again(graph: Any) -> None:
+    bench = Bench(graph, 'killed', **ENDLESS)
+    camera = graph.start(
+        'illumination', '-r', '__ns:=/killed', *overrides(**SCENE, rate=20, frames=1)
+    )
+    graph.until(lambda: int(bench.told('received') or 0) >= 3)
+    assert bench.told('answered') == '0'
+    bench.kill()
+    bench.start()
+    graph.until(lambda: len(bench.answers) >= 3)
+    assert all(len(answer.targets) == SCENE['targets'] for answer in bench.answers)
+    assert camera.end() == (0, '')
+
+
+def test_stamps_that_go_backwards_are_told_and_answered(graph: Any, pixels: np.ndarray) -> None:
+    bench = Bench(graph, 'backwards', queue='lossless')
+    image = graph.publisher(Image, '/backwards/image')
+    stamps = [Time(sec=5), Time(sec=7, nanosec=1), Time(sec=7), Time(sec=7), Time(sec=8)]
+    for stamp in stamps:
+        image.publish(image_message(pixels, Header(stamp=stamp)))
+    graph.until(lambda: len(bench.answers) == len(stamps))
+    assert [answer.header.stamp for answer in bench.answers] == stamps
+    graph.until(lambda: bench.told('answered') == str(len(stamps)))
+    assert bench.told('stamps that went backwards') == '1'
+    assert bench.told('rejected') == '0'
+    warned = [it.status[0] for it in bench.diagnostics if it.status[0].level != b'\0']
+    assert [(it.level, it.message) for it in warned] == [
+        (DiagnosticStatus.WARN, '1 stamps went backwards')
+    ]
+    status, log = bench.process.end()
+    assert status == 0
+    assert log.count('stamp') == 1
+    assert 'stamp is 7.000000000 s, that of the image before is 7.000000001 s' in log
+
+
+def test_a_topic_of_another_type_is_named_and_images_are_answered(graph: Any) -> None:
+    bench = Bench(graph, 'mistaken', 'image:=camera/image')
+    topic = '/mistaken/camera/image'
+    other = graph.node.create_publisher(String, topic, 1)
+    named = f'{topic} is of type std_msgs/msg/String, accepted is sensor_msgs/msg/Image'
+
+    def status() -> tuple[bytes, str]:
+        said = bench.diagnostics[-1].status[0]
+        return said.level, said.message
+
+    graph.until(lambda: bench.diagnostics and status() == (DiagnosticStatus.WARN, named))
+    other.publish(String(data='no image'))
+    camera = graph.start(
+        'illumination', '-r', '__ns:=/mistaken/camera', *overrides(**SCENE, rate=20, frames=1)
+    )
+    graph.until(lambda: bench.answers)
+    graph.node.destroy_publisher(other)
+    graph.until(lambda: status()[0] == DiagnosticStatus.OK)
+    assert camera.end() == (0, '')
+    ended, log = bench.process.end()
+    assert (ended, named in log) == (0, True)
+
+
+def test_simulated_time_that_has_not_begun_stands_still_or_jumps(
+    graph: Any, pixels: np.ndarray
+) -> None:
+    bench = Bench(graph, 'simulated', use_sim_time='true')
+    image = graph.publisher(Image, '/simulated/image')
+
+    def answered(count: int) -> None:
+        image.publish(image_message(pixels, Header()))
+        graph.until(lambda: len(bench.answers) == count)
+        told = len(bench.diagnostics)
+        graph.until(lambda: len(bench.diagnostics) >= told + 1)  # goes on, whatever the time
+
+    answered(1)
+    assert bench.diagnostics[-1].header.stamp == Time()
+    clock = graph.publisher(Clock, '/clock')
+
+    def arrived(sec: int) -> bool:
+        clock.publish(Clock(clock=Time(sec=sec)))  # over again, as one that is lost is lost
+        return bench.diagnostics[-1].header.stamp == Time(sec=sec)
+
+    for count, sec in ((2, 1000), (3, 10)):  # the second time as where a replay starts over
+        graph.until(lambda sec=sec: arrived(sec))
+        answered(count)
+    assert bench.process.end() == (0, '')
+
+
+def test_any_message_is_answered_or_rejected(graph: Any) -> None:
+    figures = fuzz.through_node(graph, 150)
+    assert figures['answered'] > 5
+    assert figures['answered'] + figures['rejected'] == figures['sent'] >= 150
+
+
+def test_parameters_are_those_described_and_take_integers_for_numbers(graph: Any) -> None:
+    items = {item.name: item for item in flat_parameters(DetectorNodeSettings)}
+    numbers = [item for item in items.values() if isinstance(item.default, float)]
+    whole = {item.name: max(round(item.default), math.ceil(item.minimum)) for item in numbers}
+    bench = Bench(graph, 'whole', **whole)
+    names = graph.call(
+        ListParameters, '/whole/detector/list_parameters', ListParameters.Request()
+    ).result.names
+    own = {name for name in names if not name.startswith('qos_overrides.')}
+    assert set(items) <= own
+    assert own - set(items) <= {'use_sim_time', 'start_type_description_service'}
+    assert all(len(item.description) > 10 for item in items.values())
+    assert bench.process.end() == (0, '')

@@ -1,0 +1,170 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from ahf_ros.localisation import Positions, positions
+from ahf_ros.target import Target
+
+KIND = np.dtype([('x', '<f4'), ('y', '<f4'), ('z', '<f4')])
+EXACT = np.dtype([('x', '<f8'), ('y', '<f8'), ('z', '<f8')])
+FOCAL_LENGTH = 1000.0  # px
+NOISE = 0.1  # mm, along the ray
+CENTRE = (60.3, 50.8)  # px
+RADIUS = 8.0  # px
+
+
+def on_plane(pixels: np.ndarray, tilt: float, distance: float = 1000.0) -> np.ndarray:
+    """Return the points of a plane, shape (..., 3), that pixels of a camera at 0 show."""
+    rays = np.concatenate((pixels / FOCAL_LENGTH, np.ones((*pixels.shape[:-1], 1))), axis=-1)
+    normal = np.array([math.sin(tilt), 0.3 * math.sin(tilt), math.cos(tilt)])
+    return rays * (distance * math.cos(tilt) / (rays @ normal))[..., None]
+
+
+def scan(tilt: float = 0.0, noise: float = 0.0, kind: np.dtype = KIND) -> np.ndarray:
+    """Return a cloud of 120 x 100 points."""
+    pixels = np.stack(np.mgrid[:100, :120][::-1], axis=-1).astype(float)
+    points = on_plane(pixels, tilt)
+    points *= 1 + noise / 1000 * np.random.default_rng(0).standard_normal((100, 120, 1))
+    cloud = np.zeros((100, 120), kind)
+    for axis, name in enumerate('xyz'):
+        cloud[name] = points[:, :, axis]
+    return cloud
+
+
+def target(x: float = CENTRE[0], y: float = CENTRE[1], radius: float = RADIUS) -> Target:
+    return Target(7, 71, x, y, radius, radius)
+
+
+def found(cloud: np.ndarray) -> Positions:
+    return positions(cloud, [target()])
+
+
+def error(cloud: np.ndarray, tilt: float) -> float:
+    """Return the distance of the position of a target from the truth, mm."""
+    return float(np.linalg.norm(found(cloud).points[0] - on_plane(np.array(CENTRE), tilt)))
+
+
+def blank(cloud: np.ndarray, where: np.ndarray) -> np.ndarray:
+    for name in 'xyz':
+        cloud[name][where] = np.nan
+    return cloud
+
+
+def distance_from_centre() -> np.ndarray:
+    rows, columns = np.mgrid[:100, :120]
+    return np.hypot(columns - CENTRE[0], rows - CENTRE[1])
+
+
+@pytest.mark.parametrize('degrees', [0, 30, 60])
+def test_a_plane_gives_the_point_of_the_centre_exactly(degrees: float) -> None:
+    tilt = math.radians(degrees)
+    assert error(scan(tilt, kind=EXACT), tilt) < 1e-9
+    assert error(scan(tilt), tilt) < 1e-3  # float32 at 1000 mm
+
+
+def test_the_frame_of_the_cloud_does_not_matter() -> None:
+    cloud = scan(0.7, kind=EXACT)
+    points = np.stack([cloud[name] for name in 'xyz'], axis=-1)
+    turn, _ = np.linalg.qr(np.random.default_rng(1).standard_normal((3, 3)))
+    moved = points @ turn + (5, -200, 3000)
+    for axis, name in enumerate('xyz'):
+        cloud[name] = moved[:, :, axis]
+    true = on_plane(np.array(CENTRE), 0.7) @ turn + (5, -200, 3000)
+    assert found(cloud).points[0] == pytest.approx(true, abs=1e-9)
+
+
+def test_noise_is_told_and_averaged() -> None:
+    cloud = scan(0.5, NOISE)
+    assert found(cloud).deviations[0] == pytest.approx(NOISE, rel=0.15)
+    assert error(cloud, 0.5) < NOISE / 8
+
+
+def test_a_dot_without_points_has_a_position() -> None:
+    cloud = blank(scan(0.5, NOISE), distance_from_centre() < 1.3 * RADIUS)
+    assert error(cloud, 0.5) < NOISE / 8
+
+
+def test_points_of_another_surface_do_not_count() -> None:
+    cloud = scan(0.5, NOISE)
+    rows, columns = np.mgrid[:100, :120]
+    cloud['z'][columns > CENTRE[0] + 5] += 30  # behind an edge beside the dot
+    cloud['z'][(rows + columns) % 9 == 0] -= 500
+    assert error(cloud, 0.5) < NOISE / 4
+
+
+def test_zeros_are_no_points() -> None:
+    cloud = scan(0.5)
+    cloud[distance_from_centre() < 2.2 * RADIUS] = (0, 0, 0)
+    assert error(cloud, 0.5) < 1e-3
+
+
+def test_nothing_is_extrapolated() -> None:
+    _, columns = np.mgrid[:100, :120]
+    assert found(blank(scan(), columns < CENTRE[0])).known[0]
+    assert not found(blank(scan(), columns < CENTRE[0] + 10)).known[0]
+
+
+def test_few_points_or_none_give_no_position() -> None:
+    rows, columns = np.mgrid[:100, :120]
+    sparse = blank(scan(), (rows % 3 > 0) | (columns % 3 > 0))
+    assert not found(sparse).known[0]
+    assert not found(blank(scan(), rows >= 0)).known[0]
+    line = blank(scan(), np.abs(rows - columns + 10) > 0)
+    assert not positions(line, [target(radius=1.0)]).known[0]
+
+
+@pytest.mark.parametrize(
+    ('x', 'y', 'radius'),
+    [(-500, 50, 8), (60, 1e300, 8), (math.nan, 50, 8), (60, 50, math.inf), (60, 50, math.nan)],
+)
+def test_a_target_out_of_the_cloud_has_no_position(x: float, y: float, radius: float) -> None:
+    assert not positions(scan(), [target(x, y, radius)]).known[0]
+
+
+@pytest.mark.parametrize('radius', [0.0, 1e308])
+def test_a_target_of_no_known_size_has_a_neighbourhood(radius: float) -> None:
+    result = positions(scan(), [target(radius=radius)])
+    assert result.points[0] == pytest.approx(on_plane(np.array(CENTRE), 0), abs=1e-3)
+
+
+def test_targets_keep_their_order_and_large_ones_are_thinned_out() -> None:
+    places = [(20.0, 30.0), (-100.0, 30.0), (60.5, 50.25)]
+    targets = [target(x, y, radius=15.0) for x, y in places]
+    result = positions(scan(0.4), targets)
+    assert result.known.tolist() == [True, False, True]
+    expected = on_plane(np.array(places)[[0, 2]], 0.4)
+    assert result.points[[0, 2]] == pytest.approx(expected, abs=1e-3)
+    assert result.points.shape == (3, 3)
+    assert positions(scan(), []).points.shape == (0, 3)
+
+
+def test_the_spacing_is_that_of_pixels_on_the_target() -> None:
+    assert found(scan()).spacings[0] == pytest.approx(1.0, rel=1e-3)
+    half = np.array([0.5, 0.0])
+    step = on_plane(CENTRE + half, 1.0) - on_plane(CENTRE - half, 1.0)
+    assert found(scan(1.0)).spacings[0] == pytest.approx(np.linalg.norm(step), rel=1e-3)
+
+
+def test_a_cloud_that_is_the_same_everywhere_does_no_harm() -> None:
+    result = found(np.ones((100, 120), KIND))
+    assert result.points[0].tolist() == [1, 1, 1]
+    assert (result.deviations[0], result.spacings[0]) == (0, 0)
+
+
+@pytest.mark.filterwarnings('error')
+@pytest.mark.parametrize('kind', ['<f4', '>f4', '<f8'])
+def test_garbage_does_no_harm(kind: str) -> None:
+    random = np.random.default_rng(0)
+    point = np.dtype([(name, kind) for name in 'xyz'])
+    for _ in range(100):
+        cloud = np.frombuffer(random.bytes(30 * 30 * point.itemsize), point).reshape(30, 30)
+        if random.random() < 0.5:  # a real surface with garbage in it
+            cloud = np.where(
+                random.random((30, 30)) < 0.3, cloud, scan(0.3)[:30, :30].astype(point)
+            )
+        x, y, major, minor = random.uniform(-5, 35, 4)
+        found = positions(cloud, [Target(1, 1, x, y, abs(major), abs(minor), random.normal())])
+        assert found.points.shape == (1, 3)
