@@ -8,6 +8,7 @@ from collections.abc import Collection
 import cv2
 import numpy as np
 
+from ahf_ros.imaging.image import stretched_to_8_bit
 from ahf_ros.target import UNDECODED, Identification, Target
 
 DECODED_COLOUR = (60, 230, 60)
@@ -48,7 +49,7 @@ def draw(
     ndarray of uint8, shape (height, width, 3)
         Blue, green, red.
     """
-    canvas = cv2.cvtColor(_eight_bit(image), cv2.COLOR_GRAY2BGR)
+    canvas = cv2.cvtColor(stretched_to_8_bit(image), cv2.COLOR_GRAY2BGR)
     unit = max(1, round(math.hypot(*image.shape) / 2400))
     for target in identification.targets:
         colour = DECODED_COLOUR
@@ -74,13 +75,6 @@ def summary(identification: Identification) -> str:
     if not used.applied:
         return f'{words}, no filter'
     return f'{words}, gamma_high {used.gamma_high:g}, gamma_low {used.gamma_low:g}'
-
-
-def _eight_bit(image: np.ndarray) -> np.ndarray:
-    if image.dtype == np.uint8:
-        return image
-    scaled = np.empty(image.shape, np.uint8)
-    return cv2.normalize(image, scaled, 0, 255, cv2.NORM_MINMAX, cv2.CV_8U)
 
 
 def _draw_ellipse(

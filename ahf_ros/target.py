@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 UNDECODED = -1
@@ -61,6 +61,11 @@ class TrueTarget:
     x: float
     y: float
     confirmed: bool = True
+
+    @classmethod
+    def of(cls, target: Target) -> TrueTarget:
+        """Return the ID and the centre of a target whose truth is known, as in a rendering."""
+        return cls(target.id, target.x, target.y)
 
 
 Truth = Mapping[str, Sequence[TrueTarget]]
@@ -124,6 +129,11 @@ class Identification:
         return count_codes(self.targets)
 
 
-def count_codes(targets: list[Target] | tuple[Target, ...]) -> int:
+def sorted_targets(targets: Iterable[Target]) -> list[Target]:
+    """Return targets by ascending ID, those of one ID from top to bottom and left to right."""
+    return sorted(targets, key=lambda target: (target.id, target.y, target.x))
+
+
+def count_codes(targets: Iterable[Target]) -> int:
     """Return the number of distinct codes among `targets`, undecoded ones left out."""
     return len({target.id for target in targets} - {UNDECODED})

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ahf_ros.target import UNDECODED, Target
+from ahf_ros.target import UNDECODED, Target, sorted_targets
 
 _REACH = 0.5  # of the semi-major axis, within which two places are one
 _LEAST_REACH = 2.0  # the same, px
@@ -73,4 +73,4 @@ def fused(results: Sequence[Sequence[Target]]) -> list[Target]:
             and (other.target.id == claim.target.id or claim.near(other.target))
         )
     ]
-    return sorted(kept, key=lambda target: (target.id, target.y, target.x))
+    return sorted_targets(kept)

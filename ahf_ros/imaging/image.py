@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import cv2
 import numpy as np
 
 MINIMUM_SIDE = 16
@@ -85,3 +86,16 @@ def as_gray(image: np.ndarray) -> np.ndarray:
     kind = np.float64 if image.dtype == np.float64 else np.float32
     share = image / kind(brightest(image))
     return np.minimum(255 * share, 255).astype(np.float32)
+
+
+def stretched_to_8_bit(image: np.ndarray) -> np.ndarray:
+    """Return an image with its extremes at 0 and 255, uint8; an 8-bit image is its own result.
+
+    Parameters
+    ----------
+    image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
+    """
+    if image.dtype == np.uint8:
+        return image
+    scaled = np.empty(image.shape, np.uint8)
+    return cv2.normalize(image, scaled, 0, 255, cv2.NORM_MINMAX, cv2.CV_8U)
