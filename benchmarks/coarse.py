@@ -17,7 +17,6 @@ from ahf_ros.filtering.genes import EXTENDED, PUBLISHED, TuningSettings
 from ahf_ros.filtering.identifier import AdaptiveSettings, identify
 from ahf_ros.synthetic.lights import LIGHT_NAMES
 from ahf_ros.synthetic.scene import SceneSettings, render
-from ahf_ros.target import TrueTarget
 
 AMBIENTS = (0.3, 0.12)
 
@@ -41,7 +40,7 @@ def main() -> None:
         for seed in options.seeds:
             scene = SceneSettings(light=light, ambient=ambient, seed=seed)
             rendering = render(scene)
-            truth = [TrueTarget(it.id, it.x, it.y) for it in rendering.targets]
+            truth = rendering.truth
             right['without'] += score(truth, detector(rendering.image)).right
             for name, (genes, coarse) in zip(names, ways, strict=True):
                 settings = AdaptiveSettings(tuning=TuningSettings(search=genes), coarse=coarse)

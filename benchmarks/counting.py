@@ -33,7 +33,6 @@ from ahf_ros.features import frame
 from ahf_ros.filtering.identifier import identify
 from ahf_ros.synthetic.lights import benchmark_lights
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
-from ahf_ros.target import TrueTarget
 from benchmarks.confidence import logistic_regression
 from benchmarks.filter import machine
 
@@ -180,7 +179,7 @@ def searched(seeds: Sequence[int], name: str) -> list[str]:
     jobs = [(light, ambient, seed) for light, ambient in SEARCHED for seed in seeds]
     for light, ambient, seed in progress(jobs):
         scene = render(SceneSettings(light=light, ambient=ambient, seed=seed))
-        truth = [TrueTarget(target.id, target.x, target.y) for target in scene.targets]
+        truth = scene.truth
         plain = score(truth, detector(scene.image))
         cells = [f'{light} {ambient:g}', str(len(truth)), str(plain.right)]
         times = []

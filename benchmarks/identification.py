@@ -199,7 +199,7 @@ def synthetic_rows(options: argparse.Namespace, run: Identify) -> list[Row]:
     jobs = [(row, replace(scene, seed=seed)) for row, scene in rows for seed in options.seeds]
     for row, scene in track(jobs, 'scenes', console=Console(stderr=True)):
         rendering = render(scene)
-        truth = [TrueTarget(target.id, target.x, target.y) for target in rendering.targets]
+        truth = rendering.truth
         row.add(rendering.image, truth, run(rendering.image, scene.family, len(truth)))
     return [row for row, _ in rows]
 

@@ -137,7 +137,7 @@ def run_scene(scene: SceneSettings, most: int) -> list[dict[str, Any]]:
         if family not in renderings:
             renderings[family] = render(replace(scene, family=family))
         rendering = renderings[family]
-        truth = [TrueTarget(it.id, it.x, it.y) for it in rendering.targets]
+        truth = rendering.truth
         method.identify(rendering.image[:400, :400], 0, most)  # tables that are made once
         started = time.process_time()
         found, tried = method.identify(rendering.image, len(truth), most)

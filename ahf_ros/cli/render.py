@@ -12,7 +12,6 @@ from ahf_ros.interchange.files import read_truth, write_image, write_truth
 from ahf_ros.settings.nested import flat_parameters
 from ahf_ros.settings.parameter import Parameter
 from ahf_ros.synthetic.scene import SceneSettings, render
-from ahf_ros.target import TrueTarget
 
 DESCRIPTION = 'Render images of targets under projected light, with their truth.'
 
@@ -56,9 +55,7 @@ def run(options: argparse.Namespace) -> int:
             rendering = render(scene)
             name = f'{scene.light}_{scene.ambient:g}_{scene.seed}.png'
             write_image(options.folder / name, rendering.image)
-            truth[name] = tuple(
-                TrueTarget(target.id, target.x, target.y) for target in rendering.targets
-            )
+            truth[name] = rendering.truth
             write_truth(truth_path, truth)
             told = f'{options.folder / name}: {len(rendering.targets)} targets'
             print(told, file=sys.stderr)

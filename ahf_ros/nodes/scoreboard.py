@@ -68,7 +68,7 @@ class Scoreboard(ProcessNode):
             return
         self.count += 1
         found = identification(message)
-        true = [TrueTarget(item.id, item.x, item.y) for item in truth.targets]
+        true = [*map(TrueTarget.of, truth.targets)]
         print(f'image {self.count}: {line(found, true)}', flush=True)
         if image is not None:
             picture = Path(settings.pictures, f'image_{self.count}.jpg')

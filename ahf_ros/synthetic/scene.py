@@ -25,7 +25,7 @@ from ahf_ros.synthetic.lighting import paper_texture, white_light
 from ahf_ros.synthetic.lights import LIGHT_NAMES, light_pattern
 from ahf_ros.synthetic.prints import Cover, Mark, print_mark, ring_cover, square_cover
 from ahf_ros.synthetic.projector import rig_projector
-from ahf_ros.target import Target
+from ahf_ros.target import Target, TrueTarget
 
 _PROJECTOR_PIXELS = 6.4  # in the radius of a dot
 _PIXEL_DEVIATION = 12**-0.5  # of a place in a pixel, px
@@ -153,6 +153,11 @@ class Rendering:
     targets: tuple[Target, ...]
     intrinsics: np.ndarray
     settings: SceneSettings
+
+    @property
+    def truth(self) -> tuple[TrueTarget, ...]:
+        """IDs and centres of the targets, for `ahf_ros.evaluation`."""
+        return tuple(map(TrueTarget.of, self.targets))
 
 
 def render(settings: SceneSettings) -> Rendering:

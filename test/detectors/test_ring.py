@@ -27,8 +27,7 @@ def identified(image: np.ndarray, **settings: object) -> list[Target]:
 
 
 def scored(rendering: Rendering, targets: list[Target]) -> Score:
-    truth = [TrueTarget(target.id, target.x, target.y) for target in rendering.targets]
-    return score(truth, targets)
+    return score(rendering.truth, targets)
 
 
 def errors_of(figures: Score) -> list[float]:

@@ -14,7 +14,7 @@ from ahf_ros.evaluation import score
 from ahf_ros.filtering.genetic import GeneticSettings
 from ahf_ros.filtering.identifier import AdaptiveSettings, identify
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
-from ahf_ros.target import Target, TrueTarget
+from ahf_ros.target import Target
 
 pytestmark = pytest.mark.skipif(
     not hasattr(getattr(cv2, 'aruco', None), 'ArucoDetector'),
@@ -26,8 +26,7 @@ SCENE = SceneSettings(
 
 
 def scored(rendering: Rendering, targets):
-    truth = [TrueTarget(target.id, target.x, target.y) for target in rendering.targets]
-    return score(truth, targets)
+    return score(rendering.truth, targets)
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from ahf_ros.evaluation import Score, score
 from ahf_ros.filtering.homomorphic import HomomorphicFilter
 from ahf_ros.interchange.files import read_image, read_truth
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
-from ahf_ros.target import UNDECODED, Target, TrueTarget
+from ahf_ros.target import UNDECODED, Target
 
 SMALL = SceneSettings(width=640, height=480, targets=6, dot_radius=10.0, seed=3)
 PHOTOS = Path(os.environ.get('AHF_PHOTOS', Path(__file__).parents[3] / 'shared' / 'photos'))
@@ -31,8 +31,7 @@ def identified(image: np.ndarray, **settings: object) -> list[Target]:
 
 
 def scored(rendering: Rendering, targets: list[Target]) -> Score:
-    truth = [TrueTarget(target.id, target.x, target.y) for target in rendering.targets]
-    return score(truth, targets)
+    return score(rendering.truth, targets)
 
 
 @pytest.mark.parametrize('polarity', ['dark', 'bright'])
