@@ -9,7 +9,8 @@ from typing import Any
 
 from ahf_ros.cli.options import add_option
 from ahf_ros.evaluation import TOLERANCE, Score, evaluate, table, total
-from ahf_ros.interchange.files import read_results, read_truth
+from ahf_ros.interchange.target_json import read_results
+from ahf_ros.interchange.truth_files import read_truth
 from ahf_ros.settings.parameter import Parameter
 
 DESCRIPTION = 'Compare what `ahf identify --json` printed with the truth.'

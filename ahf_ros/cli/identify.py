@@ -6,9 +6,8 @@ import argparse
 import json
 import sys
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -19,7 +18,8 @@ from ahf_ros.detectors import DETECTOR, Detector, DetectorSettings, create
 from ahf_ros.detectors.ring.counting import ESTIMATE_EXPECTED, estimator
 from ahf_ros.drawing import draw, summary
 from ahf_ros.filtering.identifier import AdaptiveSettings, Estimate, identify
-from ahf_ros.interchange.files import read_image, write_image
+from ahf_ros.interchange.image_files import read_image, write_image
+from ahf_ros.interchange.target_json import to_json
 from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.target import Identification
 
@@ -84,7 +84,8 @@ def run(options: argparse.Namespace) -> int:
             image = read_image(path)
             found = _named(path, image, detector, settings, estimate)
             if options.json:
-                print(json.dumps(record(path, image, found, detector)), flush=True)
+                names = detector.family, detector.name
+                print(json.dumps(to_json(found, path, image.shape, *names)), flush=True)
             _tell(path, found, with_targets=not options.json)
             if overlays:
                 write_image(overlays[path], draw(image, found))
@@ -92,37 +93,6 @@ def run(options: argparse.Namespace) -> int:
             print(f'ahf identify: {error}', file=sys.stderr)
             failed = True
     return int(failed)
-
-
-def record(
-    path: str, image: np.ndarray, found: Identification, detector: Detector
-) -> dict[str, Any]:
-    """Return what is printed of an image as JSON.
-
-    Parameters
-    ----------
-    path : str
-        The image, as it was named on the command line.
-    image : ndarray, shape (height, width)
-    found : Identification
-    detector : Detector
-        That identified it.
-    """
-    height, width = image.shape
-    used = asdict(found.filter)
-    elapsed = used.pop('duration')
-    return {
-        'image': path,
-        'width': width,
-        'height': height,
-        'family': detector.family,
-        'detector': detector.name,
-        'expected': found.expected,
-        'estimated': found.estimated,
-        'targets': [asdict(target) for target in found.targets],
-        'filter': used,
-        'elapsed_s': elapsed,
-    }
 
 
 def _named(

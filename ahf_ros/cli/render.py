@@ -8,7 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from ahf_ros.cli.options import add_option, settings_from
-from ahf_ros.interchange.files import read_truth, write_image, write_truth
+from ahf_ros.interchange.image_files import write_image
+from ahf_ros.interchange.truth_files import read_truth, write_truth
 from ahf_ros.settings.nested import flat_parameters
 from ahf_ros.settings.parameter import Parameter
 from ahf_ros.synthetic.scene import SceneSettings, render

@@ -7,12 +7,14 @@ of the image is taken.
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
 import cv2
 import numpy as np
+
+from ahf_ros.interchange.fields import check_rows
+from ahf_ros.interchange.image_files import decode_bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,17 +116,7 @@ def decode_image(message: Any) -> np.ndarray:
         if size <= 0:
             raise ValueError(f'{name} is {size}, accepted is an integer of at least 1')
     row = message.width * encoding.size
-    if message.step < row:
-        raise ValueError(
-            f'step is {message.step}, accepted is an integer of at least {row}: '
-            f'a row of {message.width} px of {message.encoding}'
-        )
-    size = message.step * message.height
-    if len(message.data) < size:
-        raise ValueError(
-            f'data is of {len(message.data)} bytes, accepted are at least {size}: '
-            f'{message.height} rows of {message.step} bytes'
-        )
+    check_rows(message, 'step', row, f'a row of {message.width} px of {message.encoding}')
     return _finite(_gray(_samples(message, encoding), encoding))
 
 
@@ -179,16 +171,4 @@ def decode_compressed(message: Any) -> np.ndarray:
     ValueError
         If `data` is not an image.
     """
-    encoded = np.frombuffer(message.data, np.uint8)
-    flags = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
-    image = None
-    if encoded.size:
-        # It raises where the header tells of a size that it does not accept.
-        with suppress(cv2.error):
-            image = cv2.imdecode(encoded, flags)
-    if image is None:
-        raise ValueError(
-            f'data is {encoded.size} bytes of format {message.format!r} that are no image, '
-            'accepted is JPEG or PNG'
-        )
-    return image
+    return decode_bytes(message.data, f'data of format {message.format!r}')

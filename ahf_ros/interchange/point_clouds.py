@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from ahf_ros.interchange.fields import check_rows
+
 AXES = ('x', 'y', 'z')
 """The fields that a cloud must have."""
 
@@ -48,17 +50,8 @@ def organised_points(message: Any) -> np.ndarray:
         raise ValueError(f'width is {message.width}, accepted is an integer of at least 2')
     kind = _point_type(message)
     row = message.width * message.point_step
-    if message.row_step < row:
-        raise ValueError(
-            f'row_step is {message.row_step}, accepted is an integer of at least {row}: '
-            f'{message.width} points of {message.point_step} bytes'
-        )
-    size = message.height * message.row_step
-    if len(message.data) < size:
-        raise ValueError(
-            f'data is of {len(message.data)} bytes, accepted are at least {size}: '
-            f'{message.height} rows of {message.row_step} bytes'
-        )
+    points = f'a row of {message.width} points of {message.point_step} bytes'
+    check_rows(message, 'row_step', row, points)
     return np.ndarray(
         (message.height, message.width),
         kind,

@@ -1,52 +1,134 @@
-"""Targets from what programs print as JSON: `ahf identify`, and any detector of others."""
+"""Identifications as JSON: what `ahf identify --json` prints, and other programs may print."""
 
 from __future__ import annotations
 
-import math
+import json
+import sys
 from collections.abc import Iterator
+from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
-from ahf_ros.target import Target
+from ahf_ros.interchange.fields import checked_file_name, checked_integer, checked_number
+from ahf_ros.interchange.files import read_text
+from ahf_ros.target import Identification, Target
 
-_NUMBERS = ('semi_major', 'semi_minor', 'angle')
+_OPTIONAL = ('semi_major', 'semi_minor', 'angle')
 
 
-def targets_of(record: Any, where: str) -> list[Target]:
-    """Return the targets of a record.
+def to_json(
+    identification: Identification,
+    image: str,
+    shape: tuple[int, int],
+    family: str,
+    detector: str,
+) -> dict[str, Any]:
+    """Return the JSON object of an identification.
 
     Parameters
     ----------
-    record : dict
-        With the list 'targets', each of which has 'id', 'x' and 'y', and what else `Target` has
-        where it is known.
-    where : str
-        What the record is, for messages.
+    identification : Identification
+        What was identified.
+    image : str
+        Path of the image, as the user wrote it.
+    shape : tuple of int
+        Height and width of the image, px.
+    family : str
+        Name of the family of targets.
+    detector : str
+        Name of the detector.
+    """
+    height, width = shape
+    used = asdict(identification.filter)
+    elapsed = used.pop('duration')
+    return {
+        'image': image,
+        'width': width,
+        'height': height,
+        'family': family,
+        'detector': detector,
+        'expected': identification.expected,
+        'estimated': identification.estimated,
+        'targets': [asdict(target) for target in identification.targets],
+        'filter': used,
+        'elapsed_s': elapsed,
+    }
+
+
+def targets_from_json(content: Any, name: str) -> list[Target]:
+    """Return the targets of a JSON object.
+
+    Parameters
+    ----------
+    content : dict
+        Has the list 'targets'. Each of them has 'id', 'x' and 'y' and may have the other fields
+        of `Target`.
+    name : str
+        What errors call the object.
 
     Raises
     ------
     ValueError
-        If the record is not like that, or a number is not finite; the message names the field.
+        If the object is not like that or a number is not finite; the message names the field.
     """
-    if not isinstance(record, dict) or not isinstance(record.get('targets'), list):
-        raise ValueError(f'{where} is not an object with a list of targets')
-    return list(_targets(record['targets'], where))
+    if not isinstance(content, dict) or not isinstance(content.get('targets'), list):
+        raise ValueError(f'{name} is not an object with a list of targets')
+    return list(_targets(content['targets'], name))
 
 
-def _targets(records: list[Any], where: str) -> Iterator[Target]:
-    for record in records:
-        if not isinstance(record, dict):
-            raise ValueError(f'{where}: target is {record!r}, accepted is an object')
-        known = {
-            name: checked_number(record.get(name, 0), f'{where}: {name}') for name in _NUMBERS
+def read_results(path: str | Path) -> dict[str, tuple[Target, ...]]:
+    """Return what was identified, from the output of `ahf identify --json`.
+
+    Parameters
+    ----------
+    path : str or Path
+        A JSON object a line with 'image' and 'targets', of which 'id', 'x' and 'y' are required;
+        empty lines are ignored. '-' stands for standard input.
+
+    Returns
+    -------
+    dict of str to tuple of Target
+        By the name of the image, without folders.
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be read, a line is not as described, or two lines are about images of
+        the same name; the message names both.
+    """
+    results: dict[str, tuple[Target, ...]] = {}
+    text = sys.stdin.read() if path == '-' else read_text(path)
+    for number, line in enumerate(text.splitlines(), start=1):
+        if not line.strip():
+            continue
+        where = f'{path}, line {number}'
+        try:
+            content = json.loads(line)
+        except json.JSONDecodeError as error:
+            raise ValueError(f'{where} is not JSON: {error.msg}') from error
+        targets = tuple(targets_from_json(content, where))
+        image = checked_file_name(content.get('image'), f'{where}: image')
+        if image in results:
+            raise ValueError(f'{where}: {image} was on an earlier line, accepted is one an image')
+        results[image] = targets
+    return results
+
+
+def _targets(items: list[Any], name: str) -> Iterator[Target]:
+    for item in items:
+        if not isinstance(item, dict):
+            raise ValueError(f'{name}: target is {item!r}, accepted is an object')
+        optional = {
+            field: checked_number(item.get(field, 0), f'{name}: {field}') for field in _OPTIONAL
         }
         yield Target(
-            id=checked_integer(record.get('id'), f'{where}: id'),
-            code=checked_integer(record.get('code', 0), f'{where}: code'),
-            x=checked_number(record.get('x'), f'{where}: x'),
-            y=checked_number(record.get('y'), f'{where}: y'),
-            confidence=checked_number(record.get('confidence', 1), f'{where}: confidence'),
-            covariance=_covariance(record.get('covariance', [0] * 4), f'{where}: covariance'),
-            **known,
+            id=checked_integer(item.get('id'), f'{name}: id'),
+            code=checked_integer(item.get('code', 0), f'{name}: code'),
+            x=checked_number(item.get('x'), f'{name}: x'),
+            y=checked_number(item.get('y'), f'{name}: y'),
+            confidence=checked_number(item.get('confidence', 1), f'{name}: confidence'),
+            covariance=_covariance(item.get('covariance', [0] * 4), f'{name}: covariance'),
+            **optional,
         )
 
 
@@ -55,25 +137,3 @@ def _covariance(value: Any, name: str) -> tuple[float, float, float, float]:
         raise ValueError(f'{name} is {value!r}, accepted is a list of four numbers')
     first, second, third, fourth = (checked_number(element, name) for element in value)
     return first, second, third, fourth
-
-
-def checked_integer(value: Any, name: str) -> int:
-    """Return a value as an integer, or raise a ValueError that calls it `name`."""
-    try:
-        number = int(value)
-    except (OverflowError, TypeError, ValueError) as error:
-        raise ValueError(f'{name} is {value!r}, accepted is an integer') from error
-    if isinstance(value, float) and number != value:
-        raise ValueError(f'{name} is {value!r}, accepted is an integer')
-    return number
-
-
-def checked_number(value: Any, name: str) -> float:
-    """Return a value as a finite number, or raise a ValueError that calls it `name`."""
-    try:
-        number = float(value)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f'{name} is {value!r}, accepted is a number') from error
-    if not math.isfinite(number):
-        raise ValueError(f'{name} is {value!r}, accepted is a finite number')
-    return number

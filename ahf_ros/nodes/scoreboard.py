@@ -12,7 +12,7 @@ from std_msgs.msg import Header
 
 from ahf_ros.drawing import draw, summary
 from ahf_ros.evaluation import FALSE, WRONG, judge, score
-from ahf_ros.interchange.files import write_image
+from ahf_ros.interchange.image_files import write_image
 from ahf_ros.interchange.image_messages import decode_image
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.parameters import ParameterSettings

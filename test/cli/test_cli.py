@@ -13,7 +13,8 @@ import pytest
 
 from ahf_ros.cli import main
 from ahf_ros.cli.identify import IdentifySettings
-from ahf_ros.interchange.files import read_image, read_truth, write_image
+from ahf_ros.interchange.image_files import read_image, write_image
+from ahf_ros.interchange.truth_files import read_truth
 from ahf_ros.settings.nested import flat_parameters
 from ahf_ros.synthetic.scene import SceneSettings
 

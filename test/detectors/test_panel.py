@@ -15,7 +15,9 @@ import pytest
 from ahf_ros.detectors import DetectorSettings
 from ahf_ros.detectors.ring.counting import estimate_count
 from ahf_ros.evaluation import FALSE, evaluate, judge, total
-from ahf_ros.interchange.files import read_image, read_results, read_truth
+from ahf_ros.interchange.image_files import read_image
+from ahf_ros.interchange.target_json import read_results
+from ahf_ros.interchange.truth_files import read_truth
 from ahf_ros.target import Truth
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -16,7 +16,8 @@ from ahf_ros.codes.ring import FAMILY_NAMES
 from ahf_ros.detectors import DetectorSettings, create
 from ahf_ros.evaluation import Score, score
 from ahf_ros.filtering.homomorphic import HomomorphicFilter
-from ahf_ros.interchange.files import read_image, read_truth
+from ahf_ros.interchange.image_files import read_image
+from ahf_ros.interchange.truth_files import read_truth
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 from ahf_ros.target import UNDECODED, Target
 

@@ -81,10 +81,10 @@ def test_points_are_not_copied() -> None:
             'offset of y is 17, accepted is an integer of at most point_step, 20, less 4 bytes',
         ),
         ({'row_step': 79}, 'row_step is 79, accepted is an integer of at least 80'),
-        ({'data': bytes(239)}, 'data is of 239 bytes, accepted are at least 240'),
+        ({'data': bytes(239)}, 'data has 239 bytes, accepted are at least 240'),
         (
             {'height': 2**32 - 1, 'row_step': 2**32 - 1},
-            f'data is of 240 bytes, accepted are at least {(2**32 - 1) ** 2}',
+            f'data has 240 bytes, accepted are at least {(2**32 - 1) ** 2}',
         ),
         (
             {'width': 2**32 - 1},

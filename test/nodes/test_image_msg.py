@@ -62,11 +62,11 @@ def test_data_may_be_longer_than_the_rows() -> None:
         ({'step': 3}, 'step is 3, accepted is an integer of at least 4'),
         ({'step': 0}, 'step is 0, accepted is an integer of at least 4'),
         ({'encoding': 'bgr8'}, 'step is 4, accepted is an integer of at least 12'),
-        ({'data': GRAY.tobytes()[:-1]}, 'data is of 11 bytes, accepted are at least 12'),
-        ({'data': b''}, 'data is of 0 bytes, accepted are at least 12'),
+        ({'data': GRAY.tobytes()[:-1]}, 'data has 11 bytes, accepted are at least 12'),
+        ({'data': b''}, 'data has 0 bytes, accepted are at least 12'),
         (
             {'height': 2**32 - 1, 'width': 2**32 - 1, 'step': 2**32 - 1},
-            'data is of 12 bytes, accepted are at least 18446744065119617025',
+            'data has 12 bytes, accepted are at least 18446744065119617025',
         ),
     ],
 )

@@ -30,7 +30,7 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
-from ahf_ros.interchange.files import read_image
+from ahf_ros.interchange.image_files import read_image
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.nodes.settings import DetectorNodeSettings
@@ -240,7 +240,7 @@ def test_what_is_refused_is_counted_and_the_node_goes_on(
     refused: list[Header] = []
     for count, bad, error in (
         (1, Image(header=header(), encoding='8SC1', height=4, width=4), "encoding is '8SC1'"),
-        (2, short, 'data is of 10000 bytes, accepted are at least 20000'),
+        (2, short, 'data has 10000 bytes, accepted are at least 20000'),
         (3, flat, 'image is constant, 0 everywhere'),
     ):
         detector.image.publish(bad)

@@ -202,7 +202,7 @@ def test_bad_clouds_are_named_and_the_node_goes_on(
     nameless.fields = nameless.fields[:2]
     bad = [
         (flat, 'height is 1, accepted is an integer of at least 2'),
-        (short, 'data is of 92160 bytes, accepted are at least 102400'),
+        (short, 'data has 92160 bytes, accepted are at least 102400'),
         (huge, 'row_step is 4294967295, accepted is an integer of at least 68719476720'),
         (nameless, "fields are 'x', 'y', accepted are those with x, y and z"),
         (PointCloud2(header=header()), 'height is 0, accepted'),

@@ -17,7 +17,7 @@ import numpy as np
 
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.imaging.image import as_gray, check_image
-from ahf_ros.interchange.target_json import targets_of
+from ahf_ros.interchange.target_json import targets_from_json
 from ahf_ros.target import Target
 
 LARGEST_OUTPUT = 64 * 2**20
@@ -78,7 +78,7 @@ class CommandDetector:
             raise ValueError(
                 f'{self._named} printed {told!r}, accepted is JSON: {error}'
             ) from error
-        targets = targets_of(record, self._named)
+        targets = targets_from_json(record, self._named)
         return sorted(targets, key=lambda target: (target.id, target.y, target.x))
 
     @property

@@ -1,0 +1,60 @@
+"""Fields of records and messages, checked; every error names the field."""
+
+from __future__ import annotations
+
+import math
+from pathlib import PurePath
+from typing import Any
+
+
+def checked_integer(value: Any, name: str) -> int:
+    """Return a value as an integer, or raise a ValueError that calls it `name`."""
+    try:
+        number = int(value)
+    except (OverflowError, TypeError, ValueError) as error:
+        raise ValueError(f'{name} is {value!r}, accepted is an integer') from error
+    if isinstance(value, float) and number != value:
+        raise ValueError(f'{name} is {value!r}, accepted is an integer')
+    return number
+
+
+def checked_number(value: Any, name: str) -> float:
+    """Return a value as a finite number, or raise a ValueError that calls it `name`."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f'{name} is {value!r}, accepted is a number') from error
+    if not math.isfinite(number):
+        raise ValueError(f'{name} is {value!r}, accepted is a finite number')
+    return number
+
+
+def checked_file_name(value: Any, name: str) -> str:
+    """Return the file name of a path without folders, or raise a ValueError that names it."""
+    if not isinstance(value, str) or not PurePath(value).name:
+        raise ValueError(f'{name} is {value!r}, accepted is the name of a file')
+    return PurePath(value).name
+
+
+def check_rows(message: Any, step: str, minimum: int, row: str) -> None:
+    """Raise a ValueError unless a message has the bytes of all its rows.
+
+    Parameters
+    ----------
+    message : sensor_msgs/Image or sensor_msgs/PointCloud2
+    step : str
+        Name of the field that holds the distance of two rows, bytes.
+    minimum : int
+        Bytes that a row takes without padding.
+    row : str
+        What is in a row, for the error.
+    """
+    value = getattr(message, step)
+    if value < minimum:
+        raise ValueError(f'{step} is {value}, accepted is an integer of at least {minimum}: {row}')
+    size = message.height * value
+    if len(message.data) < size:
+        raise ValueError(
+            f'data has {len(message.data)} bytes, accepted are at least {size}: '
+            f'{message.height} rows of {value} bytes'
+        )

@@ -1,0 +1,107 @@
+"""Images in files, and images that are encoded as in files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from ahf_ros.interchange.files import file_errors, read_bytes
+
+SUFFIXES = ('.bmp', '.jpeg', '.jpg', '.png', '.tif', '.tiff')
+"""Endings of the image files that are tested; others are tried."""
+
+
+def read_image(path: str | Path) -> np.ndarray:
+    """Return the image in a file as gray values.
+
+    Colour is converted to gray and transparency is ignored. The orientation that a camera notes
+    in the file is not applied: the pixels are those of the sensor.
+
+    Parameters
+    ----------
+    path : str or Path
+        A PNG, JPEG, TIFF or BMP file, or another that OpenCV reads.
+
+    Returns
+    -------
+    ndarray of uint8, uint16, float32 or float64, shape (height, width)
+
+    Raises
+    ------
+    ValueError
+        If the file is missing, a folder, empty, unreadable or not an image; the message names it.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_image(f'{folder}/ramp.png', np.arange(400, dtype=np.uint16).reshape(20, 20))
+    ...     image = read_image(f'{folder}/ramp.png')
+    >>> image.shape, image.dtype, int(image[-1, -1])
+    ((20, 20), dtype('uint16'), 399)
+    """
+    return decode_bytes(read_bytes(path), str(path))
+
+
+def decode_bytes(encoded: bytes, name: str) -> np.ndarray:
+    """Return the gray values of an encoded image, as `read_image` does.
+
+    Parameters
+    ----------
+    encoded : bytes, or another object with a buffer
+        Content of an image file.
+    name : str
+        What errors call it.
+
+    Raises
+    ------
+    ValueError
+        If `encoded` is empty or not an image.
+    """
+    content = np.frombuffer(encoded, np.uint8)
+    if not content.size:
+        raise ValueError(f'{name} is empty, accepted is an image')
+    flags = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
+    try:
+        image = cv2.imdecode(content, flags)
+    except cv2.error as error:  # for instance if the header says that the image is too large
+        raise ValueError(f'{name} cannot be decoded: {error.err}') from error
+    if image is None:
+        raise ValueError(
+            f'{name} is not an image, or is damaged; accepted is one of {", ".join(SUFFIXES)}'
+        )
+    return image
+
+
+def write_image(path: str | Path, image: np.ndarray) -> None:
+    """Write an image in the format that the ending of the file name chooses.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file; an existing one is replaced, a missing folder is created.
+    image : ndarray of uint8 or uint16, shape (height, width) or (height, width, 3)
+        Gray values, or colours in the order blue, green, red.
+
+    Raises
+    ------
+    ValueError
+        If the format is unknown or the file cannot be written; the message names the file.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_image(Path(folder, 'black.png'), np.zeros((20, 30), np.uint8))
+    ...     print(*(file.name for file in Path(folder).iterdir()))
+    black.png
+    """
+    path = Path(path)
+    if path.suffix.lower() not in SUFFIXES:
+        raise ValueError(f'{path} has an unknown format, accepted is one of {", ".join(SUFFIXES)}')
+    _, encoded = cv2.imencode(path.suffix, image)
+    with file_errors(path, 'written'):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(encoded.tobytes())

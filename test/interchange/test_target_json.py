@@ -1,0 +1,63 @@
+"""Identifications as JSON; every line that cannot be used is named."""
+
+from __future__ import annotations
+
+import io
+import json
+
+import pytest
+
+from ahf_ros.interchange.target_json import read_results, targets_from_json, to_json
+from ahf_ros.target import FilterState, Identification, Target
+
+
+def test_what_becomes_json_is_read_again():
+    covariance = (0.1, 0.01, 0.01, 0.2)
+    target = Target(7, 19, 1.25, 2.5, 20.0, 18.0, 0.3, 0.9, covariance)
+    found = Identification((target,), 4, FilterState(True, 2.0, 0.5, 80.0, 1.5, 9, 1, 0.25), True)
+    printed = json.loads(json.dumps(to_json(found, 'in/a.png', (30, 20), 'ring12', 'ring')))
+    assert targets_from_json(printed, 'record') == [target]
+    assert (printed['width'], printed['height']) == (20, 30)
+    assert (printed['elapsed_s'], printed['filter']['evaluations']) == (0.25, 9)
+
+
+def test_results_need_only_ids_and_places(tmp_path):
+    lines = [
+        json.dumps({'image': 'in/a.png', 'targets': [{'id': 4, 'x': 1.5, 'y': 2}]}),
+        '',
+        json.dumps({'image': 'b.png', 'targets': [], 'more': 1}),
+    ]
+    (tmp_path / 'results.jsonl').write_text('\n'.join(lines))
+    results = read_results(tmp_path / 'results.jsonl')
+    assert list(results) == ['a.png', 'b.png']
+    (target,) = results['a.png']
+    assert (target.id, target.x, target.y) == (4, 1.5, 2.0)
+
+
+def test_results_from_standard_input(monkeypatch):
+    monkeypatch.setattr('sys.stdin', io.StringIO('{"image": "a.png", "targets": []}\n'))
+    assert read_results('-') == {'a.png': ()}
+
+
+@pytest.mark.parametrize(
+    ('line', 'message'),
+    [
+        ('{"image": ', 'line 1 is not JSON'),
+        ('[]', 'line 1 is not an object with a list of targets'),
+        ('{"image": "a", "targets": {}}', 'line 1 is not an object with a list of targets'),
+        ('{"targets": []}', 'line 1: image is None, accepted is the name of a file'),
+        ('{"image": "a", "targets": [3]}', 'line 1: target is 3, accepted is an object'),
+        ('{"image": "a", "targets": [{"id": 1, "x": 2}]}', 'line 1: y is None'),
+        ('{"image": "a", "targets": [{"id": 1.5, "x": 2, "y": 3}]}', 'line 1: id is 1.5'),
+        ('{"image": "a", "targets": [{"id": 1, "x": NaN, "y": 3}]}', 'line 1: x is nan'),
+        (
+            '{"image": "a", "targets": []}\n{"image": "b/a", "targets": []}',
+            'line 2: a was on',
+        ),
+    ],
+)
+def test_results_that_cannot_be_used_are_named(tmp_path, line, message):
+    (tmp_path / 'results.jsonl').write_text(line)
+    with pytest.raises(ValueError, match=message) as caught:
+        read_results(tmp_path / 'results.jsonl')
+    assert str(tmp_path / 'results.jsonl') in str(caught.value)

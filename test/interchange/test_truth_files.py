@@ -1,0 +1,53 @@
+"""Truth in CSV files; every file and line that cannot be used is named."""
+
+from __future__ import annotations
+
+import pytest
+
+from ahf_ros.interchange.truth_files import read_truth, write_truth
+from ahf_ros.target import TrueTarget
+
+
+def test_truth_that_is_written_is_read(tmp_path):
+    truth = {
+        'a.png': (TrueTarget(3, 1.25, 2.5), TrueTarget(7, 100.1234, 3.0, confirmed=False)),
+        'b.png': (TrueTarget(1, 0.0, 0.0),),
+    }
+    write_truth(tmp_path / 'truth.csv', truth)
+    assert read_truth(tmp_path / 'truth.csv') == truth
+
+
+def test_truth_in_another_order_with_folders_and_no_confirmed(tmp_path):
+    (tmp_path / 'truth.csv').write_text('\ufeffid,y,x,image,note\n5,2,1,in/a.png,?\n', 'utf-8')
+    assert read_truth(tmp_path / 'truth.csv') == {'a.png': (TrueTarget(5, 1.0, 2.0),)}
+
+
+@pytest.mark.parametrize(
+    ('text', 'message'),
+    [
+        ('image,id,x\n', 'has no column y'),
+        ('', 'has no column id, image, x, y'),
+        ('image,id,x,y\na.png,1,2,far\n', "line 2: y is 'far', accepted is a number"),
+        ('image,id,x,y\na.png,1,nan,2\n', "line 2: x is 'nan', accepted is a finite number"),
+        ('image,id,x,y\na.png,one,1,2\n', "line 2: id is 'one', accepted is an integer"),
+        ('image,id,x,y\na.png,1\n', 'line 2: x is None, accepted is a number'),
+        ('image,id,x,y\n,1,2,3\n', "line 2: image is '', accepted is the name of a file"),
+        ('image,id,x,y\ni/a,1,2,3\nj/a,1,2,3\n', 'line 3: a is in two folders'),
+    ],
+)
+def test_truth_that_cannot_be_used_is_named(tmp_path, text, message):
+    (tmp_path / 'truth.csv').write_text(text)
+    with pytest.raises(ValueError, match=message) as caught:
+        read_truth(tmp_path / 'truth.csv')
+    assert str(tmp_path / 'truth.csv') in str(caught.value)
+
+
+def test_truth_that_is_no_text_is_named(tmp_path):
+    (tmp_path / 'image.png').write_bytes(b'\x89PNG\r\n\xff')
+    with pytest.raises(ValueError, match=r'image.png is not in UTF-8'):
+        read_truth(tmp_path / 'image.png')
+
+
+def test_truth_that_cannot_be_written_is_named(tmp_path):
+    with pytest.raises(ValueError, match=r'truth.csv cannot be written: No such file'):
+        write_truth(tmp_path / 'nowhere' / 'truth.csv', {})
