@@ -15,7 +15,7 @@ from ahf_ros.detectors import DETECTOR_NAMES, create
 from ahf_ros.evaluation import score
 from ahf_ros.filtering.genes import EXTENDED, PUBLISHED, TuningSettings
 from ahf_ros.filtering.identifier import AdaptiveSettings, identify
-from ahf_ros.synthetic.lights import LIGHT_NAMES
+from ahf_ros.synthetic.patterns import LIGHT_NAMES
 from ahf_ros.synthetic.scene import SceneSettings, render
 
 AMBIENTS = (0.3, 0.12)

@@ -20,7 +20,7 @@ from ahf_ros.codes.ring import FAMILY_NAMES, family
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.ring.decoding import OF_TARGET, canonical, confidence
 from ahf_ros.detectors.ring.detector import RingDetector
-from ahf_ros.synthetic.lights import LIGHT_NAMES, benchmark_lights
+from ahf_ros.synthetic.patterns import LIGHT_NAMES, benchmark_lights
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 
 NEAR = 5.0

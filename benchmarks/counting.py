@@ -31,7 +31,7 @@ from ahf_ros.detectors.ring.detector import RingDetector
 from ahf_ros.evaluation import score
 from ahf_ros.features import frame
 from ahf_ros.filtering.identifier import identify
-from ahf_ros.synthetic.lights import benchmark_lights
+from ahf_ros.synthetic.patterns import benchmark_lights
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 from benchmarks.confidence import logistic_regression
 from benchmarks.filter import machine

@@ -35,7 +35,7 @@ from ahf_ros.evaluation import RIGHT, Score, judge, score, total
 from ahf_ros.filtering.identifier import AdaptiveSettings, identify
 from ahf_ros.interchange.image_files import read_image
 from ahf_ros.interchange.truth_files import read_truth
-from ahf_ros.synthetic.lights import LIGHT_NAMES, benchmark_lights
+from ahf_ros.synthetic.patterns import LIGHT_NAMES, benchmark_lights
 from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import Target, TrueTarget
 from benchmarks.filter import machine

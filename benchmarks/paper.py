@@ -40,7 +40,7 @@ from ahf_ros.filtering.genes import EXTENDED, PUBLISHED, TuningSettings
 from ahf_ros.filtering.genetic import GeneticSettings
 from ahf_ros.filtering.identifier import AdaptiveIdentifier, AdaptiveSettings
 from ahf_ros.filtering.trials import AnyDetector
-from ahf_ros.synthetic.lights import LIGHT_NAMES
+from ahf_ros.synthetic.patterns import LIGHT_NAMES
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 from ahf_ros.target import Identification, Target, TrueTarget, count_codes
 from benchmarks.filter import machine
@@ -83,7 +83,7 @@ class Method:
     ) -> tuple[Identification, list[int]]:
         """Return what an image shows, and n of every identification that was tried for it.
 
-        Places are taken from the image as it is, whatever the detector saw.
+        Placements are taken from the image as it is, whatever the detector saw.
         """
         detector = create(self.detector, TARGETS)
         refine = getattr(detector, 'refine', None)

@@ -13,7 +13,7 @@ from typing import Any
 from ahf_ros.nodes.settings import DetectorNodeSettings
 from ahf_ros.settings.nested import flat_parameters
 from ahf_ros.settings.parameter import Parameter
-from ahf_ros.synthetic.lights import LIGHT_NAMES
+from ahf_ros.synthetic.patterns import LIGHT_NAMES
 
 ROOT = Path(__file__).resolve().parent.parent
 README = ROOT / 'README.md'

@@ -17,7 +17,7 @@ from ahf_ros.bag.definitions import (
     message_types,
     typestore,
 )
-from ahf_ros.bag.journal import Answer, Frame
+from ahf_ros.bag.journal import Entry, Output
 from ahf_ros.bag.source import Source
 from ahf_ros.detectors import DETECTOR, DetectorSettings, create
 from ahf_ros.detectors.ring.counting import estimator
@@ -96,10 +96,10 @@ class Answering:
 
     def answer(
         self, connection: Connection, timestamp: int, data: bytes
-    ) -> tuple[Frame, list[Answer]]:
+    ) -> tuple[Entry, list[Output]]:
         """Return what becomes of an image, and the messages about it."""
         topic = connection.topic
-        answers: list[Answer] = []
+        answers: list[Output] = []
         reason = ''
         try:
             answers = self._messages(connection, data)
@@ -109,13 +109,13 @@ class Answering:
             # The others go on, whatever an image does to a decoder or a detector.
             reason = f'{type(error).__name__}: {error}'
         memory = self._identifiers[topic].memory
-        return Frame(topic, timestamp, memory, reason), answers
+        return Entry(topic, timestamp, memory, reason), answers
 
-    def resume(self, frame: Frame) -> None:
+    def resume(self, entry: Entry) -> None:
         """Go on as if an image had just been answered."""
-        self._identifiers[frame.topic].memory = frame.memory
+        self._identifiers[entry.topic].memory = entry.memory
 
-    def _messages(self, connection: Connection, data: bytes) -> list[Answer]:
+    def _messages(self, connection: Connection, data: bytes) -> list[Output]:
         received = self._source.deserialize(connection, data)
         image = DECODERS[connection.msgtype](received)
         found = self._identifiers[connection.topic].identify(image, self._expected)
@@ -130,7 +130,7 @@ class Answering:
             answers.append(self._serialized(topics.debug_image, COMPRESSED_IMAGE, drawn))
         return answers
 
-    def _serialized(self, topic: str, kind: str, message: Any) -> Answer:
+    def _serialized(self, topic: str, kind: str, message: Any) -> Output:
         return topic, bytes(self._store.serialize_cdr(message, kind))
 
     def _header(self, received: Any) -> Any:

@@ -47,7 +47,7 @@ _EMPTY = f'{0:09}-0{_SUFFIX}'
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class Entry:
     """What became of an image.
 
     Attributes
@@ -68,7 +68,7 @@ class Frame:
     reason: str
 
 
-Answer = tuple[str, bytes]
+Output = tuple[str, bytes]
 """A topic and a message for it."""
 
 _Row = tuple[str, int, bytes]  # topic, time in ns, message
@@ -111,7 +111,7 @@ class Journal:
 
     Attributes
     ----------
-    frames : list of Frame
+    entries : list of Entry
         Of all images so far, in their order.
     """
 
@@ -122,18 +122,18 @@ class Journal:
         self._parts: list[str] = self._content[_INFORMATION]['relative_file_paths']
         self._remove_others()
         self._counts: Counter[str] = Counter()
-        self.frames: list[Frame] = []
+        self.entries: list[Entry] = []
         for topic, _, data in self._rows(self._parts):
             self._counts[topic] += 1
             if topic == PROGRESS:
-                self.frames.append(self._frame(data))
+                self.entries.append(self._entry(data))
 
-    def append(self, frame: Frame, answers: Sequence[Answer]) -> None:
+    def append(self, entry: Entry, answers: Sequence[Output]) -> None:
         """Write what became of an image, and the messages about it, all or nothing."""
-        rows = [(topic, frame.timestamp, data) for topic, data in answers]
-        rows.append((PROGRESS, frame.timestamp, self._serialized(frame)))
-        self._parts.append(self._write_part(len(self.frames), 1, rows))
-        self.frames.append(frame)
+        rows = [(topic, entry.timestamp, data) for topic, data in answers]
+        rows.append((PROGRESS, entry.timestamp, self._serialized(entry)))
+        self._parts.append(self._write_part(len(self.entries), 1, rows))
+        self.entries.append(entry)
         self._counts.update(topic for topic, _, _ in rows)
         while len(last := self._parts[-JOINED:]) == JOINED and len(set(map(_size, last))) == 1:
             joined = self._write_part(_first(last[0]), JOINED * _size(last[0]), self._rows(last))
@@ -141,15 +141,15 @@ class Journal:
         self._write_metadata()
         self._remove_others()
 
-    def answers(self) -> Iterator[tuple[Frame, list[Answer]]]:
+    def answers(self) -> Iterator[tuple[Entry, list[Output]]]:
         """Yield every image with the messages about it, in their order."""
-        frames = iter(self.frames)
-        answers: list[Answer] = []
+        entries = iter(self.entries)
+        answers: list[Output] = []
         for topic, _, data in self._rows(self._parts):
             if topic != PROGRESS:
                 answers.append((topic, data))
                 continue
-            yield next(frames), answers
+            yield next(entries), answers
             answers = []
 
     def _write_part(self, first: int, size: int, rows: Iterable[_Row]) -> str:
@@ -179,20 +179,20 @@ class Journal:
                     'JOIN topics ON topics.id = messages.topic_id ORDER BY messages.id'
                 )
 
-    def _serialized(self, frame: Frame) -> bytes:
-        text = self._store.types[_STRING](data=json.dumps(asdict(frame)))
+    def _serialized(self, entry: Entry) -> bytes:
+        text = self._store.types[_STRING](data=json.dumps(asdict(entry)))
         return bytes(self._store.serialize_cdr(text, _STRING))
 
-    def _frame(self, data: bytes) -> Frame:
+    def _entry(self, data: bytes) -> Entry:
         text: Any = self._store.deserialize_cdr(data, _STRING)
         fields = json.loads(text.data)
         memory = {name: value and tuple(value) for name, value in fields['memory'].items()}
-        return Frame(**fields | {'memory': Memory(**memory)})
+        return Entry(**fields | {'memory': Memory(**memory)})
 
     def _write_metadata(self) -> None:
         """Say which files count, how many messages there are and when."""
         about = self._content[_INFORMATION]
-        times = [frame.timestamp for frame in self.frames]
+        times = [entry.timestamp for entry in self.entries]
         about['starting_time'] = {'nanoseconds_since_epoch': min(times)}
         about['duration'] = {'nanoseconds': max(times) - min(times)}
         about['message_count'] = sum(self._counts.values())

@@ -23,7 +23,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
 from ahf_ros.bag.answering import Answering, AnswerTopics
 from ahf_ros.bag.copying import Copy
 from ahf_ros.bag.definitions import typestore
-from ahf_ros.bag.journal import METADATA, VERSION, Frame, Journal, begin, custom_data, remove_parts
+from ahf_ros.bag.journal import METADATA, VERSION, Entry, Journal, begin, custom_data, remove_parts
 from ahf_ros.bag.source import Source
 from ahf_ros.detectors import DETECTOR, DetectorSettings
 from ahf_ros.filtering.identifier import AdaptiveSettings
@@ -135,8 +135,8 @@ def _made(
     """Make the bag from its journal."""
     journal = Journal(task.target)
     _answer_images(task, source, topics, journal, report)
-    refused = sum(bool(frame.reason) for frame in journal.frames)
-    outcome = Outcome(len(journal.frames), refused, source.cut)
+    refused = sum(bool(entry.reason) for entry in journal.entries)
+    outcome = Outcome(len(journal.entries), refused, source.cut)
     _assemble(task, source, topics, journal, outcome)
     return outcome
 
@@ -222,23 +222,23 @@ def _answer_images(
         task.adaptive,
     )
     total = sum(item.msgcount for item in source.connections if item.topic in topics)
-    earlier = list(journal.frames)
+    earlier = list(journal.entries)
     for number, (connection, timestamp, data) in enumerate(source.messages(topics)):
         if number < len(earlier):
-            frame = earlier[number]
-            _check_frame(task, frame, connection.topic, timestamp)
-            answering.resume(frame)
+            entry = earlier[number]
+            _check_entry(task, entry, connection.topic, timestamp)
+            answering.resume(entry)
         else:
-            frame, answers = answering.answer(connection, timestamp, data)
-            journal.append(frame, answers)
-        report(number + 1, total, _refusal(frame))
+            entry, answers = answering.answer(connection, timestamp, data)
+            journal.append(entry, answers)
+        report(number + 1, total, _refusal(entry))
 
 
-def _refusal(frame: Frame) -> str:
-    if not frame.reason:
+def _refusal(entry: Entry) -> str:
+    if not entry.reason:
         return ''
-    seconds, nanoseconds = divmod(frame.timestamp, 10**9)
-    return f'{frame.topic} at {seconds}.{nanoseconds:09} s: {frame.reason}'
+    seconds, nanoseconds = divmod(entry.timestamp, 10**9)
+    return f'{entry.topic} at {seconds}.{nanoseconds:09} s: {entry.reason}'
 
 
 def _assemble(
@@ -261,12 +261,12 @@ def _assemble(
             for to in topics.values()
             for name, kind in to.types.items()
         }
-        frames = journal.answers()
+        entries = journal.answers()
         for connection, timestamp, data in source.messages():
             copy.write(connection, timestamp, data)
             if connection.topic in topics:
-                frame, answers = next(frames)
-                _check_frame(task, frame, connection.topic, timestamp)
+                entry, answers = next(entries)
+                _check_entry(task, entry, connection.topic, timestamp)
                 for name, message in answers:
                     writer.write(answered[name], timestamp, message)
     for file in sorted(bag.iterdir(), key=lambda file: file.name == METADATA):
@@ -274,8 +274,8 @@ def _assemble(
         file.replace(task.target / file.name)
 
 
-def _check_frame(task: BagTask, frame: Frame, topic: str, timestamp: int) -> None:
-    if (frame.topic, frame.timestamp) != (topic, timestamp):
+def _check_entry(task: BagTask, entry: Entry, topic: str, timestamp: int) -> None:
+    if (entry.topic, entry.timestamp) != (topic, timestamp):
         raise ValueError(f'{task.source} is not the bag that {task.target} was begun with')
 
 

@@ -18,7 +18,7 @@ from ament_index_python.packages import PackageNotFoundError, get_package_share_
 from ahf_ros.detectors import DETECTOR, DETECTOR_NAMES
 from ahf_ros.nodes.process import run
 from ahf_ros.nodes.scoreboard import Scoreboard
-from ahf_ros.synthetic.lights import LIGHT_NAMES
+from ahf_ros.synthetic.patterns import LIGHT_NAMES
 from ahf_ros.synthetic.scene import SceneSettings
 
 PATIENCE = 180.0

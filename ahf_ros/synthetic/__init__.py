@@ -1,1 +1,1 @@
-"""Images of walls of targets whose truth is known exactly."""
+"""Synthetic images of coded targets on a wall, with exact truth."""

@@ -1,7 +1,7 @@
-"""A pinhole camera before a wall, and its sensor.
+"""A pinhole camera in front of a wall, and its sensor.
 
-Lengths on the wall are in units that the camera images as one pixel at the principal point of a
-wall without tilt. The wall has x to the right and y down, as seen by that camera.
+The unit of length on the wall is what the camera sees as one pixel at the principal point when
+the wall is not tilted. On the wall, x points right and y down, as that camera sees it.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-_NEWTON_STEPS = 20
+_NEWTON_STEPS = 20  # at most; the strongest accepted distortion takes 6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Camera:
-    """A camera that looks at the wall z = 0.
+    """A camera looking at the wall z = 0.
 
     Attributes
     ----------
@@ -26,10 +26,10 @@ class Camera:
     intrinsics : ndarray of float64, shape (3, 3)
         K, for pixel (0, 0) at the centre of the first pixel.
     distortion : float
-        k1 of Brown's radial distortion: a ray (x, y) is seen at (x, y) (1 + k1 (x^2 + y^2)).
+        k1 of Brown's radial distortion: the ray (x, y) appears at (x, y) (1 + k1 (x^2 + y^2)).
     pose : ndarray of float64, shape (3, 3)
-        Homography from the wall (x, y, 1) to rays (x, y, 1), to scale; its third row gives the
-        depth.
+        Homography from the wall (x, y, 1) to rays (x, y, 1). Its scale is such that the third
+        row gives the depth.
     """
 
     width: int
@@ -39,13 +39,13 @@ class Camera:
     pose: np.ndarray
 
     def project(self, points: np.ndarray) -> np.ndarray:
-        """Return the pixels that show points of the wall, shape (n, 2) both."""
+        """Return the pixels, shape (n, 2), of points on the wall, shape (n, 2)."""
         rays = _transform(self.pose, points)
         seen = rays * (1 + self.distortion * (rays**2).sum(axis=1, keepdims=True))
         return seen * np.diag(self.intrinsics)[:2] + self.intrinsics[:2, 2]
 
     def wall(self, pixels: np.ndarray) -> np.ndarray:
-        """Return the points of the wall that pixels show, shape (n, 2) both."""
+        """Return the points on the wall, shape (n, 2), that pixels show, shape (n, 2)."""
         x, y = self.rays(pixels[:, 0], pixels[:, 1])
         return _transform(np.linalg.inv(self.pose), np.stack((x, y), axis=1))
 
@@ -55,7 +55,7 @@ class Camera:
         Parameters
         ----------
         columns, rows : ndarray of float64
-            Pixel coordinates, of shapes that can be broadcast together.
+            Pixel coordinates, px, with shapes that broadcast together.
 
         Returns
         -------
@@ -78,7 +78,7 @@ class Camera:
         return x * scale, y * scale
 
     def jacobian(self, point: np.ndarray) -> np.ndarray:
-        """Return d(pixel) / d(wall) at a point of the wall, shape (2, 2)."""
+        """Return d(pixel) / d(wall) at a point on the wall, shape (2, 2)."""
         ray = self.pose @ np.array([*point, 1.0])
         x, y = ray[:2] / ray[2]
         pinhole = (self.pose[:2, :2] - np.outer((x, y), self.pose[2, :2])) / ray[2]
@@ -87,30 +87,29 @@ class Camera:
         return np.diag(np.diag(self.intrinsics)[:2]) @ radial @ pinhole
 
     def view_angle(self, points: np.ndarray) -> np.ndarray:
-        """Return the angles between the rays to points of the wall and its normal, rad."""
+        """Return the angles between the rays to points on the wall and its normal, rad."""
         axes = self.pose[:, :2] / np.linalg.norm(self.pose[:, :2], axis=0)
         normal = np.cross(axes[:, 0], axes[:, 1])
         rays = np.column_stack((points, np.ones(len(points)))) @ self.pose.T
         return np.arccos(np.abs(rays @ normal) / np.linalg.norm(rays, axis=1))
 
     def vignetting(self, pixels: np.ndarray) -> np.ndarray:
-        """Return the share of light that reaches pixels, shape (n, 2): cos^4 of their angle."""
+        """Return the vignetting of pixels, shape (n, 2): cos^4 of the field angle."""
         seen = (pixels - self.intrinsics[:2, 2]) / self.intrinsics[0, 0]
         share: np.ndarray = (1 + (seen**2).sum(axis=1)) ** -2
         return share
 
     def circle(self, centre: np.ndarray, radius: float) -> tuple[float, float, float]:
-        """Return the ellipse that a circle on the wall is seen as.
+        """Return the ellipse that is the image of a circle on the wall.
 
-        The image of the circle's conic under the pinhole camera is exact; lens distortion is
-        taken as affine over the circle.
+        It is exact for a pinhole camera; lens distortion is taken as affine across the circle.
 
         Parameters
         ----------
         centre : ndarray of float64, shape (2,)
-            On the wall.
+            Centre on the wall.
         radius : float
-            In units of the wall.
+            Radius in units of the wall.
 
         Returns
         -------
@@ -142,16 +141,16 @@ class Camera:
 
 @dataclass(frozen=True, slots=True)
 class Sensor:
-    """What a camera makes of the light on its sensor.
+    """Conversion of light into grey values.
 
     Attributes
     ----------
     full_well : float
-        Photo-electrons at saturation; 0 for an image without photon noise.
+        Photoelectrons at saturation; 0 for an image without noise.
     read_noise : float
-        Standard deviation in electrons.
+        Standard deviation, electrons.
     gamma : float
-        The grey value is the light to the power of 1 / gamma.
+        Grey values are light to the power of 1 / gamma.
     """
 
     full_well: float
@@ -159,9 +158,9 @@ class Sensor:
     gamma: float
 
     def grey_values(self, light: np.ndarray, generator: np.random.Generator) -> np.ndarray:
-        """Return 8-bit grey values of light, 1 being saturation; overwrites `light`.
+        """Return the 8-bit grey values of light, where 1 saturates; overwrites `light`.
 
-        Photon noise is normal with the variance of the Poisson distribution.
+        Photon noise is normally distributed with the variance of the Poisson distribution.
         """
         if self.full_well:
             deviation = np.sqrt(
@@ -182,21 +181,21 @@ def tilted_camera(
     distortion: float,
     generator: np.random.Generator,
 ) -> Camera:
-    """Return a camera that looks at the wall's origin from a tilt about an axis drawn at random.
+    """Return a camera that looks at the wall's origin, tilted about a random axis.
 
     Parameters
     ----------
     width, height : int
         Size of the image, px.
     focal_length : float
-        In px; also the distance from the wall's origin, in units of the wall.
+        In px. It is also the distance from the wall's origin, in units of the wall.
     tilt : float
-        Between the optical axis and the wall's normal, rad.
+        Angle between the optical axis and the wall's normal, rad.
     distortion : float
-        k1.
+        k1, dimensionless.
     generator : numpy.random.Generator
-        Draws the direction of the tilt and the principal point (within 1 % of the width of the
-        middle).
+        Draws the direction of the tilt and the principal point, which is at most 1 % of the
+        width off the middle of the image.
     """
     direction = generator.uniform(0, 2 * math.pi)
     offset = generator.uniform(-0.01, 0.01, 2) * width
@@ -211,6 +210,6 @@ def tilted_camera(
 
 
 def _transform(homography: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Return points, shape (n, 2), after a homography."""
+    """Return points, shape (n, 2), transformed by a homography."""
     transformed = points @ homography[:, :2].T + homography[:, 2]
     return transformed[:, :2] / transformed[:, 2:]

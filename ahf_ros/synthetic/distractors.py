@@ -1,4 +1,4 @@
-"""Marks that are no coded targets: plain dots, rings, writing, leaves."""
+"""Distractors, marks that are not coded targets: plain dots, rings, text, leaves."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ import string
 import cv2
 import numpy as np
 
-from ahf_ros.synthetic.prints import Cover, stamp_cover
+from ahf_ros.synthetic.designs import Cover, stamp_cover
 
-_SIDE = 256  # px of a stamp
+_SIDE = 256  # px of a stamp, finer than any distractor in an image
 _FINE = 3  # fractional bits of drawing coordinates
 
 
 def distractor_cover(generator: np.random.Generator) -> tuple[Cover, float]:
-    """Return the ink of a mark inside the unit circle, and a usual radius in dot radii.
+    """Return the ink of a random distractor in the unit circle, and its radius in dot radii.
 
     Parameters
     ----------
     generator : numpy.random.Generator
-        Draws kind, shape, direction and darkness.
+        Draws its kind, shape, size, direction and darkness.
     """
-    kinds = ((_dot, 1.0), (_ring, 2.0), (_writing, 3.0), (_leaf, 4.0))
+    kinds = ((_dot, 1.0), (_ring, 2.0), (_text, 3.0), (_leaf, 4.0))
     draw, radius = kinds[generator.integers(len(kinds))]
     stamp = np.zeros((_SIDE, _SIDE), np.uint8)
     draw(stamp, generator)
@@ -31,7 +31,7 @@ def distractor_cover(generator: np.random.Generator) -> tuple[Cover, float]:
 
 
 def _fixed(points: np.ndarray) -> np.ndarray:
-    """Return places in the unit circle as drawing coordinates with fractional bits."""
+    """Return points of the unit circle as fixed-point drawing coordinates."""
     pixels = (np.asarray(points) + 1) * (_SIDE / 2) - 0.5
     return np.rint(pixels * 2**_FINE).astype(np.int32)
 
@@ -52,13 +52,13 @@ def _ring(stamp: np.ndarray, generator: np.random.Generator) -> None:
     cv2.circle(stamp, middle, int(inner), 0, -1, cv2.LINE_AA, _FINE)
 
 
-def _writing(stamp: np.ndarray, generator: np.random.Generator) -> None:
-    """Draw some lines of capital letters and digits."""
-    signs = np.array(list(string.ascii_uppercase + string.digits))
+def _text(stamp: np.ndarray, generator: np.random.Generator) -> None:
+    """Draw one to three lines of capital letters and digits."""
+    characters = np.array(list(string.ascii_uppercase + string.digits))
     count = int(generator.integers(1, 4))
     height = 1.3 / count
     for line in range(count):
-        text = ''.join(generator.choice(signs, int(generator.integers(2, 6))))
+        text = ''.join(generator.choice(characters, int(generator.integers(2, 6))))
         font, weight = cv2.FONT_HERSHEY_DUPLEX, int(generator.integers(2, 6))
         (width, ascent), _ = cv2.getTextSize(text, font, 1.0, weight)
         scale = min(1.2 * _SIDE / 2 / width, 0.7 * height * _SIDE / 2 / ascent)

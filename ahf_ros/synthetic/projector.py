@@ -1,4 +1,4 @@
-"""The projector that throws a pattern on the wall."""
+"""A projector that throws a pattern on the wall."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ class Projector:
     Attributes
     ----------
     pose : ndarray of float64, shape (3, 3)
-        Homography from the wall (x, y, 1) to rays (x, y, 1), to scale.
+        Homography from the wall (x, y, 1) to rays (x, y, 1).
     position : ndarray of float64, shape (3,)
-        In the coordinates of the wall.
+        Position in the coordinates of the wall.
     scale : float
-        Projector px a unit of a ray; projector pixel (0, 0) is the principal point.
+        Focal length, projector px; projector pixel (0, 0) is the principal point.
     """
 
     pose: np.ndarray
@@ -29,14 +29,14 @@ class Projector:
 
     @property
     def homography(self) -> np.ndarray:
-        """Homography from the wall (x, y, 1) to projector pixels, to scale."""
+        """Homography from the wall (x, y, 1) to projector pixels."""
         return np.diag((self.scale, self.scale, 1.0)) @ self.pose
 
     def irradiance(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return the light on points of the wall, 1 at its origin, for a pattern that is 1.
+        """Return the light of a white pattern on points of the wall, 1 at its origin.
 
-        It falls with the square of the distance, with the obliquity of the wall and with the
-        fourth power of the cosine of the projector's field angle.
+        It follows the inverse square of the distance, the cosine of the angle of incidence, and
+        the fourth power of the cosine of the projector's field angle.
         """
         towards = np.stack((x - self.position[0], y - self.position[1]), axis=-1)
         squared = (towards**2).sum(axis=-1) + self.position[2] ** 2
@@ -49,17 +49,17 @@ class Projector:
 def rig_projector(
     camera_pose: np.ndarray, pixel: float, generator: np.random.Generator
 ) -> Projector:
-    """Return a projector 12 to 20 degrees aside of the camera, aimed at the wall's origin.
+    """Return a projector 12 to 20 degrees beside the camera, aimed at the wall's origin.
 
-    It stands off along the axis that the wall is tilted about, so that neither sees the wall
-    more obliquely than the other by much, and is turned by up to 8 degrees.
+    It is displaced along the axis of the wall's tilt, so that projector and camera see the wall
+    at similar angles, and rotated about its optical axis by up to 8 degrees.
 
     Parameters
     ----------
     camera_pose : ndarray, shape (3, 3)
-        `Camera.pose`; its origin is on the optical axis.
+        `Camera.pose`; the optical axis meets the origin of the wall.
     pixel : float
-        Size of a projector pixel at the wall's origin, in units of the wall.
+        Size of a projector pixel at the wall's origin, units of the wall.
     generator : numpy.random.Generator
         Draws the angles and the distance.
     """

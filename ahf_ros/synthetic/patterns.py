@@ -1,4 +1,4 @@
-"""Patterns of projected light, in the pixels of the projector."""
+"""Projected light patterns, in projector pixels."""
 
 from __future__ import annotations
 
@@ -8,26 +8,26 @@ from collections.abc import Callable
 import numpy as np
 
 Pattern = Callable[[np.ndarray, np.ndarray], np.ndarray]
-"""Brightness 0 to 1 at projector pixels (u, v), all float32 of one shape."""
+"""From projector pixels (u, v), float32 of one shape, to the brightness there, 0 to 1."""
 
-_HALF_VIEW = (640.0, 400.0)  # projector px from the middle of the view to its sides
+_HALF_VIEW = (640.0, 400.0)  # half the size of a 1280 x 800 projector, px
 
 
 def uniform(_generator: np.random.Generator, _defocus: float) -> Pattern:
-    """Return the pattern of a projector that lights everything."""
+    """Return full light everywhere."""
     return lambda u, _v: np.ones_like(u)
 
 
 def stripes(period: float, direction: float = 0.0) -> Callable[..., Pattern]:
-    """Return a maker of hard-edged stripes, half of each period lit.
+    """Return a factory of hard-edged stripes with half of each period lit.
 
     Parameters
     ----------
     period : float
         In projector px.
     direction : float
-        Of the normal of the stripes, rad from +u; each pattern is up to 10 degrees off, to
-        either side, and mirrored half of the times.
+        Direction of the normal of the stripes, rad from +u. Each pattern deviates from it by up to
+        10 degrees, and half of the patterns are mirrored.
     """
 
     def make(generator: np.random.Generator, defocus: float) -> Pattern:
@@ -43,7 +43,7 @@ def stripes(period: float, direction: float = 0.0) -> Callable[..., Pattern]:
 
 
 def fringe(period: float) -> Callable[..., Pattern]:
-    """Return a maker of sinusoidal fringes with a period in projector px."""
+    """Return a factory of sinusoidal fringes with a period in projector px."""
 
     def make(generator: np.random.Generator, defocus: float) -> Pattern:
         x, y, phase = _wave(generator, period, 0.0)
@@ -59,7 +59,7 @@ def fringe(period: float) -> Callable[..., Pattern]:
 
 
 def lattice(period: float, diameter: float) -> Callable[..., Pattern]:
-    """Return a maker of a square lattice of bright round spots, in projector px."""
+    """Return a factory of square lattices of bright round spots; lengths in projector px."""
 
     def make(generator: np.random.Generator, defocus: float) -> Pattern:
         x, y, phase = _wave(generator, period, 0.0)
@@ -77,7 +77,7 @@ def lattice(period: float, diameter: float) -> Callable[..., Pattern]:
 
 
 def spots(generator: np.random.Generator, defocus: float) -> Pattern:
-    """Return three large bright spots with soft edges on a dark scene."""
+    """Return three large bright spots with soft edges in the dark."""
     half_width, half_height = _HALF_VIEW
     u_centres = (np.array([-0.6, 0.0, 0.6]) + generator.uniform(-0.12, 0.12, 3)) * half_width
     v_centres = generator.uniform(-0.5, 0.5, 3) * half_height
@@ -96,7 +96,7 @@ def spots(generator: np.random.Generator, defocus: float) -> Pattern:
 
 
 def shadow(generator: np.random.Generator, defocus: float) -> Pattern:
-    """Return full light with the hard shadows of bars and convex polygons."""
+    """Return full light with hard shadows of bars and convex polygons."""
     edges = [_bar(generator) for _ in range(3)] + [_polygon(generator) for _ in range(9)]
 
     def pattern(u: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -124,25 +124,25 @@ _MAKERS: dict[str, Callable[[np.random.Generator, float], Pattern]] = {
     'shadow': shadow,
 }
 LIGHT_NAMES: tuple[str, ...] = tuple(_MAKERS)
-"""The lights that `light_pattern` knows."""
+"""Names of the lights."""
 
 
 def light_pattern(name: str, defocus: float, generator: np.random.Generator) -> Pattern:
-    """Return the pattern of a light, its phase and directions drawn at random.
+    """Return the pattern of a light with random phase, directions and positions.
 
     Parameters
     ----------
     name : str
         One of `LIGHT_NAMES`.
     defocus : float
-        Standard deviation of the projector's blur, projector px.
+        Standard deviation of the blur of the projector, projector px.
     generator : numpy.random.Generator
-        Draws phase, directions and places.
+        Draws phase, directions and positions.
 
     Raises
     ------
     ValueError
-        If there is no light of that name.
+        If no light has this name.
     """
     if name not in _MAKERS:
         raise ValueError(f'light is {name!r}, accepted is one of {", ".join(LIGHT_NAMES)}')
@@ -150,15 +150,15 @@ def light_pattern(name: str, defocus: float, generator: np.random.Generator) -> 
 
 
 def benchmark_lights() -> tuple[tuple[str, float], ...]:
-    """Return the lights that identification is measured under, as (name, ambient) pairs."""
-    deep = tuple((name, ambient) for name in LIGHT_NAMES[1:] for ambient in (0.3, 0.12, 0.04))
-    return (('normal', 0.3), *deep)
+    """Return the lights of the benchmarks as (name, ambient light) pairs."""
+    patterned = ((name, ambient) for name in LIGHT_NAMES[1:] for ambient in (0.3, 0.12, 0.04))
+    return (('normal', 0.3), *patterned)
 
 
 def _wave(
     generator: np.random.Generator, period: float, direction: float
 ) -> tuple[np.float32, np.float32, np.float32]:
-    """Return a normal (x, y) near a direction or its mirror image, and a phase."""
+    """Return a unit normal (x, y) near a direction or its mirror image, and a phase."""
     angle = direction + generator.uniform(-math.radians(10), math.radians(10))
     angle *= generator.choice((-1, 1))
     phase = generator.uniform(0, period)
@@ -166,16 +166,16 @@ def _wave(
 
 
 def _remainder(values: np.ndarray, period: float) -> np.ndarray:
-    """Return values less the nearest multiple of the period; overwrites `values`."""
+    """Subtract the nearest multiple of the period from `values`, in place, and return them."""
     turns = values * np.float32(1 / period)
     values -= np.rint(turns, out=turns) * np.float32(period)
     return values
 
 
 def _soft_step(distance: np.ndarray, sigma: float) -> np.ndarray:
-    """Return an edge blurred by a normal distribution, 1 where `distance` is large.
+    """Return an edge blurred by a Gaussian, 1 where `distance` is large.
 
-    The error function is approximated by a tanh (to 3e-4), which numpy has in float32.
+    The error function is approximated to 3e-4 by tanh, which numpy has in float32.
     """
     if not sigma:
         return (distance > 0).astype(np.float32)
@@ -201,7 +201,7 @@ def _bar(generator: np.random.Generator) -> list[tuple[np.float32, np.float32, n
 
 
 def _polygon(generator: np.random.Generator) -> list[tuple[np.float32, np.float32, np.float32]]:
-    """Return the sides of a convex polygon round a place in the view."""
+    """Return the sides of a convex polygon around a random point of the view."""
     place = generator.uniform(-1, 1, 2) * _HALF_VIEW
     corners = int(generator.integers(3, 7))
     turn = generator.uniform(0, 2 * math.pi)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.synthetic.camera import tilted_camera
-from ahf_ros.synthetic.lights import LIGHT_NAMES, benchmark_lights, light_pattern
+from ahf_ros.synthetic.patterns import LIGHT_NAMES, benchmark_lights, light_pattern
 from ahf_ros.synthetic.projector import rig_projector
 
 
