@@ -1,8 +1,9 @@
 # make demo    ROS 2 nodes under striped light: a line an image, annotated pictures in demo/
 #              DEMO='--light lattice --detector traditional' and so on; ahf_demo --help tells all
-# make test    every check: ruff, mypy, the import rules, the tests, also with the oldest versions
+# make test    every check: ruff, mypy, the import rules, the tests; then the tests that need no
+#              ROS once more with the oldest versions, and once more on other vector units
 # Both set up .venv first; nothing is installed outside it. DISTRIBUTION=kilted takes the wheels of
-# ROS 2 Kilted instead of Jazzy, into .venv-kilted.
+# ROS 2 Kilted instead of Jazzy, into .venv-kilted. make --jobs=2 test uses two cores.
 
 PYTHON ?= python3
 DISTRIBUTION ?= jazzy
@@ -19,21 +20,32 @@ OLDEST := .venv-oldest
 unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: demo test test-oldest test-kilted clean
+.PHONY: demo test lint test-native test-portable test-oldest test-kilted clean
 .DELETE_ON_ERROR:
 
 demo: $(READY)
 	$(BIN)/ahf_demo $(DEMO)
 
-test: $(READY) test-oldest
+test: test-native test-portable test-oldest lint
+
+lint: $(READY)
 	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+test-native: $(READY)
 	$(BIN)/python -m pytest
 
-# What needs no ROS, with the oldest versions of numpy and OpenCV that are to be had.
+# No vector units beyond those that numpy and OpenCV were compiled for: other last bits.
+test-portable: $(READY)
+	$(BIN)/python -m support.vector_units baseline $(BIN)/python -m pytest \
+		--ignore test/benchmarks --ignore test/nodes --ignore test/bag/test_bag_live.py
+
+# The oldest versions of numpy and OpenCV that are to be had, no ROS, and no AVX-512.
 test-oldest: $(OLDEST)/ready
-	$(OLDEST)/bin/python -m pytest --ignore test/benchmarks
+	$(OLDEST)/bin/python -m support.vector_units avx2 $(OLDEST)/bin/python -m pytest \
+		--ignore test/benchmarks
 
 # The nodes on ROS 2 Kilted.
 test-kilted:

@@ -1,4 +1,4 @@
-"""The graph of the tests that talk to real nodes."""
+"""What all tests share: the line that says on which code they ran, and the graph of real nodes."""
 
 from __future__ import annotations
 
@@ -6,7 +6,11 @@ from collections.abc import Iterator
 
 import pytest
 
-from support import live
+from support import live, vector_units
+
+
+def pytest_report_header() -> str:
+    return f'vector units: {vector_units.described()}'
 
 
 @pytest.fixture(scope='module')
