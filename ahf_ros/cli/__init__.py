@@ -14,9 +14,15 @@ from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 
 import ahf_ros.blas  # noqa: F401  before numpy
-from ahf_ros.cli import bag, evaluate, identify, render
+from ahf_ros.cli import bag, evaluate, identify, learn_family, render
 
-COMMANDS = {'identify': identify, 'bag': bag, 'render': render, 'evaluate': evaluate}
+COMMANDS = {
+    'identify': identify,
+    'bag': bag,
+    'render': render,
+    'evaluate': evaluate,
+    'learn-family': learn_family,
+}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -1,0 +1,149 @@
+"""Data files that describe families of targets, read so that errors name line and field."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NoReturn
+
+from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+
+_LARGEST_FILE = 4_000_000  # bytes; ten thousand codes need a tenth of it
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A value in a data file, and where it stands.
+
+    Attributes
+    ----------
+    source : str
+        Name of the file.
+    field : str
+        Path of the value from the top of the file, such as `codes.18`; empty for the whole file.
+    line : int
+        Line of the value, from 1.
+    value : object
+        A mapping, a list, a text, a number, a truth value or None.
+    """
+
+    source: str
+    field: str
+    line: int
+    value: Any
+
+    def refuse(self, accepted: str) -> NoReturn:
+        """Raise a ValueError that names file, line, field, value and what is accepted."""
+        text = repr(_plain(self.value))
+        text = text if len(text) <= 80 else f'{text[:77]}...'
+        raise ValueError(
+            f'{self.source}, line {self.line}: {self.field or "the file"} is {text}, '
+            f'accepted is {accepted}'
+        )
+
+    def keys(self, required: Sequence[str], optional: Sequence[str] = ()) -> dict[str, Entry]:
+        """Return the entries of a mapping that has the required keys and no unknown ones."""
+        entries = dict(self.items())
+        known = (*required, *optional)
+        for name, entry in entries.items():
+            if name not in known:
+                entry.refuse(f'one of the fields {", ".join(known)} in its place')
+        for name in required:
+            if name not in entries:
+                self.refuse(f'a mapping with the field {name}')
+        return entries
+
+    def items(self) -> Iterator[tuple[str, Entry]]:
+        """Yield keys, as texts, and entries of a mapping."""
+        if not isinstance(self.value, CommentedMap):
+            self.refuse('a mapping')
+        for key, value in self.value.items():
+            line = self.value.lc.data[key][2]
+            field = f'{self.field}.{key}' if self.field else str(key)
+            yield str(key), Entry(self.source, field, line + 1, value)
+
+    def list(self, accepted: str, lengths: Sequence[int] = ()) -> list[Entry]:
+        """Return the entries of a list, of one of some lengths where these are given."""
+        if not isinstance(self.value, CommentedSeq) or (
+            lengths and len(self.value) not in lengths
+        ):
+            self.refuse(accepted)
+        return [
+            Entry(self.source, f'{self.field}[{index}]', self.value.lc.data[index][0] + 1, value)
+            for index, value in enumerate(self.value)
+        ]
+
+    def integer(self, minimum: int, maximum: int) -> int:
+        """Return an integer in a range."""
+        value = self.value
+        if (
+            isinstance(value, bool)
+            or not isinstance(value, int)
+            or not minimum <= value <= maximum
+        ):
+            self.refuse(f'an integer from {minimum} to {maximum}')
+        return int(value)
+
+    def number(self, minimum: float = -math.inf, accepted: str = 'a finite number') -> float:
+        """Return a finite number of at least `minimum`."""
+        value = self.value
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            self.refuse(accepted)
+        if not math.isfinite(value) or value < minimum:
+            self.refuse(accepted)
+        return float(value)
+
+    def text(self) -> str:
+        """Return a text that is not empty."""
+        if not isinstance(self.value, str) or not self.value.strip():
+            self.refuse('a text')
+        return str(self.value)
+
+
+def read_data_file(path: str | Path) -> Entry:
+    """Return the content of a data file.
+
+    Parameters
+    ----------
+    path : str or Path
+        JSON or YAML, of which JSON is a part.
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be read or is neither, naming the line.
+    """
+    source = str(path)
+    try:
+        with Path(path).open('rb') as stream:
+            content = stream.read(_LARGEST_FILE + 1)
+        text = content.decode()
+    except (OSError, UnicodeDecodeError) as error:
+        raise ValueError(f'{source} cannot be read: {error}') from error
+    if len(content) > _LARGEST_FILE:
+        raise ValueError(f'{source} is larger than {_LARGEST_FILE} bytes')
+    try:
+        value = YAML(typ='rt', pure=True).load(text)
+    except MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        line = mark.line + 1 if mark else 1
+        problem = str(error.problem).splitlines()[0]
+        raise ValueError(f'{source}, line {line}: {problem}; accepted is JSON or YAML') from error
+    except (YAMLError, ValueError, RecursionError) as error:
+        raise ValueError(f'{source} is neither JSON nor YAML: {error}') from error
+    return Entry(source, '', 1, value)
+
+
+def _plain(value: Any) -> Any:
+    """Return a value without the comments that the reader attaches to it."""
+    if isinstance(value, CommentedMap):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, CommentedSeq):
+        return [_plain(item) for item in value]
+    if isinstance(value, float):
+        return float(value)
+    return value

@@ -1,0 +1,151 @@
+"""Rings of dots: a disc, small dots round it that are the code, and a border about them.
+
+After Knyaz & Sibiryakov, ISPRS Commission V, 1998. Dot s stands at s 360/n degrees
+counter-clockwise from any start as seen on the printed target. A word and its mirror image are
+one code, as are its rotations, so that a target may be read from behind. The smallest of all of
+them is canonical.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from math import pi, sin
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ahf_ros.codes.data_file import Entry, read_data_file
+from ahf_ros.codes.ring import smallest_rotation
+
+DOTS_DESIGN = Path(__file__).with_name('dots.json')
+"""The design of rings of dots that this package prints."""
+
+_BITS = (6, 20)  # of a word
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DotFamily:
+    """The code words of one kind of ring of dots, and the proportions of its print.
+
+    Attributes
+    ----------
+    name, source : str
+        Name of the family, and where the design comes from.
+    bits : int
+        Number of places for small dots.
+    dot_circle, dot_radius : float
+        Radius of the circle of the small dots, and their own, in radii of the disc.
+    ground_radius, border_radius : float
+        Inner and outer radius of the border, in radii of the disc.
+    words : ndarray of int64, shape (n,)
+        The canonical code words, ascending and read-only; index i has the ID i + 1.
+    """
+
+    name: str
+    source: str
+    bits: int
+    dot_circle: float
+    dot_radius: float
+    ground_radius: float
+    border_radius: float
+    words: np.ndarray
+
+    def number(self, word: int) -> int | None:
+        """Return the ID of a word in any rotation or reflection; None where there is none."""
+        if not 0 <= word < 1 << self.bits:
+            return None
+        canonical = int(smallest_bracelet(word, self.bits))
+        index = int(np.searchsorted(self.words, canonical))
+        if index < self.words.size and self.words[index] == canonical:
+            return index + 1
+        return None
+
+    def word(self, number: int) -> int:
+        """Return the canonical code word of an ID.
+
+        Raises
+        ------
+        ValueError
+            If the family has no such ID.
+        """
+        if not 1 <= number <= self.words.size:
+            raise ValueError(
+                f'number is {number!r}, accepted is an ID of {self.name} from 1 to '
+                f'{self.words.size}'
+            )
+        return int(self.words[number - 1])
+
+
+@lru_cache(maxsize=8)
+def dot_family(path: str = '') -> DotFamily:
+    """Return a family of rings of dots.
+
+    Parameters
+    ----------
+    path : str
+        Data file, JSON or YAML, as docs/dots.md describes it; our own design where empty.
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be read or does not describe such a family, naming line and field.
+
+    Examples
+    --------
+    >>> family = dot_family()
+    >>> family.words.size, family.number(0b1000000001)
+    (76, 2)
+    """
+    return parse_design(read_data_file(path or DOTS_DESIGN))
+
+
+def parse_design(file: Entry) -> DotFamily:
+    """Return the family that the content of a data file describes; see `dot_family`."""
+    lengths = ('dot_circle', 'dot_radius', 'ground_radius', 'border_radius')
+    fields = file.keys(('family', 'bits', *lengths), ('source',))
+    circle, radius, ground, border = (
+        fields[name].number(1e-3, 'a length in radii of the disc') for name in lengths
+    )
+    bits = fields['bits'].integer(*_BITS)
+    if circle - radius <= 1:
+        fields['dot_circle'].refuse(f'more than {1 + radius:g}, clear of the disc')
+    if circle + radius >= ground:
+        fields['ground_radius'].refuse(f'more than {circle + radius:g}, clear of the dots')
+    if ground >= border:
+        fields['border_radius'].refuse(f'more than {ground:g}, the ground_radius')
+    widest = circle * sin(pi / bits)
+    if radius >= widest:
+        fields['dot_radius'].refuse(f'less than {widest:.3g}, so that the dots do not overlap')
+    words = np.arange(
+        1, (1 << bits) - 1
+    )  # without the ring that is empty and the one that is full
+    words = words[words == smallest_bracelet(words, bits)]
+    words.setflags(write=False)
+    source = fields['source'].text() if 'source' in fields else ''
+    return DotFamily(fields['family'].text(), source, bits, circle, radius, ground, border, words)
+
+
+def smallest_bracelet(words: Any, bits: int) -> np.ndarray:
+    """Return the smallest of all rotations and reflections of each word.
+
+    Parameters
+    ----------
+    words : array_like of int, any shape
+        Words of `bits` bits, 0 to 2^bits - 1.
+    bits : int
+        Length of a word.
+
+    Returns
+    -------
+    ndarray of int64, shape of `words`
+    """
+    words = np.asarray(words, dtype=np.int64)
+    mirrored = np.zeros_like(words)
+    for bit in range(bits):
+        mirrored |= (words >> bit & 1) << (bits - 1 - bit)
+    smallest: np.ndarray = np.minimum(
+        smallest_rotation(words, bits), smallest_rotation(mirrored, bits)
+    )
+    return smallest
