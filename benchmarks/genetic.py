@@ -16,7 +16,7 @@ from unittest import mock
 import numpy as np
 
 from ahf_ros.filtering import genetic
-from ahf_ros.filtering.chromosome import Values
+from ahf_ros.filtering.chromosome import Values, mutated
 from ahf_ros.filtering.genes import PUBLISHED, TuningSettings
 from ahf_ros.filtering.genetic import GeneticSettings, search
 
@@ -58,19 +58,14 @@ OBJECTIVES = {
 }
 
 
-def one_bit_children(
-    population: np.ndarray,
-    discrepancies: np.ndarray,
-    settings: GeneticSettings,
-    generator: np.random.Generator,
-    original: Callable = genetic._next_population,
+def one_bit_mutated(
+    population: np.ndarray, probability: float, generator: np.random.Generator
 ) -> np.ndarray:
-    """Return the children where mutation flips one bit of a chromosome or none."""
-    still = GeneticSettings(tournament=settings.tournament, mutation=0.0)
-    children = original(population, discrepancies, still, generator)
-    mutants = np.flatnonzero(generator.random(len(children)) < settings.mutation)
-    places = generator.integers(children.shape[1], size=len(mutants))
-    children[mutants, places] ^= True
+    """Return the chromosomes, each with one bit flipped with a probability."""
+    children = mutated(population, 0.0, generator)
+    mutants = np.flatnonzero(generator.random(len(children)) < probability)
+    bits = generator.integers(children.shape[1], size=len(mutants))
+    children[mutants, bits] ^= True
     return children
 
 
@@ -80,8 +75,8 @@ def trial(objective: Callable, way: tuple[str, float, int], seed: int, most: int
     settings = GeneticSettings(
         population=50, mutation=mutation, tournament=tournament, max_evaluations=most
     )
-    children = one_bit_children if kind == 'chromosome' else genetic._next_population
-    with mock.patch.object(genetic, '_next_population', children):
+    mutation_of = one_bit_mutated if kind == 'chromosome' else mutated
+    with mock.patch.object(genetic, 'mutated', mutation_of):
         generator = np.random.default_rng(seed)
         result = search(objective, TuningSettings(search=PUBLISHED).genes, settings, generator)
     return result.evaluations, result.discrepancy

@@ -1,1 +1,1 @@
-"""Adaptive homomorphic filtering; no detector is known here."""
+"""Adaptive homomorphic filtering, for any detector."""

@@ -1,4 +1,4 @@
-"""Chromosomes: numbers coded in binary, one after the other."""
+"""Binary chromosomes, which hold one number per gene, and the genetic operators on them."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 
 Values = tuple[float, ...]
-"""One value a gene, in the order of the genes: what a chromosome stands for."""
+"""What a chromosome stands for: one value per gene, in the order of the genes."""
 
 
 @dataclass(frozen=True, slots=True)
 class Gene:
-    """A number that is searched for: `minimum`, `minimum + step`, ... up to `maximum`.
+    """The values of one number: `minimum`, `minimum + step`, ... up to `maximum`.
 
     Raises
     ------
@@ -48,7 +48,7 @@ class Gene:
 
     @property
     def bits(self) -> int:
-        """Length of its part of the chromosome."""
+        """Number of its bits in the chromosome."""
         return (self.count - 1).bit_length()
 
     def value(self, index: int) -> float:
@@ -56,17 +56,17 @@ class Gene:
         return round(self.minimum + index * self.step, 9)
 
     def index(self, code: int) -> int:
-        """Return the number of the value that a part of a chromosome, read as binary, means."""
+        """Return the number of the value that the bits of the gene, as an integer, stand for."""
         return code * self.count >> self.bits
 
     def code(self, value: float) -> int:
-        """Return the smallest code that means the value nearest to `value`."""
+        """Return the minimum code of the value nearest to `value`."""
         index = round((min(max(value, self.minimum), self.maximum) - self.minimum) / self.step)
         return -(-(min(index, self.count - 1) << self.bits) // self.count)
 
 
 def encoded(values: Values, genes: Sequence[Gene]) -> list[bool]:
-    """Return the bits of a chromosome that stands for the values nearest to `values`."""
+    """Return the bits of a chromosome for the values nearest to `values`."""
     return [
         bool(gene.code(value) >> place & 1)
         for gene, value in zip(genes, values, strict=True)
@@ -75,10 +75,10 @@ def encoded(values: Values, genes: Sequence[Gene]) -> list[bool]:
 
 
 def decoded(chromosome: np.ndarray, genes: Sequence[Gene]) -> Values:
-    """Return what a chromosome, ndarray of bool, shape (bits,), stands for.
+    """Return the values of a chromosome, ndarray of bool, shape (bits,).
 
-    The first gene has the first bits, the first bit of a gene is its highest. A gene of five bits
-    and 31 values shares its 32 codes out among them, in ascending order and as evenly as it can.
+    The first gene has the first bits, the most significant one first. A gene of five bits and 31
+    values distributes its 32 codes among them, in ascending order and as evenly as possible.
     """
     values, start = [], 0
     for gene in genes:
@@ -87,3 +87,46 @@ def decoded(chromosome: np.ndarray, genes: Sequence[Gene]) -> Values:
         values.append(gene.value(gene.index(code)))
         start += gene.bits
     return tuple(values)
+
+
+def first_population(
+    genes: Sequence[Gene], size: int, generator: np.random.Generator, initial: Sequence[Values]
+) -> np.ndarray:
+    """Return random chromosomes, shape (size, bits), after those for `initial`."""
+    bits = sum(gene.bits for gene in genes)
+    population = generator.integers(2, size=(size, bits)).astype(bool)
+    for chromosome, values in zip(population, initial, strict=False):
+        chromosome[:] = encoded(values, genes)
+    return population
+
+
+def selected(
+    population: np.ndarray, discrepancies: np.ndarray, size: int, generator: np.random.Generator
+) -> np.ndarray:
+    """Return as many parents as chromosomes, or one more to make pairs.
+
+    Each parent wins a tournament of `size` chromosomes by the smallest discrepancy.
+    """
+    parents = len(population) + len(population) % 2
+    drawn = generator.integers(len(population), size=(parents, size))
+    winners = drawn[np.arange(parents), discrepancies[drawn].argmin(axis=1)]
+    return population[winners]
+
+
+def crossed(parents: np.ndarray, probability: float, generator: np.random.Generator) -> np.ndarray:
+    """Return the children of pairs of parents, by single-point crossover with a probability."""
+    mothers, fathers = parents[::2], parents[1::2]
+    pairs, bits = mothers.shape
+    crossing = generator.random((pairs, 1)) < probability
+    points = generator.integers(1, max(bits, 2), size=(pairs, 1))
+    exchanged = crossing & (np.arange(bits) >= points)
+    return np.concatenate(
+        [np.where(exchanged, fathers, mothers), np.where(exchanged, mothers, fathers)]
+    )
+
+
+def mutated(
+    population: np.ndarray, probability: float, generator: np.random.Generator
+) -> np.ndarray:
+    """Return the chromosomes with each bit flipped with a probability."""
+    return population ^ (generator.random(population.shape) < probability)

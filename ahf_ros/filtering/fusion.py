@@ -1,7 +1,7 @@
-"""What several filters identified in one image, settled by how many of them agree.
+"""Fusion of what several filters show in one image, by how many of them agree.
 
-A filter that is best for the whole image may hide a target that another one shows. Light that
-makes a detector read a wrong ID does so through few filters, and not always the same ID.
+The best filter for the whole image may hide a target that another one shows. If the light makes a
+detector read a wrong ID, it does so through few filters, and the wrong ID varies.
 """
 
 from __future__ import annotations
@@ -13,61 +13,60 @@ import numpy as np
 
 from ahf_ros.target import UNDECODED, Target, sorted_targets
 
-_REACH = 0.5  # of the semi-major axis, within which two places are one
-_LEAST_REACH = 2.0  # the same, px
-_FEWEST = 2  # filters that have to agree where the best one does not show a target
-_CLEARLY = 2  # times the filters for a contradicting claim
+_REACH = 0.5  # semi-major axes; targets that are closer are at the same place
+_MINIMUM_REACH = 2.0  # px, for dots so small that noise moves their centres further
+_MINIMUM_FILTERS = 2  # that must agree on a target that the best filter does not show
+_MAJORITY = 2  # times the filters of any contradicting claim: two to one
 
 
 @dataclass(slots=True)
 class _Claim:
     """An ID at a place."""
 
-    target: Target  # from the best filter that shows it
-    first: int  # that filter
+    target: Target  # through the best filter that shows it
+    first: int  # index of that filter
     filters: set[int] = field(default_factory=set)
 
     def near(self, other: Target) -> bool:
         """Return whether another target is at the same place."""
-        reach = max(_REACH * self.target.semi_major, _LEAST_REACH)
+        reach = max(_REACH * self.target.semi_major, _MINIMUM_REACH)
         return bool(np.hypot(other.x - self.target.x, other.y - self.target.y) < reach)
 
 
 def fused(results: Sequence[Sequence[Target]]) -> list[Target]:
-    """Return the union of what was identified through several filters.
+    """Return the targets on which filters agree.
 
-    A target counts that the best filter shows, or at least two others, unless a claim that
-    contradicts it, another ID at its place or its ID at another place, has more than half as many
-    filters. Of two such claims none counts.
+    A target counts if the best filter or at least two others show it, and if twice as many filters
+    show it as any contradicting claim: another ID at its place, or its ID at another place.
 
     Parameters
     ----------
     results : sequence of sequence of Target
-        What each filter showed, the best one first. Targets without an ID are left out.
+        What each filter showed, the best filter first. Undecoded targets are ignored.
 
     Returns
     -------
     list of Target
-        Sorted by ID; each as the best of the filters shows it that do.
+        Sorted by ID; each as the best of its filters shows it.
     """
     claims: list[_Claim] = []
-    of_number: dict[int, list[_Claim]] = {}
-    for place, targets in enumerate(results):
+    by_id: dict[int, list[_Claim]] = {}
+    for index, targets in enumerate(results):
         for target in targets:
             if target.id == UNDECODED:
                 continue
-            same = [claim for claim in of_number.get(target.id, []) if claim.near(target)]
+            same = [claim for claim in by_id.get(target.id, []) if claim.near(target)]
             if not same:
-                same = [_Claim(target, place)]
+                same = [_Claim(target, index)]
                 claims.append(same[0])
-                of_number.setdefault(target.id, []).append(same[0])
-            same[0].filters.add(place)
+                by_id.setdefault(target.id, []).append(same[0])
+            same[0].filters.add(index)
     kept = [
         claim.target
         for claim in claims
-        if (claim.first == 0 or len(claim.filters) >= _FEWEST)
+        if (claim.first == 0 or len(claim.filters) >= _MINIMUM_FILTERS)
         and all(
-            len(claim.filters) >= _CLEARLY * len(other.filters)
+            len(claim.filters) >= _MAJORITY * len(other.filters)
             for other in claims
             if other is not claim
             and (other.target.id == claim.target.id or claim.near(other.target))

@@ -1,13 +1,14 @@
-"""What of the filter a search tunes.
+"""Search space of the filter.
 
-The published search [1]_ tunes the two gains and leaves the rest to Eq. (8) and the median of D.
-The extended one, which finds more with as many filters (`benchmarks/strategies.py`), also tunes
+The published search [1]_ tunes the two gains; Eq. (8) gives the attenuation and the median of D
+the cut-off. The extended search, which finds more with the same number of filters
+(`benchmarks/strategies.py`), also tunes
 
-- the cut-off. Cut-off and attenuation enter Eq. (4) as c / D0^2 alone, so that one of them is
-  enough: a small D0 is a wide blur, which evens out light that changes slowly.
-- the contrast of the output, g^p with an exponent p up to 1. For p near 0 the 8-bit image shows
-  ln g. As g^p = exp(p s), the exponent is a factor of both gains: there is no filter that the
-  four numbers of `ahf_ros.filtering.transfer.Transfer` do not describe.
+- the cut-off. Eq. (4) depends on cut-off and attenuation through c / D0^2 only, so one of them is
+  enough. A small D0 is a wide blur, which removes slow changes of light.
+- the contrast of the output, g^p with an exponent p up to 1. With p near 0 the 8-bit image shows
+  ln g. Because g^p = exp(p s), the exponent is a factor of both gains: the four numbers of
+  `ahf_ros.filtering.transfer.Transfer` describe every filter of the space.
 
 References
 ----------
@@ -25,34 +26,34 @@ from ahf_ros.settings.parameter import check_parameters, parameter
 
 PUBLISHED, EXTENDED = 'published', 'extended'
 
-_CUTOFF_STEP, _EXPONENT_STEP = 0.5, 1.0  # octaves
+_CUTOFF_STEP, _EXPONENT_STEP = 0.5, 1.0  # octaves: 11 cut-offs and 4 exponents by default
 
 
 @dataclass(frozen=True, slots=True)
 class TuningSettings:
-    """Which filters are tried."""
+    """Ranges of the filters that a search tries."""
 
     search: str = parameter(
         EXTENDED,
-        'published: the gains are searched for, as in the paper; extended: also cut-off and '
-        'output contrast.',
+        'published: tunes the gains, as in the paper; extended: also tunes cut-off and output '
+        'contrast.',
         choices=(EXTENDED, PUBLISHED),
     )
     gamma_high_min: float = parameter(
-        1.0, 'Smallest gain of the high frequencies.', minimum=0.1, maximum=20.0
+        1.0, 'Minimum gain of the high frequencies.', minimum=0.1, maximum=20.0
     )
     gamma_high_max: float = parameter(
-        4.0, 'Largest gain of the high frequencies.', minimum=0.1, maximum=20.0
+        4.0, 'Maximum gain of the high frequencies.', minimum=0.1, maximum=20.0
     )
     gamma_high_step: float = parameter(
         0.1, 'Step of the gain of the high frequencies.', minimum=0.001, maximum=20.0
     )
     gamma_low_min: float = parameter(
-        0.0, 'Smallest gain of the low frequencies.', minimum=0.0, maximum=20.0
+        0.0, 'Minimum gain of the low frequencies.', minimum=0.0, maximum=20.0
     )
     gamma_low_max: float = parameter(
         1.0,
-        'Largest gain of the low frequencies, at most gamma_high_min.',
+        'Maximum gain of the low frequencies, at most gamma_high_min.',
         minimum=0.0,
         maximum=20.0,
     )
@@ -61,16 +62,19 @@ class TuningSettings:
     )
     cutoff_min: float = parameter(
         0.0625,
-        'Smallest cut-off of an extended search, as a share of the published one, the median.',
+        'Minimum cut-off of an extended search, as a fraction of the published one, the median.',
         minimum=0.02,
         maximum=4.0,
     )
     cutoff_max: float = parameter(
-        2.0, 'Largest cut-off of an extended search.', minimum=0.02, maximum=4.0
+        2.0,
+        'Maximum cut-off of an extended search, likewise.',
+        minimum=0.02,
+        maximum=4.0,
     )
     exponent_min: float = parameter(
         0.125,
-        'Smallest exponent of the output in an extended search; near 0 its logarithm is shown.',
+        'Minimum exponent of the output in an extended search; near 0 shows the logarithm.',
         minimum=0.01,
         maximum=1.0,
     )
@@ -85,7 +89,7 @@ class TuningSettings:
 
     @property
     def genes(self) -> tuple[Gene, ...]:
-        """What is searched for: the gains, then octaves of the cut-off and of the exponent."""
+        """The gains and, if extended, cut-off and exponent in octaves."""
         gains = (
             Gene('gamma_high', self.gamma_high_min, self.gamma_high_max, self.gamma_high_step),
             Gene('gamma_low', self.gamma_low_min, self.gamma_low_max, self.gamma_low_step),
@@ -93,30 +97,30 @@ class TuningSettings:
         if self.search == PUBLISHED:
             return gains
         cutoffs = math.log2(self.cutoff_min), math.log2(self.cutoff_max)
-        lowest = math.ceil(math.log2(self.exponent_min))
+        exponent = math.ceil(math.log2(self.exponent_min))
         return (
             *gains,
             Gene('cutoff', *cutoffs, _CUTOFF_STEP),
-            Gene('exponent', lowest, 0.0, _EXPONENT_STEP),
+            Gene('exponent', exponent, 0.0, _EXPONENT_STEP),
         )
 
     def _check_order(self, lower: str, upper: str) -> None:
-        lowest, highest = getattr(self, lower), getattr(self, upper)
-        if lowest > highest:
+        value, maximum = getattr(self, lower), getattr(self, upper)
+        if value > maximum:
             raise ValueError(
-                f'{lower} is {lowest!r}, accepted is a number of at most {upper}, {highest!r}'
+                f'{lower} is {value!r}, accepted is a number of at most {upper}, {maximum!r}'
             )
 
 
 def tuned(shape: tuple[int, int], values: Values) -> Transfer:
-    """Return the filter of an image that values of the genes stand for.
+    """Return the filter of an image for values of the genes.
 
     Parameters
     ----------
     shape : tuple of int
         Height and width of the image, px.
     values : tuple of float
-        Of two genes or of four, see `TuningSettings.genes`.
+        Values of two or four genes, see `TuningSettings.genes`.
     """
     if len(values) == 2:
         return transfer(shape, *values)

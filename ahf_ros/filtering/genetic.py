@@ -1,12 +1,12 @@
 """The genetic algorithm of AHF [1]_: binary chromosomes, tournament, crossover, mutation.
 
-It knows no image: it looks for the values at which a discrepancy, |N - n| in the paper, is zero.
+It knows nothing of images: it minimises a discrepancy, |N - n| in the paper, down to zero.
 
-Two things that Table 1 leaves open are settled by trial (`benchmarks/genetic.py`: five made-up
-objectives of the shape of |N - n|, 40 seeds each). The mutation of 0.1 is the probability of a
-bit: as that of a chromosome, of which one bit then flips, 37 % of the searches got stuck, against
-12 %. A tournament is held among eight, which needed 24 to 51 % of the evaluations that a
-tournament of two needed and after 200 evaluations was closer on every objective.
+Two choices that Table 1 leaves open were made by experiment (`benchmarks/genetic.py`: five
+synthetic objectives shaped like |N - n|, 40 seeds each). The mutation rate of 0.1 applies to each
+bit: applied to each chromosome, of which one bit then flips, 37 % of the searches got stuck
+instead of 12 %. A tournament of eight needed 24 to 51 % of the evaluations of a tournament of two,
+and was closer to zero on every objective after 200 evaluations.
 
 References
 ----------
@@ -24,39 +24,47 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ahf_ros.filtering.chromosome import Gene, Values, decoded, encoded
+from ahf_ros.filtering.chromosome import (
+    Gene,
+    Values,
+    crossed,
+    decoded,
+    first_population,
+    mutated,
+    selected,
+)
 from ahf_ros.settings.parameter import check_parameters, parameter
 
 DELTA = 1.0
-"""delta of Eq. (10), so that a fitness of 1 is success; a tournament only compares, so that the
-search does not depend on it."""
+"""delta of Eq. (10). With 1, a fitness of 1 is success. It does not affect the search, because
+tournaments only compare."""
 
 
 @dataclass(frozen=True, slots=True)
 class GeneticSettings:
-    """Table 1 of the paper, and limits.
+    """Parameters of Table 1 of the paper, and limits.
 
-    The paper has a population of 50. With 20, fifty filters are some generations, and find a
-    little more than fifty drawn at random.
+    The paper has a population of 50. With 20, fifty filters are more than two generations, which
+    find slightly more than fifty random filters.
     """
 
-    population: int = parameter(20, 'Chromosomes in a generation.', minimum=2, maximum=10000)
-    generations: int = parameter(100, 'Most generations of a search.', minimum=1, maximum=100000)
+    population: int = parameter(20, 'Chromosomes per generation.', minimum=2, maximum=10000)
+    generations: int = parameter(100, 'Maximum number of generations.', minimum=1, maximum=100000)
     stall: int = parameter(
         50,
-        'Generations without a better chromosome after which a search ends.',
+        'Generations without improvement after which a search ends.',
         minimum=1,
         maximum=100000,
     )
     tournament: int = parameter(
         8,
-        'Chromosomes drawn for a tournament; the fittest becomes a parent.',
+        'Chromosomes in a tournament; the fittest becomes a parent.',
         minimum=1,
         maximum=100,
     )
     crossover: float = parameter(
         0.8,
-        'Probability that two parents exchange the bits behind a random place.',
+        'Probability that two parents exchange their bits after a random position.',
         minimum=0.0,
         maximum=1.0,
     )
@@ -64,11 +72,11 @@ class GeneticSettings:
         0.1, 'Probability that a bit of a child flips.', minimum=0.0, maximum=1.0
     )
     max_evaluations: int = parameter(
-        50, 'Most filters tried in a search, 0: no limit.', minimum=0, maximum=1000000
+        50, 'Maximum number of filters tried in a search; 0: no limit.', minimum=0, maximum=1000000
     )
     max_duration: float = parameter(
         0.0,
-        'Time after which a search ends, in s, 0: no limit; results then depend on the machine.',
+        'Time after which a search ends, s; 0: no limit. With a limit, results vary with speed.',
         minimum=0.0,
         maximum=86400.0,
     )
@@ -81,14 +89,14 @@ class GeneticSettings:
 
 @dataclass(frozen=True, slots=True)
 class Generation:
-    """What one generation came to.
+    """Summary of one generation.
 
     Attributes
     ----------
     best, mean : float
-        Fitness of its fittest chromosome and of all of them, 1 / (discrepancy + delta).
+        Fitness, 1 / (discrepancy + delta), of its fittest chromosome and on average.
     evaluations : int
-        Evaluations since the search began.
+        Number of evaluations since the search began.
     """
 
     best: float
@@ -98,23 +106,23 @@ class Generation:
 
 @dataclass(frozen=True, slots=True)
 class SearchResult:
-    """What a search came to.
+    """Result of a search.
 
     Attributes
     ----------
     values : tuple of float
-        The best ever evaluated, of equally good ones the first.
+        The first of the best values that were evaluated.
     discrepancy : float
-        Its discrepancy.
+        Discrepancy of `values`.
     evaluations : int
-        Calls of the objective whose result counted.
+        Number of evaluations that counted.
     history : tuple of Generation
-        One a generation, the last one perhaps not complete.
+        All generations; the last one may be incomplete.
     tried : tuple of tuple of float
-        What was evaluated, in the order in which it counted.
+        All values evaluated, in the order in which they counted.
     reason : str
         Why the search ended: 'found', 'generations', 'stall', 'evaluations', 'duration', or
-        'exhausted' where there is nothing left to try.
+        'exhausted' if all values were tried.
     """
 
     values: Values
@@ -126,7 +134,7 @@ class SearchResult:
 
     @property
     def generations(self) -> int:
-        """Generations begun."""
+        """Number of generations, the last one included."""
         return len(self.history)
 
 
@@ -140,34 +148,33 @@ def search(
     executor: Executor | None = None,
     clock: Callable[[], float] = time.monotonic,
 ) -> SearchResult:
-    """Look for the values whose discrepancy is zero.
+    """Search for values whose discrepancy is zero.
 
     Parameters
     ----------
     discrepancy : callable
-        From one value a gene to a number of at least 0. It is called once for the same values,
-        however many chromosomes stand for them. What it raises, the search raises.
+        From one value per gene to a number of at least 0. It is called once for equal values. Its
+        exceptions are passed on.
     genes : sequence of Gene
         At least one.
     settings : GeneticSettings
-        Its seed is not used here.
+        Its seed is not used.
     generator : numpy.random.Generator
-        Source of every random number.
+        Source of all random numbers.
     initial : sequence of tuple of float, optional
-        Values to try first, as the first chromosomes of the first generation; each becomes the
-        nearest value that the gene has.
+        Values of the first chromosomes, each rounded to a value of its gene.
     executor : concurrent.futures.Executor, optional
-        Threads that evaluate a generation; `discrepancy` must then be safe to call from several
-        threads. Results count in the order of the chromosomes, so that without `max_duration`
-        the search is the same for any number of threads.
+        Threads that evaluate a generation; `discrepancy` must be thread-safe. Results count in
+        the order of the chromosomes: without `max_duration`, the search does not depend on the
+        number of threads.
     clock : callable, optional
-        Time in s, for `max_duration`.
+        Returns the time in s, for `max_duration`.
 
     Returns
     -------
     SearchResult
-        At least one evaluation is made, whatever the limits. When it returns, no call of
-        `discrepancy` is under way any more.
+        Of at least one evaluation, whatever the limits. No call of `discrepancy` is running when
+        the search returns.
 
     Raises
     ------
@@ -177,7 +184,7 @@ def search(
     if not genes:
         raise ValueError('genes is empty, accepted is at least one gene')
     objective = _Objective(discrepancy, settings, executor, clock)
-    population = _first_population(genes, settings.population, generator, initial)
+    population = first_population(genes, settings.population, generator, initial)
     history: list[Generation] = []
     stalled = 0
     while True:
@@ -196,11 +203,13 @@ def search(
         if reason:
             return objective.result(tuple(history), reason)
         discrepancies = np.array([objective.known[values] for values in tried])
-        population = _next_population(population, discrepancies, settings, generator)
+        parents = selected(population, discrepancies, settings.tournament, generator)
+        children = crossed(parents, settings.crossover, generator)[: settings.population]
+        population = mutated(children, settings.mutation, generator)
 
 
 class _Objective:
-    """The discrepancies known so far, and the limits on asking for more."""
+    """The discrepancies known so far, and the limits of a search."""
 
     def __init__(
         self,
@@ -219,24 +228,24 @@ class _Objective:
         self._started = clock()
 
     def evaluate(self, tried: Sequence[Values]) -> str:
-        """Evaluate what is not known yet, in order; return why the search ends, or ''."""
+        """Evaluate unknown values, in order; return why the search ends, or ''."""
         fresh = [values for values in dict.fromkeys(tried) if values not in self.known]
-        most = self._settings.max_evaluations
-        if most:
-            fresh = fresh[: most - len(self.known)]
+        maximum = self._settings.max_evaluations
+        if maximum:
+            fresh = fresh[: maximum - len(self.known)]
         with closing(self._results(fresh)) as results:
             for values, result in zip(fresh, results, strict=True):
                 self._learn(values, result)
                 if result == 0:
                     return 'found'
-                if len(self.known) == most:
+                if len(self.known) == maximum:
                     return 'evaluations'
                 if 0 < self._settings.max_duration <= self._clock() - self._started:
                     return 'duration'
         return ''
 
     def generation(self, tried: Sequence[Values]) -> Generation:
-        """Return the summary of a generation."""
+        """Summarise a generation."""
         fitness = [1 / (self.known[values] + DELTA) for values in tried if values in self.known]
         return Generation(max(fitness), sum(fitness) / len(fitness), len(self.known))
 
@@ -255,18 +264,18 @@ class _Objective:
             self.best, self.best_discrepancy = values, result
 
     def _results(self, fresh: Sequence[Values]) -> Generator[float, None, None]:
-        """Yield the discrepancies in order; on closing, drop what has not begun."""
+        """Yield the discrepancies in order; on closing, cancel what has not begun."""
         if self._executor is None:
             yield from map(self._discrepancy, fresh)
             return
         successes: list[int] = []
 
-        def evaluate(place: int, values: Values) -> float:
-            if successes and min(successes) < place:
-                return math.nan  # nobody gets that far
+        def evaluate(index: int, values: Values) -> float:
+            if successes and min(successes) < index:
+                return math.nan  # never read: the search ends before
             result = self._discrepancy(values)
             if result == 0:
-                successes.append(place)
+                successes.append(index)
             return result
 
         futures = [self._executor.submit(evaluate, *it) for it in enumerate(fresh)]
@@ -277,35 +286,3 @@ class _Objective:
             for future in futures:
                 future.cancel()
             wait(futures)
-
-
-def _first_population(
-    genes: Sequence[Gene], size: int, generator: np.random.Generator, initial: Sequence[Values]
-) -> np.ndarray:
-    """Return random chromosomes, shape (size, bits), the first standing for `initial`."""
-    bits = sum(gene.bits for gene in genes)
-    population = generator.integers(2, size=(size, bits)).astype(bool)
-    for chromosome, values in zip(population, initial, strict=False):
-        chromosome[:] = encoded(values, genes)
-    return population
-
-
-def _next_population(
-    population: np.ndarray,
-    discrepancies: np.ndarray,
-    settings: GeneticSettings,
-    generator: np.random.Generator,
-) -> np.ndarray:
-    """Return the children: tournaments, single-point crossover, mutation."""
-    size, bits = population.shape
-    pairs = (size + 1) // 2
-    drawn = generator.integers(size, size=(2 * pairs, settings.tournament))
-    winners = drawn[np.arange(2 * pairs), discrepancies[drawn].argmin(axis=1)]
-    mothers, fathers = population[winners[::2]], population[winners[1::2]]
-    crossing = generator.random((pairs, 1)) < settings.crossover
-    places = generator.integers(1, max(bits, 2), size=(pairs, 1))
-    exchanged = crossing & (np.arange(bits) >= places)
-    children = np.concatenate(
-        [np.where(exchanged, fathers, mothers), np.where(exchanged, mothers, fathers)]
-    )[:size]
-    return children ^ (generator.random(children.shape) < settings.mutation)

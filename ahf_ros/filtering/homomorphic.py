@@ -4,18 +4,17 @@ The filter of [1]_ (Eq. 1 to 7) is z = ln f, S = H F(z), g = exp s with a Gaussi
 
     H = gamma_high - d exp(-c (D / D0)^2),  d = gamma_high - gamma_low
 
-The Gaussian separates, so s = gamma_high z - d (G * z), where G * is one circular convolution
-along the rows and one along the columns. The logarithm is taken once an image; a filter then goes
-over it once, in strips of rows that stay in the cache of a core. By default c = d and D0 is the
-median of D. `filtered_fft` is the published form, kept as the reference.
+The Gaussian is separable, so s = gamma_high z - d (G * z), where G * is a circular convolution
+along the rows and one along the columns. The logarithm is taken once per image; each filter then
+passes over it once, in strips of rows that stay in the cache of a core. By default c = d and D0 is
+the median of D. `filtered_fft` is the published form, kept as the reference.
 
-Two steps that the paper leaves open are settled here:
+Two steps that the paper leaves open are defined here:
 
-- The offset. z = ln(f / range + offset), because f may be 0. The range is 255 for 8-bit images;
-  for 16-bit images the largest number of their bit depth, which is the smallest from 8 to 16 that
-  holds every pixel; for float images their largest value. The division scales g by a constant.
-- The output mapping. g goes to 8 bit linearly, one percentile of g to 0 and another to 255, taken
-  on a lattice of rows and columns that depends on the size of the image alone.
+- Offset: z = ln(f / range + offset), because f may be 0. `ahf_ros.imaging.logarithm.logarithm`
+  defines the range. The division scales g by a constant.
+- Output mapping: g is mapped linearly to 8 bit, one percentile of g to 0 and another to 255. Both
+  are taken on a lattice of rows and columns that depends on the size of the image only.
 
 References
 ----------
@@ -37,27 +36,27 @@ from ahf_ros.imaging.logarithm import logarithm, mapping, sample_lattice, sample
 from ahf_ros.settings.parameter import check_parameters, parameter
 
 MARGIN = 12
-"""Rows and columns around a logarithm that repeat its other end, px; few filters reach further."""
+"""Width of the periodic border around a logarithm, px; few filters reach further."""
 
 STRIP = 128
-"""Rows that are processed at once: few enough to stay in the cache of a core."""
+"""Rows that are processed at once, few enough to stay in the cache of a core."""
 
 
 @dataclass(frozen=True, slots=True)
 class FilterSettings:
-    """How an image enters the logarithm and how the filtered image becomes 8-bit."""
+    """Input and output of the filter: the offset of the logarithm and the mapping to 8 bit."""
 
     log_offset: float = parameter(
         1 / 255,
-        'Added to the image before the logarithm, as a share of the range of the image.',
+        'Added to the image before the logarithm, as a fraction of its range.',
         minimum=1e-6,
         maximum=1.0,
     )
     black_percentile: float = parameter(
-        0.1, 'Percentile of the filtered image that turns black.', minimum=0.0, maximum=49.0
+        0.1, 'Percentile of the filtered image that becomes black.', minimum=0.0, maximum=49.0
     )
     white_percentile: float = parameter(
-        99.5, 'Percentile of the filtered image that turns white.', minimum=51.0, maximum=100.0
+        99.5, 'Percentile of the filtered image that becomes white.', minimum=51.0, maximum=100.0
     )
 
     def __post_init__(self) -> None:
@@ -66,12 +65,12 @@ class FilterSettings:
 
 
 class HomomorphicFilter:
-    """One image, ready to be filtered many times and from several threads.
+    """One image, prepared to be filtered many times; thread-safe.
 
     Parameters
     ----------
     image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
-        As `ahf_ros.imaging.image.check_image` accepts it. It is not kept.
+        An image that `ahf_ros.imaging.image.check_image` accepts; no reference is kept.
     settings : FilterSettings
         Offset and output mapping.
 
@@ -82,9 +81,16 @@ class HomomorphicFilter:
 
     Notes
     -----
-    Blurs are not kept for a later filter with the same d. A search seldom comes back to a
-    difference soon: 2 to 4 % of the filters that a genetic search evaluates find their blur among
-    the last eight, each of which takes 42 MB at 10.6 MP, and writing it for the others costs more.
+    Blurs are not cached for later filters with the same d. Only 2 to 4 % of the filters of a
+    genetic search would find their blur among the last eight. Each takes 42 MB at 10.6 MP, and
+    writing it for the other filters costs more than it saves.
+
+    Examples
+    --------
+    >>> image = np.add.outer(np.arange(40.0), np.arange(60.0) % 7)
+    >>> filtered = HomomorphicFilter(image).filtered(gamma_high=2.0, gamma_low=0.5)
+    >>> filtered.shape, filtered.dtype
+    ((40, 60), dtype('uint8'))
     """
 
     def __init__(self, image: np.ndarray, settings: FilterSettings | None = None) -> None:
@@ -108,21 +114,21 @@ class HomomorphicFilter:
         gamma_high, gamma_low, cutoff, attenuation
             As for `transfer`.
         executor : concurrent.futures.Executor, optional
-            Threads that share the strips of the image; the result does not depend on them. Never
-            the one whose thread makes this call: it would wait for itself.
+            Threads that share the strips of the image; they do not change the result. Must not
+            be the executor that runs this call, which would wait for itself.
 
         Returns
         -------
         ndarray of uint8, shape (height, width)
-            Within one gray level of `filtered_fft` for photographs and the published parameters.
+            With the published parameters, within one gray level of `filtered_fft` for photographs.
 
         Raises
         ------
         ValueError
             If a parameter is out of its range.
         """
-        chosen = transfer(self.shape, gamma_high, gamma_low, cutoff, attenuation)
-        spatial = _spatial(self.shape, chosen)
+        function = transfer(self.shape, gamma_high, gamma_low, cutoff, attenuation)
+        spatial = _spatial(self.shape, function)
         padded = self._padded(spatial)
         scale, zero = mapping(
             _filtered_samples(padded, spatial, self.shape),
@@ -134,7 +140,7 @@ class HomomorphicFilter:
         def fill(rows: slice) -> None:
             values = _filtered_rows(padded, rows, spatial, scale)
             cv2.exp(values, values)
-            # subtracts, rounds and saturates in one go
+            # subtracts, rounds and saturates in one pass
             cv2.addWeighted(values, 0.5, values, 0.5, -zero, image[rows], cv2.CV_8U)
 
         _in_strips(fill, self.shape[0], executor)
@@ -151,10 +157,10 @@ class HomomorphicFilter:
         """Return s of Eq. (6), float32, shape (height, width).
 
         With the published parameters within 0.0015 (max z - min z) of `filtered_logarithm_fft`
-        for photographs, 0.008 (max z - min z) for black and white noise of single pixels.
+        for photographs, and 0.008 (max z - min z) for black and white pixel noise.
         """
-        chosen = transfer(self.shape, gamma_high, gamma_low, cutoff, attenuation)
-        spatial = _spatial(self.shape, chosen)
+        function = transfer(self.shape, gamma_high, gamma_low, cutoff, attenuation)
+        spatial = _spatial(self.shape, function)
         padded = self._padded(spatial)
         filtered = np.empty(self.shape, np.float32)
 
@@ -165,7 +171,7 @@ class HomomorphicFilter:
         return filtered
 
     def _padded(self, spatial: _Spatial) -> np.ndarray:
-        """Return z, continued periodically by the reach of the taps."""
+        """Return z, extended periodically by the reach of the taps."""
         height, width = self.shape
         top, left = MARGIN - spatial.above, MARGIN - spatial.beside
         if min(top, left) < 0:
@@ -185,7 +191,7 @@ def filtered_fft(
 ) -> np.ndarray:
     """Return what `HomomorphicFilter.filtered` returns, by Fourier transforms in double precision.
 
-    The reference: Eq. (1) to (7) as they stand, some 30 times slower.
+    This is the reference, Eq. (1) to (7) as published, about 30 times slower.
 
     Parameters
     ----------
@@ -215,9 +221,9 @@ def filtered_logarithm_fft(
     """Return s of Eq. (6) by Fourier transforms, float64, shape (height, width)."""
     check_image(image)
     settings = settings or FilterSettings()
-    chosen = transfer(image.shape, gamma_high, gamma_low, cutoff, attenuation)
+    function = transfer(image.shape, gamma_high, gamma_low, cutoff, attenuation)
     spectrum = np.fft.fft2(logarithm(image, settings.log_offset).astype(np.float64))
-    return np.fft.ifft2(chosen.response(image.shape) * spectrum).real
+    return np.fft.ifft2(function.response(image.shape) * spectrum).real
 
 
 @dataclass(frozen=True, slots=True)
@@ -231,20 +237,19 @@ class _Spatial:
 
     @property
     def above(self) -> int:
-        """Rows that the taps reach up and down."""
+        """Reach of the taps up and down, rows."""
         return len(self.column) // 2
 
     @property
     def beside(self) -> int:
-        """Columns that the taps reach to either side."""
+        """Reach of the taps to either side, columns."""
         return len(self.row) // 2
 
 
-def _spatial(shape: tuple[int, int], chosen: Transfer) -> _Spatial:
-    column, row = (
-        blur_taps(length, chosen.attenuation, chosen.cutoff).astype(np.float32) for length in shape
-    )
-    return _Spatial(chosen.gamma_high, chosen.gamma_high - chosen.gamma_low, column, row)
+def _spatial(shape: tuple[int, int], function: Transfer) -> _Spatial:
+    taps = (blur_taps(length, function.attenuation, function.cutoff) for length in shape)
+    column, row = (values.astype(np.float32) for values in taps)
+    return _Spatial(function.gamma_high, function.gamma_high - function.gamma_low, column, row)
 
 
 def _surrounded(values: np.ndarray, above: int, beside: int) -> np.ndarray:
@@ -273,11 +278,11 @@ def _filtered_rows(
 
 
 def _filtered_samples(padded: np.ndarray, spatial: _Spatial, shape: tuple[int, int]) -> np.ndarray:
-    """Return s where `sampled` looks."""
+    """Return s on the lattice of `sampled`."""
     rows, columns = sample_lattice(*shape)
     around = [padded[row : row + len(spatial.column)] for row in rows]
     blurred = np.array([np.einsum('k,kx->x', spatial.column, strip) for strip in around])
     blurred = cv2.sepFilter2D(blurred, cv2.CV_32F, spatial.row, np.ones(1, np.float32))
     centres = np.array([strip[spatial.above] for strip in around])
-    chosen = columns + spatial.beside
-    return spatial.high * centres[:, chosen] - spatial.difference * blurred[:, chosen]
+    inside = columns + spatial.beside
+    return spatial.high * centres[:, inside] - spatial.difference * blurred[:, inside]

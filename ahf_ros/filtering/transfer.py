@@ -1,4 +1,4 @@
-"""The transfer function of the homomorphic filter, in the spectrum and as kernels."""
+"""Transfer function of the homomorphic filter, in the spectrum and as kernels in space."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ from functools import lru_cache
 import numpy as np
 
 TOLERANCE = 1e-3
-"""Weight of a kernel that may lie beyond its last tap, of one."""
+"""Weight of a kernel, of 1, that may lie beyond its last tap: filtered images then stay within one
+gray level of the Fourier filter."""
 
 
 def distances(height: int, width: int) -> np.ndarray:
-    """Return D(u, v), the distance of every frequency to the centre of the spectrum [1]_.
+    """Return D(u, v), the distance of every frequency from the centre of the spectrum [1]_.
 
     Parameters
     ----------
@@ -27,8 +28,8 @@ def distances(height: int, width: int) -> np.ndarray:
 
     Notes
     -----
-    Eq. (5) prints a minus sign under the root, a slip. After a shift of the origin to pixel
-    (height // 2, width // 2) this is the distance to that pixel.
+    The minus sign under the root of Eq. (5) is a misprint. With the origin shifted to pixel
+    (height // 2, width // 2), D is the distance from that pixel.
 
     References
     ----------
@@ -41,18 +42,18 @@ def distances(height: int, width: int) -> np.ndarray:
 def median_distance(height: int, width: int) -> float:
     """Return the exact median of `distances`, the published cut-off D0, in cycles per image.
 
-    The squares of the distances are integers, so the order statistics in the middle are found
-    by bisection on the number of frequencies in a disc, without sorting the spectrum.
+    Squared distances are integers, so the middle order statistics are found by bisection on the
+    number of frequencies in a disc, without sorting the spectrum.
     """
-    middle = height * width
-    ranks = ((middle - 1) // 2, middle // 2)
+    count = height * width
+    ranks = ((count - 1) // 2, count // 2)
     lower, upper = (np.sqrt(_square_of_rank(height, width, rank)) for rank in ranks)
     return float(lower + upper) / 2
 
 
 @dataclass(frozen=True, slots=True)
 class Transfer:
-    """The numbers of one filter, all of them set.
+    """Parameters of one filter.
 
     Attributes
     ----------
@@ -99,7 +100,7 @@ def transfer(
     cutoff: float | None = None,
     attenuation: float | None = None,
 ) -> Transfer:
-    """Return the filter with what is not given at its published value.
+    """Return a filter; parameters that are not given have their published values.
 
     Parameters
     ----------
@@ -108,9 +109,9 @@ def transfer(
     gamma_high, gamma_low : float
         Gains of the high and the low frequencies, 0 <= gamma_low <= gamma_high, gamma_high > 0.
     cutoff : float, optional
-        D0, cycles per image, > 0; the median of D where not given.
+        D0, cycles per image, > 0; by default the median of D.
     attenuation : float, optional
-        c, >= 0; gamma_high - gamma_low (Eq. 8) where not given.
+        c, >= 0; by default gamma_high - gamma_low (Eq. 8).
 
     Raises
     ------
@@ -169,28 +170,28 @@ def blur_kernel(length: int, attenuation: float, cutoff: float) -> np.ndarray:
 def blur_taps(
     length: int, attenuation: float, cutoff: float, tolerance: float = TOLERANCE
 ) -> np.ndarray:
-    """Return `blur_kernel` cut to the taps that matter, for a convolution in space.
+    """Return `blur_kernel` truncated for a convolution in space.
 
-    The spectrum is cut at the Nyquist frequency, where it is not yet zero, so that the kernel
-    has a tail (-1)^k / k^2 which never ends. What lies beyond the last tap is added to the last
-    tap: constants pass exactly, and slow changes better than with a kernel twice as long.
+    The spectrum ends at the Nyquist frequency, where it is not yet zero, so the kernel has an
+    endless tail (-1)^k / k^2. The weight beyond the last tap is added to the last tap: constants
+    pass exactly, and slow changes better than with a kernel twice as long.
 
     Parameters
     ----------
     length, attenuation, cutoff
         As for `blur_kernel`.
     tolerance : float
-        Weight that may lie beyond the last tap, before it is added there. 0 takes the whole
-        kernel: the convolution is then the Fourier filter, up to rounding.
+        Weight that may lie beyond the last tap before it is added there. With 0 the kernel is
+        complete, and the convolution equals the Fourier filter up to rounding.
 
     Returns
     -------
     ndarray of float64, shape (2 reach + 1,)
-        Symmetric, the centre in the middle, sums to one; reach <= length // 2.
+        Symmetric about the middle, sums to one; reach <= length // 2.
     """
     half = blur_kernel(length, attenuation, cutoff)[: length // 2 + 1].copy()
     if length % 2 == 0:
-        half[-1] /= 2  # the sample opposite the centre is reached from both sides
+        half[-1] /= 2  # the sample opposite the centre belongs to both halves
     beyond = 1 - (2 * np.cumsum(half) - half[0])
     above = np.flatnonzero(np.abs(beyond[:-1]) > tolerance)
     reach = int(above[-1]) + 1 if above.size else 0
@@ -204,7 +205,7 @@ def _frequencies(length: int) -> np.ndarray:
 
 
 def _square_of_rank(height: int, width: int, rank: int) -> int:
-    """Return the `rank`-th smallest (from 0) squared distance of a spectrum."""
+    """Return the squared distance of a rank, from 0, in ascending order."""
     rows = (np.arange(height) - height // 2) ** 2
     low, high = 0, (height // 2) ** 2 + (width // 2) ** 2
     while low < high:
@@ -219,6 +220,6 @@ def _square_of_rank(height: int, width: int, rank: int) -> int:
     return low
 
 
-def _check_number(name: str, value: float, accepted: bool, words: str) -> None:
+def _check_number(name: str, value: float, accepted: bool, range_: str) -> None:
     if not (accepted and math.isfinite(value)):
-        raise ValueError(f'{name} is {value!r}, accepted is a number {words}')
+        raise ValueError(f'{name} is {value!r}, accepted is a number {range_}')

@@ -1,1 +1,1 @@
-"""What an image is, and its logarithm."""
+"""Images and their logarithms."""

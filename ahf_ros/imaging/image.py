@@ -1,4 +1,4 @@
-"""What this package accepts as an image."""
+"""Images that the package accepts, and their gray values."""
 
 from __future__ import annotations
 
@@ -8,31 +8,31 @@ import cv2
 import numpy as np
 
 MINIMUM_SIDE = 16
-"""Smallest width and height of an image, px: less cannot hold one readable target."""
+"""Minimum width and height of an image, px; a smaller one cannot show a readable target."""
 
 HOT_SHARE = 100_000
-"""One pixel of so many may be hot, brighter than any light in the image."""
+"""One pixel in so many may be hot, that is, brighter than any light in the image."""
 
 IMAGE_TYPES = (np.uint8, np.uint16, np.float32, np.float64)
-"""Accepted types of a pixel, in the byte order of the machine."""
+"""Accepted pixel types, in the byte order of the machine."""
 
 
 def check_image(image: Any, name: str = 'image') -> None:
-    """Raise unless `image` is a gray image that can show something.
+    """Raise a ValueError unless `image` is a gray image with contrast.
 
     Parameters
     ----------
     image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
-        Radiance or gray values, linear or not, any strides; floats on any scale.
+        Radiance or gray values, linear or not; any strides; floats on any scale.
     name : str
-        How the error calls it.
+        What errors call it.
 
     Raises
     ------
     ValueError
-        If `image` is not a two-dimensional array of an accepted type, is narrower or lower than
-        `MINIMUM_SIDE`, is constant, or is a float image with a NaN, infinite or negative pixel.
-        The message names the image, what it was and what is accepted.
+        If `image` is not a two-dimensional array of an accepted type, is smaller than
+        `MINIMUM_SIDE`, is constant, or has a NaN, infinite or negative pixel. The message names
+        the image, what it is and what is accepted.
     """
     if not isinstance(image, np.ndarray):
         raise ValueError(f'{name} is a {type(image).__name__}, accepted is a numpy array')
@@ -51,25 +51,25 @@ def check_image(image: Any, name: str = 'image') -> None:
 
 
 def _check_values(image: np.ndarray, name: str) -> None:
-    lowest, highest = image.min(), image.max()  # both NaN where one pixel is
-    if not (np.isfinite(lowest) and np.isfinite(highest)):
+    minimum, maximum = image.min(), image.max()  # both NaN if one pixel is
+    if not (np.isfinite(minimum) and np.isfinite(maximum)):
         raise ValueError(f'{name} has NaN or infinite pixels, accepted are finite values')
-    if lowest < 0:
-        raise ValueError(f'{name} has pixels down to {lowest:g}, accepted is at least 0')
-    if lowest == highest:
+    if minimum < 0:
+        raise ValueError(f'{name} has pixels down to {minimum:g}, accepted is at least 0')
+    if minimum == maximum:
         raise ValueError(
-            f'{name} is constant, {highest:g} everywhere, accepted is one with contrast'
+            f'{name} is constant, {maximum:g} everywhere, accepted is an image with contrast'
         )
 
 
 def brightest(image: np.ndarray) -> float:
-    """Return the gray value of the brightest light in an image, hot pixels left out."""
+    """Return the gray value of the brightest light in an image, hot pixels excluded."""
     rank = image.size - 1 - image.size // HOT_SHARE
     return float(np.partition(image, rank, axis=None)[rank]) or float(image.max())
 
 
 def as_gray(image: np.ndarray) -> np.ndarray:
-    """Return gray values from 0 to 255, of which an 8-bit image is its own.
+    """Return the gray values of an image on a scale from 0 to 255.
 
     Parameters
     ----------
@@ -78,8 +78,8 @@ def as_gray(image: np.ndarray) -> np.ndarray:
     Returns
     -------
     ndarray of uint8 or float32, shape (height, width)
-        Other images are scaled by their brightest light, so that it does not matter how many bits
-        of a type are used, or whether a pixel is hot.
+        An 8-bit image as it is. Other images are scaled by their brightest light, so that neither
+        the number of bits in use nor a hot pixel matters.
     """
     if image.dtype == np.uint8:
         return image

@@ -1,4 +1,4 @@
-"""From gray values to logarithms, and from filtered logarithms back to 8 bit."""
+"""Logarithms of images, and the mapping of filtered logarithms to 8 bit."""
 
 from __future__ import annotations
 
@@ -11,32 +11,32 @@ import numpy as np
 from ahf_ros.imaging.image import brightest
 
 LOG_OFFSET = 8.0
-"""Added to a gray value, of 255, before a logarithm in which edges are looked for: about where
-noise drowns contrast."""
+"""Added to gray values, 0 to 255, before a logarithm that is searched for edges: about where noise
+hides contrast."""
 
 SAMPLE_ROWS, SAMPLE_COLUMNS = 32, 1024
-"""Rows and columns on whose crossings the output mapping looks at the filtered image."""
+"""Size of the lattice on which the output mapping samples the filtered image."""
 
 MINIMUM_CONTRAST = 1e-3
-"""Smallest difference of s between black and white; a flatter image stays gray."""
+"""Minimum difference of s between black and white; a flatter image stays gray."""
 
 
 def logarithm(image: np.ndarray, offset: float) -> np.ndarray:
-    """Return z = ln(image / range + offset); 8- and 16-bit images by look-up.
+    """Return z = ln(image / range + offset); for 8- and 16-bit images from a table.
 
     Parameters
     ----------
     image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
-        Gray values, at least 0 and somewhere above.
+        Gray values of at least 0, not all 0.
     offset : float
-        As a share of the range, > 0.
+        Fraction of the range, > 0.
 
     Returns
     -------
     ndarray of float32, shape (height, width)
-        From ln(offset) to ln(1 + offset). The range is 255 for 8-bit images; the largest number
-        of the bit depth for 16-bit images, the depth being the smallest from 8 to 16 that holds
-        the brightest pixel; and that pixel for float images, hot pixels left out.
+        From ln(offset) to ln(1 + offset). The range is 255 for 8-bit images. For 16-bit images it
+        is the maximum of their bit depth, the minimum depth from 8 to 16 that holds `brightest`.
+        For float images it is `brightest`.
     """
     if image.dtype.kind == 'f':
         share = (image / brightest(image)).astype(np.float32)
@@ -50,14 +50,14 @@ def logarithm(image: np.ndarray, offset: float) -> np.ndarray:
 def mapping(
     samples: np.ndarray, black_percentile: float, white_percentile: float
 ) -> tuple[float, float]:
-    """Return `scale` and `zero` with which exp(s + scale) - zero is the 8-bit image.
+    """Return `scale` and `zero` such that exp(s + scale) - zero is the 8-bit image.
 
     Parameters
     ----------
     samples : ndarray
-        Values of s, the logarithm of the image to be mapped.
+        Values of s, the logarithm of the image.
     black_percentile, white_percentile : float
-        Percentiles of exp s that become 0 and 255, in percent.
+        Percentiles of exp s that become 0 and 255, %.
     """
     percentiles = np.percentile(samples, (black_percentile, white_percentile))
     black, white = (float(value) for value in percentiles)
@@ -68,8 +68,8 @@ def mapping(
 
 @lru_cache(maxsize=16)
 def sample_lattice(height: int, width: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the rows and the columns that the output mapping looks at, ascending."""
-    # one at random in every interval: even steps would fall in step with projected stripes
+    """Return the rows and the columns of the lattice of the output mapping, ascending."""
+    # one at random per interval: even steps could coincide with projected stripes
     generator = np.random.default_rng(0)
     lattice = []
     for length, count in ((height, SAMPLE_ROWS), (width, SAMPLE_COLUMNS)):
@@ -79,5 +79,5 @@ def sample_lattice(height: int, width: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def sampled(values: np.ndarray) -> np.ndarray:
-    """Return `values`, shape (height, width), on the crossings of `sample_lattice`."""
+    """Return `values`, shape (height, width), on `sample_lattice`."""
     return values[np.ix_(*sample_lattice(*values.shape))]
