@@ -170,6 +170,5 @@ def positions_of(value: int) -> list[int]:
 def far_apart(points: Any, minimum_distance: float) -> bool:
     """Return whether any two of the points, shape (n, 2), are at least that far apart."""
     return all(
-        dist(first, second) >= minimum_distance - 1e-9
-        for first, second in combinations(points, 2)
+        dist(first, second) >= minimum_distance - 1e-9 for first, second in combinations(points, 2)
     )

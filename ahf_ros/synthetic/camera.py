@@ -93,6 +93,12 @@ class Camera:
         rays = np.column_stack((points, np.ones(len(points)))) @ self.pose.T
         return np.arccos(np.abs(rays @ normal) / np.linalg.norm(rays, axis=1))
 
+    @property
+    def tilt(self) -> float:
+        """Angle between the optical axis and the wall's normal, degrees."""
+        axes = self.pose[:, :2] / np.linalg.norm(self.pose[:, :2], axis=0)
+        return math.degrees(math.acos(min(abs(np.cross(axes[:, 0], axes[:, 1])[2]), 1.0)))
+
     def vignetting(self, pixels: np.ndarray) -> np.ndarray:
         """Return the vignetting of pixels, shape (n, 2): cos^4 of the field angle."""
         seen = (pixels - self.intrinsics[:2, 2]) / self.intrinsics[0, 0]

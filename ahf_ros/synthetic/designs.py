@@ -1,27 +1,24 @@
-"""Printed designs of the families, as functions that say where the ink is."""
+"""Printed designs of the families."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
-import cv2
 import numpy as np
 
-from ahf_ros.codes.ring import Family, family, sectors
-from ahf_ros.codes.square import SQUARE_NAMES, dictionary, marker
+from ahf_ros.codes.dots import DotFamily, dot_family
+from ahf_ros.codes.gsi import PointFamily
+from ahf_ros.codes.gsi_library import point_family
+from ahf_ros.codes.ring import Family, family
+from ahf_ros.codes.square import SQUARE_NAMES, dictionary
+from ahf_ros.synthetic.covers import Cover, ring_cover, square_cover
+from ahf_ros.synthetic.dot_covers import dot_ring_cover, point_cover
 
-_CELL = 32  # side of a cell in the picture of a square marker, px
 _HALF_SIDE = 2.4  # of a square marker, in radii of the dot of a ring target of the same size
-
-Cover = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
-"""From points (x, y) of a mark, float32 of one shape in units of its radius, to the ink, 0 to 1.
-
-y points up, so that angles are counter-clockwise in the image. The third argument, shape (2, 2),
-is the change of (x, y) across the width of an anti-aliased edge, along the columns and the rows.
-"""
+_QUIET_ZONE = 4.2  # of ring targets and square markers: 3.5 for the widest band, a fifth more
+_MARGIN = 1.0  # about the outermost dot or border of others, in radii of the dot
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +43,9 @@ class Design:
     radius: float
 
 
-def designs(name: str, pinhole: float) -> tuple[np.ndarray, Callable[[int, float], Design]]:
+def designs(
+    name: str, pinhole: float, file: str = ''
+) -> tuple[np.ndarray, Callable[[int, float], Design]]:
     """Return the designs of a family.
 
     Parameters
@@ -54,7 +53,9 @@ def designs(name: str, pinhole: float) -> tuple[np.ndarray, Callable[[int, float
     name : str
         Name of the family.
     pinhole : float
-        As for `ring_cover`; square markers have none.
+        As for `ring_cover`; square markers and point-distributed targets have none.
+    file : str
+        Data file that describes the family, of `gsi` and `dots`; the usual one where empty.
 
     Returns
     -------
@@ -65,6 +66,12 @@ def designs(name: str, pinhole: float) -> tuple[np.ndarray, Callable[[int, float
     """
     if name in SQUARE_NAMES:
         return np.arange(len(dictionary(name).bytesList)), partial(_square_design, name)
+    if name == 'gsi':
+        points = point_family(file)
+        return points.numbers, partial(_point_design, points)
+    if name == 'dots':
+        dots = dot_family(file)
+        return np.arange(1, dots.words.size + 1), partial(_dot_ring_design, dots, pinhole)
     table = family(name)
     return np.arange(1, table.words.size + 1), partial(_ring_design, table, pinhole)
 
@@ -79,111 +86,28 @@ def _square_design(name: str, number: int, turn: float) -> Design:
     return Design(number, cover, _HALF_SIDE * 2**0.5, _HALF_SIDE)
 
 
-def ring_cover(family: Family, word: int, turn: float, pinhole: float) -> Cover:
-    """Return the ink of a ring target.
-
-    The signed distance to each edge, in widths of an anti-aliased edge, gives the covered
-    fraction of a sample.
-
-    Parameters
-    ----------
-    family : Family
-        Family with the proportions and the number of sectors.
-    word : int
-        Code word.
-    turn : float
-        Direction of the edge at which sector 0 begins, rad.
-    pinhole : float
-        Radius of the hole in the centre of the dot, in radii of the dot; 0 for none.
-    """
-
-    def cover(x: np.ndarray, y: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
-        distance = np.sqrt(x * x + y * y)
-        radial = _width(jacobian, x, y, distance)
-        inked = _inside(1 - distance, radial)
-        if pinhole:
-            inked -= _inside(pinhole - distance, radial)
-        margin = np.float32(2 * radial.max())
-        band = (distance > family.band_inner - margin) & (distance < family.band_outer + margin)
-        distance, radial, x, y = distance[band], radial[band], x[band], y[band]
-        ring = _inside(distance - np.float32(family.band_inner), radial)
-        ring *= _inside(np.float32(family.band_outer) - distance, radial)
-        around = _width(jacobian, -y, x, distance) / distance
-        ring *= _sector_cover(sectors(word, family.bits), np.arctan2(y, x) - turn, around)
-        inked[band] += ring
-        return inked
-
-    return cover
+def _point_design(table: PointFamily, number: int, turn: float) -> Design:
+    word = table.word(number)
+    radius = table.template_radii[table.reference] / table.dot_radius
+    cover = point_cover(table, word, turn)
+    return Design(word, cover, table.reach / table.dot_radius, float(radius))
 
 
-def square_cover(name: str, number: int, half_side: float, turn: float) -> Cover:
-    """Return the ink of a square marker.
+def _dot_ring_design(table: DotFamily, pinhole: float, number: int, turn: float) -> Design:
+    word = table.word(number)
+    return Design(word, dot_ring_cover(table, word, turn, pinhole), table.border_radius, 1.0)
+
+
+def quiet_zone(name: str, file: str = '') -> float:
+    """Return the radius of the area around a target that is left free, in radii of the dot.
 
     Parameters
     ----------
-    name : str
-        Name of the dictionary, one of `ahf_ros.codes.square.SQUARE_NAMES`.
-    number : int
-        ID of the marker.
-    half_side : float
-        Half the side of the marker, in radii of the mark.
-    turn : float
-        Rotation of the marker, counter-clockwise, rad.
+    name, file : str
+        As for `designs`.
     """
-    ink = 255 - marker(name, number, _CELL)
-    side = len(ink)
-    ink = np.pad(ink, _CELL)
-    return stamp_cover(ink, half_side * len(ink) / side, turn)
-
-
-def stamp_cover(stamp: np.ndarray, half_side: float, turn: float) -> Cover:
-    """Return the ink of a picture.
-
-    Parameters
-    ----------
-    stamp : ndarray of uint8, shape (side, side)
-        255 where there is ink.
-    half_side : float
-        Half the side of the picture, in radii of the mark.
-    turn : float
-        Rotation of the picture, counter-clockwise, rad.
-    """
-    cosine, sine = np.float32(math.cos(turn)), np.float32(math.sin(turn))
-    half = np.float32(len(stamp) / 2)
-    scale = half / np.float32(half_side)
-    ink = stamp.astype(np.float32) / np.float32(255)
-
-    def cover(x: np.ndarray, y: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
-        sample = float(np.sqrt(abs(np.linalg.det(jacobian)))) * float(scale)
-        smooth = cv2.GaussianBlur(ink, (0, 0), max(sample / 2, 0.5))
-        columns = (x * cosine + y * sine) * scale + (half - np.float32(0.5))
-        rows = (x * sine - y * cosine) * scale + (half - np.float32(0.5))
-        return cv2.remap(smooth, columns, rows, cv2.INTER_LINEAR)
-
-    return cover
-
-
-def _width(jacobian: np.ndarray, x: np.ndarray, y: np.ndarray, distance: np.ndarray) -> np.ndarray:
-    """Return the width of an edge perpendicular to (x, y), a vector of length `distance`."""
-    form = jacobian @ jacobian.T
-    squared = x * (form[0, 0] * x + 2 * form[0, 1] * y) + form[1, 1] * y * y
-    width: np.ndarray = np.sqrt(squared) / np.maximum(distance, np.float32(1e-6))
-    return np.maximum(width, np.float32(1e-6), out=width)
-
-
-def _inside(distance: np.ndarray, width: np.ndarray) -> np.ndarray:
-    """Return the fraction of each sample on the positive side of an edge."""
-    share: np.ndarray = distance / width + np.float32(0.5)
-    return np.clip(share, 0, 1, out=share)
-
-
-def _sector_cover(colours: np.ndarray, angle: np.ndarray, width: np.ndarray) -> np.ndarray:
-    """Return the fraction of each sample that inked sectors cover; edges are `width` rad wide."""
-    bits = len(colours)
-    position = angle * np.float32(bits / (2 * math.pi))
-    edge = np.rint(position)
-    share = _inside((position - edge) * np.float32(2 * math.pi / bits), width)
-    after = edge.astype(np.int32) % bits
-    shades = colours.astype(np.float32)
-    cover: np.ndarray = shades[after] * share + shades[after - 1] * (1 - share)
-    return cover
+    if name == 'gsi':
+        return point_family(file).reach / point_family(file).dot_radius + _MARGIN
+    if name == 'dots':
+        return dot_family(file).border_radius + _MARGIN
+    return _QUIET_ZONE

@@ -8,7 +8,7 @@ import string
 import cv2
 import numpy as np
 
-from ahf_ros.synthetic.designs import Cover, stamp_cover
+from ahf_ros.synthetic.covers import Cover, stamp_cover
 
 _SIDE = 256  # px of a stamp, finer than any distractor in an image
 _FINE = 3  # fractional bits of drawing coordinates

@@ -9,12 +9,13 @@ import numpy as np
 
 from ahf_ros.synthetic.camera import Camera
 
-QUIET_ZONE = 4.2
-"""Radius of the free area around a target, in radii of the dot: 3.5 for the widest code
-band, and a fifth more."""
-
 MAXIMUM_VIEW_ANGLE = 75.0
-"""Largest angle between the wall's normal and the ray to a target, degrees."""
+"""Largest angle between the wall's normal and the ray to a target, degrees, where the wall is not
+tilted by more than `TILT_MARGIN` less."""
+
+TILT_MARGIN = 5.0
+"""Angle by which targets may be seen more obliquely than the middle of the wall at the steepest
+tilts, degrees."""
 
 _TRIES = 1000  # positions per distractor: one in 200 of the image being free is enough in 99 %
 
@@ -35,7 +36,7 @@ class Placements:
     radii: np.ndarray
 
 
-def quiet_radius(semi_major: np.ndarray | float, focal_length: float) -> np.ndarray:
+def quiet_radius(semi_major: np.ndarray | float, focal_length: float, zone: float) -> np.ndarray:
     """Return the radius of the circle in the image that holds a target and its quiet zone, px.
 
     Parameters
@@ -45,9 +46,28 @@ def quiet_radius(semi_major: np.ndarray | float, focal_length: float) -> np.ndar
     focal_length : float
         In px. On a tilted wall, the nearer half of a target appears larger; the shorter the focal
         length, the more so.
+    zone : float
+        Radius of the quiet zone in radii of the dot.
     """
-    reach = QUIET_ZONE * np.asarray(semi_major, dtype=float)
+    reach = zone * np.asarray(semi_major, dtype=float)
     return 1.02 * reach / np.maximum(1 - reach / focal_length, 0.1)
+
+
+def size_ratios(text: str) -> list[float]:
+    """Return the ratios that a text lists, such as '0.5, 1, 2'.
+
+    Raises
+    ------
+    ValueError
+        If they are not numbers from 0.05 to 20.
+    """
+    try:
+        ratios = [float(part) for part in text.split(',')]
+    except ValueError:
+        ratios = []
+    if not ratios or not all(0.05 <= ratio <= 20 for ratio in ratios):
+        raise ValueError(f'sizes is {text!r}, accepted are numbers from 0.05 to 20, with commas')
+    return ratios
 
 
 def finest_grid(width: int, height: int, radius: float) -> tuple[int, int]:
@@ -61,7 +81,7 @@ def grid_placements(
     """Place circles at random inside the cells of a grid, one per cell.
 
     The grid is as coarse as possible. Cells where the camera sees the wall at more than
-    `MAXIMUM_VIEW_ANGLE` stay empty.
+    the maximum view angle stay empty.
 
     Parameters
     ----------
@@ -75,8 +95,9 @@ def grid_placements(
     Raises
     ------
     ValueError
-        If too few cells show the wall within `MAXIMUM_VIEW_ANGLE`.
+        If too few cells show the wall within that angle.
     """
+    steepest = max(MAXIMUM_VIEW_ANGLE, camera.tilt + TILT_MARGIN)
     count = len(radii)
     if not count:
         return Placements(np.empty((0, 2)), radii)
@@ -88,7 +109,7 @@ def grid_placements(
         x, y = np.meshgrid(*(np.arange(side) for side in grid))
         corners = np.stack((x.ravel(), y.ravel()), axis=1) * cell - 0.5
         angles = np.degrees(camera.view_angle(camera.wall(corners + cell / 2)))
-        corners = corners[angles <= MAXIMUM_VIEW_ANGLE]
+        corners = corners[angles <= steepest]
         if len(corners) >= count:
             selected = corners[generator.permutation(len(corners))[:count]]
             slack = cell - 2 * radii[:, None]
@@ -97,7 +118,7 @@ def grid_placements(
         capacity = len(corners)
     raise ValueError(
         f'targets is {count}, accepted is an integer from 0 to {capacity} where the camera '
-        f'sees the wall at less than {MAXIMUM_VIEW_ANGLE:g} degrees'
+        f'sees the wall at less than {steepest:g} degrees'
     )
 
 

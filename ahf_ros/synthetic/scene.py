@@ -12,7 +12,8 @@ from ahf_ros.codes.ring import FAMILY_NAMES
 from ahf_ros.codes.square import SQUARE_NAMES
 from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.synthetic.camera import Camera, Sensor, tilted_camera
-from ahf_ros.synthetic.designs import Cover, designs
+from ahf_ros.synthetic.covers import Cover
+from ahf_ros.synthetic.designs import designs, quiet_zone
 from ahf_ros.synthetic.distractors import distractor_cover
 from ahf_ros.synthetic.layout import (
     Placements,
@@ -20,6 +21,7 @@ from ahf_ros.synthetic.layout import (
     grid_placements,
     quiet_radius,
     scattered_placements,
+    size_ratios,
 )
 from ahf_ros.synthetic.patterns import LIGHT_NAMES, light_pattern
 from ahf_ros.synthetic.prints import Mark, print_mark
@@ -46,7 +48,12 @@ class SceneSettings:
     height: int = parameter(2656, 'Height of the image, px.', minimum=16, maximum=20000)
     targets: int = parameter(54, 'Number of coded targets in the image.', minimum=0)
     family: str = parameter(
-        'metashape12', 'Family of the codes.', choices=(*FAMILY_NAMES, *SQUARE_NAMES)
+        'metashape12',
+        'Family of the codes.',
+        choices=(*FAMILY_NAMES, *SQUARE_NAMES, 'gsi', 'dots'),
+    )
+    family_file: str = parameter(
+        '', 'Data file that describes the family gsi or dots; empty: the usual design.'
     )
     polarity: str = parameter(
         'dark',
@@ -59,6 +66,9 @@ class SceneSettings:
     radius_spread: float = parameter(
         0.1, 'Largest deviation from the radius, as a fraction of it.', minimum=0.0, maximum=0.5
     )
+    sizes: str = parameter(
+        '1', 'Sizes of the targets as ratios, mixed in equal numbers, such as 0.5, 1, 2.'
+    )
     distractors: int = parameter(
         0, 'Number of marks that are not coded targets: dots, rings, text, leaves.', minimum=0
     )
@@ -66,7 +76,7 @@ class SceneSettings:
         0.05, 'Radius of the hole in the dot, in dot radii.', minimum=0.0, maximum=0.5
     )
     tilt: float = parameter(
-        0.0, 'Angle between the optical axis and the wall normal, deg.', minimum=0.0, maximum=75.0
+        0.0, 'Angle between the optical axis and the wall normal, deg.', minimum=0.0, maximum=80.0
     )
     focal_length: float = parameter(
         1.8, 'Focal length in image widths.', minimum=0.5, maximum=20.0
@@ -134,8 +144,9 @@ class SceneSettings:
                 f'distortion is {self.distortion!r}, accepted is a number of at least '
                 f'{-strongest:.3f} with a focal_length of {self.focal_length:g}'
             )
-        largest = self.dot_radius * (1 + self.radius_spread)
-        reach = float(quiet_radius(largest, self.focal_length * self.width))
+        largest = self.dot_radius * (1 + self.radius_spread) * max(size_ratios(self.sizes))
+        zone = quiet_zone(self.family, self.family_file)
+        reach = float(quiet_radius(largest, self.focal_length * self.width, zone))
         columns, rows = finest_grid(self.width, self.height, reach)
         if self.targets > columns * rows:
             raise ValueError(
@@ -241,16 +252,18 @@ def _coded_targets(
     Prints are larger where the wall is farther away, so that every dot is about `dot_radius` in
     the image. Codes repeat only if there are more targets than codes.
     """
-    every, design_of = designs(settings.family, settings.pinhole)
+    every, design_of = designs(settings.family, settings.pinhole, settings.family_file)
     count = settings.targets
     semi_major = settings.dot_radius * (
         1 + settings.radius_spread * generator.uniform(-1, 1, count)
     )
+    semi_major *= np.resize(size_ratios(settings.sizes), count)
     turns = generator.uniform(0, 2 * math.pi, count)
     rounds = -(-count // len(every))
     shuffled = [generator.permutation(every) for _ in range(rounds)]
     ids = np.concatenate([np.empty(0, int), *shuffled])[:count].tolist()
-    reach = quiet_radius(semi_major, float(camera.intrinsics[0, 0]))
+    zone = quiet_zone(settings.family, settings.family_file)
+    reach = quiet_radius(semi_major, float(camera.intrinsics[0, 0]), zone)
     placements = grid_placements(camera, reach, generator)
 
     marks, targets = [], []

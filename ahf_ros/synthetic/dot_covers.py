@@ -1,0 +1,94 @@
+"""Printed designs that are made of dots: point-distributed targets and rings of dots."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ahf_ros.codes.dots import DotFamily
+from ahf_ros.codes.gsi import PointFamily
+from ahf_ros.synthetic.covers import Cover, edge_width, inside_share
+
+
+def point_cover(family: PointFamily, word: int, turn: float) -> Cover:
+    """Return the ink of a point-distributed target.
+
+    Parameters
+    ----------
+    family : PointFamily
+        Printed design; its `dot_radius` is the unit of length.
+    word : int
+        Value of the code.
+    turn : float
+        Counter-clockwise rotation about the reference point, rad.
+    """
+    shown = np.r_[: len(family.template), len(family.template) + family.decoding_dots(word)]
+    places = _turned(family.places[shown], turn) / family.dot_radius
+    radii = family.radii[shown] / family.dot_radius
+
+    def cover(x: np.ndarray, y: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
+        inked = np.zeros_like(x)
+        for place, radius in zip(places, radii, strict=True):
+            _add_dot(inked, x, y, place, radius, jacobian)
+        return inked
+
+    return cover
+
+
+def dot_ring_cover(family: DotFamily, word: int, turn: float, pinhole: float) -> Cover:
+    """Return the ink of a ring of dots.
+
+    Parameters
+    ----------
+    family : DotFamily
+        Printed design.
+    word : int
+        Code word.
+    turn : float
+        Direction of the place of dot 0, rad.
+    pinhole : float
+        Radius of the hole in the disc, in radii of the disc; 0 for none.
+    """
+    which = np.flatnonzero(word >> np.arange(family.bits) & 1)
+    angles = turn + 2 * math.pi * which / family.bits
+    places = family.dot_circle * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+
+    def cover(x: np.ndarray, y: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
+        distance = np.sqrt(x * x + y * y)
+        width = edge_width(jacobian, x, y, distance)
+        inked = inside_share(1 - distance, width)
+        if pinhole:
+            inked -= inside_share(pinhole - distance, width)
+        border = inside_share(distance - np.float32(family.ground_radius), width)
+        border *= inside_share(np.float32(family.border_radius) - distance, width)
+        inked += border
+        for place in places:
+            _add_dot(inked, x, y, place, family.dot_radius, jacobian)
+        return inked
+
+    return cover
+
+
+def _turned(points: np.ndarray, turn: float) -> np.ndarray:
+    """Return points rotated counter-clockwise about the origin."""
+    cosine, sine = math.cos(turn), math.sin(turn)
+    turned: np.ndarray = points @ np.array([[cosine, sine], [-sine, cosine]])
+    return turned
+
+
+def _add_dot(
+    inked: np.ndarray,
+    x: np.ndarray,
+    y: np.ndarray,
+    place: np.ndarray,
+    radius: float,
+    jacobian: np.ndarray,
+) -> None:
+    """Add the ink of a dot to samples."""
+    across, up = x - np.float32(place[0]), y - np.float32(place[1])
+    near = np.maximum(np.abs(across), np.abs(up)) < radius + 2 * np.abs(jacobian).sum()
+    across, up = across[near], up[near]
+    distance = np.sqrt(across * across + up * up)
+    width = edge_width(jacobian, across, up, distance)
+    inked[near] += inside_share(np.float32(radius) - distance, width)
