@@ -1,9 +1,10 @@
-"""Overlays: what was identified, drawn on the image."""
+"""Overlays of what was identified, and pictures side by side."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -11,38 +12,92 @@ import numpy as np
 from ahf_ros.imaging.image import stretched_to_8_bit
 from ahf_ros.target import UNDECODED, Identification, Target
 
-DECODED_COLOUR = (60, 230, 60)
-"""Blue, green, red of a decoded target."""
+Colour = tuple[int, int, int]
+"""Blue, green, red."""
 
-WRONG_COLOUR = (60, 60, 255)
-"""Blue, green, red of a target that is known to be wrong."""
+DECODED_COLOUR: Colour = (60, 230, 60)
+"""Of a decoded target."""
 
-UNDECODED_COLOUR = (0, 190, 255)
-"""Blue, green, red of a target without a code word."""
+WRONG_COLOUR: Colour = (60, 60, 255)
+"""Of a target that is known to be wrong."""
+
+MISSED_COLOUR: Colour = (0, 130, 255)
+"""Of a target that was not identified."""
+
+UNDECODED_COLOUR: Colour = (0, 190, 255)
+"""Of a target without a code word."""
+
+TEXT_COLOUR: Colour = (255, 255, 255)
+"""Of text that is neither good nor bad."""
 
 _OUTLINE_COLOUR = (0, 0, 0)
-_TEXT_COLOUR = (255, 255, 255)
+_GROUND_COLOUR = (45, 40, 35)
 _SHIFT = 4  # fractional bits of the coordinates that OpenCV draws
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 _FONT_HEIGHT = 22.0  # px of a capital at scale 1
 
 
-def draw(
-    image: np.ndarray, identification: Identification, wrong: Collection[Target] = ()
-) -> np.ndarray:
-    """Return the image in colour with the dot, the centre and the ID of every target.
+@dataclass(frozen=True, slots=True)
+class Tile:
+    """One of several pictures side by side.
 
-    A line at the top says how many were identified, and through which filter. Lines and letters
-    grow with the image, so that they can be read where it is shown as a whole.
+    Attributes
+    ----------
+    picture : ndarray of uint8, shape (height, width) or (height, width, 3)
+        Gray, or blue, green, red.
+    title : str
+        Line above it.
+    remarks : sequence of (str, tuple of 3 int)
+        Words of a second line, each with its colour.
+    """
+
+    picture: np.ndarray
+    title: str
+    remarks: Sequence[tuple[str, Colour]] = ()
+
+
+def draw(image: np.ndarray, identification: Identification) -> np.ndarray:
+    """Return the overlay of an identification, with its summary in a line at the top.
 
     Parameters
     ----------
     image : ndarray, shape (height, width)
-        Gray values; those of more than 8 bit are scaled, extremes to 0 and 255.
+        Gray values; more than 8 bits are stretched from their minimum to their maximum.
     identification : Identification
         What to draw.
+
+    Returns
+    -------
+    ndarray of uint8, shape (height, width, 3)
+        Blue, green, red.
+    """
+    canvas = overlay(image, identification.targets)
+    _draw_title(canvas, summary(identification), _pen(image))
+    return canvas
+
+
+def overlay(
+    image: np.ndarray,
+    targets: Collection[Target],
+    wrong: Collection[Target] = (),
+    missed: Collection[Target] = (),
+    unit: int | None = None,
+) -> np.ndarray:
+    """Return an image in colour with the dot, the centre and the ID of every target.
+
+    Parameters
+    ----------
+    image : ndarray, shape (height, width)
+        Gray values, as for `draw`.
+    targets : collection of Target
+        What was identified.
     wrong : collection of Target
-        Those of its targets that are known to be wrong.
+        Those of `targets` that are known to be wrong.
+    missed : collection of Target
+        Targets that were not identified; they are crossed out.
+    unit : int, optional
+        Width of a line, px. By default it grows with the image, so that lines and letters are
+        legible when all of the image is on a screen.
 
     Returns
     -------
@@ -50,8 +105,10 @@ def draw(
         Blue, green, red.
     """
     canvas = cv2.cvtColor(stretched_to_8_bit(image), cv2.COLOR_GRAY2BGR)
-    unit = max(1, round(math.hypot(*image.shape) / 2400))
-    for target in identification.targets:
+    unit = unit or _pen(image)
+    for target in missed:
+        _cross_out(canvas, target, unit)
+    for target in targets:
         colour = DECODED_COLOUR
         if target.id == UNDECODED:
             colour = UNDECODED_COLOUR
@@ -61,8 +118,25 @@ def draw(
         _draw_cross(canvas, target, colour, unit)
         if target.id != UNDECODED:
             _draw_label(canvas, target, colour, unit)
-    _draw_title(canvas, summary(identification), unit)
     return canvas
+
+
+def side_by_side(rows: Sequence[Sequence[Tile]], width: int) -> np.ndarray:
+    """Return pictures of one size in rows, each with its two lines of text above it.
+
+    Parameters
+    ----------
+    rows : sequence of sequence of Tile
+        As many in each row.
+    width : int
+        Width of each picture in the result, px.
+
+    Returns
+    -------
+    ndarray of uint8, shape (height, width, 3)
+        Blue, green, red.
+    """
+    return np.vstack([np.hstack([_framed(tile, width) for tile in row]) for row in rows])
 
 
 def summary(identification: Identification) -> str:
@@ -77,9 +151,50 @@ def summary(identification: Identification) -> str:
     return f'{words}, gamma_high {used.gamma_high:g}, gamma_low {used.gamma_low:g}'
 
 
-def _draw_ellipse(
-    canvas: np.ndarray, target: Target, colour: tuple[int, int, int], unit: int
+def _framed(tile: Tile, width: int) -> np.ndarray:
+    """Return a picture at a width, with its text above it and a margin all round."""
+    height = round(tile.picture.shape[0] * width / tile.picture.shape[1])
+    picture = cv2.resize(tile.picture, (width, height), interpolation=cv2.INTER_AREA)
+    if picture.ndim == 2:
+        picture = cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR)
+    margin, head = width // 100, width // 9
+    framed = cv2.copyMakeBorder(
+        picture, head, margin, margin, margin, cv2.BORDER_CONSTANT, value=_GROUND_COLOUR
+    )
+    _write(framed, [(tile.title, TEXT_COLOUR)], round(0.42 * head), margin)
+    _write(framed, tile.remarks, round(0.88 * head), margin)
+    return framed
+
+
+def _write(
+    canvas: np.ndarray, words: Sequence[tuple[str, Colour]], bottom: int, margin: int
 ) -> None:
+    """Write a line of words, smaller where it would be too long."""
+    scale = canvas.shape[1] / 800
+    gap, room = 2 * margin, canvas.shape[1] - 2 * margin
+    widths = [cv2.getTextSize(text, _FONT, scale, 2)[0][0] for text, _ in words]
+    scale *= min(1.0, room / (sum(widths) + gap * len(words) + 1))
+    x = margin
+    for text, colour in words:
+        cv2.putText(canvas, text, (x, bottom), _FONT, scale, colour, 2, cv2.LINE_AA)
+        x += cv2.getTextSize(text, _FONT, scale, 2)[0][0] + gap
+
+
+def _pen(image: np.ndarray) -> int:
+    """Return the width of a line that is visible when all of the image is on a screen, px."""
+    return max(1, round(math.hypot(*image.shape) / 2400))
+
+
+def _cross_out(canvas: np.ndarray, target: Target, unit: int) -> None:
+    arm = _fixed(1.8 * target.semi_major)
+    x, y = _fixed(target.x), _fixed(target.y)
+    for shade, width in ((_OUTLINE_COLOUR, 5 * unit), (MISSED_COLOUR, 3 * unit)):
+        for down in (-arm, arm):
+            start, end = (x - arm, y - down), (x + arm, y + down)
+            cv2.line(canvas, start, end, shade, width, cv2.LINE_AA, _SHIFT)
+
+
+def _draw_ellipse(canvas: np.ndarray, target: Target, colour: Colour, unit: int) -> None:
     centre = (_fixed(target.x), _fixed(target.y))
     axes = (_fixed(target.semi_major), _fixed(target.semi_minor))
     angle = math.degrees(target.angle)
@@ -87,9 +202,7 @@ def _draw_ellipse(
         cv2.ellipse(canvas, centre, axes, angle, 0, 360, shade, width, cv2.LINE_AA, _SHIFT)
 
 
-def _draw_cross(
-    canvas: np.ndarray, target: Target, colour: tuple[int, int, int], unit: int
-) -> None:
+def _draw_cross(canvas: np.ndarray, target: Target, colour: Colour, unit: int) -> None:
     arm = max(3.0 * unit, 0.35 * target.semi_minor)
     x, y, length = _fixed(target.x), _fixed(target.y), _fixed(arm)
     for shade, width in ((_OUTLINE_COLOUR, 3 * unit), (colour, unit)):
@@ -98,9 +211,7 @@ def _draw_cross(
             cv2.line(canvas, start, end, shade, width, cv2.LINE_AA, _SHIFT)
 
 
-def _draw_label(
-    canvas: np.ndarray, target: Target, colour: tuple[int, int, int], unit: int
-) -> None:
+def _draw_label(canvas: np.ndarray, target: Target, colour: Colour, unit: int) -> None:
     """Write the ID above to the right of the dot, or below to the left where the image ends."""
     scale = max(0.75 * unit, 0.6 * target.semi_major / _FONT_HEIGHT)
     text = str(target.id)
@@ -119,14 +230,14 @@ def _draw_title(canvas: np.ndarray, text: str, unit: int) -> None:
     (width, _), _ = cv2.getTextSize(text, _FONT, 1.0, 2 * unit)
     scale = min(float(unit), 0.95 * canvas.shape[1] / width)
     place = (round(8 * scale), round(30 * scale))
-    _draw_text(canvas, text, place, _TEXT_COLOUR, scale, unit)
+    _draw_text(canvas, text, place, TEXT_COLOUR, scale, unit)
 
 
 def _draw_text(
     canvas: np.ndarray,
     text: str,
     place: tuple[int, int],
-    colour: tuple[int, int, int],
+    colour: Colour,
     scale: float,
     unit: int,
 ) -> None:

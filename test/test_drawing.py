@@ -5,7 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ahf_ros.drawing import DECODED_COLOUR, UNDECODED_COLOUR, WRONG_COLOUR, draw, summary
+from ahf_ros.drawing import (
+    DECODED_COLOUR,
+    MISSED_COLOUR,
+    UNDECODED_COLOUR,
+    WRONG_COLOUR,
+    Tile,
+    draw,
+    overlay,
+    side_by_side,
+    summary,
+)
 from ahf_ros.target import UNDECODED, FilterState, Identification, Target
 
 GRAY = np.full((240, 320), 120, np.uint8)
@@ -30,11 +40,31 @@ def test_the_image_stays_where_nothing_is_drawn():
 
 def test_colours_say_what_a_target_is():
     undecoded, wrong, right = target(UNDECODED, 60.0), target(3, 160.0), target(4, 250.0)
-    drawn = draw(GRAY, Identification((undecoded, wrong, right)), wrong=[wrong])
+    drawn = overlay(GRAY, (undecoded, wrong, right), wrong=[wrong])
     for colour, x in ((UNDECODED_COLOUR, 60), (WRONG_COLOUR, 160), (DECODED_COLOUR, 250)):
         columns = np.flatnonzero(shown(drawn, colour).any(axis=0))
         assert abs(columns.mean() - x) < 20
         assert shown(drawn, colour)[140, x]
+
+
+def test_a_missed_target_is_crossed_out():
+    drawn = overlay(GRAY, (), missed=[target(3)])
+    crossed = shown(drawn, MISSED_COLOUR)
+    assert crossed[140, 160]
+    assert all(crossed[140 + down, 160 + across] for down in (-30, 30) for across in (-30, 30))
+    assert not crossed[140, 180:].any()
+
+
+def test_pictures_side_by_side_have_their_text_above_them():
+    remarks = [('two', DECODED_COLOUR), ('a word that is much too long ' * 9, WRONG_COLOUR)]
+    row = [Tile(GRAY, 'one', remarks), Tile(draw(GRAY, Identification(())), 'a title ' * 40)]
+    made = side_by_side([row, row], 160)
+    assert (made.shape[1], made.dtype) == (2 * 162, np.uint8)
+    above = made[: made.shape[0] // 2 - 122]
+    assert shown(above, WRONG_COLOUR)[:, :162].any()
+    assert not shown(above, WRONG_COLOUR)[:, 162:].any()
+    assert (made[: made.shape[0] // 2] == made[made.shape[0] // 2 :]).all()
+    assert (made[made.shape[0] // 2 - 60] == 120).any()
 
 
 def test_an_undecoded_target_has_no_label():

@@ -1,80 +1,127 @@
-"""The main job in one command: three nodes, projected light, one line an image."""
+"""The method in one command: the same image under projected light, identified in three ways."""
 
 from __future__ import annotations
 
 import argparse
+import inspect
 import os
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
-from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
+from rcl_interfaces.srv import SetParameters
+from rclpy.parameter import Parameter
 
-from ahf_ros.detectors import DETECTOR, DETECTOR_NAMES
+from ahf_ros.nodes.comparison import Comparison
 from ahf_ros.nodes.process import run
-from ahf_ros.nodes.scoreboard import Scoreboard
+from ahf_ros.nodes.settings import IlluminationNodeSettings
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
 from ahf_ros.synthetic.scene import SceneSettings
 
+DETECTORS: dict[str, tuple[str, dict[str, Any]]] = {
+    'traditional': ('traditional', {'detector': 'traditional', 'ahf': False}),
+    'adaptive': ('traditional with AHF', {'detector': 'traditional', 'ahf': True}),
+    'ring': ('ring', {'detector': 'ring', 'ahf': False}),
+}
+"""Title and parameters of each detector, by its namespace."""
+
+SCENE: dict[str, Any] = {'width': 1600, 'height': 1066, 'targets': 12}
+"""What is rendered: few enough targets to see each of them in a picture of the whole."""
+
+NAMESPACE = '/demo'
+"""Of all nodes, away from the topics of others."""
+
+RATE = 1.0
+"""Images per second."""
+
+WAITING_RATE = 0.001
+"""Images per second while nodes still look for each other; the first would come too late."""
+
 PATIENCE = 180.0
-"""Longest time without an image identified, s."""
+"""Longest time without an answer, s."""
 
 SHUTDOWN = 20.0
-"""Time that a node gets to end, s."""
+"""Time that a node is given to end, s."""
 
 PROFILE_VARIABLES = ('FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE')
 """Where Fast DDS looks for its settings: up to Jazzy, and from Kilted on."""
 
 
-class Demo(Scoreboard):
-    """A scoreboard that ends when a node that it depends on has ended, or does nothing.
+class Processes:
+    """Nodes of this package in processes of their own, which end with the context."""
+
+    def __init__(self) -> None:
+        self._started: list[subprocess.Popen] = []
+
+    def __enter__(self) -> Processes:
+        """Return itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End all nodes, in an orderly way if they can."""
+        for process in self._started:
+            process.send_signal(signal.SIGINT)
+        for process in self._started:
+            try:
+                process.wait(SHUTDOWN)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+
+    def start(self, node: str, space: str, **parameters: object) -> None:
+        """Start a node in a namespace."""
+        given = [word for name, value in parameters.items() for word in ('-p', f'{name}:={value}')]
+        names = ('-r', f'__ns:={space}', '-r', f'image:={NAMESPACE}/image')
+        command = (sys.executable, '-m', f'ahf_ros.nodes.{node}', '--ros-args', *names, *given)
+        self._started.append(subprocess.Popen(command))
+
+    def any_ended(self) -> bool:
+        """Return whether a node has ended."""
+        return any(process.poll() is not None for process in self._started)
+
+
+class Demo(Comparison):
+    """A comparison that ends when another node has ended, or does nothing.
 
     Parameters
     ----------
-    processes : sequence of subprocess.Popen
-        The other nodes.
+    processes : Processes
+        The detectors and the camera, which waits to be told that all are connected.
+    options : argparse.Namespace
+        The options of the command line.
     """
 
-    def __init__(self, processes: Sequence[subprocess.Popen]) -> None:
-        super().__init__()
+    def __init__(self, processes: Processes, options: argparse.Namespace) -> None:
+        titles = {space: title for space, (title, _) in DETECTORS.items()}
+        origin = f'{options.light}, ambient light {options.ambient:g}'
+        super().__init__(titles, options.images, options.output, origin)
         self._processes = processes
+        self._camera = self.create_client(SetParameters, 'illumination/set_parameters')
+        self._waiting = True
         self._seen = 0
         self._changed = time.monotonic()
-        self.create_timer(1.0, self._watch)
+        self.create_timer(0.2, self._watch)
 
     def _watch(self) -> None:
-        if self.count != self._seen:
-            self._seen, self._changed = self.count, time.monotonic()
-        reason = ''
-        if any(process.poll() is not None for process in self._processes):
+        if self._waiting and self._camera.service_is_ready() and self.connected():
+            self._waiting = False
+            rate = Parameter('rate', value=RATE).to_parameter_msg()
+            self._camera.call_async(SetParameters.Request(parameters=[rate]))
+        if self.answered != self._seen:
+            self._seen, self._changed = self.answered, time.monotonic()
+        reason = None
+        if self._processes.any_ended():
             reason = 'a node has ended'
         elif time.monotonic() - self._changed > PATIENCE:
-            reason = f'no image was identified for {PATIENCE:.0f} s'
+            reason = f'no image was answered for {PATIENCE:.0f} s'
         if reason and not self.ended.done():
             print(reason, file=sys.stderr)
             self.ended.set_result(1)
-
-
-def start(node: str, **parameters: object) -> subprocess.Popen:
-    """Start a node of this package in a process of its own."""
-    given = [word for name, value in parameters.items() for word in ('-p', f'{name}:={value}')]
-    module = f'ahf_ros.nodes.{node}'
-    return subprocess.Popen([sys.executable, '-m', module, '--ros-args', *given])
-
-
-def end(process: subprocess.Popen) -> None:
-    """End a node, orderly if it can."""
-    process.send_signal(signal.SIGINT)
-    try:
-        process.wait(SHUTDOWN)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()
 
 
 def shared_memory_profile() -> Path:
@@ -87,54 +134,50 @@ def shared_memory_profile() -> Path:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Show identification under projected light, by nodes in processes of their own."""
-    options = parser().parse_args(arguments)
+    """Identify the same image in three ways, by nodes in processes of their own.
+
+    Ways: the detector `traditional` alone, the same with a filter that AHF finds, and the
+    detector `ring`, which needs no filter. One line says what each of them got right and wrong,
+    and one picture shows it.
+    """
+    made = parser()
+    options = made.parse_args(arguments)
+    scene = {name: getattr(options, name) for name in ('light', 'ambient', 'seed')}
+    try:
+        IlluminationNodeSettings(frames=options.images, scene=SceneSettings(**SCENE, **scene))
+    except ValueError as error:
+        made.error(str(error))
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     for variable in PROFILE_VARIABLES:
         os.environ.setdefault(variable, str(shared_memory_profile()))
-    print(f'{options.images} images under {options.light}, being rendered ...', flush=True)
-    with ExitStack() as stack:
-        processes = [
-            start(
-                'illumination',
-                light=options.light,
-                ambient=options.ambient,
-                frames=options.images,
-                rate=0.5,
-            ),
-            start(
-                'detector',
-                detector=options.detector,
-                expected_targets=SceneSettings().targets,
-                max_duration=20.0,
-            ),
-        ]
-        for process in processes:
-            stack.callback(end, process)
-        status = run(
-            partial(Demo, processes),
-            ['--ros-args', '-p', f'images:={options.images}', '-p', f'pictures:={options.output}'],
-        )
-    if status == 0:
-        print(f'pictures: {options.output}/')
-    return status
+    print(f'{SCENE["targets"]} targets under {options.light}, being rendered ...', flush=True)
+    with Processes() as processes:
+        for space, (_, parameters) in DETECTORS.items():
+            expected = {'expected_targets': SCENE['targets']}
+            processes.start('detector', f'{NAMESPACE}/{space}', **expected, **parameters)
+        frames = {'frames': options.images, 'rate': WAITING_RATE}
+        processes.start('illumination', NAMESPACE, **frames, **SCENE, **scene)
+        return run(partial(Demo, processes, options), ['--ros-args', '-r', f'__ns:={NAMESPACE}'])
 
 
 def parser() -> argparse.ArgumentParser:
-    """Return what can be chosen on the command line."""
-    made = argparse.ArgumentParser(prog='ahf_demo', description=main.__doc__)
-    made.add_argument('--images', type=int, default=3, help='number of images (default: 3)')
-    made.add_argument('--light', choices=LIGHT_NAMES, default='stripe', help='default: stripe')
+    """Return the parser of the command line."""
+    made = argparse.ArgumentParser(
+        prog='ahf_demo',
+        description=inspect.getdoc(main),
+        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+    )
+    scene = SceneSettings()
+    made.add_argument('--light', choices=LIGHT_NAMES, default='stripe', help='projected light')
     made.add_argument(
         '--ambient',
         type=float,
-        default=SceneSettings().ambient,
-        help='ambient light as a share of the projected one (default: %(default)s)',
+        default=scene.ambient,
+        help='ambient light as a share of the projected light',
     )
-    made.add_argument(
-        '--detector', choices=DETECTOR_NAMES, default=DETECTOR.default, help='default: %(default)s'
-    )
-    made.add_argument('--output', default='demo', help='folder for pictures (default: demo)')
+    made.add_argument('--images', type=int, default=1, help='number of different images')
+    made.add_argument('--seed', type=int, default=scene.seed, help='seed of the first image')
+    made.add_argument('--output', default='demo', help='folder for pictures')
     return made
 
 

@@ -132,12 +132,11 @@ class IlluminationNodeSettings:
 
 @dataclass(frozen=True, slots=True)
 class ScoreboardSettings:
-    """The node `scoreboard`: how many images it sees, and what it keeps."""
+    """The node `scoreboard`: how many images it compares."""
 
     images: int = parameter(
         0, 'Number of images after which the node ends; 0: never.', minimum=0, maximum=10**6
     )
-    pictures: str = parameter('', 'Folder for a picture of every image; none where empty.')
 
     def __post_init__(self) -> None:
         """Refuse values that are not accepted."""
