@@ -1,8 +1,8 @@
-"""One thread for BLAS, in processes that are ours.
+"""One BLAS thread for the processes of this package.
 
-OpenCV's threads do the pixels. Those of OpenBLAS would spin beside them between short products and
-make an identification two to three times slower on two cores. It is read when numpy is loaded, so
-this module has to be imported first; a value that is set already is left alone.
+OpenCV uses all cores for pixels. Beside it, the threads of OpenBLAS spin between short products
+and make an identification two to three times slower on two cores. Numpy reads the variable when
+it is imported, so this module must come first. A value that is already set is kept.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""What was identified against what is there: C, R, D, wrong IDs, false positives, RMSE.
+"""Evaluation of identifications against the truth: C, R, D, wrong IDs, false positives, RMSE.
 
-The counts are those of the paper [1]_: of N targets that an image shows, n are reported, I of the
-reported ones are targets that are there, and d of those have the right ID;
+The counts are those of the paper [1]_. An image shows N targets, n are reported, I of these are
+there, and d of these have the right ID;
 
     C = I / n,    R = I / N,    D = d / N.
 
@@ -21,31 +21,31 @@ import numpy as np
 from ahf_ros.target import UNDECODED, Target, TrueTarget, Truth
 
 TOLERANCE = 5.0
-"""Distance within which a reported target is the one that is there, px."""
+"""Maximum distance of a report from its target, px."""
 
 RIGHT = 'right'
-"""A report with the ID of the target that is there; one for every target."""
+"""Report with the ID of its target; at most one per target."""
 
 WRONG = 'wrong'
-"""A report with an ID, at the place of a target that has another one."""
+"""Report with another ID than that of its target."""
 
 FOUND = 'found'
-"""A report without an ID at the place of a target that no other report has found."""
+"""Report without an ID, of a target that no other report has."""
 
 FALSE = 'false'
-"""Any other report: there is no target, or it has been reported already."""
+"""Any other report: there is no target, or it was reported already."""
 
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """What a report is.
+    """Judgement of a report.
 
     Attributes
     ----------
     kind : str
         `RIGHT`, `WRONG`, `FOUND` or `FALSE`.
     target : TrueTarget or None
-        What is there.
+        The target that is there.
     """
 
     kind: str
@@ -54,22 +54,22 @@ class Verdict:
 
 @dataclass(frozen=True, slots=True)
 class Score:
-    """The figures of one image, or of several together.
+    """Figures of one image, or of several together.
 
     Attributes
     ----------
     expected : int
-        N, the confirmed targets.
+        N, the number of confirmed targets.
     reported : int
-        n, the reported targets, without those that are right or found, but not confirmed.
+        n, the number of reports, except those that are right or found but not confirmed.
     found : int
-        I, the confirmed targets that were reported, under whatever ID.
+        I, the number of confirmed targets that were reported with any ID or none.
     right : int
-        d, those of them with the right ID.
+        d, the number of these with the right ID.
     wrong : int
-        Reports with the ID of another target.
+        Number of reports with another ID than that of their target.
     false_positives : int
-        Reports where there is no target, or again where there is one.
+        Number of reports without a target, or of one that was reported already.
     errors : tuple of (float, float)
         Reported minus true (x, y) of the d targets, px.
     """
@@ -84,22 +84,22 @@ class Score:
 
     @property
     def correctness(self) -> float | None:
-        """C = I / n; None where n is 0."""
+        """C = I / n; None if n is 0."""
         return self.found / self.reported if self.reported else None
 
     @property
     def recall(self) -> float | None:
-        """R = I / N; None where N is 0."""
+        """R = I / N; None if N is 0."""
         return self.found / self.expected if self.expected else None
 
     @property
     def decoding(self) -> float | None:
-        """D = d / N; None where N is 0."""
+        """D = d / N; None if N is 0."""
         return self.right / self.expected if self.expected else None
 
     @property
     def rmse(self) -> tuple[float, float, float] | None:
-        """Root mean square of the errors in x, in y and of their length, px; None without any."""
+        """Root mean square errors in x, in y and in both together, px; None without errors."""
         if not self.errors:
             return None
         x, y = np.mean(np.square(self.errors), axis=0)
@@ -109,19 +109,19 @@ class Score:
 def judge(
     truth: Sequence[TrueTarget], reported: Sequence[Target], tolerance: float = TOLERANCE
 ) -> tuple[Verdict, ...]:
-    """Say of each report what it is.
+    """Judge each report.
 
-    Nearest pairs come first, so that the order of the reports does not matter: first of reports
-    and targets with the same ID, then of the reports that are left and any target.
+    Reports are paired with targets of the same ID first, then the remaining reports with any
+    target. The nearest pairs come first, so the order of the reports does not matter.
 
     Parameters
     ----------
     truth : sequence of TrueTarget
-        What the image shows.
+        The targets that the image shows.
     reported : sequence of Target
-        What was identified in it.
+        The targets that were identified.
     tolerance : float
-        Largest distance of a report from its target, px.
+        Maximum distance of a report from its target, px.
 
     Returns
     -------
@@ -161,6 +161,13 @@ def score(
     ----------
     truth, reported, tolerance
         As for `judge`.
+
+    Examples
+    --------
+    >>> truth = [TrueTarget(7, 10.0, 10.0), TrueTarget(9, 60.0, 10.0)]
+    >>> figures = score(truth, [Target(7, 19, 10.1, 10.0, semi_major=5.0, semi_minor=5.0)])
+    >>> figures.right, figures.expected, figures.wrong, figures.false_positives
+    (1, 2, 0, 0)
     """
     verdicts = judge(truth, reported, tolerance)
     kinds = [verdict.kind for verdict in verdicts]
@@ -186,7 +193,7 @@ def score(
 
 
 def total(scores: Iterable[Score]) -> Score:
-    """Return the figures of several images together: counts add up, errors are pooled."""
+    """Return the figures of several images together: counts are added, errors pooled."""
     scores = list(scores)
     return Score(
         expected=sum(item.expected for item in scores),
@@ -202,31 +209,37 @@ def total(scores: Iterable[Score]) -> Score:
 def evaluate(
     truth: Truth, results: Mapping[str, Sequence[Target]], tolerance: float = TOLERANCE
 ) -> dict[str, Score]:
-    """Return the figures of every image of which there is a truth or a result.
+    """Return the figures of every image that has a truth or a result.
 
-    An image without a result has no reported target. An image without a truth shows none, so that
-    all that is reported in it is false.
+    An image without a result has no reports. An image without a truth shows no targets, so all
+    its reports are false.
 
     Parameters
     ----------
     truth : mapping of str to sequence of TrueTarget
-        What each image shows.
+        The targets that each image shows.
     results : mapping of str to sequence of Target
-        What was identified in each.
+        The targets that were identified in each image.
     tolerance : float
-        Largest distance of a report from its target, px.
+        As for `judge`.
+
+    Examples
+    --------
+    >>> scores = evaluate({'a.png': [TrueTarget(7, 10.0, 10.0)]}, {'a.png': []})
+    >>> scores['a.png'].decoding
+    0.0
     """
     names = dict.fromkeys([*truth, *results])
     return {name: score(truth.get(name, ()), results.get(name, ()), tolerance) for name in names}
 
 
 def table(scores: Mapping[str, Score]) -> str:
-    """Return the figures of images and of all of them together as text, one line each.
+    """Return a text table of the figures of each image and of all together.
 
     Parameters
     ----------
     scores : mapping of str to Score
-        Figures by the name of the image.
+        Figures by name of the image.
     """
     head = ('image', 'N', 'n', 'I', 'd', 'C %', 'R %', 'D %', 'wrong', 'false')
     rows: list[tuple[str, ...]] = [(*head, 'RMSE X px', 'Y', 'XY')]
@@ -254,10 +267,12 @@ def _row(name: str, item: Score) -> tuple[str, ...]:
 def _pairs(
     truth: Sequence[TrueTarget], reported: Sequence[Target], tolerance: float
 ) -> list[tuple[int, int]]:
-    """Return the indices of reports and targets within the tolerance, the nearest first."""
-    true_places = np.array([(target.x, target.y) for target in truth]).reshape(-1, 2)
-    places = np.array([(target.x, target.y) for target in reported]).reshape(-1, 2)
-    distances = np.linalg.norm(places[:, None] - true_places, axis=2)
+    """Return pairs of indices of reports and targets within the tolerance, the nearest first."""
+    true_centres, centres = (
+        np.array([(target.x, target.y) for target in targets]).reshape(-1, 2)
+        for targets in (truth, reported)
+    )
+    distances = np.linalg.norm(centres[:, None] - true_centres, axis=2)
     near = np.argwhere(distances <= tolerance)
     order = np.argsort(distances[distances <= tolerance], kind='stable')
     return [(int(report), int(target)) for report, target in near[order]]

@@ -1,21 +1,20 @@
-"""Positions in space of targets, from an organised cloud that belongs to their image.
+"""Positions of targets in space, from an organised point cloud of the same view as their image.
 
-A target is flat. What a scanner measures on it, on paper that it sees well and on ink that it sees
-badly or not at all, lies on a plane, and the image of a plane is a homography: with the offsets
-(u, v) of a pixel from the centre of the target, its point is
+A target is flat. The points that a scanner measures on it, well on paper and poorly or not at all
+on ink, lie on a plane, which a homography maps to the image. A pixel at the offset (u, v) from the
+centre of the target has the point
 
     P(u, v) = (a + b u + c v) / (1 + g u + h v),
 
-and P(0, 0) = a is the position. This holds in any frame of the cloud, for any pinhole camera; of
-the distortion of a lens only what is linear across a target is in it. Eleven numbers are fitted to
-about a thousand points by least squares, without the outliers of a first plane, the best in the
-median.
+and P(0, 0) = a is the position. This holds in any frame of the cloud and for any pinhole camera,
+and for lens distortion as far as it is linear across a target. Eleven numbers are fitted by least
+squares to about a thousand points, less the outliers of a plane of least median error.
 
-`benchmarks/positions.py` compares: with noise of 0.1 mm at a metre, a dot of 20 px and 45 degrees
-of tilt, positions are 0.005 mm off, those of the four nearest points 0.08 mm, and those of a fit
-without g and h 0.32 mm, for want of the perspective. With ink that is four times as noisy and a
-dot without any points the homography is 0.007 mm off; four neighbours give nothing then. For such
-a dot, seen at 17 degrees from the axis, distortion of k1 = 0.1 adds 0.01 mm.
+`benchmarks/positions.py` compares methods. With 0.1 mm of noise at one metre, a dot of 20 px and
+45 degrees of tilt, positions are 0.005 mm off; those of the four nearest points are 0.08 mm off,
+and those of a fit without perspective, g and h, 0.32 mm. With ink four times as noisy and no
+points on the dot, the homography is 0.007 mm off and the four nearest points give no position. For
+such a dot, 17 degrees off the axis, a distortion of k1 = 0.1 adds 0.01 mm.
 """
 
 from __future__ import annotations
@@ -31,37 +30,37 @@ from ahf_ros.interchange.point_clouds import AXES
 from ahf_ros.target import Target
 
 NEIGHBOURHOOD = 3.0
-"""Radius of the neighbourhood of a centre, in radii of its dot: not beyond the band of a code."""
+"""Radius of the neighbourhood of a centre, in radii of its dot: not beyond the code band."""
 
-LEAST_POINTS = 12
-"""Fewest points that a position is fitted to."""
+MINIMUM_POINTS = 12
+"""Minimum number of points that a position is fitted to; there are eleven unknowns."""
 
-_LARGEST = float(np.finfo(np.float32).max)  # coordinate; its square is finite in float64
-_LEAST_REACH = 5.0  # px, of a neighbourhood, also of targets whose size is not known
-_MOST_POINTS = 1024  # about, of a neighbourhood; larger ones are thinned out
-_LEAST_SHARE = 0.2  # of the pixels of a neighbourhood, that must have points on its plane
-_FARTHEST = 2.0  # standard deviations of these points, from their middle to the centre
-_TRIALS, _JUDGES = 64, 200  # planes through three points, and points that choose among them
-_LEAST_AREA = 0.1  # of three points, in units of the reach
+_MAXIMUM_COORDINATE = float(np.finfo(np.float32).max)  # its square is finite in float64
+_MINIMUM_REACH = 5.0  # px; also the neighbourhood of targets of unknown size
+_MAXIMUM_POINTS = 1024  # about; larger neighbourhoods are subsampled
+_MINIMUM_SHARE = 0.2  # of the pixels of a neighbourhood that must have points on its plane
+_MAXIMUM_OFFSET = 2.0  # from the mean of these points to the centre, standard deviations
+_TRIALS, _JUDGES = 64, 200  # planes through three points, and points that judge them
+_MINIMUM_AREA = 0.1  # of the triangle of three points, squared reaches
 _SPREADS = np.array([0.8191725134, 0.6710436067, 0.5497004779])  # Roberts' sequence in 3-D
-_DEVIATION = 1.4826  # standard deviations, of normal noise, in the median of its magnitude
+_DEVIATION = 1.4826  # standard deviation of normal noise in units of its median magnitude
 _OUTLIER = 3.0  # standard deviations
 _PASSES = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Positions:
-    """Where targets are, in the frame and unit of a cloud; one row a target, in their order.
+    """Positions of targets in the frame and unit of a cloud, one row per target.
 
     Attributes
     ----------
     points : ndarray of float64, shape (n, 3)
-        x, y, z of the centres; NaN where the cloud does not tell.
+        x, y, z of the centres; NaN where unknown.
     deviations : ndarray of float64, shape (n,)
-        Root mean square of the distances of the points of a neighbourhood from where the plane
-        has them: the noise of the scanner, or more where a target is not flat.
+        Root mean square of the residuals of the fit: the noise of the scanner, or more if a
+        target is not flat.
     spacings : ndarray of float64, shape (n,)
-        Distance on the target of what the image shows a pixel apart, the larger one of both axes.
+        Distance on the target of two adjacent pixels, along the axis where it is larger.
     """
 
     points: np.ndarray
@@ -70,7 +69,7 @@ class Positions:
 
     @property
     def known(self) -> np.ndarray:
-        """Which targets have a position, shape (n,)."""
+        """Whether each target has a position, shape (n,)."""
         return np.isfinite(self.points[:, 2])
 
 
@@ -79,27 +78,28 @@ def positions(
 ) -> Positions:
     """Return the positions of targets.
 
-    A target has none where fewer than `LEAST_POINTS` or a fifth of the pixels about it have points
-    of its plane, or where these are all on one side of it: nothing is extrapolated.
+    A target has no position if fewer than `MINIMUM_POINTS`, or less than a fifth, of the pixels
+    around it have points on its plane, or if all of these are on one side of its centre: nothing
+    is extrapolated.
 
     Parameters
     ----------
     cloud : ndarray of shape (height, width), with the fields x, y and z
-        As `ahf_ros.interchange.point_clouds.organised_points` returns it. A point that is not
-        finite in float32, or that is 0, 0, 0, is none.
+        Result of `ahf_ros.interchange.point_clouds.organised_points`. Points that are not finite
+        in float32 or that are 0, 0, 0 are missing.
     targets : sequence of Target, or of ahf_ros/CodedTarget
-        In the pixels of the image that the cloud belongs to.
+        Targets in the pixels of the image that the cloud belongs to.
     neighbourhood : float
-        Radius about a centre within which points count, in radii of its dot, which is taken as
-        the ellipse that the image shows.
+        Radius around a centre within which points count, in radii of its dot, an ellipse in the
+        image.
     """
     rows = np.full((len(targets), 5), np.nan)
-    with np.errstate(all='ignore'):  # garbage leads to what is not finite
+    with np.errstate(all='ignore'):  # bad points end in values that are not finite
         for row, target in zip(rows, targets, strict=True):
             offsets, points, pixels = _neighbours(cloud, target, neighbourhood)
-            if len(points) >= max(LEAST_POINTS, _LEAST_SHARE * pixels):
+            if len(points) >= max(MINIMUM_POINTS, _MINIMUM_SHARE * pixels):
                 with suppress(np.linalg.LinAlgError):
-                    row[:] = _position(offsets, points, _LEAST_SHARE * pixels)
+                    row[:] = _position(offsets, points, _MINIMUM_SHARE * pixels)
     rows[~np.isfinite(rows).all(axis=1)] = np.nan
     return Positions(rows[:, :3], rows[:, 3], rows[:, 4])
 
@@ -107,18 +107,18 @@ def positions(
 def _neighbours(
     cloud: np.ndarray, target: Target, neighbourhood: float
 ) -> tuple[np.ndarray, np.ndarray, int]:
-    """Return offsets (n, 2) in px and points (n, 3) about a target, and the number of pixels."""
+    """Return offsets (n, 2) in px and points (n, 3) near a target, and the number of pixels."""
     shape = (target.x, target.y, target.semi_major, target.semi_minor, target.angle)
     if not all(map(math.isfinite, shape)):
         return np.empty((0, 2)), np.empty((0, 3)), 0
-    reach = [max(_LEAST_REACH, neighbourhood * axis) for axis in shape[2:4]]
+    reach = [max(_MINIMUM_REACH, neighbourhood * axis) for axis in shape[2:4]]
     places = []
     for centre, size in ((target.y, cloud.shape[0]), (target.x, cloud.shape[1])):
         first = math.ceil(min(size, max(0, centre - reach[0])))
         last = math.floor(min(size - 1, max(-1, centre + reach[0])))
         places.append((first, max(first, last + 1)))
     count = math.prod(end - first for first, end in places)
-    step = max(1, math.ceil(math.sqrt(count / _MOST_POINTS)))
+    step = max(1, math.ceil(math.sqrt(count / _MAXIMUM_POINTS)))
     window = tuple(slice(first, end, step) for first, end in places)
     rows, columns = np.mgrid[window]
     offsets = np.stack((columns - target.x, rows - target.y), axis=-1)
@@ -131,12 +131,12 @@ def _neighbours(
     inside = (((offsets @ turn) / reach) ** 2).sum(axis=-1) <= 1
     near = cloud[window][inside]
     points = np.stack([near[name].astype(np.float64) for name in AXES], axis=-1)
-    real = (np.abs(points) <= _LARGEST).all(axis=1) & points.any(axis=1)
+    real = (np.abs(points) <= _MAXIMUM_COORDINATE).all(axis=1) & points.any(axis=1)
     return offsets[inside][real], points[real], int(inside.sum())
 
 
-def _position(offsets: np.ndarray, points: np.ndarray, least: float) -> list[float]:
-    """Return position, deviation and spacing of a target; NaN where the points do not tell."""
+def _position(offsets: np.ndarray, points: np.ndarray, minimum: float) -> list[float]:
+    """Return position, deviation and spacing of a target; NaN if the points do not suffice."""
     unknown = [math.nan] * 5
     reach = np.abs(offsets).max()
     unit = offsets / reach
@@ -148,7 +148,7 @@ def _position(offsets: np.ndarray, points: np.ndarray, least: float) -> list[flo
     floor = 1e-6 * np.abs(shifted).max()
     for _ in range(_PASSES):
         near = distances <= max(_OUTLIER * _DEVIATION * np.median(distances), floor)
-        if near.sum() < max(LEAST_POINTS, least) or _outside(unit[near]):
+        if near.sum() < max(MINIMUM_POINTS, minimum) or _outside(unit[near]):
             return unknown
         plane, perspective = _homography(unit[near], shifted[near])
         seen = plane[0] + unit @ plane[1:]
@@ -160,10 +160,10 @@ def _position(offsets: np.ndarray, points: np.ndarray, least: float) -> list[flo
 
 
 def _distances_from_median_plane(unit: np.ndarray, shifted: np.ndarray) -> np.ndarray | None:
-    """Return distances from the affine plane through three points that is best in the median.
+    """Return distances from the affine plane through three points with the least median error.
 
-    Least median of squares [1]_, from triples that are spread evenly over the points [2]_; None
-    where all points are on a line.
+    This is least median of squares [1]_ with triples spread evenly over the points [2]_. None if
+    all points are on a line.
 
     References
     ----------
@@ -172,7 +172,7 @@ def _distances_from_median_plane(unit: np.ndarray, shifted: np.ndarray) -> np.nd
     """
     design = np.column_stack((np.ones(len(unit)), unit))
     triples = (np.arange(1, _TRIALS + 1)[:, None] * _SPREADS % 1 * len(unit)).astype(int)
-    wide = np.abs(np.linalg.det(design[triples])) > 2 * _LEAST_AREA
+    wide = np.abs(np.linalg.det(design[triples])) > 2 * _MINIMUM_AREA
     triples = triples[wide]
     if not len(triples):
         return None
@@ -186,8 +186,8 @@ def _distances_from_median_plane(unit: np.ndarray, shifted: np.ndarray) -> np.nd
 def _homography(unit: np.ndarray, shifted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return (a, b, c), shape (3, 3), and (g, h) of the best homography from offsets to points.
 
-    It is linear in them: P = a + b u + c v - (g u + h v) P. What a, b and c can explain is taken
-    off both sides first, so that two unknowns are left.
+    It is linear in them: P = a + b u + c v - (g u + h v) P. The parts of both sides that a, b and
+    c can explain are removed first, so that two unknowns remain.
     """
     design = np.column_stack((np.ones(len(unit)), unit))
     sides = np.stack((shifted, -unit[:, :1] * shifted, -unit[:, 1:] * shifted), axis=1)
@@ -199,9 +199,9 @@ def _homography(unit: np.ndarray, shifted: np.ndarray) -> tuple[np.ndarray, np.n
 
 
 def _outside(unit: np.ndarray) -> bool:
-    """Return whether the centre lies off the points, which are all on one side of it then."""
+    """Return whether the points are all on one side of the centre."""
     middle = unit.mean(axis=0)
     spread = np.cov(unit.T)
     if np.linalg.det(spread) < 1e-6:
         return True
-    return bool(middle @ np.linalg.solve(spread, middle) > _FARTHEST**2)
+    return bool(middle @ np.linalg.solve(spread, middle) > _MAXIMUM_OFFSET**2)

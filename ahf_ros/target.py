@@ -1,4 +1,4 @@
-"""The records that every room of the package speaks."""
+"""Records that the whole package shares."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 UNDECODED = -1
-"""Identifier of a target that was found but whose code word is not certain."""
+"""ID of a target whose code word could not be read for certain."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,11 +16,12 @@ class Target:
     Attributes
     ----------
     id : int
-        The number its vendor gives the code word, or `UNDECODED`.
+        Number that the vendor gives the code word, or `UNDECODED`.
     code : int
-        The code word: for ring codes the smallest rotation, 0 where undecoded.
+        Code word, 0 if undecoded; for ring codes the minimum over all rotations.
     x, y : float
-        Image of the physical centre, px; (0, 0) is the centre of the first pixel, x right, y down.
+        Image of the physical centre, px. (0, 0) is the centre of the first pixel, x points right
+        and y down.
     semi_major, semi_minor : float
         Semi-axes of the ellipse of the central dot, px.
     angle : float
@@ -29,6 +30,11 @@ class Target:
         Probability that `id` is right, 0 to 1.
     covariance : tuple of 4 float
         Row-major covariance of (x, y), px^2.
+
+    Examples
+    --------
+    >>> Target(id=7, code=19, x=10.5, y=20.0, semi_major=8.0, semi_minor=7.5).confidence
+    1.0
     """
 
     id: int
@@ -53,8 +59,8 @@ class TrueTarget:
     x, y : float
         Image of its centre, px.
     confirmed : bool
-        Whether it can be seen for certain. One that cannot counts neither where it is identified
-        nor where it is not; a wrong ID in its place is a wrong ID.
+        Whether it is certainly visible. If not, it counts neither when identified nor when
+        missed, but a wrong ID in its place is a wrong ID.
     """
 
     id: int
@@ -64,12 +70,12 @@ class TrueTarget:
 
     @classmethod
     def of(cls, target: Target) -> TrueTarget:
-        """Return the ID and the centre of a target whose truth is known, as in a rendering."""
+        """Return the truth of a target whose ID and centre are exact, as in a rendering."""
         return cls(target.id, target.x, target.y)
 
 
 Truth = Mapping[str, Sequence[TrueTarget]]
-"""The targets of each image, by the name of its file without folders."""
+"""The targets of each image, by file name without folders."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,15 +85,15 @@ class FilterState:
     Attributes
     ----------
     applied : bool
-        False where the unfiltered image gave the result; the filter is then the identity.
+        False if the result is that of the unfiltered image; the filter is then the identity.
     gamma_high, gamma_low : float
         Gains of the high and the low frequencies, dimensionless.
     cutoff : float
-        D0, cycles per image; 0 where no filter was applied.
+        D0, cycles per image; 0 if no filter was applied.
     attenuation : float
         c, dimensionless.
     evaluations, generations : int
-        Identifications run, the unfiltered one included, and generations of the search.
+        Number of identifications, the unfiltered one included, and of generations of the search.
     duration : float
         Time from the image to the result, s.
     """
@@ -104,18 +110,24 @@ class FilterState:
 
 @dataclass(frozen=True, slots=True)
 class Identification:
-    """What was identified in one image.
+    """The targets that were identified in one image.
 
     Attributes
     ----------
     targets : tuple of Target
         Sorted by `id`, undecoded targets first.
     expected : int
-        N, the number of coded targets that the image shows; 0 where unknown.
+        N, the number of coded targets that the image shows; 0 if unknown.
     filter : FilterState
         The filter that gave the targets.
     estimated : bool
         Whether `expected` was estimated from the image.
+
+    Examples
+    --------
+    >>> target = Target(id=7, code=19, x=10.5, y=20.0, semi_major=8.0, semi_minor=7.5)
+    >>> Identification((target,), expected=2).count
+    1
     """
 
     targets: tuple[Target, ...]
@@ -125,7 +137,7 @@ class Identification:
 
     @property
     def count(self) -> int:
-        """n, the number of distinct codes identified."""
+        """n, the number of distinct IDs identified."""
         return count_codes(self.targets)
 
 
@@ -135,5 +147,5 @@ def sorted_targets(targets: Iterable[Target]) -> list[Target]:
 
 
 def count_codes(targets: Iterable[Target]) -> int:
-    """Return the number of distinct codes among `targets`, undecoded ones left out."""
+    """Return the number of distinct IDs among `targets`, undecoded targets excluded."""
     return len({target.id for target in targets} - {UNDECODED})

@@ -1,10 +1,9 @@
-"""What is in the place of a bag while it is made: its answers so far, and how to go on.
+"""Journal of an unfinished bag: the results so far, from which a later run continues.
 
-It is a bag itself, of several files that are never changed once they have their name. Every image
-adds one; ten files of the same number of images are joined into one, so that there are never
-many. The metadata, replaced as a whole, says which files count. So there is no moment in which a
-process that is killed leaves anything but a bag with the answers to all images before the one it
-was at.
+The journal is itself a bag, of several files that never change once they have their names. Every
+image adds a file, and ten files with the same number of images are merged into one, which keeps
+the number of files small. The metadata lists the valid files and is replaced atomically. So a
+process that is killed at any moment leaves a bag with the results of all earlier images.
 """
 
 from __future__ import annotations
@@ -29,15 +28,15 @@ from ahf_ros.bag.definitions import typestore
 from ahf_ros.filtering.identifier import Memory
 
 VERSION: Final = 9
-"""Of the format of bags that are written."""
+"""Format version of the bags that are written."""
 
 METADATA = 'metadata.yaml'
 
 PROGRESS = '/ahf_bag/progress'
-"""Topic that tells of every image what became of it. The finished bag does not have it."""
+"""Topic with the entry of every image; the finished bag does not have it."""
 
-JOINED = 10
-"""Number of files that are joined into one."""
+MERGED = 10
+"""Number of files that are merged into one."""
 
 _STRING = 'std_msgs/msg/String'
 _INFORMATION = 'rosbag2_bagfile_information'
@@ -48,18 +47,18 @@ _EMPTY = f'{0:09}-0{_SUFFIX}'
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """What became of an image.
+    """Entry of one image.
 
     Attributes
     ----------
     topic : str
-        That it was recorded from.
+        Topic of the image.
     timestamp : int
-        When it was recorded, ns.
+        Time of recording, ns.
     memory : Memory
-        What its identification leaves to the next one of its topic.
+        State of the identifier after the image, for the next image of the topic.
     reason : str
-        Why it was refused; empty where it was not.
+        Why the image was refused; empty if it was not.
     """
 
     topic: str
@@ -69,29 +68,29 @@ class Entry:
 
 
 Output = tuple[str, bytes]
-"""A topic and a message for it."""
+"""A topic and a serialized message for it."""
 
 _Row = tuple[str, int, bytes]  # topic, time in ns, message
 
 
-def begin(folder: Path, topics: Mapping[str, str], told: str) -> None:
-    """Make a bag without messages, all at once.
+def begin(folder: Path, topics: Mapping[str, str], origin: str) -> None:
+    """Create a bag without messages, atomically.
 
     Parameters
     ----------
     folder : Path
         The bag, which does not exist.
     topics : mapping of str to str
-        The topics of the answers and their types.
-    told : str
-        What the bag is made from, kept with it.
+        The topics of the results and their types.
+    origin : str
+        Description of what the bag is made from, stored in its metadata.
     """
     folder.parent.mkdir(parents=True, exist_ok=True)
     store = typestore()
     with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f'.{folder.name}.') as made:
         bag = Path(made) / 'bag'
         with Writer(bag, version=VERSION, storage_plugin=StoragePlugin.SQLITE3) as writer:
-            writer.set_custom_data('ahf_ros', told)
+            writer.set_custom_data('ahf_ros', origin)
             for topic, kind in {**topics, PROGRESS: _STRING}.items():
                 writer.add_connection(topic, kind, typestore=store)
         (bag / f'{bag.name}.db3').rename(bag / _EMPTY)
@@ -102,17 +101,17 @@ def begin(folder: Path, topics: Mapping[str, str], told: str) -> None:
 
 
 class Journal:
-    """The answers of a bag that is being made.
+    """The results of an unfinished bag.
 
     Parameters
     ----------
     folder : Path
-        The bag, made by `begin`.
+        The bag, created by `begin`.
 
     Attributes
     ----------
     entries : list of Entry
-        Of all images so far, in their order.
+        Entries of all images so far, in their order.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -129,20 +128,20 @@ class Journal:
                 self.entries.append(self._entry(data))
 
     def append(self, entry: Entry, answers: Sequence[Output]) -> None:
-        """Write what became of an image, and the messages about it, all or nothing."""
+        """Write the entry of an image and the messages about it, all or nothing."""
         rows = [(topic, entry.timestamp, data) for topic, data in answers]
         rows.append((PROGRESS, entry.timestamp, self._serialized(entry)))
         self._parts.append(self._write_part(len(self.entries), 1, rows))
         self.entries.append(entry)
         self._counts.update(topic for topic, _, _ in rows)
-        while len(last := self._parts[-JOINED:]) == JOINED and len(set(map(_size, last))) == 1:
-            joined = self._write_part(_first(last[0]), JOINED * _size(last[0]), self._rows(last))
-            self._parts[-JOINED:] = [joined]
+        while len(last := self._parts[-MERGED:]) == MERGED and len(set(map(_size, last))) == 1:
+            merged = self._write_part(_first(last[0]), MERGED * _size(last[0]), self._rows(last))
+            self._parts[-MERGED:] = [merged]
         self._write_metadata()
         self._remove_others()
 
     def answers(self) -> Iterator[tuple[Entry, list[Output]]]:
-        """Yield every image with the messages about it, in their order."""
+        """Yield every entry with the messages about its image, in order."""
         entries = iter(self.entries)
         answers: list[Output] = []
         for topic, _, data in self._rows(self._parts):
@@ -158,7 +157,7 @@ class Journal:
         new = self._folder / f'new{_SUFFIX}'
         shutil.copyfile(self._folder / _EMPTY, new)
         with closing(sqlite3.connect(new)) as database, database:
-            # A file that is broken off is not used.
+            # A partial file is never used, so nothing needs to be safe on disk.
             database.execute('PRAGMA journal_mode=OFF')
             database.execute('PRAGMA synchronous=OFF')
             numbers = dict(database.execute('SELECT name, id FROM topics').fetchall())
@@ -190,26 +189,26 @@ class Journal:
         return Entry(**fields | {'memory': Memory(**memory)})
 
     def _write_metadata(self) -> None:
-        """Say which files count, how many messages there are and when."""
+        """Write which files are valid, the number of messages, and their times."""
         about = self._content[_INFORMATION]
         times = [entry.timestamp for entry in self.entries]
         about['starting_time'] = {'nanoseconds_since_epoch': min(times)}
         about['duration'] = {'nanoseconds': max(times) - min(times)}
         about['message_count'] = sum(self._counts.values())
-        about['files'] = []  # of what each file holds, which readers can do without
+        about['files'] = []  # contents of each file; readers do not need them
         for item in about['topics_with_message_count']:
             item['message_count'] = self._counts[item['topic_metadata']['name']]
         _replace(self._folder / METADATA, self._content)
 
     def _remove_others(self) -> None:
-        """Remove the parts that do not count: joined, or not finished."""
+        """Remove files that are not valid: already merged, or unfinished."""
         for file in self._folder.glob(f'*{_SUFFIX}'):
             if file.name not in self._parts:
                 file.unlink()
 
 
 def custom_data(folder: Path) -> dict[str, str]:
-    """Return what is kept with a bag, empty where there is nothing or it is none."""
+    """Return the custom data of a bag; empty if there are none or the folder is no bag."""
     try:
         return _metadata(folder)[_INFORMATION]['custom_data'] or {}
     except (OSError, YAMLError, KeyError, TypeError):
@@ -217,7 +216,7 @@ def custom_data(folder: Path) -> dict[str, str]:
 
 
 def remove_parts(folder: Path) -> None:
-    """Remove all files of a journal from a bag that is finished."""
+    """Remove all files of the journal from a finished bag."""
     for file in (*folder.glob(f'*{_SUFFIX}'), *folder.glob(_NEW)):
         file.unlink()
 
@@ -235,7 +234,7 @@ def _metadata(folder: Path) -> Any:
 
 
 def _replace(path: Path, content: Any) -> None:
-    """Write a file of which readers see the old or the new one, never a part."""
+    """Replace a file atomically."""
     new = path.with_name(_NEW)
     new.write_text(json.dumps(content, indent=1), encoding='utf-8')  # JSON is YAML
     new.replace(path)

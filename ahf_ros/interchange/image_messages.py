@@ -1,8 +1,7 @@
-"""Image messages as gray images, from ROS or from a bag, without a copy where none is needed.
+"""Image messages as gray images, from ROS or from a bag, copied only if necessary.
 
 The encodings are those of sensor_msgs/image_encodings.hpp that hold an image. Values keep their
-range: what a camera of 12 bit or a scanner in float sends is scaled by nobody before the logarithm
-of the image is taken.
+range: those of a 12-bit camera or of a float scanner are not scaled before the logarithm.
 """
 
 from __future__ import annotations
@@ -19,18 +18,18 @@ from ahf_ros.interchange.image_files import decode_bytes
 
 @dataclass(frozen=True, slots=True)
 class Encoding:
-    """How the bytes of a pixel are meant.
+    """Meaning of the bytes of a pixel.
 
     Attributes
     ----------
     kind : str
-        Type of a sample, as numpy names it.
+        Numpy type of a sample.
     samples : int
-        Samples a pixel in a row of the image.
+        Samples per pixel in a row of the image.
     to_gray : int or None
-        Code of `cv2.cvtColor` for the conversion to gray; None where one sample is the gray value.
+        Code of `cv2.cvtColor` for the conversion to gray; None if one sample is the gray value.
     gray : int
-        That sample.
+        Index of that sample.
     """
 
     kind: str
@@ -40,19 +39,19 @@ class Encoding:
 
     @property
     def size(self) -> int:
-        """Bytes a pixel in a row of the image."""
+        """Bytes per pixel in a row of the image."""
         return self.samples * np.dtype(self.kind).itemsize
 
 
 def _encodings() -> dict[str, Encoding]:
-    found = {'mono8': Encoding('u1'), 'mono16': Encoding('u2')}
+    encodings = {'mono8': Encoding('u1'), 'mono16': Encoding('u2')}
     colours = {
         'rgb': (3, cv2.COLOR_RGB2GRAY),
         'bgr': (3, cv2.COLOR_BGR2GRAY),
         'rgba': (4, cv2.COLOR_RGBA2GRAY),
         'bgra': (4, cv2.COLOR_BGRA2GRAY),
     }
-    # OpenCV names a pattern by the second row and column of it, ROS by the first ones.
+    # OpenCV names a pattern by its second row and column, ROS by its first.
     patterns = {
         'rggb': cv2.COLOR_BayerBG2GRAY,
         'bggr': cv2.COLOR_BayerRG2GRAY,
@@ -61,45 +60,45 @@ def _encodings() -> dict[str, Encoding]:
     }
     for bits, kind in ((8, 'u1'), (16, 'u2')):
         for name, (samples, code) in colours.items():
-            found[f'{name}{bits}'] = Encoding(kind, samples, code)
+            encodings[f'{name}{bits}'] = Encoding(kind, samples, code)
         for name, code in patterns.items():
-            found[f'bayer_{name}{bits}'] = Encoding(kind, 1, code)
-    # Channels without a name are blue, green, red, as in cv_bridge; of two, the first is gray.
+            encodings[f'bayer_{name}{bits}'] = Encoding(kind, 1, code)
+    # Unnamed channels are blue, green, red, as in cv_bridge; the first of two is gray.
     generic = {2: None, 3: cv2.COLOR_BGR2GRAY, 4: cv2.COLOR_BGRA2GRAY}
     for name, kind in (('8U', 'u1'), ('16U', 'u2'), ('32F', 'f4'), ('64F', 'f8')):
-        found[f'{name}C1'] = Encoding(kind)
+        encodings[f'{name}C1'] = Encoding(kind)
         for samples, to_gray in generic.items():
-            found[f'{name}C{samples}'] = Encoding(kind, samples, to_gray)
+            encodings[f'{name}C{samples}'] = Encoding(kind, samples, to_gray)
     for name in ('yuv422', 'uyvy'):
-        found[name] = Encoding('u1', 2, gray=1)
+        encodings[name] = Encoding('u1', 2, gray=1)
     for name in ('yuv422_yuy2', 'yuyv'):
-        found[name] = Encoding('u1', 2)
-    # The gray values of these come first, the colours in planes behind them.
+        encodings[name] = Encoding('u1', 2)
+    # Gray values come first, colours in planes behind them.
     for name in ('nv21', 'nv24'):
-        found[name] = Encoding('u1')
-    return found
+        encodings[name] = Encoding('u1')
+    return encodings
 
 
 ENCODINGS = _encodings()
-"""The accepted encodings, by their names in sensor_msgs/image_encodings.hpp."""
+"""Accepted encodings by their names in sensor_msgs/image_encodings.hpp."""
 
 
 def decode_image(message: Any) -> np.ndarray:
     """Return the gray image of a message.
 
-    Colours are weighted as in ITU-R BT.601, in the values that they are sent in, linear or not.
+    Colours are weighted as in ITU-R BT.601, whether the values are linear or not.
 
     Parameters
     ----------
     message : sensor_msgs/Image
-        Of one of `ENCODINGS`; in either byte order; rows may be padded (`step`).
+        Has one of `ENCODINGS`, in either byte order; rows may be padded (`step`).
 
     Returns
     -------
     ndarray of uint8, uint16, float32 or float64, shape (height, width)
-        With the values that were sent; a view of the data of a gray message in the byte order of
-        the machine, not a copy. What is not finite in a float image, as scanners mark pixels
-        without a value, is 0, unless nothing is finite.
+        The values that were sent; for a gray message in the byte order of the machine, a view of
+        its data. Values that are not finite, with which scanners mark missing pixels, are 0,
+        unless the whole image is not finite.
 
     Raises
     ------
@@ -137,15 +136,15 @@ def _samples(message: Any, encoding: Encoding) -> np.ndarray:
 def _gray(samples: np.ndarray, encoding: Encoding) -> np.ndarray:
     if encoding.to_gray is None:
         return samples[:, :, encoding.gray]
-    if samples.dtype == np.float64:  # which cv2.cvtColor does not take
+    if samples.dtype == np.float64:  # not accepted by cv2.cvtColor
         weights = np.array([0.114, 0.587, 0.299])
-        with np.errstate(invalid='ignore', over='ignore'):  # of pixels without a value
+        with np.errstate(invalid='ignore', over='ignore'):  # of missing pixels
             return samples[:, :, :3] @ weights
     return cv2.cvtColor(np.ascontiguousarray(samples), encoding.to_gray)
 
 
 def _finite(image: np.ndarray) -> np.ndarray:
-    """Return an image in which pixels without a value are black."""
+    """Return an image with black for missing pixels."""
     if image.dtype.kind != 'f':
         return image
     finite = np.isfinite(image)
@@ -160,7 +159,7 @@ def decode_compressed(message: Any) -> np.ndarray:
     Parameters
     ----------
     message : sensor_msgs/CompressedImage
-        JPEG, PNG of 8 or 16 bit, or another that OpenCV reads.
+        JPEG, PNG of 8 or 16 bit, or another format that OpenCV reads.
 
     Returns
     -------

@@ -1,8 +1,7 @@
-"""Organised clouds of messages as arrays, from ROS or from a bag, without a copy.
+"""Organised point clouds of messages as arrays, from ROS or from a bag, without a copy.
 
-`sensor_msgs_py.point_cloud2` is not used, also where it is installed: it does not know padded rows
-(`row_step`), it swaps the bytes of a whole cloud of the other byte order, and it does not say what
-is wrong with a cloud that it cannot read.
+`sensor_msgs_py.point_cloud2` is never used: it ignores padded rows (`row_step`), swaps the bytes
+of the whole cloud if the byte order differs, and does not say what is wrong with a bad cloud.
 """
 
 from __future__ import annotations
@@ -14,33 +13,33 @@ import numpy as np
 from ahf_ros.interchange.fields import check_rows
 
 AXES = ('x', 'y', 'z')
-"""The fields that a cloud must have."""
+"""Fields that a cloud must have."""
 
 FLOAT32, FLOAT64 = 7, 8
-"""Their types, as sensor_msgs/PointField numbers them."""
+"""Accepted types of these fields, as numbered in sensor_msgs/PointField."""
 
 _KINDS = {FLOAT32: 'f4', FLOAT64: 'f8'}
 
 
 def organised_points(message: Any) -> np.ndarray:
-    """Return the points of an organised cloud, which belong to the pixels of an image.
+    """Return the points of an organised cloud, one per pixel of an image.
 
     Parameters
     ----------
     message : sensor_msgs/PointCloud2
-        With fields x, y and z of float32 or float64; in either byte order, with any other fields,
-        at any offsets; points and rows may be padded (`point_step`, `row_step`).
+        Has fields x, y and z of float32 or float64 at any offsets, in either byte order; may have
+        other fields and padded points or rows (`point_step`, `row_step`).
 
     Returns
     -------
     ndarray of shape (height, width), with the fields x, y and z
-        A view of the data of the message, not a copy, in the byte order of the message.
+        A view of the data of the message, in its byte order.
 
     Raises
     ------
     ValueError
-        If the cloud is not organised, a field is missing or of another type, or the sizes do not
-        fit together; the message names the field, its value and what is accepted.
+        If the cloud is not organised, a field is missing or of another type, or the sizes are
+        inconsistent; the message names the field, its value and what is accepted.
     """
     if message.height < 2:
         raise ValueError(
@@ -61,14 +60,14 @@ def organised_points(message: Any) -> np.ndarray:
 
 
 def _point_type(message: Any) -> np.dtype:
-    """Return the type of a point, of which only the coordinates are named."""
+    """Return the type of a point, with fields for its coordinates only."""
     fields = {field.name: field for field in message.fields}
     order = '>' if message.is_bigendian else '<'
     formats, offsets = [], []
     for name in AXES:
         if name not in fields:
-            told = ', '.join(map(repr, fields)) or 'none'
-            raise ValueError(f'fields are {told}, accepted are those with x, y and z')
+            names = ', '.join(map(repr, fields)) or 'none'
+            raise ValueError(f'fields are {names}, accepted are those with x, y and z')
         field = fields[name]
         if field.datatype not in _KINDS:
             raise ValueError(
@@ -79,7 +78,7 @@ def _point_type(message: Any) -> np.dtype:
         if field.offset + size > message.point_step:
             raise ValueError(
                 f'offset of {name} is {field.offset}, accepted is an integer of at most '
-                f'point_step, {message.point_step}, less {size} bytes'
+                f'point_step, {message.point_step}, minus {size} bytes'
             )
         formats.append(order + _KINDS[field.datatype])
         offsets.append(field.offset)

@@ -3,13 +3,13 @@ from __future__ import annotations
 from pathlib import Path
 
 from ahf_ros.bag.definitions import CODED_TARGETS
-from ahf_ros.bag.journal import JOINED, Entry, Journal, begin, custom_data
+from ahf_ros.bag.journal import MERGED, Entry, Journal, begin, custom_data
 from ahf_ros.filtering.identifier import Memory
 from support import bags
 
 ENTRIES = [
     Entry('/image', 10**18 + number, Memory((1 + number / 3, 0.13), (number, 54)), '')
-    for number in range(2 * JOINED + 3)
+    for number in range(2 * MERGED + 3)
 ]
 REFUSED = Entry('/image', 7, Memory(), 'no image')
 
