@@ -78,7 +78,7 @@ def test_points_are_not_copied() -> None:
         ),
         (
             {'fields': [field('x', 0), field('y', 17), field('z', 8)]},
-            'offset of y is 17, accepted is an integer of at most point_step, 20, less 4 bytes',
+            'offset of y is 17, accepted is an integer of at most point_step, 20, minus 4 bytes',
         ),
         ({'row_step': 79}, 'row_step is 79, accepted is an integer of at least 80'),
         ({'data': bytes(239)}, 'data has 239 bytes, accepted are at least 240'),
