@@ -22,15 +22,11 @@ from typing import Any
 import cv2
 import numpy as np
 
-from ahf_ros.filtering.homomorphic import (
-    FilterSettings,
-    HomomorphicFilter,
-    filtered_fft,
-    filtered_logarithm_fft,
-)
-from ahf_ros.filtering.transfer import distances, median_distance
-from ahf_ros.imaging.logarithm import logarithm, mapping, sampled
+from ahf_ros.filtering.homomorphic import FilterSettings, HomomorphicFilter
+from ahf_ros.filtering.transfer import median_distance
+from ahf_ros.imaging.logarithm import logarithm, mapping
 from ahf_ros.synthetic.scene import SceneSettings, render
+from support.fourier import distances, filtered_fft, filtered_logarithm_fft, sampled
 
 GAINS = [(1.0, 0.1), (1.2, 0.25), (1.5, 0.6), (2.8, 0.82), (3.7, 0.66)]
 """Filters that are timed and checked; the last two are those of the paper."""

@@ -7,7 +7,7 @@ The filter of [1]_ (Eq. 1 to 7) is z = ln f, S = H F(z), g = exp s with a Gaussi
 The Gaussian is separable, so s = gamma_high z - d (G * z), where G * is a circular convolution
 along the rows and one along the columns. The logarithm is taken once per image; each filter then
 passes over it once, in strips of rows that stay in the cache of a core. By default c = d and D0 is
-the median of D. `filtered_fft` is the published form, kept as the reference.
+the median of D. `support.fourier` has the published form, with which tests compare.
 
 Two steps that the paper leaves open are defined here:
 
@@ -32,7 +32,7 @@ import numpy as np
 
 from ahf_ros.filtering.transfer import Transfer, blur_taps, transfer
 from ahf_ros.imaging.image import check_image
-from ahf_ros.imaging.logarithm import logarithm, mapping, sample_lattice, sampled
+from ahf_ros.imaging.logarithm import logarithm, mapping, sample_lattice
 from ahf_ros.settings.parameter import check_parameters, parameter
 
 MARGIN = 12
@@ -120,7 +120,7 @@ class HomomorphicFilter:
         Returns
         -------
         ndarray of uint8, shape (height, width)
-            With the published parameters, within one gray level of `filtered_fft` for photographs.
+            For photographs and published parameters, within one gray level of the Fourier filter.
 
         Raises
         ------
@@ -156,8 +156,8 @@ class HomomorphicFilter:
     ) -> np.ndarray:
         """Return s of Eq. (6), float32, shape (height, width).
 
-        With the published parameters within 0.0015 (max z - min z) of `filtered_logarithm_fft`
-        for photographs, and 0.008 (max z - min z) for black and white pixel noise.
+        With the published parameters, within 0.0015 (max z - min z) of the Fourier filter for
+        photographs, and 0.008 (max z - min z) for black and white pixel noise.
         """
         function = transfer(self.shape, gamma_high, gamma_low, cutoff, attenuation)
         spatial = _spatial(self.shape, function)
@@ -179,51 +179,6 @@ class HomomorphicFilter:
             return _surrounded(inside, spatial.above, spatial.beside)
         bottom, right = height + 2 * MARGIN - top, width + 2 * MARGIN - left
         return self._margined[top:bottom, left:right]
-
-
-def filtered_fft(
-    image: np.ndarray,
-    gamma_high: float,
-    gamma_low: float,
-    cutoff: float | None = None,
-    attenuation: float | None = None,
-    settings: FilterSettings | None = None,
-) -> np.ndarray:
-    """Return what `HomomorphicFilter.filtered` returns, by Fourier transforms in double precision.
-
-    This is the reference, Eq. (1) to (7) as published, about 30 times slower.
-
-    Parameters
-    ----------
-    image, settings
-        As for `HomomorphicFilter`.
-    gamma_high, gamma_low, cutoff, attenuation
-        As for `transfer`.
-
-    Returns
-    -------
-    ndarray of uint8, shape (height, width)
-    """
-    settings = settings or FilterSettings()
-    values = filtered_logarithm_fft(image, gamma_high, gamma_low, cutoff, attenuation, settings)
-    scale, zero = mapping(sampled(values), settings.black_percentile, settings.white_percentile)
-    return np.clip(np.rint(np.exp(values + scale) - zero), 0, 255).astype(np.uint8)
-
-
-def filtered_logarithm_fft(
-    image: np.ndarray,
-    gamma_high: float,
-    gamma_low: float,
-    cutoff: float | None = None,
-    attenuation: float | None = None,
-    settings: FilterSettings | None = None,
-) -> np.ndarray:
-    """Return s of Eq. (6) by Fourier transforms, float64, shape (height, width)."""
-    check_image(image)
-    settings = settings or FilterSettings()
-    function = transfer(image.shape, gamma_high, gamma_low, cutoff, attenuation)
-    spectrum = np.fft.fft2(logarithm(image, settings.log_offset).astype(np.float64))
-    return np.fft.ifft2(function.response(image.shape) * spectrum).real
 
 
 @dataclass(frozen=True, slots=True)
@@ -278,7 +233,7 @@ def _filtered_rows(
 
 
 def _filtered_samples(padded: np.ndarray, spatial: _Spatial, shape: tuple[int, int]) -> np.ndarray:
-    """Return s on the lattice of `sampled`."""
+    """Return s on `sample_lattice`."""
     rows, columns = sample_lattice(*shape)
     around = [padded[row : row + len(spatial.column)] for row in rows]
     blurred = np.array([np.einsum('k,kx->x', spatial.column, strip) for strip in around])

@@ -13,37 +13,13 @@ TOLERANCE = 1e-3
 gray level of the Fourier filter."""
 
 
-def distances(height: int, width: int) -> np.ndarray:
-    """Return D(u, v), the distance of every frequency from the centre of the spectrum [1]_.
-
-    Parameters
-    ----------
-    height, width : int
-        Size of the image, px.
-
-    Returns
-    -------
-    ndarray of float64, shape (height, width)
-        sqrt(u^2 + v^2) in cycles per image, in the order of `numpy.fft.fft2`; 0 at the origin.
-
-    Notes
-    -----
-    The minus sign under the root of Eq. (5) is a misprint. With the origin shifted to pixel
-    (height // 2, width // 2), D is the distance from that pixel.
-
-    References
-    ----------
-    .. [1] Shang & Liu, Remote Sens. 2023, 15, 3151.
-    """
-    return np.hypot(_frequencies(height)[:, None], _frequencies(width))
-
-
 @lru_cache(maxsize=64)
 def median_distance(height: int, width: int) -> float:
-    """Return the exact median of `distances`, the published cut-off D0, in cycles per image.
+    """Return the exact median of D, the published cut-off D0, in cycles per image.
 
-    Squared distances are integers, so the middle order statistics are found by bisection on the
-    number of frequencies in a disc, without sorting the spectrum.
+    D(u, v) is the distance of a frequency from the centre of the spectrum. Its squares are
+    integers, so the middle order statistics are found by bisection on the number of frequencies
+    in a disc, without sorting the spectrum.
     """
     count = height * width
     ranks = ((count - 1) // 2, count // 2)
@@ -69,28 +45,6 @@ class Transfer:
     gamma_low: float
     cutoff: float
     attenuation: float
-
-    def response(self, shape: tuple[int, int]) -> np.ndarray:
-        """Return H(u, v) of Eq. (4) in [1]_.
-
-        H = (gamma_high - gamma_low) (1 - exp(-attenuation (D / cutoff)^2)) + gamma_low
-
-        Parameters
-        ----------
-        shape : tuple of int
-            Height and width of the image, px.
-
-        Returns
-        -------
-        ndarray of float64, shape (height, width)
-            In the order of `numpy.fft.fft2`.
-
-        References
-        ----------
-        .. [1] Shang & Liu, Remote Sens. 2023, 15, 3151.
-        """
-        attenuated = np.exp(-self.attenuation * (distances(*shape) / self.cutoff) ** 2)
-        return (self.gamma_high - self.gamma_low) * (1 - attenuated) + self.gamma_low
 
 
 def transfer(

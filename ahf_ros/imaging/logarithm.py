@@ -76,8 +76,3 @@ def sample_lattice(height: int, width: int) -> tuple[np.ndarray, np.ndarray]:
         edges = np.linspace(0, length, min(length, count) + 1).astype(int)
         lattice.append(generator.integers(edges[:-1], edges[1:]))
     return lattice[0], lattice[1]
-
-
-def sampled(values: np.ndarray) -> np.ndarray:
-    """Return `values`, shape (height, width), on `sample_lattice`."""
-    return values[np.ix_(*sample_lattice(*values.shape))]

@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from ahf_ros.imaging.logarithm import MINIMUM_CONTRAST, logarithm, mapping, sample_lattice, sampled
+from ahf_ros.imaging.logarithm import MINIMUM_CONTRAST, logarithm, mapping, sample_lattice
+from support.fourier import sampled
 
 RAMP = np.arange(256, dtype=np.uint8).reshape(16, 16)
 
