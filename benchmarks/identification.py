@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -39,12 +38,10 @@ from ahf_ros.synthetic.patterns import LIGHT_NAMES, benchmark_lights
 from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import Target, TrueTarget
 from benchmarks.filter import machine
+from support import PHOTOS
 
 FIRST_TEST_SEED = 101
 """Seeds below this one are for development."""
-
-PHOTOS = Path(__file__).resolve().parents[2] / 'shared' / 'photos'
-"""Where photographs are, unless the environment variable AHF_PHOTOS says otherwise."""
 
 PATIENCE = 600.0
 """Longest time for one image, s, of a command."""
@@ -281,7 +278,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     run = with_command(options) if options.command else with_detector(options)
     rows = synthetic_rows(options, run)
     if 'photographs' in options.groups:
-        rows += panel_rows(Path(os.environ.get('AHF_PHOTOS', PHOTOS)), run)
+        rows += panel_rows(PHOTOS, run)
     size = asdict(SceneSettings(**QUICK) if options.quick else SceneSettings())
     report = {
         'method': options.command or options.detector + (' with AHF' if options.ahf else ''),

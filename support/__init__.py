@@ -8,5 +8,5 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 """The sources."""
 
-PHOTOS = Path(os.environ.get('AHF_PHOTOS', ROOT.parent / 'shared' / 'photos'))
+PHOTOS = Path(os.environ.get('AHF_PHOTOS') or ROOT.parent / 'shared' / 'photos')
 """Photographs with truth, which are no part of the package."""

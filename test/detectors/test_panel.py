@@ -19,19 +19,16 @@ from ahf_ros.interchange.image_files import read_image
 from ahf_ros.interchange.target_json import read_results
 from ahf_ros.interchange.truth_files import read_truth
 from ahf_ros.target import Truth
+from support import ROOT
+from support.photographs import PANEL, WALL, needs_photographs
 
-ROOT = Path(__file__).resolve().parents[2]
-PHOTOS = Path(os.environ.get('AHF_PHOTOS', ROOT.parent / 'shared' / 'photos'))
-PANEL = PHOTOS / 'panel'
-WALL = PHOTOS / 'wall' / 'wall_14bit.jpg'
 WALL_TRUTH = Path(__file__).parent / 'wall_truth.csv'
 """IDs of the wall, read off the photograph with a threshold; they follow the order of the sheets.
 One that the frame cuts is not confirmed."""
 SEEN_ELSEWHERE = 12  # targets near by, in another photograph
 NEAR = 3.0  # px
 
-needs_panel = pytest.mark.skipif(not PANEL.is_dir(), reason=f'no photographs in {PANEL}')
-needs_wall = pytest.mark.skipif(not WALL.is_file(), reason=f'there is no {WALL}')
+pytestmark = needs_photographs
 
 
 def identify(results: Path, *arguments: object) -> Path:
@@ -69,6 +66,11 @@ def predicted(truth: Truth, name: str, number: int) -> np.ndarray:
     return np.array(places).reshape(-1, 2)
 
 
+def test_all_photographs_are_there():
+    assert len(list(PANEL.glob('*.png'))) == len(read_truth(PANEL / 'truth.csv')) == 10
+    assert WALL.is_file()
+
+
 @pytest.fixture(scope='module')
 def panel(tmp_path_factory) -> Path:
     photographs = sorted(PANEL.glob('*.png'))
@@ -76,25 +78,23 @@ def panel(tmp_path_factory) -> Path:
     return identify(results, *photographs, '--family', 'aicon14')
 
 
-@needs_panel
 def test_recall_and_wrong_ids_on_the_panel(panel):
     truth = read_truth(PANEL / 'truth.csv')
     figures = total(evaluate(truth, read_results(panel)).values())
     assert figures.expected == 546
     assert figures.wrong == 0
-    assert figures.recall == figures.decoding >= 0.97  # 99.8 % were measured
-    assert figures.rmse[2] < 0.05  # 0.024 px; the truth is good to 0.02
+    assert figures.recall == figures.decoding
+    assert figures.right >= 544  # measured: 544
+    assert figures.rmse[2] < 0.025  # measured: 0.022 px; the truth is good to 0.02
 
 
-@needs_panel
 def test_targets_on_the_panel_are_counted_among_dots_without_code():
     truth = read_truth(PANEL / 'truth.csv')
     for name in sorted(truth)[:4]:
         count = estimate_count(read_image(PANEL / name), DetectorSettings(family='aicon14'))
-        assert abs(count - len(truth[name])) <= 3  # 2 at the most were measured in all ten
+        assert abs(count - len(truth[name])) <= 2  # measured in all ten: 0 to 2
 
 
-@needs_panel
 def test_nothing_on_the_panel_is_made_up(panel):
     """The truth leaves out targets that the frame cuts; two were decoded there, both right."""
     truth = read_truth(PANEL / 'truth.csv')
@@ -106,7 +106,6 @@ def test_nothing_on_the_panel_is_made_up(panel):
                 assert np.median(np.linalg.norm(errors, axis=1)) < NEAR, (name, target)
 
 
-@needs_panel
 def test_each_photograph_has_a_line_with_its_size_and_time(panel):
     records = [json.loads(line) for line in panel.read_text().splitlines()]
     assert [Path(record['image']) for record in records] == sorted(PANEL.glob('*.png'))
@@ -114,11 +113,11 @@ def test_each_photograph_has_a_line_with_its_size_and_time(panel):
     assert all(record['elapsed_s'] > 0 for record in records)
 
 
-@needs_wall
-@pytest.mark.parametrize('detector', ['ring', 'traditional'])
-def test_a_wall_with_dark_targets(detector, tmp_path):
+@pytest.mark.parametrize(('detector', 'measured'), [('ring', 55), ('traditional', 61)])
+def test_a_wall_with_dark_targets(detector, measured, tmp_path):
     options = ('--family', 'aicon14', '--polarity', 'dark', '--detector', detector)
     results = read_results(identify(tmp_path / 'results.jsonl', WALL, *options))
     figures = total(evaluate(read_truth(WALL_TRUTH), results).values())
     assert (figures.wrong, figures.false_positives) == (0, 0)
-    assert figures.right >= 50  # of 62; ring has 55, the traditional detector all of them
+    assert figures.expected == 62
+    assert figures.right >= measured

@@ -13,6 +13,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import cv2
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -158,9 +159,18 @@ def test_the_detector_of_a_launch_file_works_in_its_namespace(graph: Any) -> Non
 def test_the_detector_of_a_launch_file_reads_compressed_images(graph: Any) -> None:
     from sensor_msgs.msg import CompressedImage
 
+    from ahf_ros.msg import CodedTargetArray
+    from ahf_ros.synthetic.scene import SceneSettings, render
+
     (detector,), _ = started('detector', namespace='right', image='/right/image_raw')
     graph.start('detector', *detector.arguments, '-p', 'image_transport:=compressed')
-    graph.publisher(CompressedImage, '/right/image_raw/compressed')
+    answers = graph.listen(CodedTargetArray, '/right/coded_targets')
+    scene = render(SceneSettings(width=640, height=480, targets=4, dot_radius=10.0))
+    content = cv2.imencode('.png', scene.image)[1].tobytes()
+    sent = CompressedImage(format='mono8; png compressed', data=content)
+    graph.publisher(CompressedImage, '/right/image_raw/compressed').publish(sent)
+    graph.until(lambda: answers)
+    assert [it.id for it in answers[0].targets] == [it.id for it in scene.targets]
 
 
 @pytest.mark.usefixtures('stand_in')
