@@ -1,0 +1,204 @@
+"""Right and wrong IDs of targets that are covered, glossy, faint, cut off or of another family.
+
+    python -m benchmarks.disturbances [--tables disturbances ...] [--families metashape12 ...]
+
+Every row of the first table is a disturbance of sheets of targets; a cell has right and wrong IDs
+and false positives. The second table reads the targets of each family as those of the others, and
+the photographs of the panel as well; the third reads marks that are no targets. Seeds from 101 on
+are for tests: nothing in the package was chosen by looking at them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.progress import track
+
+from ahf_ros.codes.ring import FAMILY_NAMES, family
+from ahf_ros.detectors import DetectorSettings, create
+from ahf_ros.detectors.contract import Detector
+from ahf_ros.evaluation import FALSE, RIGHT, WRONG, judge
+from ahf_ros.interchange.image_files import read_image
+from ahf_ros.interchange.truth_files import read_truth
+from ahf_ros.target import Target, TrueTarget
+from benchmarks.disturbed import Scene, Targets
+from benchmarks.exposure import Exposure
+from benchmarks.identification import PHOTOS
+from benchmarks.lookalikes import LOOKALIKES
+from benchmarks.sheets import COLUMNS, ROWS, mark_sheet
+
+LOOKALIKE_COUNT = 300
+"""Marks of each kind that are no targets."""
+
+
+@dataclass(slots=True)
+class Count:
+    """Reports of a kind of image.
+
+    Attributes
+    ----------
+    expected : int
+        Targets that the images show.
+    right, wrong, false : int
+        IDs at the place of their target, at that of another one, and anywhere else.
+    stated : list of float
+        Confidences of the reports that are not right.
+    """
+
+    expected: int = 0
+    right: int = 0
+    wrong: int = 0
+    false: int = 0
+    stated: list[float] = field(default_factory=list)
+
+    def add(self, truth: Sequence[TrueTarget], targets: Sequence[Target]) -> None:
+        """Add the reports of one image."""
+        kinds = [verdict.kind for verdict in judge(truth, targets)]
+        self.expected += len(truth)
+        self.right += kinds.count(RIGHT)
+        self.wrong += kinds.count(WRONG)
+        self.false += kinds.count(FALSE)
+        self.stated += [
+            target.confidence for target, kind in zip(targets, kinds, strict=True) if kind != RIGHT
+        ]
+
+    def above(self, confidence: float) -> int:
+        """Return how many reports with more than a confidence are not right."""
+        return sum(stated > confidence for stated in self.stated)
+
+    def __str__(self) -> str:
+        """Return right and wrong, false positives where there are any, and the certain errors."""
+        text = f'{self.right} / {self.wrong}' + (f' + {self.false}' if self.false else '')
+        return text + (f' ({self.above(0.99)})' if self.above(0.99) else '')
+
+
+def detector(name: str, target_family: str) -> Detector:
+    """Return a detector of targets of a family."""
+    return create(name, DetectorSettings(family=target_family))
+
+
+def counted(detect: Detector, scenes: Iterator[Scene]) -> Count:
+    """Return the reports of some scenes."""
+    count = Count()
+    for image, truth in scenes:
+        count.add(truth, detect(image))
+    return count
+
+
+def disturbance_table(options: argparse.Namespace) -> dict[str, dict[str, Count]]:
+    """Return the reports by disturbance and family."""
+    table: dict[str, dict[str, Count]] = {}
+    for name in options.families:
+        detect = detector(options.detector, name)
+        targets = Targets(name, options.count, options.seed, options.bright)
+        for row, scenes in _shown(targets.rows(), name):
+            if not options.rows or any(part in row for part in options.rows):
+                table.setdefault(row, {})[name] = counted(detect, scenes)
+    return table
+
+
+def family_table(options: argparse.Namespace) -> dict[str, dict[str, Count]]:
+    """Return the reports by family of the targets and family that they are read as."""
+    table: dict[str, dict[str, Count]] = {}
+    for shown in _shown(FAMILY_NAMES, 'families'):
+        sheets = Targets(shown, options.count, options.seed, options.bright).sheets()
+        scenes = [(sheet.photograph(Exposure()), sheet.truth) for sheet in sheets]
+        for name in FAMILY_NAMES:
+            seen = ((image, truth if name == shown else []) for image, truth in scenes)
+            table.setdefault(shown, {})[name] = counted(detector(options.detector, name), seen)
+    folder = Path(os.environ.get('AHF_PHOTOS', PHOTOS)) / 'panel'
+    panel = read_truth(folder / 'truth.csv') if folder.exists() else {}
+    for photograph, truth in _shown(panel.items(), 'photographs'):
+        image = read_image(folder / photograph)
+        row = table.setdefault('photographs of aicon14', {})
+        for name in FAMILY_NAMES:
+            targets = detector(options.detector, name)(image)
+            row.setdefault(name, Count()).add(truth if name == 'aicon14' else [], targets)
+    return table
+
+
+def lookalike_table(options: argparse.Namespace) -> dict[str, dict[str, Count]]:
+    """Return the reports by kind of mark and family that it is read as."""
+    table: dict[str, dict[str, Count]] = {}
+    for kind, draw in _shown(LOOKALIKES.items(), 'look-alikes'):
+        for name in options.families:
+            generator = np.random.default_rng([options.seed, 3])
+            inks = [draw(family(name), generator) for _ in range(LOOKALIKE_COUNT)]
+            size = COLUMNS * ROWS
+            sheets = [
+                mark_sheet(inks[start : start + size], options.seed + start)
+                for start in range(0, LOOKALIKE_COUNT, size)
+            ]
+            scenes = ((sheet.photograph(Exposure()), ()) for sheet in sheets)
+            table.setdefault(kind, {})[name] = counted(detector(options.detector, name), scenes)
+    return table
+
+
+def _shown(items: Any, what: str) -> Iterator[Any]:
+    """Yield items and show how far it has come."""
+    items = items if isinstance(items, Iterator) else list(items)
+    total = None if isinstance(items, Iterator) else len(items)
+    yield from track(items, what, total=total, console=Console(stderr=True))
+
+
+TABLES: dict[str, Callable[[argparse.Namespace], dict[str, dict[str, Count]]]] = {
+    'disturbances': disturbance_table,
+    'families': family_table,
+    'look-alikes': lookalike_table,
+}
+
+
+def markdown(title: str, table: dict[str, dict[str, Count]]) -> str:
+    """Return a table as Markdown."""
+    columns = list(dict.fromkeys(name for row in table.values() for name in row))
+    lines = [f'| {title} | {" | ".join(columns)} |', '|---' * (len(columns) + 1) + '|']
+    for name, row in table.items():
+        cells = [str(row[column]) if column in row else '-' for column in columns]
+        lines.append(f'| {name} | {" | ".join(cells)} |')
+    return '\n'.join(lines)
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the options."""
+    made = argparse.ArgumentParser(
+        description=__doc__.split('\n\n')[0],
+        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+    )
+    made.add_argument('--detector', choices=('ring', 'traditional'), default='ring')
+    made.add_argument('--tables', nargs='+', choices=TABLES, default=list(TABLES))
+    made.add_argument('--families', nargs='+', choices=FAMILY_NAMES, default=FAMILY_NAMES)
+    made.add_argument('--rows', nargs='+', default=[], help='rows with one of these in their name')
+    made.add_argument('--count', type=int, default=216, help='targets of a row')
+    made.add_argument('--seed', type=int, default=101, help='of the first sheet')
+    made.add_argument('--bright', action='store_true', help='bright targets on dark paper')
+    made.add_argument('--json', type=Path, metavar='FILE', help='also write a JSON object')
+    return made
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Measure and print."""
+    options = parser().parse_args(arguments)
+    report: dict[str, Any] = {'detector': options.detector, 'seed': options.seed}
+    for name in options.tables:
+        table = TABLES[name](options)
+        print(markdown(name, table), end='\n\n', flush=True)
+        report[name] = {
+            row: {column: asdict(count) for column, count in cells.items()}
+            for row, cells in table.items()
+        }
+    if options.json:
+        options.json.write_text(json.dumps(report, indent=1))
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

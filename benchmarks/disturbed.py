@@ -1,0 +1,153 @@
+"""Scenes of targets that are disturbed in all the ways that a table has rows for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import cv2
+import numpy as np
+
+from ahf_ros.codes.ring import FAMILY_NAMES
+from ahf_ros.target import TrueTarget
+from benchmarks import occluders
+from benchmarks.exposure import Exposure
+from benchmarks.sheets import COLUMNS, Sheet, random_numbers, target_sheet
+
+RADIUS = 12.0
+"""Of the dots, px."""
+
+COVERS = {'black': 61.0, 'gray 80': 80.0, 'gray 128': 128.0, 'gray 170': 170.0, 'white': 220.0}
+"""Gray values of what covers targets; black and white are those of ink and paper."""
+
+Scene = tuple[np.ndarray, Sequence[TrueTarget]]
+"""An image and the targets that it shows."""
+
+
+def exposures() -> dict[str, Exposure]:
+    """Return the disturbances of whole sheets by their names."""
+    rows = {'clean': Exposure()}
+    for sectors in (1, 2, 3):
+        for name, gray in COVERS.items():
+            wedge = occluders.over_sectors(sectors, gray)
+            rows[f'{name} over {sectors} sector' + 's' * (sectors > 1)] = Exposure(occluder=wedge)
+    for name, gray in COVERS.items():
+        wedge = occluders.over_sectors(2, gray, whole=True)
+        rows[f'{name} over 2 whole sectors'] = Exposure(occluder=wedge)
+    for name in ('black', 'gray 128', 'white'):
+        for distance in (2.0, 1.4):
+            edge = occluders.paper(distance, COVERS[name])
+            rows[f'{name} paper {distance} dot radii away'] = Exposure(occluder=edge)
+    for name in ('black', 'gray 128', 'white'):
+        bar = occluders.finger(2.0, COVERS[name])
+        rows[f'{name} finger 2 dot radii wide'] = Exposure(occluder=bar)
+    spot = occluders.disc(1.0, COVERS['white'])
+    rows['white spot of 1 dot radius'] = Exposure(occluder=spot)
+    for radius, levels in ((1.0, 200.0), (1.0, 400.0), (1.5, 200.0)):
+        glare = occluders.highlight(radius, levels)
+        rows[f'highlight of {radius} dot radii, +{levels:.0f}'] = Exposure(glare=glare)
+    for contrast, noise in ((20, 1.5), (15, 1.0), (10, 0.7), (5, 0.5)):
+        levels = (130.0, 130.0 - contrast, noise)
+        rows[f'{contrast} gray levels, noise {noise}'] = Exposure(levels=levels)
+    for white, dark in ((180, 120), (160, 120), (90, 60), (240, 200), (100, 60)):
+        rows[f'{dark} on {white}'] = Exposure(levels=(white, dark, 1.0))
+    rows['gamma 0.3'] = Exposure(develop=partial(_power, 0.3))
+    for light in (3.0, 4.0, 0.01):
+        rows[f'exposed {light:g} times'] = Exposure(light=light)
+    for blur in (2.0, 3.0):
+        rows[f'blur of {blur:g} px'] = Exposure(develop=partial(_blurred, blur))
+    for noise in (10.0, 30.0):
+        rows[f'noise of {noise:g}'] = Exposure(develop=partial(_noisy, noise))
+    for quality in (30, 5):
+        rows[f'JPEG {quality}'] = Exposure(develop=partial(_compressed, quality))
+    return rows
+
+
+def _power(exponent: float, image: np.ndarray, _: np.random.Generator) -> np.ndarray:
+    return np.rint(255 * (image / 255) ** exponent).astype(np.uint8)
+
+
+def _blurred(blur: float, image: np.ndarray, _: np.random.Generator) -> np.ndarray:
+    return cv2.GaussianBlur(image, (0, 0), blur)
+
+
+def _noisy(noise: float, image: np.ndarray, generator: np.random.Generator) -> np.ndarray:
+    values = image + noise * generator.standard_normal(image.shape)
+    return np.rint(np.clip(values, 0, 255)).astype(np.uint8)
+
+
+def _compressed(quality: int, image: np.ndarray, _: np.random.Generator) -> np.ndarray:
+    _, code = cv2.imencode('.jpg', image, [cv2.IMWRITE_JPEG_QUALITY, quality])
+    return cv2.imdecode(code, cv2.IMREAD_GRAYSCALE)
+
+
+@dataclass(frozen=True, slots=True)
+class Targets:
+    """The targets of one family that a table is made of.
+
+    Attributes
+    ----------
+    name : str
+        Their family.
+    count : int
+        Number of targets of a row.
+    seed : int
+        Of the first sheet.
+    bright : bool
+        Whether they are bright on dark.
+    """
+
+    name: str
+    count: int
+    seed: int
+    bright: bool = False
+
+    def sheets(self) -> list[Sheet]:
+        """Return whole sheets."""
+        return [
+            target_sheet(self.name, numbers, self.seed + index, bright=self.bright)
+            for index, numbers in enumerate(random_numbers(self.name, self.count, self.seed))
+        ]
+
+    def rows(self) -> Iterator[tuple[str, Iterator[Scene]]]:
+        """Yield the disturbances, each with its scenes."""
+        sheets = self.sheets()
+        for name, exposure in exposures().items():
+            yield name, self._exposed(sheets, exposure)
+        for distance in (6.5, 5.5) if self.name in FAMILY_NAMES else ():
+            other = Exposure(occluder=occluders.other_target(self.name, distance))
+            yield f'another target {distance} dot radii away', self._exposed(sheets, other)
+        yield 'mirrored', self._mirrored(sheets)
+        for distance in (3.2, 2.6):
+            yield f'border of the image {distance} dot radii away', self._cut(distance)
+
+    def _exposed(self, sheets: list[Sheet], exposure: Exposure) -> Iterator[Scene]:
+        for sheet in sheets:
+            yield sheet.photograph(exposure), sheet.truth
+
+    def _mirrored(self, sheets: list[Sheet]) -> Iterator[Scene]:
+        for sheet in sheets:
+            image = np.ascontiguousarray(sheet.photograph(Exposure())[:, ::-1])
+            last = image.shape[1] - 1
+            yield image, [TrueTarget(it.id, last - it.x, it.y) for it in sheet.truth]
+
+    def _cut(self, distance: float) -> Iterator[Scene]:
+        """Yield rows of targets that each side of an image cuts at a distance from the centres."""
+        numbers = np.concatenate(random_numbers(self.name, self.count, self.seed))
+        for index, start in enumerate(range(0, len(numbers), COLUMNS)):
+            row = target_sheet(
+                self.name,
+                numbers[start : start + COLUMNS],
+                self.seed + index,
+                spread=0.0,
+                bright=self.bright,
+            )
+            image, truth = row.photograph(Exposure()), row.truth
+            height = round(len(image) / 2 + distance * RADIUS)
+            image = image[:height]
+            for _ in range(index % 4):
+                last = image.shape[1] - 1
+                image = np.rot90(image)
+                truth = [TrueTarget(it.id, it.y, last - it.x) for it in truth]
+            yield np.ascontiguousarray(image), truth

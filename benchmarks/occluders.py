@@ -1,0 +1,149 @@
+"""Objects before targets, and reflections on them."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+
+import numpy as np
+
+from ahf_ros.codes.ring import family
+from ahf_ros.synthetic.covers import ring_cover
+from benchmarks.exposure import GAMMA, INK, WHITE, Cell, Glare, Occluder
+
+_LABEL = 3.8  # radius of the paper that another target is printed on, dot radii
+
+
+def over_sectors(count: float, gray: float, *, whole: bool = False) -> Occluder:
+    """Return a wedge across the band, as wide as some sectors.
+
+    Parameters
+    ----------
+    count : float
+        Width of the wedge, sectors.
+    gray : float
+        Its gray value.
+    whole : bool
+        Whether its sides lie on edges of sectors, instead of anywhere.
+    """
+    return partial(_wedge, count, gray, whole)
+
+
+def _wedge(
+    count: float, gray: float, whole: bool, cell: Cell, generator: np.random.Generator
+) -> tuple[np.ndarray, float]:
+    step = 2 * math.pi / cell.bits
+    position = generator.integers(cell.bits) if whole else generator.uniform(0, cell.bits)
+    start = cell.turn + step * position
+    inner = generator.uniform(1.2, cell.inner - 0.2)
+    outer = generator.uniform(cell.outer + 0.2, 4.6)
+    distance = np.hypot(cell.x, cell.y)
+    sides = np.minimum(_beside(cell, start), -_beside(cell, start + count * step))
+    ends = np.minimum(distance - inner, outer - distance)
+    return _share(np.minimum(sides, ends), cell), gray
+
+
+def finger(width: float, gray: float) -> Occluder:
+    """Return a bar with a round end that reaches from outside across the band.
+
+    Parameters
+    ----------
+    width : float
+        Width of the bar, dot radii.
+    gray : float
+        Its gray value.
+    """
+    return partial(_finger, width, gray)
+
+
+def _finger(
+    width: float, gray: float, cell: Cell, generator: np.random.Generator
+) -> tuple[np.ndarray, float]:
+    direction = generator.uniform(0, 2 * math.pi)
+    end = generator.uniform(1.2, cell.inner - 0.2) + width / 2
+    along = cell.x * math.cos(direction) + cell.y * math.sin(direction)
+    across = cell.y * math.cos(direction) - cell.x * math.sin(direction)
+    return _share(width / 2 - np.hypot(np.minimum(along - end, 0), across), cell), gray
+
+
+def paper(distance: float, gray: float) -> Occluder:
+    """Return a sheet with a straight edge at a distance from the centre, dot radii."""
+    return partial(_paper, distance, gray)
+
+
+def _paper(
+    distance: float, gray: float, cell: Cell, generator: np.random.Generator
+) -> tuple[np.ndarray, float]:
+    direction = generator.uniform(0, 2 * math.pi)
+    along = cell.x * math.cos(direction) + cell.y * math.sin(direction)
+    return _share(along - distance, cell), gray
+
+
+def disc(radius: float, gray: float) -> Occluder:
+    """Return a disc on the middle of the band, of a radius in dot radii."""
+    return partial(_disc, radius, gray)
+
+
+def _disc(
+    radius: float, gray: float, cell: Cell, generator: np.random.Generator
+) -> tuple[np.ndarray, float]:
+    return _share(radius - _from_band(cell, generator), cell), gray
+
+
+def other_target(name: str, distance: float) -> Occluder:
+    """Return the round paper of another target of a family, at a distance in dot radii."""
+    return partial(_other_target, name, distance)
+
+
+def _other_target(
+    name: str, distance: float, cell: Cell, generator: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
+    code = family(name)
+    direction, turn = generator.uniform(0, 2 * math.pi, 2)
+    x = cell.x - np.float32(distance * math.cos(direction))
+    y = cell.y - np.float32(distance * math.sin(direction))
+    word = int(generator.choice(code.words))
+    ink = ring_cover(code, word, turn, 0.0)(x, y, np.eye(2, dtype=np.float32) * cell.width)
+    gray = WHITE * (1 - (1 - INK) * ink) ** (1 / GAMMA)
+    return _share(_LABEL - np.hypot(x, y), cell), gray
+
+
+def highlight(radius: float, levels: float) -> Glare:
+    """Return a reflection on the band that falls off smoothly.
+
+    Parameters
+    ----------
+    radius : float
+        Standard deviation, dot radii.
+    levels : float
+        Gray values that it adds in its middle.
+    """
+    return partial(_highlight, radius, levels)
+
+
+def _highlight(
+    radius: float, levels: float, cell: Cell, generator: np.random.Generator
+) -> np.ndarray:
+    distance = _from_band(cell, generator)
+    return (levels * np.exp(-0.5 * (distance / radius) ** 2)).astype(np.float32)
+
+
+def _from_band(cell: Cell, generator: np.random.Generator) -> np.ndarray:
+    """Return the distances of the samples from a random place in the middle of the band."""
+    direction = generator.uniform(0, 2 * math.pi)
+    middle = (cell.inner + cell.outer) / 2
+    x, y = middle * math.cos(direction), middle * math.sin(direction)
+    return np.hypot(cell.x - np.float32(x), cell.y - np.float32(y))
+
+
+def _beside(cell: Cell, direction: float) -> np.ndarray:
+    """Return the distances of the samples from a line through the centre, positive to its left."""
+    cosine, sine = np.float32(math.cos(direction)), np.float32(math.sin(direction))
+    beside: np.ndarray = cell.y * cosine - cell.x * sine
+    return beside
+
+
+def _share(inside: np.ndarray, cell: Cell) -> np.ndarray:
+    """Return the share of each sample that is covered, from the distance inside the edge."""
+    share: np.ndarray = inside / np.float32(cell.width) + np.float32(0.5)
+    return np.clip(share, 0, 1).astype(np.float32, copy=False)
