@@ -11,10 +11,10 @@ from collections import defaultdict
 from itertools import product
 
 import ahf_ros.blas  # noqa: F401  before numpy
-from ahf_ros.detectors import DETECTOR_NAMES, create
+from ahf_ros.detectors import DETECTOR_NAMES, create_detector
 from ahf_ros.evaluation import score
-from ahf_ros.filtering.genes import EXTENDED, PUBLISHED, TuningSettings
-from ahf_ros.filtering.identifier import AdaptiveSettings, identify
+from ahf_ros.filtering.genes import EXTENDED, PUBLISHED
+from ahf_ros.session import identify
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
 from ahf_ros.synthetic.scene import SceneSettings, render
 
@@ -28,7 +28,7 @@ def main() -> None:
     parser.add_argument('--seeds', type=int, nargs='+', default=[1, 2])
     parser.add_argument('--lights', nargs='+', default=LIGHT_NAMES, choices=LIGHT_NAMES)
     options = parser.parse_args()
-    detector = create(options.detector)
+    detector = create_detector(options.detector)
     ways = list(product((PUBLISHED, EXTENDED), (False, True)))
     names = [f'{genes}{", coarse" if coarse else ""}' for genes, coarse in ways]
     print(f'| light | without | {" | ".join(f"{name} | s" for name in names)} |')
@@ -43,9 +43,9 @@ def main() -> None:
             truth = rendering.truth
             right['without'] += score(truth, detector(rendering.image)).right
             for name, (genes, coarse) in zip(names, ways, strict=True):
-                settings = AdaptiveSettings(tuning=TuningSettings(search=genes), coarse=coarse)
+                settings = {'expected_targets': scene.targets, 'search': genes, 'coarse': coarse}
                 started = time.perf_counter()
-                found = identify(rendering.image, detector, scene.targets, settings)
+                found = identify(rendering.image, detector, **settings)
                 duration[name] += time.perf_counter() - started
                 figures = score(truth, found.targets)
                 right[name] += figures.right

@@ -16,7 +16,6 @@ import argparse
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 from statistics import mean, median
 
 import cv2
@@ -25,12 +24,12 @@ from rich.console import Console
 from rich.progress import track
 
 from ahf_ros.codes.ring import FAMILY_NAMES, family
-from ahf_ros.detectors import DetectorSettings, create
+from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.detectors.ring.counting import estimate_count, target_features, terms
 from ahf_ros.detectors.ring.detector import RingDetector
 from ahf_ros.evaluation import score
 from ahf_ros.features import frame
-from ahf_ros.filtering.identifier import identify
+from ahf_ros.session import identify
 from ahf_ros.synthetic.patterns import benchmark_lights
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 from benchmarks.confidence import logistic_regression
@@ -174,8 +173,7 @@ def searched(seeds: Sequence[int], name: str) -> list[str]:
         '| wrong | filters | times N given |',
         '|---' * 10 + '|',
     ]
-    detector, wanted = create(name), DetectorSettings()
-    estimate = partial(estimate_count, settings=wanted)
+    detector = create_detector(name)
     jobs = [(light, ambient, seed) for light, ambient in SEARCHED for seed in seeds]
     for light, ambient, seed in progress(jobs):
         scene = render(SceneSettings(light=light, ambient=ambient, seed=seed))
@@ -184,7 +182,9 @@ def searched(seeds: Sequence[int], name: str) -> list[str]:
         cells = [f'{light} {ambient:g}', str(len(truth)), str(plain.right)]
         times = []
         for expected in (len(truth), 0):
-            found = identify(scene.image, detector, expected, estimate=estimate)
+            found = identify(
+                scene.image, detector, expected_targets=expected, estimate_expected=True
+            )
             figures = score(truth, found.targets)
             cells += [figures.right, figures.wrong + figures.false_positives]
             cells += [found.filter.evaluations]

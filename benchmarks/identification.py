@@ -28,12 +28,11 @@ from rich.console import Console
 from rich.progress import track
 
 from ahf_ros.codes.ring import FAMILY_NAMES
-from ahf_ros.detectors import DETECTOR_NAMES, DetectorSettings, create
-from ahf_ros.detectors.contract import ProgramSettings
+from ahf_ros.detectors import DETECTOR_NAMES, DetectorSettings, create_detector
 from ahf_ros.evaluation import RIGHT, Score, judge, score, total
-from ahf_ros.filtering.identifier import AdaptiveSettings, identify
 from ahf_ros.interchange.image_files import read_image
 from ahf_ros.interchange.truth_files import read_truth
+from ahf_ros.session import identify
 from ahf_ros.synthetic.patterns import LIGHT_NAMES, benchmark_lights
 from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import Target, TrueTarget
@@ -145,10 +144,9 @@ def with_detector(options: argparse.Namespace) -> Identify:
     """Return identification by a detector of the package, driven by AHF or not."""
 
     def run(image: np.ndarray, family: str, expected: int) -> Seen:
-        detector = create(options.detector, DetectorSettings(family=family))
+        detector = create_detector(options.detector, DetectorSettings(family=family))
         detector(image[:400, :400])  # tables that are made once are not timed
-        settings = AdaptiveSettings(ahf=options.ahf)
-        found = identify(image, detector, expected if options.ahf else 0, settings)
+        found = identify(image, detector, expected_targets=expected if options.ahf else 0)
         return found.targets, found.filter.duration
 
     return run
@@ -159,10 +157,8 @@ def with_command(options: argparse.Namespace) -> Identify:
 
     def run(image: np.ndarray, family: str, expected: int) -> Seen:
         command = options.command.replace('{family}', family).replace('{expected}', str(expected))
-        settings = DetectorSettings(
-            program=ProgramSettings(command=command), detector_timeout=PATIENCE
-        )
-        detector = create('command', settings)
+        settings = DetectorSettings(command=command, detector_timeout=PATIENCE)
+        detector = create_detector('command', settings)
         started = time.perf_counter()
         return detector(image), time.perf_counter() - started
 

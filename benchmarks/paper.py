@@ -33,13 +33,13 @@ import numpy as np
 from rich.console import Console
 from rich.progress import track
 
-from ahf_ros.detectors import DetectorSettings, create
-from ahf_ros.detectors.contract import SquareSettings
+from ahf_ros.detectors import Drafter, Refiner, create_detector
 from ahf_ros.evaluation import RIGHT, judge, score
 from ahf_ros.filtering.genes import EXTENDED, PUBLISHED, TuningSettings
 from ahf_ros.filtering.genetic import GeneticSettings
-from ahf_ros.filtering.identifier import AdaptiveIdentifier, AdaptiveSettings
-from ahf_ros.filtering.trials import AnyDetector
+from ahf_ros.filtering.identifier import Identifier
+from ahf_ros.filtering.settings import AdaptiveSettings
+from ahf_ros.filtering.trials import DetectorFunction
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 from ahf_ros.target import Identification, Target, TrueTarget, count_codes
@@ -47,7 +47,7 @@ from benchmarks.filter import machine
 from benchmarks.paper_tables import markdown
 from benchmarks.preprocessors import PREPROCESSORS
 
-TARGETS = DetectorSettings(family='metashape12', square=SquareSettings(aruco_dictionary='4x4_100'))
+FAMILIES = {'ring': 'metashape12', 'traditional': 'metashape12', 'aruco': 'aruco_4x4_100'}
 """Ring targets as in the paper, and a dictionary with as many markers as there are targets."""
 
 QUICK = {'width': 1200, 'height': 900, 'targets': 6}
@@ -83,16 +83,16 @@ class Method:
     ) -> tuple[Identification, list[int]]:
         """Return what an image shows, and n of every identification that was tried for it.
 
-        Placements are taken from the image as it is, whatever the detector saw.
+        Centres are taken from the image as it is, whatever the detector saw.
         """
-        detector = create(self.detector, TARGETS)
-        refine = getattr(detector, 'refine', None)
+        detector = create_detector(self.detector, family=FAMILIES[self.detector])
+        assert isinstance(detector, Refiner)
         if self.preprocessor:
             found = detector(PREPROCESSORS[self.preprocessor](image))
-            return Identification(tuple(refine(image, found) if refine else found)), []
+            return Identification(tuple(detector.refine(image, found))), []
         tried: list[int] = []
 
-        def counted(identify: AnyDetector, shown: np.ndarray) -> list[Target]:
+        def counted(identify: DetectorFunction, shown: np.ndarray) -> list[Target]:
             targets = identify(shown)
             tried.append(count_codes(targets))
             return targets
@@ -103,8 +103,13 @@ class Method:
             tuning=TuningSettings(search=self.search),
             genetic=GeneticSettings(max_evaluations=most),
         )
-        draft = partial(counted, getattr(detector, 'draft', detector))
-        identifier = AdaptiveIdentifier(partial(counted, detector), settings, refine, draft=draft)
+        draft = detector.draft if isinstance(detector, Drafter) else detector
+        identifier = Identifier(
+            partial(counted, detector),
+            settings,
+            refine=detector.refine,
+            draft=partial(counted, draft),
+        )
         return identifier.identify(image, expected), tried
 
 
@@ -133,7 +138,7 @@ def run_scene(scene: SceneSettings, most: int) -> list[dict[str, Any]]:
     renderings: dict[str, Rendering] = {}
     records = []
     for method in METHODS:
-        family = create(method.detector, TARGETS).family
+        family = FAMILIES[method.detector]
         if family not in renderings:
             renderings[family] = render(replace(scene, family=family))
         rendering = renderings[family]

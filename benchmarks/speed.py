@@ -25,11 +25,11 @@ from typing import Any
 import numpy as np
 
 import ahf_ros.blas  # noqa: F401  before numpy
-from ahf_ros.detectors import create
+from ahf_ros.detectors import create_detector
 from ahf_ros.filtering.genes import PUBLISHED, TuningSettings
 from ahf_ros.filtering.genetic import GeneticSettings, search
 from ahf_ros.filtering.homomorphic import FilterSettings, HomomorphicFilter
-from ahf_ros.filtering.identifier import AdaptiveIdentifier, identify
+from ahf_ros.session import create_identifier, identify
 from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import count_codes
 from benchmarks.filter import Recipe, machine
@@ -84,12 +84,12 @@ def candidates(image: np.ndarray, detector: Any, recipe: Recipe) -> tuple[float,
 
 def stream(image: np.ndarray, detector: Any, expected: int) -> tuple[float, float]:
     """Return the median time of an image of a stream, and of its filter and identification, s."""
-    identifier = AdaptiveIdentifier(detector)
-    state = identifier.identify(image, expected).filter
+    identifier = create_identifier(detector=detector, expected_targets=expected)
+    state = identifier.identify(image).filter
     times = []
     with ThreadPoolExecutor(os.cpu_count()) as executor:
         for _ in range(FRAMES):
-            whole, result = seconds(lambda: identifier.identify(image, expected))
+            whole, result = seconds(lambda: identifier.identify(image))
             assert result.filter.evaluations == 1
             parts, _ = seconds(
                 lambda: detector(
@@ -116,7 +116,7 @@ def main() -> None:
     options = parser.parse_args()
     scene = SceneSettings(light=options.light, ambient=options.ambient, seed=options.seed)
     image, expected = render(scene).image, scene.targets
-    detector, recipe = create('traditional'), Recipe(image.shape, FilterSettings())
+    detector, recipe = create_detector('traditional'), Recipe(image.shape, FilterSettings())
     theirs, ours = candidates(image, detector, recipe)
     facts = machine()
     print(
@@ -133,7 +133,8 @@ def main() -> None:
     duration, (count, evaluations) = seconds(lambda: published(recipe, image, detector, expected))
     other = f'published, traditional: {count} in {evaluations} identifications'
     for name in ('traditional', 'ring'):
-        times = [seconds(partial(identify, image, create(name), expected)) for _ in range(3)]
+        run = partial(identify, image, name, expected_targets=expected)
+        times = [seconds(run) for _ in range(3)]
         result = times[0][1]
         words = f'AHF, {name}: {result.count} in {result.filter.evaluations}'
         row(words, statistics.median(it[0] for it in times), other, duration)

@@ -19,12 +19,11 @@ from ahf_ros.bag.definitions import (
 )
 from ahf_ros.bag.journal import Entry, Output
 from ahf_ros.bag.source import Source
-from ahf_ros.detectors import DETECTOR, DetectorSettings, create
-from ahf_ros.detectors.ring.counting import estimator
+from ahf_ros.detectors import create_detector
 from ahf_ros.drawing import draw
-from ahf_ros.filtering.identifier import AdaptiveIdentifier, AdaptiveSettings
 from ahf_ros.interchange.image_messages import decode_compressed, decode_image
 from ahf_ros.interchange.target_messages import coded_target_array
+from ahf_ros.session import IdentificationSettings, create_identifier
 from ahf_ros.target import Identification
 
 DECODERS = {IMAGE: decode_image, COMPRESSED_IMAGE: decode_compressed}
@@ -61,36 +60,20 @@ class Answering:
         That the images come from.
     topics : mapping of str to AnswerTopics
         By the topic of the images.
-    expected : int
-        N, the number of coded targets in every image; 0 where unknown.
-    estimate_expected : bool
-        Whether to estimate N where it is unknown.
-    detector : str
-        Name of the detector.
-    detection : DetectorSettings
-    adaptive : AdaptiveSettings
+    settings : IdentificationSettings
     """
 
     def __init__(
         self,
         source: Source,
         topics: Mapping[str, AnswerTopics],
-        expected: int = 0,
-        estimate_expected: bool = False,
-        detector: str = DETECTOR.default,
-        detection: DetectorSettings | None = None,
-        adaptive: AdaptiveSettings | None = None,
+        settings: IdentificationSettings,
     ) -> None:
-        detection = detection or DetectorSettings()
-        made = create(detector, detection)
+        detector = create_detector(settings.detector, settings.detection)
         self._source = source
         self._topics = topics
-        self._expected = expected
-        self._family = made.family
-        estimate = estimator(made, detection) if estimate_expected else None
-        self._identifiers = {
-            topic: AdaptiveIdentifier(made, adaptive, estimate=estimate) for topic in topics
-        }
+        self._family = detector.family
+        self._identifiers = {topic: create_identifier(settings, detector) for topic in topics}
         self._store = typestore()
         self._types = message_types(self._store)
 
@@ -118,8 +101,8 @@ class Answering:
     def _messages(self, connection: Connection, data: bytes) -> list[Output]:
         received = self._source.deserialize(connection, data)
         image = DECODERS[connection.msgtype](received)
-        found = self._identifiers[connection.topic].identify(image, self._expected)
-        # Time is the one thing about it that would be another one in a second run.
+        found = self._identifiers[connection.topic].identify(image)
+        # Without the duration, runs are byte-identical.
         found = replace(found, filter=replace(found.filter, duration=0.0))
         header = self._header(received)
         message = coded_target_array(found, self._family, image.shape, header, self._types)

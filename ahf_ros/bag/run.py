@@ -25,8 +25,7 @@ from ahf_ros.bag.copying import Copy
 from ahf_ros.bag.definitions import typestore
 from ahf_ros.bag.journal import METADATA, VERSION, Entry, Journal, begin, custom_data, remove_parts
 from ahf_ros.bag.source import Source
-from ahf_ros.detectors import DETECTOR, DetectorSettings
-from ahf_ros.filtering.identifier import AdaptiveSettings
+from ahf_ros.session import IdentificationSettings
 
 STORAGES = {'mcap': StoragePlugin.MCAP, 'sqlite3': StoragePlugin.SQLITE3}
 
@@ -59,8 +58,7 @@ class BagTask:
         One of `STORAGES`.
     debug_images : bool
         Whether annotated images are written, as JPEG.
-    expected, estimate_expected, detector, detection, adaptive
-        As for `Answering`.
+    identification : IdentificationSettings
     """
 
     source: Path
@@ -69,11 +67,7 @@ class BagTask:
     output_topic: str = 'coded_targets'
     storage: str = 'mcap'
     debug_images: bool = False
-    expected: int = 0
-    estimate_expected: bool = False
-    detector: str = DETECTOR.default
-    detection: DetectorSettings = field(default_factory=DetectorSettings)
-    adaptive: AdaptiveSettings = field(default_factory=AdaptiveSettings)
+    identification: IdentificationSettings = field(default_factory=IdentificationSettings)
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,15 +206,7 @@ def _answer_images(
     report: Report,
 ) -> None:
     """Answer the images that are not answered yet."""
-    answering = Answering(
-        source,
-        topics,
-        task.expected,
-        task.estimate_expected,
-        task.detector,
-        task.detection,
-        task.adaptive,
-    )
+    answering = Answering(source, topics, task.identification)
     total = sum(item.msgcount for item in source.connections if item.topic in topics)
     earlier = list(journal.entries)
     for number, (connection, timestamp, data) in enumerate(source.messages(topics)):

@@ -16,9 +16,8 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from ahf_ros.cli.identify import IdentifySettings
 from ahf_ros.cli.options import add_option, add_options, settings_from
-from ahf_ros.detectors.ring.counting import ESTIMATE_EXPECTED
+from ahf_ros.session import IdentificationSettings
 from ahf_ros.settings.parameter import Parameter
 
 if TYPE_CHECKING:
@@ -69,8 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--debug-images', action='store_true', help='Write annotated images, too, as JPEG.'
     )
     add_option(parser, JOBS)
-    add_option(parser, ESTIMATE_EXPECTED)
-    add_options(parser, IdentifySettings)
+    add_options(parser, IdentificationSettings)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -110,7 +108,7 @@ def _tasks(options: argparse.Namespace) -> list[BagTask]:
             f'{error.name} is not installed, bags need it: pip install rosbags'
         ) from error
 
-    settings = settings_from(options, IdentifySettings)
+    settings = settings_from(options, IdentificationSettings)
     targets = [options.target]
     if len(options.bags) > 1:
         targets = [options.target / bag.stem for bag in options.bags]
@@ -124,11 +122,7 @@ def _tasks(options: argparse.Namespace) -> list[BagTask]:
             output_topic=options.output_topic,
             storage=options.storage,
             debug_images=options.debug_images,
-            expected=settings.expected,
-            estimate_expected=options.estimate_expected,
-            detector=settings.detector,
-            detection=settings.target,
-            adaptive=settings.adaptive,
+            identification=settings,
         )
         for source, target in zip(options.bags, targets, strict=True)
     ]

@@ -6,43 +6,21 @@ import argparse
 import json
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from rich.console import Console
 from rich.progress import Progress
 
-from ahf_ros.cli.options import add_option, add_options, settings_from
-from ahf_ros.detectors import DETECTOR, Detector, DetectorSettings, create
-from ahf_ros.detectors.ring.counting import ESTIMATE_EXPECTED, estimator
+from ahf_ros.cli.options import add_options, settings_from
+from ahf_ros.detectors import Detector, create_detector
 from ahf_ros.drawing import draw, summary
-from ahf_ros.filtering.identifier import AdaptiveSettings, Estimate, identify
 from ahf_ros.interchange.image_files import read_image, write_image
 from ahf_ros.interchange.target_json import to_json
-from ahf_ros.settings.parameter import check_parameters, parameter
+from ahf_ros.session import IdentificationSettings, identify
 from ahf_ros.target import Identification
 
 DESCRIPTION = 'Identify the coded targets in images.'
-
-
-@dataclass(frozen=True, slots=True)
-class IdentifySettings:
-    """What can be set: which identification, of how many targets, driven by which search."""
-
-    expected: int = parameter(
-        0,
-        'Coded targets that each image shows; 0: unknown, no filter is searched for unless their '
-        'number is estimated.',
-        minimum=0,
-    )
-    detector: str = parameter(DETECTOR.default, DETECTOR.description, choices=DETECTOR.choices)
-    target: DetectorSettings = field(default_factory=DetectorSettings)
-    adaptive: AdaptiveSettings = field(default_factory=AdaptiveSettings)
-
-    def __post_init__(self) -> None:
-        """Refuse values that are not accepted."""
-        check_parameters(self)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -57,8 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='DIR',
         help='Write each image with what was identified to this folder, as NAME_overlay.png.',
     )
-    add_option(parser, ESTIMATE_EXPECTED)
-    add_options(parser, IdentifySettings)
+    add_options(parser, IdentificationSettings)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -74,15 +51,14 @@ def run(options: argparse.Namespace) -> int:
     ValueError
         If options do not fit each other.
     """
-    settings = settings_from(options, IdentifySettings)
+    settings = settings_from(options, IdentificationSettings)
     overlays = _overlay_paths(options.images, options.overlay)
-    detector = create(settings.detector, settings.target)
-    estimate = estimator(detector, settings.target) if options.estimate_expected else None
+    detector = create_detector(settings.detector, settings.detection)
     failed = False
     for path in _with_progress(options.images):
         try:
             image = read_image(path)
-            found = _named(path, image, detector, settings, estimate)
+            found = _identified(path, image, detector, settings)
             if options.json:
                 names = detector.family, detector.name
                 print(json.dumps(to_json(found, path, image.shape, *names)), flush=True)
@@ -95,15 +71,11 @@ def run(options: argparse.Namespace) -> int:
     return int(failed)
 
 
-def _named(
-    path: str,
-    image: np.ndarray,
-    detector: Detector,
-    settings: IdentifySettings,
-    estimate: Estimate | None,
+def _identified(
+    path: str, image: np.ndarray, detector: Detector, settings: IdentificationSettings
 ) -> Identification:
     try:
-        return identify(image, detector, settings.expected, settings.adaptive, estimate=estimate)
+        return identify(image, detector, settings)
     except ValueError as error:
         raise ValueError(f'{path}: {error}') from error
 

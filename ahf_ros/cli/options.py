@@ -12,6 +12,7 @@ from ahf_ros.settings.parameter import Parameter
 Settings = TypeVar('Settings')
 
 _METAVARS = {int: 'N', float: 'X', str: 'TEXT'}
+_SHORT = {'expected_targets': '--expected'}
 
 
 def add_options(parser: argparse.ArgumentParser, settings: type) -> None:
@@ -45,7 +46,9 @@ def add_option(parser: argparse.ArgumentParser, item: Parameter, **changes: Any)
         arguments |= {'action': argparse.BooleanOptionalAction}
     else:
         arguments |= {'type': _converter(item), 'metavar': _METAVARS[type(item.default)]}
-    parser.add_argument(f'--{item.name.replace("_", "-")}', **(arguments | changes))
+    names = [_SHORT[item.name]] if item.name in _SHORT else []
+    names.append(f'--{item.name.replace("_", "-")}')
+    parser.add_argument(*names, dest=item.name, **(arguments | changes))
 
 
 def settings_from(options: argparse.Namespace, settings: type[Settings]) -> Settings:

@@ -6,20 +6,17 @@ from typing import Any
 
 import cv2
 
-APRILTAG_NAMES = ('16h5', '25h9', '36h10', '36h11')
-"""Dictionaries of AprilTag."""
-
 ARUCO_NAMES = (
-    *(f'{side}x{side}_{count}' for side in (4, 5, 6, 7) for count in (50, 100, 250, 1000)),
-    'original',
+    *(f'aruco_{side}x{side}_{count}' for side in (4, 5, 6, 7) for count in (50, 100, 250, 1000)),
+    'aruco_original',
 )
-"""Dictionaries of ArUco: cells a side, and number of markers."""
+"""Families of ArUco: cells along a side, and number of markers."""
 
-SQUARE_NAMES = (
-    *(f'aruco_{name}' for name in ARUCO_NAMES),
-    *(f'apriltag_{name}' for name in APRILTAG_NAMES),
-)
-"""Dictionaries by their names as families of targets."""
+APRILTAG_NAMES = ('apriltag_16h5', 'apriltag_25h9', 'apriltag_36h10', 'apriltag_36h11')
+"""Families of AprilTag."""
+
+SQUARE_NAMES = (*ARUCO_NAMES, *APRILTAG_NAMES)
+"""All families of square markers."""
 
 
 def dictionary(name: str) -> Any:
@@ -40,11 +37,11 @@ def dictionary(name: str) -> Any:
         If there is no such dictionary, or this OpenCV has none at all.
     """
     if name not in SQUARE_NAMES:
-        raise ValueError(f'dictionary is {name!r}, accepted is one of {", ".join(SQUARE_NAMES)}')
+        raise ValueError(f'family is {name!r}, accepted is one of {", ".join(SQUARE_NAMES)}')
     if not hasattr(cv2, 'aruco') or not hasattr(cv2.aruco, 'ArucoDetector'):
         raise ValueError(
-            f'dictionary is {name!r}, accepted where OpenCV has square markers: '
-            f'opencv-python-headless of at least 4.7, this is {cv2.__version__}'
+            f'family is {name!r}, accepted with opencv-python-headless of at least 4.7, which has '
+            f'square markers; this is OpenCV {cv2.__version__}'
         )
     kind, _, wanted = name.partition('_')
     member = {'aruco': 'DICT_', 'apriltag': 'DICT_APRILTAG_'}[kind] + wanted

@@ -1,75 +1,177 @@
-"""Detectors, and the registry that makes one from its name.
+"""Detectors, and the registry that makes one from a name or from a family of targets.
 
-A detector is one file here, with a class made from `DetectorSettings`, and one line below. Other
-packages add theirs by entry points of the group `ahf_ros.detectors`: the name of a detector, and a
-callable that makes it from `DetectorSettings`.
+A family of targets is one folder here and one line below. Other packages add detectors by entry
+points of the group `ahf_ros.detectors`: the name of a detector, and a callable that makes it from
+`DetectorSettings`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
+from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
+from typing import Any
 
-from ahf_ros.detectors.contract import Detector, DetectorSettings
+import numpy as np
+
+from ahf_ros.codes.families import FAMILY_NAMES, KINDS
+from ahf_ros.detectors.contract import Detector, DetectorSettings, Drafter, Refiner
 from ahf_ros.detectors.external.command import CommandDetector
-from ahf_ros.detectors.external.guarded import GuardedDetector
+from ahf_ros.detectors.external.guarded import guarded
+from ahf_ros.detectors.ring.counting import estimate_count
 from ahf_ros.detectors.ring.detector import RingDetector
 from ahf_ros.detectors.ring.traditional import TraditionalDetector
 from ahf_ros.detectors.square.detector import SquareDetector
+from ahf_ros.settings.nested import updated
 from ahf_ros.settings.parameter import Parameter
 
-__all__ = ['DETECTOR', 'DETECTOR_NAMES', 'GROUP', 'Detector', 'DetectorSettings', 'create']
+__all__ = [
+    'AUTO',
+    'DETECTOR',
+    'DETECTOR_NAMES',
+    'FAMILY_NAMES',
+    'GROUP',
+    'Detector',
+    'DetectorSettings',
+    'Drafter',
+    'Refiner',
+    'create_detector',
+    'detector_name',
+    'estimator',
+]
 
 GROUP = 'ahf_ros.detectors'
 """Group of the entry points by which other packages add detectors."""
 
-_DETECTORS: dict[str, Callable[[DetectorSettings], Detector]] = {
-    'ring': RingDetector,
-    'traditional': TraditionalDetector,
-    'aruco': partial(SquareDetector, 'aruco'),
-    'apriltag': partial(SquareDetector, 'apriltag'),
-    'command': CommandDetector,
+AUTO = 'auto'
+"""Stands for the detector of the family."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Entry:
+    """A detector, its families, and how their targets are counted without being decoded."""
+
+    create: Callable[[DetectorSettings], Detector]
+    families: tuple[str, ...]
+    estimate: Callable[[np.ndarray, DetectorSettings], int] | None = None
+
+
+# The detector of a family is the first one that lists it.
+_ENTRIES = {
+    'ring': _Entry(RingDetector, KINDS['ring'], estimate_count),
+    'traditional': _Entry(TraditionalDetector, KINDS['ring']),
+    'aruco': _Entry(SquareDetector, KINDS['aruco']),
+    'apriltag': _Entry(SquareDetector, KINDS['apriltag']),
+    'command': _Entry(CommandDetector, FAMILY_NAMES),
 }
 
 _ADDED: dict[str, EntryPoint] = {
-    point.name: point for point in entry_points(group=GROUP) if point.name not in _DETECTORS
+    point.name: point for point in entry_points(group=GROUP) if point.name not in (AUTO, *_ENTRIES)
 }
 
-DETECTOR_NAMES = (*_DETECTORS, *sorted(_ADDED))
-"""The accepted names of detectors, those of this package first."""
+DETECTOR_NAMES = (*_ENTRIES, *sorted(_ADDED))
+"""The names of all detectors, those of this package first."""
 
-DETECTOR = Parameter('detector', 'ring', 'How targets are identified.', choices=DETECTOR_NAMES)
-"""The choice of a detector as a parameter, for the node and the command line."""
+DETECTOR = Parameter(
+    'detector',
+    AUTO,
+    'How targets are identified; auto is the detector of the family.',
+    choices=(AUTO, *DETECTOR_NAMES),
+)
+"""The choice of a detector."""
 
 
-def create(name: str, settings: DetectorSettings | None = None) -> Detector:
-    """Return the detector called `name`.
+def create_detector(
+    name: str = AUTO, settings: DetectorSettings | None = None, **values: Any
+) -> Detector:
+    """Return a detector.
 
     Parameters
     ----------
     name : str
-        One of `DETECTOR_NAMES`.
+        One of `DETECTOR_NAMES`, or 'auto' for the detector of the family.
     settings : DetectorSettings, optional
         What the targets look like; the defaults where None.
+    **values
+        Fields of `DetectorSettings` that differ from `settings`.
 
     Raises
     ------
     ValueError
-        If there is no such detector, naming those that there are; if that of another package
-        cannot be loaded; or if the detector does not accept the settings.
+        If there is no such detector, if it does not identify the family or does not accept other
+        settings, or if it comes from another package that cannot be imported.
+
+    Examples
+    --------
+    >>> create_detector('traditional', family='aicon14').family
+    'aicon14'
+    >>> create_detector(family='apriltag_36h11').name
+    'apriltag'
+    """
+    settings = updated(settings or DetectorSettings(), values)
+    name = detector_name(name, settings.family)
+    if name in _ENTRIES:
+        return _ENTRIES[name].create(settings)
+    return guarded(_loaded(_ADDED[name])(settings), settings.detector_timeout)
+
+
+def detector_name(name: str, family: str) -> str:
+    """Return the name of a detector that identifies a family.
+
+    Parameters
+    ----------
+    name : str
+        One of `DETECTOR_NAMES`, or 'auto' for the detector of the family.
+    family : str
+        One of `FAMILY_NAMES`.
+
+    Raises
+    ------
+    ValueError
+        If there is no such detector, or it does not identify the family.
     """
     DETECTOR.check(name)
-    settings = settings or DetectorSettings()
-    if name in _DETECTORS:
-        return _DETECTORS[name](settings)
-    return GuardedDetector(_loaded(_ADDED[name])(settings), settings.detector_timeout)
+    fitting = [of for of, entry in _ENTRIES.items() if family in entry.families]
+    if name == AUTO:
+        return fitting[0]
+    if name in _ENTRIES and name not in fitting:
+        raise ValueError(
+            f'detector is {name!r} and family is {family!r}; accepted with this family is one of '
+            f'{", ".join((AUTO, *fitting, *_ADDED))}, and with this detector one of '
+            f'{", ".join(_ENTRIES[name].families)}'
+        )
+    return name
+
+
+def estimator(settings: DetectorSettings) -> Callable[[np.ndarray], int]:
+    """Return the function that estimates how many targets of a family an image shows.
+
+    Parameters
+    ----------
+    settings : DetectorSettings
+        What the targets look like.
+
+    Raises
+    ------
+    ValueError
+        If targets of this family cannot be counted.
+    """
+    count = _ENTRIES[detector_name(AUTO, settings.family)].estimate
+    if count is None:
+        counted = [
+            name for entry in _ENTRIES.values() if entry.estimate for name in entry.families
+        ]
+        raise ValueError(
+            f'estimate_expected is True and family is {settings.family!r}; accepted with this '
+            f'family is False, and True with one of {", ".join(counted)}'
+        )
+    return lambda image: count(image, settings)
 
 
 def _loaded(point: EntryPoint) -> Callable[[DetectorSettings], Detector]:
     try:
         made: Callable[[DetectorSettings], Detector] = point.load()
-    except Exception as error:  # whatever the other package does when it is imported
+    except Exception as error:  # whatever the other package raises when it is imported
         raise ValueError(
             f'detector is {point.name!r}, but {point.value} cannot be loaded: '
             f'{type(error).__name__}: {error}'

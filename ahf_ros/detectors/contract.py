@@ -1,14 +1,14 @@
-"""What a detector is, and the settings that every detector of ours understands."""
+"""What a detector is, and the settings that detectors share."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Protocol
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from ahf_ros.codes.ring import FAMILY_NAMES
-from ahf_ros.codes.square import APRILTAG_NAMES, ARUCO_NAMES
+from ahf_ros.codes.families import FAMILY_NAMES
 from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.target import Target
 
@@ -16,27 +16,23 @@ POLARITIES = ('auto', 'dark', 'bright')
 """Colour of the dot against its surroundings; 'auto' accepts both in one image."""
 
 
+@runtime_checkable
 class Detector(Protocol):
-    """A callable with a name: grayscale image in, targets out. It is the whole contract.
+    """A callable with a name: grayscale image in, targets out.
 
-    A detector keeps nothing between calls, may be called from several threads at once and gives
-    the same targets for the same image. Nothing but the image given is its input, so a filtered
-    image is as good as one that a camera took.
-
-    A detector may also have a method `refine(image, targets)`. It is given the image as received
-    and what the detector found in a filtered version of it, and returns the same targets with the
-    places that the image as received gives them. With that it may have a method `draft(image)`: as
-    a call, but fast, with centres that `refine` can start from. AHF tries filters with it.
+    A detector keeps nothing between calls, may be called from several threads at once and returns
+    the same targets for the same image. The image is its only input, so a filtered image is as
+    good as one taken by a camera. A detector may also be a `Refiner`, and a `Drafter` with it.
     """
 
     @property
     def name(self) -> str:
-        """Name in the registry, and in results."""
+        """Name in the registry and in results."""
         ...
 
     @property
     def family(self) -> str:
-        """Family of the targets that it identifies, in results."""
+        """Family of the targets that it identifies, as in results."""
         ...
 
     def __call__(self, image: np.ndarray) -> list[Target]:
@@ -60,45 +56,38 @@ class Detector(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True)
-class SquareSettings:
-    """Which square markers the detectors `aruco` and `apriltag` look for.
+@runtime_checkable
+class Refiner(Protocol):
+    """A detector that measures centres in the image as received, wherever it found the targets."""
 
-    Attributes
-    ----------
-    aruco_dictionary, apriltag_dictionary : str
-        Names of `ahf_ros.codes.square`.
+    def refine(self, image: np.ndarray, targets: Sequence[Target]) -> Sequence[Target]:
+        """Return targets with the centres that an image gives them.
+
+        Parameters
+        ----------
+        image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
+            The image as received.
+        targets : sequence of Target
+            Found by this detector in a filtered version of `image`.
+
+        Returns
+        -------
+        sequence of Target
+            The same targets.
+        """
+        ...
+
+
+@runtime_checkable
+class Drafter(Protocol):
+    """A `Refiner` that also identifies faster, with centres good enough for `refine`.
+
+    AHF tries its filters with drafts.
     """
 
-    aruco_dictionary: str = parameter(
-        '4x4_50', 'Dictionary of the detector aruco.', choices=ARUCO_NAMES
-    )
-    apriltag_dictionary: str = parameter(
-        '36h11', 'Dictionary of the detector apriltag.', choices=APRILTAG_NAMES
-    )
-
-    def __post_init__(self) -> None:
-        """Refuse values that are not accepted."""
-        check_parameters(self)
-
-
-@dataclass(frozen=True, slots=True)
-class ProgramSettings:
-    """Which program the detector `command` runs.
-
-    Attributes
-    ----------
-    command : str
-        Program and arguments, as for a shell, which is not used.
-    """
-
-    command: str = parameter(
-        '', 'Program of the detector command, with arguments; {image} is the path of a PNG file.'
-    )
-
-    def __post_init__(self) -> None:
-        """Refuse values that are not accepted."""
-        check_parameters(self)
+    def draft(self, image: np.ndarray) -> list[Target]:
+        """Identify the targets of one image, as a call does but with rough centres."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,44 +97,43 @@ class DetectorSettings:
     Attributes
     ----------
     family : str
-        Name of a family of `ahf_ros.codes.ring`.
+        One of `ahf_ros.codes.families.FAMILY_NAMES`.
     polarity : str
         One of `POLARITIES`.
     min_radius, max_radius : float
         Bounds of the semi-major axis of the dot, px.
     report_undecoded : bool
         Whether targets whose code word is not certain are reported, with the ID `UNDECODED`.
+    command : str
+        Program and arguments of the detector `command`, quoted as for a shell; no shell runs.
     detector_timeout : float
-        Time that a detector from elsewhere has for an image, s.
-    square : SquareSettings
-        Of detectors of square markers.
-    program : ProgramSettings
-        Of the detector that is another program.
+        Time limit for one image of a detector that is not part of this package, s.
     """
 
-    family: str = parameter('metashape12', 'Family of the coded targets.', choices=FAMILY_NAMES)
+    family: str = parameter(
+        'metashape12',
+        'Family of the coded targets. It also chooses the detector where that is auto.',
+        choices=FAMILY_NAMES,
+    )
     polarity: str = parameter(
         'auto', 'Colour of the dot: dark on bright, bright on dark, or either.', choices=POLARITIES
     )
-    min_radius: float = parameter(4.0, 'Smallest radius of a dot, px.', minimum=1.0, maximum=1e4)
-    max_radius: float = parameter(60.0, 'Largest radius of a dot, px.', minimum=1.0, maximum=1e4)
+    min_radius: float = parameter(4.0, 'Minimum radius of a dot, px.', minimum=1.0, maximum=1e4)
+    max_radius: float = parameter(60.0, 'Maximum radius of a dot, px.', minimum=1.0, maximum=1e4)
     report_undecoded: bool = parameter(
         False, 'Whether to report targets whose code word is not certain, with the ID -1.'
     )
+    command: str = parameter(
+        '',
+        'Program and arguments of the detector command; {image} is the path of a PNG file.',
+    )
     detector_timeout: float = parameter(
         60.0,
-        'Longest time for one image of a detector that is a command, a service or of another '
+        'Time limit for one image of a detector that is a command, a service or part of another '
         'package, s.',
         minimum=0.01,
         maximum=86400.0,
     )
-    square: SquareSettings = field(default_factory=SquareSettings)
-    program: ProgramSettings = field(default_factory=ProgramSettings)
-
-    @property
-    def signs(self) -> tuple[int, ...]:
-        """1 where dots may be dark, -1 where they may be bright."""
-        return {'auto': (1, -1), 'dark': (1,), 'bright': (-1,)}[self.polarity]
 
     def __post_init__(self) -> None:
         """Refuse values that are not accepted."""
@@ -155,3 +143,8 @@ class DetectorSettings:
                 f'min_radius is {self.min_radius!r}, accepted is a number of at most max_radius, '
                 f'{self.max_radius!r}'
             )
+
+    @property
+    def signs(self) -> tuple[int, ...]:
+        """1 where dots may be dark, -1 where they may be bright."""
+        return {'auto': (1, -1), 'dark': (1,), 'bright': (-1,)}[self.polarity]

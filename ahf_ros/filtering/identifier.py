@@ -1,8 +1,8 @@
 """Adaptive homomorphic filtering: the identification chooses the filter of its image [1]_.
 
-The image as received is identified first. Where it does not show the N targets that are expected,
-a genetic search looks for the filter through which the detector finds n with the smallest |N - n|.
-It works with any detector, of which it knows nothing but how it is called.
+The image as received is identified first. If it does not show the N targets that are expected, a
+genetic search looks for the filter through which the detector finds n with the smallest |N - n|.
+It works with any detector: it knows nothing about a detector but how to call it.
 
 References
 ----------
@@ -16,115 +16,37 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import nullcontext
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
+from functools import partial
 from numbers import Integral
 from typing import Any
 
 import numpy as np
 
 from ahf_ros.filtering.fusion import fused
-from ahf_ros.filtering.genes import TuningSettings, tuned
-from ahf_ros.filtering.genetic import GeneticSettings, SearchResult, Values, search
-from ahf_ros.filtering.homomorphic import FilterSettings
-from ahf_ros.filtering.trials import AnyDetector, Trials, checked_targets, confirmed
+from ahf_ros.filtering.genes import tuned
+from ahf_ros.filtering.genetic import SearchResult, Values, search
+from ahf_ros.filtering.settings import AdaptiveSettings
+from ahf_ros.filtering.trials import DetectorFunction, Trials, checked_targets, confirmed
 from ahf_ros.imaging.image import check_image
-from ahf_ros.settings.parameter import check_parameters, numbers_in, parameter
 from ahf_ros.target import FilterState, Identification, Target, count_codes
 
 Refinement = Callable[[np.ndarray, Sequence[Target]], Sequence[Target]]
 """From the image as received and targets found in a filtered one to the same targets, with centres
-taken from the image as received."""
+measured in the image as received."""
 
 Estimate = Callable[[np.ndarray], int]
 """From the image as received to the number of coded targets that it seems to show."""
 
 
 @dataclass(frozen=True, slots=True)
-class AdaptiveSettings:
-    """Whether and where a filter is searched for, and how.
-
-    The default of `max_evaluations` bounds what an image costs where no filter shows all N
-    targets. With the extended genes, 50 filters find what 100 of the published search do
-    (`benchmarks/strategies.py`).
-    """
-
-    ahf: bool = parameter(
-        True, 'Whether to search for a filter where the image as received does not show N targets.'
-    )
-    expected_ids: str = parameter(
-        '',
-        'IDs of the coded targets in every image, as 1-54, 60; their number is N, and other IDs '
-        'are wrong.',
-    )
-    fusion: bool = parameter(
-        False,
-        'Whether targets count that other filters than the best one show, after a search in vain.',
-    )
-    coarse: bool = parameter(
-        False,
-        'Whether to search on the image at half its size, and to confirm the best few filters at '
-        'full size.',
-    )
-    threads: int = parameter(
-        0,
-        'Filters tried at the same time, 0: one a processor core. The result is the same.',
-        minimum=0,
-        maximum=256,
-    )
-    tuning: TuningSettings = field(default_factory=TuningSettings)
-    filter: FilterSettings = field(default_factory=FilterSettings)
-    genetic: GeneticSettings = field(default_factory=GeneticSettings)
-
-    def __post_init__(self) -> None:
-        """Check every parameter."""
-        check_parameters(self)
-        numbers_in('expected_ids', self.expected_ids)
-
-    @property
-    def listed(self) -> frozenset[int]:
-        """The IDs that images may show; empty where any may be."""
-        return numbers_in('expected_ids', self.expected_ids)
-
-
-def identify(
-    image: np.ndarray,
-    detector: AnyDetector,
-    expected: int,
-    settings: AdaptiveSettings | None = None,
-    refine: Refinement | None = None,
-    estimate: Estimate | None = None,
-    draft: AnyDetector | None = None,
-) -> Identification:
-    """Identify the targets of one image through the filter that suits the detector.
-
-    Parameters
-    ----------
-    image, expected
-        As for `AdaptiveIdentifier.identify`.
-    detector, settings, refine, estimate, draft
-        As for `AdaptiveIdentifier`.
-
-    Returns
-    -------
-    Identification
-
-    Raises
-    ------
-    ValueError
-        As `AdaptiveIdentifier.identify` does.
-    """
-    identifier = AdaptiveIdentifier(detector, settings, refine, estimate, draft)
-    return identifier.identify(image, expected)
-
-
-@dataclass(frozen=True, slots=True)
 class Memory:
-    """What lives from one image to the next.
+    """What an identification leaves to that of the next image.
 
     Attributes
     ----------
     filter : tuple of float or None
-        The filter that the next image is begun with; None for none.
+        The filter to try first; None for none.
     settled : tuple of 2 int or None
         n and N of the last image; None unless N was estimated.
     """
@@ -133,165 +55,192 @@ class Memory:
     settled: tuple[int, int] | None = None
 
 
-class AdaptiveIdentifier:
-    """Identifies one image after the other and begins each with the filter that worked last.
+@dataclass(frozen=True, slots=True)
+class _Choice:
+    """The filter chosen for an image, None for the image as received, and how it was found."""
+
+    expected: int
+    filter: Values | None
+    remembered: Values | None  # for the next image
+    evaluations: int
+    tried: tuple[Values, ...] = ()
+    search: SearchResult | None = None
+
+
+class Identifier:
+    """Identifies one image after the other, each beginning with the filter that worked last.
 
     Results depend on the images since the last `reset` and, with `max_duration`, on the machine.
+    `ahf_ros.create_identifier` makes one from settings.
 
     Parameters
     ----------
     detector : callable
         From an 8-bit image to the targets in it. Targets with the same ID count once and are all
-        passed on; what it raises, `identify` raises.
+        passed on.
     settings : AdaptiveSettings, optional
-        The limits of the search and the number of threads.
+        Limits of the search and number of threads; the defaults where None.
+    expected_targets : int
+        N where `identify` is not given another one; 0 where unknown.
     refine : callable, optional
-        From the image as received and the targets to the same targets with better centres; the
-        method `refine` of the detector where None, if it has one. It is asked where the targets
-        were found in another image: through a filter, or in the 8-bit version of an image with
-        more bits.
-    estimate : callable, optional
-        From the image as received to N, asked where N is unknown. Not for every image: while the
-        filter that worked last, or none, goes on to show the n codes of the image before, the
-        light and the targets are taken to be the same, and so is N; no filter is searched for,
-        either. What it raises, `identify` raises.
+        From the image as received and the targets to the same targets with better centres. Called
+        if the targets were found in another image: through a filter, or in the 8-bit version of an
+        image with more bits.
     draft : callable, optional
-        The detector with centres good enough for `refine`, in less time; the method `draft` of
-        the detector where None, if it has one. It is asked instead of the detector wherever
-        `refine` is asked next.
+        The detector with centres good enough for `refine`, in less time. It replaces the detector
+        wherever `refine` is called next.
+    estimate : callable, optional
+        From the image as received to N, called where N is unknown. On a stream, N is estimated
+        again when n changes: while the filter that worked last, or none, still shows the n codes
+        of the image before, light and targets are taken to be the same and no filter is searched
+        for.
+    interrupt : callable, optional
+        Called before each identification; what it raises ends `identify`.
     clock : callable, optional
         Time in s.
 
     Attributes
     ----------
     last_search : SearchResult or None
-        The search for the last image; None where there was none.
+        The search for the last image; None if there was none.
     memory : Memory
-        What earlier images leave to the next one; set it to go on where another left off.
+        What earlier images leave to the next one; set it to continue from another identifier.
+
+    Examples
+    --------
+    >>> from ahf_ros import Identifier, SceneSettings, create_detector, render
+    >>> rendering = render(SceneSettings(width=320, height=240, targets=3, dot_radius=8))
+    >>> Identifier(create_detector('ring')).identify(rendering.image, 3).count
+    3
     """
 
     def __init__(
         self,
-        detector: AnyDetector,
+        detector: DetectorFunction,
         settings: AdaptiveSettings | None = None,
+        *,
+        expected_targets: int = 0,
         refine: Refinement | None = None,
+        draft: DetectorFunction | None = None,
         estimate: Estimate | None = None,
-        draft: AnyDetector | None = None,
+        interrupt: Callable[[], None] | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.last_search: SearchResult | None = None
-        self._detector = detector
+        self.memory = Memory()
+        # Without a refinement, centres are those of the detector.
+        draft = draft if draft and refine else detector
+        self._detector = _interruptible(detector, interrupt)
+        self._draft = _interruptible(draft, interrupt)
         self._settings = settings or AdaptiveSettings()
-        self._refine = refine or getattr(detector, 'refine', None)
-        self._draft = draft or getattr(detector, 'draft', None)
+        self._expected_targets = expected_targets
+        self._refine = refine
         self._estimate = estimate
         self._clock = clock
-        self.memory = Memory()
 
     def reset(self) -> None:
         """Forget what worked for earlier images."""
         self.memory = Memory()
 
-    def identify(self, image: np.ndarray, expected: int) -> Identification:
+    def identify(self, image: np.ndarray, expected_targets: int | None = None) -> Identification:
         """Identify the targets of one image; call it from one thread at a time.
 
         Parameters
         ----------
         image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
             The image as received.
-        expected : int
-            N, the number of coded targets that it shows; 0 where unknown: N is then estimated, or
-            no filter tried where nothing estimates it. Codes that the detector shows at once are
-            targets: no estimate is below their number. Where the settings list the IDs, N is
-            their number, whatever is given here; a target with another ID is left out, and counts
-            as much against a filter as one that it misses.
+        expected_targets : int, optional
+            N, the number of coded targets in this image; that of the identifier where None. Where
+            it is 0, N is estimated; without an estimate, no filter is tried. An estimate is never
+            below n of the image as received. Where the settings list the IDs, N is their number
+            in any case; a target with another ID is left out, and counts against a filter as much
+            as a missing one.
 
         Returns
         -------
         Identification
-            The result with the smallest |N - n|, of equally good ones that of the image as
-            received, then the first; with `fusion`, and after a search, what it and the other
-            filters show together, see `ahf_ros.filtering.fusion`. The evaluations of its filter
+            The result with the smallest |N - n|; of equally good ones that of the image as
+            received, then the first. With `fusion`, and after a search, what this filter and the
+            others show together, see `ahf_ros.filtering.fusion`. The evaluations of its filter
             state are the identifications that led to it; threads may have begun others when the
             right one was found.
 
         Raises
         ------
         ValueError
-            If the image is not accepted, `expected` is not an integer of at least 0, or the
-            detector or the refinement returns anything but a list of targets at finite places, or
-            the estimate is no integer of at least 0.
+            If the image is not accepted, N is not an integer of at least 0, the detector or the
+            refinement does not return a list of targets with finite coordinates, or the estimate
+            is not an integer of at least 0.
+        Exception
+            Whatever the detector, the refinement or the estimate raises.
         """
         started = self._clock()
         check_image(image)
-        _check_count('expected', expected)
-        listed = self._settings.listed
-        expected = len(listed) or expected
-        estimate = None if expected else self._estimate
-        # Without a refinement, centres are those of the detector.
-        draft = (self._refine and self._draft) or self._detector
-        trials = Trials(image, self._detector, draft, expected, listed, self._settings.filter)
-        tried: tuple[Values, ...] = ()
-        threads = self._settings.threads or os.cpu_count() or 1
+        given = self._expected_targets if expected_targets is None else expected_targets
+        _check_count('expected_targets', given)
+        settings = self._settings
+        expected = len(settings.listed) or given
+        estimating = not expected and self._estimate is not None
+        trials = Trials(image, self._detector, self._draft, settings.listed, settings.filter)
+        threads = settings.threads or os.cpu_count() or 1
         with ThreadPoolExecutor(threads) if threads > 1 else nullcontext() as executor:
-            if estimate and self._unchanged(trials, estimate, executor):
-                chosen, evaluations = self.memory.filter, 1
+            if estimating:
+                choice = self._steady(trials, executor) or self._choose(
+                    trials, self._estimated(trials, executor), executor
+                )
             else:
-                chosen, evaluations, tried = self._choose(trials, executor)
-        targets = trials.targets[chosen]
-        others = tried if self._settings.fusion else ()
-        if others:
-            targets = fused(trials.of([chosen, None, *others]))
-        settled = (count_codes(targets), trials.expected) if estimate else None
-        self.memory = replace(self.memory, settled=settled)
-        if self._refine and (chosen or others or image.dtype != np.uint8):
+                choice = self._choose(trials, expected, executor)
+        targets = trials.targets[choice.filter]
+        fusing = settings.fusion and choice.tried
+        if fusing:
+            targets = fused(trials.of([choice.filter, None, *choice.tried]))
+        self.last_search = choice.search
+        settled = (count_codes(targets), choice.expected) if estimating else None
+        self.memory = Memory(choice.remembered, settled)
+        if self._refine and (choice.filter or fusing or image.dtype != np.uint8):
             targets = checked_targets(self._refine(image, targets), 'refine')
         state = FilterState(
-            evaluations=evaluations,
-            generations=self.last_search.generations if self.last_search else 0,
+            evaluations=choice.evaluations,
+            generations=choice.search.generations if choice.search else 0,
             duration=self._clock() - started,
         )
-        if chosen:
-            state = replace(state, applied=True, **asdict(tuned(image.shape, chosen)))
+        if choice.filter:
+            state = replace(state, applied=True, **asdict(tuned(image.shape, choice.filter)))
         ordered = tuple(sorted(targets, key=lambda target: target.id))
-        return Identification(ordered, trials.expected, state, estimate is not None)
+        return Identification(ordered, choice.expected, state, estimating)
 
-    def _unchanged(self, trials: Trials, estimate: Estimate, executor: Executor | None) -> bool:
-        """Return whether an image shows what the last one did; tell the trials what N is."""
-        self.last_search = None
+    def _steady(self, trials: Trials, executor: Executor | None) -> _Choice | None:
+        """Return the filter and N of the image before if it still shows the same n."""
+        remembered, settled = self.memory.filter, self.memory.settled
+        if settled and 0 < settled[0] == trials.count(remembered, executor):
+            return _Choice(settled[1], remembered, remembered, 1)
+        return None
+
+    def _estimated(self, trials: Trials, executor: Executor | None) -> int:
+        """Return the estimate of N, which is at least n through the filter that worked last."""
+        assert self._estimate is not None
         shown = trials.count(self.memory.filter, executor)
-        settled = self.memory.settled
-        if shown and settled and settled[0] == shown:
-            trials.expected = settled[1]
-            return True
-        estimated = estimate(trials.image)
+        estimated = self._estimate(trials.image)
         _check_count('estimate', estimated)
-        trials.expected = max(int(estimated), shown)
-        return False
+        return max(int(estimated), shown)
 
-    def _choose(
-        self, trials: Trials, executor: Executor | None
-    ) -> tuple[Values | None, int, tuple[Values, ...]]:
-        """Return the best filter, the evaluations, and the filters that a search tried.
-
-        None is the image as received.
-        """
-        self.last_search = None
-        remembered = self.memory.filter
-        searching = self._settings.ahf and trials.expected > 0
-        if searching and remembered and trials.discrepancy(remembered, executor) == 0:
-            return remembered, len(trials.targets), ()
-        unfiltered = trials.discrepancy(None, executor)
+    def _choose(self, trials: Trials, expected: int, executor: Executor | None) -> _Choice:
+        """Return the filter with the smallest |N - n|."""
+        settings, remembered = self._settings, self.memory.filter
+        discrepancy = partial(trials.discrepancy, expected)
+        searching = settings.ahf and expected > 0
+        if searching and remembered and discrepancy(remembered, executor) == 0:
+            return _Choice(expected, remembered, remembered, len(trials.targets))
+        unfiltered = discrepancy(None, executor)
         if not searching or unfiltered == 0:
-            self.memory = replace(self.memory, filter=None if searching else remembered)
-            return None, len(trials.targets), ()
-        genetic = self._settings.genetic
-        searched = trials.reduced() if self._settings.coarse else trials
-        self.last_search = result = search(
-            searched.discrepancy,
-            self._settings.tuning.genes,
-            genetic,
-            np.random.default_rng(genetic.seed),
+            kept = None if searching else remembered
+            return _Choice(expected, None, kept, len(trials.targets))
+        searched = trials.reduced() if settings.coarse else trials
+        result = search(
+            partial(searched.discrepancy, expected),
+            settings.tuning.genes,
+            settings.genetic,
+            np.random.default_rng(settings.genetic.seed),
             initial=[remembered] if remembered else [],
             executor=executor,
             clock=self._clock,
@@ -299,12 +248,25 @@ class AdaptiveIdentifier:
         evaluations = 1 + result.evaluations
         tried = result.tried
         if searched is not trials:
-            tried = confirmed(tried, searched, trials, executor)
+            tried = confirmed(expected, tried, searched, trials, executor)
             evaluations += len(tried)
-        best = min(tried, key=trials.discrepancy)
-        chosen = best if trials.discrepancy(best) < unfiltered else None
-        self.memory = replace(self.memory, filter=chosen)
-        return chosen, evaluations, tried
+        best = min(tried, key=discrepancy)
+        best_or_none = best if discrepancy(best) < unfiltered else None
+        return _Choice(expected, best_or_none, best_or_none, evaluations, tried, result)
+
+
+def _interruptible(
+    detector: DetectorFunction, interrupt: Callable[[], None] | None
+) -> DetectorFunction:
+    """Return a detector that calls `interrupt` first."""
+    if interrupt is None:
+        return detector
+
+    def detect(image: np.ndarray) -> list[Target]:
+        interrupt()
+        return detector(image)
+
+    return detect
 
 
 def _check_count(name: str, count: Any) -> None:

@@ -1,10 +1,11 @@
-"""One image, identified through one filter after the other and through none twice."""
+"""One image identified through many filters, through each of them once."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
+from functools import partial
 from threading import Lock
 from typing import Any
 
@@ -16,13 +17,12 @@ from ahf_ros.filtering.genes import tuned
 from ahf_ros.filtering.homomorphic import FilterSettings, HomomorphicFilter
 from ahf_ros.target import UNDECODED, Target, count_codes
 
-AnyDetector = Callable[[np.ndarray], list[Target]]
+DetectorFunction = Callable[[np.ndarray], list[Target]]
 """From an 8-bit image, shape (height, width), to the targets in it. Called from several threads at
 once where several filters are tried at a time."""
 
-
 CONFIRMED = 5
-"""Filters of a reduced image that are tried on the whole one."""
+"""Number of filters of a reduced image that are tried on the whole one."""
 
 
 class Trials:
@@ -36,33 +36,29 @@ class Trials:
         For the image as received.
     draft : callable
         For images made from it.
-    expected : int
-        N; it may be set later.
     listed : frozenset of int
-        The IDs that the image may show; empty where any may be.
+        The IDs that the image may show; empty if it may show any.
     settings : FilterSettings
 
     Attributes
     ----------
-    image, expected
+    image
         As given.
     targets : dict
-        From the gains of a filter to its targets; None stands for the image as received.
+        From the values of a filter to its targets; None stands for the image as received.
     """
 
     def __init__(
         self,
         image: np.ndarray,
-        detector: AnyDetector,
-        draft: AnyDetector,
-        expected: int,
+        detector: DetectorFunction,
+        draft: DetectorFunction,
         listed: frozenset[int],
         settings: FilterSettings,
     ) -> None:
         self.image = image
-        self.expected = expected
         self._listed = listed
-        self._strangers: dict[Values | None, int] = {}
+        self._unexpected: dict[Values | None, int] = {}
         self.targets: dict[Values | None, list[Target]] = {}
         self._detector = detector
         self._draft = draft
@@ -70,10 +66,12 @@ class Trials:
         self._lock = Lock()
         self._prepared: HomomorphicFilter | None = None
 
-    def discrepancy(self, values: Values | None, executor: Executor | None = None) -> int:
-        """Return |N - n| through a filter; None is the image as received."""
-        missing = abs(self.expected - self.count(values, executor))
-        return missing + self._strangers[values]
+    def discrepancy(
+        self, expected: int, values: Values | None, executor: Executor | None = None
+    ) -> int:
+        """Return |N - n| through a filter, and one more for each unexpected ID."""
+        difference = abs(expected - self.count(values, executor))
+        return difference + self._unexpected[values]
 
     def count(self, values: Values | None, executor: Executor | None = None) -> int:
         """Return n through a filter."""
@@ -84,7 +82,7 @@ class Trials:
                 for target in found
                 if not self._listed or target.id == UNDECODED or target.id in self._listed
             ]
-            self._strangers[values] = count_codes(found) - count_codes(known)
+            self._unexpected[values] = count_codes(found) - count_codes(known)
             self.targets[values] = known
         return count_codes(self.targets[values])
 
@@ -93,10 +91,10 @@ class Trials:
         height, width = self.image.shape
         size = (max(width // 2, 1), max(height // 2, 1))
         image = cv2.resize(self.image, size, interpolation=cv2.INTER_AREA)
-        return Trials(image, self._draft, self._draft, self.expected, self._listed, self._settings)
+        return Trials(image, self._draft, self._draft, self._listed, self._settings)
 
     def of(self, tried: Sequence[Values | None]) -> list[list[Target]]:
-        """Return the targets through filters that were tried, each filter once."""
+        """Return what each filter showed; one that is listed twice counts once."""
         return [self.targets[values] for values in dict.fromkeys(tried)]
 
     def _found(self, values: Values | None, executor: Executor | None) -> Any:
@@ -115,12 +113,18 @@ class Trials:
 
 
 def confirmed(
-    tried: Sequence[Values], reduced: Trials, whole: Trials, executor: Executor | None
+    expected: int,
+    tried: Sequence[Values],
+    reduced: Trials,
+    whole: Trials,
+    executor: Executor | None,
 ) -> tuple[Values, ...]:
     """Try the best filters of a reduced image on the whole one, up to the first that shows N.
 
     Parameters
     ----------
+    expected : int
+        N.
     tried : sequence of tuple of float
         Filters of the reduced image.
     reduced, whole : Trials
@@ -130,22 +134,22 @@ def confirmed(
     Returns
     -------
     tuple of tuple of float
-        What was tried on the whole image, the best of the reduced one first.
+        The filters tried on the whole image, the best of the reduced one first.
     """
-    best = sorted(tried, key=reduced.discrepancy)[:CONFIRMED]
+    best = sorted(tried, key=partial(reduced.discrepancy, expected))[:CONFIRMED]
     for count, values in enumerate(best, 1):
-        if whole.discrepancy(values, executor) == 0:
+        if whole.discrepancy(expected, values, executor) == 0:
             return tuple(best[:count])
     return tuple(best)
 
 
 def checked_targets(found: Any, source: str) -> list[Target]:
-    """Return what a callable of others returned, if it is targets at finite places.
+    """Return what a user's function returned, as a list.
 
     Raises
     ------
     ValueError
-        If it is not; the message calls it `source`.
+        If it is not a list of targets with finite coordinates; the message calls it `source`.
     """
     if not isinstance(found, (list, tuple)) or not all(isinstance(it, Target) for it in found):
         raise ValueError(f'{source} returned {found!r}, accepted is a list of targets')

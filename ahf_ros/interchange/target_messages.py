@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from typing import Any, Protocol
 
 import numpy as np
 
-from ahf_ros.target import Identification
+from ahf_ros.target import Identification, Target
 
 
 class MessageTypes(Protocol):
@@ -46,11 +46,6 @@ def coded_target_array(
         Of `types`.
     """
     height, width = shape
-    targets = []
-    for target in identification.targets:
-        values = asdict(target)
-        values['covariance'] = np.array(target.covariance)
-        targets.append(types.CodedTarget(**values))
     return types.CodedTargetArray(
         header=header,
         width=width,
@@ -58,6 +53,12 @@ def coded_target_array(
         family=family,
         expected=identification.expected,
         estimated=identification.estimated,
-        targets=targets,
+        targets=[_coded_target(target, types) for target in identification.targets],
         filter=types.FilterState(**asdict(identification.filter)),
     )
+
+
+def _coded_target(target: Target, types: MessageTypes) -> Any:
+    """Return the message of a target, which may be of a class with more fields than `Target`."""
+    values = {item.name: getattr(target, item.name) for item in fields(Target)}
+    return types.CodedTarget(**values | {'covariance': np.array(target.covariance)})

@@ -125,10 +125,10 @@ class DetectorNode(ProcessNode):
 
     def _service_detector(self, settings: DetectorNodeSettings) -> ServiceDetector | None:
         """Return the detector that is a service, where the settings ask for it."""
-        if settings.detector != SERVICE:
+        if settings.identification.detector != SERVICE:
             return None
-        wanted = settings.service, settings.target.detector_timeout
-        if not self._service or (self._service.service, self._service.timeout) != wanted:
+        wanted = settings.service, settings.identification.detection
+        if not self._service or (self._service.service, self._service.settings) != wanted:
             self._service = ServiceDetector(self, *wanted, self._stopping)
         return self._service
 
@@ -158,7 +158,7 @@ class DetectorNode(ProcessNode):
         self, request: Identify.Request, response: Identify.Response
     ) -> Identify.Response:
         pipeline = self._pipeline
-        expected = request.expected or pipeline.settings.expected_targets
+        expected = request.expected or None
         job = partial(self._attempt, partial(pipeline.answer, request.image, expected))
         try:
             response.coded_targets = self._worker.call(job).message
@@ -183,7 +183,7 @@ class DetectorNode(ProcessNode):
             self._attempt(partial(self._answer, message, pipeline, received))
 
     def _answer(self, message: ImageMessage, pipeline: Pipeline, received: float) -> None:
-        answer = pipeline.answer(message, pipeline.settings.expected_targets)
+        answer = pipeline.answer(message)
         self._targets.publish(answer.message)
         self._tally.answered += 1
         self._tally.latency = time.monotonic() - received

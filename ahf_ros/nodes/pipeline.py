@@ -9,16 +9,14 @@ from typing import TypeAlias
 import numpy as np
 from sensor_msgs.msg import CompressedImage, Image
 
-from ahf_ros.detectors import Detector, create
-from ahf_ros.detectors.ring.counting import estimator
+from ahf_ros.detectors import Detector, create_detector
 from ahf_ros.filtering.homomorphic import HomomorphicFilter
-from ahf_ros.filtering.identifier import AdaptiveIdentifier
-from ahf_ros.filtering.trials import AnyDetector
 from ahf_ros.interchange.image_messages import decode_compressed, decode_image
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.settings import LOSSLESS, DetectorNodeSettings
 from ahf_ros.nodes.target_msg import coded_target_array
-from ahf_ros.target import Identification, Target
+from ahf_ros.session import create_identifier
+from ahf_ros.target import Identification
 
 ImageMessage: TypeAlias = Image | CompressedImage
 """What images come in as."""
@@ -71,19 +69,15 @@ class Pipeline:
     ) -> None:
         self.settings = settings
         self._stopping = stopping
-        self._detector = detector or create(settings.detector, settings.target)
-        estimate = None
-        if settings.estimate_expected:
-            estimate = estimator(self._detector, settings.target)
-        self._identifier = AdaptiveIdentifier(
-            self._unless_stopping(self._detector),
-            settings.adaptive,
-            getattr(self._detector, 'refine', None),
-            estimate,
-            self._unless_stopping(getattr(self._detector, 'draft', None) or self._detector),
+        identification = settings.identification
+        self._detector = detector or create_detector(
+            identification.detector, identification.detection
+        )
+        self._identifier = create_identifier(
+            identification, self._detector, interrupt=self._check_running
         )
 
-    def answer(self, message: ImageMessage, expected: int) -> Answer:
+    def answer(self, message: ImageMessage, expected: int | None = None) -> Answer:
         """Identify the targets of an image.
 
         Raises
@@ -96,7 +90,7 @@ class Pipeline:
         image = (decode_compressed if hasattr(message, 'format') else decode_image)(message)
         identification = self._identifier.identify(image, expected)
         if self.settings.queue == LOSSLESS:
-            # Time is the one thing about it that would be another one in a second run.
+            # Without the duration, runs are byte-identical.
             used = replace(identification.filter, duration=0.0)
             identification = replace(identification, filter=used)
         sent = coded_target_array(
@@ -109,7 +103,8 @@ class Pipeline:
         used = answer.identification.filter
         if not used.applied:
             return answer.image
-        return HomomorphicFilter(answer.image, self.settings.adaptive.filter).filtered(
+        settings = self.settings.identification.adaptive.filter
+        return HomomorphicFilter(answer.image, settings).filtered(
             used.gamma_high, used.gamma_low, used.cutoff, used.attenuation
         )
 
@@ -117,12 +112,6 @@ class Pipeline:
         """Forget what was learnt from earlier images."""
         self._identifier.reset()
 
-    def _unless_stopping(self, detector: AnyDetector) -> AnyDetector:
-        """Return a detector that breaks off before its next image when the node stops."""
-
-        def detect(image: np.ndarray) -> list[Target]:
-            if self._stopping.is_set():
-                raise Refused(STOPPING)
-            return detector(image)
-
-        return detect
+    def _check_running(self) -> None:
+        if self._stopping.is_set():
+            raise Refused(STOPPING)

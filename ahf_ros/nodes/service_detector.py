@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 import time
-from typing import ClassVar
 
 import numpy as np
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -13,6 +12,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 from std_msgs.msg import Header
 
+from ahf_ros.detectors import DetectorSettings
 from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.nodes.pipeline import STOPPING, Refused
 from ahf_ros.nodes.target_msg import identification
@@ -33,24 +33,31 @@ class ServiceDetector:
     node : rclpy.node.Node
         Whose client it is.
     service : str
-    timeout : float
-        Longest time for an image, s.
+    settings : DetectorSettings
+        Their time limit and their family count.
     stopping : threading.Event
         Breaks off waiting for an answer.
     """
 
-    name: ClassVar[str] = 'service'
-    family: ClassVar[str] = 'service'
-
     def __init__(
-        self, node: Node, service: str, timeout: float, stopping: threading.Event
+        self, node: Node, service: str, settings: DetectorSettings, stopping: threading.Event
     ) -> None:
         self.service = service
-        self.timeout = timeout
+        self.settings = settings
         self._stopping = stopping
         self._client: Client = node.create_client(
             Identify, service, callback_group=ReentrantCallbackGroup()
         )
+
+    @property
+    def name(self) -> str:
+        """Name among the detectors of the node."""
+        return 'service'
+
+    @property
+    def family(self) -> str:
+        """Family of the targets, by which the results are named."""
+        return self.settings.family
 
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of an 8-bit gray image; see `ahf_ros.detectors.Detector`.
@@ -64,7 +71,7 @@ class ServiceDetector:
             If the node stops before.
         """
         # What is sent before the service is known to this node gets lost.
-        if not self._client.wait_for_service(min(_GONE, self.timeout)):
+        if not self._client.wait_for_service(min(_GONE, self.settings.detector_timeout)):
             raise ValueError(f'{self._named} is not there')
         future = self._client.call_async(Identify.Request(image=image_message(image, Header())))
         try:
@@ -82,7 +89,7 @@ class ServiceDetector:
     def _awaited(self, future: Future) -> Identify.Response:
         answered = threading.Event()
         future.add_done_callback(lambda _: answered.set())
-        patience = self.timeout
+        patience = self.settings.detector_timeout
         limit = time.monotonic() + patience
         seen = time.monotonic()
         while not answered.wait(_POLL):

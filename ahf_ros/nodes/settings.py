@@ -5,19 +5,14 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field, replace
 
-from ahf_ros.detectors import DETECTOR, DetectorSettings, create
-from ahf_ros.detectors.ring.counting import ESTIMATE_EXPECTED, estimator
-from ahf_ros.filtering.identifier import AdaptiveSettings
+from ahf_ros.detectors import DETECTOR
 from ahf_ros.localisation import NEIGHBOURHOOD
+from ahf_ros.session import IdentificationSettings, create_identifier
 from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.synthetic.scene import SceneSettings
 
 LATEST, LOSSLESS = 'latest', 'lossless'
-"""What becomes of images that come in while another is worked on."""
-
-LARGEST_COUNT = 100000
-"""Largest number of targets that an image can be told to show."""
-
+"""What becomes of images that arrive while another one is being identified."""
 
 SERVICE = 'service'
 """The detector that is a service of another node."""
@@ -51,21 +46,24 @@ class CloudSettings:
 
 
 @dataclass(frozen=True, slots=True)
-class DetectorNodeSettings:
-    """The node `detector`: which identification, of how many targets, driven by which search."""
+class NodeIdentificationSettings(IdentificationSettings):
+    """Settings of an identification whose detector may also be a service of another node."""
 
     detector: str = parameter(
         DETECTOR.default, DETECTOR.description, choices=(*DETECTOR.choices, SERVICE)
     )
+
+    def check_detector(self) -> None:
+        """Refuse a detector that does not identify the family; a service identifies any."""
+        if self.detector != SERVICE:
+            IdentificationSettings.check_detector(self)
+
+
+@dataclass(frozen=True, slots=True)
+class DetectorNodeSettings:
+    """Settings of the node `detector`: the identification, and how images come in."""
+
     service: str = parameter('', 'Service of the detector service, an ahf_ros/srv/Identify.')
-    expected_targets: int = parameter(
-        0,
-        'N, the number of coded targets in every image; 0: unknown, no filter is searched for '
-        'unless N is estimated.',
-        minimum=0,
-        maximum=LARGEST_COUNT,
-    )
-    estimate_expected: bool = parameter(ESTIMATE_EXPECTED.default, ESTIMATE_EXPECTED.description)
     image_transport: str = parameter(
         'raw',
         'raw: sensor_msgs/Image on image; compressed: CompressedImage on image/compressed.',
@@ -84,24 +82,18 @@ class DetectorNodeSettings:
         minimum=1,
         maximum=10**6,
     )
+    identification: NodeIdentificationSettings = field(default_factory=NodeIdentificationSettings)
     cloud: CloudSettings = field(default_factory=CloudSettings)
-    target: DetectorSettings = field(default_factory=DetectorSettings)
-    adaptive: AdaptiveSettings = field(default_factory=AdaptiveSettings)
 
     def __post_init__(self) -> None:
         """Refuse values that are not accepted."""
         check_parameters(self)
         if self.service and not _SERVICE_NAME.fullmatch(self.service):
             raise ValueError(f'service is {self.service!r}, accepted is the name of a service')
-        if self.detector == SERVICE:
-            if not self.service:
-                raise ValueError("service is '', accepted is the name of a service")
-            if self.estimate_expected:
-                raise ValueError(f'estimate_expected is True, accepted with {SERVICE} is False')
-            return
-        detector = create(self.detector, self.target)
-        if self.estimate_expected:
-            estimator(detector, self.target)
+        if self.identification.detector != SERVICE:
+            create_identifier(self.identification)
+        elif not self.service:
+            raise ValueError("service is '', accepted is the name of a service")
 
 
 @dataclass(frozen=True, slots=True)

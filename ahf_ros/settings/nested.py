@@ -54,6 +54,31 @@ def assemble(settings: type[Settings], values: Mapping[str, Any]) -> Settings:
     return _assembled(settings, values)
 
 
+def flat_values(settings: Any) -> dict[str, Any]:
+    """Return the values of all parameters of a settings instance, by name."""
+    values = {item.name: getattr(settings, item.name) for item in parameters(settings)}
+    for name in _parts(type(settings)):
+        values |= flat_values(getattr(settings, name))
+    return values
+
+
+def updated(settings: Settings, values: Mapping[str, Any]) -> Settings:
+    """Return settings with other values for some of their parameters.
+
+    Parameters
+    ----------
+    settings : instance of a settings dataclass
+    values : mapping of str to value
+        As for `assemble`.
+
+    Raises
+    ------
+    ValueError
+        As `assemble` does.
+    """
+    return assemble(type(settings), {**flat_values(settings), **values}) if values else settings
+
+
 def _assembled(settings: type[Settings], values: Mapping[str, Any]) -> Settings:
     own = {
         item.name: _typed(item, values[item.name])

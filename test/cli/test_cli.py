@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from ahf_ros.cli import main
-from ahf_ros.cli.identify import IdentifySettings
 from ahf_ros.interchange.image_files import read_image, write_image
 from ahf_ros.interchange.truth_files import read_truth
+from ahf_ros.session import IdentificationSettings
 from ahf_ros.settings.nested import flat_parameters
 from ahf_ros.synthetic.scene import SceneSettings
 
@@ -202,7 +202,7 @@ def test_files_that_cannot_be_read_do_not_stop_the_others(folder, tmp_path):
 @pytest.mark.parametrize(
     ('arguments', 'message'),
     [
-        (['--expected', -1], "expected is '-1', accepted is an integer of at least 0"),
+        (['--expected', -1], "expected_targets is '-1', accepted is an integer from 0 to 100000"),
         (['--population', 1], "population is '1', accepted is an integer from 2 to"),
         (['--family', 'ring'], "family is 'ring', accepted is one of metashape12, metashape14"),
         (['--detector', 'magic'], "detector is 'magic', accepted is one of"),
@@ -243,7 +243,11 @@ def test_files_that_cannot_be_compared_are_named(tmp_path, capsys, missing):
 
 @pytest.mark.parametrize(
     ('command', 'settings'),
-    [('identify', IdentifySettings), ('bag', IdentifySettings), ('render', SceneSettings)],
+    [
+        ('identify', IdentificationSettings),
+        ('bag', IdentificationSettings),
+        ('render', SceneSettings),
+    ],
 )
 def test_help_describes_every_setting(monkeypatch, capsys, command, settings):
     monkeypatch.setenv('COLUMNS', '1000')

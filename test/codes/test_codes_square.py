@@ -34,7 +34,7 @@ def test_a_marker_has_a_black_border_and_its_own_bits():
 
 
 def test_what_is_not_there_is_named():
-    with pytest.raises(ValueError, match=r"dictionary is 'aruco_9x9', accepted is one of aruco_4"):
+    with pytest.raises(ValueError, match=r"family is 'aruco_9x9', accepted is one of aruco_4"):
         dictionary('aruco_9x9')
     with pytest.raises(ValueError, match='number is 50, accepted is an integer from 0 to 49'):
         marker('aruco_4x4_50', 50, 5)
@@ -42,5 +42,5 @@ def test_what_is_not_there_is_named():
 
 def test_an_opencv_without_markers_is_named(monkeypatch):
     monkeypatch.delattr(cv2.aruco, 'ArucoDetector')
-    with pytest.raises(ValueError, match=r'at least 4\.7, this is'):
+    with pytest.raises(ValueError, match=r'at least 4\.7, which has square markers; this is'):
         dictionary('aruco_4x4_50')

@@ -11,9 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ahf_ros.detectors import DetectorSettings, create
-from ahf_ros.detectors.contract import ProgramSettings
-from ahf_ros.filtering.identifier import identify
+from ahf_ros.detectors import DetectorSettings, create_detector
+from ahf_ros.session import identify
 
 IMAGE = np.arange(400, dtype=np.uint8).reshape(20, 20)
 
@@ -23,9 +22,8 @@ def detector(tmp_path, script: str, words: str = '', timeout: float = 20.0):
     path = tmp_path / 'program.py'
     path.write_text(script)
     command = f'{sys.executable} {path} {words}'
-    program = ProgramSettings(command=command)
-    settings = DetectorSettings(program=program, detector_timeout=timeout)
-    return create('command', settings)
+    settings = DetectorSettings(command=command, detector_timeout=timeout)
+    return create_detector('command', settings)
 
 
 def printing(text: str) -> str:
@@ -111,13 +109,13 @@ def _runs(pid: int) -> bool:
 )
 def test_a_command_that_is_none(command, message):
     with pytest.raises(ValueError, match=message):
-        create('command', DetectorSettings(program=ProgramSettings(command=command)))
+        create_detector('command', DetectorSettings(command=command))
 
 
 def test_a_program_that_is_not_there(tmp_path):
-    program = ProgramSettings(command=str(tmp_path / 'nothing'))
+    settings = DetectorSettings(command=str(tmp_path / 'nothing'))
     with pytest.raises(ValueError, match='cannot be started: No such file'):
-        create('command', DetectorSettings(program=program))(IMAGE)
+        create_detector('command', settings)(IMAGE)
 
 
 def test_several_threads_at_once_and_no_file_left(tmp_path, monkeypatch):
@@ -144,5 +142,5 @@ def test_a_program_behind_the_adaptive_filter(tmp_path):
         'seen = image[0, :3].tolist() != [0, 1, 2]\n'
         'print(json.dumps({"targets": [{"id": 1, "x": 0, "y": 0}] if seen else []}))\n'
     )
-    found = identify(IMAGE, detector(tmp_path, script), expected=1)
+    found = identify(IMAGE, detector(tmp_path, script), expected_targets=1)
     assert found.count == 1 and found.filter.applied

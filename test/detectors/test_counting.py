@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from ahf_ros.codes.ring import family
-from ahf_ros.detectors import DetectorSettings, create
-from ahf_ros.detectors.ring.counting import estimate_count, estimator
-from ahf_ros.nodes.settings import DetectorNodeSettings
+from ahf_ros.detectors import DetectorSettings, create_detector
+from ahf_ros.detectors.ring.counting import estimate_count
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 
 SMALL = {'width': 900, 'height': 640, 'targets': 6}
@@ -67,7 +66,7 @@ def test_targets_count_whose_bands_are_half_hidden():
         corner = np.rint([target.x + 1.4 * target.semi_major, target.y - reach]).astype(int)
         opposite = np.rint([target.x + reach, target.y + reach]).astype(int)
         cv2.rectangle(image, tuple(corner.tolist()), tuple(opposite.tolist()), 110, -1)
-    assert len(create('ring')(image)) < 6
+    assert len(create_detector('ring')(image)) < 6
     assert estimate_count(image) == 6
 
 
@@ -98,23 +97,6 @@ def test_the_same_image_gives_the_same_count():
 def test_what_is_no_image_is_refused(image, words):
     with pytest.raises(ValueError, match=words):
         estimate_count(image)
-
-
-def test_another_detector_of_ring_targets_estimates_the_same():
-    wanted = DetectorSettings()
-    assert estimator(create('traditional', wanted), wanted)(scene(seed=11).image) == 6
-
-
-@pytest.mark.skipif(
-    not hasattr(getattr(cv2, 'aruco', None), 'ArucoDetector'),
-    reason=f'OpenCV {cv2.__version__} has no square markers',
-)
-def test_only_ring_targets_are_estimated():
-    wanted = DetectorSettings()
-    with pytest.raises(ValueError, match=r'estimate_expected is True, accepted is False where'):
-        estimator(create('aruco', wanted), wanted)
-    with pytest.raises(ValueError, match='estimate_expected is True'):
-        DetectorNodeSettings(detector='aruco', estimate_expected=True)
 
 
 @pytest.mark.parametrize(('paper', 'ink'), [(200, 20), (20, 200)])

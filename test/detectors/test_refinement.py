@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from ahf_ros.codes.ring import family
-from ahf_ros.detectors import DetectorSettings, create
+from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.detectors.ring.refinement import refine_centres
 from ahf_ros.filtering.genetic import GeneticSettings
-from ahf_ros.filtering.identifier import AdaptiveSettings, identify
+from ahf_ros.filtering.identifier import Identifier
+from ahf_ros.filtering.settings import AdaptiveSettings
 from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import UNDECODED, Target
 
@@ -125,15 +126,14 @@ def test_a_filter_leaves_no_trace_in_the_places(name):
     """The detector is blind to the image as received; AHF refines there all the same."""
     image = rendered(SCENE).image
 
-    class Filtered(type(create(name))):
+    class Filtered(type(create_detector(name))):
         def __call__(self, shown):
             return [] if shown is image else super().__call__(shown)
 
     settings = AdaptiveSettings(threads=1, genetic=GeneticSettings(max_evaluations=8))
-    result = identify(image, Filtered(DetectorSettings()), 6, settings)
-    unrefined = identify(
-        image, Filtered(DetectorSettings()), 6, settings, refine=lambda _, targets: targets
-    )
+    detector = Filtered(DetectorSettings())
+    result = Identifier(detector, settings, refine=detector.refine).identify(image, 6)
+    unrefined = Identifier(detector, settings).identify(image, 6)
     assert result.filter.applied
     assert result.count == unrefined.count >= 4
     before, after = (distances(of.targets, SCENE) for of in (unrefined, result))

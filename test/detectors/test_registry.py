@@ -10,9 +10,19 @@ import numpy as np
 import pytest
 
 from ahf_ros import detectors
-from ahf_ros.detectors import DETECTOR, DETECTOR_NAMES, GROUP, DetectorSettings, create
-from ahf_ros.detectors.contract import ProgramSettings
-from ahf_ros.filtering.identifier import identify
+from ahf_ros.detectors import (
+    DETECTOR_NAMES,
+    FAMILY_NAMES,
+    GROUP,
+    Detector,
+    DetectorSettings,
+    Drafter,
+    Refiner,
+    create_detector,
+    detector_name,
+    estimator,
+)
+from ahf_ros.session import IdentificationSettings, identify
 
 EXAMPLE = Path(__file__).parents[2] / 'docs' / 'examples' / 'my_detector.py'
 
@@ -23,31 +33,78 @@ NEEDS_MARKERS = pytest.mark.skipif(
 )
 
 
+SQUARES = {'aruco': 'aruco_4x4_50', 'apriltag': 'apriltag_36h11'}
+
+
 @pytest.mark.parametrize(
     'name',
     [
-        pytest.param(name, marks=NEEDS_MARKERS if name in ('aruco', 'apriltag') else ())
+        pytest.param(name, marks=NEEDS_MARKERS if name in SQUARES else ())
         for name in DETECTOR_NAMES
     ],
 )
 def test_every_detector_is_called_as_it_is_registered(name):
-    made = create(name, DetectorSettings(program=ProgramSettings(command='program')))
+    family = SQUARES.get(name, 'metashape12')
+    made = create_detector(name, family=family, command='program')
     assert made.name == name
-    assert made.family
+    assert made.family == family
 
 
-def test_the_default_is_registered():
-    assert DETECTOR.default in DETECTOR_NAMES
+def test_every_family_chooses_a_detector():
+    for family in FAMILY_NAMES:
+        kind = family.partition('_')[0]
+        name = kind if kind in ('aruco', 'apriltag') else 'ring'
+        assert detector_name('auto', family) == name
+
+
+@pytest.mark.parametrize(
+    ('name', 'family', 'accepted'),
+    [
+        ('aruco', 'metashape12', ['auto, ring, traditional, command', 'aruco_4x4_50, ']),
+        ('ring', 'apriltag_36h11', ['auto, apriltag, command', 'one of metashape12, ']),
+    ],
+)
+def test_a_detector_that_does_not_identify_the_family_is_refused(name, family, accepted):
+    with pytest.raises(ValueError) as caught:
+        create_detector(name, family=family)
+    message = str(caught.value)
+    assert message.startswith(f'detector is {name!r} and family is {family!r}; accepted with')
+    assert all(part in message for part in accepted)
+
+
+def test_a_family_that_is_not_there_is_refused_with_those_that_are():
+    with pytest.raises(ValueError, match=r"family is 'aruco', accepted is .*, apriltag_36h11"):
+        create_detector(family='aruco')
+
+
+def test_only_families_that_can_be_counted_are_estimated():
+    assert estimator(DetectorSettings(family='aicon12'))
+    square = DetectorSettings(family='aruco_4x4_50')
+    message = (
+        "estimate_expected is True and family is 'aruco_4x4_50'; accepted .* False, .*aicon14"
+    )
+    with pytest.raises(ValueError, match=message):
+        estimator(square)
+    with pytest.raises(ValueError, match=message):
+        IdentificationSettings(estimate_expected=True, detection=square)
+
+
+def test_refinement_and_drafts_are_part_of_the_contract():
+    ring = create_detector('ring')
+    assert isinstance(ring, Detector) and isinstance(ring, Refiner)
+    assert not isinstance(ring, Drafter)
+    assert isinstance(create_detector('traditional'), Drafter)
+    assert not isinstance(create_detector('command', command='program'), Refiner)
 
 
 def test_an_unknown_detector_is_refused_by_name():
     with pytest.raises(ValueError, match=r"detector is 'magic', accepted is one of .*traditional"):
-        create('magic')
+        create_detector('magic')
 
 
 def test_settings_reach_the_detector():
     settings = DetectorSettings(family='aicon14')
-    assert create('traditional', settings).settings == settings
+    assert create_detector('traditional', settings).settings == settings
 
 
 @pytest.mark.parametrize(
@@ -79,19 +136,19 @@ def added(tmp_path, monkeypatch, module: str, body: str):
 def test_a_detector_of_another_package(tmp_path, monkeypatch):
     registry = added(tmp_path, monkeypatch, 'package_with_detector', EXAMPLE.read_text())
     assert registry['DETECTOR_NAMES'] == (*DETECTOR_NAMES, 'mine')
-    detector = registry['create']('mine', DetectorSettings(min_radius=5.0))
+    detector = registry['create_detector']('mine', DetectorSettings(min_radius=5.0))
     image = np.full((100, 120), 200, np.uint8)
     cv2.circle(image, (40, 50), 8, 20, -1)
     (target,) = detector(image)
     assert (target.x, target.y) == pytest.approx((40, 50), abs=0.1)
-    assert identify(image, detector, expected=1).count == 1
+    assert identify(image, detector, expected_targets=1).count == 1
 
 
 def test_a_detector_of_another_package_that_cannot_be_imported(tmp_path, monkeypatch):
     registry = added(tmp_path, monkeypatch, 'package_that_is_broken', 'import nothing_like_this')
-    assert registry['create']('ring').name == 'ring'
+    assert registry['create_detector']('ring').name == 'ring'
     with pytest.raises(ValueError, match="detector is 'mine', but package_that_is_broken:MyDet"):
-        registry['create']('mine')
+        registry['create_detector']('mine')
 
 
 FAILING = """
@@ -124,23 +181,22 @@ class MyDetector:
 )
 def test_a_detector_of_another_package_may_fail_and_hang(tmp_path, monkeypatch, gray, words):
     registry = added(tmp_path, monkeypatch, f'package_that_fails_{gray}', FAILING)
-    detector = registry['create']('mine', DetectorSettings(detector_timeout=0.2))
+    detector = registry['create_detector']('mine', DetectorSettings(detector_timeout=0.2))
     image = np.full((20, 20), gray, np.uint8)
     image[0] = 0
     with pytest.raises(ValueError) as raised:
-        identify(image, detector, expected=0)
+        identify(image, detector, expected_targets=0)
     assert str(raised.value) == words
     with pytest.raises(ValueError, match="detector 'mine' failed: RuntimeError: no GPU"):
         detector.refine(image, [])
-    assert detector.draft is None
 
 
 def test_a_search_ends_when_a_detector_hangs_in_it(tmp_path, monkeypatch):
     body = FAILING.replace('image.max() == 1', 'image.max() > 100')
     registry = added(tmp_path, monkeypatch, 'package_that_hangs', body)
-    detector = registry['create']('mine', DetectorSettings(detector_timeout=0.2))
+    detector = registry['create_detector']('mine', DetectorSettings(detector_timeout=0.2))
     image = np.full((20, 20), 60, np.uint8)
     image[0] = 0
-    assert identify(image, detector, expected=0).targets == ()
+    assert identify(image, detector, expected_targets=0).targets == ()
     with pytest.raises(ValueError, match='took longer than detector_timeout'):
-        identify(image, detector, expected=5)
+        identify(image, detector, expected_targets=5)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.codes.ring import FAMILY_NAMES, family
-from ahf_ros.detectors import DetectorSettings, create
+from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.evaluation import Score, score
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 from ahf_ros.target import UNDECODED, Target, TrueTarget
@@ -23,7 +23,7 @@ rendered = lru_cache(render)
 
 
 def identified(image: np.ndarray, **settings: object) -> list[Target]:
-    return create('ring', DetectorSettings(**settings))(image)
+    return create_detector('ring', DetectorSettings(**settings))(image)
 
 
 def scored(rendering: Rendering, targets: list[Target]) -> Score:

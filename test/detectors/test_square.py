@@ -8,11 +8,9 @@ import cv2
 import numpy as np
 import pytest
 
-from ahf_ros.detectors import DetectorSettings, create
-from ahf_ros.detectors.contract import SquareSettings
+from ahf_ros.detectors import create_detector
 from ahf_ros.evaluation import score
-from ahf_ros.filtering.genetic import GeneticSettings
-from ahf_ros.filtering.identifier import AdaptiveSettings, identify
+from ahf_ros.session import identify
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 from ahf_ros.target import Target
 
@@ -30,18 +28,18 @@ def scored(rendering: Rendering, targets):
 
 
 @pytest.mark.parametrize(
-    ('detector', 'family', 'square'),
+    ('detector', 'family'),
     [
-        ('aruco', 'aruco_4x4_50', SquareSettings()),
-        ('aruco', 'aruco_6x6_250', SquareSettings(aruco_dictionary='6x6_250')),
-        ('apriltag', 'apriltag_36h11', SquareSettings()),
-        ('apriltag', 'apriltag_25h9', SquareSettings(apriltag_dictionary='25h9')),
+        ('aruco', 'aruco_4x4_50'),
+        ('aruco', 'aruco_6x6_250'),
+        ('apriltag', 'apriltag_36h11'),
+        ('apriltag', 'apriltag_25h9'),
     ],
 )
 @pytest.mark.parametrize('tilt', [0.0, 45.0])
-def test_markers_and_their_physical_centres(detector, family, square, tilt):
+def test_markers_and_their_physical_centres(detector, family, tilt):
     rendering = render(replace(SCENE, family=family, tilt=tilt, targets=4))
-    made = create(detector, DetectorSettings(square=square))
+    made = create_detector(family=family)
     assert (made.name, made.family) == (detector, family)
     figures = scored(rendering, made(rendering.image))
     assert (figures.right, figures.wrong, figures.false_positives) == (4, 0, 0)
@@ -51,23 +49,22 @@ def test_markers_and_their_physical_centres(detector, family, square, tilt):
 def test_the_ellipse_is_inscribed_in_the_marker():
     rendering = render(SCENE)
     true = {target.id: target for target in rendering.targets}
-    for target in create('aruco')(rendering.image):
+    for target in create_detector(family=SCENE.family)(rendering.image):
         assert target.semi_major == pytest.approx(true[target.id].semi_major, rel=0.03)
         assert target.semi_minor == pytest.approx(true[target.id].semi_minor, rel=0.03)
 
 
 def test_markers_of_another_dictionary_are_not_seen():
     rendering = render(SCENE)
-    other = DetectorSettings(square=SquareSettings(aruco_dictionary='7x7_50'))
-    assert create('aruco', other)(rendering.image) == []
+    assert create_detector(family='aruco_7x7_50')(rendering.image) == []
 
 
 def test_the_filter_finds_markers_that_stripes_hide():
     rendering = render(replace(SCENE, light='stripe', ambient=0.12))
-    detector = create('aruco')
+    detector = create_detector(family=SCENE.family)
     without = scored(rendering, detector(rendering.image))
-    settings = AdaptiveSettings(genetic=GeneticSettings(max_evaluations=40))
-    found = scored(rendering, identify(rendering.image, detector, 6, settings).targets)
+    identification = identify(rendering.image, detector, expected_targets=6, max_evaluations=40)
+    found = scored(rendering, identification.targets)
     assert found.right >= 2 * max(without.right, 1)
     assert (found.wrong, found.false_positives) == (0, 0)
 
@@ -75,8 +72,8 @@ def test_the_filter_finds_markers_that_stripes_hide():
 @pytest.mark.parametrize('light', ['stripe', 'lattice', 'fringe'])
 def test_places_are_those_of_the_image_as_received(light):
     rendering = render(replace(SCENE, light=light, ambient=0.3))
-    detector = create('aruco')
-    found = identify(rendering.image, detector, 6)
+    detector = create_detector(family=SCENE.family)
+    found = identify(rendering.image, detector, expected_targets=6)
     figures = scored(rendering, found.targets)
     assert (figures.right, figures.wrong, figures.false_positives) == (6, 0, 0)
     assert figures.rmse[2] < 0.08
@@ -87,7 +84,7 @@ def test_places_are_those_of_the_image_as_received(light):
 
 def test_corners_are_those_of_the_marker():
     rendering = render(SCENE)
-    for target in create('aruco')(rendering.image):
+    for target in create_detector(family=SCENE.family)(rendering.image):
         corners = np.array(target.corners)
         sides = np.roll(corners, -1, axis=0) - corners
         assert np.hypot(*sides.T) == pytest.approx(np.full(4, 2 * target.semi_major), rel=0.15)
@@ -97,7 +94,7 @@ def test_corners_are_those_of_the_marker():
 
 def test_what_has_no_corners_or_no_sides_stays_where_it_is():
     rendering = render(SCENE)
-    detector = create('aruco')
+    detector = create_detector(family=SCENE.family)
     markers = detector(rendering.image)
     others = [Target(1, 1, 50.0, 60.0, 5.0, 5.0), Target(2, 2, -900.0, 60.0, 5.0, 5.0)]
     assert detector.refine(rendering.image, others) == others
@@ -108,8 +105,9 @@ def test_what_has_no_corners_or_no_sides_stays_where_it_is():
 
 def test_any_kind_of_image():
     rendering = render(SCENE)
-    same = create('aruco')(rendering.image)
+    detector = create_detector(family=SCENE.family)
+    same = detector(rendering.image)
     for image in (rendering.image.astype(np.uint16) * 16, rendering.image[:, ::-1][:, ::-1]):
-        assert [target.id for target in create('aruco')(image)] == [it.id for it in same]
+        assert [target.id for target in detector(image)] == [it.id for it in same]
     with pytest.raises(ValueError, match='image has shape'):
-        create('aruco')(np.zeros((50, 50, 3), np.uint8))
+        detector(np.zeros((50, 50, 3), np.uint8))

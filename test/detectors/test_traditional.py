@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.codes.ring import FAMILY_NAMES
-from ahf_ros.detectors import DetectorSettings, create
+from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.evaluation import Score, score
 from ahf_ros.filtering.homomorphic import HomomorphicFilter
 from ahf_ros.interchange.image_files import read_image
@@ -26,7 +26,7 @@ rendered = lru_cache(render)
 
 
 def identified(image: np.ndarray, **settings: object) -> list[Target]:
-    return create('traditional', DetectorSettings(**settings))(image)
+    return create_detector('traditional', DetectorSettings(**settings))(image)
 
 
 def scored(rendering: Rendering, targets: list[Target]) -> Score:
@@ -45,7 +45,7 @@ def test_every_family_in_both_polarities(name, polarity):
 @pytest.mark.parametrize('polarity', ['dark', 'bright'])
 def test_a_draft_shows_the_same_ids_and_refinement_starts_from_it(polarity):
     rendering = rendered(replace(SMALL, polarity=polarity, light='stripe', ambient=1.0))
-    detector = create('traditional')
+    detector = create_detector('traditional')
     draft = detector.draft(rendering.image)
     assert [it.id for it in draft] == [it.id for it in detector(rendering.image)]
     assert scored(rendering, draft).rmse[2] < 1.0

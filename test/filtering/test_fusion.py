@@ -6,7 +6,8 @@ import numpy as np
 
 from ahf_ros.filtering.fusion import fused
 from ahf_ros.filtering.genetic import GeneticSettings
-from ahf_ros.filtering.identifier import AdaptiveSettings, identify
+from ahf_ros.filtering.identifier import Identifier
+from ahf_ros.filtering.settings import AdaptiveSettings
 from ahf_ros.target import UNDECODED, Target
 
 
@@ -57,11 +58,14 @@ def test_a_search_that_finds_no_filter_for_all_shows_what_several_do():
         first = 1 + round(1000 * float(shown.mean())) % 2
         return [at(number, 100.0 * number) for number in range(first, first + 3)]
 
-    genetic = GeneticSettings(max_evaluations=30)
-    single = identify(image, detector, 4, AdaptiveSettings(genetic=genetic))
+    def identify(**changes):
+        settings = AdaptiveSettings(genetic=GeneticSettings(max_evaluations=30), **changes)
+        return Identifier(detector, settings).identify(image, 4)
+
+    single = identify()
     assert single.count == 3
-    together = identify(image, detector, 4, AdaptiveSettings(genetic=genetic, fusion=True))
+    together = identify(fusion=True)
     assert [target.id for target in together.targets] == [1, 2, 3, 4]
     assert together.filter.gamma_high == single.filter.gamma_high
-    alone = identify(image, detector, 4, AdaptiveSettings(genetic=genetic, fusion=True, threads=1))
+    alone = identify(fusion=True, threads=1)
     assert alone.targets == together.targets

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from ahf_ros.detectors import create
+from ahf_ros.detectors import create_detector
 from ahf_ros.imaging.image import as_gray
 from ahf_ros.interchange.image_messages import decode_compressed, decode_image
 from ahf_ros.synthetic.scene import SceneSettings, render
@@ -146,7 +146,7 @@ IDS = [target.id for target in SCENE.targets]
 
 
 def identified(sent) -> list[int]:
-    return [target.id for target in create('ring')(decode_image(sent))]
+    return [target.id for target in create_detector('ring')(decode_image(sent))]
 
 
 def with_hot_pixel(image: np.ndarray, value: float) -> np.ndarray:

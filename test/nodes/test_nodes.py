@@ -458,7 +458,7 @@ def test_a_service_is_a_detector_and_its_end_is_named(
     assert detector.set(*chosen, ('expected_targets', 0)) == (True, '')
     found = detector.answer(message)
     assert [it.id for it in found.targets] == [it.id for it in rendering.targets]
-    assert found.family == 'service'
+    assert found.family == 'metashape12'
     other.kill()
     response = detector.identify(image_message(rendering.image, header()))
     assert not response.success

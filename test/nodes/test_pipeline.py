@@ -14,6 +14,7 @@ from std_msgs.msg import Header
 from ahf_ros.nodes import pipeline
 from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.nodes.settings import DetectorNodeSettings
+from ahf_ros.settings.nested import assemble
 from ahf_ros.synthetic.scene import SceneSettings, render
 
 SCENE = SceneSettings(width=1000, height=700, targets=6, light='stripe', seed=2)
@@ -22,7 +23,7 @@ SCENE = SceneSettings(width=1000, height=700, targets=6, light='stripe', seed=2)
 def test_places_come_from_the_image_as_received():
     """The traditional detector needs a filter here, which moves centres by 0.02 px."""
     scene = render(SCENE)
-    settings = DetectorNodeSettings(detector='traditional')
+    settings = assemble(DetectorNodeSettings, {'detector': 'traditional'})
     made = pipeline.Pipeline(settings, threading.Event())
     answer = made.answer(image_message(scene.image, Header()), len(scene.targets))
     assert answer.message.filter.applied

@@ -10,7 +10,7 @@ import subprocess
 import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import cv2
 import numpy as np
@@ -45,7 +45,6 @@ class CommandDetector:
         If there is no command, or it cannot be split into words.
     """
 
-    name: ClassVar[str] = 'command'
     settings: DetectorSettings = field(default_factory=DetectorSettings)
 
     def __post_init__(self) -> None:
@@ -53,8 +52,13 @@ class CommandDetector:
         self._words('image.png')
 
     @property
+    def name(self) -> str:
+        """Name in the registry."""
+        return 'command'
+
+    @property
     def family(self) -> str:
-        """What the targets are: the command knows more than its name."""
+        """Family of the targets, by which the results are named."""
         return self.settings.family
 
     def __call__(self, image: np.ndarray) -> list[Target]:
@@ -83,11 +87,11 @@ class CommandDetector:
 
     @property
     def _named(self) -> str:
-        return f'command {self.settings.program.command!r}'
+        return f'command {self.settings.command!r}'
 
     def _words(self, image: str) -> list[str]:
         try:
-            words = shlex.split(self.settings.program.command)
+            words = shlex.split(self.settings.command)
         except ValueError as error:
             raise ValueError(f'{self._named} cannot be split into words: {error}') from error
         if not words:

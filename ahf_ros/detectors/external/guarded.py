@@ -1,4 +1,4 @@
-"""A detector of another package, which may fail in any way and never end."""
+"""Detectors of other packages, which may fail in any way or never return."""
 
 from __future__ import annotations
 
@@ -6,24 +6,24 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future, wait
 from dataclasses import dataclass
 from threading import Thread
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
-from ahf_ros.detectors.contract import Detector
+from ahf_ros.detectors.contract import Detector, Drafter, Refiner
 from ahf_ros.target import Target
 
 
 @dataclass(frozen=True, slots=True)
 class GuardedDetector:
-    """A detector whose errors are all of one kind, and which has a time limit.
+    """A detector with a time limit, all of whose errors are a ValueError.
 
     Attributes
     ----------
     detector : Detector
     timeout : float
-        Time that it has for an image, s. A call that takes longer is left behind in its thread,
-        which cannot be stopped and ends with the process.
+        Time limit for one image, s. A call that takes longer goes on in its thread, which cannot
+        be stopped and ends with the process.
     """
 
     detector: Detector
@@ -39,30 +39,16 @@ class GuardedDetector:
         """Family of its targets."""
         return self.detector.family
 
-    @property
-    def refine(self) -> Callable[[np.ndarray, Sequence[Target]], Sequence[Target]] | None:
-        """The method of that name of the detector, if it has one."""
-        return self._guarded_method('refine')
-
-    @property
-    def draft(self) -> Callable[[np.ndarray], list[Target]] | None:
-        """The method of that name of the detector, if it has one."""
-        return self._guarded_method('draft')
-
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image; see `Detector`.
 
         Raises
         ------
         ValueError
-            Whatever the detector raises, naming it; or if it takes longer than its time limit.
+            Whatever the detector raises, with its name; or if it exceeds its time limit.
         """
         found: list[Target] = self._guarded(self.detector, image)
         return found
-
-    def _guarded_method(self, name: str) -> Callable[..., Any] | None:
-        method = getattr(self.detector, name, None)
-        return method and (lambda *arguments: self._guarded(method, *arguments))
 
     def _guarded(self, call: Callable[..., Any], *arguments: Any) -> Any:
         outcome: Future[Any] = Future()
@@ -70,7 +56,7 @@ class GuardedDetector:
         def work() -> None:
             try:
                 outcome.set_result(call(*arguments))
-            except BaseException as error:  # it is raised again where it is waited for
+            except BaseException as error:  # raised again by the caller
                 outcome.set_exception(error)
 
         Thread(target=work, name=f'detector {self.name}', daemon=True).start()
@@ -85,3 +71,33 @@ class GuardedDetector:
                 f'detector {self.name!r} failed: {type(error).__name__}: {error}'
             ) from error
         return outcome.result()
+
+
+class RefiningDetector(Detector, Refiner, Protocol):
+    """A detector that is a `Refiner`."""
+
+
+@dataclass(frozen=True, slots=True)
+class GuardedRefiner(GuardedDetector):
+    """The same for a detector that is a `Refiner`."""
+
+    detector: RefiningDetector
+
+    def refine(self, image: np.ndarray, targets: Sequence[Target]) -> Sequence[Target]:
+        """Return targets with the centres of an image; see `Refiner`."""
+        refined: Sequence[Target] = self._guarded(self.detector.refine, image, targets)
+        return refined
+
+    def draft(self, image: np.ndarray) -> list[Target]:
+        """Identify the targets of one image, if possible as a `Drafter` does."""
+        found: list[Target] = self._guarded(
+            self.detector.draft if isinstance(self.detector, Drafter) else self.detector, image
+        )
+        return found
+
+
+def guarded(detector: Detector, timeout: float) -> GuardedDetector:
+    """Return a detector with a time limit, in s, that is a `Refiner` if `detector` is one."""
+    if isinstance(detector, Refiner):
+        return GuardedRefiner(detector, timeout)
+    return GuardedDetector(detector, timeout)

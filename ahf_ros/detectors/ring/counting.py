@@ -7,13 +7,10 @@ a margin. No word has to be read: a target counts also where its band is half hi
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
-
 import numpy as np
 
-from ahf_ros.codes.ring import FAMILY_NAMES, Family, family
-from ahf_ros.detectors.contract import Detector, DetectorSettings
+from ahf_ros.codes.ring import Family, family
+from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.ring.decoding import (
     ACROSS,
     BAND_DEPTHS,
@@ -33,14 +30,6 @@ from ahf_ros.detectors.ring.hypotheses import Hypotheses, settled_dots
 from ahf_ros.features import frame
 from ahf_ros.features.profiles import USUAL_BLUR
 from ahf_ros.imaging.image import as_gray
-from ahf_ros.settings.parameter import Parameter
-
-ESTIMATE_EXPECTED = Parameter(
-    'estimate_expected',
-    False,
-    'Whether to estimate N where it is unknown, and to search for a filter that shows N targets.',
-)
-"""The choice as a parameter, for the node and the command line."""
 
 _SAMPLES = 5  # angles a sector
 _MARGIN = 0.45  # of a place in the margin from the band, dot radii
@@ -106,28 +95,6 @@ def estimate_count(image: np.ndarray, settings: DetectorSettings | None = None) 
     count = len(targets.words)
     distinct, _ = settled_dots(targets, np.zeros(count), np.ones(count, bool), code)
     return len(distinct)
-
-
-def estimator(detector: Detector, settings: DetectorSettings) -> Callable[[np.ndarray], int]:
-    """Return the estimate of how many targets an image shows of those that a detector looks for.
-
-    Parameters
-    ----------
-    detector : Detector
-    settings : DetectorSettings
-        What its targets look like.
-
-    Raises
-    ------
-    ValueError
-        If it looks for others than ring targets.
-    """
-    if detector.family not in FAMILY_NAMES:
-        raise ValueError(
-            f'{ESTIMATE_EXPECTED.name} is True, accepted is False where targets are of the family '
-            f'{detector.family}: only ring targets are counted'
-        )
-    return partial(estimate_count, settings=settings)
 
 
 def target_probability(features: np.ndarray) -> np.ndarray:

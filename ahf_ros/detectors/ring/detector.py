@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar
 
 import numpy as np
 
@@ -40,8 +39,12 @@ class RingDetector:
     settings : DetectorSettings
     """
 
-    name: ClassVar[str] = 'ring'
     settings: DetectorSettings = field(default_factory=DetectorSettings)
+
+    @property
+    def name(self) -> str:
+        """Name in the registry."""
+        return 'ring'
 
     @property
     def family(self) -> str:

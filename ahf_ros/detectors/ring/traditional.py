@@ -95,11 +95,14 @@ class TraditionalDetector:
     settings: DetectorSettings = field(default_factory=DetectorSettings)
 
     @property
+    def name(self) -> str:
+        """Name in the registry."""
+        return 'traditional'
+
+    @property
     def family(self) -> str:
         """Family of the codes."""
         return self.settings.family
-
-    name: str = field(default='traditional', init=False)
 
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image; see `Detector`.

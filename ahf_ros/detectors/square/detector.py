@@ -6,7 +6,7 @@ OpenCV identifies; places come from `ahf_ros.detectors.square.sides`, in the ima
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -41,31 +41,33 @@ class SquareMarker(Target):
 
 @dataclass(frozen=True, slots=True)
 class SquareDetector:
-    """Identify the markers of one dictionary.
+    """Identify the markers of one family.
 
     Attributes
     ----------
-    name : str
-        'aruco' or 'apriltag'.
     settings : DetectorSettings
 
     Raises
     ------
     ValueError
-        If OpenCV does not have the dictionary.
+        If the family is none of square markers, or OpenCV does not have it.
     """
 
-    name: str
-    settings: DetectorSettings = field(default_factory=DetectorSettings)
+    settings: DetectorSettings
 
     def __post_init__(self) -> None:
-        """Refuse a dictionary that is not there."""
+        """Refuse a family that is not there."""
         dictionary(self.family)
 
     @property
+    def name(self) -> str:
+        """Name in the registry, aruco or apriltag."""
+        return self.family.partition('_')[0]
+
+    @property
     def family(self) -> str:
-        """Name of the dictionary as a family of targets."""
-        return f'{self.name}_{getattr(self.settings.square, f"{self.name}_dictionary")}'
+        """Family of the markers."""
+        return self.settings.family
 
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the markers of one image; see `Detector`."""

@@ -1,0 +1,183 @@
+"""One identification: its settings, declared once, and the builder that every way in uses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ahf_ros.detectors import (
+    DETECTOR,
+    Detector,
+    DetectorSettings,
+    Drafter,
+    Refiner,
+    create_detector,
+    detector_name,
+    estimator,
+)
+from ahf_ros.filtering.identifier import Identifier
+from ahf_ros.filtering.settings import AdaptiveSettings
+from ahf_ros.filtering.trials import DetectorFunction
+from ahf_ros.settings.nested import updated
+from ahf_ros.settings.parameter import check_parameters, parameter
+from ahf_ros.target import Identification
+
+MAXIMUM_TARGETS = 100_000
+"""Maximum of N."""
+
+
+@dataclass(frozen=True, slots=True)
+class IdentificationSettings:
+    """Settings of one identification: which targets, how many, by which detector and search.
+
+    Attributes
+    ----------
+    detector : str
+        One of `ahf_ros.detectors.DETECTOR_NAMES`, or 'auto' for the detector of the family.
+    expected_targets : int
+        N, the number of coded targets in every image; 0 where unknown.
+    estimate_expected : bool
+        Whether to estimate N where it is unknown.
+    detection : DetectorSettings
+        What the targets look like.
+    adaptive : AdaptiveSettings
+        How a filter is searched for.
+
+    Raises
+    ------
+    ValueError
+        If a value is not accepted or does not fit the others.
+
+    Examples
+    --------
+    >>> from ahf_ros import DetectorSettings, IdentificationSettings
+    >>> IdentificationSettings(detection=DetectorSettings(family='aicon14')).detector
+    'auto'
+    """
+
+    detector: str = parameter(DETECTOR.default, DETECTOR.description, choices=DETECTOR.choices)
+    expected_targets: int = parameter(
+        0,
+        'N, the number of coded targets in every image; 0: unknown, and no filter is searched for '
+        'unless N is estimated.',
+        minimum=0,
+        maximum=MAXIMUM_TARGETS,
+    )
+    estimate_expected: bool = parameter(
+        False,
+        'Whether to estimate N where it is unknown, and to search for a filter that shows N '
+        'targets.',
+    )
+    detection: DetectorSettings = field(default_factory=DetectorSettings)
+    adaptive: AdaptiveSettings = field(default_factory=AdaptiveSettings)
+
+    def __post_init__(self) -> None:
+        """Refuse values that are not accepted."""
+        check_parameters(self)
+        self.check_detector()
+        if self.estimate_expected:
+            estimator(self.detection)
+
+    def check_detector(self) -> None:
+        """Refuse a detector that does not identify the family."""
+        detector_name(self.detector, self.detection.family)
+
+
+def create_identifier(
+    settings: IdentificationSettings | None = None,
+    detector: str | DetectorFunction | None = None,
+    *,
+    interrupt: Callable[[], None] | None = None,
+    **values: Any,
+) -> Identifier:
+    """Return what identifies one image after the other.
+
+    Parameters
+    ----------
+    settings : IdentificationSettings, optional
+        The defaults where None.
+    detector : str or callable, optional
+        Name of a detector, or a detector of your own: any function from an 8-bit image to a list
+        of `Target`. If it is also a `Refiner` or a `Drafter`, that is used.
+    interrupt : callable, optional
+        As for `Identifier`.
+    **values
+        Parameters that differ from `settings`, such as `family`, `expected_targets`, `threads`.
+
+    Raises
+    ------
+    ValueError
+        If a value is not accepted or does not fit the others.
+
+    Examples
+    --------
+    >>> from ahf_ros import SceneSettings, create_identifier, render
+    >>> scene = SceneSettings(width=320, height=240, targets=3, dot_radius=8, family='aicon12')
+    >>> identifier = create_identifier(family='aicon12', expected_targets=3)
+    >>> identifier.identify(render(scene).image).count
+    3
+    """
+    if isinstance(detector, str):
+        values, detector = values | {'detector': detector}, None
+    settings = updated(settings or IdentificationSettings(), values)
+    used = detector or create_detector(settings.detector, settings.detection)
+    estimate = None
+    if settings.estimate_expected:
+        _check_family(used, settings.detection)
+        estimate = estimator(settings.detection)
+    return Identifier(
+        used,
+        settings.adaptive,
+        expected_targets=settings.expected_targets,
+        refine=used.refine if isinstance(used, Refiner) else None,
+        draft=used.draft if isinstance(used, Drafter) else None,
+        estimate=estimate,
+        interrupt=interrupt,
+    )
+
+
+def identify(
+    image: np.ndarray,
+    detector: str | DetectorFunction | None = None,
+    settings: IdentificationSettings | None = None,
+    **values: Any,
+) -> Identification:
+    """Identify the coded targets of one image.
+
+    Parameters
+    ----------
+    image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
+        Gray values, increasing with light.
+    detector, settings, **values
+        As for `create_identifier`.
+
+    Returns
+    -------
+    Identification
+
+    Raises
+    ------
+    ValueError
+        If the image or a value is not accepted.
+
+    Examples
+    --------
+    >>> from ahf_ros import SceneSettings, identify, render
+    >>> rendering = render(SceneSettings(width=320, height=240, targets=3, dot_radius=8))
+    >>> found = identify(rendering.image, expected_targets=3)
+    >>> [it.id for it in found.targets] == [it.id for it in rendering.targets]
+    True
+    """
+    return create_identifier(settings, detector, **values).identify(image)
+
+
+def _check_family(detector: DetectorFunction, settings: DetectorSettings) -> None:
+    """Refuse to count targets of another family than that of the detector."""
+    if isinstance(detector, Detector) and detector.family != settings.family:
+        raise ValueError(
+            f'family is {settings.family!r}, accepted with estimate_expected is that of the '
+            f'detector, {detector.family!r}'
+        )
