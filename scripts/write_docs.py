@@ -1,6 +1,6 @@
-"""Write the tables in README.md: parameters from the code, figures from docs/figures/*.json.
+"""Write the tables of the documentation: parameters from the code, results from docs/figures/.
 
-The commands that make these files are in docs/figures.md.
+docs/figures.md has the commands that make these files.
 """
 
 from __future__ import annotations
@@ -16,14 +16,13 @@ from ahf_ros.settings.parameter import Parameter
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
 
 ROOT = Path(__file__).resolve().parent.parent
-README = ROOT / 'README.md'
 AMBIENT = ('0.3', '0.12', '0.04')
 AHF_LIGHTS = ('normal 0.3', 'stripe 0.3', 'stripe 0.12', 'lattice 0.3', 'lattice 0.12')
 
 
 def parameters() -> str:
     """Return the parameters of the node `detector`."""
-    rows = [('parameter', 'default', 'accepted', '')]
+    rows = [('parameter', 'default', 'accepted', 'meaning')]
     rows += [parameter(item) for item in flat_parameters(DetectorNodeSettings)]
     return table(rows)
 
@@ -44,21 +43,21 @@ def lights() -> str:
     return table(rows)
 
 
-def filters() -> str:
-    """Return what `traditional` identifies without and with AHF."""
-    alone, driven = read('traditional'), read('traditional_ahf')
-    rows = [('light', '`traditional`', 'with AHF')]
-    rows += [(of, cell(alone['light', of]), cell(driven['light', of])) for of in AHF_LIGHTS]
+def summary() -> str:
+    """Return what `traditional` identifies without and with AHF, and `ring`."""
+    figures = [read(name) for name in ('traditional', 'traditional_ahf', 'ring')]
+    rows = [('light', '`traditional`', '`traditional` with AHF', '`ring`')]
+    rows += [(light, *(cell(of['light', light]) for of in figures)) for light in AHF_LIGHTS]
     return table(rows)
 
 
 def others() -> str:
     """Return what `ring` identifies in other views, of other sizes, and in photographs."""
     names = {
-        'tilt': 'view from the side',
-        'radius': 'radius of the dots',
+        'tilt': 'oblique view',
+        'radius': 'radius of the dot',
         'polarity': 'bright targets',
-        'no targets': '100 marks that are no targets',
+        'no targets': '100 distractors, no target',
         'photographs': 'ten photographs',
     }
     rows = [('', '', 'right', 'of', 'wrong', 'false', 'RMSE XY px')]
@@ -91,17 +90,17 @@ def table(rows: list[tuple[str, ...]]) -> str:
     return head + '|---' * len(rows[0]) + '|\n' + ''.join(body)
 
 
-TABLES: dict[str, Callable[[], str]] = {
-    'parameters': parameters,
-    'lights': lights,
-    'filters': filters,
-    'others': others,
+PAGES: dict[str, dict[str, Callable[[], str]]] = {
+    'README.md': {'summary': summary},
+    'docs/parameters.md': {'parameters': parameters},
+    'docs/figures.md': {'lights': lights, 'others': others},
 }
+"""The tables of each page."""
 
 
-def with_tables(text: str) -> str:
-    """Return the text of README.md with tables that are current."""
-    for name, make in TABLES.items():
+def with_tables(page: str, text: str) -> str:
+    """Return the text of a page with tables that are current."""
+    for name, make in PAGES[page].items():
         begin, end = f'<!-- {name} -->\n', f'<!-- end of {name} -->\n'
         before, rest = text.split(begin)
         _, after = rest.split(end)
@@ -110,4 +109,6 @@ def with_tables(text: str) -> str:
 
 
 if __name__ == '__main__':
-    README.write_text(with_tables(README.read_text()))
+    for name in PAGES:
+        path = ROOT / name
+        path.write_text(with_tables(name, path.read_text()))

@@ -1,0 +1,110 @@
+"""`ring` with one constant changed, on the scenes in a folder; see `benchmarks.sensitivity`.
+
+    python -m benchmarks.changed_constant FOLDER [MODULE.NAME VALUE]
+
+The constant is changed in the source of its module as that is imported. So values that are
+computed from it, default arguments and names imported into other modules change as well.
+"""
+
+from __future__ import annotations
+
+import ast
+import json
+import sys
+from collections.abc import Sequence
+from importlib.abc import MetaPathFinder
+from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
+from pathlib import Path
+from types import CodeType, ModuleType
+from typing import Any
+
+
+class Changed(SourceFileLoader):
+    """Loads a module with one of its constants changed."""
+
+    name_of_constant = ''
+    value: float = 0.0
+
+    def get_code(self, fullname: str) -> CodeType:
+        """Return the code of the module, compiled from its source."""
+        tree = ast.parse(self.get_data(self.path))
+        found = [node for node in tree.body if assigned(node) == self.name_of_constant]
+        if len(found) != 1:
+            raise ValueError(f'{fullname} has no constant {self.name_of_constant}')
+        found[0].value = ast.Constant(self.value)  # type: ignore[attr-defined]
+        return compile(ast.fix_missing_locations(tree), self.path, 'exec')
+
+
+class Finder(MetaPathFinder):
+    """Finds one module and has it loaded with a constant changed."""
+
+    def __init__(self, constant: str, value: float) -> None:
+        self._module, _, self._name = constant.rpartition('.')
+        self._value = value
+        self.used = False
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        """Return the specification of the module, and nothing for any other."""
+        if fullname != self._module:
+            return None
+        spec = PathFinder.find_spec(fullname, path, target)
+        if spec is None or spec.origin is None:
+            return None
+        loader = Changed(fullname, spec.origin)
+        loader.name_of_constant, loader.value = self._name, self._value
+        spec.loader = loader
+        self.used = True
+        return spec
+
+
+def assigned(node: ast.stmt) -> str:
+    """Return the name that a statement assigns to, where it is a single one."""
+    targets = node.targets if isinstance(node, ast.Assign) else []
+    if isinstance(node, ast.AnnAssign) and node.value is not None:
+        targets = [node.target]
+    return targets[0].id if len(targets) == 1 and isinstance(targets[0], ast.Name) else ''
+
+
+def results(folder: Path) -> dict[str, Any]:
+    """Return what `ring` identifies in all scenes of a folder together."""
+    # Imported only now, so that the constant is changed already.
+    import numpy as np
+
+    from ahf_ros.detectors.contract import DetectorSettings
+    from ahf_ros.detectors.ring.detector import RingDetector
+    from ahf_ros.evaluation import score, total
+    from ahf_ros.target import TrueTarget
+
+    detector = RingDetector(DetectorSettings(polarity='dark'))
+    scores = []
+    for path in sorted(folder.glob('*.npz')):
+        with np.load(path) as scene:
+            truth = [TrueTarget(int(number), x, y) for number, x, y in scene['truth'].tolist()]
+            scores.append(score(truth, detector(scene['image'])))
+    figures = total(scores)
+    return {
+        'right': figures.right,
+        'wrong': figures.wrong,
+        'false': figures.false_positives,
+        'rmse': figures.rmse[2] if figures.rmse else None,
+    }
+
+
+def main() -> None:
+    """Print the results as JSON."""
+    folder, *change = sys.argv[1:]
+    if change:
+        constant, value = change
+        number = float(value)
+        finder = Finder(constant, int(number) if value.isdigit() else number)
+        sys.meta_path.insert(0, finder)
+    found = results(Path(folder))
+    if change and not finder.used:
+        raise SystemExit(f'{constant} is not in a module that the detector imports')
+    print(json.dumps(found))
+
+
+if __name__ == '__main__':
+    main()

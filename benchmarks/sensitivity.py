@@ -1,0 +1,187 @@
+"""What the results of `ring` owe to each of its constants: halved, and doubled.
+
+    python -m benchmarks.sensitivity [MODULE.NAME ...] [--count 10]
+
+Without names, all numbers that `ring` and `features` give a name to are screened on small scenes,
+and those whose change costs most are measured on more and larger ones. All scenes have seeds for
+development and little ambient light, where the detector is at its limits.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import json
+import re
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.progress import track
+
+from ahf_ros.synthetic.scene import SceneSettings, render
+from benchmarks.changed_constant import assigned
+
+ROOT = Path(__file__).resolve().parent.parent
+ROOMS = ('features', 'detectors/ring')
+OTHERS = {'blobs', 'counting', 'grey_gradient', 'traditional'}
+"""Modules in these rooms that `ring` does without."""
+
+LIGHTS = ('stripe', 'fine_stripe', 'lattice', 'dense_lattice')
+FACTORS = (0.5, 2.0)
+PATIENCE = 600.0
+"""Longest time for the scenes with one constant changed, s."""
+
+Scenes = Sequence[SceneSettings]
+
+SMALL: Scenes = [
+    SceneSettings(width=1600, height=1066, targets=12, distractors=4, light=light, ambient=0.04)
+    for light in LIGHTS
+]
+"""For screening."""
+
+LARGE: Scenes = [
+    SceneSettings(
+        width=2000,
+        height=1500,
+        targets=20,
+        distractors=8,
+        light=light,
+        ambient=ambient,
+        seed=seed,
+    )
+    for light in LIGHTS
+    for ambient in (0.04, 0.12)
+    for seed in (1, 2)
+]
+"""For the table."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What was identified in all scenes; None for everything where the detector failed."""
+
+    right: int | None = None
+    wrong: int | None = None
+    false: int | None = None
+    rmse: float | None = None
+
+    def loss(self) -> float:
+        """Return one number by which outcomes compare: a wrong ID is as bad as three missed."""
+        if self.right is None or self.wrong is None or self.false is None:
+            return 1000.0
+        return 3.0 * (self.wrong + self.false) - self.right + 10.0 * (self.rmse or 0.0)
+
+    def __str__(self) -> str:
+        """Return the cell of a table."""
+        if self.right is None:
+            return 'fails'
+        others = [(self.wrong, 'wrong'), (self.false, 'false')]
+        words = [str(self.right), *(f'{count} {word}' for count, word in others if count)]
+        return ', '.join(words) + (f' ({self.rmse:.3f})' if self.rmse is not None else '')
+
+
+def constants() -> Iterator[tuple[str, float]]:
+    """Yield the name and the value of every constant of `ring` that is one number."""
+    for room in ROOMS:
+        for file in sorted((ROOT / 'ahf_ros' / room).glob('*.py')):
+            if file.stem in OTHERS:
+                continue
+            module = '.'.join(file.relative_to(ROOT).with_suffix('').parts)
+            for name in map(assigned, ast.parse(file.read_text()).body):
+                if not re.fullmatch('_?[A-Z][A-Z0-9_]*', name):
+                    continue
+                value = getattr(import_module(module), name)
+                if type(value) in (int, float) and value:
+                    yield f'{module}.{name}', value
+
+
+def written(scenes: Scenes, folder: Path) -> Path:
+    """Render scenes with their truth into a folder."""
+    folder.mkdir()
+    for number, settings in enumerate(scenes):
+        scene = render(settings)
+        truth = [(target.id, target.x, target.y) for target in scene.targets]
+        np.savez(folder / f'{number:03}.npz', image=scene.image, truth=np.array(truth))
+    return folder
+
+
+def outcome(folder: Path, constant: str = '', value: float = 0.0) -> Outcome:
+    """Return what `ring` identifies with a constant changed, in a process of its own."""
+    change = (constant, repr(value)) if constant else ()
+    try:
+        done = subprocess.run(
+            [sys.executable, '-m', 'benchmarks.changed_constant', str(folder), *change],
+            cwd=ROOT,
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE,
+        )
+    except subprocess.TimeoutExpired:
+        return Outcome()
+    return Outcome(**json.loads(done.stdout)) if done.returncode == 0 else Outcome()
+
+
+def changed(value: float, factor: float) -> float:
+    """Return a value times a factor; integers stay integers, and differ."""
+    if isinstance(value, int):
+        return round(value * factor) or 1
+    return value * factor
+
+
+def measured(
+    folder: Path, names: dict[str, float], what: str
+) -> tuple[Outcome, dict[str, list[Outcome]]]:
+    """Return the outcome as it is, and those with each constant halved and doubled."""
+    console = Console(stderr=True)
+    tried = {
+        name: [outcome(folder, name, changed(value, factor)) for factor in FACTORS]
+        for name, value in track(names.items(), what, console=console, disable=not names)
+    }
+    return outcome(folder), tried
+
+
+def table(names: dict[str, float], default: Outcome, tried: dict[str, list[Outcome]]) -> str:
+    """Return outcomes as Markdown."""
+    lines = ['| constant | value | halved | doubled |', '|---|---|---|---|']
+    lines.append(f'| none changed | | {default} | {default} |')
+    for name, outcomes in tried.items():
+        short = name.removeprefix('ahf_ros.')
+        lines.append(f'| `{short}` | {names[name]:g} | {" | ".join(map(str, outcomes))} |')
+    return '\n'.join(lines)
+
+
+def main() -> None:
+    """Print the table of the constants to which results are most sensitive."""
+    parser = argparse.ArgumentParser(description=__doc__.split('\n', 1)[0])
+    parser.add_argument('names', nargs='*', metavar='MODULE.NAME', help='default: screen all')
+    parser.add_argument('--count', type=int, default=10, help='rows of the table (default: 10)')
+    options = parser.parse_args()
+    values = dict(constants())
+    unknown = set(options.names) - set(values)
+    if unknown:
+        parser.error(f'no such constants: {", ".join(sorted(unknown))}')
+    with tempfile.TemporaryDirectory() as folder:
+        names = {name: values[name] for name in options.names}
+        if not names:
+            small = written(SMALL, Path(folder, 'small'))
+            default, tried = measured(small, values, f'{len(values)} constants')
+            print(table(values, default, tried), end='\n\n', file=sys.stderr)
+            costs = {name: max(one.loss() for one in of) for name, of in tried.items()}
+            most = sorted(costs, key=lambda name: -costs[name])[: options.count]
+            names = {name: values[name] for name in most}
+        large = written(LARGE, Path(folder, 'large'))
+        default, tried = measured(large, names, 'the table')
+        total = sum(settings.targets for settings in LARGE)
+        print(f'Targets with the right ID, of {total}, and the RMSE of their centres in px.\n')
+        print(table(names, default, tried))
+
+
+if __name__ == '__main__':
+    main()
