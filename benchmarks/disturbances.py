@@ -24,7 +24,7 @@ from rich.console import Console
 from rich.progress import track
 
 from ahf_ros.codes.ring import FAMILY_NAMES, family
-from ahf_ros.detectors import DetectorSettings, create
+from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.detectors.contract import Detector
 from ahf_ros.evaluation import FALSE, RIGHT, WRONG, judge
 from ahf_ros.interchange.image_files import read_image
@@ -83,7 +83,7 @@ class Count:
 
 def detector(name: str, target_family: str) -> Detector:
     """Return a detector of targets of a family."""
-    return create(name, DetectorSettings(family=target_family))
+    return create_detector(name, DetectorSettings(family=target_family))
 
 
 def counted(detect: Detector, scenes: Iterator[Scene]) -> Count:
