@@ -1,10 +1,12 @@
-"""Fit the weights of the confidence of ring targets, and show how far it can be trusted.
+"""How far the confidence of ring targets can be trusted, and the weights that it rests on.
 
-Scenes under all lights are rendered, every plausible reading of the ring detector is compared with
-the truth, and two logistic regressions are fitted to the readings of the development seeds. The
-reliability of the weights in force is that of the test seeds, which the fit never sees.
+Scenes under all lights are rendered, and every plausible reading of the ring detector is compared
+with the truth. The table shows the reliability of the weights in force. With --fit, two logistic
+regressions are fitted to the readings instead, and written to the file of fitted weights. Seeds
+from 101 on are for tests, those below for development.
 
-    python -m benchmarks.confidence [--development 1 2 3] [--test 101 102]
+    python -m benchmarks.confidence [--seeds 101 102]
+    python -m benchmarks.confidence --fit 1 2 3
 """
 
 from __future__ import annotations
@@ -16,12 +18,13 @@ from itertools import pairwise, product
 import numpy as np
 from rich.progress import track
 
-from ahf_ros.codes.ring import FAMILY_NAMES, family
+from ahf_ros.codes.ring import FAMILY_NAMES, canonical, family
 from ahf_ros.detectors.contract import DetectorSettings
-from ahf_ros.detectors.ring.decoding import OF_TARGET, canonical, confidence
-from ahf_ros.detectors.ring.detector import RingDetector
+from ahf_ros.detectors.ring.confidence import OF_TARGET, confidence
+from ahf_ros.detectors.ring.detector import find_hypotheses
 from ahf_ros.synthetic.patterns import LIGHT_NAMES, benchmark_lights
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
+from benchmarks.weights import write_weights
 
 NEAR = 5.0
 """Largest distance of a target from its truth, px."""
@@ -42,12 +45,12 @@ def readings(scene: Rendering) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     of_target, right : ndarray of bool, shape (k,)
     """
     code = family(scene.settings.family)
-    found = RingDetector(DetectorSettings(family=code.name)).hypotheses(scene.image)
-    found = found.chosen(found.words > 0)
-    _, numbers = canonical(found.words, code)
-    x, y, number = np.array([(target.x, target.y, target.id) for target in scene.targets]).T
-    near = np.hypot(found.frames[:, :1, 2] - x, found.frames[:, 1:2, 2] - y) < NEAR
-    return found.features, near.any(axis=1), (near & (numbers[:, None] == number)).any(axis=1)
+    read = find_hypotheses(scene.image, DetectorSettings(family=code.name))
+    read = read.select(read.words > 0)
+    _, ids = canonical(read.words, code)
+    x, y, true = np.array([(target.x, target.y, target.id) for target in scene.targets]).T
+    near = np.hypot(read.frames[:, :1, 2] - x, read.frames[:, 1:2, 2] - y) < NEAR
+    return read.features, near.any(axis=1), (near & (ids[:, None] == true)).any(axis=1)
 
 
 def scenes(seed: int) -> Iterator[SceneSettings]:
@@ -94,32 +97,42 @@ def logistic_regression(features: np.ndarray, right: np.ndarray) -> np.ndarray:
     return np.concatenate([[weights[0] - slopes @ mean], slopes])
 
 
+def fitted(seeds: Iterable[int]) -> dict[str, np.ndarray]:
+    """Return intercepts and weights of both regressions on the scenes of some seeds."""
+    features, of_target, right = gathered(seeds)
+    return {
+        'target': np.round(logistic_regression(features[:, :OF_TARGET], of_target), 2),
+        'word': np.round(
+            logistic_regression(features[of_target, OF_TARGET:], right[of_target]), 2
+        ),
+    }
+
+
+def reliability(seeds: Iterable[int]) -> Iterator[str]:
+    """Yield the lines of the table of confidences and how often they are right."""
+    features, _, right = gathered(seeds)
+    stated = confidence(features)
+    yield '| confidence | readings | mean confidence | share right |'
+    yield '|---|---|---|---|'
+    for low, high in pairwise(CLASSES):
+        within = (stated >= low) & (stated < high)
+        if within.any():
+            yield (
+                f'| {low} to {high} | {within.sum()} | {stated[within].mean():.4f} '
+                f'| {right[within].mean():.4f} |'
+            )
+
+
 def main() -> None:
-    """Print the weights and the reliability as Markdown."""
+    """Write weights, or print their reliability as Markdown."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument('--development', type=int, nargs='*', default=[1, 2, 3])
-    parser.add_argument('--test', type=int, nargs='*', default=[101, 102])
+    parser.add_argument('--fit', type=int, nargs='+', metavar='SEED', help='fit the weights anew')
+    parser.add_argument('--seeds', type=int, nargs='+', default=[101, 102])
     options = parser.parse_args()
-    if options.development:
-        features, of_target, right = gathered(options.development)
-        told = {
-            'target': logistic_regression(features[:, :OF_TARGET], of_target),
-            'word': logistic_regression(features[of_target, OF_TARGET:], right[of_target]),
-        }
-        for name, fitted in told.items():
-            weights = ', '.join(f'{weight:.2f}' for weight in fitted)
-            print(f'Intercept and weights that tell a {name}: {weights}\n')
-    if options.test:
-        features, _, right = gathered(options.test)
-        stated = confidence(features)
-        print('| confidence | readings | mean confidence | share right |\n|---|---|---|---|')
-        for low, high in pairwise(CLASSES):
-            chosen = (stated >= low) & (stated < high)
-            if chosen.any():
-                print(
-                    f'| {low} to {high} | {chosen.sum()} | {stated[chosen].mean():.4f} '
-                    f'| {right[chosen].mean():.4f} |'
-                )
+    if options.fit:
+        write_weights('confidence', options.fit, fitted(options.fit))
+    else:
+        print('\n'.join(reliability(options.seeds)))
 
 
 if __name__ == '__main__':

@@ -3,8 +3,8 @@
 The first table is of scenes under all lights, as in benchmarks/identification.py, and of walls
 without targets. The second one compares AHF with N given and with N estimated. With --fit, scenes
 of all kinds and sizes are rendered instead, some targets half covered, and a logistic regression
-is fitted to their dots: the weights of `target_probability`. Seeds from 101 on are for tests,
-those below for development.
+is fitted to their dots, and written to the file of fitted weights. Seeds from 101 on are for
+tests, those below for development.
 
     python -m benchmarks.counting [--seeds 101] [--detector traditional]
     python -m benchmarks.counting --fit 1 2 3 4 5 6 7 8
@@ -26,7 +26,7 @@ from rich.progress import track
 from ahf_ros.codes.ring import FAMILY_NAMES, family
 from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.detectors.ring.counting import estimate_count, target_features, terms
-from ahf_ros.detectors.ring.detector import RingDetector
+from ahf_ros.detectors.ring.detector import RingDetector, find_hypotheses
 from ahf_ros.evaluation import score
 from ahf_ros.features import frame
 from ahf_ros.session import identify
@@ -34,6 +34,7 @@ from ahf_ros.synthetic.patterns import benchmark_lights
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 from benchmarks.confidence import logistic_regression
 from benchmarks.filter import machine
+from benchmarks.weights import write_weights
 
 SEARCHED = (('normal', 0.3), ('stripe', 0.3), ('stripe', 0.12), ('lattice', 0.3))
 """Lights under which AHF is driven."""
@@ -113,7 +114,7 @@ def dots(scene: Rendering) -> tuple[np.ndarray, np.ndarray]:
     """Return the features, shape (k, n), of all dots, and whether each is a target's middle."""
     image = half_covered(scene)
     code = family(scene.settings.family)
-    found = RingDetector(DetectorSettings(family=code.name)).hypotheses(image)
+    found = find_hypotheses(image, DetectorSettings(family=code.name))
     major, minor, _ = frame.ellipse_axes(found.frames)
     true = [(target.x, target.y, target.semi_major) for target in scene.targets]
     x, y, size = np.array(true).reshape(-1, 3).T
@@ -124,13 +125,13 @@ def dots(scene: Rendering) -> tuple[np.ndarray, np.ndarray]:
 
 
 def fitted(seeds: Iterable[int]) -> dict[str, np.ndarray]:
-    """Return the constants of the regression on the scenes of some seeds, by their names."""
+    """Return the numbers of the regression on the scenes of some seeds, by their names."""
     wanted = [scene for seed in seeds for scene in training_scenes(seed)]
     parts = [dots(render(scene)) for scene in progress(wanted)]
     features, of_target = (np.concatenate(part) for part in zip(*parts, strict=True))
-    means, spreads = (np.round(of(features, axis=0), 3) for of in (np.mean, np.std))
-    weights = logistic_regression(terms(features, means, spreads)[:, 1:], of_target)
-    return {'_MEANS': means, '_SPREADS': spreads, '_WEIGHTS': np.round(weights, 2)}
+    means, deviations = (np.round(of(features, axis=0), 3) for of in (np.mean, np.std))
+    weights = logistic_regression(terms(features, means, deviations)[:, 1:], of_target)
+    return {'means': means, 'deviations': deviations, 'weights': np.round(weights, 2)}
 
 
 def counted(seeds: Sequence[int]) -> list[str]:
@@ -199,15 +200,14 @@ def progress(jobs: Sequence) -> Iterable:
 
 
 def main() -> None:
-    """Print weights, or the tables as Markdown."""
+    """Write weights, or print the tables as Markdown."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument('--fit', type=int, nargs='+', metavar='SEED', help='fit the weights anew')
     parser.add_argument('--seeds', type=int, nargs='+', default=[101])
     parser.add_argument('--detector', nargs='*', choices=SEARCHING, default=SEARCHING[:1])
     options = parser.parse_args()
     if options.fit:
-        for name, values in fitted(options.fit).items():
-            print(f'{name} = np.array({values.tolist()})')
+        write_weights('counting', options.fit, fitted(options.fit))
         return
     facts = machine()
     seeds = ', '.join(map(str, options.seeds))

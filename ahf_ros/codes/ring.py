@@ -137,13 +137,31 @@ def smallest_rotation(words: Any, bits: int) -> np.ndarray:
     return smallest
 
 
+def canonical(words: np.ndarray, family: Family) -> tuple[np.ndarray, np.ndarray]:
+    """Return the canonical code words and the IDs of words of a family in any rotation.
+
+    Parameters
+    ----------
+    words : ndarray of int64, shape (k,)
+        Each a word of the family.
+    family : Family
+
+    Returns
+    -------
+    codes : ndarray of int64, shape (k,)
+    ids : ndarray of int64, shape (k,)
+    """
+    codes = smallest_rotation(words, family.bits)
+    return codes, np.searchsorted(family.words, codes) + 1
+
+
 def sectors(word: int, bits: int) -> np.ndarray:
     """Return the colours of the sectors of a band.
 
     Parameters
     ----------
     word : int
-        A code word, in the rotation wanted.
+        A code word, in any rotation.
     bits : int
         Length of the word.
 

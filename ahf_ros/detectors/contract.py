@@ -145,6 +145,6 @@ class DetectorSettings:
             )
 
     @property
-    def signs(self) -> tuple[int, ...]:
+    def polarities(self) -> tuple[int, ...]:
         """1 where dots may be dark, -1 where they may be bright."""
         return {'auto': (1, -1), 'dark': (1,), 'bright': (-1,)}[self.polarity]

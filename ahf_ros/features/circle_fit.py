@@ -8,36 +8,41 @@ would move all edges to the same side, is taken from the profiles and corrected 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ahf_ros.features import frame
-from ahf_ros.features.circles import Circles, dot_circles, ring_circles
-from ahf_ros.features.edge_weights import median, trust_edges
+from ahf_ros.features.array_record import ArrayRecord
+from ahf_ros.features.circles import Circles
+from ahf_ros.features.edge_weights import weigh_edges
+from ahf_ros.features.light_slope import LightSlope, common_slope, smooth_slopes
 from ahf_ros.features.profiles import BLURS, CORRELATION, USUAL_BLUR, Edges, measure_edges
-
-__all__ = ['Circles', 'Fit', 'dot_circles', 'fit_circles', 'ring_circles']
+from ahf_ros.features.robust import geman_mcclure, geman_mcclure_gain, median, reweight, spread
 
 _NOISE = 1.0  # of gray values, of 255; the fit scales it to what it finds
-_OUTLIER = 3.0  # times the usual distance from the circle that quarters the trust
+_MINIMUM_STEP = 1.0  # gray values, that the error of an edge is computed from
+_OUTLIER = 3.0  # times the usual distance from the circle that quarters the weight
+_MINIMUM_SPREAD = 0.5  # that counts as usual, in deviations that noise alone would cause
 _ROUNDS = 4  # of robust least squares
+_PLACED, _PLACED_RADII = 4 / 3, 0.08  # error of an edge in its place: in outliers, and dot radii
+_MINIMUM_GAIN = 0.2  # where many errors lie beyond the turning point of the weight function
+_MAXIMUM_CHANGE = 0.3  # of a frame in one measurement, dot radii
 _LIGHT_REACH = 0.3  # standard deviation of the window in which the light is even, dot radii
-_LIGHT_PRIOR = 5.0  # px of trusted edges that say as much of the slope as the prior, none, does
+_LIGHT_PRIOR = 5.0  # px of whole edges that say as much of the slope as the prior, none, does
 _SHARPENED = 0.03  # slope of all edges that makes those of single ones doubtful, 1/px
-_LEAST_SLOPE_ERROR = 0.002  # that counts as usual, 1/px
 _UNEVEN_LIGHT = 0.011  # usual error of slopes from which the variance of a centre is twice, 1/px
-_PRIOR_SCALE = 0.003  # standard deviation of the printed proportions of band and dot
+_PRIOR_SCALE = 0.003  # standard deviation of the printed proportions of circles and dot
 _PRIOR_PERSPECTIVE = 0.02  # of the projective part, in 1 a dot radius
 _PRIOR_SHIFT = 1.0  # of the shift of edges towards the dark side, px
 _WEAK_PRIOR = 1e-6
 _SYSTEMATIC = 0.001  # standard deviation of what pixels and interpolation do to a centre, px
+_NO_WEIGHT = 1e-9  # instead of a sum of no weights
 
 
 @dataclass(frozen=True, slots=True)
-class Fit:
-    """Frames fitted to edges.
+class Fit(ArrayRecord):
+    """Frames of k targets fitted to edges.
 
     Attributes
     ----------
@@ -63,16 +68,6 @@ class Fit:
     deviation: np.ndarray
     covariance: np.ndarray
     blur: np.ndarray
-
-    def chosen(self, which: np.ndarray) -> Fit:
-        """Return the fits of some of the frames."""
-        return Fit(*(getattr(self, item.name)[which] for item in fields(self)))
-
-    @staticmethod
-    def joined(parts: Sequence[Fit]) -> Fit:
-        """Return the fits of all the frames, one part after the other."""
-        names = [item.name for item in fields(Fit)]
-        return Fit(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
 def fit_circles(
@@ -110,7 +105,8 @@ def fit_circles(
         edges = measure_edges(gray, frames, circles, blur, reach)
         blur = np.clip(blur + median(edges.softness, edges.visible, 0.0), *BLURS)
         changes, fit = _solve(frames, circles, edges, blur, projective)
-        frames = frame.moved(frames, np.clip(changes[:, : 7 if projective else 5], -0.3, 0.3))
+        changes = np.clip(changes, -_MAXIMUM_CHANGE, _MAXIMUM_CHANGE)
+        frames = frame.moved(frames, changes[:, : 7 if projective else 5])
     affine = frame.local_affine(frames)
     covariance = affine @ fit.covariance @ affine.transpose(0, 2, 1)
     covariance += _SYSTEMATIC**2 * np.eye(2)
@@ -121,79 +117,51 @@ def _solve(
     frames: np.ndarray, circles: Circles, edges: Edges, blur: np.ndarray, projective: bool
 ) -> tuple[np.ndarray, Fit]:
     """Return the changes of the frames that bring the circles onto the edges."""
-    expected = edges.visible
-    trusted = trust_edges(edges)
-    seen, trust = trusted.seen, trusted.trust
-    light = _light(edges, trust, circles)
+    own = weigh_edges(edges)
+    light = _light(edges, own.weights, circles)
     displacement = (edges.offset - edges.sensitivity * light.slope) / edges.scale
     noise = _NOISE * np.sqrt(2 * np.sqrt(np.pi) * USUAL_BLUR)
-    deviation = noise / np.maximum(edges.bright - edges.dark, 1.0) / edges.scale
+    deviation = noise / np.maximum(edges.bright - edges.dark, _MINIMUM_STEP) / edges.scale
     model = _Model(circles, edges.scale, projective)
-    weights = trust / deviation**2
-    robust = weights
-    for _ in range(_ROUNDS):
-        changes, normal = model.solve(displacement, robust)
-        errors = displacement - model.displacement(changes)
-        relative = np.abs(errors) / deviation
-        spread = np.maximum(1.4826 * median(relative, seen), 0.5)[:, None]
-        doubt = (relative / (_OUTLIER * spread)) ** 2
-        robust = weights / (1 + doubt) ** 2
-    placed = seen & (relative < 4 * spread) & (np.abs(errors) < 0.08)
-    share = placed.sum(axis=1) / np.maximum(expected.sum(axis=1), 1)
+
+    def solve(weights: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
+        changes, normal = model.solve(displacement, weights)
+        return (changes, normal), np.abs(displacement - model.displacement(changes)) / deviation
+
+    weights = own.weights / deviation**2
+    fitted = reweight(
+        solve, weights, lambda sizes: _OUTLIER * spread(sizes, own.seen, _MINIMUM_SPREAD), _ROUNDS
+    )
+    changes, normal = fitted.solution
+    errors = displacement - model.displacement(changes)
+    placed = own.seen & (fitted.errors < _PLACED) & (np.abs(errors) < _PLACED_RADII)
+    share = placed.sum(axis=1) / np.maximum(edges.visible.sum(axis=1), 1)
     squares = np.where(placed, errors * edges.scale, 0) ** 2
     scatter = np.sqrt(squares.sum(axis=1) / np.maximum(placed.sum(axis=1), 1))
     # What an error changes is not its weight times the error, but the derivative of that.
-    gain = (weights * (1 - 3 * doubt) / (1 + doubt) ** 3).sum(axis=1)
-    gain = np.maximum(gain / np.maximum(robust.sum(axis=1), 1e-9), 0.2)
-    influence = model.influence(normal) * (robust / gain[:, None])[:, None]
+    gain = geman_mcclure_gain(weights, fitted.errors).sum(axis=1)
+    gain = np.maximum(gain / np.maximum(fitted.weights.sum(axis=1), _NO_WEIGHT), _MINIMUM_GAIN)
+    influence = model.influence(normal) * (fitted.weights / gain[:, None])[:, None]
     parts = influence * errors[:, None]
     parts -= light.influence(influence * (edges.sensitivity / edges.scale)[:, None])
-    used = trust / (1 + doubt) ** 2
+    used = geman_mcclure(own.weights, fitted.errors)
     covariance = _covariance(parts, used, edges.spacing, normal.shape[1])
     # Where slopes differ that much from their neighbours, light is no slope within a profile.
-    uneven = (used * light.errors**2).sum(axis=1) / np.maximum(used.sum(axis=1), 1e-9)
+    total = np.maximum(used.sum(axis=1), _NO_WEIGHT)
+    uneven = (used * light.errors**2).sum(axis=1) / total
     covariance *= (1 + np.minimum(uneven / _UNEVEN_LIGHT**2, 1))[:, None, None]
-    bright = median(np.maximum(edges.bright, 0), seen)
-    fit = Fit(frames, trusted.contrast, bright, share, scatter, covariance, blur)
-    return changes, fit
+    bright = median(np.maximum(edges.bright, 0), own.seen)
+    return changes, Fit(frames, own.contrast, bright, share, scatter, covariance, blur)
 
 
-@dataclass(frozen=True, slots=True)
-class _Light:
-    """The slope of the light along circles, smoothed."""
-
-    slope: np.ndarray  # (k, m), outwards, 1/px
-    errors: np.ndarray  # (k, m), of the slopes of the single profiles
-    weights: np.ndarray  # (k, m), of these
-    totals: np.ndarray  # (k, m), of the weights that a smoothed slope is made from
-    window: np.ndarray  # (m, m), what each profile adds to each smoothed slope
-
-    def influence(self, of_slopes: np.ndarray) -> np.ndarray:
-        """Return what the errors do, given what the smoothed slopes do, shape (k, n, m) both."""
-        of_profiles = (of_slopes / self.totals[:, None]) @ self.window.T
-        return of_profiles * (self.weights * self.errors)[:, None]
-
-
-def _light(edges: Edges, trust: np.ndarray, circles: Circles) -> _Light:
+def _light(edges: Edges, weights: np.ndarray, circles: Circles) -> LightSlope:
     """Return the slope of the light along the circles."""
-    # What all edges have towards their bright side is not the light's: the blur is another than
-    # that of the step, or edges were sharpened, and then none of their slopes is the light's.
-    common = (trust * circles.polarity * edges.slope).sum(axis=1)
-    common /= np.maximum(trust.sum(axis=1), 1e-9)
-    slopes = edges.slope - circles.polarity * common[:, None]
-    window = _window(circles)
-    seen = trust > 0
-    middle = median(slopes, seen)[:, None]
-    usual = np.maximum(median(np.abs(slopes - middle), seen), _LEAST_SLOPE_ERROR)[:, None]
+    common = common_slope(edges.slope, circles.polarity, weights)
     prior = _LIGHT_PRIOR / edges.scale.mean(axis=1, keepdims=True)
-    prior *= (1 + (common[:, None] / _SHARPENED) ** 2) ** 2
-    weights = trust
-    for _ in range(2):
-        totals = weights @ window + prior
-        smooth = (weights * slopes) @ window / totals
-        errors = slopes - smooth
-        used, weights = weights, trust / (1 + (errors / (3 * usual)) ** 2)
-    return _Light(smooth, errors, used, totals, window)
+    # Where edges were sharpened, none of their slopes is the light's.
+    prior *= (1 + (common / _SHARPENED) ** 2) ** 2
+    slopes = edges.slope - circles.polarity * common
+    return smooth_slopes(slopes, weights, _window(circles), prior)
 
 
 def _window(circles: Circles) -> np.ndarray:
@@ -208,7 +176,7 @@ def _window(circles: Circles) -> np.ndarray:
 
 
 def _covariance(
-    parts: np.ndarray, trust: np.ndarray, spacing: np.ndarray, unknowns: int
+    parts: np.ndarray, weights: np.ndarray, spacing: np.ndarray, unknowns: int
 ) -> np.ndarray:
     """Return the covariance of centres, dot radii^2, from what each edge's error does to them.
 
@@ -219,7 +187,8 @@ def _covariance(
     alike = np.ones_like(distance)
     for steps in range(1, 10):
         alike += 2 * np.maximum(1 - steps * distance, 0)
-    count = trust.sum(axis=1) ** 2 / np.maximum((trust**2 * alike).sum(axis=1), 1e-9)
+    squares = (weights**2 * alike).sum(axis=1)
+    count = weights.sum(axis=1) ** 2 / np.maximum(squares, _NO_WEIGHT)
     free = count / np.maximum(count - unknowns, 1)
     return free[:, None, None] * ((parts * alike[:, None]) @ parts.transpose(0, 2, 1))
 
@@ -228,23 +197,25 @@ class _Model:
     """How changes of k frames, and of what else is unknown, move their edges outwards.
 
     The unknowns are the changes in the order of `frame.displacement_basis`. In a projective model
-    the scale of the band, and the shift of all edges towards the dark side which the gamma of a
-    camera causes, follow.
+    the scale of each group of circles, and the shift of all edges towards the dark side which the
+    gamma of a camera causes, follow.
     """
 
     def __init__(self, circles: Circles, scale: np.ndarray, projective: bool) -> None:
         shared = frame.displacement_basis(circles.angles, circles.radii)
         own = np.zeros((len(scale), len(shared), 0))
-        prior: np.ndarray = np.full(9, _WEAK_PRIOR)
-        prior[5:7], prior[7:] = _PRIOR_PERSPECTIVE**-2, (_PRIOR_SCALE**-2, _PRIOR_SHIFT**-2)
+        prior: np.ndarray = np.full(5, _WEAK_PRIOR)
         if projective:
-            band = np.where(circles.radii > 1, circles.radii, 0)
-            self._shared = np.concatenate([shared, band[:, None]], axis=1)
+            groups = np.arange(1, circles.group.max(initial=0) + 1)
+            scales = np.where(circles.group[:, None] == groups, circles.radii[:, None], 0)
+            shared = np.concatenate([shared, scales], axis=1)
             own = (-circles.polarity / scale)[..., None]
+            deviations = [_PRIOR_PERSPECTIVE] * 2 + [_PRIOR_SCALE] * len(groups) + [_PRIOR_SHIFT]
+            prior = np.concatenate([prior, np.array(deviations) ** -2])
         else:
-            self._shared, prior = shared[:, :5], prior[:5]
-        self._own, self._prior = own, np.diag(prior)
-        products = self._shared[:, :, None] * self._shared[:, None]
+            shared = shared[:, :5]
+        self._shared, self._own, self._prior = shared, own, np.diag(prior)
+        products = shared[:, :, None] * shared[:, None]
         self._products = products.reshape(len(shared), -1)
 
     def solve(self, values: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

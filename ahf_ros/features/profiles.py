@@ -1,8 +1,8 @@
 """Edges measured in gray values, on profiles across the outlines of targets.
 
-Across each point of an outline a blurred step is fitted to the gray values. What the fit says
-about more than the place of the step tells later whether to trust it: its levels, the slope of the
-light beside it, and what it leaves unexplained.
+Across each point of an outline a blurred step is fitted to the gray values. Besides the offset of
+the step, the fit gives its levels, the slope of the light beside it and what it leaves
+unexplained, which tell later how much weight the edge deserves.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 
 from ahf_ros.features import frame
 from ahf_ros.features.circles import Circles
+from ahf_ros.features.sampling import sample_lines, within
 
 USUAL_BLUR = 0.8
 """Standard deviation of a step, px: a sharp lens, the area of a pixel and the interpolation."""
@@ -27,14 +28,15 @@ CORRELATION = 1.9
 
 _HALF_WIDTHS = np.array([0.0, 1.0, 1.3, 1.6, 2.0, 2.5, 3.0])  # of a profile, px
 _SAMPLES = 13  # of a profile
-_LARGEST_ASIDE = 0.8  # of the two lines of a profile, from its middle, px
+_FARTHEST, _SPACING = 0.8, 0.1  # of the offsets that are tried, half widths of a profile
+_MAXIMUM_ASIDE = 0.8  # of the two lines of a profile, from its middle, px
 _BLUR_STEP = 0.1
 _CONTRAST = 0.25  # usual gray value of dark over bright
-_LEAST_STEP = 1.0  # gray values, that a place is computed from
+_MINIMUM_STEP = 1.0  # gray values, that an offset is computed from
 
 
 @dataclass(frozen=True, slots=True)
-class Places:
+class OutlinePoints:
     """Where the outlines of k targets have edges, at m points each.
 
     Attributes
@@ -78,7 +80,7 @@ class Edges:
     residual : ndarray of float64
         Root mean square of what step, slope and blur do not explain, gray values.
     scale : ndarray of float64
-        As in `Places`, as is the next.
+        As in `OutlinePoints`, as is the next.
     spacing : ndarray of float64
     visible : ndarray of bool
         Whether an edge is expected and its profile lies in the image; what was measured is 0
@@ -114,7 +116,7 @@ def measure_edges(
         How far from a circle to look, dot radii.
     """
     circle = frame.circle_geometry(frames, circles.angles, circles.radii)
-    places = Places(
+    points = OutlinePoints(
         circle.points,
         circle.normals,
         circles.polarity,
@@ -122,43 +124,45 @@ def measure_edges(
         circles.spacing * circle.stretch,
         circle.curvature,
     )
-    return measure_places(gray, places, blur, reach)
+    return measure_outlines(gray, points, blur, reach)
 
 
-def measure_places(gray: np.ndarray, places: Places, blur: np.ndarray, reach: float) -> Edges:
+def measure_outlines(
+    gray: np.ndarray, outlines: OutlinePoints, blur: np.ndarray, reach: float
+) -> Edges:
     """Fit blurred steps to the gray values across the outlines of k targets.
 
     Parameters
     ----------
     gray : ndarray of float32, shape (height, width)
         Gray values from 0 to 255.
-    places : Places
+    outlines : OutlinePoints
     blur : ndarray of float64, shape (k,)
         Standard deviation of the steps, px. A wrong one costs precision, and moves nothing.
     reach : float
         How far from an outline to look, in its units.
     """
-    aside = np.minimum(places.spacing / 4, _LARGEST_ASIDE)
-    which = np.searchsorted(_HALF_WIDTHS, reach * places.scale, side='right') - 1
-    which[places.polarity == 0] = 0
-    ends = _HALF_WIDTHS[which, None] * places.normals
-    for end in (places.points - ends, places.points + ends):
-        which[~frame.within(end, gray.shape)] = 0
+    aside = np.minimum(outlines.spacing / 4, _MAXIMUM_ASIDE)
+    which = np.searchsorted(_HALF_WIDTHS, reach * outlines.scale, side='right') - 1
+    which[outlines.polarity == 0] = 0
+    ends = _HALF_WIDTHS[which, None] * outlines.normals
+    for end in (outlines.points - ends, outlines.points + ends):
+        which[~within(end, gray.shape)] = 0
     blurs = np.rint(np.clip(blur, *BLURS) / _BLUR_STEP).astype(int)
     groups = np.where(which > 0, which + len(_HALF_WIDTHS) * blurs[:, None], 0)
     steps = np.zeros((7, *which.shape))
     for group in np.unique(groups[groups > 0]):
         blur_steps, index = divmod(int(group), len(_HALF_WIDTHS))
         half = float(_HALF_WIDTHS[index])
-        chosen = np.nonzero(groups == group)
-        polarity = places.polarity[chosen]
-        across = polarity[:, None] * places.normals[chosen]  # from dark to bright
-        values = _profiles(gray, places.points[chosen], across, aside[chosen], half)
+        selected = np.nonzero(groups == group)
+        polarity = outlines.polarity[selected]
+        across = polarity[:, None] * outlines.normals[selected]  # from dark to bright
+        values = _profiles(gray, outlines.points[selected], across, aside[selected], half)
         fitted = _fit_steps(values, _step_filters(half, blur_steps * _BLUR_STEP))
         fitted[[0, 3]] *= polarity
-        steps[:, chosen[0], chosen[1]] = fitted
+        steps[:, selected[0], selected[1]] = fitted
     # On a curve, the blur and the chord between the two lines of a profile lie inside.
-    inside = (blur[:, None] ** 2 + aside**2) / 2 * places.curvature
+    inside = (blur[:, None] ** 2 + aside**2) / 2 * outlines.curvature
     steps[0] += np.where(which > 0, inside, 0.0)
     offset, dark, bright, slope, sensitivity, softness, residual = steps
     return Edges(
@@ -169,8 +173,8 @@ def measure_places(gray: np.ndarray, places: Places, blur: np.ndarray, reach: fl
         sensitivity,
         softness,
         residual,
-        places.scale,
-        places.spacing,
+        outlines.scale,
+        outlines.spacing,
         which > 0,
     )
 
@@ -182,7 +186,7 @@ def _profiles(
     along = np.linspace(-half, half, _SAMPLES)
     beside = aside[:, None] * across[:, ::-1] * [-1, 1]
     first, second = (
-        frame.sample_lines(gray, middles, across, along)
+        sample_lines(gray, middles, across, along)
         for middles in (points - beside, points + beside)
     )
     return (first + second) / 2
@@ -191,39 +195,39 @@ def _profiles(
 def _fit_steps(values: np.ndarray, filters: _StepFilters) -> np.ndarray:
     """Fit blurred steps to n profiles, shape (n, samples), from dark to bright.
 
-    The fit is linear about each of a row of places; the one with the least residual is taken.
+    The fit is linear about each of the offsets tried; the one with the smallest residual is taken.
 
     Returns
     -------
     ndarray of float64, shape (7, n)
-        Place, levels before and after, slope of the light, how a slope moves the place, blur that
-        is missing, and residual.
+        Offset, levels before and after, slope of the light, how a slope moves the offset, missing
+        blur, and residual.
     """
-    count = len(filters.places)
+    count = len(filters.offsets)
     first, second, contrast = (
         (values @ filters.search).reshape(len(values), 3, count).swapaxes(0, 1)
     )
     explained = np.where(contrast > 0, first * first + second * second, -1.0)
     best = explained.argmax(axis=1)
-    found = np.empty((len(values), filters.parts.shape[2]), np.float32)
-    for place in np.unique(best):
-        there = best == place
-        found[there] = values[there] @ filters.parts[place]
-    low, high, moved, light, blurred = found[:, :5].T.astype(np.float64)
-    residual = np.sqrt((found[:, 5:] ** 2).mean(axis=1))
-    contrast = np.maximum(high - low, _LEAST_STEP)
-    spacing = filters.places[1] - filters.places[0]
-    place = filters.places[best] + np.clip(-moved / contrast, -spacing, spacing)
-    slope, softness = light / np.maximum(high, _LEAST_STEP), -blurred / contrast
-    return np.stack([place, low, high, slope, filters.sensitivity[best], softness, residual])
+    parameters = np.empty((len(values), filters.parts.shape[2]), np.float32)
+    for index in np.unique(best):
+        there = best == index
+        parameters[there] = values[there] @ filters.parts[index]
+    low, high, moved, light, blurred = parameters[:, :5].T.astype(np.float64)
+    residual = np.sqrt((parameters[:, 5:] ** 2).mean(axis=1))
+    contrast = np.maximum(high - low, _MINIMUM_STEP)
+    spacing = filters.offsets[1] - filters.offsets[0]
+    offset = filters.offsets[best] + np.clip(-moved / contrast, -spacing, spacing)
+    slope, softness = light / np.maximum(high, _MINIMUM_STEP), -blurred / contrast
+    return np.stack([offset, low, high, slope, filters.sensitivity[best], softness, residual])
 
 
 @dataclass(frozen=True, slots=True)
 class _StepFilters:
-    places: np.ndarray  # (p,), tried, px
-    search: np.ndarray  # (samples, 3 p), two that explain a step at each place, and its contrast
+    offsets: np.ndarray  # (p,), tried, px
+    search: np.ndarray  # (samples, 3 p), two that explain a step at each, and its contrast
     parts: np.ndarray  # (p, samples, 5 + samples), low, high, moved, slope, blur, residuals
-    sensitivity: np.ndarray  # (p,), how a slope of the light of 1 / px moves the place, px^2
+    sensitivity: np.ndarray  # (p,), how a slope of the light of 1 / px moves a step, px^2
 
 
 @cache
@@ -231,18 +235,18 @@ def _step_filters(half: float, blur: float) -> _StepFilters:
     """Return the filters that fit steps of a blur to profiles of a half width.
 
     A step has the levels inside and outside, and minus its contrast times its distance from the
-    place as unknowns; the slope of the light is one more, and minus its contrast times its change
+    offset as unknowns; the slope of the light is one more, and minus its contrast times its change
     of blur another. A single profile hardly determines these two: each is fitted with those
     before it, and without those behind.
     """
     along = np.linspace(-half, half, _SAMPLES)
-    places = np.arange(-0.8 * half, 0.8 * half + 1e-9, 0.1 * half)
+    offsets = np.arange(-_FARTHEST * half, _FARTHEST * half + 1e-9, _SPACING * half)
     search, parts, sensitivity = [], [], []
-    for place in places:
-        scaled = (along - place) / blur
+    for offset in offsets:
+        scaled = (along - offset) / blur
         rise = 0.5 * (1 + np.array([erf(value / sqrt(2)) for value in scaled]))
         density = np.exp(-0.5 * scaled**2) / (blur * sqrt(2 * pi))
-        light = (along - place) * (_CONTRAST + (1 - _CONTRAST) * rise)
+        light = (along - offset) * (_CONTRAST + (1 - _CONTRAST) * rise)
         design = np.stack([1 - rise, rise, density, light, scaled * density], axis=1)
         step = np.linalg.pinv(design[:, :3])
         slope = np.linalg.pinv(design[:, :4])[3]
@@ -253,7 +257,7 @@ def _step_filters(half: float, blur: float) -> _StepFilters:
         parts.append(np.column_stack([step.T, slope, softness, rest]))
         sensitivity.append(-(light @ step[2]) / (1 - _CONTRAST))
     return _StepFilters(
-        places,
+        offsets,
         np.array(search).transpose(2, 1, 0).reshape(_SAMPLES, -1).astype(np.float32),
         np.array(parts, np.float32),
         np.array(sensitivity),

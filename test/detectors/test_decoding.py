@@ -8,9 +8,12 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from ahf_ros.codes.ring import FAMILY_NAMES, family
-from ahf_ros.detectors.ring import decoding
-from ahf_ros.detectors.ring.evidence import Marks
+from ahf_ros.codes.ring import FAMILY_NAMES, canonical, family
+from ahf_ros.detectors.ring.band_evidence import band_evidence
+from ahf_ros.detectors.ring.band_samples import beside_edges, sample_bands
+from ahf_ros.detectors.ring.confidence import FEATURES, confidence, confidence_features
+from ahf_ros.detectors.ring.decoding import Readings, decode, sector_angles
+from ahf_ros.detectors.ring.evidence import MarkAppearance
 from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import Fit
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
@@ -20,24 +23,34 @@ SMALL = SceneSettings(width=800, height=600, targets=6, dot_radius=18.0, seed=7)
 rendered = lru_cache(render)
 
 
-def marks_of(rendering: Rendering, count: int) -> Marks:
+def marks_of(rendering: Rendering, count: int) -> MarkAppearance:
     """Return how the marks of a scene look, from what it was rendered with."""
     scene = rendering.settings
-    sign = 1 if scene.polarity == 'dark' else -1
+    polarity = 1 if scene.polarity == 'dark' else -1
     contrast = scene.black ** (1 / scene.gamma)
-    bright = np.percentile(rendering.image, 90 if sign > 0 else 99)
-    return Marks(
-        np.full(count, sign), np.full(count, contrast), np.full(count, bright), np.full(count, 0.8)
+    bright = np.percentile(rendering.image, 90 if polarity > 0 else 99)
+    return MarkAppearance(
+        np.full(count, polarity),
+        np.full(count, contrast),
+        np.full(count, bright),
+        np.full(count, 0.8),
     )
 
 
-def read(rendering: Rendering) -> decoding.Readings:
+def decoded(gray: np.ndarray, frames: np.ndarray, marks: MarkAppearance, name: str) -> Readings:
+    code, size = family(name), frame.mean_radii(frames)
+    angles = sector_angles(code, 10)
+    samples = sample_bands(gray, frames, beside_edges(size, marks.blur), angles, code)
+    return decode(samples, band_evidence(samples, marks, size, code), marks, code)
+
+
+def read(rendering: Rendering) -> Readings:
     """Read the bands of a scene in the frames that are true, but for their perspective."""
     values = [(of.x, of.y, of.semi_major, of.semi_minor, of.angle) for of in rendering.targets]
     frames = frame.affine_frames(*np.array(values).T)
     gray = rendering.image.astype(np.float32)
     name = rendering.settings.family
-    return decoding.read_bands(gray, frames, marks_of(rendering, len(frames)), family(name))
+    return decoded(gray, frames, marks_of(rendering, len(frames)), name)
 
 
 @pytest.mark.parametrize('polarity', ['dark', 'bright'])
@@ -45,7 +58,7 @@ def read(rendering: Rendering) -> decoding.Readings:
 def test_words_are_read_in_their_direction(name, polarity):
     rendering = rendered(replace(SMALL, family=name, polarity=polarity))
     readings = read(rendering)
-    codes, numbers = decoding.canonical(readings.words, family(name))
+    codes, numbers = canonical(readings.words, family(name))
     assert codes.tolist() == [target.code for target in rendering.targets]
     assert numbers.tolist() == [target.id for target in rendering.targets]
     assert readings.margin.min() > 10
@@ -57,7 +70,7 @@ def test_words_are_read_in_their_direction(name, polarity):
 def test_light_changes_the_margin_and_not_the_words(light):
     rendering = rendered(replace(SMALL, light=light))
     readings = read(rendering)
-    _, numbers = decoding.canonical(readings.words, family(SMALL.family))
+    _, numbers = canonical(readings.words, family(SMALL.family))
     assert numbers.tolist() == [target.id for target in rendering.targets]
     assert readings.margin.min() > 3
 
@@ -84,27 +97,27 @@ def test_dark_spots_at_the_edge_of_an_unmarked_sector_contradict_the_word():
 def test_a_band_of_plain_paper_is_no_word():
     gray = np.full((200, 200), 200, np.float32)
     frames = frame.affine_frames([100], [100], [15], [15], [0])
-    marks = Marks(np.array([1]), np.array([0.25]), np.array([200.0]), np.array([0.8]))
-    readings = decoding.read_bands(gray, frames, marks, family('metashape12'))
+    marks = MarkAppearance(np.array([1]), np.array([0.25]), np.array([200.0]), np.array([0.8]))
+    readings = decoded(gray, frames, marks, 'metashape12')
     assert not readings.plausible.any()
 
 
 def test_no_band_no_reading():
     gray = np.full((50, 60), 200, np.float32)
-    nothing = Marks(np.zeros(0, int), np.zeros(0), np.zeros(0), np.zeros(0))
-    readings = decoding.read_bands(gray, np.zeros((0, 3, 3)), nothing, family('aicon14'))
+    nothing = MarkAppearance(np.zeros(0, int), np.zeros(0), np.zeros(0), np.zeros(0))
+    readings = decoded(gray, np.zeros((0, 3, 3)), nothing, 'aicon14')
     assert len(readings.words) == len(readings.plausible) == 0
 
 
 def test_some_of_the_readings():
     readings = read(rendered(SMALL))
-    some = readings.chosen(np.array([4, 1]))
+    some = readings.select(np.array([4, 1]))
     assert some.words.tolist() == readings.words[[4, 1]].tolist()
     assert some.explained.tolist() == readings.explained[[4, 1]].tolist()
 
 
 def test_confidence_is_a_probability_that_grows_with_the_evidence():
-    def confidence(readings, share=1.0, deviation=0.05, contrast=0.25):
+    def of(readings, share=1.0, deviation=0.05, contrast=0.25):
         fit = Fit(
             frame.affine_frames(np.zeros(6), 0, 12, 12, 0),
             contrast=np.full(6, contrast),
@@ -114,21 +127,21 @@ def test_confidence_is_a_probability_that_grows_with_the_evidence():
             covariance=np.tile(1e-4 * np.eye(2), (6, 1, 1)),
             blur=np.full(6, 0.8),
         )
-        features = decoding.confidence_features(readings, fit)
-        assert features.shape == (6, decoding.FEATURES)
-        return decoding.confidence(features)
+        features = confidence_features(readings, fit)
+        assert features.shape == (6, FEATURES)
+        return confidence(features)
 
     readings = read(rendered(SMALL))
-    sure = confidence(readings)
+    sure = of(readings)
     assert (sure > 0.9).all()
     assert (sure <= 1).all()
     for worse in (
-        confidence(replace(readings, margin=readings.margin / 100)),
-        confidence(replace(readings, contradiction=readings.contradiction + 20)),
-        confidence(replace(readings, explained=readings.explained / 2)),
-        confidence(readings, share=0.5),
-        confidence(readings, deviation=0.5),
-        confidence(readings, contrast=0.7),
+        of(replace(readings, margin=readings.margin / 100)),
+        of(replace(readings, contradiction=readings.contradiction + 20)),
+        of(replace(readings, explained=readings.explained / 2)),
+        of(readings, share=0.5),
+        of(readings, deviation=0.5),
+        of(readings, contrast=0.7),
     ):
         assert (worse >= 0).all()
         assert (worse < sure).all()
@@ -138,6 +151,6 @@ def test_canonical_words_and_their_ids():
     table = family('aicon12')
     word = table.word(3)
     rotated = np.array([word, word >> 1 | (word & 1) << 11, table.word(147)])
-    codes, numbers = decoding.canonical(rotated, table)
+    codes, numbers = canonical(rotated, table)
     assert codes.tolist() == [word, word, table.word(147)]
     assert numbers.tolist() == [3, 3, 147]

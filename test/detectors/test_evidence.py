@@ -2,24 +2,26 @@ import numpy as np
 import pytest
 
 from ahf_ros.detectors.ring.evidence import (
-    Marks,
+    MarkAppearance,
     border_evidence,
     level_evidence,
-    see_light,
+    light_levels,
     step_evidence,
 )
 
 ANGLES = 40
 
 
-def marks(sign, contrast=0.25, bright=200.0):
-    return Marks(np.array([sign]), np.array([contrast]), np.array([bright]), np.array([0.8]))
+def marks(polarity, contrast=0.25, bright=200.0):
+    return MarkAppearance(
+        np.array([polarity]), np.array([contrast]), np.array([bright]), np.array([0.8])
+    )
 
 
 def light(levels, of=None):
     """Return the light that bright places of given gray values show, without edges in the gap."""
     bright = np.resize(np.array(levels, float), (1, ANGLES))
-    return see_light(bright, np.full((2, 1, ANGLES), 100.0), of or marks(1))
+    return light_levels(bright, np.full((2, 1, ANGLES), 100.0), of or marks(1))
 
 
 def test_a_dark_mark_is_darker_and_a_bright_one_brighter_by_its_contrast():
@@ -48,7 +50,7 @@ def test_bright_marks_are_read_on_a_black_surround():
 
 
 def test_levels_that_light_and_marks_share_say_nothing():
-    # Marks in the light are as dark as the surround in the shadow.
+    # MarkAppearance in the light are as dark as the surround in the shadow.
     there = light([200.0, 50.0])
     values = np.array([[[200.0, 50.0, 12.5]]])  # one depth, one target, three places
     lit, shared, deep = level_evidence(values, there)[0]
@@ -65,7 +67,7 @@ def test_the_more_edges_of_light_the_less_a_step_says():
     surround = np.full((1, ANGLES), 30.0)
     values = np.full((1, ANGLES), 25.0)  # a mark in the light, or the same shadow without a mark
     alone, doubted = (
-        step_evidence(surround, values, marks(1), see_light(bright, gap, marks(1)))
+        step_evidence(surround, values, marks(1), light_levels(bright, gap, marks(1)))
         for gap in (calm, restless)
     )
     assert (alone < -2).all()

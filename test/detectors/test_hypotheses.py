@@ -1,12 +1,13 @@
-"""Contradicting readings: settled where one is clearly better, undecoded where none is."""
+"""Contradicting readings: resolved where one is clearly better, undecoded where none is."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ahf_ros.codes.ring import family
-from ahf_ros.detectors.ring import decoding
-from ahf_ros.detectors.ring.hypotheses import Hypotheses, settled_dots, settled_numbers
+from ahf_ros.detectors.ring.confidence import FEATURES
+from ahf_ros.detectors.ring.decoding import Readings
+from ahf_ros.detectors.ring.hypotheses import Hypotheses, resolve_dots, resolve_ids
 from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import Fit
 
@@ -23,67 +24,67 @@ def hypotheses(places: list[tuple[float, float]], margins: list[float]) -> Hypot
         share=np.ones(count),
         words=np.full(count, 71),
         margin=np.array(margins),
-        features=np.zeros((count, decoding.FEATURES)),
+        features=np.zeros((count, FEATURES)),
         confidence=np.ones(count),
     )
 
 
-def settled(places, margins, numbers, certain=None):
+def resolved(places, margins, ids, certain=None):
     certain = np.ones(len(places), bool) if certain is None else np.array(certain)
     found = hypotheses(places, margins)
-    kept, uncontested = settled_dots(found, np.array(numbers), certain, CODE)
+    kept, uncontested = resolve_dots(found, np.array(ids), certain, CODE)
     return kept.tolist(), uncontested.tolist()
 
 
 def test_dots_apart_are_all_kept():
-    kept, uncontested = settled([(50, 50), (150, 50)], [30, 20], [1, 2])
+    kept, uncontested = resolved([(50, 50), (150, 50)], [30, 20], [1, 2])
     assert kept == [0, 1]
     assert uncontested == [True, True]
 
 
 def test_of_two_readings_of_a_dot_the_first_is_kept():
-    assert settled([(50, 50), (51, 50)], [30, 5], [1, 2]) == ([0], [True, False])
+    assert resolved([(50, 50), (51, 50)], [30, 5], [1, 2]) == ([0], [True, False])
 
 
 def test_two_readings_of_a_dot_that_are_alike_in_evidence_contest_it():
-    assert settled([(50, 50), (51, 50)], [30, 20], [1, 2]) == ([0], [False, False])
+    assert resolved([(50, 50), (51, 50)], [30, 20], [1, 2]) == ([0], [False, False])
 
 
 def test_two_readings_of_a_dot_that_say_the_same_agree():
-    assert settled([(50, 50), (51, 50)], [30, 20], [1, 1]) == ([0], [True, False])
+    assert resolved([(50, 50), (51, 50)], [30, 20], [1, 1]) == ([0], [True, False])
 
 
 def test_an_uncertain_reading_contests_nothing():
-    result = settled([(50, 50), (51, 50)], [30, 20], [1, 2], [True, False])
+    result = resolved([(50, 50), (51, 50)], [30, 20], [1, 2], [True, False])
     assert result == ([0], [True, False])
 
 
 def test_sectors_of_a_band_that_was_read_are_no_dots():
     """2.9 radii away, between the edges of the band."""
     in_band = (50 + 2.9 * RADIUS, 50)
-    assert settled([(50, 50), in_band], [30, 20], [1, 1], [True, False])[0] == [0]
-    assert settled([(50, 50), in_band], [30, 20], [1, 1], [False, False])[0] == [0, 1]
+    assert resolved([(50, 50), in_band], [30, 20], [1, 1], [True, False])[0] == [0]
+    assert resolved([(50, 50), in_band], [30, 20], [1, 1], [False, False])[0] == [0, 1]
 
 
 def test_of_two_claims_to_an_id_the_clearly_better_one_stays():
     places = [(50, 50), (150, 50), (250, 50)]
     certain = np.ones(3, bool)
-    clear = settled_numbers(hypotheses(places, [30, 20, 10]), np.array([1, 2, 1]), certain)
+    clear = resolve_ids(hypotheses(places, [30, 20, 10]), np.array([1, 2, 1]), certain)
     assert clear.tolist() == [True, True, False]
-    unclear = settled_numbers(hypotheses(places, [30, 20, 16]), np.array([1, 2, 1]), certain)
+    unclear = resolve_ids(hypotheses(places, [30, 20, 16]), np.array([1, 2, 1]), certain)
     assert unclear.tolist() == [False, True, False]
     assert certain.all()
 
 
 def test_uncertain_claims_do_not_count():
     found = hypotheses([(50, 50), (150, 50)], [30, 29])
-    certain = settled_numbers(found, np.array([1, 1]), np.array([True, False]))
+    certain = resolve_ids(found, np.array([1, 1]), np.array([True, False]))
     assert certain.tolist() == [True, False]
 
 
 def test_parts_of_finds_stay_in_order():
     found = hypotheses([(50, 50), (150, 50), (250, 50)], [3, 2, 1])
-    parts = [found.chosen(np.array([2])), found.chosen(np.array([0, 1]))]
+    parts = [found.select(np.array([2])), found.select(np.array([0, 1]))]
     assert Hypotheses.joined(parts).margin.tolist() == [1, 3, 2]
 
 
@@ -97,8 +98,8 @@ def test_readings_are_taken_over_where_they_belong():
         covariance=np.tile(np.eye(2), (2, 1, 1)),
         blur=np.full(2, 0.8),
     )
-    found = Hypotheses.unread(fit)
-    assert not found.words.any() and not found.confidence.any()
+    unread = Hypotheses.unread(fit)
+    assert not unread.words.any() and not unread.confidence.any()
     better = Fit(
         frames=frame.affine_frames([20.5], 5.0, 4.0, 3.0, 0.0),
         contrast=np.full(1, 0.3),
@@ -109,12 +110,11 @@ def test_readings_are_taken_over_where_they_belong():
         blur=np.full(1, 0.8),
     )
     one = np.ones(1)
-    readings = decoding.Readings(
-        np.array([71]), 0 * one, 100 * one, 5 * one, 0 * one, np.ones((1, 4))
-    )
-    found.update(np.array([1]), readings, better)
+    readings = Readings(np.array([71]), 0 * one, 100 * one, 5 * one, 0 * one, np.ones((1, 4)))
+    found = unread.replaced(np.array([1]), Hypotheses.read(readings, better))
     assert found.words.tolist() == [0, 71]
     assert found.frames[:, 0, 2].tolist() == [10.0, 20.5]
     assert found.share.tolist() == [0.8, 1.0]
     assert found.confidence[0] == 0 and found.confidence[1] > 0.9
     assert fit.frames[1, 0, 2] == 20.0  # what was given is not changed
+    assert not unread.words.any()

@@ -128,7 +128,8 @@ def test_dots_without_a_code_are_reported_on_request():
     cv2.circle(image, (90, 100), 10, 30, -1)
     cv2.circle(image, (210, 100), 10, 30, -1)
     assert identified(image) == []
-    left, right = identified(image, report_undecoded=True)
+    found = identified(image, report_undecoded=True)
+    left, right = sorted(found, key=lambda target: target.x)
     assert (left.id, left.code, left.confidence) == (UNDECODED, 0, 0.0)
     assert (left.x, left.y) == pytest.approx((90, 100), abs=0.05)
     assert (right.x, right.y) == pytest.approx((210, 100), abs=0.05)

@@ -1,13 +1,19 @@
-"""Candidates: edges in the logarithm, whole outlines, and votes for the centres of dots."""
+"""Candidates: votes for the centres of dots."""
 
 from __future__ import annotations
+
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
 import pytest
 
 from ahf_ros.features import candidates, frame
-from ahf_ros.features.candidates import LOG_OFFSET, LOG_SCALE, MAXIMUM_CANDIDATES
+from ahf_ros.features.candidates import MAXIMUM_CANDIDATES
+from ahf_ros.features.log_edges import LOG_SCALE, LogEdges, find_edges
+from ahf_ros.features.outlines import whole_outlines
+from ahf_ros.features.pyramid import halved, image_pyramid, log_image
+from ahf_ros.imaging.logarithm import LOG_OFFSET
 from ahf_ros.synthetic.scene import SceneSettings, render
 
 
@@ -27,38 +33,36 @@ def stripes(image: np.ndarray, period: int, shadow: float) -> np.ndarray:
     return np.rint(image * np.where(lit, 1, shadow)).astype(np.uint8)
 
 
-def edges_of(gray: np.ndarray, levels: int = 3) -> dict[int, candidates.LogEdges]:
-    halves = candidates.pyramid(gray, levels)[1:]
-    found = [candidates.find_edges(candidates.log_image(half)) for half in halves]
-    return dict(enumerate(found, start=1))
+def edges_of(gray: np.ndarray) -> tuple[LogEdges, ...]:
+    return image_pyramid(gray, 60.0).edges
 
 
 def places(groups: list[candidates.Candidates]) -> tuple[np.ndarray, np.ndarray]:
-    """Return points in the pixels of the image, and their signs."""
+    """Return points in the pixels of the image, and their polarity."""
     points = [(group.points + 0.5) * 2.0**group.level - 0.5 for group in groups]
-    return np.concatenate(points), np.concatenate([group.signs for group in groups])
+    return np.concatenate(points), np.concatenate([group.polarity for group in groups])
 
 
 def test_the_logarithm_of_bytes_and_of_numbers_is_the_same():
     gray = np.arange(256, dtype=np.uint8).reshape(16, 16)
-    log = candidates.log_image(gray)
+    log = log_image(gray)
     assert log.dtype == np.int16
     assert log[0, 0] == int(LOG_SCALE * np.log(LOG_OFFSET))
-    assert np.abs(candidates.log_image(gray.astype(np.float32)) - log).max() <= 1
+    assert np.abs(log_image(gray.astype(np.float32)) - log).max() <= 1
 
 
 def test_a_step_is_as_high_in_the_shadow_as_in_the_light():
     dark, bright = np.float32([[20, 60]]), np.float32([[100, 220]])
     offset = np.float32(LOG_OFFSET)
     shadow = (np.concatenate([dark, bright]) + offset) * np.float32(0.4) - offset
-    light = candidates.log_image(np.concatenate([dark, bright]))
-    assert np.abs(np.diff(light, axis=0) - np.diff(candidates.log_image(shadow), axis=0)).max() < 3
+    light = log_image(np.concatenate([dark, bright]))
+    assert np.abs(np.diff(light, axis=0) - np.diff(log_image(shadow), axis=0)).max() < 3
 
 
 @pytest.mark.parametrize('shape', [(64, 48), (65, 49), (16, 17)])
 def test_a_pixel_of_the_pyramid_is_the_mean_of_four(shape):
     image = np.random.default_rng(0).integers(0, 256, shape).astype(np.uint8)
-    first, second, third, _ = candidates.pyramid(image, 3)
+    first, second, third, _ = halved(image, 3)
     height, width = shape[0] // 2, shape[1] // 2
     assert first is image
     assert second.shape == (height, width)
@@ -71,7 +75,7 @@ def test_a_pixel_of_the_pyramid_is_the_mean_of_four(shape):
 def test_edges_lie_on_steps_and_point_to_the_bright_side():
     gray = np.full((60, 80), 40, np.uint8)
     gray[:, 41:] = 160
-    edges = candidates.find_edges(candidates.log_image(gray))
+    edges = find_edges(log_image(gray))
     assert len(edges.x) >= 50
     assert set(edges.x) <= {40, 41}
     assert edges.unit_x == pytest.approx(1, abs=1e-6)
@@ -81,37 +85,35 @@ def test_edges_lie_on_steps_and_point_to_the_bright_side():
 def test_an_image_without_edges_has_no_candidates():
     gray = np.full((60, 80), 40, np.uint8)
     edges = edges_of(gray)
-    assert all(len(level.x) == 0 for level in edges.values())
-    frames, signs = edges[1].outlines(2, 30)
-    assert frames.shape == (0, 3, 3)
-    assert len(signs) == 0
+    assert all(len(level.x) == 0 for level in edges)
+    assert whole_outlines(edges[0], 2, 30).frames.shape == (0, 3, 3)
     points, _ = places(candidates.find_candidates(edges, 4, 60, (1, -1)))
     assert points.shape == (0, 2)
 
 
-@pytest.mark.parametrize('sign', [1, -1])
+@pytest.mark.parametrize('polarity', [1, -1])
 @pytest.mark.parametrize(('paper', 'ink'), [(200, 30), (70, 20)], ids=['lit', 'shadow'])
-def test_a_whole_outline_is_an_ellipse(sign, paper, ink):
-    colours = (paper, ink) if sign == 1 else (ink, paper)
+def test_a_whole_outline_is_an_ellipse(polarity, paper, ink):
+    colours = (paper, ink) if polarity == 1 else (ink, paper)
     gray = drawn([(100.3, 80.6, 14.0)], *colours)
-    frames, signs = edges_of(gray)[1].outlines(2, 30)
-    assert signs.tolist() == [sign]
-    whole = frame.enlarged(frames, 1)
+    dots = whole_outlines(edges_of(gray)[0], 2, 30)
+    assert dots.polarity.tolist() == [polarity]
+    whole = frame.enlarged(dots.frames, 1)
     assert whole[0, :2, 2] == pytest.approx((100.3, 80.6), abs=0.3)
     major, minor, _ = frame.ellipse_axes(whole)
     assert (major[0], minor[0]) == pytest.approx((14, 14), abs=1)
 
 
 def test_outlines_of_another_size_are_left_out():
-    edges = edges_of(drawn([(80, 80, 8.0), (200, 120, 24.0)]))[1]
-    small, _ = edges.outlines(2, 7)
-    large, _ = edges.outlines(7, 30)
+    edges = edges_of(drawn([(80, 80, 8.0), (200, 120, 24.0)]))[0]
+    small = whole_outlines(edges, 2, 7).frames
+    large = whole_outlines(edges, 7, 30).frames
     assert frame.enlarged(small, 1)[:, :2, 2] == pytest.approx(np.array([[80, 80]]), abs=0.5)
     assert frame.enlarged(large, 1)[:, :2, 2] == pytest.approx(np.array([[200, 120]]), abs=0.5)
 
 
 def test_edges_within_polygons_are_left_out():
-    edges = edges_of(drawn([(80, 80, 10.0), (200, 120, 10.0)]))[1]
+    edges = edges_of(drawn([(80, 80, 10.0), (200, 120, 10.0)]))[0]
     square = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * 12.0
     rest = edges.outside([square + 39.75])
     assert 0 < len(rest.x) < len(edges.x)
@@ -120,21 +122,21 @@ def test_edges_within_polygons_are_left_out():
 
 
 @pytest.mark.parametrize('radius', [5.0, 9.0, 18.0, 40.0])
-@pytest.mark.parametrize('sign', [1, -1])
-def test_votes_find_dots_of_all_sizes_under_stripes(radius, sign):
-    colours = (220, 40) if sign == 1 else (40, 220)
+@pytest.mark.parametrize('polarity', [1, -1])
+def test_votes_find_dots_of_all_sizes_under_stripes(radius, polarity):
+    colours = (220, 40) if polarity == 1 else (40, 220)
     gray = stripes(drawn([(150.0, 120.0, radius)], *colours), round(2.2 * radius), 0.4)
-    points, signs = places(candidates.find_candidates(edges_of(gray), 4, 60, (sign,)))
-    assert set(signs) == {sign}
+    points, polarities = places(candidates.find_candidates(edges_of(gray), 4, 60, (polarity,)))
+    assert set(polarities) == {polarity}
     assert np.linalg.norm(points - (150, 120), axis=1).min() < 0.3 * radius
 
 
 def test_only_the_polarity_that_is_asked_for_votes():
     edges = edges_of(drawn([(150.0, 120.0, 12.0)]))
-    points, signs = places(candidates.find_candidates(edges, 4, 60, (1,)))
+    points, polarity = places(candidates.find_candidates(edges, 4, 60, (1,)))
     near = np.linalg.norm(points - (150, 120), axis=1) < 3
     assert near.any()
-    assert (signs == 1).all()
+    assert (polarity == 1).all()
     points, _ = places(candidates.find_candidates(edges, 4, 60, (-1,)))
     assert not (np.linalg.norm(points - (150, 120), axis=1) < 3).any()
 
@@ -153,7 +155,7 @@ def test_every_target_of_a_scene_is_a_candidate(light):
     rendering = render(scene)
     edges = edges_of(rendering.image)
     points, _ = places(candidates.find_candidates(edges, 4, 60, (1,)))
-    whole = frame.enlarged(edges[1].outlines(2, 30)[0], 1)[:, :2, 2]
+    whole = frame.enlarged(whole_outlines(edges[0], 2, 30).frames, 1)[:, :2, 2]
     points = np.concatenate([points, whole])
     for target in rendering.targets:
         assert np.linalg.norm(points - (target.x, target.y), axis=1).min() < 0.35 * 18
@@ -166,15 +168,17 @@ def test_candidates_are_bounded_where_dots_are_everywhere():
     assert all(len(group.points) <= 2 * MAXIMUM_CANDIDATES for group in groups)
 
 
-def test_more_dots_than_are_looked_at_are_said_and_the_roundest_stay(monkeypatch, caplog):
+def test_more_dots_than_are_looked_at_are_said_and_the_roundest_stay(monkeypatch):
     image = np.full((400, 400), 200, np.uint8)
     for row in range(20, 400, 40):
         for column in range(20, 400, 40):
             cv2.ellipse(image, (column, row), (9, 9 if row < 200 else 6), 30, 0, 360, 40, -1)
-    edges = candidates.find_edges(candidates.log_image(image))
-    everything, _ = edges.outlines(4.0, 20.0)
-    assert len(everything) == 100 and not caplog.records
-    monkeypatch.setattr('ahf_ros.features.candidates.MAXIMUM_OUTLINES', 30)
-    kept, signs = edges.outlines(4.0, 20.0)
-    assert len(kept) == len(signs) == 30
-    assert '100 whole ellipses, of which the 30 best are looked at' in caplog.text
+    edges = find_edges(log_image(image))
+    messages: list[str] = []
+    log = SimpleNamespace(warning=lambda text, *values: messages.append(text % values))
+    monkeypatch.setattr('ahf_ros.features.dots._LOG', log)
+    assert len(whole_outlines(edges, 4.0, 20.0).frames) == 100
+    assert messages == []
+    monkeypatch.setattr('ahf_ros.features.outlines.MAXIMUM_OUTLINES', 30)
+    assert len(whole_outlines(edges, 4.0, 20.0).frames) == 30
+    assert messages == ['100 whole ellipses, of which the 30 best are looked at']

@@ -2,49 +2,43 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 
-from ahf_ros.codes.ring import family
 from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import Fit, fit_circles
-from ahf_ros.features.circles import dot_circles, ring_circles
+from ahf_ros.features.circles import Circles, dot_circles
 
-CODE = family('metashape12')
-WORD = 0b000001000111
-START = 0.4
 BLUR = 0.7
 DARK, BRIGHT = 40.0, 200.0
 
 
 def through(frames: np.ndarray, side: int) -> tuple[np.ndarray, ...]:
-    """Return where pixels are on the target: radii, angles, and px a radius across a circle."""
+    """Return where pixels are on the target: radii, and px a radius across a circle."""
     rows, columns = np.mgrid[:side, :side]
     pixels = np.stack([columns.ravel(), rows.ravel(), np.ones(rows.size)])
     plane = np.linalg.inv(frames[0]) @ pixels
     x, y = (plane[:2] / plane[2]).reshape(2, side, side)
-    radius, angle = np.hypot(x, y), np.arctan2(y, x)
-    return radius, angle, 1 / np.maximum(np.hypot(*np.gradient(radius)), 1e-3)
+    radius = np.hypot(x, y)
+    return radius, 1 / np.maximum(np.hypot(*np.gradient(radius)), 1e-3)
 
 
-def drawn(frames: np.ndarray, side: int = 100, band: bool = False) -> np.ndarray:
-    """Return a dark target whose edges are blurred steps across its circles.
+def drawn(frames: np.ndarray, side: int = 100, radii: Sequence[float] = (1.0,)) -> np.ndarray:
+    """Return a target, dark inside, whose edges are blurred steps across circles.
 
     A blurred step across a circle differs from a blurred disc: its level halfway stays on the
     circle. `fit_circles` expects a disc, whose level halfway moves inwards by blur^2 / 2 radii.
     """
-    radius, angle, scale = through(frames, side)
+    radius, scale = through(frames, side)
 
     def rise(edge: float) -> np.ndarray:
         outwards = (radius - edge) * scale
         outwards = outwards + BLUR**2 / 2 / np.maximum(radius * scale, 1)  # as of a disc
         return 1 / (1 + np.exp(-np.clip(1.702 * outwards / BLUR, -40, 40)))
 
-    light = rise(1.0)
-    if band:
-        sector = np.floor((-angle - START) / (2 * np.pi / CODE.bits)).astype(int) % CODE.bits
-        marked = WORD >> sector & 1
-        light *= 1 - marked * rise(CODE.band_inner) * (1 - rise(CODE.band_outer))
+    light = sum((-1) ** number * rise(edge) for number, edge in enumerate(radii))
     return DARK + (BRIGHT - DARK) * light
 
 
@@ -81,20 +75,24 @@ def test_an_ellipse():
     assert (major[0], minor[0], angle[0]) == pytest.approx((15.0, 8.0, 0.6), abs=0.05)
 
 
-def test_band_and_dot_give_the_image_of_the_centre():
-    """The centre of the dot's ellipse is 0.1 px beside it."""
+def test_circles_of_several_groups_give_the_image_of_the_centre():
+    """That of the dot's ellipse is 0.1 px beside it; the print is a little off its design."""
     oblique = np.array([[[11.0, 1.5, 60.3], [0.5, 7.0, 59.8], [0.012, -0.01, 1.0]]])
-    image = drawn(oblique, 120, band=True).astype(np.float32)
+    designed, printed = np.array([1.0, 2.25, 3.5, 4.5]), np.array([1.0, 2.26, 3.49, 4.49])
+    image = drawn(oblique, 120, printed).astype(np.float32)
     major, minor, angle = frame.ellipse_axes(oblique)
     start = frame.affine_frames([60.5], [59.5], major, minor, angle)
     by_dot = fitted(image, start)
-    circles = ring_circles(np.array([WORD]), np.array([START]), np.array([1]), 48, 10, CODE)
-    by_both = fit_circles(image, by_dot.frames, circles, reach=0.45, projective=True)
-    by_both = fit_circles(image, by_both.frames, circles, reach=0.45, projective=True)
-    errors = [np.hypot(*(centre(fit) - (60.3, 59.8))) for fit in (by_dot, by_both)]
+    rays = 96
+    angles = np.tile(2 * np.pi * np.arange(rays) / rays, len(designed))
+    polarity = np.repeat([1, -1, 1, -1], rays)[None]
+    circles = Circles(angles, np.repeat(designed, rays), np.repeat(range(4), rays), polarity)
+    joint = fit_circles(image, by_dot.frames, circles, reach=0.3, projective=True)
+    joint = fit_circles(image, joint.frames, circles, reach=0.3, projective=True)
+    errors = [np.hypot(*(centre(fit) - (60.3, 59.8))) for fit in (by_dot, joint)]
     assert errors[0] > 0.08
     assert errors[1] < 0.015
-    assert by_both.share[0] > 0.9
+    assert joint.share[0] > 0.9
 
 
 def test_a_slope_of_the_light_does_not_move_the_centre():
@@ -147,8 +145,10 @@ def test_dots_do_not_depend_on_each_other():
     )
     for index, start in enumerate(starts):
         alone = fitted(image, start)
-        assert together.chosen(np.array([index])).frames == pytest.approx(alone.frames, abs=1e-9)
-    halves = [together.chosen(np.array([index])) for index in (0, 1)]
+        # BLAS may round batches otherwise; where a profile then falls into another bin of places
+        # or blurs, centres move by less than a thousandth of what is promised.
+        assert together.select(np.array([index])).frames == pytest.approx(alone.frames, abs=1e-6)
+    halves = [together.select(np.array([index])) for index in (0, 1)]
     assert (Fit.joined(halves).frames == together.frames).all()
 
 

@@ -44,44 +44,6 @@ def test_each_frame_projects_points_of_its_own():
         assert images == pytest.approx(frame.project(own[None], of_frame)[0])
 
 
-def test_samples_of_a_slope_are_those_of_the_slope():
-    rows, columns = np.mgrid[:20, :30]
-    image = (2 * columns + 3 * rows).astype(np.float32)
-    pixels = np.array([[3.25, 4.5], [10.0, 11.75]])
-    assert frame.sample(image, pixels) == pytest.approx([20.0, 55.25])
-    lines = frame.sample_lines(
-        image, np.array([[10.0, 8.0]]), np.array([[0.6, 0.8]]), np.array([-1.0, 0.0, 2.0])
-    )
-    assert lines[0] == pytest.approx([44 - 3.6, 44, 44 + 7.2], abs=0.08)  # cv2.remap: 1/32 px
-
-
-def test_the_border_goes_on_beyond_the_image():
-    image = np.arange(12, dtype=np.float32).reshape(3, 4)
-    assert frame.sample(image, np.array([[-5.0, 0.0], [9.0, 2.0]])).tolist() == [0.0, 11.0]
-
-
-def test_more_lines_than_one_remap_takes():
-    image = np.tile(np.arange(40, dtype=np.float32), (20, 1))
-    middles = np.stack([np.linspace(5, 35, 40000), np.full(40000, 10.0)], axis=1)
-    directions = np.tile([1.0, 0.0], (40000, 1))
-    values = frame.sample_lines(image, middles, directions, np.array([0.0, 1.0]))
-    assert np.abs(values - middles[:, :1] - [0, 1]).max() < 0.02  # cv2.remap: 1/32 px
-
-
-def test_circles_are_sampled_where_they_are_projected():
-    rows, columns = np.mgrid[:160, :200]
-    image = (columns + 0.5 * rows).astype(np.float32)
-    radii = np.array([0.5, 1.0, 2.0])
-    sampled = frame.sample_circles(image, OBLIQUE, ANGLES, radii)
-    projected = frame.sample(image, frame.project(OBLIQUE, frame.circle_points(ANGLES, radii)))
-    assert sampled == pytest.approx(projected, abs=0.02)
-
-
-def test_what_lies_in_an_image():
-    pixels = np.array([[0.0, 0.0], [29.0, 19.0], [29.1, 5.0], [5.0, -0.1]])
-    assert frame.within(pixels, (20, 30)).tolist() == [True, True, False, False]
-
-
 def test_geometry_of_a_circle():
     geometry = frame.circle_geometry(
         frame.affine_frames([50], [40], [8], [8], [0]), ANGLES, np.full(24, 2.5)

@@ -29,7 +29,7 @@ def step_image(place: float, blur: float, slope: float = 0.0) -> np.ndarray:
 def measured(image: np.ndarray, blur: float, polarity: int = 1) -> Edges:
     """Measure the one point of a wide circle that is vertical at MIDDLE."""
     frames = frame.affine_frames([MIDDLE[0] - WIDE], [MIDDLE[1]], [WIDE], [WIDE], [0.0])
-    point = Circles(np.zeros(1), np.ones(1), np.full((1, 1), polarity))
+    point = Circles(np.zeros(1), np.ones(1), np.zeros(1, int), np.full((1, 1), polarity))
     return measure_edges(image, frames, point, np.array([blur]), reach=2.5 / WIDE)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from ahf_ros.codes.ring import Family
 
 _EXHAUSTIVE = 50_000  # rotations of words, up to which all of them compete
-_LEAST_EVIDENCE = 10.0  # for ones, in units of ln
+_MINIMUM_EVIDENCE = 10.0  # for ones, in units of ln
 _UNCERTAIN = 10  # sectors whose bits are varied where not all words compete
 
 
@@ -49,7 +49,7 @@ def best_words(
     words = np.zeros(len(sectors), np.int64)
     phases, margins = np.zeros(len(sectors), np.intp), np.zeros(len(sectors))
     everything = len(family.words) * family.bits <= _EXHAUSTIVE
-    hopeful = np.maximum(sectors, 0).sum(axis=2).max(axis=1) > _LEAST_EVIDENCE
+    hopeful = np.maximum(sectors, 0).sum(axis=2).max(axis=1) > _MINIMUM_EVIDENCE
     for index in np.flatnonzero(hopeful):
         competing, starts, features = (
             _all_rotations(family) if everything else _near_rotations(single[index], family)
@@ -61,8 +61,8 @@ def best_words(
         second, first = np.partition(np.maximum.reduceat(of_word, starts), -2)[-2:]
         margins[index] = first - second
     own = np.take_along_axis(sectors, phases[:, None, None], axis=1)[:, 0]
-    signs = 2 * (words[:, None] >> np.arange(family.bits) & 1) - 1
-    return words, phases, margins, (own * signs).min(axis=1)
+    bits = 2 * (words[:, None] >> np.arange(family.bits) & 1) - 1
+    return words, phases, margins, (own * bits).min(axis=1)
 
 
 @cache

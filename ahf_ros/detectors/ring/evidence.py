@@ -8,10 +8,11 @@ bounds what one reading can claim.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
+from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
 _NOISE = 1.2  # gray values, of 255
@@ -21,22 +22,22 @@ _BORDER_SPREAD = 0.2  # of steps along the band, in steps of a mark
 _BORDER_FLOOR = 0.5  # density of them where an edge of light lies between
 _LEVEL_SPREAD = 0.12  # of ln, of levels
 _FLOOR = 0.06  # density of what no hypothesis explains
-_LARGEST = 4.0  # evidence of one reading
+_MAXIMUM = 4.0  # evidence of one reading
 _EDGE_STEP = 0.35  # of ln, of an edge of light
-_FEWEST_EDGES, _MOST_EDGES = 0.02, 0.5  # probability of one between neighbouring places
-_LEAST_STEP = 0.2  # of ln, of a mark
+_MINIMUM_EDGES, _MAXIMUM_EDGES = 0.02, 0.5  # probability of one between neighbouring places
+_MINIMUM_STEP = 0.2  # of ln, of a mark
 _DEEPEST_SHADOW = 0.1  # of the light on the dot, elsewhere on the target
 _LEVEL_BIN = 0.05  # of ln
 _LEVELS = np.arange(np.log(LOG_OFFSET), np.log(255 + LOG_OFFSET) + _LEVEL_BIN, _LEVEL_BIN)
 
 
 @dataclass(frozen=True, slots=True)
-class Marks:
+class MarkAppearance(ArrayRecord):
     """How the marks of k targets look against their surround.
 
     Attributes
     ----------
-    signs : ndarray of int, shape (k,)
+    polarity : ndarray of int, shape (k,)
         1 where marks are dark, -1 where they are bright.
     contrast : ndarray of float64, shape (k,)
         Gray value of dark over bright under the same light.
@@ -46,21 +47,17 @@ class Marks:
         Of their edges, standard deviation in px.
     """
 
-    signs: np.ndarray
+    polarity: np.ndarray
     contrast: np.ndarray
     bright: np.ndarray
     blur: np.ndarray
-
-    def chosen(self, which: np.ndarray) -> Marks:
-        """Return the marks of some of the targets."""
-        return Marks(*(getattr(self, of.name)[which] for of in fields(self)))
 
     def step(self, values: np.ndarray) -> np.ndarray:
         """Return the step of ln onto a mark where the bright side has gray values (k, ...)."""
         spread = (slice(None),) + (None,) * (values.ndim - 1)
         bright = np.maximum(values, _DEEPEST_SHADOW * self.bright[spread])
         dark = self.contrast[spread] * bright
-        return self.signs[spread] * np.log((dark + LOG_OFFSET) / (bright + LOG_OFFSET))
+        return self.polarity[spread] * np.log((dark + LOG_OFFSET) / (bright + LOG_OFFSET))
 
 
 def log_ratio(values: np.ndarray, others: np.ndarray) -> np.ndarray:
@@ -69,7 +66,7 @@ def log_ratio(values: np.ndarray, others: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True, slots=True)
-class Light:
+class LightLevels:
     """The light on k targets, as it shows in their bright places.
 
     Attributes
@@ -86,15 +83,15 @@ class Light:
 
     def densities(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the densities of gray values (k, ...) where unmarked and where marked."""
-        places = _bins(_flat(values))
+        bins = _bins(_flat(values))
         tables = (self.unmarked, self.marked)
         unmarked, marked = (
-            np.take_along_axis(table, places, axis=1).reshape(values.shape) for table in tables
+            np.take_along_axis(table, bins, axis=1).reshape(values.shape) for table in tables
         )
         return unmarked, marked
 
 
-def see_light(bright: np.ndarray, gap: np.ndarray, marks: Marks) -> Light:
+def light_levels(bright: np.ndarray, gap: np.ndarray, marks: MarkAppearance) -> LightLevels:
     """Return the light on targets.
 
     Bright places show under which light a target lies: the density of their levels is that of all
@@ -106,24 +103,24 @@ def see_light(bright: np.ndarray, gap: np.ndarray, marks: Marks) -> Light:
         Gray values of places that are bright: the surround of dark marks, or a bright dot.
     gap : ndarray of float, shape (2, k, m)
         Gray values on two circles in the gap.
-    marks : Marks
+    marks : MarkAppearance
     """
     seen = _bins(_flat(bright))
     levels = np.broadcast_to(np.exp(_LEVELS) - LOG_OFFSET, (len(seen), len(_LEVELS)))
     moved = _LEVELS - np.abs(marks.step(levels)) - _LEVELS[0]
     moved = np.clip(np.rint(moved / _LEVEL_BIN).astype(np.intp), 0, len(_LEVELS) - 1)
     dark, light = _density(np.take_along_axis(moved, seen, axis=1)), _density(seen)
-    of_dark_marks = (marks.signs > 0)[:, None]
+    of_dark_marks = (marks.polarity > 0)[:, None]
     edges = (np.abs(log_ratio(gap[1], gap[0])) > _EDGE_STEP).mean(axis=1)
-    return Light(
+    return LightLevels(
         np.where(of_dark_marks, light, dark),
         np.where(of_dark_marks, dark, light),
-        np.clip(edges, _FEWEST_EDGES, _MOST_EDGES),
+        np.clip(edges, _MINIMUM_EDGES, _MAXIMUM_EDGES),
     )
 
 
 def step_evidence(
-    surround: np.ndarray, values: np.ndarray, marks: Marks, light: Light
+    surround: np.ndarray, values: np.ndarray, marks: MarkAppearance, light: LightLevels
 ) -> np.ndarray:
     """Return the evidence that a step from the surround leads onto a mark.
 
@@ -133,8 +130,8 @@ def step_evidence(
     step = log_ratio(values, surround)
     noise = _NOISE * np.hypot(1 / (values + LOG_OFFSET), 1 / (surround + LOG_OFFSET))
     unmarked = _normal(step, np.hypot(_SURROUND_SPREAD, noise))
-    wanted = marks.step(np.maximum(values, surround))
-    error = (step - wanted) * np.sign(wanted)
+    expected = marks.step(np.maximum(values, surround))
+    error = (step - expected) * np.sign(expected)
     spread, tail = np.hypot(_MARK_SPREAD, noise), np.hypot(_MARK_TAIL, noise)
     width = np.where(error > 0, tail, spread)
     marked = _normal(error, width) * width / ((spread + tail) / 2)
@@ -145,7 +142,7 @@ def step_evidence(
     return _limited(marked, unmarked)
 
 
-def level_evidence(values: np.ndarray, light: Light) -> np.ndarray:
+def level_evidence(values: np.ndarray, light: LightLevels) -> np.ndarray:
     """Return the evidence of the gray values of the band, by the light on the target."""
     unmarked, marked = light.densities(np.moveaxis(values, 0, 2))
     return _limited(marked, unmarked).mean(axis=2)
@@ -153,7 +150,7 @@ def level_evidence(values: np.ndarray, light: Light) -> np.ndarray:
 
 def _limited(marked: np.ndarray, unmarked: np.ndarray) -> np.ndarray:
     evidence = np.log((marked + _FLOOR) / (unmarked + _FLOOR))
-    return np.clip(evidence, -_LARGEST, _LARGEST)
+    return np.clip(evidence, -_MAXIMUM, _MAXIMUM)
 
 
 def _flat(values: np.ndarray) -> np.ndarray:
@@ -163,8 +160,8 @@ def _flat(values: np.ndarray) -> np.ndarray:
 
 def _bins(values: np.ndarray) -> np.ndarray:
     """Return the bins of gray values among `_LEVELS`."""
-    places = np.rint((np.log(np.maximum(values, 0) + LOG_OFFSET) - _LEVELS[0]) / _LEVEL_BIN)
-    return np.clip(places.astype(np.intp), 0, len(_LEVELS) - 1)
+    bins = np.rint((np.log(np.maximum(values, 0) + LOG_OFFSET) - _LEVELS[0]) / _LEVEL_BIN)
+    return np.clip(bins.astype(np.intp), 0, len(_LEVELS) - 1)
 
 
 def _density(bins: np.ndarray) -> np.ndarray:
@@ -178,17 +175,19 @@ def _density(bins: np.ndarray) -> np.ndarray:
     return counts / max(bins.shape[1], 1) @ kernel
 
 
-def border_evidence(band: np.ndarray, marks: Marks, light: Light) -> tuple[np.ndarray, np.ndarray]:
+def border_evidence(
+    band: np.ndarray, marks: MarkAppearance, light: LightLevels
+) -> tuple[np.ndarray, np.ndarray]:
     """Return the evidence of borders onto a mark and off it, against none, after each angle."""
     before, after = np.roll(band, 1, axis=2), np.roll(band, -2, axis=2)
     bright = np.moveaxis(np.maximum(before, after), 0, 2)
     mark = np.moveaxis(marks.step(bright), 2, 0)
     # A mark that makes no step cannot be told by one.
-    mark = np.sign(mark) * np.maximum(np.abs(mark), _LEAST_STEP)
+    mark = np.sign(mark) * np.maximum(np.abs(mark), _MINIMUM_STEP)
     rise = log_ratio(after, before) / mark
     floor = _FLOOR + _BORDER_FLOOR * light.edges[:, None]
     onto, none, off = (
-        np.log(_normal(rise - wanted, _BORDER_SPREAD) + floor) for wanted in (1, 0, -1)
+        np.log(_normal(rise - height, _BORDER_SPREAD) + floor) for height in (1, 0, -1)
     )
     return (onto - none).sum(axis=0), (off - none).sum(axis=0)
 

@@ -1,14 +1,17 @@
-"""Hypotheses on the dots of an image, and how contradicting ones are settled."""
+"""Hypotheses on the dots of an image, and how contradicting ones are resolved."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
 from ahf_ros.codes.ring import Family
-from ahf_ros.detectors.ring import decoding
-from ahf_ros.features import circle_fit, frame
+from ahf_ros.detectors.ring.confidence import FEATURES, confidence, confidence_features
+from ahf_ros.detectors.ring.decoding import Readings
+from ahf_ros.features import frame
+from ahf_ros.features.array_record import ArrayRecord
+from ahf_ros.features.circle_fit import Fit
 
 CERTAIN = 0.98
 """Confidence from which a word is reported."""
@@ -17,7 +20,7 @@ _CLEARLY = 2.0  # times the evidence of another claim to the same ID or dot
 
 
 @dataclass(frozen=True, slots=True)
-class Hypotheses:
+class Hypotheses(ArrayRecord):
     """k dots, and what their bands were read as.
 
     Attributes
@@ -33,7 +36,7 @@ class Hypotheses:
     margin : ndarray of float64, shape (k,)
         Evidence over the best word of another ID, in units of ln.
     features : ndarray of float64, shape (k, n)
-        What the confidence is computed from, see `decoding.confidence_features`.
+        What the confidence is computed from, see `confidence_features`.
     confidence : ndarray of float64, shape (k,)
         Probability that the word is right.
     """
@@ -47,70 +50,78 @@ class Hypotheses:
     confidence: np.ndarray
 
     @staticmethod
-    def unread(fit: circle_fit.Fit) -> Hypotheses:
-        """Return dots of which no band was read."""
-        count = len(fit.frames)
+    def unread(dots: Fit) -> Hypotheses:
+        """Return dots whose bands are not read."""
+        count = len(dots.frames)
+        words, nothing = np.zeros(count, np.int64), np.zeros(count)
+        features = np.zeros((count, FEATURES))
         return Hypotheses(
-            fit.frames.copy(),
-            fit.covariance.copy(),
-            fit.share.copy(),
-            words=np.zeros(count, np.int64),
-            margin=np.zeros(count),
-            features=np.zeros((count, decoding.FEATURES)),
-            confidence=np.zeros(count),
+            dots.frames, dots.covariance, dots.share, words, nothing, features, nothing
         )
 
-    def update(self, which: np.ndarray, readings: decoding.Readings, fit: circle_fit.Fit) -> None:
-        """Take over the readings of some of the dots."""
-        features = decoding.confidence_features(readings, fit)
-        self.frames[which], self.covariance[which] = fit.frames, fit.covariance
-        self.share[which] = fit.share
-        self.words[which], self.margin[which] = readings.words, readings.margin
-        self.features[which] = features
-        self.confidence[which] = decoding.confidence(features)
-
-    def chosen(self, which: np.ndarray) -> Hypotheses:
-        """Return some of the dots."""
-        return Hypotheses(*(getattr(self, item.name)[which] for item in fields(self)))
-
     @staticmethod
-    def joined(parts: list[Hypotheses]) -> Hypotheses:
-        """Return the dots of several finds."""
-        names = [item.name for item in fields(Hypotheses)]
-        return Hypotheses(*(np.concatenate([getattr(of, n) for of in parts]) for n in names))
+    def read(readings: Readings, fit: Fit) -> Hypotheses:
+        """Return bands that are read, with the frames of dot and band."""
+        features = confidence_features(readings, fit)
+        return Hypotheses(
+            fit.frames,
+            fit.covariance,
+            fit.share,
+            readings.words,
+            readings.margin,
+            features,
+            confidence(features),
+        )
 
 
-def settled_dots(
-    found: Hypotheses, numbers: np.ndarray, certain: np.ndarray, code: Family
+def resolve_dots(
+    hypotheses: Hypotheses, ids: np.ndarray, certain: np.ndarray, family: Family
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the best hypotheses of each dot, and where no other reading comes near to it.
+    """Resolve which hypotheses on the same dot to keep.
 
-    Hypotheses come in the order of their evidence. Dots on a band that has been read are its
-    sectors, and not kept.
+    Parameters
+    ----------
+    hypotheses : Hypotheses
+        In the order of their evidence, the best first.
+    ids : ndarray of int, shape (k,)
+    certain : ndarray of bool, shape (k,)
+    family : Family
+
+    Returns
+    -------
+    kept : ndarray of int
+        Indices of the best hypothesis of each dot. Dots on a band that has been read are its
+        sectors, and not kept.
+    uncontested : ndarray of bool, shape (k,)
+        Whether a hypothesis is kept and no other reading of its dot comes near to it.
     """
-    major, minor, _ = frame.ellipse_axes(found.frames)
-    reach = np.where(certain, code.band_outer * minor, major)
-    uncontested = np.ones(len(numbers), bool)
+    major, minor, _ = frame.ellipse_axes(hypotheses.frames)
+    reach = np.where(certain, family.band_outer * minor, major)
+    centres, margin = hypotheses.frames[:, :2, 2], hypotheses.margin
+    uncontested = np.ones(len(ids), bool)
     kept: list[int] = []
-    for index, centre in enumerate(found.frames[:, :2, 2]):
-        distance = np.hypot(*(found.frames[kept, :2, 2] - centre).T)
+    for index, centre in enumerate(centres):
+        distance = np.hypot(*(centres[kept] - centre).T)
         same = [other for other, near in zip(kept, distance < reach[kept], strict=True) if near]
         if not same:
             kept.append(index)
         for other in same:
-            if certain[index] and numbers[index] != numbers[other]:
-                uncontested[other] &= found.margin[other] > _CLEARLY * found.margin[index]
-    dropped = np.ones(len(numbers), bool)
+            if certain[index] and ids[index] != ids[other]:
+                uncontested[other] &= margin[other] > _CLEARLY * margin[index]
+    dropped = np.ones(len(ids), bool)
     dropped[kept] = False
     return np.array(kept, np.intp), uncontested & ~dropped
 
 
-def settled_numbers(found: Hypotheses, numbers: np.ndarray, certain: np.ndarray) -> np.ndarray:
-    """Return which readings are certain and clearly the best claim to their ID."""
+def resolve_ids(hypotheses: Hypotheses, ids: np.ndarray, certain: np.ndarray) -> np.ndarray:
+    """Return which hypotheses are certain and clearly the best claim to their ID, shape (k,).
+
+    Parameters are those of `resolve_dots`.
+    """
     certain = certain.copy()
-    for number in np.unique(numbers[certain]):
-        best, *others = np.flatnonzero(certain & (numbers == number))
+    for identifier in np.unique(ids[certain]):
+        best, *others = np.flatnonzero(certain & (ids == identifier))
         certain[others] = False
-        if others and found.margin[best] <= _CLEARLY * found.margin[others[0]]:
+        if others and hypotheses.margin[best] <= _CLEARLY * hypotheses.margin[others[0]]:
             certain[best] = False
     return certain

@@ -1,4 +1,8 @@
-"""The bands about dots read, and dot and band refined together."""
+"""The bands about dots read, and dot and band refined together.
+
+One pass goes from the samples of the band to the frames of dot and band. A band that was read
+right makes the frame better, and a better frame the reading: there are two passes.
+"""
 
 from __future__ import annotations
 
@@ -7,29 +11,30 @@ from collections.abc import Sequence
 import numpy as np
 
 from ahf_ros.codes.ring import Family
-from ahf_ros.detectors.ring import decoding, evidence
+from ahf_ros.detectors.ring.band_evidence import band_evidence
+from ahf_ros.detectors.ring.band_samples import beside_edges, sample_bands
+from ahf_ros.detectors.ring.decoding import decode, sector_angles
+from ahf_ros.detectors.ring.evidence import MarkAppearance
+from ahf_ros.detectors.ring.frames import SMALL, fit_dots_and_bands, target_circles, unshifted
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
-from ahf_ros.features import circle_fit, frame
-
-REACH = 0.45
-"""Distance from an expected edge to look for it, dot radii."""
+from ahf_ros.features.circle_fit import Fit
+from ahf_ros.features.frame import mean_radii
+from ahf_ros.features.sampling import sample_circles
 
 PASSES = ((5, 1), (10, 2))
 """Over a band, each in a better frame: samples a sector, and rounds of the fit that follows."""
 
-_RAYS = 48  # about a dot
-_LEVELS = (0.75, 1.4)  # dot radii, where the levels of dot and gap are read
+_LEVEL_RADII = np.array([0.75, 1.4])  # dot radii, where the levels of dot and gap are read
 _LEVEL_RAYS = 24
+_LEVEL_ANGLES = 2 * np.pi * np.arange(_LEVEL_RAYS) / _LEVEL_RAYS
 _PRINTED = 0.25  # usual contrast of prints
-_SHIFT = 0.5  # of an edge towards the dark side, in its blur, at the most
-_SMALL = 7.0  # radius of dots that such a shift spoils the reading of, px
 
 
-def read_dots(
+def read_bands(
     gray: np.ndarray,
-    fit: circle_fit.Fit,
-    signs: np.ndarray,
-    code: Family,
+    dots: Fit,
+    polarity: np.ndarray,
+    family: Family,
     passes: Sequence[tuple[int, int]] = PASSES,
 ) -> tuple[Hypotheses, np.ndarray]:
     """Read the bands about dots, and refine dot and band together.
@@ -38,71 +43,60 @@ def read_dots(
     ----------
     gray : ndarray of float32, shape (height, width)
         Gray values from 0 to 255.
-    fit : Fit
+    dots : Fit
         Of k dots.
-    signs : ndarray of int, shape (k,)
+    polarity : ndarray of int, shape (k,)
         1 for a dark target, -1 for a bright one.
-    code : Family
+    family : Family
     passes : sequence of (int, int)
         As `PASSES` has them; one is enough where frames are right to a tenth of a pixel.
 
     Returns
     -------
-    found : Hypotheses
+    hypotheses : Hypotheses
         One of each dot, then a second one of each small dot.
     which : ndarray of int, shape (m,)
         The dot that each is of.
     """
-    which, frames = _unshifted(fit, signs)
-    fit = fit.chosen(which)
-    contrast = _contrast(gray, fit, signs[which])
-    marks = evidence.Marks(signs[which], contrast, fit.bright, fit.blur)
-    found = Hypotheses.unread(fit)
+    which, frames = unshifted(dots, polarity)
+    dots = dots.select(which)
+    marks = mark_appearance(gray, dots, polarity[which])
     read = np.arange(len(which))
-    # A band that was read right makes the frame better, and a better frame the reading.
-    for samples, rounds in passes:
-        readings = decoding.read_bands(gray, frames, marks, code, samples)
+    for per_sector, rounds in passes:
+        size, angles = mean_radii(frames), sector_angles(family, per_sector)
+        samples = sample_bands(gray, frames, beside_edges(size, marks.blur), angles, family)
+        evidence = band_evidence(samples, marks, size, family)
+        readings = decode(samples, evidence, marks, family)
         good = readings.plausible
-        read, readings, marks = read[good], readings.chosen(good), marks.chosen(good)
-        circles = circle_fit.ring_circles(
-            readings.words, readings.start, marks.signs, _RAYS, samples, code
-        )
-        fit = circle_fit.fit_circles(
-            gray, frames[good], circles, reach=REACH, projective=True, rounds=rounds
-        )
-        frames = fit.frames
-    found.update(read, readings, fit)
-    return found, which
+        read, readings, marks = read[good], readings.select(good), marks.select(good)
+        words, starts = readings.words, readings.start
+        circles = target_circles(words, starts, marks.polarity, per_sector, family)
+        joint = fit_dots_and_bands(gray, frames[good], circles, rounds)
+        frames = joint.frames
+    unread = Hypotheses.unread(dots)
+    return unread.replaced(read, Hypotheses.read(readings, joint)), which
 
 
-def _contrast(gray: np.ndarray, fit: circle_fit.Fit, signs: np.ndarray) -> np.ndarray:
-    """Return the contrast that marks are expected to have.
+def mark_appearance(gray: np.ndarray, dots: Fit, polarity: np.ndarray) -> MarkAppearance:
+    """Return how marks are expected to look.
 
-    It is that of the dot's edge. Where a camera sharpens, that edge is darker than marks are, and
-    where marks are small blur makes them less dark. The levels beside the edge then tell more; at
-    large dots only up to the usual contrast of prints, because the light may change between them.
+    Their contrast is that of the dot's edge. Where a camera sharpens, that edge is darker than
+    marks are, and where marks are small blur makes them less dark. The levels beside the edge then
+    tell more; at large dots only up to the usual contrast of prints, because the light may change
+    between them.
+
+    Parameters
+    ----------
+    gray : ndarray of float32, shape (height, width)
+        Gray values from 0 to 255.
+    dots : Fit
+        Of k dots.
+    polarity : ndarray of int, shape (k,)
     """
-    angles = 2 * np.pi * np.arange(_LEVEL_RAYS) / _LEVEL_RAYS
-    values = frame.sample_circles(gray, fit.frames, angles, np.array(_LEVELS))
+    values = sample_circles(gray, dots.frames, _LEVEL_ANGLES, _LEVEL_RADII)
     inside, outside = np.moveaxis(np.maximum(values, 1.0), 2, 0)
-    ratio = np.median(inside / outside, axis=1) ** signs
-    small = frame.mean_radii(fit.frames) < _SMALL
-    return np.maximum(fit.contrast, np.where(small, ratio, np.minimum(ratio, _PRINTED)))
-
-
-def _unshifted(fit: circle_fit.Fit, signs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return which dots to read, and their frames without the shift of the dot's edge.
-
-    A camera's gamma makes a dark dot smaller and a bright one larger, by up to half of the
-    standard deviation of the blur; a linear camera does not. The band, up to 3.5 radii away, needs
-    the scale: small dots are read with either, others with the mean.
-    """
-    size = frame.mean_radii(fit.frames)
-    every, small = np.arange(len(size)), np.flatnonzero(size < _SMALL)
-    which = np.concatenate([every, small])
-    share = np.full(len(size), 0.5)
-    share[small] = 0.0
-    share = np.concatenate([share, np.ones(len(small))])
-    changes = np.zeros((len(which), 5))
-    changes[:, 2] = signs[which] * _SHIFT * share * fit.blur[which] / size[which]
-    return which, frame.moved(fit.frames[which], changes)
+    ratio = np.median(inside / outside, axis=1) ** polarity
+    small = mean_radii(dots.frames) < SMALL
+    by_levels = np.where(small, ratio, np.minimum(ratio, _PRINTED))
+    contrast = np.maximum(dots.contrast, by_levels)
+    return MarkAppearance(polarity, contrast, dots.bright, dots.blur)

@@ -11,8 +11,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ahf_ros.features.edge_weights import median, trust_edges
-from ahf_ros.features.profiles import BLURS, CORRELATION, USUAL_BLUR, Edges, Places, measure_places
+from ahf_ros.features.edge_weights import weigh_edges
+from ahf_ros.features.light_slope import common_slope, smooth_slopes
+from ahf_ros.features.profiles import (
+    BLURS,
+    CORRELATION,
+    USUAL_BLUR,
+    Edges,
+    OutlinePoints,
+    measure_outlines,
+)
+from ahf_ros.features.robust import median, reweight, spread
 
 _PROFILES = 32  # across a side
 _ENDS = 0.06  # of a side, where the next one rounds it off
@@ -20,11 +29,12 @@ _FARTHEST = 3.0  # to either side that an edge is looked for, px
 _IN_CELLS = 0.45  # the same, in cells of the marker: other edges lie a cell away
 _MEASUREMENTS = 3
 _ROUNDS = 6  # of robust least squares
-_OUTLIER = 3.0  # times the usual distance from the line that quarters the trust
-_LEAST_DISTANCE = 0.02  # that counts as usual, px
+_OUTLIER = 3.0  # times the usual distance from the line that quarters the weight
+_MINIMUM_DISTANCE = 0.02  # that counts as usual, px
 _PLACED = 0.25  # distance from the line within which an edge is in its place, px
+_MINIMUM_STEP = 1.0  # gray values, that the weight of an edge is computed from
 _LIGHT_REACH = 1.5  # standard deviation of the window in which the light is even, profiles
-_LIGHT_PRIOR = 1.0  # trusted profiles that say as much of the slope as the prior, none, does
+_LIGHT_PRIOR = 1.0  # whole profiles that say as much of the slope as the prior, none, does
 _WEAK_PRIOR = 1e-3  # of a side where it is, in gray values^2 / px^2
 _DIFFERENCE = 1e-3  # px, for derivatives
 _SYSTEMATIC = 0.003  # standard deviation of what lens distortion and pixels do to a centre, px
@@ -84,17 +94,17 @@ def fit_sides(gray: np.ndarray, corners: np.ndarray, cells: int) -> Sides:
     for _ in range(_MEASUREMENTS if len(corners) else 0):
         starts, ends = corners, np.roll(corners, -1, axis=1)
         normals = _normals(starts, ends)
-        places, along = _places(starts, ends, normals, cells)
-        edges = measure_places(gray, places, blur, reach=1.0)
+        points, along = _outlines(starts, ends, normals, cells)
+        edges = measure_outlines(gray, points, blur, reach=1.0)
         blur = np.clip(blur + median(edges.softness, edges.visible, 0.0), *BLURS)
-        trusted = trust_edges(edges)
-        step = np.maximum(edges.bright - edges.dark, 1.0)
+        own = weigh_edges(edges)
+        step = np.maximum(edges.bright - edges.dark, _MINIMUM_STEP)
         of_side = (len(corners), 4, _PROFILES)
         lines = _fit_lines(
             along,
-            (edges.offset - edges.sensitivity * _slopes(edges, trusted.trust)).reshape(of_side),
-            (trusted.trust * step**2).reshape(of_side),
-            trusted.seen.reshape(of_side),
+            (edges.offset - edges.sensitivity * _slopes(edges, own.weights)).reshape(of_side),
+            (own.weights * step**2).reshape(of_side),
+            own.seen.reshape(of_side),
             edges.spacing.reshape(of_side),
         )
         met, covariance = _corners(starts, ends, normals, lines)
@@ -104,15 +114,13 @@ def fit_sides(gray: np.ndarray, corners: np.ndarray, cells: int) -> Sides:
     return Sides(corners, share, covariance)
 
 
-def _slopes(edges: Edges, trust: np.ndarray) -> np.ndarray:
+def _slopes(edges: Edges, weights: np.ndarray) -> np.ndarray:
     """Return the slope of the light across the edges, smoothed along each side, shape (k, m)."""
-    # What all edges have outwards is not the light's: the blur is another than that of the step.
-    common = (trust * edges.slope).sum(axis=1) / np.maximum(trust.sum(axis=1), 1e-9)
-    place = np.arange(_PROFILES)
-    window = np.exp(-0.5 * ((place[:, None] - place) / _LIGHT_REACH) ** 2)
-    weights = trust.reshape(len(trust), 4, _PROFILES)
-    slopes = (edges.slope - common[:, None]).reshape(weights.shape)
-    return ((weights * slopes) @ window / (weights @ window + _LIGHT_PRIOR)).reshape(trust.shape)
+    slopes = edges.slope - common_slope(edges.slope, np.ones_like(edges.slope), weights)
+    index = np.arange(_PROFILES)
+    window = np.exp(-0.5 * ((index[:, None] - index) / _LIGHT_REACH) ** 2)
+    of_sides = (slopes.reshape(-1, _PROFILES), weights.reshape(-1, _PROFILES))
+    return smooth_slopes(*of_sides, window, _LIGHT_PRIOR, rounds=1).slope.reshape(slopes.shape)
 
 
 def _normals(starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
@@ -122,9 +130,9 @@ def _normals(starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
     return np.stack([ways[..., 1], -ways[..., 0]], axis=2) / lengths
 
 
-def _places(
+def _outlines(
     starts: np.ndarray, ends: np.ndarray, normals: np.ndarray, cells: int
-) -> tuple[Places, np.ndarray]:
+) -> tuple[OutlinePoints, np.ndarray]:
     """Return where the edges of the sides are expected, and how far along a side, 0 to 1."""
     count = len(starts)
     along = np.linspace(_ENDS, 1 - _ENDS, _PROFILES)
@@ -133,18 +141,18 @@ def _places(
     depth = np.minimum(np.roll(lengths, 1, axis=1), np.roll(lengths, -1, axis=1))
     reach = np.minimum(_IN_CELLS * depth / cells, _FARTHEST)
 
-    def spread(of_sides: np.ndarray) -> np.ndarray:
+    def repeated(of_sides: np.ndarray) -> np.ndarray:
         return np.repeat(of_sides, _PROFILES, axis=1)
 
-    places = Places(
+    outlines = OutlinePoints(
         points.reshape(count, -1, 2),
-        spread(normals),
+        repeated(normals),
         np.ones((count, 4 * _PROFILES), int),
-        spread(reach),
-        spread(lengths * (along[1] - along[0])),
+        repeated(reach),
+        repeated(lengths * (along[1] - along[0])),
         np.zeros((count, 4 * _PROFILES)),
     )
-    return places, along
+    return outlines, along
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,17 +174,22 @@ def _fit_lines(
     """Lay lines through the offsets of edges, shape (k, 4, n), by robust least squares."""
     basis = np.stack([1 - along, along], axis=1)
     flat = (-1, len(along))
-    robust = weights
-    for _ in range(_ROUNDS):
+
+    def solve(robust: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
         normal = (robust @ _products(basis)).reshape(*robust.shape[:2], 2, 2)
         inverse = np.linalg.inv(normal + _WEAK_PRIOR * np.eye(2))
         unknowns = (inverse @ ((robust * offsets) @ basis)[..., None])[..., 0]
-        errors = np.abs(offsets - unknowns @ basis.T)
-        usual = median(errors.reshape(flat), seen.reshape(flat)).reshape(errors.shape[:2])
-        spread = np.maximum(1.4826 * usual, _LEAST_DISTANCE)[..., None]
-        robust = weights / (1 + (errors / (_OUTLIER * spread)) ** 2) ** 2
+        return (unknowns, inverse), np.abs(offsets - unknowns @ basis.T)
+
+    def scale(errors: np.ndarray) -> np.ndarray:
+        usual = spread(errors.reshape(flat), seen.reshape(flat), _MINIMUM_DISTANCE)
+        return _OUTLIER * usual.reshape(*errors.shape[:2], 1)
+
+    fitted = reweight(solve, weights, scale, _ROUNDS)
+    unknowns, inverse = fitted.solution
+    errors = np.abs(offsets - unknowns @ basis.T)
     share = (seen & (errors < _PLACED)).mean(axis=2)
-    influence = (robust[..., None] * basis) @ inverse
+    influence = (fitted.weights[..., None] * basis) @ inverse
     together = np.maximum(CORRELATION / spacing, 1.0)
     parts = influence * (errors * np.sqrt(together))[..., None]
     return _Lines(unknowns, np.swapaxes(parts, 2, 3) @ parts, share)

@@ -6,7 +6,10 @@ import cv2
 import numpy as np
 import pytest
 
-from ahf_ros.features import candidates, dots, frame
+from ahf_ros.features import frame
+from ahf_ros.features.candidates import Candidates
+from ahf_ros.features.ellipses import fit_ellipses, refine_ellipses
+from ahf_ros.features.pyramid import image_pyramid, log_image
 
 SHAPE = (200, 240)
 
@@ -32,10 +35,6 @@ def half_in_shadow(gray: np.ndarray, x: float, y: float, angle: float) -> np.nda
     return np.rint(gray * np.clip(0.65 + side / 2, 0.3, 1)).astype(np.uint8)
 
 
-def logs_of(gray: np.ndarray) -> list[np.ndarray]:
-    return [candidates.log_image(level) for level in candidates.pyramid(gray, 3)]
-
-
 def frames_of(*ellipses: tuple[float, float, float, float, float]) -> np.ndarray:
     return frame.affine_frames(*np.array(ellipses).T)
 
@@ -48,17 +47,17 @@ ELLIPSES = [
 
 
 @pytest.mark.parametrize('ellipse', ELLIPSES, ids=['round', 'tilted', 'oblique'])
-@pytest.mark.parametrize('sign', [1, -1])
-def test_a_start_that_is_near_comes_onto_the_edge(ellipse, sign):
-    colours = (210, 30) if sign == 1 else (30, 210)
-    log = candidates.log_image(drawn([ellipse], *colours))
+@pytest.mark.parametrize('polarity', [1, -1])
+def test_a_start_that_is_near_comes_onto_the_edge(ellipse, polarity):
+    colours = (210, 30) if polarity == 1 else (30, 210)
+    log = log_image(drawn([ellipse], *colours))
     x, y, major, minor, angle = ellipse
     start = frames_of((x + 0.1 * minor, y - 0.1 * minor, 1.1 * major, 1.08 * minor, angle))
-    frames, signs, inliers = dots.refine_dots(log, start, np.array([sign]))
-    assert signs.tolist() == [sign]
-    assert inliers[0] > 0.9
-    assert frames[0, :2, 2] == pytest.approx((x, y), abs=0.2)
-    axes = [axis[0] for axis in frame.ellipse_axes(frames)]
+    dots = refine_ellipses(log, start, np.array([polarity]))
+    assert dots.polarity.tolist() == [polarity]
+    assert dots.share[0] > 0.9
+    assert dots.frames[0, :2, 2] == pytest.approx((x, y), abs=0.2)
+    axes = [axis[0] for axis in frame.ellipse_axes(dots.frames)]
     # In the logarithm a blurred edge lies some way towards its dark side.
     assert axes[:2] == pytest.approx((major, minor), abs=0.8)
     if major > minor:
@@ -69,23 +68,23 @@ def test_a_start_that_is_near_comes_onto_the_edge(ellipse, sign):
 def test_an_edge_of_light_across_the_dot_moves_it_little(angle):
     gray = half_in_shadow(drawn([(100.3, 90.6, 16.0, 14.0, 0.3)]), 104, 92, angle)
     start = frames_of((101.0, 90.0, 15.0, 15.0, 0.0))
-    frames, _, inliers = dots.refine_dots(candidates.log_image(gray), start, np.array([1]))
-    assert inliers[0] > 0.7
-    assert frames[0, :2, 2] == pytest.approx((100.3, 90.6), abs=0.4)
+    dots = refine_ellipses(log_image(gray), start, np.array([1]))
+    assert dots.share[0] > 0.7
+    assert dots.frames[0, :2, 2] == pytest.approx((100.3, 90.6), abs=0.4)
 
 
 def test_what_the_edges_do_not_bear_out_is_left_out():
-    log = candidates.log_image(drawn([(60, 60, 12, 12, 0)]))
+    log = log_image(drawn([(60, 60, 12, 12, 0)]))
     start = frames_of((60, 60, 12, 12, 0), (160, 120, 12, 12, 0), (60, 60, 12, 12, 0))
-    frames, signs, inliers = dots.refine_dots(log, start, np.array([1, 1, -1]))
-    assert len(frames) == len(signs) == len(inliers) == 1
-    assert frames[0, :2, 2] == pytest.approx((60, 60), abs=0.1)
+    dots = refine_ellipses(log, start, np.array([1, 1, -1]))
+    assert len(dots.frames) == len(dots.polarity) == len(dots.share) == 1
+    assert dots.frames[0, :2, 2] == pytest.approx((60, 60), abs=0.1)
 
 
 def test_nothing_in_nothing_out():
-    log = candidates.log_image(drawn([(60, 60, 12, 12, 0)]))
-    frames, signs, inliers = dots.refine_dots(log, np.zeros((0, 3, 3)), np.zeros(0, int))
-    assert (frames.shape, signs.shape, inliers.shape) == ((0, 3, 3), (0,), (0,))
+    log = log_image(drawn([(60, 60, 12, 12, 0)]))
+    dots = refine_ellipses(log, np.zeros((0, 3, 3)), np.zeros(0, int))
+    assert (dots.frames.shape, dots.polarity.shape, dots.share.shape) == ((0, 3, 3), (0,), (0,))
 
 
 @pytest.mark.parametrize('level', [1, 2])
@@ -95,36 +94,15 @@ def test_an_ellipse_is_found_about_a_candidate(ellipse, level):
     scale = 2.0**level
     size = np.sqrt(major * minor) / scale
     points = (np.array([[x + 1.5, y - 1.5]]) + 0.5) / scale - 0.5
-    candidate = candidates.Candidates(level, points, (0.7 * size, 1.4 * size), np.array([1]))
-    frames, signs, _ = dots.fit_dots(logs_of(drawn([ellipse])), candidate)
-    assert signs.tolist() == [1]
-    assert frames[0, :2, 2] == pytest.approx((x, y), abs=0.3 * scale)
-    fitted = [axis[0] for axis in frame.ellipse_axes(frames)]
+    candidate = Candidates(level, points, (0.7 * size, 1.4 * size), np.array([1]))
+    dots = fit_ellipses(image_pyramid(drawn([ellipse]), 60.0).logs, candidate)
+    assert dots.polarity.tolist() == [1]
+    assert dots.frames[0, :2, 2] == pytest.approx((x, y), abs=0.3 * scale)
+    fitted = [axis[0] for axis in frame.ellipse_axes(dots.frames)]
     assert fitted[:2] == pytest.approx((major, minor), abs=scale)
 
 
 def test_a_candidate_on_even_ground_has_no_ellipse():
-    points, signs = np.array([[80.0, 20.0]]), np.array([1])
-    candidate = candidates.Candidates(1, points, (5.8, 11.2), signs)
-    frames, signs, inliers = dots.fit_dots(logs_of(drawn([(60, 60, 12, 12, 0)])), candidate)
-    assert len(frames) == len(signs) == len(inliers) == 0
-
-
-def test_a_linear_model_is_found_despite_outliers():
-    generator = np.random.default_rng(0)
-    basis = np.stack([np.ones(40), np.linspace(-1, 1, 40)], axis=1)
-    true = np.array([[0.2, 0.1], [-0.3, 0.05]])
-    values = true @ basis.T + 0.01 * generator.standard_normal((2, 40))
-    values[:, :10] += 1.0
-    found, residuals = dots.fit_robustly(values, np.ones((2, 40)), basis, scale=0.05, rounds=8)
-    assert found == pytest.approx(true, abs=0.02)
-    assert np.abs(residuals[:, :10]).min() > 0.8
-    assert residuals == pytest.approx(values - found @ basis.T)
-
-
-def test_values_without_weight_do_not_count():
-    basis = np.ones((6, 1))
-    values = np.array([[1.0, 1, 1, 9, 9, 9]])
-    weights = np.array([[1.0, 1, 1, 0, 0, 0]])
-    found, _ = dots.fit_robustly(values, weights, basis, scale=10.0)
-    assert found[0, 0] == pytest.approx(1, abs=1e-2)
+    candidate = Candidates(1, np.array([[80.0, 20.0]]), (5.8, 11.2), np.array([1]))
+    dots = fit_ellipses(image_pyramid(drawn([(60, 60, 12, 12, 0)]), 60.0).logs, candidate)
+    assert len(dots.frames) == len(dots.polarity) == len(dots.share) == 0

@@ -1,0 +1,77 @@
+"""Evidence of the samples of a band for marks in it, at every angle.
+
+Three kinds of evidence that light cannot easily fake together are added:
+
+- edges: the step across the inner and the outer edge of the band, against the step that a mark
+  makes at the gray value found beside it;
+- levels: the gray value itself, against those of bright places of the same target, as they are and
+  as a mark would turn them;
+- borders: the step along the band where two sectors meet, and its absence within them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ahf_ros.codes.ring import Family
+from ahf_ros.detectors.ring.band_samples import BandSamples
+from ahf_ros.detectors.ring.evidence import (
+    MarkAppearance,
+    border_evidence,
+    level_evidence,
+    light_levels,
+    step_evidence,
+)
+
+_CORRELATION = 2.5  # px between independent readings
+_MINIMUM_ALONG, _MINIMUM_ACROSS = 0.08, 0.1  # weight of a reading among many that are alike
+
+
+@dataclass(frozen=True, slots=True)
+class BandEvidence:
+    """Evidence about the bands of k targets at m angles, in units of ln, weighted.
+
+    Attributes
+    ----------
+    steps : ndarray of float64, shape (2, k, m)
+        For a mark, of the steps across the inner and the outer edge of the band.
+    marked : ndarray of float64, shape (k, m)
+        For a mark, of these steps and of the levels in the band.
+    onto, off : ndarray of float64, shape (k, m)
+        For a border onto a mark and off it, against none, after each angle.
+    """
+
+    steps: np.ndarray
+    marked: np.ndarray
+    onto: np.ndarray
+    off: np.ndarray
+
+
+def band_evidence(
+    samples: BandSamples, marks: MarkAppearance, size: np.ndarray, family: Family
+) -> BandEvidence:
+    """Weigh the samples of bands.
+
+    Parameters
+    ----------
+    samples : BandSamples
+        Of k targets.
+    marks : MarkAppearance
+    size : ndarray of float64, shape (k,)
+        Radii of the dots, px.
+    family : Family
+    """
+    inner, outer = family.band_inner, family.band_outer
+    dark = (marks.polarity > 0)[:, None]
+    bright = np.where(dark, samples.ground, np.concatenate([samples.dot, samples.dot]))
+    light = light_levels(np.moveaxis(bright, 0, 2), samples.gap, marks)
+    along = 2 * np.pi * inner * size / samples.visible.shape[1]
+    weight = np.clip(along / _CORRELATION, _MINIMUM_ALONG, 1)[:, None] * samples.visible
+    steps = [weight * step_evidence(ground, band, marks, light) for ground, band in samples.edges]
+    marked = sum(steps) + weight * level_evidence(samples.band, light)
+    across = (outer - inner) * size / len(samples.band)
+    weight = np.clip(across / _CORRELATION, _MINIMUM_ACROSS, 1)[:, None] * samples.visible
+    onto, off = (weight * border for border in border_evidence(samples.band, marks, light))
+    return BandEvidence(np.stack(steps), marked, onto, off)

@@ -1,0 +1,117 @@
+"""Gray values read on the circles of ring targets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ahf_ros.codes.ring import Family
+from ahf_ros.features import frame
+from ahf_ros.features.sampling import sample_circles, within
+
+BESIDE = 2.6
+"""Distance of a reading from an edge that is sharp, px."""
+
+NEAREST_BESIDE, FARTHEST_BESIDE = 0.13, 0.36
+"""Bounds of that distance, dot radii."""
+
+_SOFT, _BESIDE_SOFT = 1.0, 3.0  # blur of an edge, px, from which that distance grows, and how fast
+_BAND_DEPTHS = (0.3, 0.5, 0.7)  # shares of the width of the band, where its level is read
+_GAP_DEPTHS = (0.35, 0.65)  # shares of the width of the gap, where its level is read
+_DOT_RADII = (0.35, 0.7)  # where the level of the dot is read, dot radii
+
+
+@dataclass(frozen=True, slots=True)
+class BandSamples:
+    """Gray values of k targets at m angles, each on a circle of its own; none is negative.
+
+    Attributes
+    ----------
+    inner_ground, inner_band : ndarray of float32, shape (k, m)
+        Beside the inner edge of the band, in the gap and in the band.
+    outer_band, outer_ground : ndarray of float32, shape (k, m)
+        Beside the outer edge of the band, in the band and outside of it.
+    band : ndarray of float32, shape (3, k, m)
+        In the band, away from its edges.
+    gap : ndarray of float32, shape (2, k, m)
+        In the gap between dot and band, away from their edges.
+    dot : ndarray of float32, shape (2, k, m)
+        In the dot.
+    visible : ndarray of bool, shape (k, m)
+        Whether the image shows all of these.
+    """
+
+    inner_ground: np.ndarray
+    inner_band: np.ndarray
+    outer_band: np.ndarray
+    outer_ground: np.ndarray
+    band: np.ndarray
+    gap: np.ndarray
+    dot: np.ndarray
+    visible: np.ndarray
+
+    @property
+    def edges(self) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
+        """Ground and band beside the inner edge of the band, and beside the outer one."""
+        return (self.inner_ground, self.inner_band), (self.outer_ground, self.outer_band)
+
+    @property
+    def ground(self) -> np.ndarray:
+        """All readings that no mark lies on, ndarray of float32, shape (4, k, m)."""
+        return np.stack([*self.gap, self.inner_ground, self.outer_ground])
+
+
+def beside_edges(size: np.ndarray, blur: np.ndarray | float) -> np.ndarray:
+    """Return how far from an edge to read, so that its blur does not reach there.
+
+    Parameters
+    ----------
+    size : ndarray of float64, shape (k,)
+        Radii of the dots, px.
+    blur : float or ndarray of float64, shape (k,)
+        Of the edges, standard deviation in px.
+
+    Returns
+    -------
+    ndarray of float64, shape (k, 1)
+        Dot radii.
+    """
+    beside = BESIDE + _BESIDE_SOFT * np.maximum(blur - _SOFT, 0)
+    return np.clip(beside / size, NEAREST_BESIDE, FARTHEST_BESIDE)[:, None]
+
+
+def sample_bands(
+    gray: np.ndarray, frames: np.ndarray, beside: np.ndarray, angles: np.ndarray, family: Family
+) -> BandSamples:
+    """Read the gray values of targets about their dots.
+
+    Parameters
+    ----------
+    gray : ndarray of float32, shape (height, width)
+        Gray values from 0 to 255.
+    frames : ndarray of float64, shape (k, 3, 3)
+    beside : ndarray of float64, shape (k, 1)
+        Distance of readings from edges, see `beside_edges`.
+    angles : ndarray of float64, shape (m,)
+        In the frame, from +x towards +y, rad.
+    family : Family
+    """
+    inner, outer = family.band_inner, family.band_outer
+    fixed = np.concatenate(
+        [
+            inner + (outer - inner) * np.array(_BAND_DEPTHS),
+            1 + (inner - 1) * np.array(_GAP_DEPTHS),
+            np.array(_DOT_RADII),
+        ]
+    )
+    edges = np.array([inner, inner, outer, outer]) + beside * np.array([-1, 1, -1, 1])
+    radii = np.concatenate([edges, np.broadcast_to(fixed, (len(frames), len(fixed)))], axis=1)
+    values = sample_circles(gray, frames, angles, radii)
+    values = np.moveaxis(np.maximum(values, 0), 2, 0)
+    ends = np.cumsum([4, len(_BAND_DEPTHS), len(_GAP_DEPTHS)])
+    of_edges, band, gap, dot = np.split(values, ends)
+    inner_ground, inner_band, outer_band, outer_ground = of_edges
+    limit = frame.circle_points(angles, np.array([outer + FARTHEST_BESIDE]))[:, 0]
+    visible = within(frame.project(frames, limit), gray.shape)
+    return BandSamples(inner_ground, inner_band, outer_band, outer_ground, band, gap, dot, visible)

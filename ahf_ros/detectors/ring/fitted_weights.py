@@ -1,0 +1,29 @@
+"""The weights that were fitted to data, all in `fitted_weights.json` beside this file.
+
+Each set says which command made it, from which seeds and at which commit. `benchmarks.confidence`
+and `benchmarks.counting` fit them anew and write the file.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+PATH = Path(__file__).with_suffix('.json')
+"""The data file."""
+
+
+def fitted_weights(purpose: str, *names: str) -> tuple[np.ndarray, ...]:
+    """Return arrays of one set of the file, each ndarray of float64, shape (n,).
+
+    Parameters
+    ----------
+    purpose : str
+        Name of the set.
+    *names : str
+        Names of the arrays.
+    """
+    weights = json.loads(PATH.read_text(encoding='utf-8'))[purpose]
+    return tuple(np.array(weights[name], np.float64) for name in names)

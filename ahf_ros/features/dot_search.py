@@ -1,0 +1,78 @@
+"""The dots of an image, found with their ellipses under any light.
+
+`whole_dots` takes the outlines that an edge follows all the way round: fast, and enough where the
+light is even. `voted_dots` finds the others, whose outlines the edges of light interrupt, in what
+is left of the edges when those of explained objects are hidden.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ahf_ros.features import frame
+from ahf_ros.features.candidates import find_candidates
+from ahf_ros.features.dots import Dots, distinct
+from ahf_ros.features.ellipses import fit_ellipses
+from ahf_ros.features.outlines import whole_outlines
+from ahf_ros.features.pyramid import ImagePyramid
+
+
+def whole_dots(
+    pyramid: ImagePyramid, min_radius: float, max_radius: float, polarities: Sequence[int]
+) -> Dots:
+    """Return the dots with a whole outline.
+
+    Parameters
+    ----------
+    pyramid : ImagePyramid
+    min_radius, max_radius : float
+        Bounds of the semi-major axis, px.
+    polarities : sequence of int
+        1 to find dark dots, -1 to find bright ones.
+
+    Returns
+    -------
+    Dots
+        No two of them the same, in px of the image, to about half a pixel.
+    """
+    dots = whole_outlines(pyramid.edges[0], min_radius / 2, max_radius / 2)
+    dots = dots.select(np.isin(dots.polarity, polarities))
+    return distinct(replace(dots, frames=frame.enlarged(dots.frames, 1)))
+
+
+def voted_dots(
+    pyramid: ImagePyramid,
+    min_radius: float,
+    max_radius: float,
+    polarities: Sequence[int],
+    explained: Sequence[np.ndarray] | np.ndarray = (),
+) -> Dots:
+    """Return the dots that many gradients point away from, whether their outline is whole or not.
+
+    Parameters
+    ----------
+    pyramid : ImagePyramid
+    min_radius, max_radius : float
+        Bounds of the radius, px; dots that are a little smaller or larger may be among those
+        returned.
+    polarities : sequence of int
+        1 to find dark dots, -1 to find bright ones.
+    explained : sequence of ndarray of float, each of shape (m, 2)
+        Outlines of objects that are known already, px of the image. No edge inside of one votes.
+
+    Returns
+    -------
+    Dots
+        No two of them the same, those with the largest share first, in px of the image.
+    """
+    edges = [
+        of_level.outside([(outline + 0.5) / 2**level - 0.5 for outline in explained])
+        for level, of_level in enumerate(pyramid.edges, start=1)
+    ]
+    candidates = find_candidates(edges, min_radius, max_radius, polarities)
+    dots = [fit_ellipses(pyramid.logs, of_range) for of_range in candidates]
+    nothing = Dots(np.zeros((0, 3, 3)), np.zeros(0, int), np.zeros(0))
+    return distinct(Dots.joined([nothing, *dots]))

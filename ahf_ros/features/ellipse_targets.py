@@ -1,0 +1,57 @@
+"""Targets made from frames: centre, ellipse and covariance as reported."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ahf_ros.features.frame import ellipse_axes
+from ahf_ros.target import UNDECODED, Target
+
+
+def ellipse_fields(frames: np.ndarray, covariance: np.ndarray) -> list[dict[str, Any]]:
+    """Return the fields of `Target` that say where it is.
+
+    Parameters
+    ----------
+    frames : ndarray of float64, shape (k, 3, 3)
+        In px of the image.
+    covariance : ndarray of float64, shape (k, 2, 2)
+        Of the image of the centre, px^2.
+    """
+    columns = (frames[:, 0, 2], frames[:, 1, 2], *ellipse_axes(frames))
+    names = ('x', 'y', 'semi_major', 'semi_minor', 'angle')
+    return [
+        {**dict(zip(names, row, strict=True)), 'covariance': tuple(of_row)}
+        for row, of_row in zip(
+            np.stack(columns, axis=1).tolist(), covariance.reshape(-1, 4).tolist(), strict=True
+        )
+    ]
+
+
+def targets_from_frames(
+    frames: np.ndarray,
+    covariance: np.ndarray,
+    ids: np.ndarray,
+    codes: np.ndarray,
+    confidence: np.ndarray,
+) -> list[Target]:
+    """Return targets, in the order given.
+
+    Parameters
+    ----------
+    frames, covariance
+        As for `ellipse_fields`.
+    ids : ndarray of int, shape (k,)
+        `UNDECODED` where the code word is not certain.
+    codes : ndarray of int, shape (k,)
+        Code words; 0 is reported where the ID is `UNDECODED`.
+    confidence : ndarray of float64, shape (k,)
+    """
+    codes = np.where(ids == UNDECODED, 0, codes)
+    rows = (ids.tolist(), codes.tolist(), confidence.tolist(), ellipse_fields(frames, covariance))
+    return [
+        Target(id=identifier, code=code, confidence=certainty, **fields)
+        for identifier, code, certainty, fields in zip(*rows, strict=True)
+    ]

@@ -1,0 +1,157 @@
+"""Ellipses of dots, found about candidates despite the edges of light that cross them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+
+import numpy as np
+
+from ahf_ros.features import frame
+from ahf_ros.features.candidates import Candidates
+from ahf_ros.features.dots import Dots
+from ahf_ros.features.log_edges import LOG_SCALE
+from ahf_ros.features.robust import fit_linear
+from ahf_ros.features.sampling import sample_circles
+
+_RAYS = 32
+_ANGLES = 2 * np.pi * np.arange(_RAYS) / _RAYS
+_BINS = 26  # of the radius, in equal ratios
+_NEAREST, _FARTHEST = 0.4, 1.35  # radii sampled, in the smallest and the largest of the range
+_SHAPES = ((1.0, 1), (0.75, 4), (0.55, 6), (0.4, 8))  # aspect, number of directions
+_LOWEST_STEP, _HIGHEST_STEP = -0.3, 0.6  # of ln; a single step beyond counts no more
+_MINIMUM_SCORE = 0.15  # mean step of ln along the ellipse
+_COARSE = 8.0  # largest radius of a range that is fitted one level below its own, px
+_OVERSIZE = 1.6  # semi-major axis of a dot, in the largest radius of its range, at the most
+_WINDOWS = (0.35, 0.22, 0.14)  # about the ellipse, in its own radius
+_MINIMUM_WINDOW, _MAXIMUM_WINDOW = 2.0, 0.5  # the same: px, and in its own radius
+_PROFILE, _SAMPLES = 1.15, 13  # half length of a profile across it, in windows, and its samples
+_MINIMUM_STEP = 0.1  # of ln, for a ray to count in the fit
+_CLEAR_STEP = 1.5 * _MINIMUM_STEP  # for a ray to show the edge
+_FLAT = -1e-3  # curvature of a peak of the steps, from which its top is computed
+_OUTLIERS = 5.0  # to a window: residuals that quarter the weight of a ray
+_INLIER, _PIXEL_INLIER = 0.06, 0.4  # of the radius, or px
+_MINIMUM_INLIERS = 0.45
+_MINIMUM_ASPECT = 0.28
+_MINIMUM_MINOR = 1.0  # px
+
+
+def fit_ellipses(logs: Sequence[np.ndarray], candidates: Candidates) -> Dots:
+    """Fit ellipses to the dots about candidates.
+
+    About each candidate the steps of ln I along rays are summed on circles and ellipses of all
+    sizes; the best one is then refined, robustly, on the strongest step of each ray near to it.
+
+    Parameters
+    ----------
+    logs : sequence of ndarray of int16
+        The pyramid of logarithmic images.
+    candidates : Candidates
+
+    Returns
+    -------
+    Dots
+        In px of the first level; only candidates that the edges bear out.
+    """
+    level = candidates.level - (candidates.radii[1] < _COARSE)
+    shrink = 2.0 ** (candidates.level - level)
+    points = (candidates.points + 0.5) * shrink - 0.5
+    low, high = candidates.radii[0] * shrink, candidates.radii[1] * shrink
+    frames, scores = _best_ellipses(logs[level], points, candidates.polarity, low, high)
+    clear = scores > _MINIMUM_SCORE
+    dots = refine_ellipses(logs[level], frames[clear], candidates.polarity[clear])
+    dots = dots.select(frame.ellipse_axes(dots.frames)[0] < _OVERSIZE * high)
+    return Dots(frame.enlarged(dots.frames, level), dots.polarity, dots.share)
+
+
+def refine_ellipses(log: np.ndarray, frames: np.ndarray, polarity: np.ndarray) -> Dots:
+    """Refine ellipses on a logarithmic image; leave out those that its edges do not bear out.
+
+    Parameters
+    ----------
+    log : ndarray of int16, shape (height, width)
+    frames : ndarray of float64, shape (k, 3, 3)
+        Affine, in px of `log`.
+    polarity : ndarray of int, shape (k,)
+
+    Returns
+    -------
+    Dots
+        In px of `log`.
+    """
+    dots = Dots(frames, polarity, np.zeros(len(frames)))
+    for window in _WINDOWS:
+        dots = _refined(log, dots, window)
+        major, minor, _ = frame.ellipse_axes(dots.frames)
+        good = (minor > _MINIMUM_ASPECT * major) & (minor > _MINIMUM_MINOR)
+        dots = dots.select(good & (dots.share > _MINIMUM_INLIERS))
+    return dots
+
+
+def _best_ellipses(
+    log: np.ndarray, points: np.ndarray, polarity: np.ndarray, low: float, high: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return for each point the ellipse about it with the highest mean step, and that step."""
+    templates, radii, majors, minors, directions = _templates(low, high)
+    one = np.ones(len(points))
+    frames = frame.affine_frames(points[:, 0], points[:, 1], one, one, 0 * one)
+    steps = _steps(log, frames, radii, polarity)
+    scores = steps.reshape(len(points), len(templates)) @ templates
+    best = scores.argmax(axis=1)
+    fitted = frame.affine_frames(
+        points[:, 0], points[:, 1], majors[best], minors[best], directions[best]
+    )
+    return fitted, scores[np.arange(len(points)), best]
+
+
+@cache
+def _templates(low: float, high: float) -> tuple[np.ndarray, ...]:
+    """Return weights that average steps along ellipses, the sampled radii, and the ellipses."""
+    radii = np.geomspace(_NEAREST * low, _FARTHEST * high, _BINS)
+    ratio = np.log(radii[1] / radii[0])
+    middle = radii[1:-1]
+    weights, ellipses = [], []
+    for aspect, count in _SHAPES:
+        for direction in np.pi * np.arange(count) / count:
+            along = np.cos(_ANGLES - direction) ** 2 + (np.sin(_ANGLES - direction) / aspect) ** 2
+            for major in middle[middle * aspect >= middle[0]]:
+                bins = np.log(major / np.sqrt(along) / middle[0]) / ratio
+                distance = np.abs(bins[:, None] - np.arange(len(middle)))
+                weights.append(np.clip(1.5 - distance, 0, 1).ravel() / _RAYS)
+                ellipses.append((major, aspect * major, direction))
+    majors, minors, directions = np.array(ellipses).T
+    return np.array(weights, np.float32).T, radii, majors, minors, directions
+
+
+def _steps(
+    log: np.ndarray, frames: np.ndarray, radii: np.ndarray, polarity: np.ndarray
+) -> np.ndarray:
+    """Return the steps of ln outwards, from dark to bright, at all but the end radii."""
+    values = sample_circles(log, frames, _ANGLES, radii).astype(np.float32)
+    steps = (values[:, :, 2:] - values[:, :, :-2]) * (polarity / LOG_SCALE)[:, None, None]
+    return np.clip(steps, _LOWEST_STEP, _HIGHEST_STEP, dtype=np.float32)
+
+
+def _refined(log: np.ndarray, dots: Dots, window: float) -> Dots:
+    """Return dots moved onto the strongest steps near their ellipses."""
+    size = frame.mean_radii(dots.frames)[:, None]
+    windows = np.clip(_MINIMUM_WINDOW / size, window, _MAXIMUM_WINDOW)
+    radii = 1 + np.linspace(-_PROFILE, _PROFILE, _SAMPLES) * windows
+    steps = _steps(log, dots.frames, radii, dots.polarity)
+    best = np.clip(steps.argmax(axis=2), 1, steps.shape[2] - 2)
+    before, step, after = (
+        np.take_along_axis(steps, (best + shift)[..., None], axis=2)[..., 0].astype(np.float64)
+        for shift in (-1, 0, 1)
+    )
+    curvature = np.minimum(before - 2 * step + after, _FLAT)
+    shift = np.clip(0.5 * (before - after) / curvature, -1, 1)
+    spacing = radii[:, 1:2] - radii[:, :1]
+    displacement = np.take_along_axis(radii, best + 1, axis=1) + shift * spacing - 1
+    usual = np.maximum(np.median(step, axis=1, keepdims=True), _MINIMUM_STEP)
+    weights = np.clip(step / usual, 0, 1) * (step > _MINIMUM_STEP)
+    basis = frame.displacement_basis(_ANGLES, np.ones(_RAYS))[:, :5]
+    changes, errors = fit_linear(displacement, weights, basis, window / _OUTLIERS)
+    inlying = np.abs(errors) < np.maximum(_INLIER, _PIXEL_INLIER / size)
+    share = (inlying & (step > _CLEAR_STEP)).mean(axis=1)
+    frames = frame.moved(dots.frames, np.clip(changes, -windows, windows))
+    return Dots(frames, dots.polarity, share)

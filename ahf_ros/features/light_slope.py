@@ -1,0 +1,100 @@
+"""The slope of the light along outlines.
+
+A slope of the light moves all edges that it crosses to the same side. A single profile hardly
+determines it, but neighbours on an outline see the same light, so that their slopes are smoothed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ahf_ros.features.robust import cauchy, median
+
+_NO_WEIGHT = 1e-9  # instead of a sum of no weights
+_MINIMUM_USUAL = 0.002  # of the errors of slopes, 1/px
+_OUTLIER = 3.0  # times the usual error of a slope that halves its weight
+
+
+@dataclass(frozen=True, slots=True)
+class LightSlope:
+    """The slope of the light on outlines, smoothed, from n points of each.
+
+    Attributes
+    ----------
+    slope : ndarray of float64, shape (..., n)
+        Outwards, as a share of the light, 1/px.
+    errors : ndarray of float64, shape (..., n)
+        Of the slopes of the single profiles, 1/px.
+    weights : ndarray of float64, shape (..., n)
+        Of the single profiles.
+    totals : ndarray of float64, shape (..., n)
+        Weight that each smoothed slope is made from.
+    window : ndarray of float64, shape (n, n)
+        What each profile, by row, adds to each smoothed slope.
+    """
+
+    slope: np.ndarray
+    errors: np.ndarray
+    weights: np.ndarray
+    totals: np.ndarray
+    window: np.ndarray
+
+    def influence(self, of_slopes: np.ndarray) -> np.ndarray:
+        """Return what the errors do, given what the smoothed slopes do, shape (k, c, n) both."""
+        of_profiles = (of_slopes / self.totals[:, None]) @ self.window.T
+        return of_profiles * (self.weights * self.errors)[:, None]
+
+
+def common_slope(slopes: np.ndarray, polarity: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Return the mean slope towards the bright side of edges, which is not the light's.
+
+    The blur is another than that of the fitted step, or edges were sharpened.
+
+    Parameters
+    ----------
+    slopes, weights : ndarray of float, shape (k, m)
+        Of profiles, outwards.
+    polarity : ndarray of int, shape (k, m)
+        1 where the outside is brighter, -1 where it is darker.
+
+    Returns
+    -------
+    ndarray of float64, shape (k, 1)
+        1/px.
+    """
+    total = np.maximum(weights.sum(axis=1), _NO_WEIGHT)
+    return ((weights * polarity * slopes).sum(axis=1) / total)[:, None]
+
+
+def smooth_slopes(
+    slopes: np.ndarray,
+    weights: np.ndarray,
+    window: np.ndarray,
+    prior: np.ndarray | float,
+    rounds: int = 2,
+) -> LightSlope:
+    """Smooth the slopes of profiles along outlines.
+
+    Parameters
+    ----------
+    slopes, weights : ndarray of float, shape (k, n)
+        Of the profiles of k outlines.
+    window : ndarray of float, shape (n, n)
+        How much each profile, by row, says of the light at each.
+    prior : float or ndarray of float, shape (k, 1)
+        Weight that says as much as the prior: that there is no slope.
+    rounds : int
+        In each but the first, outliers among the profiles have lost weight.
+    """
+    seen = weights > 0
+    middle = median(slopes, seen)[:, None]
+    usual = np.maximum(median(np.abs(slopes - middle), seen), _MINIMUM_USUAL)[:, None]
+    robust = weights
+    for _ in range(rounds):
+        totals = robust @ window + prior
+        smooth = (robust * slopes) @ window / totals
+        errors = slopes - smooth
+        used, robust = robust, cauchy(weights, errors / (_OUTLIER * usual))
+    return LightSlope(smooth, errors, used, totals, window)

@@ -1,0 +1,87 @@
+"""The edge pixels of a logarithmic image, and their gradients."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+LOG_SCALE = 1000.0
+"""Units of a logarithmic image of int16 in one unit of ln."""
+
+_WEAK_EDGE, _STRONG_EDGE = 0.15, 0.22  # steps of ln, of the thresholds with hysteresis
+_STRAIGHT = 0.97  # cosine between the directions of an edge and of its continuation
+_CONTINUED = 0.5  # of the strength of an edge, that its continuation has at least
+
+
+@dataclass(frozen=True, slots=True)
+class LogEdges:
+    """The edge pixels of a logarithmic image, and their gradients.
+
+    Attributes
+    ----------
+    dx, dy : ndarray of int16, shape (height, width)
+        Gradient of the image.
+    marked : ndarray of uint8, shape (height, width)
+        Not zero on edges.
+    x, y : ndarray of int32, shape (m,)
+        The edge pixels.
+    unit_x, unit_y, strength : ndarray of float32, shape (m,)
+        Direction and size of their gradients.
+    """
+
+    dx: np.ndarray
+    dy: np.ndarray
+    marked: np.ndarray
+    x: np.ndarray
+    y: np.ndarray
+    unit_x: np.ndarray
+    unit_y: np.ndarray
+    strength: np.ndarray
+
+    def select(self, which: np.ndarray) -> LogEdges:
+        """Return some of the edge pixels, by an index array or a mask of shape (m,)."""
+        names = ('x', 'y', 'unit_x', 'unit_y', 'strength')
+        return replace(self, **{name: getattr(self, name)[which] for name in names})
+
+    def outside(self, polygons: Sequence[np.ndarray]) -> LogEdges:
+        """Return the edges that lie outside of polygons, each of shape (n, 2), px."""
+        mask = np.zeros(self.marked.shape, np.uint8)
+        for polygon in polygons:
+            cv2.fillPoly(mask, [np.rint(polygon).astype(np.int32)], 1)
+        return self.select(mask[self.y, self.x] == 0)
+
+    def curved(self, length: float) -> LogEdges:
+        """Return the edges that do not run straight on for `length` px, to neither side."""
+        straight = np.ones(len(self.x), bool)
+        for way in (length, -length):
+            rest = np.flatnonzero(straight)
+            straight[rest] = self._continues(rest, way)
+        return self.select(~straight)
+
+    def _continues(self, which: np.ndarray, way: float) -> np.ndarray:
+        """Return whether edges have the same gradient `way` px along themselves."""
+        height, width = self.dx.shape
+        unit_x, unit_y = self.unit_x[which], self.unit_y[which]
+        x = np.clip(np.rint(self.x[which] - way * unit_y).astype(np.int32), 0, width - 1)
+        y = np.clip(np.rint(self.y[which] + way * unit_x).astype(np.int32), 0, height - 1)
+        across, down = self.dx[y, x].astype(np.float32), self.dy[y, x].astype(np.float32)
+        along = across * unit_x + down * unit_y
+        strong = along > np.float32(_CONTINUED) * self.strength[which]
+        return (along > _STRAIGHT * np.hypot(across, down)) & strong
+
+
+def find_edges(log: np.ndarray) -> LogEdges:
+    """Return the edges of a logarithmic image, ndarray of int16, shape (height, width)."""
+    dx = cv2.Scharr(log, cv2.CV_16S, 1, 0, scale=1 / 32)
+    dy = cv2.Scharr(log, cv2.CV_16S, 0, 1, scale=1 / 32)
+    weak, strong = _WEAK_EDGE * LOG_SCALE, _STRONG_EDGE * LOG_SCALE
+    marked = cv2.Canny(dx, dy, weak, strong, L2gradient=True)
+    pixels = cv2.findNonZero(marked)
+    pixels = np.zeros((0, 2), np.int32) if pixels is None else pixels.reshape(-1, 2)
+    x, y = pixels[:, 0].copy(), pixels[:, 1].copy()
+    across, down = dx[y, x].astype(np.float32), dy[y, x].astype(np.float32)
+    strength = np.hypot(across, down)
+    return LogEdges(dx, dy, marked, x, y, across / strength, down / strength, strength)

@@ -1,0 +1,156 @@
+"""Robust statistics: medians, and weights that outliers lose.
+
+Two weight functions are used. That of Cauchy, 1 / (1 + r^2), halves at r = 1 and is for values of
+which no single one can be far off. That of Geman and McClure [1]_, 1 / (1 + r^2)^2, falls to a
+quarter at r = 1 and to nothing beyond, and is for fits.
+
+References
+----------
+.. [1] Geman & McClure, Statistical methods for tomographic image reconstruction, Bull. Int. Stat.
+   Inst. LII-4, 1987, 5-21.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+import numpy as np
+
+_Solution = TypeVar('_Solution')
+
+_NORMAL = 1.4826  # standard deviation of normal errors over the median of their sizes
+_RIDGE = 1e-3  # added to normal matrices, in weights, so that they can be inverted
+
+
+def median(values: np.ndarray, selected: np.ndarray, empty: float = 1.0) -> np.ndarray:
+    """Return the lower medians of the selected values of each row.
+
+    Parameters
+    ----------
+    values : ndarray of float, shape (k, m)
+    selected : ndarray of bool, shape (k, m)
+    empty : float
+        The result where nothing is selected.
+
+    Returns
+    -------
+    ndarray of float64, shape (k,)
+    """
+    count = selected.sum(axis=1)
+    ordered = np.sort(np.where(selected, values, np.inf), axis=1)
+    middle = np.take_along_axis(ordered, np.maximum(count - 1, 0)[:, None] // 2, axis=1)[:, 0]
+    return np.where(count > 0, middle, empty)
+
+
+def spread(sizes: np.ndarray, selected: np.ndarray, minimum: float) -> np.ndarray:
+    """Return robust standard deviations from the median of the sizes of errors.
+
+    Parameters
+    ----------
+    sizes : ndarray of float, shape (k, m)
+        Absolute errors.
+    selected : ndarray of bool, shape (k, m)
+    minimum : float
+        Returned where the errors spread less.
+
+    Returns
+    -------
+    ndarray of float64, shape (k, 1)
+    """
+    return np.maximum(_NORMAL * median(sizes, selected), minimum)[:, None]
+
+
+def cauchy(weights: np.ndarray | float, errors: np.ndarray) -> np.ndarray:
+    """Return weights after Cauchy: halved where the error is 1."""
+    return weights / (1 + errors**2)
+
+
+def geman_mcclure(weights: np.ndarray | float, errors: np.ndarray) -> np.ndarray:
+    """Return weights after Geman and McClure: a quarter is left where the error is 1."""
+    return weights / (1 + errors**2) ** 2
+
+
+def geman_mcclure_gain(weights: np.ndarray, errors: np.ndarray) -> np.ndarray:
+    """Return the derivative of an error times its `geman_mcclure` weight, by the error."""
+    squares = errors**2
+    return weights * (1 - 3 * squares) / (1 + squares) ** 3
+
+
+@dataclass(frozen=True, slots=True)
+class Reweighted(Generic[_Solution]):
+    """What iterated reweighting comes to.
+
+    Attributes
+    ----------
+    solution
+        The last one.
+    errors : ndarray of float64
+        Its errors over the scale at which a value keeps a quarter of its weight.
+    weights : ndarray of float64
+        The weights after them.
+    """
+
+    solution: _Solution
+    errors: np.ndarray
+    weights: np.ndarray
+
+
+def reweight(
+    solve: Callable[[np.ndarray], tuple[_Solution, np.ndarray]],
+    weights: np.ndarray,
+    scale: Callable[[np.ndarray], np.ndarray | float],
+    rounds: int,
+) -> Reweighted[_Solution]:
+    """Solve least-squares problems robustly, by iterated reweighting after Geman and McClure.
+
+    Parameters
+    ----------
+    solve : callable
+        Given weights, the solution and its residuals, of the shape of the weights.
+    weights : ndarray of float
+        Those without outliers.
+    scale : callable
+        Given the residuals, the residual at which a value keeps a quarter of its weight.
+    rounds : int
+        Number of solutions, at least 1.
+    """
+    robust = weights
+    for _ in range(rounds):
+        solution, residuals = solve(robust)
+        errors = residuals / scale(residuals)
+        robust = geman_mcclure(weights, errors)
+    return Reweighted(solution, errors, robust)
+
+
+def fit_linear(
+    values: np.ndarray, weights: np.ndarray, basis: np.ndarray, scale: float, rounds: int = 4
+) -> tuple[np.ndarray, np.ndarray]:
+    """Fit linear models to k sets of values by iterated reweighting.
+
+    Parameters
+    ----------
+    values, weights : ndarray of float, shape (k, m)
+    basis : ndarray of float, shape (m, n)
+    scale : float
+        Residual at which a value keeps a quarter of its weight.
+    rounds : int
+        Number of solutions.
+
+    Returns
+    -------
+    parameters : ndarray of float64, shape (k, n)
+    residuals : ndarray of float64, shape (k, m)
+    """
+    products = (basis[:, :, None] * basis[:, None, :]).reshape(len(basis), -1)
+    size = basis.shape[1]
+
+    def solve(robust: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
+        normal = (robust @ products).reshape(-1, size, size) + _RIDGE * np.eye(size)
+        right = (robust * values) @ basis
+        parameters = np.linalg.solve(normal, right[..., None])[..., 0]
+        residuals = values - parameters @ basis.T
+        return (parameters, residuals), residuals
+
+    return reweight(solve, weights, lambda _: scale, rounds).solution

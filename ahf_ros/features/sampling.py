@@ -1,0 +1,112 @@
+"""Gray values of an image at points, on lines and on circles."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import cv2
+import numpy as np
+
+_NO_MAP: Any = None  # coordinates come as pairs in one map
+_REMAP_ROWS = 16384  # cv2.remap takes maps of at most 32767 rows
+
+
+def sample(image: np.ndarray, pixels: np.ndarray) -> np.ndarray:
+    """Return the bilinearly interpolated values of an image.
+
+    Parameters
+    ----------
+    image : ndarray of uint8, uint16, int16 or float32, shape (height, width)
+    pixels : ndarray of float, shape (..., 2)
+        Beyond the border the nearest pixel counts.
+
+    Returns
+    -------
+    ndarray of the image's dtype, shape (...)
+    """
+    columns = pixels.shape[-2]
+    maps = np.ascontiguousarray(pixels, np.float32).reshape(-1, columns, 2)
+    values = np.empty(maps.shape[:2], image.dtype)
+    for start in range(0, len(maps), _REMAP_ROWS):
+        rows = slice(start, start + _REMAP_ROWS)
+        values[rows] = _remapped(image, maps[rows], _NO_MAP)
+    return values.reshape(pixels.shape[:-1])
+
+
+def sample_lines(
+    image: np.ndarray, middles: np.ndarray, directions: np.ndarray, along: np.ndarray
+) -> np.ndarray:
+    """Return the values of an image on straight lines, as `sample` does.
+
+    Parameters
+    ----------
+    image : ndarray of uint8, uint16, int16 or float32, shape (height, width)
+    middles : ndarray of float, shape (k, 2)
+        px.
+    directions : ndarray of float, shape (k, 2)
+        Unit vectors.
+    along : ndarray of float, shape (n,)
+        Distances from the middle, px.
+
+    Returns
+    -------
+    ndarray of the image's dtype, shape (k, n)
+    """
+    x, y = middles.T.astype(np.float32)[..., None]
+    across, down = directions.T.astype(np.float32)[..., None]
+    along = along.astype(np.float32)
+    values = np.empty((len(middles), len(along)), image.dtype)
+    for start in range(0, len(values), _REMAP_ROWS):
+        rows = slice(start, start + _REMAP_ROWS)
+        values[rows] = _remapped(
+            image, x[rows] + across[rows] * along, y[rows] + down[rows] * along
+        )
+    return values
+
+
+def sample_circles(
+    image: np.ndarray, frames: np.ndarray, angles: np.ndarray, radii: np.ndarray
+) -> np.ndarray:
+    """Return the values of an image on concentric circles of targets.
+
+    It does what `sample` does for the projected `frame.circle_points`, in single precision and in
+    parts that stay in the cache.
+
+    Parameters
+    ----------
+    image : ndarray of uint8, uint16, int16 or float32, shape (height, width)
+    frames : ndarray of float64, shape (k, 3, 3)
+    angles : ndarray of float, shape (m,)
+        From +x towards +y, rad.
+    radii : ndarray of float, shape (n,) or (k, n)
+        The same for every frame, or those of each, dot radii.
+
+    Returns
+    -------
+    ndarray of the image's dtype, shape (k, m, n)
+    """
+    directions = np.stack([np.cos(angles), np.sin(angles)])
+    radii = np.broadcast_to(radii, (len(frames), np.shape(radii)[-1])).astype(np.float32)
+    values = np.empty((len(frames), len(angles), radii.shape[1]), image.dtype)
+    step = max(1, _REMAP_ROWS // len(angles))
+    for start in range(0, len(frames), step):
+        part = slice(start, start + step)
+        along = (frames[part, :, :2] @ directions).astype(np.float32)[..., None]
+        centre = frames[part, :, 2].astype(np.float32)[..., None, None]
+        lengths = radii[part, None, :]
+        across, down, scale = (centre[:, row] + along[:, row] * lengths for row in range(3))
+        rows = across.size // radii.shape[1]
+        values[part] = _remapped(
+            image, (across / scale).reshape(rows, -1), (down / scale).reshape(rows, -1)
+        ).reshape(across.shape)
+    return values
+
+
+def within(pixels: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """Return whether pixels, shape (..., 2), lie in an image of shape (height, width)."""
+    x, y = pixels[..., 0], pixels[..., 1]
+    return (x >= 0) & (y >= 0) & (x <= shape[1] - 1) & (y <= shape[0] - 1)
+
+
+def _remapped(image: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    return cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)

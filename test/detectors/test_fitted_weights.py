@@ -1,0 +1,28 @@
+"""The data file of fitted weights: complete, and open about what made it."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from ahf_ros.detectors.ring.confidence import FEATURES, OF_TARGET
+from ahf_ros.detectors.ring.fitted_weights import PATH, fitted_weights
+
+
+def test_there_is_a_weight_for_every_feature_and_an_intercept():
+    target, word = fitted_weights('confidence', 'target', 'word')
+    assert (len(target), len(word)) == (OF_TARGET + 1, FEATURES - OF_TARGET + 1)
+    means, deviations, weights = fitted_weights('counting', 'means', 'deviations', 'weights')
+    count = len(means) + 1
+    assert (len(deviations), len(weights)) == (len(means), count * (count + 1) // 2)
+    assert deviations.min() > 0
+
+
+@pytest.mark.parametrize('purpose', ['confidence', 'counting'])
+def test_each_set_says_what_made_it(purpose):
+    made = json.loads(PATH.read_text(encoding='utf-8'))[purpose]
+    seeds = ' '.join(map(str, made['seeds']))
+    assert made['command'] == f'python -m benchmarks.{purpose} --fit {seeds}'
+    assert max(made['seeds']) < 101  # those from 101 on are for tests
+    assert made['commit']
