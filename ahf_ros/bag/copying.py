@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import sys
-from contextlib import redirect_stdout
+from collections import Counter
+from collections.abc import Callable
+from contextlib import redirect_stdout, suppress
+from types import SimpleNamespace
 from typing import Any
 
 from rosbags.convert.converter import create_connections_converters
 from rosbags.interfaces import Connection, ConnectionExtRosbag2, MessageDefinitionFormat
 from rosbags.rosbag2 import Writer
-from rosbags.typesys.store import Typestore
 
+from ahf_ros.bag.definitions import TypeStores
+from ahf_ros.bag.records import reason_of
 from ahf_ros.bag.source import Source
 
 UNKNOWN_HASH = f'RIHS01_{0:064x}'
-"""Of a type that a bag uses but does not define."""
+"""Of a type whose definition is missing or not accepted."""
+
+_Target = tuple[Connection, Callable[[bytes], Any]]
 
 
 class Copy:
@@ -26,38 +32,75 @@ class Copy:
         Where they come from.
     writer : Writer
         Gets all topics of the source now, and its messages by `write`.
+
+    Attributes
+    ----------
+    counts : Counter
+        Number of messages that were written, by topic.
     """
 
     def __init__(self, source: Source, writer: Writer) -> None:
         self._writer = writer
-        if source.is_ros2:
-            self._converters: dict[str, Any] = {}
-            self._targets = {
-                (item.id, id(item.owner)): _added(writer, item, source.typestore)
-                for item in source.connections
-            }
-            return
-        with redirect_stdout(sys.stderr):  # it tells of types that have a new name
-            targets, self._converters = create_connections_converters(
-                source.connections, None, source.reader, writer
-            )
-        self._targets = {(number, id(owner)): it for (number, owner), it in targets.items()}
+        self._targets: dict[tuple[int, int], _Target] = {}
+        self._refused: Counter[tuple[str, str]] = Counter()
+        self.counts: Counter[str] = Counter()
+        for item in source.connections:
+            if isinstance(item.ext, ConnectionExtRosbag2):
+                target: _Target | None = (_added(writer, item, source.stores), bytes)
+            else:
+                target = self._converted(item, source.stores)
+            if target is not None:
+                self._targets[item.id, id(item.owner)] = target
+
+    @property
+    def refused(self) -> list[str]:
+        """Messages of ROS 1 that have no counterpart in ROS 2, and why."""
+        return [
+            f'{topic}, {count} messages: {reason}'
+            for (topic, reason), count in self._refused.items()
+        ]
 
     def write(self, connection: Connection, timestamp: int, data: bytes) -> None:
         """Write a message of the source."""
-        convert = self._converters.get(connection.msgtype, memoryview)
-        target = self._targets[connection.id, id(connection.owner)]
-        self._writer.write(target, timestamp, convert(data))
+        target = self._targets.get((connection.id, id(connection.owner)))
+        if target is None:
+            self._refused[connection.topic, 'its type has no counterpart in ROS 2'] += 1
+            return
+        written, convert = target
+        try:
+            converted = convert(data)
+        except Exception as error:
+            # Damaged messages make the generated code raise anything.
+            self._refused[connection.topic, reason_of(error)] += 1
+            return
+        self._writer.write(written, timestamp, converted)
+        self.counts[connection.topic] += 1
+
+    def _converted(self, item: Connection, stores: TypeStores) -> _Target | None:
+        """Return where messages of ROS 1 go to and how; None if their type is not accepted."""
+        try:
+            reader: Any = SimpleNamespace(is2=False, typestore=stores.of(item))
+            with redirect_stdout(sys.stderr):  # it tells of types that have a new name
+                targets, converters = create_connections_converters(
+                    [item], None, reader, self._writer
+                )
+        except Exception as error:
+            # The parser and the generator of code raise anything for what is no definition.
+            self._refused[item.topic, reason_of(error)] += 0
+            return None
+        return targets[item.id, item.owner], converters[item.msgtype]
 
 
-def _added(writer: Writer, item: Connection, store: Typestore) -> Connection:
+def _added(writer: Writer, item: Connection, stores: TypeStores) -> Connection:
     """Return the connection of a writer that is as the given one, added where it is missing."""
     assert isinstance(item.ext, ConnectionExtRosbag2)
     for known in writer.connections:
         if (known.topic, known.msgtype, known.ext) == (item.topic, item.msgtype, item.ext):
             return known
     definition, digest = item.msgdef.data, item.digest
-    if item.msgtype in store.fielddefs:
+    with suppress(Exception):
+        # A type that is not accepted is copied under the hash of an unknown one.
+        store = stores.of(item)
         if item.msgdef.format == MessageDefinitionFormat.NONE:
             definition, _ = store.generate_msgdef(item.msgtype, ros_version=2)
         digest = digest or store.hash_rihs01(item.msgtype)

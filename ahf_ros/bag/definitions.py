@@ -6,7 +6,13 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.interfaces import (
+    Connection,
+    ConnectionExtRosbag1,
+    MessageDefinition,
+    MessageDefinitionFormat,
+)
+from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 import ahf_ros
@@ -17,6 +23,7 @@ COMPRESSED_IMAGE = 'sensor_msgs/msg/CompressedImage'
 IMAGE = 'sensor_msgs/msg/Image'
 
 _NAMES = ('CodedTarget', 'CodedTargetArray', 'FilterState')
+_IDL_SEPARATOR = '=' * 80 + '\n'
 
 
 def definition_folder() -> Path:
@@ -53,3 +60,76 @@ def message_types(store: Typestore) -> MessageTypes:
     """Return the classes that `ahf_ros.interchange.target_messages` makes messages of."""
     classes: Any = {name: store.types[f'ahf_ros/msg/{name}'] for name in _NAMES}
     return SimpleNamespace(**classes)
+
+
+class TypeStores:
+    """The types of recorded messages: as their bag defines them, or else those of ROS 2 Jazzy.
+
+    Every connection has types of its own, so that a definition that is damaged, or differs from
+    another one, concerns nobody else.
+    """
+
+    def __init__(self) -> None:
+        self.default = typestore()
+        self._stores: dict[tuple[str, MessageDefinition], Typestore] = {}
+
+    def of(self, item: Connection) -> Typestore:
+        """Return the types of a connection.
+
+        Raises
+        ------
+        ValueError
+            If the definition in the bag is not one, or the type is not known.
+        """
+        key = (item.msgtype, item.msgdef)
+        if key not in self._stores:
+            try:
+                self._stores[key] = self._defined(item)
+            except Exception as error:
+                # The parser raises anything for what is no definition.
+                raise ValueError(
+                    f'{item.topic}: the definition of {item.msgtype} is not accepted: '
+                    f'{type(error).__name__}: {error}'
+                ) from error
+        return self._stores[key]
+
+    def deserialize(self, item: Connection, data: bytes) -> Any:
+        """Return a message of a connection.
+
+        Raises
+        ------
+        ValueError
+            If it is not as its type says, or the type is not known.
+        """
+        store = self.of(item)
+        try:
+            if isinstance(item.ext, ConnectionExtRosbag1):
+                return store.deserialize_ros1(data, item.msgtype)
+            return store.deserialize_cdr(data, item.msgtype)
+        except Exception as error:
+            # Damaged data make the generated code raise anything.
+            raise ValueError(
+                f'the message is no {item.msgtype}: {type(error).__name__}: {error}'
+            ) from error
+
+    def _defined(self, item: Connection) -> Typestore:
+        if item.msgdef.format == MessageDefinitionFormat.NONE:
+            if item.msgtype not in self.default.fielddefs:
+                raise ValueError('the bag does not define it, and ROS 2 Jazzy neither')
+            return self.default
+        store = get_typestore(Stores.EMPTY)
+        store.register(_types(item))
+        return store
+
+
+def _types(item: Connection) -> dict[str, Any]:
+    """Return the types that the definition of a connection holds."""
+    text = item.msgdef.data
+    if item.msgdef.format == MessageDefinitionFormat.MSG:
+        return get_types_from_msg(text, item.msgtype)
+    if not text.startswith(f'{_IDL_SEPARATOR}IDL: '):
+        return get_types_from_idl(text)
+    types: dict[str, Any] = {}
+    for part in text.split(_IDL_SEPARATOR)[1:]:
+        types.update(get_types_from_idl(part.split('\n', 1)[1]))
+    return types

@@ -1,0 +1,80 @@
+"""What reading a bag yields: messages, and what could not be read in their place."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Protocol
+
+from rosbags.interfaces import Connection
+
+Message = tuple[Connection, int, bytes]
+"""Where a message comes from, when it was recorded in ns, and its bytes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Lost:
+    """Messages that could not be read.
+
+    Attributes
+    ----------
+    topics : tuple of str
+        Topics that they may belong to; empty where unknown.
+    start, stop : int or None
+        Times of recording that they lie between, ns; None where unknown.
+    reason : str
+        Why they could not be read.
+    """
+
+    topics: tuple[str, ...]
+    start: int | None
+    stop: int | None
+    reason: str
+
+    def __str__(self) -> str:
+        """Return a line for people."""
+        topics = ', '.join(self.topics) or 'messages'
+        if self.start is None and self.stop is None:
+            return f'{topics}: {self.reason}'
+        if self.start == self.stop:
+            return f'{topics} at {seconds(self.start)} s: {self.reason}'
+        start = 'the beginning' if self.start is None else f'{seconds(self.start)} s'
+        stop = 'the end' if self.stop is None else f'{seconds(self.stop)} s'
+        return f'{topics} from {start} to {stop}: {self.reason}'
+
+
+class BagFile(Protocol):
+    """One file of a bag.
+
+    Attributes
+    ----------
+    connections : list of rosbags.interfaces.Connection
+        Its topics.
+    start : int
+        Time of the first message, ns.
+    left_out : list of str
+        What else is in it and cannot be copied.
+    """
+
+    connections: list[Connection]
+    start: int
+    left_out: list[str]
+
+    def messages(self, wanted: list[Connection]) -> Iterator[Message | Lost]:
+        """Yield the messages of some topics in the order of time.
+
+        What is yielded of a topic does not depend on the other topics that are wanted.
+        """
+        ...
+
+
+def seconds(timestamp: int | None) -> str:
+    """Return a time in ns as seconds, exactly."""
+    sign = '-' if (timestamp or 0) < 0 else ''
+    whole, part = divmod(abs(timestamp or 0), 10**9)
+    return f'{sign}{whole}.{part:09}'
+
+
+def reason_of(error: BaseException) -> str:
+    """Return an error of a library as text."""
+    return f'{type(error).__name__}: {error}'
