@@ -23,6 +23,8 @@ HERE = Path(__file__).resolve().parent
 NAME = 'ahf_ros'
 DISTRIBUTION = os.environ.get('AHF_ROS_DISTRIBUTION') or 'jazzy'
 REQUIREMENTS = [
+    'backports.zstd; python_version < "3.14"',
+    'lz4',
     'numpy>=1.21',
     'opencv-python-headless>=4.5',
     'rich>=12',

@@ -53,6 +53,10 @@ class Block:
         channels = channels | {channel: channels.get(channel, 0) + len(times)}
         self.channels = None if self.doubtful else channels
 
+    def distrust(self) -> None:
+        """Forget what the index tells: a part of it is missing."""
+        self.doubtful, self.channels = True, None
+
     def content(self, file: BinaryIO) -> bytes:
         """Return its records.
 
@@ -76,7 +80,7 @@ class Block:
         return content
 
 
-class Entry(NamedTuple):
+class Recorded(NamedTuple):
     """A message in the order in which it is yielded."""
 
     time: int
@@ -87,7 +91,7 @@ class Entry(NamedTuple):
     data: bytes
 
 
-Load = Callable[[BinaryIO, Block], Iterable[Entry | Lost]]
+Load = Callable[[BinaryIO, Block], Iterable[Recorded | Lost]]
 """Yields the messages of a block, none of them before its start."""
 
 
@@ -95,7 +99,7 @@ def merged(
     path: Path, blocks: Iterable[Block], channels: Collection[int], load: Load
 ) -> Iterator[Message | Lost]:
     """Yield the messages of the blocks that hold some channels in the order of time."""
-    waiting: list[Entry] = []
+    waiting: list[Recorded] = []
     with path.open('rb') as file:
         for block in sorted(blocks, key=lambda block: (block.start, block.offset)):
             if block.channels is not None and not any(it in block.channels for it in channels):

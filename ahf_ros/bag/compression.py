@@ -6,7 +6,7 @@ import bz2
 import sys
 from typing import Any
 
-from lz4.frame import LZ4FrameDecompressor
+from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]
 
 if sys.version_info >= (3, 14):
     from compression import zstd

@@ -42,6 +42,7 @@ class Copy:
     def __init__(self, source: Source, writer: Writer) -> None:
         self._writer = writer
         self._targets: dict[tuple[int, int], _Target] = {}
+        self._reasons: dict[str, str] = {}  # by topics that are not accepted
         self._refused: Counter[tuple[str, str]] = Counter()
         self.counts: Counter[str] = Counter()
         for item in source.connections:
@@ -56,7 +57,7 @@ class Copy:
     def refused(self) -> list[str]:
         """Messages of ROS 1 that have no counterpart in ROS 2, and why."""
         return [
-            f'{topic}, {count} messages: {reason}'
+            f'{topic}: {count} messages cannot be converted: {reason}'
             for (topic, reason), count in self._refused.items()
         ]
 
@@ -64,7 +65,7 @@ class Copy:
         """Write a message of the source."""
         target = self._targets.get((connection.id, id(connection.owner)))
         if target is None:
-            self._refused[connection.topic, 'its type has no counterpart in ROS 2'] += 1
+            self._refused[connection.topic, self._reasons[connection.topic]] += 1
             return
         written, convert = target
         try:
@@ -86,7 +87,7 @@ class Copy:
                 )
         except Exception as error:
             # The parser and the generator of code raise anything for what is no definition.
-            self._refused[item.topic, reason_of(error)] += 0
+            self._reasons[item.topic] = reason_of(error)
             return None
         return targets[item.id, item.owner], converters[item.msgtype]
 

@@ -87,6 +87,8 @@ class TypeStores:
                 self._stores[key] = self._defined(item)
             except Exception as error:
                 # The parser raises anything for what is no definition.
+                if item.msgtype in self.default.fielddefs and not _is_ros1(item):
+                    return self.default
                 raise ValueError(
                     f'{item.topic}: the definition of {item.msgtype} is not accepted: '
                     f'{type(error).__name__}: {error}'
@@ -103,7 +105,7 @@ class TypeStores:
         """
         store = self.of(item)
         try:
-            if isinstance(item.ext, ConnectionExtRosbag1):
+            if _is_ros1(item):
                 return store.deserialize_ros1(data, item.msgtype)
             return store.deserialize_cdr(data, item.msgtype)
         except Exception as error:
@@ -120,6 +122,10 @@ class TypeStores:
         store = get_typestore(Stores.EMPTY)
         store.register(_types(item))
         return store
+
+
+def _is_ros1(item: Connection) -> bool:
+    return isinstance(item.ext, ConnectionExtRosbag1)
 
 
 def _types(item: Connection) -> dict[str, Any]:

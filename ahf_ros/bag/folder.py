@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 from typing import Any
@@ -18,7 +19,7 @@ from ahf_ros.bag.sqlite import Sqlite
 
 METADATA = 'metadata.yaml'
 
-_KINDS: dict[str, type[BagFile]] = {'.bag': Ros1, '.db3': Sqlite, '.mcap': Mcap}
+_KINDS: dict[str, Callable[[Path], BagFile]] = {'.bag': Ros1, '.db3': Sqlite, '.mcap': Mcap}
 _COMPRESSED = '.zstd'
 _PART = 2**20  # bytes that are decompressed at once
 _SHARE = 2  # of the free disk space, the part that a decompressed file may take

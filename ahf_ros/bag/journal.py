@@ -17,20 +17,16 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 from urllib.parse import quote
 
-from rosbags.rosbag2 import StoragePlugin, Writer
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from ahf_ros.bag.definitions import typestore
+from ahf_ros.bag.folder import METADATA
+from ahf_ros.bag.writing import BagWriter
 from ahf_ros.filtering.identifier import Memory
-
-VERSION: Final = 9
-"""Format version of the bags that are written."""
-
-METADATA = 'metadata.yaml'
 
 PROGRESS = '/ahf_bag/progress'
 """Topic with the entry of every image; the finished bag does not have it."""
@@ -89,7 +85,7 @@ def begin(folder: Path, topics: Mapping[str, str], origin: str) -> None:
     store = typestore()
     with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f'.{folder.name}.') as made:
         bag = Path(made) / 'bag'
-        with Writer(bag, version=VERSION, storage_plugin=StoragePlugin.SQLITE3) as writer:
+        with BagWriter(bag, 'sqlite3') as writer:
             writer.set_custom_data('ahf_ros', origin)
             for topic, kind in {**topics, PROGRESS: _STRING}.items():
                 writer.add_connection(topic, kind, typestore=store)

@@ -17,7 +17,7 @@ from zlib import crc32
 
 from rosbags.interfaces import Connection
 
-from ahf_ros.bag.blocks import Block, Entry, merged
+from ahf_ros.bag.blocks import Block, Recorded, merged
 from ahf_ros.bag.mcap_topics import Topics, name_at
 from ahf_ros.bag.records import Lost, Message
 
@@ -94,12 +94,16 @@ class Mcap:
                 self._note(file, opcode, place, length)
                 place += _HEAD + length
             except (ValueError, struct.error) as error:
+                if self._blocks:
+                    self._blocks[-1].distrust()
                 following = next((it for it in chunks if it > place), None)
                 after = None if following is None else _start(file, following)
                 self._lost.append(Lost((), self._latest(), after, f'byte {place}: {error}'))
                 if following is None:
                     return
                 place = following
+        if self._blocks:
+            self._blocks[-1].distrust()
         self._lost.append(Lost((), self._latest(), None, 'the file has no end'))
 
     def _latest(self) -> int | None:
@@ -157,7 +161,7 @@ class Mcap:
 
     def _entries(
         self, file: BinaryIO, block: Block, wanted: dict[int, Connection]
-    ) -> Iterator[Entry | Lost]:
+    ) -> Iterator[Recorded | Lost]:
         """Yield the messages of a block, up to where it is damaged."""
         time = block.start
         try:
@@ -172,7 +176,7 @@ class Mcap:
                 self._differs |= sequence != 0 or published != recorded
                 if channel in wanted:
                     data = content[_MESSAGE_HEADER:]
-                    yield Entry(time, block.offset, number, wanted[channel], recorded, data)
+                    yield Recorded(time, block.offset, number, wanted[channel], recorded, data)
                 elif not self._topics.know((channel,)):
                     yield Lost((), recorded, recorded, f'channel {channel} is not defined')
         except (ValueError, struct.error) as error:

@@ -43,22 +43,29 @@ class Lost:
         return f'{topics} from {start} to {stop}: {self.reason}'
 
 
+_LONGEST = 300  # characters of a reason
+
+
 class BagFile(Protocol):
     """One file of a bag.
 
     Attributes
     ----------
-    connections : list of rosbags.interfaces.Connection
-        Its topics.
     start : int
         Time of the first message, ns.
-    left_out : list of str
-        What else is in it and cannot be copied.
     """
 
-    connections: list[Connection]
     start: int
-    left_out: list[str]
+
+    @property
+    def connections(self) -> list[Connection]:
+        """Its topics."""
+        ...
+
+    @property
+    def left_out(self) -> list[str]:
+        """What else is in it and cannot be copied; complete once its messages were read."""
+        ...
 
     def messages(self, wanted: list[Connection]) -> Iterator[Message | Lost]:
         """Yield the messages of some topics in the order of time.
@@ -77,4 +84,10 @@ def seconds(timestamp: int | None) -> str:
 
 def reason_of(error: BaseException) -> str:
     """Return an error of a library as text."""
-    return f'{type(error).__name__}: {error}'
+    return printable(f'{type(error).__name__}: {error}')
+
+
+def printable(text: str) -> str:
+    """Return a text without what a terminal or JSON would not take, bounded in length."""
+    shown = text[:_LONGEST].encode('ascii', 'backslashreplace').decode()
+    return ''.join(it if it.isprintable() else repr(it)[1:-1] for it in shown)

@@ -16,7 +16,7 @@ from rosbags.interfaces import Connection
 from rosbags.rosbag1 import Reader
 from rosbags.rosbag1.reader import Header, RecordType
 
-from ahf_ros.bag.blocks import Block, Entry, merged
+from ahf_ros.bag.blocks import Block, Recorded, merged
 from ahf_ros.bag.records import Lost, Message, reason_of
 
 _MAGIC = b'#ROSBAG V2.0'
@@ -116,20 +116,25 @@ class Ros1:
         block.count(channel, times, whole)
 
     def _learn(self, file: BinaryIO) -> None:
-        """Read the chunks that no index describes, or whose connections are not known."""
+        """Read the chunks that no index describes, all where the index of the bag is damaged."""
+        known = self._known
+        self._known = {} if self._lost else dict(known)
+        if self._lost and self._blocks:
+            self._blocks[-1].distrust()
         for block in self._blocks:
             if block.channels is not None and all(it in self._known for it in block.channels):
                 continue
             times = [item.recorded for item in self._all(file, block)]
             block.start, block.stop = min(times, default=0), max(times, default=0)
             block.channels = None
+        self._known = known | self._known
 
-    def _all(self, file: BinaryIO, block: Block) -> list[Entry]:
-        return [it for it in self._entries(file, block, None) if isinstance(it, Entry)]
+    def _all(self, file: BinaryIO, block: Block) -> list[Recorded]:
+        return [it for it in self._entries(file, block, None) if isinstance(it, Recorded)]
 
     def _entries(
         self, file: BinaryIO, block: Block, wanted: dict[int, Connection] | None
-    ) -> Iterator[Entry | Lost]:
+    ) -> Iterator[Recorded | Lost]:
         """Yield the messages of a chunk, up to where it is damaged; all where None is wanted."""
         time = block.start
         number = 0
@@ -152,14 +157,12 @@ class Ros1:
                     yield Lost((), recorded, recorded, f'connection {channel} is not defined')
                 elif wanted is None or channel in wanted:
                     item = item if wanted is None else wanted[channel]
-                    yield Entry(time, block.offset, number, item, recorded, data)
+                    yield Recorded(time, block.offset, number, item, recorded, data)
         except Exception as error:
             # Damaged records make the parser raise anything.
             known = self._known if block.channels is None else block.channels
             topics = {self._known[it].topic for it in known if it in self._known}
-            yield Lost(
-                tuple(sorted(topics)), time, max(block.stop, time), reason_of(error)
-            )
+            yield Lost(tuple(sorted(topics)), time, max(block.stop, time), reason_of(error))
 
 
 def _head(file: BinaryIO, end: int) -> tuple[Header, int]:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import fcntl
 import json
 import os
-import shutil
 import sqlite3
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -18,16 +17,21 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
+from rosbags.rosbag2 import WriterError
 
 from ahf_ros.bag.answering import Answering, AnswerTopics
-from ahf_ros.bag.copying import Copy
-from ahf_ros.bag.definitions import typestore
-from ahf_ros.bag.journal import METADATA, VERSION, Entry, Journal, begin, custom_data, remove_parts
+from ahf_ros.bag.assembly import (
+    TASK_KEY,
+    Outcome,
+    assemble,
+    check_entry,
+    finished,
+    remove_assembled,
+)
+from ahf_ros.bag.journal import PROGRESS, Entry, Journal, begin, custom_data, remove_parts
+from ahf_ros.bag.records import seconds
 from ahf_ros.bag.source import Source
 from ahf_ros.session import IdentificationSettings
-
-STORAGES = {'mcap': StoragePlugin.MCAP, 'sqlite3': StoragePlugin.SQLITE3}
 
 WRITING_ERRORS = (OSError, sqlite3.Error, WriterError)
 """What it means when a bag cannot be written: a full disk, a folder of somebody else."""
@@ -36,7 +40,7 @@ Report = Callable[[int, int, str], None]
 """Gets the number of images that are done and that there are, 0 where unknown, and why the last
 one was refused, empty where it was not."""
 
-_ASSEMBLED = '.assembled'
+_FORMAT = 2  # of the journal and of what is kept in a bag
 _IRRELEVANT = ('source', 'target', 'threads')  # to what is in the bag
 
 
@@ -55,7 +59,7 @@ class BagTask:
     output_topic : str
         Topic of the answers; one without a slash at the beginning is below that of the images.
     storage : str
-        One of `STORAGES`.
+        One of `ahf_ros.bag.writing.STORAGES`.
     debug_images : bool
         Whether annotated images are written, as JPEG.
     identification : IdentificationSettings
@@ -68,25 +72,6 @@ class BagTask:
     storage: str = 'mcap'
     debug_images: bool = False
     identification: IdentificationSettings = field(default_factory=IdentificationSettings)
-
-
-@dataclass(frozen=True, slots=True)
-class Outcome:
-    """What became of a bag.
-
-    Attributes
-    ----------
-    images : int
-        Number of images.
-    refused : int
-        Number of those that were not accepted.
-    cut : str
-        Why the end of the bag could not be read; empty where it could.
-    """
-
-    images: int
-    refused: int
-    cut: str
 
 
 def answer_bag(task: BagTask, report: Report) -> Outcome:
@@ -117,8 +102,7 @@ def answer_bag(task: BagTask, report: Report) -> Outcome:
             begin(task.target, types, json.dumps(told))
         with locked(task.target):
             _check_target(task.target, told)
-            done = custom_data(task.target).get('ahf_ros_outcome')
-            outcome = Outcome(**json.loads(done)) if done else _made(task, source, topics, report)
+            outcome = finished(task.target) or _made(task, source, topics, report)
             _tidy(task.target)
     return outcome
 
@@ -129,10 +113,7 @@ def _made(
     """Make the bag from its journal."""
     journal = Journal(task.target)
     _answer_images(task, source, topics, journal, report)
-    refused = sum(bool(entry.reason) for entry in journal.entries)
-    outcome = Outcome(len(journal.entries), refused, source.cut)
-    _assemble(task, source, topics, journal, outcome)
-    return outcome
+    return assemble(source, task.target, topics, journal, task.storage)
 
 
 @contextmanager
@@ -162,10 +143,11 @@ def _answer_topics(task: BagTask, source: Source) -> dict[str, AnswerTopics]:
         targets = name if name.startswith('/') else f'{image}/{name}'
         debug_image = f'{targets}/debug_image/compressed' if task.debug_images else ''
         topics[image] = AnswerTopics(targets, debug_image)
-    taken = {item.topic for item in source.connections}
+    taken = {item.topic for item in source.connections} | {PROGRESS}
     for name in (name for to in topics.values() for name in to.types):
         if name in taken:
-            raise ValueError(f'{task.source} has a topic {name}, accepted is another output_topic')
+            has = f'{task.source} has' if name != PROGRESS else 'ahf bag needs'
+            raise ValueError(f'{has} a topic {name}, accepted is another output_topic')
     return topics
 
 
@@ -173,7 +155,7 @@ def _told(task: BagTask, source: Source, topics: dict[str, AnswerTopics]) -> dic
     """Return everything that the answers depend on."""
     told = _flat(asdict(task))
     told = {name: value for name, value in told.items() if name not in _IRRELEVANT}
-    told |= {'topics': list(topics), 'size of the bag': source.size()}
+    told |= {'topics': list(topics), 'size of the bag': source.size(), 'format': _FORMAT}
     return told
 
 
@@ -186,7 +168,7 @@ def _flat(values: dict[str, Any]) -> dict[str, Any]:
 
 def _check_target(target: Path, told: dict[str, Any]) -> None:
     """Refuse what is there unless it is a bag that was begun with the same task."""
-    begun = custom_data(target).get('ahf_ros')
+    begun = custom_data(target).get(TASK_KEY)
     if begun is None:
         raise ValueError(f'{target} exists, accepted is a new name or a bag that was begun here')
     before = json.loads(begun)
@@ -212,7 +194,7 @@ def _answer_images(
     for number, (connection, timestamp, data) in enumerate(source.messages(topics)):
         if number < len(earlier):
             entry = earlier[number]
-            _check_entry(task, entry, connection.topic, timestamp)
+            check_entry(source, task.target, entry, connection.topic, timestamp)
             answering.resume(entry)
         else:
             entry, answers = answering.answer(connection, timestamp, data)
@@ -223,49 +205,10 @@ def _answer_images(
 def _refusal(entry: Entry) -> str:
     if not entry.reason:
         return ''
-    seconds, nanoseconds = divmod(entry.timestamp, 10**9)
-    return f'{entry.topic} at {seconds}.{nanoseconds:09} s: {entry.reason}'
-
-
-def _assemble(
-    task: BagTask,
-    source: Source,
-    topics: dict[str, AnswerTopics],
-    journal: Journal,
-    outcome: Outcome,
-) -> None:
-    """Write the bag from its source and the journal, and put it in the place of the journal."""
-    shutil.rmtree(task.target / _ASSEMBLED, ignore_errors=True)
-    bag = task.target / _ASSEMBLED / task.target.name
-    store = typestore()
-    with Writer(bag, version=VERSION, storage_plugin=STORAGES[task.storage]) as writer:
-        writer.set_custom_data('ahf_ros', custom_data(task.target)['ahf_ros'])
-        writer.set_custom_data('ahf_ros_outcome', json.dumps(asdict(outcome)))
-        copy = Copy(source, writer)
-        answered = {
-            name: writer.add_connection(name, kind, typestore=store)
-            for to in topics.values()
-            for name, kind in to.types.items()
-        }
-        entries = journal.answers()
-        for connection, timestamp, data in source.messages():
-            copy.write(connection, timestamp, data)
-            if connection.topic in topics:
-                entry, answers = next(entries)
-                _check_entry(task, entry, connection.topic, timestamp)
-                for name, message in answers:
-                    writer.write(answered[name], timestamp, message)
-    for file in sorted(bag.iterdir(), key=lambda file: file.name == METADATA):
-        # The metadata last: it says which files are the bag.
-        file.replace(task.target / file.name)
-
-
-def _check_entry(task: BagTask, entry: Entry, topic: str, timestamp: int) -> None:
-    if (entry.topic, entry.timestamp) != (topic, timestamp):
-        raise ValueError(f'{task.source} is not the bag that {task.target} was begun with')
+    return f'{entry.topic} at {seconds(entry.timestamp)} s: {entry.reason}'
 
 
 def _tidy(target: Path) -> None:
     """Remove what is left of the way to a bag that is done."""
-    shutil.rmtree(target / _ASSEMBLED, ignore_errors=True)
+    remove_assembled(target)
     remove_parts(target)

@@ -65,8 +65,8 @@ class Source:
                 self._note(Lost((), None, None, str(error)))
         scratch = Path(self._stack.enter_context(TemporaryDirectory(prefix='ahf_')))
         self._files, lost = open_files(self.path, self.metadata.files, scratch)
-        for item in lost:
-            self._note(item)
+        for missing in lost:
+            self._note(missing)
         self.connections: list[Connection] = []
         for item in (it for file in self._files for it in file.connections):
             (self.connections if _is_ros(item) else self._foreign).append(item)
@@ -93,9 +93,13 @@ class Source:
 
     @property
     def left_out(self) -> list[str]:
-        """What is in the bag and cannot be copied; complete once the messages were read."""
-        foreign = [f'{it.topic}, whose messages are {_encoding(it)}' for it in self._foreign]
-        return foreign + [it for file in self._files for it in file.left_out]
+        """What a copy does not have beside messages; complete once the messages were read."""
+        return [it for file in self._files for it in file.left_out]
+
+    @property
+    def foreign(self) -> list[str]:
+        """Topics whose messages ROS 2 cannot read, so that no bag of ROS 2 can hold them."""
+        return [f'{it.topic}: messages are serialized as {_encoding(it)}' for it in self._foreign]
 
     def size(self) -> int:
         """Return the bytes of all files of the bag."""

@@ -48,7 +48,9 @@ class Sqlite:
         wal = path.with_name(f'{path.name}-wal')
         if wal.exists() and wal.stat().st_size:
             self._lost.append(Lost((), None, None, f'{wal.name} was not merged into the file'))
-        numbers, counts = (it.tolist() for it in np.unique(self._rows['topic'], return_counts=True))
+        numbers, counts = (
+            it.tolist() for it in np.unique(self._rows['topic'], return_counts=True)
+        )
         count = dict(zip(numbers, counts, strict=True))
         self.connections = [it._replace(msgcount=count.pop(it.id, 0)) for it in topics]
         for number, messages in count.items():
@@ -103,20 +105,23 @@ class Sqlite:
     def _scan(self, database: sqlite3.Connection) -> np.ndarray:
         """Return the rows that can be read, in the order of time."""
         rows: list[tuple[int, int, int]] = []
-        following: int | None = 0
+        following = 0
         query = 'SELECT timestamp, id, topic_id FROM messages WHERE id >= ? ORDER BY id'
-        while following is not None:
+        while True:
             try:
                 for row in database.execute(query, (following,)):
                     time, number, topic = (int(it) for it in row)
                     rows.append((time, number, topic))
-                following = None
+                break
             except (sqlite3.Error, TypeError, ValueError, OverflowError) as error:
                 first = rows[-1][1] + 1 if rows else following
                 before = rows[-1][0] if rows else None
                 found = _readable(database, max(first, following))
-                following, after = found if found else (None, None)
+                after = found[1] if found else None
                 self._lost.append(Lost((), before, after, reason_of(error)))
+                if found is None:
+                    break
+                following = found[0]
         table = np.array(rows, _ROW)
         return table[np.argsort(table, order=('time', 'row'))]
 

@@ -96,7 +96,7 @@ def run(options: argparse.Namespace) -> int:
 
         for task, outcome in _outcomes(tasks, options.jobs, report):
             _tell(task, outcome)
-            failed |= isinstance(outcome, ValueError) or bool(outcome.refused or outcome.cut)
+            failed |= isinstance(outcome, ValueError) or bool(outcome.refused or outcome.lost)
     return int(failed)
 
 
@@ -197,5 +197,7 @@ def _tell(task: BagTask, outcome: Outcome | ValueError) -> None:
         return
     refused = f', {outcome.refused} of them not accepted' if outcome.refused else ''
     print(f'{task.target}: {outcome.images} images answered{refused}', file=sys.stderr)
-    if outcome.cut:
-        print(f'ahf bag: {task.source} is cut: {outcome.cut}', file=sys.stderr)
+    for lost in outcome.lost:
+        print(f'ahf bag: {task.source}: missing: {lost}', file=sys.stderr)
+    for left_out in outcome.left_out:
+        print(f'ahf bag: {task.source}: left out: {left_out}', file=sys.stderr)

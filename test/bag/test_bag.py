@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from rosbags import rosbag2
 
-from ahf_ros.bag import run
+from ahf_ros.bag import assembly, run
 from ahf_ros.bag.definitions import COMPRESSED_IMAGE, IMAGE, typestore
 from ahf_ros.cli import main
 from support import bags
@@ -189,7 +189,7 @@ def test_a_kill_while_the_bag_is_assembled(
 
     target = tmp_path / 'out'
     with monkeypatch.context() as patch:
-        patch.setattr(run.Copy, 'write', killed)
+        patch.setattr(assembly.Copy, 'write', killed)
         assert status(recording, target, *SEARCH, '--debug-images') == 130
     assert len(bags.answers(target)) == 6
     with monkeypatch.context() as patch:
@@ -238,7 +238,7 @@ def test_a_bag_that_is_cut_is_answered_up_to_there(
         cut(next(it for it in source.iterdir() if it.suffix != '.yaml'), 0.5)
     for _ in range(2):
         assert status(source, tmp_path / 'out', '--detector', 'traditional') == 1
-        assert f'{source} is cut: ' in capfd.readouterr().err
+        assert f'{source}: missing: ' in capfd.readouterr().err
     times = [time for time, _ in bags.answers(tmp_path / 'out')]
     assert 20 <= len(times) <= 30
     assert times == [(1 + number) * 10**8 for number in range(len(times))]
