@@ -28,7 +28,7 @@ REQUIREMENTS = [
     'numpy>=1.21',
     'opencv-python-headless>=4.5',
     'rich>=12',
-    'rosbags>=0.11.7',
+    'rosbags>=0.11.7,<0.12',  # ahf_ros.bag uses more of it than its public API
     'ruamel.yaml',
 ]
 SITE = Path(f'lib/python{sys.version_info[0]}.{sys.version_info[1]}/site-packages')

@@ -8,6 +8,7 @@ computed from it, default arguments and names imported into other modules change
 
 from __future__ import annotations
 
+import argparse
 import ast
 import json
 import sys
@@ -94,14 +95,17 @@ def results(folder: Path) -> dict[str, Any]:
 
 def main() -> None:
     """Print the results as JSON."""
-    folder, *change = sys.argv[1:]
-    if change:
-        constant, value = change
+    parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
+    parser.add_argument('folder', type=Path)
+    parser.add_argument('change', nargs='*', metavar='MODULE.NAME VALUE')
+    options = parser.parse_args()
+    if options.change:
+        constant, value = options.change
         number = float(value)
         finder = Finder(constant, int(number) if value.isdigit() else number)
         sys.meta_path.insert(0, finder)
-    found = results(Path(folder))
-    if change and not finder.used:
+    found = results(options.folder)
+    if options.change and not finder.used:
         raise SystemExit(f'{constant} is not in a module that the detector imports')
     print(json.dumps(found))
 

@@ -1,7 +1,8 @@
-"""What all tests share: the line that says on which code they ran, and the graph of real nodes."""
+"""What all tests share: a header, the log of the package, and the graph of real nodes."""
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
 
 import pytest
@@ -11,6 +12,17 @@ from support import live, vector_units
 
 def pytest_report_header() -> str:
     return f'vector units: {vector_units.described()}'
+
+
+@pytest.fixture
+def caplog(
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> pytest.LogCaptureFixture:
+    """Capture the log of the package also where launch has made loggers that do not propagate."""
+    for name, logger in logging.root.manager.loggerDict.items():
+        if name.startswith('ahf_ros') and isinstance(logger, logging.Logger):
+            monkeypatch.setattr(logger, 'propagate', True)
+    return caplog
 
 
 @pytest.fixture(scope='module')

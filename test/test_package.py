@@ -2,33 +2,138 @@
 
 from __future__ import annotations
 
+import ast
+import importlib.util
+import re
 import subprocess
 import sys
+from collections import Counter
+from fnmatch import fnmatch
+from importlib import metadata
 from pathlib import Path
 
-ROOT = Path(__file__).parent.parent
+import pytest
+
+from support import ROOT
+
+PACKAGE = ROOT / 'ahf_ros'
+MODULES = {
+    '.'.join(file.relative_to(ROOT).with_suffix('').parts): file for file in PACKAGE.rglob('*.py')
+}
+"""The files of the package by the names of their modules."""
+
+LONGEST = 300
+"""Lines of a file that is one idea."""
+
+TO_BE_SPLIT = {'ahf_ros.features.frame', 'ahf_ros.detectors.ring.traditional'}
+TO_BE_USED = {'ahf_ros.codes.invariant'}
+
+NOT_DISTRIBUTED = ('.ci/*', '.gitignore')
+ADDED_BY_SETUPTOOLS = ('MANIFEST.in', 'README.md', 'pyproject.toml', 'setup.py')
+
+needs_rosbags = pytest.mark.skipif(
+    not importlib.util.find_spec('rosbags'), reason='rosbags is not installed'
+)
+
 WITHOUT_ROS = """
-import pkgutil, sys
+import importlib, sys
 
 for name in ('rclpy', 'sensor_msgs', 'std_msgs', 'rosidl_runtime_py', 'rosidl_parser'):
     sys.modules[name] = None
-
-import ahf_ros
-
-for module in pkgutil.iter_modules([sys.argv[1]]):
-    if module.name not in ('nodes', 'msg', 'srv'):
-        __import__(f'ahf_ros.{module.name}')
-        print(module.name)
+for name in sys.argv[1:]:
+    importlib.import_module(name)
 """
 
 
+def imported(file: Path) -> set[str]:
+    """Return the names of all modules that a file imports, and of what it takes out of them."""
+    names = set()
+    for node in ast.walk(ast.parse(file.read_text())):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names |= {node.module, *(f'{node.module}.{alias.name}' for alias in node.names)}
+    return names
+
+
+def importable_without_ros() -> list[str]:
+    without = [name for name in MODULES if not name.startswith('ahf_ros.nodes')]
+    return [name for name in without if not name.endswith(('.__init__', '.__main__'))]
+
+
+@needs_rosbags
 def test_everything_but_the_nodes_works_without_ros() -> None:
-    command = [sys.executable, '-c', WITHOUT_ROS, str(ROOT / 'ahf_ros')]
+    names = importable_without_ros()
+    assert len(names) > 50
+    command = [sys.executable, '-c', WITHOUT_ROS, *names]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    assert {'bag', 'cli', 'detectors', 'filtering', 'synthetic'} <= set(done.stdout.split())
 
 
 def test_what_needs_no_ros_among_the_nodes_does_without() -> None:
-    program = "import sys; sys.modules['rclpy'] = None; import ahf_ros.nodes.settings"
-    subprocess.run([sys.executable, '-c', program], cwd=ROOT, check=True)
+    command = [sys.executable, '-c', WITHOUT_ROS, 'ahf_ros.nodes.settings']
+    subprocess.run(command, cwd=ROOT, check=True)
+
+
+def test_a_file_is_one_idea() -> None:
+    lines = {name: len(file.read_text().splitlines()) for name, file in MODULES.items()}
+    long = {name: count for name, count in lines.items() if count > LONGEST}
+    assert set(long) <= TO_BE_SPLIT, long
+
+
+def test_every_module_is_used() -> None:
+    entries = (ROOT / 'pyproject.toml').read_text()
+    users = [*MODULES.values(), *(ROOT / 'scripts').iterdir()]
+    used = Counter(name for file in users if file.is_file() for name in imported(file))
+    # Registries name what they import when it is asked for.
+    words = {
+        word for file in MODULES.values() for word in re.findall(r"'([\w.]+)", file.read_text())
+    }
+    unused = {
+        name
+        for name in MODULES
+        if not name.endswith(('.__init__', '.__main__'))
+        and not used[name]
+        and f'"{name}:' not in entries
+        and name not in words
+        and name.removeprefix('ahf_ros.') not in words
+    }
+    assert unused <= TO_BE_USED
+
+
+def test_no_two_test_files_have_the_same_name() -> None:
+    names = Counter(file.name for file in (ROOT / 'test').rglob('test_*.py'))
+    assert [name for name, count in names.items() if count > 1] == []
+
+
+def distributed(file: str) -> bool:
+    """Return whether MANIFEST.in takes a file into the source distribution."""
+    for line in (ROOT / 'MANIFEST.in').read_text().splitlines():
+        command, *patterns = line.split()
+        if command == 'include' and file in patterns:
+            return True
+        if command == 'graft' and file.startswith(tuple(f'{folder}/' for folder in patterns)):
+            return True
+    return file in ADDED_BY_SETUPTOOLS
+
+
+def test_the_source_distribution_holds_everything() -> None:
+    if not (ROOT / '.git').exists():
+        pytest.skip('this is a source distribution')
+    listed = subprocess.check_output(['git', 'ls-files'], cwd=ROOT, text=True).splitlines()
+    tracked = [file for file in listed if (ROOT / file).exists()]
+    assert len(tracked) > 100
+    missing = [file for file in tracked if not distributed(file)]
+    assert [file for file in missing if not any(fnmatch(file, it) for it in NOT_DISTRIBUTED)] == []
+
+
+@needs_rosbags
+def test_rosbags_has_what_is_used_beyond_its_public_api() -> None:
+    """Where this fails, the bound of rosbags in setup.py and package.xml is too high."""
+    version = metadata.version('rosbags')
+    for file in (PACKAGE / 'bag').glob('*.py'):
+        for node in ast.walk(ast.parse(file.read_text())):
+            if isinstance(node, ast.ImportFrom) and (node.module or '').startswith('rosbags.'):
+                module = importlib.import_module(node.module)
+                missing = [it.name for it in node.names if not hasattr(module, it.name)]
+                assert not missing, f'rosbags {version}: {node.module} lacks {missing}'

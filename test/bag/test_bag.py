@@ -11,6 +11,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+
+pytest.importorskip('rosbags', reason='rosbags is not installed')
+
 from rosbags import rosbag2
 
 from ahf_ros.bag import assembly, run

@@ -2,6 +2,8 @@ from __future__ import annotations
 
 import pytest
 
+pytest.importorskip('rosbags', reason='rosbags is not installed')
+
 from ahf_ros.bag.definitions import CODED_TARGETS, message_types, typestore
 from ahf_ros.interchange.target_messages import coded_target_array
 from ahf_ros.target import UNDECODED, FilterState, Identification, Target

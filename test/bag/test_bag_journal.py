@@ -2,6 +2,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
+pytest.importorskip('rosbags', reason='rosbags is not installed')
+
 from ahf_ros.bag.definitions import CODED_TARGETS
 from ahf_ros.bag.journal import MERGED, Entry, Journal, begin, custom_data
 from ahf_ros.filtering.identifier import Memory
