@@ -7,10 +7,6 @@ from typing import Any
 
 import cv2
 import numpy as np
-import pytest
-
-pytest.importorskip('rosbags', reason='rosbags is not installed')
-
 from rosbags import rosbag1, rosbag2
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore

@@ -101,6 +101,15 @@ def test_every_module_is_used() -> None:
     assert unused <= TO_BE_USED
 
 
+def test_tests_of_bags_skip_without_rosbags() -> None:
+    for file in (ROOT / 'test').rglob('test_*.py'):
+        top = [
+            node for node in ast.parse(file.read_text()).body if isinstance(node, ast.ImportFrom)
+        ]
+        if any((node.module or '').startswith(('ahf_ros.bag', 'rosbags')) for node in top):
+            assert "pytest.importorskip('rosbags'" in file.read_text(), file
+
+
 def test_no_two_test_files_have_the_same_name() -> None:
     names = Counter(file.name for file in (ROOT / 'test').rglob('test_*.py'))
     assert [name for name, count in names.items() if count > 1] == []

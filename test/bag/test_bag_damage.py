@@ -8,6 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
+pytest.importorskip('rosbags', reason='rosbags is not installed')
+
 from backports import zstd
 from rosbags import rosbag2
 

@@ -7,8 +7,7 @@ from typing import Any
 
 import pytest
 
-from support import bags
-
+pytest.importorskip('rosbags', reason='rosbags is not installed')
 pytest.importorskip('rclpy', reason='ROS 2 is not installed')
 
 from rclpy.serialization import deserialize_message, serialize_message
@@ -19,6 +18,7 @@ from sensor_msgs.msg import Image
 from ahf_ros.bag.definitions import CODED_TARGETS, typestore
 from ahf_ros.cli import main
 from ahf_ros.msg import CodedTargetArray
+from support import bags
 
 SEARCH = {'detector': 'traditional', 'population': 6, 'seed': 3}
 
