@@ -70,6 +70,11 @@ def draw(image: np.ndarray, identification: Identification) -> np.ndarray:
     -------
     ndarray of uint8, shape (height, width, 3)
         Blue, green, red.
+
+    Examples
+    --------
+    >>> draw(np.full((60, 80), 128, np.uint8), Identification(())).shape
+    (60, 80, 3)
     """
     canvas = overlay(image, identification.targets)
     _draw_title(canvas, summary(identification), _pen(image))

@@ -61,6 +61,11 @@ class TrueTarget:
     confirmed : bool
         Whether it is certainly visible. If not, it counts neither when identified nor when
         missed, but a wrong ID in its place is a wrong ID.
+
+    Examples
+    --------
+    >>> TrueTarget(id=7, x=10.5, y=20.0).confirmed
+    True
     """
 
     id: int
@@ -96,6 +101,11 @@ class FilterState:
         Number of identifications, the unfiltered one included, and of generations of the search.
     duration : float
         Time from the image to the result, s.
+
+    Examples
+    --------
+    >>> FilterState().applied
+    False
     """
 
     applied: bool = False

@@ -23,6 +23,12 @@ class Detector(Protocol):
     A detector keeps nothing between calls, may be called from several threads at once and returns
     the same targets for the same image. The image is its only input, so a filtered image is as
     good as one taken by a camera. A detector may also be a `Refiner`, and a `Drafter` with it.
+
+    Examples
+    --------
+    >>> from ahf_ros import create_detector
+    >>> isinstance(create_detector('ring'), Detector)
+    True
     """
 
     @property
@@ -108,6 +114,11 @@ class DetectorSettings:
         Program and arguments of the detector `command`, quoted as for a shell; no shell runs.
     detector_timeout : float
         Time limit for one image of a detector that is not part of this package, s.
+
+    Examples
+    --------
+    >>> DetectorSettings(family='aicon14', min_radius=6.0).polarity
+    'auto'
     """
 
     family: str = parameter(

@@ -17,6 +17,11 @@ class AdaptiveSettings:
     The default of `max_evaluations` bounds the cost of an image of which no filter shows all N
     targets. With the extended genes, 50 filters find what 100 of the published search do
     (`benchmarks/strategies.py`).
+
+    Examples
+    --------
+    >>> sorted(AdaptiveSettings(expected_ids='1-3, 7').listed)
+    [1, 2, 3, 7]
     """
 
     ahf: bool = parameter(

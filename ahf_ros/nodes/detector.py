@@ -127,8 +127,10 @@ class DetectorNode(ProcessNode):
         """Return the detector that is a service, where the settings ask for it."""
         if settings.identification.detector != SERVICE:
             return None
-        wanted = settings.service, settings.identification.detection
-        if not self._service or (self._service.service, self._service.settings) != wanted:
+        detection = settings.identification.detection
+        wanted = settings.service, detection.family, detection.detector_timeout
+        old = self._service
+        if not old or (old.service, old.family, old.timeout) != wanted:
             self._service = ServiceDetector(self, *wanted, self._stopping)
         return self._service
 

@@ -12,7 +12,6 @@ from rclpy.node import Node
 from rclpy.task import Future
 from std_msgs.msg import Header
 
-from ahf_ros.detectors import DetectorSettings
 from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.nodes.pipeline import STOPPING, Refused
 from ahf_ros.nodes.target_msg import identification
@@ -33,17 +32,20 @@ class ServiceDetector:
     node : rclpy.node.Node
         Whose client it is.
     service : str
-    settings : DetectorSettings
-        Their time limit and their family count.
+    family : str
+        Family of the targets.
+    timeout : float
+        Time limit for one image, s.
     stopping : threading.Event
         Breaks off waiting for an answer.
     """
 
     def __init__(
-        self, node: Node, service: str, settings: DetectorSettings, stopping: threading.Event
+        self, node: Node, service: str, family: str, timeout: float, stopping: threading.Event
     ) -> None:
         self.service = service
-        self.settings = settings
+        self.timeout = timeout
+        self._family = family
         self._stopping = stopping
         self._client: Client = node.create_client(
             Identify, service, callback_group=ReentrantCallbackGroup()
@@ -57,7 +59,7 @@ class ServiceDetector:
     @property
     def family(self) -> str:
         """Family of the targets, by which the results are named."""
-        return self.settings.family
+        return self._family
 
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of an 8-bit gray image; see `ahf_ros.detectors.Detector`.
@@ -71,7 +73,7 @@ class ServiceDetector:
             If the node stops before.
         """
         # What is sent before the service is known to this node gets lost.
-        if not self._client.wait_for_service(min(_GONE, self.settings.detector_timeout)):
+        if not self._client.wait_for_service(min(_GONE, self.timeout)):
             raise ValueError(f'{self._named} is not there')
         future = self._client.call_async(Identify.Request(image=image_message(image, Header())))
         try:
@@ -89,7 +91,7 @@ class ServiceDetector:
     def _awaited(self, future: Future) -> Identify.Response:
         answered = threading.Event()
         future.add_done_callback(lambda _: answered.set())
-        patience = self.settings.detector_timeout
+        patience = self.timeout
         limit = time.monotonic() + patience
         seen = time.monotonic()
         while not answered.wait(_POLL):

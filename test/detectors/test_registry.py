@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import runpy
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -13,7 +12,6 @@ from ahf_ros import detectors
 from ahf_ros.detectors import (
     DETECTOR_NAMES,
     FAMILY_NAMES,
-    GROUP,
     Detector,
     DetectorSettings,
     Drafter,
@@ -23,9 +21,7 @@ from ahf_ros.detectors import (
     estimator,
 )
 from ahf_ros.session import IdentificationSettings, identify
-
-EXAMPLE = Path(__file__).parents[2] / 'docs' / 'examples' / 'my_detector.py'
-
+from support.packages import EXAMPLE, write_package
 
 NEEDS_MARKERS = pytest.mark.skipif(
     not hasattr(getattr(cv2, 'aruco', None), 'ArucoDetector'),
@@ -124,11 +120,7 @@ def test_settings_that_make_no_sense_are_refused(change, message):
 
 def added(tmp_path, monkeypatch, module: str, body: str):
     """Return the registry of a process in which another package has added a detector."""
-    (tmp_path / f'{module}.py').write_text(body)
-    told = tmp_path / f'{module}-1.0.dist-info'
-    told.mkdir()
-    (told / 'METADATA').write_text(f'Metadata-Version: 2.1\nName: {module}\nVersion: 1.0\n')
-    (told / 'entry_points.txt').write_text(f'[{GROUP}]\nmine = {module}:MyDetector\n')
+    write_package(tmp_path, module, body)
     monkeypatch.syspath_prepend(str(tmp_path))
     return runpy.run_path(detectors.__file__)
 

@@ -7,8 +7,6 @@ import itertools
 import math
 import re
 import signal
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -21,9 +19,7 @@ pytest.importorskip('rclpy', reason='ROS 2 is not installed')
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.srv import (
     DescribeParameters,
-    GetParameters,
     SetParameters,
-    SetParametersAtomically,
 )
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
@@ -34,8 +30,8 @@ from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.nodes.settings import DetectorNodeSettings
 from ahf_ros.settings.nested import flat_parameters
-from ahf_ros.srv import Identify
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
+from support.detector import DetectorProcess
 
 CONFIG = Path(__file__).parents[2] / 'config' / 'detector.yaml'
 SCENE = {'width': 1000, 'height': 700, 'targets': 6}
@@ -67,65 +63,9 @@ def values(message: DiagnosticArray) -> dict[str, str]:
     return {item.key: item.value for item in message.status[0].values}
 
 
-class Detector:
-    """A detector of the test's own, with nobody else's images."""
-
-    def __init__(self, graph: Any, *arguments: str) -> None:
-        self.graph = graph
-        places = '-r', '__ns:=/own', '-r', '/diagnostics:=/own/diagnostics'
-        self.process = graph.start('detector', *places, *arguments)
-        self.targets = graph.listen(CodedTargetArray, '/own/coded_targets')
-        self.image = graph.publisher(Image, '/own/image')
-
-    def answer(self, message: Image) -> CodedTargetArray:
-        """Return the answer to an image."""
-        self.image.publish(message)
-        return self.graph.until(
-            lambda: next((it for it in self.targets if it.header == message.header), None)
-        )
-
-    def identify(self, message: Image, expected: int = 0) -> Identify.Response:
-        """Return the answer of the service."""
-        request = Identify.Request(image=message, expected=expected)
-        return self.graph.call(Identify, '/own/detector/identify', request)
-
-    def set(self, *given: tuple[str, Any]) -> tuple[bool, str]:
-        """Set parameters together; return whether they are accepted, or why not."""
-        parameters = [Parameter(name, value=value).to_parameter_msg() for name, value in given]
-        response = self.graph.call(
-            SetParametersAtomically,
-            '/own/detector/set_parameters_atomically',
-            SetParametersAtomically.Request(parameters=parameters),
-        )
-        return response.result.successful, response.result.reason
-
-    @contextmanager
-    def resubscription(self) -> Iterator[None]:
-        """Wait until another subscription to images has taken the place of the one before.
-
-        That goes when the node gets round to it, and what it receives till then gets lost.
-        """
-        before = self._subscriptions()
-        yield
-        self.graph.until(lambda: len(now := self._subscriptions()) == 1 and not now & before)
-
-    def _subscriptions(self) -> set[tuple[int, ...]]:
-        known = self.graph.node.get_subscriptions_info_by_topic('/own/image')
-        return {tuple(it.endpoint_gid) for it in known}
-
-    def get(self, name: str) -> Any:
-        """Return the value of a parameter."""
-        response = self.graph.call(
-            GetParameters, '/own/detector/get_parameters', GetParameters.Request(names=[name])
-        )
-        return Parameter.from_parameter_msg(
-            type('Named', (), {'name': name, 'value': response.values[0]})
-        ).value
-
-
 @pytest.fixture(scope='module')
-def detector(graph: Any) -> Detector:
-    return Detector(graph, '--params-file', str(CONFIG))
+def detector(graph: Any) -> DetectorProcess:
+    return DetectorProcess(graph, '/own', '--params-file', str(CONFIG))
 
 
 @pytest.fixture(scope='module')
@@ -191,14 +131,14 @@ def test_the_scoreboard_compares_with_the_truth(graph: Any) -> None:
         assert process.end() == (0, '')
 
 
-def test_an_image_without_targets_is_answered(detector: Detector) -> None:
+def test_an_image_without_targets_is_answered(detector: DetectorProcess) -> None:
     noise = np.random.default_rng(0).integers(100, 120, (200, 300), np.uint8)
     answer = detector.answer(image_message(noise, header()))
     assert answer.targets == []
     assert (answer.width, answer.height, answer.expected) == (300, 200, 0)
 
 
-def test_an_unknown_number_is_estimated(detector: Detector, message: Image) -> None:
+def test_an_unknown_number_is_estimated(detector: DetectorProcess, message: Image) -> None:
     assert detector.set(('estimate_expected', True)) == (True, '')
     answer = detector.answer(message)
     given = detector.identify(message, expected=6).coded_targets
@@ -207,7 +147,9 @@ def test_an_unknown_number_is_estimated(detector: Detector, message: Image) -> N
     assert (given.expected, given.estimated) == (6, False)
 
 
-def test_colour_and_padding_make_no_difference(detector: Detector, rendering: Rendering) -> None:
+def test_colour_and_padding_make_no_difference(
+    detector: DetectorProcess, rendering: Rendering
+) -> None:
     image = rendering.image
     gray = detector.answer(image_message(image, header()))
     colour = detector.answer(image_message(np.repeat(image[:, :, None], 3, axis=2), header()))
@@ -220,7 +162,7 @@ def test_colour_and_padding_make_no_difference(detector: Detector, rendering: Re
 
 
 def test_what_is_refused_is_counted_and_the_node_goes_on(
-    graph: Any, detector: Detector, message: Image
+    graph: Any, detector: DetectorProcess, message: Image
 ) -> None:
     diagnostics = graph.listen(DiagnosticArray, '/own/diagnostics')
 
@@ -248,7 +190,7 @@ def test_what_is_refused_is_counted_and_the_node_goes_on(
     assert not [it for it in detector.targets if it.header in refused]
 
 
-def test_the_service_answers_one_image(detector: Detector, message: Image) -> None:
+def test_the_service_answers_one_image(detector: DetectorProcess, message: Image) -> None:
     response = detector.identify(message, expected=6)
     assert (response.success, response.message) == (True, '')
     assert response.coded_targets.header == message.header
@@ -261,7 +203,7 @@ def test_the_service_answers_one_image(detector: Detector, message: Image) -> No
     assert response.message.startswith(accepted)
 
 
-def test_every_parameter_says_what_it_is(graph: Any, detector: Detector) -> None:
+def test_every_parameter_says_what_it_is(graph: Any, detector: DetectorProcess) -> None:
     items = flat_parameters(DetectorNodeSettings)
     described = graph.call(
         DescribeParameters,
@@ -292,7 +234,7 @@ def test_every_parameter_says_what_it_is(graph: Any, detector: Detector) -> None
     ],
 )
 def test_a_refused_parameter_is_named(
-    detector: Detector, name: str, value: Any, words: tuple[str, ...]
+    detector: DetectorProcess, name: str, value: Any, words: tuple[str, ...]
 ) -> None:
     before = detector.get(name)
     accepted, reason = detector.set((name, value))
@@ -301,7 +243,9 @@ def test_a_refused_parameter_is_named(
     assert detector.get(name) == before
 
 
-def test_parameters_are_checked_and_applied_together(detector: Detector, message: Image) -> None:
+def test_parameters_are_checked_and_applied_together(
+    detector: DetectorProcess, message: Image
+) -> None:
     lower = ('gamma_high_min', 0.5)
     assert not detector.set(lower)[0]
     assert detector.set(lower, ('gamma_low_max', 0.5)) == (True, '')
@@ -314,7 +258,9 @@ def test_parameters_are_checked_and_applied_together(detector: Detector, message
     assert detector.set(('polarity', 'auto')) == (True, '')
 
 
-def test_one_refused_parameter_of_a_list_leaves_the_others(graph: Any, detector: Detector) -> None:
+def test_one_refused_parameter_of_a_list_leaves_the_others(
+    graph: Any, detector: DetectorProcess
+) -> None:
     before = detector.get('population')
     pair = [Parameter('seed', value=7), Parameter('population', value=1)]
     response = graph.call(
@@ -326,7 +272,9 @@ def test_one_refused_parameter_of_a_list_leaves_the_others(graph: Any, detector:
     assert (detector.get('seed'), detector.get('population')) == (7, before)
 
 
-def test_images_for_those_who_look(graph: Any, detector: Detector, rendering: Rendering) -> None:
+def test_images_for_those_who_look(
+    graph: Any, detector: DetectorProcess, rendering: Rendering
+) -> None:
     topics = '/own/detector/debug_image', '/own/detector/filtered_image'
     debug, filtered = (graph.listen(Image, topic) for topic in topics)
     message = image_message(rendering.image, header())
@@ -341,7 +289,7 @@ def test_images_for_those_who_look(graph: Any, detector: Detector, rendering: Re
 
 
 def test_parameters_are_answered_and_the_latest_image_waits_during_a_search(
-    graph: Any, detector: Detector, rendering: Rendering
+    graph: Any, detector: DetectorProcess, rendering: Rendering
 ) -> None:
     images = [image_message(rendering.image, header()) for _ in range(4)]
 
@@ -373,7 +321,7 @@ def test_parameters_are_answered_and_the_latest_image_waits_during_a_search(
 
 
 def test_no_image_is_lost_in_a_lossless_queue(
-    graph: Any, detector: Detector, rendering: Rendering
+    graph: Any, detector: DetectorProcess, rendering: Rendering
 ) -> None:
     with detector.resubscription():
         assert detector.set(('queue', 'lossless'), ('queue_memory', 1)) == (True, '')
@@ -394,7 +342,7 @@ def test_no_image_is_lost_in_a_lossless_queue(
         assert detector.set(('queue', 'latest')) == (True, '')
 
 
-def test_compressed_images(graph: Any, detector: Detector, rendering: Rendering) -> None:
+def test_compressed_images(graph: Any, detector: DetectorProcess, rendering: Rendering) -> None:
     assert detector.set(('image_transport', 'compressed')) == (True, '')
     publisher = graph.publisher(CompressedImage, '/own/image/compressed')
     _, data = cv2.imencode('.png', rendering.image)
@@ -446,7 +394,7 @@ def test_a_refused_parameter_stops_a_node_at_the_start(
 
 
 def test_a_service_is_a_detector_and_its_end_is_named(
-    graph: Any, detector: Detector, message: Image, rendering: Rendering
+    graph: Any, detector: DetectorProcess, message: Image, rendering: Rendering
 ) -> None:
     other = graph.start('detector', '-r', '__ns:=/other')
     graph.until(lambda: ('detector', '/other') in graph.node.get_node_names_and_namespaces())

@@ -1,0 +1,80 @@
+"""The node `detector` as a process of its own, with its parameters and services."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from rcl_interfaces.srv import GetParameters, SetParametersAtomically
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import Image
+from std_srvs.srv import Trigger
+
+from ahf_ros.msg import CodedTargetArray
+from ahf_ros.srv import Identify
+from support.live import Graph
+
+
+class DetectorProcess:
+    """The node `detector` in a namespace of its own, and what it answers."""
+
+    def __init__(self, graph: Graph, namespace: str, *arguments: str) -> None:
+        self.graph = graph
+        self.namespace = namespace
+        places = '-r', f'__ns:={namespace}', '-r', f'/diagnostics:={namespace}/diagnostics'
+        self.process = graph.start('detector', *places, *arguments)
+        self.targets = graph.listen(CodedTargetArray, f'{self.namespace}/coded_targets')
+        self.image = graph.publisher(Image, f'{self.namespace}/image')
+
+    def answer(self, message: Image) -> CodedTargetArray:
+        """Return the answer to an image."""
+        self.image.publish(message)
+        return self.graph.until(
+            lambda: next((it for it in self.targets if it.header == message.header), None)
+        )
+
+    def identify(self, message: Image, expected: int = 0) -> Identify.Response:
+        """Return the answer of the service."""
+        request = Identify.Request(image=message, expected=expected)
+        return self.graph.call(Identify, f'{self.namespace}/detector/identify', request)
+
+    def reset(self) -> None:
+        """Let the node forget what was learnt from earlier images."""
+        response = self.graph.call(Trigger, f'{self.namespace}/detector/reset', Trigger.Request())
+        assert response.success, response.message
+
+    def set(self, *given: tuple[str, Any]) -> tuple[bool, str]:
+        """Set parameters together; return whether they are accepted, or why not."""
+        parameters = [Parameter(name, value=value).to_parameter_msg() for name, value in given]
+        response = self.graph.call(
+            SetParametersAtomically,
+            f'{self.namespace}/detector/set_parameters_atomically',
+            SetParametersAtomically.Request(parameters=parameters),
+        )
+        return response.result.successful, response.result.reason
+
+    @contextmanager
+    def resubscription(self) -> Iterator[None]:
+        """Wait until another subscription to images has taken the place of the one before.
+
+        That goes when the node gets round to it, and what it receives till then gets lost.
+        """
+        before = self._subscriptions()
+        yield
+        self.graph.until(lambda: len(now := self._subscriptions()) == 1 and not now & before)
+
+    def _subscriptions(self) -> set[tuple[int, ...]]:
+        known = self.graph.node.get_subscriptions_info_by_topic(f'{self.namespace}/image')
+        return {tuple(it.endpoint_gid) for it in known}
+
+    def get(self, name: str) -> Any:
+        """Return the value of a parameter."""
+        response = self.graph.call(
+            GetParameters,
+            f'{self.namespace}/detector/get_parameters',
+            GetParameters.Request(names=[name]),
+        )
+        return Parameter.from_parameter_msg(
+            type('Named', (), {'name': name, 'value': response.values[0]})
+        ).value

@@ -1,0 +1,28 @@
+"""Other packages that add a detector, made on the spot."""
+
+from __future__ import annotations
+
+import runpy
+from pathlib import Path
+
+from ahf_ros.detectors import GROUP, Detector, DetectorSettings
+
+EXAMPLE = Path(__file__).parents[1] / 'docs' / 'examples' / 'my_detector.py'
+
+MINE = 'mine'
+"""Name of the detector that the package adds."""
+
+
+def write_package(folder: Path, module: str, body: str = EXAMPLE.read_text()) -> None:
+    """Write a package whose class `MyDetector` is the detector `MINE`."""
+    (folder / f'{module}.py').write_text(body)
+    told = folder / f'{module}-1.0.dist-info'
+    told.mkdir()
+    (told / 'METADATA').write_text(f'Metadata-Version: 2.1\nName: {module}\nVersion: 1.0\n')
+    (told / 'entry_points.txt').write_text(f'[{GROUP}]\n{MINE} = {module}:MyDetector\n')
+
+
+def my_detector() -> Detector:
+    """Return the detector of the example in the documentation."""
+    made: Detector = runpy.run_path(str(EXAMPLE))['MyDetector'](DetectorSettings())
+    return made

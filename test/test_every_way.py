@@ -1,0 +1,174 @@
+"""Every detector and every kind of family gives the same answer by every way in."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import redirect_stdout
+from dataclasses import dataclass
+from functools import cache
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from ahf_ros import FAMILY_NAMES, SceneSettings, create_detector, identify, render
+from ahf_ros.bag.definitions import typestore
+from ahf_ros.cli import main
+from ahf_ros.interchange.image_files import write_image
+from ahf_ros.interchange.target_json import targets_from_json
+from support import bags
+from support.packages import MINE, my_detector, write_package
+
+SCENE = {'width': 400, 'height': 300, 'targets': 4, 'dot_radius': 10.0}
+SQUARES = ('aruco_4x4_50', 'apriltag_36h11')
+NO_MARKERS = pytest.mark.skipif(
+    not hasattr(getattr(cv2, 'aruco', None), 'ArucoDetector'),
+    reason=f'OpenCV {cv2.__version__} has no square markers',
+)
+COMMAND = f'{sys.executable} -m ahf_ros.cli identify --json'
+
+
+@dataclass(frozen=True)
+class Case:
+    """An image, and the settings of its identification."""
+
+    family: str = 'metashape12'
+    light: str = 'normal'
+    detector: str = 'auto'
+    command: str = ''
+    expected_targets: int = 0
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Return the parameters, all of them, so that nothing of the case before is left."""
+        names = 'family', 'detector', 'command', 'expected_targets'
+        return {name: getattr(self, name) for name in names}
+
+    def __str__(self) -> str:
+        return self.family if self.detector == 'auto' else self.detector
+
+
+CASES = (
+    *(Case(family) for family in FAMILY_NAMES if not family.startswith(('aruco', 'apriltag'))),
+    *(Case(family) for family in SQUARES),
+    Case(detector='traditional', light='stripe', expected_targets=4),
+    Case(detector='command', command=COMMAND),
+    Case(detector=MINE),
+)
+EVERY_CASE = pytest.mark.parametrize(
+    'case',
+    [
+        pytest.param(it, id=str(it), marks=NO_MARKERS if it.family in SQUARES else ())
+        for it in CASES
+    ],
+)
+
+Answer = tuple[str, list[tuple[Any, ...]]]
+"""The family of targets, and what is exactly the same by every way."""
+
+
+@cache
+def image(case: Case) -> np.ndarray:
+    scene = SCENE | {'family': case.family, 'light': case.light}
+    return render(SceneSettings(**scene, seed=1)).image
+
+
+@cache
+def by_library(case: Case) -> Answer:
+    if case.detector == MINE:
+        detector = my_detector()
+        return answer(detector.family, identify(image(case), detector).targets)
+    found = identify(image(case), **case.settings)
+    assert found.filter.applied == (case.light == 'stripe')
+    made = create_detector(case.detector, family=case.family, command=case.command)
+    return answer(made.family, found.targets)
+
+
+def answer(family: str, targets: Any) -> Answer:
+    """Return an answer from targets or from messages of targets."""
+    return family, [(it.id, it.code, it.x, it.y, *it.covariance) for it in targets]
+
+
+@pytest.fixture(scope='module', autouse=True)
+def package_of_mine(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Let processes that are started find a package that adds a detector."""
+    folder = tmp_path_factory.mktemp('packages')
+    write_package(folder, 'package_of_mine')
+    paths = [str(folder), str(Path.cwd()), os.environ.get('PYTHONPATH', '')]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv('PYTHONPATH', os.pathsep.join(filter(None, paths)))
+        yield
+
+
+def ahf(*words: object, case: Case) -> str:
+    """Return what the command line prints; a detector that was added needs another process."""
+    given = [f'--{name.replace("_", "-")}={value}' for name, value in case.settings.items()]
+    arguments = [*map(str, words), *given]
+    if case.detector == MINE:
+        line = [sys.executable, '-m', 'ahf_ros.cli', *arguments]
+        return subprocess.run(line, stdout=subprocess.PIPE, text=True, check=True).stdout
+    with redirect_stdout(StringIO()) as printed:
+        assert main(arguments) == 0
+    return printed.getvalue()
+
+
+@EVERY_CASE
+def test_the_library_identifies_something(case: Case) -> None:
+    _, targets = by_library(case)
+    assert len({number for number, *_ in targets}) >= 3
+
+
+@EVERY_CASE
+def test_the_command_line(case: Case, tmp_path: Path) -> None:
+    path = tmp_path / 'image.png'
+    write_image(path, image(case))
+    printed = json.loads(ahf('identify', path, '--json', case=case))
+    assert answer(printed['family'], targets_from_json(printed, 'ahf')) == by_library(case)
+
+
+@EVERY_CASE
+def test_a_bag(case: Case, tmp_path: Path) -> None:
+    source = bags.write_ros2(tmp_path / 'in', bags.recorded(typestore(), [image(case)]))
+    ahf('bag', source, tmp_path / 'out', case=case)
+    ((_, found),) = bags.answers(tmp_path / 'out')
+    assert answer(found.family, found.targets) == by_library(case)
+
+
+@pytest.fixture(scope='module')
+def nodes(graph: Any) -> Any:
+    """Return a node that identifies, and another one that asks the first for its targets."""
+    from support.detector import DetectorProcess
+
+    first = DetectorProcess(graph, '/first')
+    second = DetectorProcess(graph, '/second', '-p', 'service:=/first/detector/identify')
+    return first, second
+
+
+@EVERY_CASE
+def test_the_node_and_its_service_and_a_node_that_calls_it(case: Case, nodes: Any) -> None:
+    from std_msgs.msg import Header
+
+    from ahf_ros.nodes.image_msg import image_message
+
+    first, second = nodes
+    message = image_message(image(case), Header(frame_id=str(case)))
+    assert first.set(*case.settings.items()) == (True, '')
+    live = first.answer(message)
+    assert answer(live.family, live.targets) == by_library(case)
+    first.reset()
+    response = first.identify(message)
+    assert response.success, response.message
+    served = response.coded_targets
+    assert answer(served.family, served.targets) == by_library(case)
+    first.reset()
+    assert second.set(('detector', 'service'), ('family', case.family)) == (True, '')
+    asked = second.answer(message)
+    assert answer('', asked.targets)[1] == by_library(case)[1]
+    assert asked.family == case.family
