@@ -1,4 +1,4 @@
-"""The messages of a bag in another one, whatever they are."""
+"""Copies of messages of any type from one bag to another."""
 
 from __future__ import annotations
 
@@ -18,31 +18,31 @@ from ahf_ros.bag.records import reason_of
 from ahf_ros.bag.source import Source
 
 UNKNOWN_HASH = f'RIHS01_{0:064x}'
-"""Of a type whose definition is missing or not accepted."""
+"""Hash of a type whose definition is missing or not accepted."""
 
 _Target = tuple[Connection, Callable[[bytes], Any]]
 
 
 class Copy:
-    """Copies messages: those of ROS 2 byte for byte, those of ROS 1 as ROS 2 serializes them.
+    """Copies ROS 2 messages byte for byte, and converts ROS 1 messages to ROS 2.
 
     Parameters
     ----------
     source : Source
-        Where they come from.
+        Bag that is copied.
     writer : Writer
-        Gets all topics of the source now, and its messages by `write`.
+        Bag that is written. All topics of the source are added at once.
 
     Attributes
     ----------
     counts : Counter
-        Number of messages that were written, by topic.
+        Number of messages written, by topic.
     """
 
     def __init__(self, source: Source, writer: Writer) -> None:
         self._writer = writer
         self._targets: dict[tuple[int, int], _Target] = {}
-        self._reasons: dict[str, str] = {}  # by topics that are not accepted
+        self._reasons: dict[str, str] = {}  # by topic that cannot be converted
         self._refused: Counter[tuple[str, str]] = Counter()
         self.counts: Counter[str] = Counter()
         for item in source.connections:
@@ -55,7 +55,7 @@ class Copy:
 
     @property
     def refused(self) -> list[str]:
-        """Messages of ROS 1 that have no counterpart in ROS 2, and why."""
+        """ROS 1 messages that could not be converted to ROS 2, and why."""
         return [
             f'{topic}: {count} messages cannot be converted: {reason}'
             for (topic, reason), count in self._refused.items()
@@ -71,36 +71,36 @@ class Copy:
         try:
             converted = convert(data)
         except Exception as error:
-            # Damaged messages make the generated code raise anything.
+            # With damaged messages, the generated code may raise anything.
             self._refused[connection.topic, reason_of(error)] += 1
             return
         self._writer.write(written, timestamp, converted)
         self.counts[connection.topic] += 1
 
     def _converted(self, item: Connection, stores: TypeStores) -> _Target | None:
-        """Return where messages of ROS 1 go to and how; None if their type is not accepted."""
+        """Return the topic for ROS 1 messages and their converter; None if there is none."""
         try:
             reader: Any = SimpleNamespace(is2=False, typestore=stores.of(item))
-            with redirect_stdout(sys.stderr):  # it tells of types that have a new name
+            with redirect_stdout(sys.stderr):  # prints which types have a new name
                 targets, converters = create_connections_converters(
                     [item], None, reader, self._writer
                 )
         except Exception as error:
-            # The parser and the generator of code raise anything for what is no definition.
+            # With bad definitions, the parser and the code generator may raise anything.
             self._reasons[item.topic] = reason_of(error)
             return None
         return targets[item.id, item.owner], converters[item.msgtype]
 
 
 def _added(writer: Writer, item: Connection, stores: TypeStores) -> Connection:
-    """Return the connection of a writer that is as the given one, added where it is missing."""
+    """Return the connection of a writer that equals the given one; add it if it is missing."""
     assert isinstance(item.ext, ConnectionExtRosbag2)
     for known in writer.connections:
         if (known.topic, known.msgtype, known.ext) == (item.topic, item.msgtype, item.ext):
             return known
     definition, digest = item.msgdef.data, item.digest
     with suppress(Exception):
-        # A type that is not accepted is copied under the hash of an unknown one.
+        # Types that are not accepted are copied with the hash of unknown types.
         store = stores.of(item)
         if item.msgdef.format == MessageDefinitionFormat.NONE:
             definition, _ = store.generate_msgdef(item.msgtype, ros_version=2)

@@ -1,4 +1,4 @@
-"""The messages of this package, for reading and writing bags without ROS."""
+"""Message definitions, for reading and writing bags without ROS."""
 
 from __future__ import annotations
 
@@ -27,26 +27,26 @@ _IDL_SEPARATOR = '=' * 80 + '\n'
 
 
 def definition_folder() -> Path:
-    """Return the folder of the files *.msg of this package.
+    """Return the folder of the .msg files of this package.
 
-    They lie beside the modules in the sources, and in `share` where the package is installed.
+    In the sources it is beside the package; in an installation it is below `share`.
 
     Raises
     ------
     FileNotFoundError
-        If the installation lacks them.
+        If the files are missing.
     """
     package = Path(ahf_ros.__file__).resolve().parent
-    # The second is as in PREFIX/lib/python3.12/site-packages/ahf_ros.
+    # The second is for a package in PREFIX/lib/python3.12/site-packages/ahf_ros.
     places = [package.parent / 'msg', *(it / 'share/ahf_ros/msg' for it in package.parents[3:4])]
     for folder in places:
         if all((folder / f'{name}.msg').is_file() for name in _NAMES):
             return folder
-    raise FileNotFoundError(f'the messages of ahf_ros are not in {" or ".join(map(str, places))}')
+    raise FileNotFoundError(f'no .msg files of ahf_ros in {" or ".join(map(str, places))}')
 
 
 def typestore() -> Typestore:
-    """Return the messages of ROS 2 Jazzy and of this package."""
+    """Return the message types of ROS 2 Jazzy and of this package."""
     store = get_typestore(Stores.ROS2_JAZZY)
     types = {}
     for name in _NAMES:
@@ -57,16 +57,15 @@ def typestore() -> Typestore:
 
 
 def message_types(store: Typestore) -> MessageTypes:
-    """Return the classes that `ahf_ros.interchange.target_messages` makes messages of."""
+    """Return the message classes for `ahf_ros.interchange.target_messages`."""
     classes: Any = {name: store.types[f'ahf_ros/msg/{name}'] for name in _NAMES}
     return SimpleNamespace(**classes)
 
 
 class TypeStores:
-    """The types of recorded messages: as their bag defines them, or else those of ROS 2 Jazzy.
+    """Types of recorded messages, from the bag if it defines them, otherwise from ROS 2 Jazzy.
 
-    Every connection has types of its own, so that a definition that is damaged, or differs from
-    another one, concerns nobody else.
+    Each connection has its own types, so a damaged or different definition affects no other.
     """
 
     def __init__(self) -> None:
@@ -79,14 +78,14 @@ class TypeStores:
         Raises
         ------
         ValueError
-            If the definition in the bag is not one, or the type is not known.
+            If the definition in the bag is invalid or the type is unknown.
         """
         key = (item.msgtype, item.msgdef)
         if key not in self._stores:
             try:
                 self._stores[key] = self._defined(item)
             except Exception as error:
-                # The parser raises anything for what is no definition.
+                # With bad definitions, the parser may raise anything.
                 if item.msgtype in self.default.fielddefs and not _is_ros1(item):
                     return self.default
                 raise ValueError(
@@ -101,7 +100,7 @@ class TypeStores:
         Raises
         ------
         ValueError
-            If it is not as its type says, or the type is not known.
+            If the data do not match their type, or the type is unknown.
         """
         store = self.of(item)
         try:
@@ -109,7 +108,7 @@ class TypeStores:
                 return store.deserialize_ros1(data, item.msgtype)
             return store.deserialize_cdr(data, item.msgtype)
         except Exception as error:
-            # Damaged data make the generated code raise anything.
+            # With damaged data, the generated code may raise anything.
             raise ValueError(
                 f'the message is no {item.msgtype}: {type(error).__name__}: {error}'
             ) from error
@@ -117,7 +116,7 @@ class TypeStores:
     def _defined(self, item: Connection) -> Typestore:
         if item.msgdef.format == MessageDefinitionFormat.NONE:
             if item.msgtype not in self.default.fielddefs:
-                raise ValueError('the bag does not define it, and ROS 2 Jazzy neither')
+                raise ValueError('neither the bag nor ROS 2 Jazzy defines it')
             return self.default
         store = get_typestore(Stores.EMPTY)
         store.register(_types(item))
@@ -129,7 +128,7 @@ def _is_ros1(item: Connection) -> bool:
 
 
 def _types(item: Connection) -> dict[str, Any]:
-    """Return the types that the definition of a connection holds."""
+    """Return the types in the definition of a connection."""
     text = item.msgdef.data
     if item.msgdef.format == MessageDefinitionFormat.MSG:
         return get_types_from_msg(text, item.msgtype)

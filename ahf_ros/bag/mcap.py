@@ -72,10 +72,10 @@ class Mcap:
         times = ['publish times and sequence numbers'] if self._differs else []
         return self._others + times
 
-    def messages(self, wanted: list[Connection]) -> Iterator[Message | Lost]:
+    def messages(self, selected: list[Connection]) -> Iterator[Message | Lost]:
         """Yield the messages of some topics in the order of time; see `BagFile`."""
         yield from self._lost
-        channels = {item.id: item for item in wanted}
+        channels = {item.id: item for item in selected}
         yield from merged(
             self._path,
             self._blocks,
@@ -160,7 +160,7 @@ class Mcap:
                             self._topics.add_channel(content)
 
     def _entries(
-        self, file: BinaryIO, block: Block, wanted: dict[int, Connection]
+        self, file: BinaryIO, block: Block, selected: dict[int, Connection]
     ) -> Iterator[Recorded | Lost]:
         """Yield the messages of a block, up to where it is damaged."""
         time = block.start
@@ -174,9 +174,9 @@ class Mcap:
                     continue
                 time = max(recorded, block.start)  # so that blocks can be merged
                 self._differs |= sequence != 0 or published != recorded
-                if channel in wanted:
+                if channel in selected:
                     data = content[_MESSAGE_HEADER:]
-                    yield Recorded(time, block.offset, number, wanted[channel], recorded, data)
+                    yield Recorded(time, block.offset, number, selected[channel], recorded, data)
                 elif not self._topics.know((channel,)):
                     yield Lost((), recorded, recorded, f'channel {channel} is not defined')
         except (ValueError, struct.error) as error:

@@ -79,8 +79,8 @@ class Topics:
 
     def names(self, channels: Iterable[int] | None) -> tuple[str, ...]:
         """Return the topics of some channels, or all where they are not known."""
-        wanted = self._channels if channels is None else channels
-        topics = {self._channels[it].topic for it in wanted if it in self._channels}
+        selected = self._channels if channels is None else channels
+        topics = {self._channels[it].topic for it in selected if it in self._channels}
         return tuple(sorted(topics))
 
     def connections(self, counts: Mapping[int, int]) -> list[Connection]:

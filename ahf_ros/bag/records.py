@@ -1,4 +1,4 @@
-"""What reading a bag yields: messages, and what could not be read in their place."""
+"""Records of reading a bag: messages, and gaps that could not be read."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Protocol
 from rosbags.interfaces import Connection
 
 Message = tuple[Connection, int, bytes]
-"""Where a message comes from, when it was recorded in ns, and its bytes."""
+"""Connection of a message, its time of recording in ns, and its bytes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,9 +19,9 @@ class Lost:
     Attributes
     ----------
     topics : tuple of str
-        Topics that they may belong to; empty where unknown.
+        Topics that they may belong to; empty if unknown.
     start, stop : int or None
-        Times of recording that they lie between, ns; None where unknown.
+        Interval of their times of recording, ns; None if unknown.
     reason : str
         Why they could not be read.
     """
@@ -32,7 +32,7 @@ class Lost:
     reason: str
 
     def __str__(self) -> str:
-        """Return a line for people."""
+        """Return a line of text."""
         topics = ', '.join(self.topics) or 'messages'
         if self.start is None and self.stop is None:
             return f'{topics}: {self.reason}'
@@ -43,7 +43,7 @@ class Lost:
         return f'{topics} from {start} to {stop}: {self.reason}'
 
 
-_LONGEST = 300  # characters of a reason
+_MAXIMUM_LENGTH = 300  # characters of a reason
 
 
 class BagFile(Protocol):
@@ -64,13 +64,13 @@ class BagFile(Protocol):
 
     @property
     def left_out(self) -> list[str]:
-        """What else is in it and cannot be copied; complete once its messages were read."""
+        """Other contents that cannot be copied; complete after all messages were read."""
         ...
 
-    def messages(self, wanted: list[Connection]) -> Iterator[Message | Lost]:
-        """Yield the messages of some topics in the order of time.
+    def messages(self, selected: list[Connection]) -> Iterator[Message | Lost]:
+        """Yield the messages of some topics in order of time.
 
-        What is yielded of a topic does not depend on the other topics that are wanted.
+        The result for a topic does not depend on the other selected topics.
         """
         ...
 
@@ -88,6 +88,6 @@ def reason_of(error: BaseException) -> str:
 
 
 def printable(text: str) -> str:
-    """Return a text without what a terminal or JSON would not take, bounded in length."""
-    shown = text[:_LONGEST].encode('ascii', 'backslashreplace').decode()
+    """Return a text that a terminal and JSON accept, bounded in length."""
+    shown = text[:_MAXIMUM_LENGTH].encode('ascii', 'backslashreplace').decode()
     return ''.join(it if it.isprintable() else repr(it)[1:-1] for it in shown)

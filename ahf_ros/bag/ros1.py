@@ -55,10 +55,10 @@ class Ros1:
             for _, item in sorted(self._known.items())
         ]
 
-    def messages(self, wanted: list[Connection]) -> Iterator[Message | Lost]:
+    def messages(self, selected: list[Connection]) -> Iterator[Message | Lost]:
         """Yield the messages of some topics in the order of time; see `BagFile`."""
         yield from self._lost
-        channels = {item.id: item for item in wanted}
+        channels = {item.id: item for item in selected}
         yield from merged(
             self._path,
             self._blocks,
@@ -133,9 +133,9 @@ class Ros1:
         return [it for it in self._entries(file, block, None) if isinstance(it, Recorded)]
 
     def _entries(
-        self, file: BinaryIO, block: Block, wanted: dict[int, Connection] | None
+        self, file: BinaryIO, block: Block, selected: dict[int, Connection] | None
     ) -> Iterator[Recorded | Lost]:
-        """Yield the messages of a chunk, up to where it is damaged; all where None is wanted."""
+        """Yield the messages of a chunk, up to the damage; all if `selected` is None."""
         time = block.start
         number = 0
         try:
@@ -155,8 +155,8 @@ class Ros1:
                 item = self._known.get(channel)
                 if item is None:
                     yield Lost((), recorded, recorded, f'connection {channel} is not defined')
-                elif wanted is None or channel in wanted:
-                    item = item if wanted is None else wanted[channel]
+                elif selected is None or channel in selected:
+                    item = item if selected is None else selected[channel]
                     yield Recorded(time, block.offset, number, item, recorded, data)
         except Exception as error:
             # Damaged records make the parser raise anything.

@@ -1,8 +1,8 @@
-"""From a bag with images to a bag that holds the answers beside everything else.
+"""Identification of all images of a bag, into a copy of the bag with the results.
 
-First all images are answered, one after the other, into a journal in the place of the bag
-(`ahf_ros.bag.journal`). Then the bag is written in one go, at the speed of the disk, and takes
-the place of the journal. What is killed on the way goes on from there.
+First, the results of all images are written to a journal in the place of the new bag
+(`ahf_ros.bag.journal`). Then the bag is written in one pass, at the speed of the disk, and
+replaces the journal. A run that was killed continues where it stopped.
 """
 
 from __future__ import annotations
@@ -34,35 +34,36 @@ from ahf_ros.bag.source import Source
 from ahf_ros.session import IdentificationSettings
 
 WRITING_ERRORS = (OSError, sqlite3.Error, WriterError)
-"""What it means when a bag cannot be written: a full disk, a folder of somebody else."""
+"""Errors of writing a bag, such as a full disk or a folder without permission."""
 
 Report = Callable[[int, int, str], None]
-"""Gets the number of images that are done and that there are, 0 where unknown, and why the last
-one was refused, empty where it was not."""
+"""Called after each image with the number of finished images, the number of all images or 0 if
+unknown, and the reason why this image was refused, empty if it was not."""
 
-_FORMAT = 2  # of the journal and of what is kept in a bag
-_IRRELEVANT = ('source', 'target', 'threads')  # to what is in the bag
+_FORMAT = 2  # version of the journal and of the data stored in a bag
+_IRRELEVANT = ('source', 'target', 'threads')  # settings that do not change the bag
 
 
 @dataclass(frozen=True, slots=True)
 class BagTask:
-    """What is to be done.
+    """Task of `answer_bag`.
 
     Attributes
     ----------
     source : Path
         The bag with the images.
     target : Path
-        The bag that is to be made.
+        The bag to write.
     topics : tuple of str
-        The topics of the images, all where empty.
+        Topics of the images; all if empty.
     output_topic : str
-        Topic of the answers; one without a slash at the beginning is below that of the images.
+        Topic of the results; without a leading slash, relative to the topic of the images.
     storage : str
         One of `ahf_ros.bag.writing.STORAGES`.
     debug_images : bool
-        Whether annotated images are written, as JPEG.
+        Whether to write annotated images, as JPEG.
     identification : IdentificationSettings
+        Settings of the identification.
     """
 
     source: Path
@@ -75,33 +76,34 @@ class BagTask:
 
 
 def answer_bag(task: BagTask, report: Report) -> Outcome:
-    """Identify the targets of all images in a bag, or go on with it.
+    """Identify the targets of all images in a bag, or continue an interrupted run.
 
     Parameters
     ----------
     task : BagTask
     report : callable
-        Told of every image, also of those that an earlier run has answered.
+        Called after each image, also for images of an earlier run.
 
     Returns
     -------
     Outcome
-        The same, and the same bag byte for byte, for every run with the same task, however often
-        it was broken off.
+        Equal for equal tasks, as is the bag, byte for byte, however often the run was
+        interrupted.
 
     Raises
     ------
     ValueError
-        If the bag cannot be read, has no such topics, or the target is something else already.
+        If the bag cannot be read or lacks a topic, or if the target exists and is not from the
+        same task.
     """
     with Source(task.source) as source:
         topics = _answer_topics(task, source)
-        told = _told(task, source, topics)
+        origin = _origin(task, source, topics)
         if not task.target.exists():
             types = {name: kind for to in topics.values() for name, kind in to.types.items()}
-            begin(task.target, types, json.dumps(told))
+            begin(task.target, types, json.dumps(origin))
         with locked(task.target):
-            _check_target(task.target, told)
+            _check_target(task.target, origin)
             outcome = finished(task.target) or _made(task, source, topics, report)
             _tidy(task.target)
     return outcome
@@ -110,7 +112,7 @@ def answer_bag(task: BagTask, report: Report) -> Outcome:
 def _made(
     task: BagTask, source: Source, topics: dict[str, AnswerTopics], report: Report
 ) -> Outcome:
-    """Make the bag from its journal."""
+    """Write the journal, then the bag."""
     journal = Journal(task.target)
     _answer_images(task, source, topics, journal, report)
     return assemble(source, task.target, topics, journal, task.storage)
@@ -118,7 +120,7 @@ def _made(
 
 @contextmanager
 def locked(target: Path) -> Iterator[None]:
-    """Keep other processes from a bag; whatever ends this one ends that, too."""
+    """Lock a bag against other processes, until this process ends at the latest."""
     descriptor = os.open(target, os.O_RDONLY)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -130,12 +132,12 @@ def locked(target: Path) -> Iterator[None]:
 
 
 def _answer_topics(task: BagTask, source: Source) -> dict[str, AnswerTopics]:
-    """Return where the answers go, by the topic of the images."""
+    """Return the topics of the results by topic of the images."""
     images = source.image_topics(task.topics)
     if task.output_topic.startswith('/') and len(images) > 1:
         raise ValueError(
-            f'output_topic is {task.output_topic}, accepted for several topics of images '
-            f'({", ".join(images)}) is a name without a slash at the beginning'
+            f'output_topic is {task.output_topic}, accepted for several image topics '
+            f'({", ".join(images)}) is a name without a leading slash'
         )
     topics = {}
     for image in images:
@@ -151,12 +153,12 @@ def _answer_topics(task: BagTask, source: Source) -> dict[str, AnswerTopics]:
     return topics
 
 
-def _told(task: BagTask, source: Source, topics: dict[str, AnswerTopics]) -> dict[str, Any]:
-    """Return everything that the answers depend on."""
-    told = _flat(asdict(task))
-    told = {name: value for name, value in told.items() if name not in _IRRELEVANT}
-    told |= {'topics': list(topics), 'size of the bag': source.size(), 'format': _FORMAT}
-    return told
+def _origin(task: BagTask, source: Source, topics: dict[str, AnswerTopics]) -> dict[str, Any]:
+    """Return everything that the results depend on."""
+    origin = _flat(asdict(task))
+    origin = {name: value for name, value in origin.items() if name not in _IRRELEVANT}
+    origin |= {'topics': list(topics), 'size of the bag': source.size(), 'format': _FORMAT}
+    return origin
 
 
 def _flat(values: dict[str, Any]) -> dict[str, Any]:
@@ -166,17 +168,17 @@ def _flat(values: dict[str, Any]) -> dict[str, Any]:
     return flat
 
 
-def _check_target(target: Path, told: dict[str, Any]) -> None:
-    """Refuse what is there unless it is a bag that was begun with the same task."""
+def _check_target(target: Path, origin: dict[str, Any]) -> None:
+    """Raise a ValueError unless a bag was begun with the same task."""
     begun = custom_data(target).get(TASK_KEY)
     if begun is None:
         raise ValueError(f'{target} exists, accepted is a new name or a bag that was begun here')
     before = json.loads(begun)
-    for name in before | told:
-        if before.get(name) != told.get(name):
+    for name in before | origin:
+        if before.get(name) != origin.get(name):
             raise ValueError(
                 f'{target} was begun with {name} {before.get(name)!r}, now it is '
-                f'{told.get(name)!r}; accepted is the same, or another name for the bag'
+                f'{origin.get(name)!r}; accepted is the same value, or another name for the bag'
             )
 
 
@@ -187,7 +189,7 @@ def _answer_images(
     journal: Journal,
     report: Report,
 ) -> None:
-    """Answer the images that are not answered yet."""
+    """Identify the images that are not in the journal yet."""
     answering = Answering(source, topics, task.identification)
     total = sum(item.msgcount for item in source.connections if item.topic in topics)
     earlier = list(journal.entries)
@@ -209,6 +211,6 @@ def _refusal(entry: Entry) -> str:
 
 
 def _tidy(target: Path) -> None:
-    """Remove what is left of the way to a bag that is done."""
+    """Remove the temporary files of a finished bag."""
     remove_assembled(target)
     remove_parts(target)

@@ -1,4 +1,4 @@
-"""Bags as they are read: every message in the order of time, and what could not be read."""
+"""Bags that are open for reading: all messages in order of time, and what is unreadable."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from ahf_ros.bag.folder import Metadata, open_files, read_metadata
 from ahf_ros.bag.records import Lost, Message
 
 _SERIALIZATION = 'cdr'
-_NAMED = 100  # what is lost, in lines; more is counted
+_MAXIMUM_LINES = 100  # about lost messages; more are only counted
 
 
 class Source:
-    """A bag of ROS 1 or ROS 2 that is open for reading.
+    """A bag of ROS 1 or ROS 2, open for reading.
 
     Parameters
     ----------
     path : Path
-        Folder of a bag of ROS 2, one of its files (.db3, .mcap), or a bag of ROS 1 (.bag).
+        Folder of a ROS 2 bag, one of its files (.db3, .mcap), or a ROS 1 bag (.bag).
 
     Attributes
     ----------
     connections : list of rosbags.interfaces.Connection
-        Every topic, once for each way in which it was recorded.
+        All topics; one that was recorded in several ways has several connections.
     metadata : Metadata
-        What the folder says about the bag.
+        Contents of metadata.yaml.
     stores : TypeStores
-        The types of its messages.
+        Types of the messages.
 
     Raises
     ------
@@ -46,7 +46,7 @@ class Source:
         self.path = path
         self.stores = TypeStores()
         self.metadata = Metadata()
-        self._lost: dict[Lost, None] = {}  # in the order in which it was found
+        self._lost: dict[Lost, None] = {}  # an ordered set
         self._foreign: list[Connection] = []
         self._stack = ExitStack()
         if not path.exists():
@@ -81,38 +81,38 @@ class Source:
 
     @property
     def is_ros2(self) -> bool:
-        """Whether the messages are serialized as ROS 2 does it."""
+        """Whether all messages are serialized as in ROS 2."""
         return not any(isinstance(it.ext, ConnectionExtRosbag1) for it in self.connections)
 
     @property
     def lost(self) -> list[str]:
-        """What could not be read so far; bounded in length, empty where nothing is missing."""
+        """What could not be read so far, in a bounded number of lines."""
         lines = [str(item) for item in self._lost]
-        more = len(lines) - _NAMED
-        return [*lines[:_NAMED], f'{more} more'] if more > 0 else lines
+        more = len(lines) - _MAXIMUM_LINES
+        return [*lines[:_MAXIMUM_LINES], f'{more} more'] if more > 0 else lines
 
     @property
     def left_out(self) -> list[str]:
-        """What a copy does not have beside messages; complete once the messages were read."""
+        """What a copy lacks besides messages; complete after all messages were read."""
         return [it for file in self._files for it in file.left_out]
 
     @property
     def foreign(self) -> list[str]:
-        """Topics whose messages ROS 2 cannot read, so that no bag of ROS 2 can hold them."""
+        """Topics whose messages ROS 2 cannot read, so a ROS 2 bag cannot hold them."""
         return [f'{it.topic}: messages are serialized as {_encoding(it)}' for it in self._foreign]
 
     def size(self) -> int:
-        """Return the bytes of all files of the bag."""
+        """Return the total size of the files of the bag, bytes."""
         files = self.path.rglob('*') if self.path.is_dir() else [self.path]
         return sum(file.stat().st_size for file in files if file.is_file())
 
     def image_topics(self, names: Collection[str]) -> list[str]:
-        """Return the topics of the given names, or all that carry images where there are none.
+        """Return the given image topics, or all image topics if none are given.
 
         Raises
         ------
         ValueError
-            If the bag has no such topic, or it does not carry images; the message names both.
+            If a topic is not in the bag or has no images; the message names both.
         """
         kinds = {item.topic: item.msgtype for item in self.connections}
         accepted = [topic for topic, kind in kinds.items() if kind in (IMAGE, COMPRESSED_IMAGE)]
@@ -131,24 +131,24 @@ class Source:
         return list(names) or accepted
 
     def deserialize(self, connection: Connection, data: bytes) -> Any:
-        """Return the message that was recorded.
+        """Return a recorded message.
 
         Raises
         ------
         ValueError
-            If it is not as its type says.
+            If the data do not match their type.
         """
         return self.stores.deserialize(connection, data)
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[Message]:
-        """Yield the messages of some topics, or of all; take note of those that are lost."""
+        """Yield the messages of some or all topics, and note which are lost."""
         for file in self._files:
-            wanted = [
+            selected = [
                 it
                 for it in self.connections
                 if it.owner is file and (topics is None or it.topic in topics)
             ]
-            for item in file.messages(wanted) if wanted else ():
+            for item in file.messages(selected) if selected else ():
                 plain = item if isinstance(item, Lost) else self._plain(item)
                 if isinstance(plain, Lost):
                     self._note(plain)
@@ -156,7 +156,7 @@ class Source:
                     yield plain
 
     def check_counts(self, counts: dict[str, int]) -> None:
-        """Take note of topics of which fewer messages were read than the metadata count."""
+        """Note the topics of which fewer messages were read than the metadata count."""
         for topic, count in self.metadata.counts.items():
             if (read := counts.get(topic, 0)) < count and topic not in self._foreign_topics:
                 reason = f'{read} of {count} messages were read'
@@ -170,7 +170,7 @@ class Source:
         self._lost[item] = None
 
     def _plain(self, message: Message) -> Message | Lost:
-        """Return a message without its compression."""
+        """Return a message, decompressed."""
         item, time, data = message
         compressed = self.metadata.compressed
         if compressed is None:

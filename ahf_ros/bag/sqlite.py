@@ -58,10 +58,10 @@ class Sqlite:
             self._lost.append(Lost((), None, None, reason))
         self.start = int(self._rows['time'][0]) if len(self._rows) else 0
 
-    def messages(self, wanted: list[Connection]) -> Iterator[Message | Lost]:
+    def messages(self, selected: list[Connection]) -> Iterator[Message | Lost]:
         """Yield the messages of some topics in the order of time; see `BagFile`."""
         yield from self._lost
-        topics = {item.id: item for item in wanted}
+        topics = {item.id: item for item in selected}
         rows = self._rows[np.isin(self._rows['topic'], list(topics))]
         with closing(self._open()) as database:
             for time, row, topic in rows.tolist():

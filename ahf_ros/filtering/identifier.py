@@ -29,7 +29,7 @@ from ahf_ros.filtering.genetic import SearchResult, Values, search
 from ahf_ros.filtering.settings import AdaptiveSettings
 from ahf_ros.filtering.trials import DetectorFunction, Trials, checked_targets, confirmed
 from ahf_ros.imaging.image import check_image
-from ahf_ros.target import FilterState, Identification, Target, count_codes
+from ahf_ros.target import FilterState, Identification, Target, count_codes, sorted_targets
 
 Refinement = Callable[[np.ndarray, Sequence[Target]], Sequence[Target]]
 """From the image as received and targets found in a filtered one to the same targets, with centres
@@ -206,8 +206,8 @@ class Identifier:
         )
         if choice.filter:
             state = replace(state, applied=True, **asdict(tuned(image.shape, choice.filter)))
-        ordered = tuple(sorted(targets, key=lambda target: target.id))
-        return Identification(ordered, choice.expected, state, estimating)
+        ordered = sorted_targets(targets)
+        return Identification(tuple(ordered), choice.expected, state, estimating)
 
     def _steady(self, trials: Trials, executor: Executor | None) -> _Choice | None:
         """Return the filter and N of the image before if it still shows the same n."""

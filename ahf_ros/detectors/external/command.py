@@ -18,7 +18,7 @@ import numpy as np
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.interchange.target_json import targets_from_json
-from ahf_ros.target import Target
+from ahf_ros.target import Target, sorted_targets
 
 LARGEST_OUTPUT = 64 * 2**20
 """Bytes that a command may print."""
@@ -82,8 +82,7 @@ class CommandDetector:
             raise ValueError(
                 f'{self._named} printed {told!r}, accepted is JSON: {error}'
             ) from error
-        targets = targets_from_json(record, self._named)
-        return sorted(targets, key=lambda target: (target.id, target.y, target.x))
+        return sorted_targets(targets_from_json(record, self._named))
 
     @property
     def _named(self) -> str:

@@ -15,7 +15,7 @@ from ahf_ros.codes.square import dictionary
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.square.sides import centres, fit_sides
 from ahf_ros.imaging.image import as_gray, check_image
-from ahf_ros.target import Target
+from ahf_ros.target import Target, sorted_targets
 
 _DRAFT_DEVIATION = 0.3  # px, of a centre by corners that are those of contours
 _LEAST_SHARE = 0.3  # of the edges of each side, for a fit to count
@@ -83,7 +83,7 @@ class SquareDetector:
             return []
         covariances = np.tile(_DRAFT_DEVIATION**2 * np.eye(2), (len(numbers), 1, 1))
         found = _markers(numbers.ravel(), np.reshape(corners, (-1, 4, 2)), covariances)
-        return sorted(found, key=lambda target: (target.id, target.y, target.x))
+        return sorted_targets(found)
 
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
         """Return markers with their places in an image, from all of their sides.
