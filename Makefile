@@ -1,5 +1,5 @@
-# make demo    ROS 2 nodes under striped light: a line an image, annotated pictures in demo/
-#              DEMO='--light lattice --detector traditional' and so on; ahf_demo --help tells all
+# make demo    ROS 2 nodes identify one striped image in three ways: a line each, a picture in demo/
+#              DEMO='--light lattice --ambient 0.12' and so on; ahf_demo --help lists all options
 # make test    every check: ruff, mypy, the import rules, the tests; then the tests that need no
 #              ROS once more with the oldest versions, and once more on other vector units
 # Both set up .venv first; nothing is installed outside it. DISTRIBUTION=kilted takes the wheels of

@@ -101,8 +101,7 @@ def main() -> None:
     options = parser.parse_args()
     if options.change:
         constant, value = options.change
-        number = float(value)
-        finder = Finder(constant, int(number) if value.isdigit() else number)
+        finder = Finder(constant, float(value))
         sys.meta_path.insert(0, finder)
     found = results(options.folder)
     if options.change and not finder.used:

@@ -1,10 +1,10 @@
-"""What the results of `ring` owe to each of its constants: halved, and doubled.
+"""How much the results of `ring` depend on its constants: each one halved, and doubled.
 
     python -m benchmarks.sensitivity [MODULE.NAME ...] [--count 10]
 
-Without names, all numbers that `ring` and `features` give a name to are screened on small scenes,
-and those whose change costs most are measured on more and larger ones. All scenes have seeds for
-development and little ambient light, where the detector is at its limits.
+Without names, all named numbers of `ring` and `features` that are not integers are screened on
+small scenes, and those whose change costs most are then measured on more and larger scenes. All
+scenes have development seeds and little ambient light, where the detector reaches its limits.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import ast
 import json
+import math
 import re
 import subprocess
 import sys
@@ -32,6 +33,9 @@ ROOT = Path(__file__).resolve().parent.parent
 ROOMS = ('features', 'detectors/ring')
 OTHERS = {'blobs', 'counting', 'grey_gradient', 'traditional'}
 """Modules in these rooms that `ring` does without."""
+
+BOUNDED = {'CERTAIN', '_STRAIGHT', '_WHOLE', '_MINIMUM_AGREEMENT', '_FAINTEST'}
+"""Constants that are meaningful up to 1 only: their distance from 1 is halved and doubled."""
 
 LIGHTS = ('stripe', 'fine_stripe', 'lattice', 'dense_lattice')
 FACTORS = (0.5, 2.0)
@@ -65,7 +69,7 @@ LARGE: Scenes = [
 
 @dataclass(frozen=True)
 class Outcome:
-    """What was identified in all scenes; None for everything where the detector failed."""
+    """What was identified in all scenes; None where the detector does not work any more."""
 
     right: int | None = None
     wrong: int | None = None
@@ -75,7 +79,7 @@ class Outcome:
     def loss(self) -> float:
         """Return one number by which outcomes compare: a wrong ID is as bad as three missed."""
         if self.right is None or self.wrong is None or self.false is None:
-            return 1000.0
+            return -math.inf
         return 3.0 * (self.wrong + self.false) - self.right + 10.0 * (self.rmse or 0.0)
 
     def __str__(self) -> str:
@@ -98,7 +102,7 @@ def constants() -> Iterator[tuple[str, float]]:
                 if not re.fullmatch('_?[A-Z][A-Z0-9_]*', name):
                     continue
                 value = getattr(import_module(module), name)
-                if type(value) in (int, float) and value:
+                if isinstance(value, float):
                     yield f'{module}.{name}', value
 
 
@@ -128,10 +132,10 @@ def outcome(folder: Path, constant: str = '', value: float = 0.0) -> Outcome:
     return Outcome(**json.loads(done.stdout)) if done.returncode == 0 else Outcome()
 
 
-def changed(value: float, factor: float) -> float:
-    """Return a value times a factor; integers stay integers, and differ."""
-    if isinstance(value, int):
-        return round(value * factor) or 1
+def changed(name: str, value: float, factor: float) -> float:
+    """Return the value of a constant times a factor."""
+    if name.rpartition('.')[2] in BOUNDED:
+        return 1 - factor * (1 - value)
     return value * factor
 
 
@@ -141,7 +145,7 @@ def measured(
     """Return the outcome as it is, and those with each constant halved and doubled."""
     console = Console(stderr=True)
     tried = {
-        name: [outcome(folder, name, changed(value, factor)) for factor in FACTORS]
+        name: [outcome(folder, name, changed(name, value, factor)) for factor in FACTORS]
         for name, value in track(names.items(), what, console=console, disable=not names)
     }
     return outcome(folder), tried

@@ -1,0 +1,67 @@
+"""A constant is changed wherever it is used, and nothing else is."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from ahf_ros.synthetic.scene import SceneSettings
+from benchmarks.sensitivity import Outcome, changed, constants, main, outcome, table, written
+
+CERTAIN = 'ahf_ros.detectors.ring.hypotheses.CERTAIN'  # the detector imports it
+SCENE = SceneSettings(width=480, height=320, targets=3, dot_radius=9.0)
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return written([SCENE], tmp_path_factory.mktemp('sensitivity') / 'scenes')
+
+
+def test_nothing_changed_is_the_detector_as_it_is(folder: Path) -> None:
+    assert CERTAIN in dict(constants())
+    found = outcome(folder)
+    assert (found.right, found.wrong, found.false) == (3, 0, 0)
+    assert outcome(folder, CERTAIN, dict(constants())[CERTAIN]) == found
+
+
+def test_a_change_reaches_modules_that_import_the_constant(folder: Path) -> None:
+    assert outcome(folder, CERTAIN, 1.1) == Outcome(0, 0, 0, None)
+
+
+@pytest.mark.parametrize('name', [f'{CERTAIN}LY', 'ahf_ros.cli.bag.PERIOD'])
+def test_what_cannot_be_changed_is_no_outcome(folder: Path, name: str) -> None:
+    done = subprocess.run(
+        [sys.executable, '-m', 'benchmarks.changed_constant', str(folder), name, '1.0'],
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 1
+    assert name.rpartition('.')[2] in done.stderr
+    assert outcome(folder, name, 1.0) == Outcome()
+
+
+def test_constants_up_to_one_approach_it() -> None:
+    assert [changed(CERTAIN, 0.98, factor) for factor in (0.5, 2.0)] == pytest.approx([0.99, 0.96])
+    assert changed('ahf_ros.features.dots._SAME', 0.3, 0.5) == 0.15
+
+
+def test_the_table_shows_what_changed() -> None:
+    lines = table(
+        {CERTAIN: 0.98}, Outcome(9, 0, 0, 0.01), {CERTAIN: [Outcome(), Outcome(8, 1, 0)]}
+    )
+    assert lines.splitlines()[-2:] == [
+        '| none changed | | 9 (0.010) | 9 (0.010) |',
+        '| `detectors.ring.hypotheses.CERTAIN` | 0.98 | fails | 8, 1 wrong |',
+    ]
+
+
+def test_names_that_do_not_exist_are_refused(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, 'argv', ['sensitivity', 'NO_CONSTANT'])
+    with pytest.raises(SystemExit):
+        main()
+    assert 'no such constants: NO_CONSTANT' in capsys.readouterr().err
