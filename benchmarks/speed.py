@@ -124,7 +124,7 @@ def main() -> None:
         f'{facts["processor"]}, {facts["cores"]} cores, numpy {facts["numpy"]}, '
         f'OpenCV {facts["opencv"]}\n'
     )
-    print('| | s | against | s | times faster |\n|---|---|---|---|---|')
+    print('| | s | compared with | s | times faster |\n|---|---|---|---|---|')
 
     def row(name: str, own: float, other: str, others: float) -> None:
         print(f'| {name} | {own:.3f} | {other} | {others:.3f} | {others / own:.1f} |', flush=True)
@@ -139,7 +139,7 @@ def main() -> None:
         words = f'AHF, {name}: {result.count} in {result.filter.evaluations}'
         row(words, statistics.median(it[0] for it in times), other, duration)
     whole, parts = stream(image, detector, expected)
-    row('an image of a stream, traditional', whole, 'a filter and an identification', parts)
+    row('one image of a stream, traditional', whole, 'a filter and an identification', parts)
 
 
 if __name__ == '__main__':

@@ -1,7 +1,7 @@
 """The genetic search against random ones and a grid, at equal numbers of filters tried.
 
 Every strategy looks for a filter of the same scenes with many seeds, by the published genes and by
-the extended ones: the mean of the best |N - n| after so many filters.
+the extended ones: the mean of the best |N - n| after a number of filters.
 
     python -m benchmarks.strategies [--detector traditional] [--seeds 20]
 """

@@ -16,9 +16,9 @@ def test_every_image_is_answered_and_nothing_is_left_behind(graph: Any) -> None:
     run.run()
     figures = soak.report(run, 1.0)
     assert figures['answered'] == figures['images'] == 130
-    assert figures['other IDs than there are'] == 0
-    assert figures['rejected'] == figures['messages that are no images'] == 13 + 1
-    assert (figures['parameters set'], figures['participants come and gone']) == (10, 1)
-    assert figures['threads at last'] <= figures['threads when warm'] + 1
-    assert figures['open files at last'] == figures['open files when warm']
+    assert figures['unexpected IDs'] == 0
+    assert figures['rejected'] == figures['messages that are not images'] == 13 + 1
+    assert (figures['parameters set'], figures['participants that joined and left']) == (10, 1)
+    assert figures['threads at the end'] <= figures['threads when warm'] + 1
+    assert figures['open files at the end'] == figures['open files when warm']
     assert run.node.end()[0] == 0
