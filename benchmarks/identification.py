@@ -5,6 +5,7 @@ nothing in the package was chosen by looking at them. Those below are for develo
 is of one kind or the other. The panel is a set of photographs and is shown where it is there.
 
     python -m benchmarks.identification [--detector ring] [--ahf] [--quick] [--lights stripe ...]
+    python -m benchmarks.identification --compare docs/figures/ring.json
     python -m benchmarks.identification --command 'my_detector --family {family} {image}'
 
 A command is used as the detector `command` does; its time includes its start.
@@ -36,6 +37,7 @@ from ahf_ros.session import identify
 from ahf_ros.synthetic.patterns import LIGHT_NAMES, benchmark_lights
 from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import Target, TrueTarget
+from benchmarks import comparison
 from benchmarks.filter import machine
 from support import PHOTOS
 
@@ -260,6 +262,9 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument('--groups', nargs='+', choices=groups, default=groups)
     made.add_argument('--seeds', nargs='+', type=int, default=[FIRST_TEST_SEED])
     made.add_argument('--json', type=Path, metavar='FILE', help='also write a JSON object')
+    made.add_argument(
+        '--compare', type=Path, metavar='FILE', help='an earlier JSON object to show beside'
+    )
     return made
 
 
@@ -271,22 +276,32 @@ def main(arguments: Sequence[str] | None = None) -> int:
         told = f'seeds are {options.seeds}, accepted are all below {FIRST_TEST_SEED} or none'
         print(told, file=sys.stderr)
         return 2
-    run = with_command(options) if options.command else with_detector(options)
-    rows = synthetic_rows(options, run)
-    if 'photographs' in options.groups:
-        rows += panel_rows(PHOTOS, run)
     size = asdict(SceneSettings(**QUICK) if options.quick else SceneSettings())
-    report = {
+    report: dict[str, Any] = {
         'method': options.command or options.detector + (' with AHF' if options.ahf else ''),
         'width': size['width'],
         'height': size['height'],
         'seeds': options.seeds,
         'test': test[0],
         'machine': machine(),
-        'rows': [row.record() for row in rows],
     }
+    before = json.loads(options.compare.read_text()) if options.compare else None
+    if before:
+        try:
+            comparison.check_comparable(before, report)
+        except ValueError as error:
+            print(error, file=sys.stderr)
+            return 2
+    run = with_command(options) if options.command else with_detector(options)
+    rows = synthetic_rows(options, run)
+    if 'photographs' in options.groups:
+        rows += panel_rows(PHOTOS, run)
+    report['rows'] = [row.record() for row in rows]
     if options.json:
         options.json.write_text(json.dumps(report, indent=1))
+    if before:
+        print(comparison.markdown(before, report))
+        return int(bool(comparison.worse(before, report)))
     print(markdown(report))
     return 0
 

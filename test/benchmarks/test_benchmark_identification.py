@@ -3,41 +3,26 @@
 from __future__ import annotations
 
 import json
-import os
-import runpy
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
 from ahf_ros.target import Target, TrueTarget
+from benchmarks import identification
+from support import ROOT
 
-ROOT = Path(__file__).resolve().parents[2]
-SCRIPT = ROOT / 'benchmarks' / 'identification.py'
 NORMAL = ('--quick', '--lights', 'normal', '--groups', 'light')
 
 
 def benchmark(*arguments: object) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, str(SCRIPT), *map(str, arguments)],
+        [sys.executable, '-m', 'benchmarks.identification', *map(str, arguments)],
+        cwd=ROOT,
         capture_output=True,
         text=True,
-        env={**os.environ, 'PYTHONPATH': str(ROOT)},
         timeout=300,
     )
-
-
-@pytest.fixture(scope='module')
-def script(monkeypatch_module) -> dict:
-    monkeypatch_module.syspath_prepend(str(SCRIPT.parent))
-    return runpy.run_path(str(SCRIPT))
-
-
-@pytest.fixture(scope='module')
-def monkeypatch_module():
-    with pytest.MonkeyPatch.context() as patch:
-        yield patch
 
 
 def test_a_detector_and_the_same_one_as_a_command(tmp_path):
@@ -68,14 +53,14 @@ def test_seeds_for_tests_and_for_development_are_kept_apart():
     assert 'accepted are all below 101 or none' in done.stderr
 
 
-def test_every_row_is_a_scene_that_can_be_made(script):
+def test_every_row_is_a_scene_that_can_be_made():
     for quick in ([], ['--quick']):
-        rows = script['chosen_scenes'](script['parser']().parse_args(quick))
+        rows = identification.chosen_scenes(identification.parser().parse_args(quick))
         assert len({row[:2] for row in rows}) == len(rows) >= 50
 
 
-def test_squares_are_in_units_of_the_covariance(script):
+def test_squares_are_in_units_of_the_covariance():
     truth = [TrueTarget(1, 100.0, 100.0), TrueTarget(2, 200.0, 100.0)]
     right = Target(1, 71, 100.2, 99.9, 5, 5, covariance=(0.04, 0.0, 0.0, 0.01))
     unknown = Target(2, 75, 200.0, 100.0, 5, 5)
-    assert script['normalised_squares'](truth, [right, unknown]) == pytest.approx([2.0])
+    assert identification.normalised_squares(truth, [right, unknown]) == pytest.approx([2.0])
