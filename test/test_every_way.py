@@ -18,6 +18,8 @@ import cv2
 import numpy as np
 import pytest
 
+pytest.importorskip('rosbags', reason='rosbags is not installed')
+
 from ahf_ros import FAMILY_NAMES, SceneSettings, create_detector, identify, render
 from ahf_ros.bag.definitions import typestore
 from ahf_ros.cli import main

@@ -107,7 +107,8 @@ def test_tests_of_bags_skip_without_rosbags() -> None:
             node for node in ast.parse(file.read_text()).body if isinstance(node, ast.ImportFrom)
         ]
         if any((node.module or '').startswith(('ahf_ros.bag', 'rosbags')) for node in top):
-            assert "pytest.importorskip('rosbags'" in file.read_text(), file
+            skips = "pytest.importorskip('rosbags'" in file.read_text()
+            assert skips, f'{file} needs rosbags, accepted is pytest.importorskip before'
 
 
 def test_no_two_test_files_have_the_same_name() -> None:
