@@ -1,3 +1,3 @@
-"""The ROS 2 nodes, and nothing but them: what they do is done by the rooms below."""
+"""The ROS 2 nodes: messages, parameters and threads; the work is done by the rooms below."""
 
 import ahf_ros.blas  # noqa: F401  before numpy

@@ -1,9 +1,8 @@
-"""Identified targets as a drawing that a viewer lays over the image.
+"""Identified targets as annotations that a viewer draws over the image.
 
-ROS 2 itself has one message for that, visualization_msgs/ImageMarker. Of these a viewer keeps one
-a topic, and they know lines but no text. So all outlines and all IDs are lines of one marker, and
-a digit is up to seven of them. foxglove_msgs, which has text, is neither a part of ROS 2 nor among
-its wheels.
+The message for this in ROS 2 is visualization_msgs/ImageMarker. A viewer shows one marker per
+topic, and markers have lines but no text. So all outlines and IDs are lines of one marker, with up
+to seven lines per digit. foxglove_msgs has text but is not part of ROS 2 nor of its wheels.
 """
 
 from __future__ import annotations
@@ -20,13 +19,13 @@ from ahf_ros.msg import CodedTarget, CodedTargetArray
 from ahf_ros.target import UNDECODED
 
 CORNER = 0.5
-"""Added to coordinates, px: viewers have (0, 0) at the corner of the first pixel."""
+"""Offset of coordinates, px: in viewers, (0, 0) is the corner of the first pixel."""
 
 _SIDES = 24  # of the outline of a dot
-_SMALLEST_DIGIT = 12.0  # px, height at a line width of 1
-_DIGIT = 0.9  # height of a digit in radii of its dot
-_ADVANCE = 0.8  # from digit to digit, in heights
-_STROKES = {  # the seven lines of a digit, in heights: x, y of both ends
+_MINIMUM_DIGIT = 12.0  # height at a line width of 1, px
+_DIGIT = 0.9  # height of a digit, in radii of the dot
+_ADVANCE = 0.8  # distance from digit to digit, in heights
+_STROKES = {  # x, y of both ends of the seven lines of a digit, in heights
     'a': ((0.0, -1.0), (0.5, -1.0)),
     'b': ((0.5, -1.0), (0.5, -0.5)),
     'c': ((0.5, -0.5), (0.5, 0.0)),
@@ -51,12 +50,12 @@ _DIGITS = {
 
 
 def target_annotations(answer: CodedTargetArray) -> ImageMarker:
-    """Return the outlines of the dots and the IDs of targets, as lines of one marker.
+    """Return the outlines of dots and the IDs of targets as lines of one marker.
 
     Parameters
     ----------
     answer : CodedTargetArray
-        What was identified in an image; lines grow with the image.
+        Targets of an image, whose size sets the width of the lines.
     """
     width = max(1.0, math.hypot(answer.height, answer.width) / 2400)
     marker = ImageMarker(
@@ -83,7 +82,7 @@ def target_colour(target: CodedTarget) -> dict[str, float]:
 
 
 def target_name(target: CodedTarget) -> str:
-    """Return what a target is called: its ID, or a question mark."""
+    """Return the label of a target: its ID, or a question mark."""
     return '?' if target.id == UNDECODED else str(target.id)
 
 
@@ -109,10 +108,10 @@ def _outline(target: CodedTarget) -> np.ndarray:
 
 
 def _letters(target: CodedTarget, width: float) -> np.ndarray:
-    """Return the lines of an ID above to the right of its dot, shape (n, 2, 2)."""
+    """Return the lines of an ID above and to the right of its dot, shape (n, 2, 2)."""
     if target.id == UNDECODED:
         return np.empty((0, 2, 2))
-    height = max(_SMALLEST_DIGIT * width, _DIGIT * target.semi_major)
+    height = max(_MINIMUM_DIGIT * width, _DIGIT * target.semi_major)
     name = str(target.id)
     lines = np.array([_STROKES[line] for digit in name for line in _DIGITS[digit]])
     counts = [len(_DIGITS[digit]) for digit in name]

@@ -1,4 +1,4 @@
-"""Where the targets of an image are in space, from the cloud of the same shot."""
+"""Positions of the targets of an image in space, from the point cloud of the same shot."""
 
 from __future__ import annotations
 
@@ -17,32 +17,32 @@ from ahf_ros.nodes.process import ProcessNode
 from ahf_ros.nodes.settings import LOSSLESS, DetectorNodeSettings
 
 ANSWERS = 100
-"""Most answers that wait for the cloud of their image."""
+"""Maximum number of answers waiting for the cloud of their image."""
 
 LOG_PERIOD = 5.0
-"""Shortest time between two log lines about clouds that are refused, s."""
+"""Minimum time between two log lines about refused clouds, s."""
 
 CLOUD, ANSWER = 0, 1
 """Sides of the matcher."""
 
 
 class TargetPoints:
-    """Publishes the positions of targets as soon as there are both an answer and its cloud.
+    """Publishes the positions of targets as soon as an answer and its cloud are both there.
 
-    Drivers of scanners give the image and the cloud of a shot the same stamp, and either may come
-    first. Of those that wait, all that came before a match are given up, and the oldest where they
-    take too much memory.
+    Drivers of scanners give the image and the cloud of a shot the same stamp, and either may
+    arrive first. A match discards everything that arrived before it; if too much waits, the oldest
+    is discarded.
 
     Parameters
     ----------
     node : ProcessNode
         Subscribes to `points`.
     settings : DetectorNodeSettings
-        Of the node.
+        Settings of the node.
     tally : CloudTally
-        Goes on to be counted in.
+        Counts to continue.
     points, labels : rclpy.publisher.Publisher
-        Of sensor_msgs/PointCloud2, and of visualization_msgs/MarkerArray.
+        Publishers of sensor_msgs/PointCloud2 and of visualization_msgs/MarkerArray.
     """
 
     def __init__(
@@ -67,15 +67,15 @@ class TargetPoints:
         self._clouds = subscribe(PointCloud2, 'points', self._on_cloud, group)
 
     def suits(self, settings: DetectorNodeSettings) -> bool:
-        """Return whether clouds are matched as these settings of the node ask for it."""
+        """Return whether other settings of the node would make no difference."""
         return _relevant(settings) == self._settings
 
     def close(self) -> None:
-        """Subscribe no more."""
+        """End the subscription."""
         self._node.destroy_subscription(self._clouds)
 
     def locate(self, answer: CodedTargetArray) -> None:
-        """Publish where the targets of an answer are, now or when the cloud comes."""
+        """Publish the positions of the targets of an answer, now or when its cloud arrives."""
         cloud = self._matcher.put(ANSWER, _nanoseconds(answer.header), answer)
         if cloud is not None:
             self._publish(answer, cloud)
@@ -94,7 +94,7 @@ class TargetPoints:
     def _publish(self, answer: CodedTargetArray, cloud: PointCloud2) -> None:
         if (cloud.width, cloud.height) != (answer.width, answer.height):
             self._refuse(
-                f'cloud is of {cloud.width} x {cloud.height} points, '
+                f'cloud has {cloud.width} x {cloud.height} points, '
                 f'accepted is {answer.width} x {answer.height}, the size of the image'
             )
             return

@@ -23,10 +23,10 @@ from ahf_ros.drawing import (
 from ahf_ros.evaluation import FALSE, RIGHT, WRONG, judge
 from ahf_ros.interchange.image_files import write_image
 from ahf_ros.interchange.image_messages import decode_image
+from ahf_ros.interchange.target_messages import identification_from
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.process import ProcessNode
 from ahf_ros.nodes.scoreboard import Truths, line, method
-from ahf_ros.nodes.target_msg import identification
 from ahf_ros.target import Identification, Target, TrueTarget
 
 WIDTH = 800
@@ -99,7 +99,7 @@ class Comparison(ProcessNode):
 
     def _keep_answer(self, case: Case, space: str, message: CodedTargetArray) -> None:
         self.answered += 1
-        case.answers.setdefault(space, identification(message))
+        case.answers.setdefault(space, identification_from(message))
 
     def _show(self, case: Case) -> None:
         """Print a line for each detector and write the picture of a scene."""

@@ -38,26 +38,26 @@ from ahf_ros.srv import Identify
 Result = TypeVar('Result')
 
 DIAGNOSTICS_PERIOD = 1.0
-"""Time between two statements on /diagnostics, s."""
+"""Period of /diagnostics, s."""
 
 TOPICS = {'raw': (Image, 'image'), 'compressed': (CompressedImage, 'image/compressed')}
-"""Where images come in, by the way that they are sent."""
+"""Type and topic of the images, by image transport."""
 
 ANSWERS_KEPT = 1000
-"""Answers that are sent once more where they got lost on the way: those of many heartbeats.
+"""Depth of the publishers of answers, so that lost messages can be resent.
 
-With fewer, the next answer takes the place of one that a subscriber still waits for.
+With a small depth, the next answer replaces one that a subscriber has not received yet.
 """
 
 LOG_PERIOD = 5.0
-"""Shortest time between two log lines about images of the same kind of fault, s."""
+"""Minimum time between two log lines of the same kind about images, s."""
 
 
 class DetectorNode(ProcessNode):
     """Identifies the targets of the latest image, one image at a time.
 
-    Parameters and services are answered meanwhile. Every image that is accepted gets an answer,
-    unless a later one comes in before its turn; one that is not is counted and named in the log.
+    Parameters and services are answered meanwhile. Every valid image gets an answer, unless a
+    newer one arrives before its turn. Invalid images are counted and logged.
     """
 
     def __init__(self) -> None:
@@ -75,7 +75,7 @@ class DetectorNode(ProcessNode):
         self._target_points = self.publisher(PointCloud2, '~/target_points', ANSWERS_KEPT)
         self._target_labels = self.publisher(MarkerArray, '~/target_labels')
         self._diagnostic_array = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
-        # With use_sim_time the node's clock stands still while a replay does.
+        # With use_sim_time, the node's clock stops when a replay stops.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(DIAGNOSTICS_PERIOD, self._publish_diagnostics, clock=steady)
         self._last = Header()
@@ -90,12 +90,12 @@ class DetectorNode(ProcessNode):
         self.create_service(Trigger, '~/reset', self._on_reset, callback_group=requests)
 
     def close(self) -> None:
-        """Break off the identification that is going on."""
+        """Interrupt the current identification."""
         self._stopping.set()
         self._worker.stop()
 
     def _renew(self) -> None:
-        """Work on the images from now on as the parameters say now."""
+        """Put the current parameters into force."""
         settings = self._settings.current
         self._renew_clouds(settings)
         self._pipeline = Pipeline(settings, self._stopping, self._service_detector(settings))
@@ -106,12 +106,12 @@ class DetectorNode(ProcessNode):
             kind, topic = TOPICS[settings.image_transport]
             lossless = settings.queue == LOSSLESS
             subscribe = self.subscribe_to_all if lossless else self.subscribe
-            # It may wait for room, which must not keep anything else waiting.
+            # The callback may wait for room in the queue and must not block the others.
             group = MutuallyExclusiveCallbackGroup()
             self._images = subscribe(kind, topic, self._on_image, group)
 
     def _renew_clouds(self, settings: DetectorNodeSettings) -> None:
-        """Match clouds with images as the settings ask for it."""
+        """Start or stop matching clouds with images."""
         if self._clouds and self._clouds.suits(settings):
             return
         clouds, self._clouds = self._clouds, None
@@ -124,7 +124,7 @@ class DetectorNode(ProcessNode):
             )
 
     def _service_detector(self, settings: DetectorNodeSettings) -> ServiceDetector | None:
-        """Return the detector that is a service, where the settings ask for it."""
+        """Return the detector that calls a service, if the settings name it."""
         if settings.identification.detector != SERVICE:
             return None
         detection = settings.identification.detection
@@ -145,7 +145,7 @@ class DetectorNode(ProcessNode):
             self._tally.dropped += 1
 
     def _compare_stamps(self, header: Header) -> None:
-        """Tell where time goes backwards; a replay that starts over is answered all the same."""
+        """Report stamps that go backwards, as when a replay starts over."""
         now, before = header.stamp, self._last.stamp
         self._last = header
         if (now.sec, now.nanosec) < (before.sec, before.nanosec):
@@ -180,7 +180,7 @@ class DetectorNode(ProcessNode):
         return response
 
     def _process(self, message: ImageMessage, pipeline: Pipeline, received: float) -> None:
-        """Identify the targets of an image and publish everything about it."""
+        """Identify the targets of an image and publish the results."""
         with suppress(Refused):
             self._attempt(partial(self._answer, message, pipeline, received))
 
@@ -202,7 +202,7 @@ class DetectorNode(ProcessNode):
             self._filtered_image.publish(image_message(filtered, message.header))
 
     def _attempt(self, job: Callable[[], Result]) -> Result:
-        """Return the result of a job on an image, or count and log why there is none.
+        """Return the result of a job on an image, or count and log its error.
 
         Raises
         ------
@@ -216,7 +216,7 @@ class DetectorNode(ProcessNode):
         except ValueError as error:
             reason = str(error)
         except Exception as error:
-            # A node does not die of an image, whatever it does to a detector.
+            # No image may end the node, whatever it does to a detector.
             reason = f'{type(error).__name__}: {error}'
             self.get_logger().error(traceback.format_exc())
         self._tally.rejected += 1
@@ -225,7 +225,7 @@ class DetectorNode(ProcessNode):
         raise Refused(reason)
 
     def _compare_types(self) -> None:
-        """Tell where what is published on the topic of the images is of another type."""
+        """Report publishers of another type on the topic of the images."""
         kind, name = TOPICS[self._subscribed[0]]
         topic = self.resolve_topic_name(name)
         accepted = f'sensor_msgs/msg/{kind.__name__}'

@@ -1,4 +1,4 @@
-"""What the node `detector` says about itself on /diagnostics."""
+"""Diagnostics of the node `detector`."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from ahf_ros.target import Identification
 
 @dataclass(slots=True)
 class CloudTally:
-    """What became of the clouds.
+    """Counts of point clouds since the start.
 
     Attributes
     ----------
     received, used, rejected : int
-        Clouds from the start: come in; matched with an image, so that positions were published;
+        Clouds that arrived; that matched an image, so that positions were published; that were
         not accepted.
     reason : str
-        Why the last one that was rejected was.
+        Why the last rejected cloud was rejected.
     unmatched : list of int
-        Clouds without an image, and images without a cloud.
+        Number of clouds without an image, and of images without a cloud.
     positions : str
-        How many of the targets of the last image have one.
+        How many targets of the last image have a position.
     """
 
     received: int = 0
@@ -34,7 +34,7 @@ class CloudTally:
     positions: str = ''
 
     def values(self) -> dict[str, object]:
-        """Return what is said of them."""
+        """Return the entries of the diagnostics."""
         return {
             'clouds received': self.received,
             'clouds used': self.used,
@@ -48,23 +48,23 @@ class CloudTally:
 
 @dataclass(slots=True)
 class Tally:
-    """What became of the images.
+    """Counts of images since the start.
 
     Attributes
     ----------
     received, answered, dropped, rejected, backwards : int
-        Images from the start: come in; identified, whatever was found; overtaken by a later one
-        before their turn; not accepted; with a stamp earlier than that of the image before.
+        Images that arrived; that were answered; that were replaced by a newer one before their
+        turn; that were not accepted; whose stamp is earlier than that of the image before.
     reason : str
-        Why the last one that was rejected was.
+        Why the last rejected image was rejected.
     mistaken : str
-        What else than images is published on their topic; nothing where empty.
+        Message about other types on the topic of the images; empty if there are none.
     latency : float
-        Time from an image in to its targets out, s, of the last one.
+        Time from the arrival of the last image to its answer, s.
     last : Identification
-        The last one.
+        The last identification.
     clouds : CloudTally or None
-        Of the clouds, once there may be any.
+        Counts of clouds; None while they are not subscribed to.
     """
 
     received: int = 0
@@ -80,7 +80,7 @@ class Tally:
 
 
 class Diagnostics:
-    """Turns a tally into one status a period; rates and the level are those of the period."""
+    """Turns a tally into one status per period, whose rate and level are those of the period."""
 
     def __init__(self, name: str, tally: Tally) -> None:
         self._name = name

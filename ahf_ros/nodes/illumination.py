@@ -10,20 +10,21 @@ import numpy as np
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 
+from ahf_ros import msg
+from ahf_ros.interchange.target_messages import coded_target_array
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.nodes.parameters import ParameterSettings
 from ahf_ros.nodes.process import ProcessNode, run
 from ahf_ros.nodes.settings import IlluminationNodeSettings
-from ahf_ros.nodes.target_msg import coded_target_array
 from ahf_ros.nodes.worker import Worker
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 from ahf_ros.target import Identification
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
-    """The messages of one image, which share a header."""
+class SceneMessages:
+    """The messages of one rendered image, which share a header."""
 
     image: Image
     camera_info: CameraInfo
@@ -31,13 +32,13 @@ class Frame:
 
 
 class IlluminationNode(ProcessNode):
-    """Publishes rendered images in turn, each with what it truly shows."""
+    """Publishes rendered images in turn, each with its truth."""
 
     def __init__(self) -> None:
         super().__init__('illumination')
         self._settings = ParameterSettings(self, IlluminationNodeSettings, self._restart)
         self._scenes: list[SceneSettings] = []
-        self._frames: list[Frame] = []
+        self._rendered: list[SceneMessages] = []
         self._published = 0
         self._image = self.publisher(Image, 'image')
         self._camera_info = self.publisher(CameraInfo, 'camera_info')
@@ -47,57 +48,57 @@ class IlluminationNode(ProcessNode):
         self._restart()
 
     def close(self) -> None:
-        """Return when the image that is being rendered is done."""
-        self._frames = []
+        """Stop rendering after the current image."""
+        self._rendered = []
         self._worker.stop()
 
     def _restart(self) -> None:
-        """Render what the parameters say now and publish it as often as they say."""
+        """Render and publish as the parameters now say."""
         settings = self._settings.current
         self._timer.timer_period_ns = round(1e9 / settings.rate)
         self._timer.reset()
         if settings.scenes() == self._scenes:
             return
         self._scenes = settings.scenes()
-        self._frames = []
+        self._rendered = []
         self._published = 0
-        self._worker.offer(partial(self._render, self._scenes, self._frames))
+        self._worker.offer(partial(self._render, self._scenes, self._rendered))
 
-    def _render(self, scenes: list[SceneSettings], frames: list[Frame]) -> None:
-        """Append every frame of the cycle, until other frames are wanted or none."""
+    def _render(self, scenes: list[SceneSettings], rendered: list[SceneMessages]) -> None:
+        """Render the scenes of the cycle, until other scenes or none are wanted."""
         for scene in scenes:
-            if self._frames is not frames:
+            if self._rendered is not rendered:
                 return
             try:
-                frames.append(make_frame(render(scene)))
+                rendered.append(scene_messages(render(scene)))
             except ValueError as error:
                 self.get_logger().error(f'nothing to publish: {error}')
                 return
 
     def _publish(self) -> None:
-        """Publish the frame whose turn it is, if it is rendered already."""
+        """Publish the image whose turn it is, if it is already rendered."""
         turn = self._published % len(self._scenes)
-        if turn >= len(self._frames):
+        if turn >= len(self._rendered):
             return
-        frame = self._frames[turn]
+        messages = self._rendered[turn]
         frame_id = self._settings.current.frame_id
         header = Header(stamp=self.get_clock().now().to_msg(), frame_id=frame_id)
-        for message in (frame.ground_truth, frame.camera_info, frame.image):
+        for message in (messages.ground_truth, messages.camera_info, messages.image):
             message.header = header
-        self._ground_truth.publish(frame.ground_truth)
-        self._camera_info.publish(frame.camera_info)
-        self._image.publish(frame.image)
+        self._ground_truth.publish(messages.ground_truth)
+        self._camera_info.publish(messages.camera_info)
+        self._image.publish(messages.image)
         self._published += 1
 
 
-def make_frame(rendering: Rendering) -> Frame:
+def scene_messages(rendering: Rendering) -> SceneMessages:
     """Return the messages of a rendered image."""
     settings = rendering.settings
     truth = Identification(rendering.targets, expected=len(rendering.targets))
-    return Frame(
+    return SceneMessages(
         image_message(rendering.image, Header()),
         camera_info(rendering),
-        coded_target_array(truth, settings.family, rendering.image.shape, Header()),
+        coded_target_array(truth, settings.family, rendering.image.shape, Header(), msg),
     )
 
 

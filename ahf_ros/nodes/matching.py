@@ -1,4 +1,4 @@
-"""Messages of two topics that belong together by their stamps, without message_filters."""
+"""Messages of two topics matched by their stamps, without message_filters."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ class _Waiting(NamedTuple):
 
 
 class Matcher:
-    """Pairs what two topics say of the same moment, whichever of them comes first.
+    """Pairs messages of two topics, whichever of them arrives first.
 
-    Each topic keeps its order. So where two messages match, what came before them on either topic
-    waits in vain, and is given up.
+    Each topic keeps its order, so a match discards all messages that arrived before it on either
+    topic.
 
     Parameters
     ----------
     tolerance : int
-        Largest distance of two stamps that match, ns; of several the nearest matches.
-    limits : tuple of int
-        What all that waits of either topic may take together; one message may always wait.
-    unmatched : list of int
-        Goes on to count the messages of either topic that were given up.
+        Maximum difference of the stamps of a match, ns; the nearest message matches.
+    limits : tuple of 2 int
+        Maximum size of all waiting messages of each topic together; a single one may always wait.
+    unmatched : list of 2 int
+        Counts of discarded messages of each topic, to continue.
     """
 
     def __init__(self, tolerance: int, limits: tuple[int, int], unmatched: list[int]) -> None:
@@ -37,36 +37,36 @@ class Matcher:
         self._lock = threading.Lock()
 
     def put(self, side: int, stamp: int, item: Any, size: int = 1) -> Any:
-        """Return what matches a message, or None and let the message wait.
+        """Return the match of a message, or None and let the message wait.
 
         Parameters
         ----------
         side : int
-            The topic, 0 or 1.
+            Topic, 0 or 1.
         stamp : int
-            In ns.
+            Stamp of the message, ns.
         item : object
             The message.
         size : int
-            What it takes while it waits.
+            Its size, in the unit of `limits`.
         """
         other = 1 - side
         with self._lock:
             stamps = [abs(waiting.stamp - stamp) for waiting in self._waiting[other]]
             if stamps and min(stamps) <= self._tolerance:
                 for _ in range(stamps.index(min(stamps))):
-                    self._give_up(other)
+                    self._discard(other)
                 while self._waiting[side]:
-                    self._give_up(side)
+                    self._discard(side)
                 return self._waiting[other].popleft().item
             self._waiting[side].append(_Waiting(stamp, item, size))
             while len(self._waiting[side]) > 1 and self._taken(side) > self._limits[side]:
-                self._give_up(side)
+                self._discard(side)
         return None
 
     def _taken(self, side: int) -> int:
         return sum(waiting.size for waiting in self._waiting[side])
 
-    def _give_up(self, side: int) -> None:
+    def _discard(self, side: int) -> None:
         self._waiting[side].popleft()
         self._unmatched[side] += 1

@@ -21,21 +21,21 @@ Settings = TypeVar('Settings')
 
 
 class ParameterSettings(Generic[Settings]):
-    """The settings of a node, declared as its parameters and always a consistent whole.
+    """The settings of a node, declared as its parameters and always consistent.
 
     Parameters
     ----------
     node : rclpy.node.Node
-        Gets one parameter a field of the settings.
+        Node that gets one parameter for each field of the settings.
     settings : type
-        Settings dataclass; fields that are settings dataclasses themselves are laid out flat.
+        Settings dataclass; nested settings are flattened.
     changed : callable, optional
-        Called after new settings are in force.
+        Called when new settings are in force.
 
     Raises
     ------
     ValueError
-        If a value given at the start is not accepted, or does not fit the others.
+        If an initial value is not accepted or does not fit the others.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class ParameterSettings(Generic[Settings]):
         return self._current
 
     def _changes(self, parameters: Iterable[RosParameter]) -> dict[str, object]:
-        """Return those of the new values that are ours, not the node's own."""
+        """Return the new values of our parameters, without those that rclpy declares."""
         return {item.name: item.value for item in parameters if item.name in self._values}
 
     def _check(self, parameters: Iterable[RosParameter]) -> SetParametersResult:
@@ -78,10 +78,10 @@ class ParameterSettings(Generic[Settings]):
 
 
 def descriptor(item: Parameter) -> ParameterDescriptor:
-    """Return what ROS tools show of a parameter.
+    """Return the descriptor of a parameter, which ROS tools show.
 
-    The typing is dynamic so that an integer is accepted where a number is meant, and so that what
-    is refused is refused by the settings, which say what is accepted.
+    Its type is dynamic so that an integer is accepted for a number, and so that refusals come from
+    the settings, which say what is accepted.
     """
     described = ParameterDescriptor(
         name=item.name,
@@ -90,7 +90,7 @@ def descriptor(item: Parameter) -> ParameterDescriptor:
         dynamic_typing=True,
     )
     if item.minimum is not None and item.maximum is not None:
-        # Tools draw sliders from a range; it has two ends or none.
+        # Tools draw sliders from a range, which needs both ends.
         if isinstance(item.default, int):
             bounds = IntegerRange(from_value=int(item.minimum), to_value=int(item.maximum))
             described.integer_range = [bounds]

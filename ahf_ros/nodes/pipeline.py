@@ -9,38 +9,39 @@ from typing import TypeAlias
 import numpy as np
 from sensor_msgs.msg import CompressedImage, Image
 
+from ahf_ros import msg
 from ahf_ros.detectors import Detector, create_detector
 from ahf_ros.filtering.homomorphic import HomomorphicFilter
 from ahf_ros.interchange.image_messages import decode_compressed, decode_image
+from ahf_ros.interchange.target_messages import coded_target_array
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.settings import LOSSLESS, DetectorNodeSettings
-from ahf_ros.nodes.target_msg import coded_target_array
 from ahf_ros.session import create_identifier
 from ahf_ros.target import Identification
 
 ImageMessage: TypeAlias = Image | CompressedImage
-"""What images come in as."""
+"""The messages that images arrive in."""
 
 STOPPING = 'the node stops'
-"""Why there is no answer any more."""
+"""Why an image that waits is not answered."""
 
 
 class Refused(Exception):
-    """There is no answer for an image; the text says why."""
+    """An image that cannot be answered; the text says why."""
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
-    """What an image shows.
+class ImageAnswer:
+    """An image and its identification.
 
     Attributes
     ----------
     image : ndarray of uint8, shape (height, width)
         The image as received, in gray.
     identification : Identification
-        What was identified in it.
+        Its identification.
     message : CodedTargetArray
-        The same, to be sent.
+        The identification as it is sent.
     """
 
     image: np.ndarray
@@ -49,16 +50,16 @@ class Answer:
 
 
 class Pipeline:
-    """Detector and adaptive filter, as long as the settings that they are made from are in force.
+    """Detector and adaptive filter; new settings need a new pipeline.
 
     Parameters
     ----------
     settings : DetectorNodeSettings
-        Of the node.
+        Settings of the node.
     stopping : threading.Event
-        Breaks off what is going on, also a search, at its next step.
+        Interrupts an identification, also a search, at its next step.
     detector : Detector, optional
-        Where it is not one that the settings name.
+        Replaces the detector that the settings name.
     """
 
     def __init__(
@@ -77,15 +78,22 @@ class Pipeline:
             identification, self._detector, interrupt=self._check_running
         )
 
-    def answer(self, message: ImageMessage, expected: int | None = None) -> Answer:
+    def answer(self, message: ImageMessage, expected: int | None = None) -> ImageAnswer:
         """Identify the targets of an image.
+
+        Parameters
+        ----------
+        message : Image or CompressedImage
+            The image.
+        expected : int, optional
+            N; that of the settings where None.
 
         Raises
         ------
         ValueError
             If the image is not accepted.
         Refused
-            If the node stops before.
+            If the node stops first.
         """
         image = (decode_compressed if hasattr(message, 'format') else decode_image)(message)
         identification = self._identifier.identify(image, expected)
@@ -93,13 +101,12 @@ class Pipeline:
             # Without the duration, runs are byte-identical.
             used = replace(identification.filter, duration=0.0)
             identification = replace(identification, filter=used)
-        sent = coded_target_array(
-            identification, self._detector.family, image.shape, message.header
-        )
-        return Answer(image, identification, sent)
+        family, shape = self._detector.family, image.shape
+        sent = coded_target_array(identification, family, shape, message.header, msg)
+        return ImageAnswer(image, identification, sent)
 
-    def filtered(self, answer: Answer) -> np.ndarray:
-        """Return the image in which the targets of an answer were found."""
+    def filtered(self, answer: ImageAnswer) -> np.ndarray:
+        """Return the filtered image in which the targets of an answer were identified."""
         used = answer.identification.filter
         if not used.applied:
             return answer.image
@@ -109,7 +116,7 @@ class Pipeline:
         )
 
     def reset(self) -> None:
-        """Forget what was learnt from earlier images."""
+        """Forget what worked for earlier images."""
         self._identifier.reset()
 
     def _check_running(self) -> None:

@@ -1,4 +1,4 @@
-"""Positions of targets as messages: a labelled cloud, and labels that RViz shows."""
+"""Positions of targets as messages: a point cloud with IDs, and text markers for RViz."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ POINT_FIELDS = {
     'confidence': PointField.FLOAT32,
     'deviation': PointField.FLOAT32,
 }
-"""Fields of a point of the labelled cloud; the last one is the deviation of `Positions`."""
+"""Fields of a point of the cloud; the last one is the deviation of `Positions`."""
 
 _KINDS = {PointField.FLOAT32: '<f4', PointField.INT32: '<i4'}
 _POINT_TYPE = np.dtype([(name, _KINDS[datatype]) for name, datatype in POINT_FIELDS.items()])
@@ -31,16 +31,16 @@ _LABEL_HEIGHT = 3.0  # of the letters, in radii of the dot
 
 
 def target_points(targets: Sequence[CodedTarget], found: Positions, header: Header) -> PointCloud2:
-    """Return a cloud of one point a target, in their order, NaN where it has no position.
+    """Return a cloud with one point per target, in their order; NaN if it has no position.
 
     Parameters
     ----------
     targets : sequence of CodedTarget
-        Of one image.
+        Targets of one image.
     found : Positions
-        Where they are.
+        Their positions.
     header : std_msgs.msg.Header
-        With the frame of the cloud that they were found in.
+        Header with the coordinate frame of the positions.
     """
     points = np.empty(len(targets), _POINT_TYPE)
     for axis, name in enumerate('xyz'):
@@ -65,7 +65,7 @@ def target_points(targets: Sequence[CodedTarget], found: Positions, header: Head
 
 
 def target_labels(targets: Sequence[CodedTarget], found: Positions, header: Header) -> MarkerArray:
-    """Return the IDs of targets as text at their positions, in place of all earlier text.
+    """Return the IDs of targets as text at their positions, which replaces all earlier text.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How a node is entered and left."""
+"""Node start-up and shutdown."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from rclpy.subscription import Subscription
 from rclpy.task import Future
 
 ARENAS = 2
-"""Parts of memory that the threads of a node share; glibc would give most of them one each."""
+"""Number of memory arenas that the threads of a node share; glibc would give each its own."""
 
 _M_ARENA_MAX = -8  # of glibc's malloc.h
 
@@ -33,9 +33,9 @@ ENDING = {signal.SIGINT, signal.SIGTERM}
 
 
 class Ending(Future):
-    """A future for the one executor that waits for it; it keeps the first callback only.
+    """A future for a single executor, which keeps only the first callback.
 
-    Up to Jazzy an executor adds the same one with every spin, and would so grow for ever.
+    Up to Jazzy, an executor adds the same callback with every spin, and memory would grow.
     """
 
     def __init__(self) -> None:
@@ -43,19 +43,19 @@ class Ending(Future):
         self._waited_for = False
 
     def add_done_callback(self, callback: Callable[[Future], None]) -> None:
-        """Call `callback` when done, unless another one is called already."""
+        """Call `callback` when done, unless there is one already."""
         if not self._waited_for:
             self._waited_for = True
             super().add_done_callback(callback)
 
 
 class ProcessNode(Node):
-    """A node that is the whole of a process.
+    """A node with a process of its own.
 
     Attributes
     ----------
     ended : Ending of int
-        The exit status, as soon as the node is to end, by a signal or of its own accord.
+        Exit status; set it to end the node. A signal sets it, too.
     """
 
     def __init__(self, name: str) -> None:
@@ -63,10 +63,10 @@ class ProcessNode(Node):
         self.ended = Ending()
 
     def close(self) -> None:
-        """End the threads of the node; topics and the log still work."""
+        """End the threads of the node, while topics and the log still work."""
 
     def publisher(self, kind: type, topic: str, depth: int = 1) -> Publisher:
-        """Return a publisher, reliable and of this depth where `qos_overrides` do not say more."""
+        """Return a publisher, reliable and of this depth unless `qos_overrides` differ."""
         options = QoSOverridingOptions.with_default_policies()
         return self.create_publisher(
             kind, topic, QoSProfile(depth=depth), qos_overriding_options=options
@@ -79,7 +79,7 @@ class ProcessNode(Node):
         callback: Callable[[Any], None],
         group: CallbackGroup | None = None,
     ) -> Subscription:
-        """Subscribe to a topic, reliable and of depth 1 where `qos_overrides` do not say more."""
+        """Subscribe to a topic, reliable and of depth 1 unless `qos_overrides` differ."""
         options = QoSOverridingOptions.with_default_policies()
         return self.create_subscription(
             kind,
@@ -93,9 +93,9 @@ class ProcessNode(Node):
     def subscribe_to_all(
         self, kind: type, topic: str, callback: Callable[[Any], None], group: CallbackGroup
     ) -> Subscription:
-        """Subscribe to every message of a topic: those that wait are kept, and hold back others.
+        """Subscribe to every message of a topic; a full queue holds back the publisher.
 
-        `qos_overrides` name it `subscription_lossless`.
+        In `qos_overrides` it is called `subscription_lossless`.
         """
         options = QoSOverridingOptions.with_default_policies(entity_id='lossless')
         return self.create_subscription(
@@ -109,20 +109,20 @@ class ProcessNode(Node):
 
 
 def run(make_node: Callable[[], ProcessNode], arguments: list[str] | None = None) -> int:
-    """Run a node until it has ended or gets SIGINT or SIGTERM, and return the exit status.
+    """Run a node until it ends itself or receives SIGINT or SIGTERM.
 
     Parameters
     ----------
     make_node : callable
-        Makes the node, once rclpy is initialised.
+        Returns the node; called when rclpy is initialised.
     arguments : list of str, optional
-        Of the command line; those of the process where not given.
+        Command line arguments; those of the process where None.
 
     Returns
     -------
     int
-        That with which the node has ended, 0 where a signal ended it; 1 where a parameter given
-        at the start is refused: stderr tells which and why.
+        Exit status: that of the node, 0 after a signal, 1 if a parameter given at the start is
+        refused, with the reason on stderr.
     """
     _share_memory()
     signalled = _signalled()
@@ -134,8 +134,8 @@ def run(make_node: Callable[[], ProcessNode], arguments: list[str] | None = None
         rclpy.shutdown()
         return 1
     threading.Thread(target=_end_at_signal, args=(node.ended, signalled), daemon=True).start()
-    # One thread for a service that takes as long as an identification, one for images that wait
-    # for room in a queue, one for all that is short.
+    # One thread for a service that takes as long as an identification, one for an image that waits
+    # for room in the queue, one for everything short.
     executor = MultiThreadedExecutor(num_threads=3)
     executor.add_node(node)
     try:
@@ -146,25 +146,25 @@ def run(make_node: Callable[[], ProcessNode], arguments: list[str] | None = None
         node.destroy_node()
         rclpy.shutdown()
         for number in ENDING:
-            # What is left to do, Python and the middleware do, for some tenths of a second.
+            # Python and the middleware still need some tenths of a second to shut down.
             signal.signal(number, signal.SIG_IGN)
     return node.ended.result()
 
 
 def _share_memory() -> None:
-    """Let threads that come and go use the same memory, in which what they free stays.
+    """Let threads share arenas, because memory that a thread frees stays in its arena.
 
-    Each search has threads of its own. With an arena each, the process grew for hours.
+    Each search starts threads. With an arena each, the process grew for hours.
     """
     with suppress(AttributeError):  # where malloc is not that of glibc
         ctypes.CDLL(None).mallopt(_M_ARENA_MAX, ARENAS)
 
 
 def _signalled() -> int:
-    """Return a file descriptor that can be read from as soon as there was a signal.
+    """Return a file descriptor that becomes readable after a signal.
 
-    A node then ends in order, and a second signal, as a terminal and a launch file send for the
-    same Ctrl-C, does not break that order off.
+    So a node shuts down in order, and a second signal does not interrupt that: a terminal and a
+    launch file both send one for the same Ctrl-C.
     """
     signalled, written = os.pipe()
     os.set_blocking(written, False)

@@ -8,11 +8,11 @@ from collections.abc import Sequence
 from std_msgs.msg import Header
 
 from ahf_ros.evaluation import score
+from ahf_ros.interchange.target_messages import identification_from
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.parameters import ParameterSettings
 from ahf_ros.nodes.process import ProcessNode, run
 from ahf_ros.nodes.settings import ScoreboardSettings
-from ahf_ros.nodes.target_msg import identification
 from ahf_ros.target import Identification, Target, TrueTarget
 
 KEPT = 1000
@@ -34,7 +34,7 @@ class Truths:
     def get(self, header: Header) -> tuple[Target, ...] | None:
         """Return the targets of the image with the stamp of a header, if they are known."""
         message = self._messages.get(_stamp(header))
-        return identification(message).targets if message else None
+        return identification_from(message).targets if message else None
 
 
 class Scoreboard(ProcessNode):
@@ -54,7 +54,7 @@ class Scoreboard(ProcessNode):
         if truth is None or (images and self._count >= images):
             return
         self._count += 1
-        print(f'image {self._count}: {line(identification(message), truth)}', flush=True)
+        print(f'image {self._count}: {line(identification_from(message), truth)}', flush=True)
         if self._count == images:
             self.ended.set_result(0)
 

@@ -1,4 +1,4 @@
-"""A detector behind a ROS 2 service, so that it can be written in any language."""
+"""A detector that calls a ROS 2 service, so that it can be written in any language."""
 
 from __future__ import annotations
 
@@ -12,32 +12,33 @@ from rclpy.node import Node
 from rclpy.task import Future
 from std_msgs.msg import Header
 
+from ahf_ros.interchange.target_messages import identification_from
 from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.nodes.pipeline import STOPPING, Refused
-from ahf_ros.nodes.target_msg import identification
 from ahf_ros.srv import Identify
 from ahf_ros.target import Target
 
-_POLL = 0.2  # s, between two looks at whether there still is somebody to answer
-_GONE = 3.0  # s, that a service may seem to be away; discovery takes a moment
+_POLL = 0.2  # interval between checks that the service still exists, s
+_GONE = 3.0  # time that discovery may take, s
 
 
 class ServiceDetector:
     """Identify targets by a service of type `ahf_ros/srv/Identify`.
 
-    It is called from other threads than those of the node's executor, which bring the answers.
+    Call it from other threads than those of the node's executor, which deliver the responses.
 
     Parameters
     ----------
     node : rclpy.node.Node
-        Whose client it is.
+        Node that has the client.
     service : str
+        Name of the service.
     family : str
         Family of the targets.
     timeout : float
         Time limit for one image, s.
     stopping : threading.Event
-        Breaks off waiting for an answer.
+        Interrupts waiting for a response.
     """
 
     def __init__(
@@ -67,12 +68,12 @@ class ServiceDetector:
         Raises
         ------
         ValueError
-            If the service is not there, goes away, takes longer than its time limit, or says that
-            it does not accept the image; the message names the service.
+            If the service does not exist, disappears, exceeds its time limit or refuses the image;
+            the message names the service.
         Refused
-            If the node stops before.
+            If the node stops first.
         """
-        # What is sent before the service is known to this node gets lost.
+        # A request that is sent before the service is discovered gets lost.
         if not self._client.wait_for_service(min(_GONE, self.timeout)):
             raise ValueError(f'{self._named} is not there')
         future = self._client.call_async(Identify.Request(image=image_message(image, Header())))
@@ -82,7 +83,7 @@ class ServiceDetector:
             self._client.remove_pending_request(future)
         if not response.success:
             raise ValueError(f'{self._named} refuses the image: {response.message}')
-        return list(identification(response.coded_targets).targets)
+        return list(identification_from(response.coded_targets).targets)
 
     @property
     def _named(self) -> str:

@@ -1,4 +1,4 @@
-"""What can be set on the nodes; readable without ROS."""
+"""Settings of the nodes; importable without ROS."""
 
 from __future__ import annotations
 
@@ -15,27 +15,28 @@ LATEST, LOSSLESS = 'latest', 'lossless'
 """What becomes of images that arrive while another one is being identified."""
 
 SERVICE = 'service'
-"""The detector that is a service of another node."""
+"""Name of the detector that calls a service of another node."""
 
 _SERVICE_NAME = re.compile(r'[~/]?/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*', re.ASCII)
 
 
 @dataclass(frozen=True, slots=True)
 class CloudSettings:
-    """Positions of targets in space, from a cloud that belongs to the image."""
+    """Positions of targets in space, from the point cloud of the same shot."""
 
     cloud: bool = parameter(
-        False, 'Whether to subscribe to clouds on points and to publish where targets are in them.'
+        False,
+        'Whether to subscribe to point clouds on points and to publish the positions of targets.',
     )
     cloud_tolerance: float = parameter(
         0.0,
-        'Largest difference of the stamps of an image and its cloud, s; 0: they are equal.',
+        'Maximum difference between the stamps of an image and its cloud, s; 0: equal stamps.',
         minimum=0.0,
         maximum=10.0,
     )
     cloud_radius: float = parameter(
         NEIGHBOURHOOD,
-        'Radius about a centre within which points of the cloud count, in radii of the dot.',
+        'Radius around a centre within which points of the cloud are used, in radii of the dot.',
         minimum=0.5,
         maximum=10.0,
     )
@@ -63,7 +64,9 @@ class NodeIdentificationSettings(IdentificationSettings):
 class DetectorNodeSettings:
     """Settings of the node `detector`: the identification, and how images come in."""
 
-    service: str = parameter('', 'Service of the detector service, an ahf_ros/srv/Identify.')
+    service: str = parameter(
+        '', 'Name of the ahf_ros/srv/Identify that the detector service calls.'
+    )
     image_transport: str = parameter(
         'raw',
         'raw: sensor_msgs/Image on image; compressed: CompressedImage on image/compressed.',
@@ -71,14 +74,14 @@ class DetectorNodeSettings:
     )
     queue: str = parameter(
         LATEST,
-        'latest: an image that waits is dropped for a later one; lossless: all are answered in '
-        'order, and the duration in answers is 0.',
+        'latest: a waiting image is dropped when a newer one arrives; lossless: every image is '
+        'answered in order, and the duration in answers is 0.',
         choices=(LATEST, LOSSLESS),
     )
     queue_memory: int = parameter(
         1024,
-        'Most memory for images that wait in a lossless queue, MB; what is full holds back the '
-        'publisher. As much again for clouds that wait for their image; the oldest make room.',
+        'Maximum memory of images waiting in a lossless queue, MB; a full queue holds back the '
+        'publisher. Clouds waiting for their image may take as much again; the oldest is dropped.',
         minimum=1,
         maximum=10**6,
     )
@@ -89,25 +92,27 @@ class DetectorNodeSettings:
         """Refuse values that are not accepted."""
         check_parameters(self)
         if self.service and not _SERVICE_NAME.fullmatch(self.service):
-            raise ValueError(f'service is {self.service!r}, accepted is the name of a service')
+            raise ValueError(f'service is {self.service!r}, accepted is the name of a ROS service')
         if self.identification.detector != SERVICE:
             create_identifier(self.identification)
         elif not self.service:
-            raise ValueError("service is '', accepted is the name of a service")
+            raise ValueError("service is '', accepted is the name of a ROS service")
 
 
 @dataclass(frozen=True, slots=True)
 class IlluminationNodeSettings:
-    """The node `illumination`: which synthetic images, and how often."""
+    """Settings of the node `illumination`: which synthetic images, and how often."""
 
     rate: float = parameter(1.0, 'Images per second.', minimum=0.001, maximum=1000.0)
     frames: int = parameter(
         3,
-        'Number of different images, published in turn; the seed grows by one with each.',
+        'Number of different images, published in turn; each has the next seed.',
         minimum=1,
         maximum=1000,
     )
-    frame_id: str = parameter('camera', 'Frame of the camera, in the header of every image.')
+    frame_id: str = parameter(
+        'camera', 'Coordinate frame of the camera, in the header of every image.'
+    )
     scene: SceneSettings = field(default_factory=SceneSettings)
 
     def __post_init__(self) -> None:
@@ -116,7 +121,7 @@ class IlluminationNodeSettings:
         self.scenes()
 
     def scenes(self) -> list[SceneSettings]:
-        """Return the scene of every image, in the order in which they are published."""
+        """Return the scene of each image, in the order of publication."""
         return [
             replace(self.scene, seed=self.scene.seed + number) for number in range(self.frames)
         ]
@@ -124,7 +129,7 @@ class IlluminationNodeSettings:
 
 @dataclass(frozen=True, slots=True)
 class ScoreboardSettings:
-    """The node `scoreboard`: how many images it compares."""
+    """Settings of the node `scoreboard`."""
 
     images: int = parameter(
         0, 'Number of images after which the node ends; 0: never.', minimum=0, maximum=10**6

@@ -1,4 +1,4 @@
-"""One thread that works off jobs, of which all may wait or only the latest."""
+"""A thread with a queue of jobs: all of them, or only the latest."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ Result = TypeVar('Result')
 
 
 class Worker:
-    """Runs jobs one at a time, beside the threads that answer parameters and services.
+    """Runs jobs one at a time in a thread of its own.
 
-    A live stream offers its jobs: while one runs, only the latest waits. What must not lose any
-    appends its jobs: they run in their order. A request calls its job: it runs in any case, and
-    its caller gets the result.
+    `offer` is for a live stream: while a job runs, only the latest one waits. `append` is for a
+    stream that must be complete: jobs run in order. `call` is for requests: the job runs in any
+    case, and the caller gets the result.
     """
 
     def __init__(self) -> None:
@@ -27,12 +27,12 @@ class Worker:
         self._latest: Callable[[], None] | None = None
 
     def offer(self, job: Callable[[], None]) -> bool:
-        """Run `job`, which handles its own errors, unless a later one is offered before its turn.
+        """Run `job`, which handles its own errors, unless a newer one is offered before its turn.
 
         Returns
         -------
         bool
-            Whether an earlier job was waiting and is dropped.
+            Whether a waiting job was dropped.
         """
         with self._lock:
             dropped = self._latest is not None
@@ -42,17 +42,18 @@ class Worker:
         return dropped
 
     def append(self, job: Callable[[], None], size: int, limit: int) -> None:
-        """Run `job`, which handles its own errors, after all that were appended before.
+        """Run `job`, which handles its own errors, after all jobs that were appended before.
 
-        Return as soon as there is room for it, or the worker has been stopped.
+        Return as soon as there is room for it or the worker is stopped.
 
         Parameters
         ----------
         job : callable
+            Without arguments.
         size : int
-            What it takes while it waits.
+            Memory that the job takes while it waits, in bytes.
         limit : int
-            What all that wait may take together; one may always wait.
+            Maximum memory of all waiting jobs together; a single job may always wait.
         """
         with self._room:
             self._room.wait_for(
@@ -74,7 +75,7 @@ class Worker:
         return self._submit(job).result()
 
     def stop(self) -> None:
-        """Drop the jobs that wait and return when the one that runs has ended."""
+        """Drop the waiting jobs and return when the running one has ended."""
         with self._room:
             self._stopped = True
             self._room.notify_all()

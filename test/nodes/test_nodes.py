@@ -401,7 +401,7 @@ def test_a_service_is_a_detector_and_its_end_is_named(
     chosen = ('detector', 'service'), ('service', '/other/detector/identify')
     assert detector.set(('detector', 'service')) == (
         False,
-        "service is '', accepted is the name of a service",
+        "service is '', accepted is the name of a ROS service",
     )
     assert detector.set(*chosen, ('expected_targets', 0)) == (True, '')
     found = detector.answer(message)

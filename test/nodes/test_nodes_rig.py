@@ -217,7 +217,7 @@ def test_bad_clouds_are_named_and_the_node_goes_on(
     rig.cloud.publish(cloud_message(scanned[:, :-1], image.header))
     rig.graph.until(lambda: rig.told('clouds rejected') == before + len(bad) + 1)
     assert values(rig.diagnostics[-1])['last reason for rejection of a cloud'] == (
-        'cloud is of 639 x 480 points, accepted is 640 x 480, the size of the image'
+        'cloud has 639 x 480 points, accepted is 640 x 480, the size of the image'
     )
     image = image_message(rendering.image, header())
     rig.detector.answer(image)

@@ -7,8 +7,9 @@ pytest.importorskip('rclpy', reason='ROS 2 is not installed')
 from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import Header
 
+from ahf_ros import msg
+from ahf_ros.interchange.target_messages import coded_target_array, identification_from
 from ahf_ros.msg import CodedTarget, CodedTargetArray
-from ahf_ros.nodes.target_msg import coded_target_array, identification
 from ahf_ros.target import UNDECODED, FilterState, Identification, Target
 
 # Values that 32-bit numbers hold exactly.
@@ -27,16 +28,16 @@ FOUND = Identification(
 
 def test_nothing_is_lost_on_the_way() -> None:
     header = Header(frame_id='camera')
-    sent = coded_target_array(FOUND, 'metashape20', (2656, 3984), header)
+    sent = coded_target_array(FOUND, 'metashape20', (2656, 3984), header, msg)
     received = deserialize_message(serialize_message(sent), CodedTargetArray)
-    assert identification(received) == FOUND
+    assert identification_from(received) == FOUND
     assert received.header == header
     assert (received.width, received.height, received.family) == (3984, 2656, 'metashape20')
 
 
 def test_nothing_identified_is_a_message_too() -> None:
-    sent = coded_target_array(Identification(()), 'aicon12', (10, 20), Header())
-    assert identification(sent) == Identification(())
+    sent = coded_target_array(Identification(()), 'aicon12', (10, 20), Header(), msg)
+    assert identification_from(sent) == Identification(())
 
 
 def test_message_and_record_mean_the_same_by_undecoded() -> None:
