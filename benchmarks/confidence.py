@@ -22,6 +22,7 @@ from ahf_ros.codes.ring import FAMILY_NAMES, canonical, family
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.ring.confidence import OF_TARGET, confidence
 from ahf_ros.detectors.ring.detector import find_hypotheses
+from ahf_ros.imaging.image import as_gray
 from ahf_ros.synthetic.patterns import LIGHT_NAMES, benchmark_lights
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 from benchmarks.weights import write_weights
@@ -45,7 +46,7 @@ def readings(scene: Rendering) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     of_target, right : ndarray of bool, shape (k,)
     """
     code = family(scene.settings.family)
-    read = find_hypotheses(scene.image, DetectorSettings(family=code.name))
+    read = find_hypotheses(as_gray(scene.image), DetectorSettings(family=code.name))
     read = read.select(read.words > 0)
     _, ids = canonical(read.words, code)
     x, y, true = np.array([(target.x, target.y, target.id) for target in scene.targets]).T

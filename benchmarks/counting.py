@@ -29,6 +29,7 @@ from ahf_ros.detectors.ring.counting import estimate_count, target_features, ter
 from ahf_ros.detectors.ring.detector import RingDetector, find_hypotheses
 from ahf_ros.evaluation import score
 from ahf_ros.features import frame
+from ahf_ros.imaging.image import as_gray
 from ahf_ros.session import identify
 from ahf_ros.synthetic.patterns import benchmark_lights
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
@@ -114,7 +115,7 @@ def dots(scene: Rendering) -> tuple[np.ndarray, np.ndarray]:
     """Return the features, shape (k, n), of all dots, and whether each is a target's middle."""
     image = half_covered(scene)
     code = family(scene.settings.family)
-    found = find_hypotheses(image, DetectorSettings(family=code.name))
+    found = find_hypotheses(as_gray(image), DetectorSettings(family=code.name))
     major, minor, _ = frame.ellipse_axes(found.frames)
     true = [(target.x, target.y, target.semi_major) for target in scene.targets]
     x, y, size = np.array(true).reshape(-1, 3).T

@@ -14,7 +14,7 @@ import numpy as np
 
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
-from ahf_ros.features.circles import Circles
+from ahf_ros.features.circles import Circles, dot_circles
 from ahf_ros.features.edge_weights import weigh_edges
 from ahf_ros.features.light_slope import LightSlope, common_slope, smooth_slopes
 from ahf_ros.features.profiles import BLURS, CORRELATION, USUAL_BLUR, Edges, measure_edges
@@ -35,7 +35,8 @@ _UNEVEN_LIGHT = 0.011  # usual error of slopes from which the variance of a cent
 _PRIOR_SCALE = 0.003  # standard deviation of the printed proportions of circles and dot
 _PRIOR_PERSPECTIVE = 0.02  # of the projective part, in 1 a dot radius
 _PRIOR_SHIFT = 1.0  # of the shift of edges towards the dark side, px
-_WEAK_PRIOR = 1e-6
+_WEAK_PRIOR = 1e-6  # of the other changes, so that they can always be solved for
+_NEIGHBOURS = 10  # of an edge whose errors may be like its own, to either side
 _SYSTEMATIC = 0.001  # standard deviation of what pixels and interpolation do to a centre, px
 _NO_WEIGHT = 1e-9  # instead of a sum of no weights
 
@@ -47,6 +48,8 @@ class Fit(ArrayRecord):
     Attributes
     ----------
     frames : ndarray of float64, shape (k, 3, 3)
+    polarity : ndarray of int, shape (k,)
+        1 for a dark target on bright ground, -1 for a bright one on dark.
     contrast : ndarray of float64, shape (k,)
         Usual gray value of the dark side of an edge over that of the bright side.
     bright : ndarray of float64, shape (k,)
@@ -62,12 +65,47 @@ class Fit(ArrayRecord):
     """
 
     frames: np.ndarray
+    polarity: np.ndarray
     contrast: np.ndarray
     bright: np.ndarray
     share: np.ndarray
     deviation: np.ndarray
     covariance: np.ndarray
     blur: np.ndarray
+
+    @property
+    def size(self) -> np.ndarray:
+        """Radii of circles with the areas of the dots, px, shape (k,)."""
+        return frame.mean_radii(self.frames)
+
+
+def fit_dots(
+    gray: np.ndarray,
+    frames: np.ndarray,
+    polarity: np.ndarray,
+    *,
+    rays: int,
+    reach: float,
+    rounds: int = 2,
+    min_share: float = 0.0,
+    max_contrast: float = 1.0,
+) -> Fit:
+    """Fit the ellipses of dots, and leave out those that their edges do not bear out.
+
+    Parameters
+    ----------
+    gray, frames, reach, rounds
+        As for `fit_circles`.
+    polarity : ndarray of int, shape (k,)
+        1 for a dark dot, -1 for a bright one.
+    rays : int
+        Number of points about a dot.
+    min_share, max_contrast : float
+        Bounds of `Fit.share` and `Fit.contrast`.
+    """
+    circles = dot_circles(polarity, rays)
+    fit = fit_circles(gray, frames, circles, reach=reach, projective=False, rounds=rounds)
+    return fit.select((fit.share >= min_share) & (fit.contrast <= max_contrast))
 
 
 def fit_circles(
@@ -129,29 +167,30 @@ def _solve(
         return (changes, normal), np.abs(displacement - model.displacement(changes)) / deviation
 
     weights = own.weights / deviation**2
-    fitted = reweight(
+    (changes, normal), relative, robust = reweight(
         solve, weights, lambda sizes: _OUTLIER * spread(sizes, own.seen, _MINIMUM_SPREAD), _ROUNDS
     )
-    changes, normal = fitted.solution
     errors = displacement - model.displacement(changes)
-    placed = own.seen & (fitted.errors < _PLACED) & (np.abs(errors) < _PLACED_RADII)
+    placed = own.seen & (relative < _PLACED) & (np.abs(errors) < _PLACED_RADII)
     share = placed.sum(axis=1) / np.maximum(edges.visible.sum(axis=1), 1)
     squares = np.where(placed, errors * edges.scale, 0) ** 2
     scatter = np.sqrt(squares.sum(axis=1) / np.maximum(placed.sum(axis=1), 1))
     # What an error changes is not its weight times the error, but the derivative of that.
-    gain = geman_mcclure_gain(weights, fitted.errors).sum(axis=1)
-    gain = np.maximum(gain / np.maximum(fitted.weights.sum(axis=1), _NO_WEIGHT), _MINIMUM_GAIN)
-    influence = model.influence(normal) * (fitted.weights / gain[:, None])[:, None]
+    gain = geman_mcclure_gain(weights, relative).sum(axis=1)
+    gain = np.maximum(gain / np.maximum(robust.sum(axis=1), _NO_WEIGHT), _MINIMUM_GAIN)
+    influence = model.influence(normal) * (robust / gain[:, None])[:, None]
     parts = influence * errors[:, None]
     parts -= light.influence(influence * (edges.sensitivity / edges.scale)[:, None])
-    used = geman_mcclure(own.weights, fitted.errors)
+    used = geman_mcclure(own.weights, relative)
     covariance = _covariance(parts, used, edges.spacing, normal.shape[1])
     # Where slopes differ that much from their neighbours, light is no slope within a profile.
     total = np.maximum(used.sum(axis=1), _NO_WEIGHT)
     uneven = (used * light.errors**2).sum(axis=1) / total
     covariance *= (1 + np.minimum(uneven / _UNEVEN_LIGHT**2, 1))[:, None, None]
     bright = median(np.maximum(edges.bright, 0), own.seen)
-    return changes, Fit(frames, own.contrast, bright, share, scatter, covariance, blur)
+    polarity = circles.polarity[:, 0]
+    fit = Fit(frames, polarity, own.contrast, bright, share, scatter, covariance, blur)
+    return changes, fit
 
 
 def _light(edges: Edges, weights: np.ndarray, circles: Circles) -> LightSlope:
@@ -183,9 +222,9 @@ def _covariance(
     Neighbours closer than `CORRELATION` share pixels, so that their errors are alike. Their
     products are not taken as they are: a fit leaves little of what they have in common.
     """
-    distance = np.maximum(spacing / CORRELATION, 0.1)
+    distance = np.maximum(spacing / CORRELATION, 1 / _NEIGHBOURS)
     alike = np.ones_like(distance)
-    for steps in range(1, 10):
+    for steps in range(1, _NEIGHBOURS):
         alike += 2 * np.maximum(1 - steps * distance, 0)
     squares = (weights**2 * alike).sum(axis=1)
     count = weights.sum(axis=1) ** 2 / np.maximum(squares, _NO_WEIGHT)

@@ -22,7 +22,8 @@ class Circles:
         0 on the dot, whose scale is that of the frame. Circles of the same group from 1 on share
         a scale relative to the dot that is known about as well as a print is.
     polarity : ndarray of int, shape (k, m)
-        1 where the outside is brighter, -1 where it is darker, 0 where there is no edge.
+        1 where the outside is brighter, -1 where it is darker, 0 where there is no edge. The
+        first point is on the outline of the target or its dot, and has its polarity.
     """
 
     angles: np.ndarray

@@ -11,15 +11,7 @@ from ahf_ros.target import UNDECODED, Target
 
 
 def ellipse_fields(frames: np.ndarray, covariance: np.ndarray) -> list[dict[str, Any]]:
-    """Return the fields of `Target` that say where it is.
-
-    Parameters
-    ----------
-    frames : ndarray of float64, shape (k, 3, 3)
-        In px of the image.
-    covariance : ndarray of float64, shape (k, 2, 2)
-        Of the image of the centre, px^2.
-    """
+    """Return the fields of `Target` that say where it is, from (k, 3, 3) and (k, 2, 2)."""
     columns = (frames[:, 0, 2], frames[:, 1, 2], *ellipse_axes(frames))
     names = ('x', 'y', 'semi_major', 'semi_minor', 'angle')
     return [
@@ -41,8 +33,10 @@ def targets_from_frames(
 
     Parameters
     ----------
-    frames, covariance
-        As for `ellipse_fields`.
+    frames : ndarray of float64, shape (k, 3, 3)
+        In px of the image.
+    covariance : ndarray of float64, shape (k, 2, 2)
+        Of the image of the centre, px^2.
     ids : ndarray of int, shape (k,)
         `UNDECODED` where the code word is not certain.
     codes : ndarray of int, shape (k,)

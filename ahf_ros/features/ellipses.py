@@ -18,8 +18,9 @@ _RAYS = 32
 _ANGLES = 2 * np.pi * np.arange(_RAYS) / _RAYS
 _BINS = 26  # of the radius, in equal ratios
 _NEAREST, _FARTHEST = 0.4, 1.35  # radii sampled, in the smallest and the largest of the range
+_WIDTH = 1.5  # from the middle of an ellipse to where its weights end, bins
 _SHAPES = ((1.0, 1), (0.75, 4), (0.55, 6), (0.4, 8))  # aspect, number of directions
-_LOWEST_STEP, _HIGHEST_STEP = -0.3, 0.6  # of ln; a single step beyond counts no more
+_MINIMUM_COUNTED, _MAXIMUM_COUNTED = -0.3, 0.6  # steps of ln; one beyond counts no more
 _MINIMUM_SCORE = 0.15  # mean step of ln along the ellipse
 _COARSE = 8.0  # largest radius of a range that is fitted one level below its own, px
 _OVERSIZE = 1.6  # semi-major axis of a dot, in the largest radius of its range, at the most
@@ -117,7 +118,7 @@ def _templates(low: float, high: float) -> tuple[np.ndarray, ...]:
             for major in middle[middle * aspect >= middle[0]]:
                 bins = np.log(major / np.sqrt(along) / middle[0]) / ratio
                 distance = np.abs(bins[:, None] - np.arange(len(middle)))
-                weights.append(np.clip(1.5 - distance, 0, 1).ravel() / _RAYS)
+                weights.append(np.clip(_WIDTH - distance, 0, 1).ravel() / _RAYS)
                 ellipses.append((major, aspect * major, direction))
     majors, minors, directions = np.array(ellipses).T
     return np.array(weights, np.float32).T, radii, majors, minors, directions
@@ -129,7 +130,7 @@ def _steps(
     """Return the steps of ln outwards, from dark to bright, at all but the end radii."""
     values = sample_circles(log, frames, _ANGLES, radii).astype(np.float32)
     steps = (values[:, :, 2:] - values[:, :, :-2]) * (polarity / LOG_SCALE)[:, None, None]
-    return np.clip(steps, _LOWEST_STEP, _HIGHEST_STEP, dtype=np.float32)
+    return np.clip(steps, _MINIMUM_COUNTED, _MAXIMUM_COUNTED, dtype=np.float32)
 
 
 def _refined(log: np.ndarray, dots: Dots, window: float) -> Dots:

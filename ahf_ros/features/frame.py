@@ -17,6 +17,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+_CORNERS = 32  # of the polygon of an outline
+
 
 def affine_frames(
     x: np.ndarray,
@@ -66,6 +68,24 @@ def circle_points(angles: np.ndarray, radii: np.ndarray) -> np.ndarray:
     """
     directions = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     return radii[..., None, :, None] * directions[:, None, :]
+
+
+def circle_outlines(frames: np.ndarray, radii: np.ndarray) -> np.ndarray:
+    """Return polygons along the images of circles, one of each target.
+
+    Parameters
+    ----------
+    frames : ndarray of float64, shape (k, 3, 3)
+    radii : ndarray of float, shape (k,)
+        In dot radii.
+
+    Returns
+    -------
+    ndarray of float64, shape (k, 32, 2)
+        Pixels.
+    """
+    angles = 2 * np.pi * np.arange(_CORNERS) / _CORNERS
+    return project(frames, circle_points(angles, radii[:, None]))[:, :, 0]
 
 
 def project(frames: np.ndarray, points: np.ndarray) -> np.ndarray:

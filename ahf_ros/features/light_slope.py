@@ -19,17 +19,15 @@ _OUTLIER = 3.0  # times the usual error of a slope that halves its weight
 
 @dataclass(frozen=True, slots=True)
 class LightSlope:
-    """The slope of the light on outlines, smoothed, from n points of each.
+    """The smoothed slope of the light at n points of outlines, arrays of shape (..., n).
 
     Attributes
     ----------
-    slope : ndarray of float64, shape (..., n)
+    slope : ndarray of float64
         Outwards, as a share of the light, 1/px.
-    errors : ndarray of float64, shape (..., n)
-        Of the slopes of the single profiles, 1/px.
-    weights : ndarray of float64, shape (..., n)
-        Of the single profiles.
-    totals : ndarray of float64, shape (..., n)
+    errors, weights : ndarray of float64
+        Of the slopes of the single profiles, 1/px, and their weights.
+    totals : ndarray of float64
         Weight that each smoothed slope is made from.
     window : ndarray of float64, shape (n, n)
         What each profile, by row, adds to each smoothed slope.
@@ -48,21 +46,10 @@ class LightSlope:
 
 
 def common_slope(slopes: np.ndarray, polarity: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Return the mean slope towards the bright side of edges, which is not the light's.
+    """Return the mean slope towards the bright side of edges, shape (k, 1), all others (k, m).
 
-    The blur is another than that of the fitted step, or edges were sharpened.
-
-    Parameters
-    ----------
-    slopes, weights : ndarray of float, shape (k, m)
-        Of profiles, outwards.
-    polarity : ndarray of int, shape (k, m)
-        1 where the outside is brighter, -1 where it is darker.
-
-    Returns
-    -------
-    ndarray of float64, shape (k, 1)
-        1/px.
+    It is not the light's: the blur is another than that of the fitted step, or edges were
+    sharpened.
     """
     total = np.maximum(weights.sum(axis=1), _NO_WEIGHT)
     return ((weights * polarity * slopes).sum(axis=1) / total)[:, None]

@@ -1,8 +1,7 @@
 """Robust statistics: medians, and weights that outliers lose.
 
-Two weight functions are used. That of Cauchy, 1 / (1 + r^2), halves at r = 1 and is for values of
-which no single one can be far off. That of Geman and McClure [1]_, 1 / (1 + r^2)^2, falls to a
-quarter at r = 1 and to nothing beyond, and is for fits.
+The weight of Cauchy, 1 / (1 + r^2), and that of Geman and McClure [1]_, 1 / (1 + r^2)^2, which
+leaves less to outliers.
 
 References
 ----------
@@ -13,8 +12,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -78,32 +76,13 @@ def geman_mcclure_gain(weights: np.ndarray, errors: np.ndarray) -> np.ndarray:
     return weights * (1 - 3 * squares) / (1 + squares) ** 3
 
 
-@dataclass(frozen=True, slots=True)
-class Reweighted(Generic[_Solution]):
-    """What iterated reweighting comes to.
-
-    Attributes
-    ----------
-    solution
-        The last one.
-    errors : ndarray of float64
-        Its errors over the scale at which a value keeps a quarter of its weight.
-    weights : ndarray of float64
-        The weights after them.
-    """
-
-    solution: _Solution
-    errors: np.ndarray
-    weights: np.ndarray
-
-
 def reweight(
     solve: Callable[[np.ndarray], tuple[_Solution, np.ndarray]],
     weights: np.ndarray,
     scale: Callable[[np.ndarray], np.ndarray | float],
     rounds: int,
-) -> Reweighted[_Solution]:
-    """Solve least-squares problems robustly, by iterated reweighting after Geman and McClure.
+) -> tuple[_Solution, np.ndarray, np.ndarray]:
+    """Solve least-squares problems by iterated reweighting after Geman and McClure.
 
     Parameters
     ----------
@@ -115,13 +94,20 @@ def reweight(
         Given the residuals, the residual at which a value keeps a quarter of its weight.
     rounds : int
         Number of solutions, at least 1.
+
+    Returns
+    -------
+    solution
+        The last one.
+    errors, weights : ndarray of float64
+        Its residuals over their scale, and the weights that they leave.
     """
     robust = weights
     for _ in range(rounds):
         solution, residuals = solve(robust)
         errors = residuals / scale(residuals)
         robust = geman_mcclure(weights, errors)
-    return Reweighted(solution, errors, robust)
+    return solution, errors, robust
 
 
 def fit_linear(
@@ -153,4 +139,4 @@ def fit_linear(
         residuals = values - parameters @ basis.T
         return (parameters, residuals), residuals
 
-    return reweight(solve, weights, lambda _: scale, rounds).solution
+    return reweight(solve, weights, lambda _: scale, rounds)[0]

@@ -10,7 +10,7 @@ import pytest
 
 from ahf_ros.codes.ring import FAMILY_NAMES, canonical, family
 from ahf_ros.detectors.ring.band_evidence import band_evidence
-from ahf_ros.detectors.ring.band_samples import beside_edges, sample_bands
+from ahf_ros.detectors.ring.band_samples import sample_bands
 from ahf_ros.detectors.ring.confidence import FEATURES, confidence, confidence_features
 from ahf_ros.detectors.ring.decoding import Readings, decode, sector_angles
 from ahf_ros.detectors.ring.evidence import MarkAppearance
@@ -38,10 +38,10 @@ def marks_of(rendering: Rendering, count: int) -> MarkAppearance:
 
 
 def decoded(gray: np.ndarray, frames: np.ndarray, marks: MarkAppearance, name: str) -> Readings:
-    code, size = family(name), frame.mean_radii(frames)
+    code = family(name)
     angles = sector_angles(code, 10)
-    samples = sample_bands(gray, frames, beside_edges(size, marks.blur), angles, code)
-    return decode(samples, band_evidence(samples, marks, size, code), marks, code)
+    samples = sample_bands(gray, frames, marks.blur, angles, code)
+    return decode(samples, band_evidence(samples, marks, frames, code), marks, code)
 
 
 def read(rendering: Rendering) -> Readings:
@@ -120,6 +120,7 @@ def test_confidence_is_a_probability_that_grows_with_the_evidence():
     def of(readings, share=1.0, deviation=0.05, contrast=0.25):
         fit = Fit(
             frame.affine_frames(np.zeros(6), 0, 12, 12, 0),
+            polarity=np.ones(6, int),
             contrast=np.full(6, contrast),
             bright=np.full(6, 200.0),
             share=np.full(6, share),

@@ -91,6 +91,7 @@ def test_parts_of_finds_stay_in_order():
 def test_readings_are_taken_over_where_they_belong():
     fit = Fit(
         frames=frame.affine_frames([10.0, 20.0], 5.0, 4.0, 3.0, 0.0),
+        polarity=np.ones(2, int),
         contrast=np.full(2, 0.3),
         bright=np.full(2, 200.0),
         share=np.array([0.8, 0.9]),
@@ -102,6 +103,7 @@ def test_readings_are_taken_over_where_they_belong():
     assert not unread.words.any() and not unread.confidence.any()
     better = Fit(
         frames=frame.affine_frames([20.5], 5.0, 4.0, 3.0, 0.0),
+        polarity=np.ones(1, int),
         contrast=np.full(1, 0.3),
         bright=np.full(1, 200.0),
         share=np.array([1.0]),

@@ -24,6 +24,7 @@ from ahf_ros.detectors.ring.evidence import (
     light_levels,
     step_evidence,
 )
+from ahf_ros.features.frame import mean_radii
 
 _CORRELATION = 2.5  # px between independent readings
 _MINIMUM_ALONG, _MINIMUM_ACROSS = 0.08, 0.1  # weight of a reading among many that are alike
@@ -50,7 +51,7 @@ class BandEvidence:
 
 
 def band_evidence(
-    samples: BandSamples, marks: MarkAppearance, size: np.ndarray, family: Family
+    samples: BandSamples, marks: MarkAppearance, frames: np.ndarray, family: Family
 ) -> BandEvidence:
     """Weigh the samples of bands.
 
@@ -59,11 +60,11 @@ def band_evidence(
     samples : BandSamples
         Of k targets.
     marks : MarkAppearance
-    size : ndarray of float64, shape (k,)
-        Radii of the dots, px.
+    frames : ndarray of float64, shape (k, 3, 3)
+        Of the targets.
     family : Family
     """
-    inner, outer = family.band_inner, family.band_outer
+    inner, outer, size = family.band_inner, family.band_outer, mean_radii(frames)
     dark = (marks.polarity > 0)[:, None]
     bright = np.where(dark, samples.ground, np.concatenate([samples.dot, samples.dot]))
     light = light_levels(np.moveaxis(bright, 0, 2), samples.gap, marks)

@@ -10,12 +10,8 @@ from ahf_ros.codes.ring import Family
 from ahf_ros.features import frame
 from ahf_ros.features.sampling import sample_circles, within
 
-BESIDE = 2.6
-"""Distance of a reading from an edge that is sharp, px."""
-
-NEAREST_BESIDE, FARTHEST_BESIDE = 0.13, 0.36
-"""Bounds of that distance, dot radii."""
-
+_BESIDE = 2.6  # distance of a reading from an edge that is sharp, px
+_NEAREST, _FARTHEST = 0.13, 0.36  # bounds of that distance, dot radii
 _SOFT, _BESIDE_SOFT = 1.0, 3.0  # blur of an edge, px, from which that distance grows, and how fast
 _BAND_DEPTHS = (0.3, 0.5, 0.7)  # shares of the width of the band, where its level is read
 _GAP_DEPTHS = (0.35, 0.65)  # shares of the width of the gap, where its level is read
@@ -38,6 +34,8 @@ class BandSamples:
         In the gap between dot and band, away from their edges.
     dot : ndarray of float32, shape (2, k, m)
         In the dot.
+    beside : ndarray of float64, shape (k, 1)
+        Distance of readings beside an edge from it, dot radii.
     visible : ndarray of bool, shape (k, m)
         Whether the image shows all of these.
     """
@@ -49,6 +47,7 @@ class BandSamples:
     band: np.ndarray
     gap: np.ndarray
     dot: np.ndarray
+    beside: np.ndarray
     visible: np.ndarray
 
     @property
@@ -62,27 +61,12 @@ class BandSamples:
         return np.stack([*self.gap, self.inner_ground, self.outer_ground])
 
 
-def beside_edges(size: np.ndarray, blur: np.ndarray | float) -> np.ndarray:
-    """Return how far from an edge to read, so that its blur does not reach there.
-
-    Parameters
-    ----------
-    size : ndarray of float64, shape (k,)
-        Radii of the dots, px.
-    blur : float or ndarray of float64, shape (k,)
-        Of the edges, standard deviation in px.
-
-    Returns
-    -------
-    ndarray of float64, shape (k, 1)
-        Dot radii.
-    """
-    beside = BESIDE + _BESIDE_SOFT * np.maximum(blur - _SOFT, 0)
-    return np.clip(beside / size, NEAREST_BESIDE, FARTHEST_BESIDE)[:, None]
-
-
 def sample_bands(
-    gray: np.ndarray, frames: np.ndarray, beside: np.ndarray, angles: np.ndarray, family: Family
+    gray: np.ndarray,
+    frames: np.ndarray,
+    blur: np.ndarray | float,
+    angles: np.ndarray,
+    family: Family,
 ) -> BandSamples:
     """Read the gray values of targets about their dots.
 
@@ -91,13 +75,15 @@ def sample_bands(
     gray : ndarray of float32, shape (height, width)
         Gray values from 0 to 255.
     frames : ndarray of float64, shape (k, 3, 3)
-    beside : ndarray of float64, shape (k, 1)
-        Distance of readings from edges, see `beside_edges`.
+    blur : float or ndarray of float64, shape (k,)
+        Of the edges, standard deviation in px; readings keep away from it.
     angles : ndarray of float64, shape (m,)
         In the frame, from +x towards +y, rad.
     family : Family
     """
     inner, outer = family.band_inner, family.band_outer
+    beside = _BESIDE + _BESIDE_SOFT * np.maximum(blur - _SOFT, 0)
+    beside = np.clip(beside / frame.mean_radii(frames), _NEAREST, _FARTHEST)[:, None]
     fixed = np.concatenate(
         [
             inner + (outer - inner) * np.array(_BAND_DEPTHS),
@@ -111,7 +97,9 @@ def sample_bands(
     values = np.moveaxis(np.maximum(values, 0), 2, 0)
     ends = np.cumsum([4, len(_BAND_DEPTHS), len(_GAP_DEPTHS)])
     of_edges, band, gap, dot = np.split(values, ends)
-    inner_ground, inner_band, outer_band, outer_ground = of_edges
-    limit = frame.circle_points(angles, np.array([outer + FARTHEST_BESIDE]))[:, 0]
+    limit = frame.circle_points(angles, np.array([outer + _FARTHEST]))[:, 0]
     visible = within(frame.project(frames, limit), gray.shape)
-    return BandSamples(inner_ground, inner_band, outer_band, outer_ground, band, gap, dot, visible)
+    inner_ground, inner_band, outer_band, outer_ground = of_edges
+    return BandSamples(
+        inner_ground, inner_band, outer_band, outer_ground, band, gap, dot, beside, visible
+    )

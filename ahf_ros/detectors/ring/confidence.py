@@ -12,7 +12,6 @@ import numpy as np
 from ahf_ros.detectors.ring.decoding import Readings
 from ahf_ros.detectors.ring.fitted_weights import fitted_weights
 from ahf_ros.features.circle_fit import Fit
-from ahf_ros.features.frame import mean_radii
 
 _MINIMUM_DEVIATION = 0.001  # of edges, below which it says no more, dot radii
 _MINIMUM_CONTRAST = 0.25  # of prints; a smaller one speaks no more for a target
@@ -42,12 +41,11 @@ def confidence_features(readings: Readings, fit: Fit) -> np.ndarray:
         radii; ln of the contrast. Of the word: ln(1 + margin), the contradiction, and the
         explained share of all steps.
     """
-    deviation = fit.deviation / mean_radii(fit.frames)
     return np.stack(
         [
             readings.explained[:, 2:].min(axis=1),
             fit.share,
-            np.log(deviation + _MINIMUM_DEVIATION),
+            np.log(fit.deviation / fit.size + _MINIMUM_DEVIATION),
             np.log(np.maximum(fit.contrast, _MINIMUM_CONTRAST)),
             np.log1p(np.maximum(readings.margin, 0)),
             readings.contradiction,

@@ -11,7 +11,7 @@ import numpy as np
 
 from ahf_ros.codes.ring import Family, family
 from ahf_ros.detectors.contract import DetectorSettings
-from ahf_ros.detectors.ring.band_samples import beside_edges, sample_bands
+from ahf_ros.detectors.ring.band_samples import sample_bands
 from ahf_ros.detectors.ring.detector import find_hypotheses
 from ahf_ros.detectors.ring.evidence import (
     MarkAppearance,
@@ -25,7 +25,7 @@ from ahf_ros.detectors.ring.hypotheses import Hypotheses, resolve_dots
 from ahf_ros.features import frame
 from ahf_ros.features.profiles import USUAL_BLUR
 from ahf_ros.features.sampling import sample_circles
-from ahf_ros.imaging.image import as_gray
+from ahf_ros.imaging.image import as_gray, check_image
 
 _SAMPLES = 5  # angles a sector
 _MARGIN = 0.45  # distance from the band at which its margin is read, dot radii
@@ -62,10 +62,12 @@ def estimate_count(image: np.ndarray, settings: DetectorSettings | None = None) 
     """
     settings = settings or DetectorSettings()
     code = family(settings.family)
-    dots = find_hypotheses(image, settings)
+    check_image(image)
+    gray = as_gray(image)
+    dots = find_hypotheses(gray, settings)
     major, _, _ = frame.ellipse_axes(dots.frames)
     dots = dots.select((major >= settings.min_radius) & (major <= settings.max_radius))
-    features = target_features(as_gray(image).astype(np.float32, copy=False), dots, code)
+    features = target_features(gray.astype(np.float32, copy=False), dots, code)
     probability = target_probability(features)
     # No regression knows all dots that have no band; every word has two marked sectors at least.
     banded = features[:, _MARKED] * code.bits >= _MINIMUM_MARKED
@@ -131,11 +133,9 @@ def target_features(gray: np.ndarray, dots: Hypotheses, code: Family) -> np.ndar
     """
     angles = 2 * np.pi * np.arange(code.bits * _SAMPLES) / (code.bits * _SAMPLES)
     major, minor, _ = frame.ellipse_axes(dots.frames)
-    size = np.sqrt(major * minor)
-    beside = beside_edges(size, USUAL_BLUR)
-    samples = sample_bands(gray, dots.frames, beside, angles, code)
-    margin = np.full_like(beside, code.band_outer + _MARGIN)
-    radii = np.concatenate([1 - beside, 1 + beside, margin], axis=1)
+    samples = sample_bands(gray, dots.frames, USUAL_BLUR, angles, code)
+    margin = np.full_like(samples.beside, code.band_outer + _MARGIN)
+    radii = np.concatenate([1 - samples.beside, 1 + samples.beside, margin], axis=1)
     values = sample_circles(gray, dots.frames, angles, radii)
     inside, outside, margin = np.moveaxis(np.maximum(values, 0), 2, 0)
 
@@ -161,7 +161,7 @@ def target_features(gray: np.ndarray, dots: Hypotheses, code: Family) -> np.ndar
             dots.share,
             (step * marks.polarity[:, None] > _WHOLE_STEP * usual).mean(axis=1),
             np.log(marks.contrast + _MINIMUM_CONTRAST),
-            np.log(size),
+            np.log(np.sqrt(major * minor)),
             np.log(major / minor),
             free(samples.inner_ground, *samples.gap),
             free(samples.outer_ground, margin),

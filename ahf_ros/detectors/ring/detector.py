@@ -15,11 +15,12 @@ import numpy as np
 
 from ahf_ros.codes.ring import Family, canonical, family
 from ahf_ros.detectors.contract import DetectorSettings
-from ahf_ros.detectors.ring.frames import fit_dots
-from ahf_ros.detectors.ring.hypotheses import CERTAIN, Hypotheses, resolve_dots, resolve_ids
+from ahf_ros.detectors.ring.hypotheses import Hypotheses, resolve_dots, resolve_ids
 from ahf_ros.detectors.ring.reading import read_bands
 from ahf_ros.detectors.ring.refinement import refine_centres
+from ahf_ros.detectors.ring.target_circles import REACH
 from ahf_ros.features import frame
+from ahf_ros.features.circle_fit import Fit, fit_dots
 from ahf_ros.features.dot_search import voted_dots, whole_dots
 from ahf_ros.features.dots import Dots
 from ahf_ros.features.ellipse_targets import targets_from_frames
@@ -33,7 +34,6 @@ _FAINTEST = 0.8  # contrast of a dot, dark over bright, for its band to be read
 _WHOLE = 0.9  # share of the edge of a dot that is reported without a word
 _PART = 256  # dots read at a time, which bounds the memory
 _MARGIN = 0.4  # width of the quiet margin round a dot or a band, dot radii
-_OUTLINE = 2 * np.pi * np.arange(32) / 32  # angles of the polygon that hides an object
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,35 +59,35 @@ class RingDetector:
 
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image; see `Detector`."""
-        return report(find_hypotheses(image, self.settings), self.settings)
+        check_image(image)
+        return report(find_hypotheses(as_gray(image), self.settings), self.settings)
 
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
         """Return targets with their places in an image; see `refine_centres`."""
         return refine_centres(image, targets, family(self.family), self.settings.polarities)
 
 
-def find_hypotheses(image: np.ndarray, settings: DetectorSettings) -> Hypotheses:
-    """Return all dots of one image and what their bands may say, before anything is decided.
+def find_hypotheses(gray: np.ndarray, settings: DetectorSettings) -> Hypotheses:
+    """Return all dots of an image and what their bands may say, before anything is decided.
 
     Parameters
     ----------
-    image : ndarray, shape (height, width)
-        As for `Detector`.
+    gray : ndarray of uint8 or float32, shape (height, width)
+        Gray values from 0 to 255.
     settings : DetectorSettings
         What the targets look like.
-
-    Raises
-    ------
-    ValueError
-        If the image is not accepted.
     """
-    check_image(image)
     code = family(settings.family)
-    wanted = (settings.min_radius, settings.max_radius, settings.polarities)
-    pyramid = image_pyramid(as_gray(image), settings.max_radius)
-    whole = read_dots(pyramid.gray, whole_dots(pyramid, *wanted), code)
-    voted = voted_dots(pyramid, *wanted, explained=explained_outlines(whole, code))
-    return Hypotheses.joined([whole, read_dots(pyramid.gray, voted, code)])
+    kind = (settings.min_radius, settings.max_radius, settings.polarities)
+    pyramid = image_pyramid(gray, settings.max_radius)
+    dots = whole_dots(pyramid, *kind)
+    whole = read_dots(pyramid.gray, dots, code)
+    explained = whole.certain | (whole.share >= _WHOLE)
+    radii = np.where(whole.certain, code.band_outer, 1.0) + _MARGIN
+    outlines = frame.circle_outlines(whole.frames[explained], radii[explained])
+    dots = voted_dots(pyramid, *kind, explained=outlines)
+    voted = read_dots(pyramid.gray, dots, code)
+    return Hypotheses.joined([whole, voted])
 
 
 def read_dots(gray: np.ndarray, dots: Dots, code: Family) -> Hypotheses:
@@ -102,26 +102,23 @@ def read_dots(gray: np.ndarray, dots: Dots, code: Family) -> Hypotheses:
     """
     parts = []
     for start in range(0, max(len(dots.frames), 1), _PART):
-        part = dots.select(np.s_[start : start + _PART])
-        fit = fit_dots(gray, part.frames, part.polarity, _RAYS)
-        good = (fit.share >= _MINIMUM_SHARE) & (fit.contrast <= _FAINTEST)
-        parts.append(read_bands(gray, fit.select(good), part.polarity[good], code)[0])
+        part = dots.select(slice(start, start + _PART))
+        hypotheses, _ = read_bands(gray, _fitted(gray, part), code)
+        parts.append(hypotheses)
     return Hypotheses.joined(parts)
 
 
-def explained_outlines(hypotheses: Hypotheses, code: Family) -> np.ndarray:
-    """Return outlines of targets and of whole dots, whose edges need no other explanation.
-
-    Returns
-    -------
-    ndarray of float64, shape (n, m, 2)
-        px.
-    """
-    certain = hypotheses.confidence >= CERTAIN
-    explained = certain | (hypotheses.share >= _WHOLE)
-    radii = np.where(certain, code.band_outer + _MARGIN, 1 + _MARGIN)[explained, None]
-    points = frame.circle_points(_OUTLINE, radii)
-    return frame.project(hypotheses.frames[explained], points)[:, :, 0]
+def _fitted(gray: np.ndarray, dots: Dots) -> Fit:
+    """Return the fits of the dots whose bands are worth reading."""
+    return fit_dots(
+        gray,
+        dots.frames,
+        dots.polarity,
+        rays=_RAYS,
+        reach=REACH,
+        min_share=_MINIMUM_SHARE,
+        max_contrast=_FAINTEST,
+    )
 
 
 def report(hypotheses: Hypotheses, settings: DetectorSettings) -> list[Target]:
@@ -129,15 +126,12 @@ def report(hypotheses: Hypotheses, settings: DetectorSettings) -> list[Target]:
     code = family(settings.family)
     major, _, _ = frame.ellipse_axes(hypotheses.frames)
     whole = settings.report_undecoded & (hypotheses.share >= _WHOLE)
-    shown = (hypotheses.confidence >= CERTAIN) | whole
-    shown &= (major >= settings.min_radius) & (major <= settings.max_radius)
-    hypotheses = hypotheses.select(shown)
-    uncertain = hypotheses.confidence < CERTAIN
-    hypotheses = hypotheses.select(np.lexsort((-hypotheses.margin, uncertain)))
+    of_size = (major >= settings.min_radius) & (major <= settings.max_radius)
+    hypotheses = hypotheses.select(of_size & (hypotheses.certain | whole))
+    hypotheses = hypotheses.select(np.lexsort((-hypotheses.margin, ~hypotheses.certain)))
     codes, ids = canonical(hypotheses.words, code)
-    certain = hypotheses.confidence >= CERTAIN
-    kept, uncontested = resolve_dots(hypotheses, ids, certain, code)
-    certain = resolve_ids(hypotheses, ids, certain & uncontested)
+    kept, uncontested = resolve_dots(hypotheses, ids, hypotheses.certain, code)
+    certain = resolve_ids(hypotheses, ids, hypotheses.certain & uncontested)
     ids = np.where(certain, ids, UNDECODED)
     if not settings.report_undecoded:
         kept = kept[certain[kept]]

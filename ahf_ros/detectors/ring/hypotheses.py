@@ -13,9 +13,7 @@ from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.circle_fit import Fit
 
-CERTAIN = 0.98
-"""Confidence from which a word is reported."""
-
+_CERTAIN = 0.98  # confidence from which a word is reported
 _CLEARLY = 2.0  # times the evidence of another claim to the same ID or dot
 
 
@@ -48,6 +46,11 @@ class Hypotheses(ArrayRecord):
     margin: np.ndarray
     features: np.ndarray
     confidence: np.ndarray
+
+    @property
+    def certain(self) -> np.ndarray:
+        """Whether words are certain enough to be reported, ndarray of bool, shape (k,)."""
+        return self.confidence >= _CERTAIN
 
     @staticmethod
     def unread(dots: Fit) -> Hypotheses:

@@ -12,30 +12,26 @@ import numpy as np
 
 from ahf_ros.codes.ring import Family
 from ahf_ros.detectors.ring.band_evidence import band_evidence
-from ahf_ros.detectors.ring.band_samples import beside_edges, sample_bands
+from ahf_ros.detectors.ring.band_samples import sample_bands
 from ahf_ros.detectors.ring.decoding import decode, sector_angles
 from ahf_ros.detectors.ring.evidence import MarkAppearance
-from ahf_ros.detectors.ring.frames import SMALL, fit_dots_and_bands, target_circles, unshifted
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
-from ahf_ros.features.circle_fit import Fit
-from ahf_ros.features.frame import mean_radii
+from ahf_ros.detectors.ring.target_circles import REACH, target_circles
+from ahf_ros.features.circle_fit import Fit, fit_circles
+from ahf_ros.features.edge_shift import SMALL, unshifted
 from ahf_ros.features.sampling import sample_circles
 
 PASSES = ((5, 1), (10, 2))
 """Over a band, each in a better frame: samples a sector, and rounds of the fit that follows."""
 
 _LEVEL_RADII = np.array([0.75, 1.4])  # dot radii, where the levels of dot and gap are read
-_LEVEL_RAYS = 24
-_LEVEL_ANGLES = 2 * np.pi * np.arange(_LEVEL_RAYS) / _LEVEL_RAYS
+_LEVEL_ANGLES = 2 * np.pi * np.arange(24) / 24
+_MINIMUM_LEVEL = 1.0  # gray value that ratios are taken of
 _PRINTED = 0.25  # usual contrast of prints
 
 
 def read_bands(
-    gray: np.ndarray,
-    dots: Fit,
-    polarity: np.ndarray,
-    family: Family,
-    passes: Sequence[tuple[int, int]] = PASSES,
+    gray: np.ndarray, dots: Fit, family: Family, passes: Sequence[tuple[int, int]] = PASSES
 ) -> tuple[Hypotheses, np.ndarray]:
     """Read the bands about dots, and refine dot and band together.
 
@@ -45,8 +41,6 @@ def read_bands(
         Gray values from 0 to 255.
     dots : Fit
         Of k dots.
-    polarity : ndarray of int, shape (k,)
-        1 for a dark target, -1 for a bright one.
     family : Family
     passes : sequence of (int, int)
         As `PASSES` has them; one is enough where frames are right to a tenth of a pixel.
@@ -58,27 +52,26 @@ def read_bands(
     which : ndarray of int, shape (m,)
         The dot that each is of.
     """
-    which, frames = unshifted(dots, polarity)
-    dots = dots.select(which)
-    marks = mark_appearance(gray, dots, polarity[which])
-    read = np.arange(len(which))
+    marks = mark_appearance(gray, dots)
+    which, frames = unshifted(dots)
+    marks, read = marks.select(which), np.arange(len(which))
     for per_sector, rounds in passes:
-        size, angles = mean_radii(frames), sector_angles(family, per_sector)
-        samples = sample_bands(gray, frames, beside_edges(size, marks.blur), angles, family)
-        evidence = band_evidence(samples, marks, size, family)
+        angles = sector_angles(family, per_sector)
+        samples = sample_bands(gray, frames, marks.blur, angles, family)
+        evidence = band_evidence(samples, marks, frames, family)
         readings = decode(samples, evidence, marks, family)
         good = readings.plausible
         read, readings, marks = read[good], readings.select(good), marks.select(good)
         words, starts = readings.words, readings.start
         circles = target_circles(words, starts, marks.polarity, per_sector, family)
-        joint = fit_dots_and_bands(gray, frames[good], circles, rounds)
-        frames = joint.frames
-    unread = Hypotheses.unread(dots)
-    return unread.replaced(read, Hypotheses.read(readings, joint)), which
+        fit = fit_circles(gray, frames[good], circles, reach=REACH, projective=True, rounds=rounds)
+        frames = fit.frames
+    unread = Hypotheses.unread(dots.select(which))
+    return unread.replaced(read, Hypotheses.read(readings, fit)), which
 
 
-def mark_appearance(gray: np.ndarray, dots: Fit, polarity: np.ndarray) -> MarkAppearance:
-    """Return how marks are expected to look.
+def mark_appearance(gray: np.ndarray, dots: Fit) -> MarkAppearance:
+    """Return how marks about dots are expected to look.
 
     Their contrast is that of the dot's edge. Where a camera sharpens, that edge is darker than
     marks are, and where marks are small blur makes them less dark. The levels beside the edge then
@@ -91,12 +84,10 @@ def mark_appearance(gray: np.ndarray, dots: Fit, polarity: np.ndarray) -> MarkAp
         Gray values from 0 to 255.
     dots : Fit
         Of k dots.
-    polarity : ndarray of int, shape (k,)
     """
     values = sample_circles(gray, dots.frames, _LEVEL_ANGLES, _LEVEL_RADII)
-    inside, outside = np.moveaxis(np.maximum(values, 1.0), 2, 0)
-    ratio = np.median(inside / outside, axis=1) ** polarity
-    small = mean_radii(dots.frames) < SMALL
-    by_levels = np.where(small, ratio, np.minimum(ratio, _PRINTED))
+    inside, outside = np.moveaxis(np.maximum(values, _MINIMUM_LEVEL), 2, 0)
+    ratio = np.median(inside / outside, axis=1) ** dots.polarity
+    by_levels = np.where(dots.size < SMALL, ratio, np.minimum(ratio, _PRINTED))
     contrast = np.maximum(dots.contrast, by_levels)
-    return MarkAppearance(polarity, contrast, dots.bright, dots.blur)
+    return MarkAppearance(dots.polarity, contrast, dots.bright, dots.blur)

@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ahf_ros.codes.ring import Family, canonical
-from ahf_ros.detectors.ring.frames import fit_dots
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.reading import PASSES, read_bands
+from ahf_ros.detectors.ring.target_circles import REACH
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
-from ahf_ros.features.circle_fit import Fit
+from ahf_ros.features.circle_fit import Fit, fit_dots
 from ahf_ros.features.ellipse_targets import ellipse_fields
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, Target
@@ -93,12 +93,10 @@ def _locate(
     polarities: Sequence[int],
 ) -> _Located:
     """Return where targets are, by dot and band where the band agrees, else by the dot."""
-    dots, polarity = _fit_either_polarity(gray, start, polarities)
+    dots = _fit_either_polarity(gray, start, polarities)
     ids, codes = np.array([(target.id, target.code) for target in targets]).T
     decoded = np.flatnonzero((ids != UNDECODED) & (dots.share >= _MINIMUM_SHARE))
-    hypotheses, of_decoded = read_bands(
-        gray, dots.select(decoded), polarity[decoded], code, passes=PASSES[-1:]
-    )
+    hypotheses, of_decoded = read_bands(gray, dots.select(decoded), code, passes=PASSES[-1:])
     which = decoded[of_decoded]
     agreed = (hypotheses.words > 0) & (canonical(hypotheses.words, code)[0] == codes[which])
     agreed &= hypotheses.share >= _MINIMUM_SHARE
@@ -106,7 +104,7 @@ def _locate(
     order = np.lexsort((-hypotheses.margin, ~agreed))[: agreed.sum()]
     by_band, best = np.unique(which[order], return_index=True)
     rest = np.setdiff1d(np.arange(len(targets)), by_band)
-    alone = fit_dots(gray, start[rest], polarity[rest], _RAYS)
+    alone = fit_dots(gray, start[rest], dots.polarity[rest], rays=_RAYS, reach=REACH)
     located = _located(dots).replaced(rest, _located(alone))
     return located.replaced(by_band, _located(hypotheses.select(order[best])))
 
@@ -115,15 +113,13 @@ def _located(of: Fit | Hypotheses) -> _Located:
     return _Located(of.frames, of.covariance, of.share)
 
 
-def _fit_either_polarity(
-    gray: np.ndarray, frames: np.ndarray, polarities: Sequence[int]
-) -> tuple[Fit, np.ndarray]:
-    """Return first fits of dots, with the polarity of each that its edge has."""
+def _fit_either_polarity(gray: np.ndarray, frames: np.ndarray, polarities: Sequence[int]) -> Fit:
+    """Return first fits of dots, each with the polarity that its edge has."""
     count = len(frames)
     fits = [
-        fit_dots(gray, frames, np.full(count, polarity), _FIRST_RAYS, rounds=1)
+        fit_dots(gray, frames, np.full(count, polarity), rays=_FIRST_RAYS, reach=REACH, rounds=1)
         for polarity in polarities
     ]
     # Edges of the wrong polarity are found, too, within what is flat; but they are faint.
     best = np.argmax([fit.share * (1 - fit.contrast) for fit in fits], axis=0)
-    return Fit.joined(fits).select(best * count + np.arange(count)), np.array(polarities)[best]
+    return Fit.joined(fits).select(best * count + np.arange(count))

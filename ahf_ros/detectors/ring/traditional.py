@@ -24,10 +24,10 @@ import numpy as np
 from ahf_ros.codes.ring import Family, family
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.ring.blobs import blob_frames, masks
-from ahf_ros.detectors.ring.frames import fit_dots, fit_dots_and_bands, target_circles
 from ahf_ros.detectors.ring.grey_gradient import BandReadings, read_by_gradient
 from ahf_ros.detectors.ring.refinement import refine_centres
-from ahf_ros.features.circle_fit import Fit
+from ahf_ros.detectors.ring.target_circles import REACH, target_circles
+from ahf_ros.features.circle_fit import Fit, fit_circles, fit_dots
 from ahf_ros.features.ellipse_targets import targets_from_frames
 from ahf_ros.features.frame import ellipse_axes
 from ahf_ros.imaging.image import as_gray, check_image, stretched_to_8_bit
@@ -47,9 +47,6 @@ class TraditionalDetector:
     Attributes
     ----------
     settings : DetectorSettings
-        What the targets look like.
-    name : str
-        'traditional'.
     """
 
     settings: DetectorSettings = field(default_factory=DetectorSettings)
@@ -68,37 +65,13 @@ class TraditionalDetector:
         """Identify the targets of one image; see `Detector`.
 
         Of several targets that claim one ID the most certain keeps it, the others are undecoded.
-
-        Parameters
-        ----------
-        image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
-            Gray values. The threshold sees them scaled to 8 bit, extremes to 0 and 255; edges and
-            bands are measured in the image as it is.
-
-        Returns
-        -------
-        list of Target
-            Sorted by ID, undecoded targets (only with `report_undecoded`) first.
-
-        Raises
-        ------
-        ValueError
-            If `image` is not an image, see `ahf_ros.imaging.image.check_image`.
+        The threshold sees the image scaled to 8 bit, extremes to 0 and 255; edges and bands are
+        measured in the image as it is.
         """
         return self._identify(image, fine=True)
 
     def draft(self, image: np.ndarray) -> list[Target]:
-        """Identify the targets of one image, centres being those of contours, to about a pixel.
-
-        Parameters
-        ----------
-        image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
-
-        Returns
-        -------
-        list of Target
-            As a call returns it, in less than half of the time.
-        """
+        """Identify as a call does, in less than half of the time, with centres to about a pixel."""
         return self._identify(image, fine=False)
 
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
@@ -127,8 +100,14 @@ def _identify_dots(
     covariance = np.broadcast_to(_CONTOUR_ERROR**2 * np.eye(2), (len(frames), 2, 2))
     code = family(settings.family)
     if fine:
-        fit = fit_dots(gray, frames, np.full(len(frames), polarity), _RAYS)
-        fit = fit.select(fit.share >= _MINIMUM_SHARE)
+        fit = fit_dots(
+            gray,
+            frames,
+            np.full(len(frames), polarity),
+            rays=_RAYS,
+            reach=REACH,
+            min_share=_MINIMUM_SHARE,
+        )
         frames, covariance = fit.frames, fit.covariance
     if not len(frames):
         return []
@@ -140,7 +119,7 @@ def _identify_dots(
         ]
     )
     if fine:
-        fit = _fit_decoded(gray, fit, readings, polarity, np.flatnonzero(ids != UNDECODED), code)
+        fit = _fit_decoded(gray, fit, readings, np.flatnonzero(ids != UNDECODED), code)
         frames, covariance = fit.frames, fit.covariance
     major, _, _ = ellipse_axes(frames)
     shown = (settings.min_radius <= major) & (major <= settings.max_radius) & readings.surrounded
@@ -152,18 +131,12 @@ def _identify_dots(
 
 
 def _fit_decoded(
-    gray: np.ndarray,
-    fit: Fit,
-    readings: BandReadings,
-    polarity: int,
-    decoded: np.ndarray,
-    code: Family,
+    gray: np.ndarray, fit: Fit, readings: BandReadings, decoded: np.ndarray, code: Family
 ) -> Fit:
     """Return fits of dots, those of decoded targets with their bands."""
-    read = readings.select(decoded)
-    polarities = np.full(len(decoded), polarity)
-    circles = target_circles(read.words, read.starts, polarities, _SAMPLES, code)
-    joint = fit_dots_and_bands(gray, fit.frames[decoded], circles)
+    read, dots = readings.select(decoded), fit.select(decoded)
+    circles = target_circles(read.words, read.starts, dots.polarity, _SAMPLES, code)
+    joint = fit_circles(gray, dots.frames, circles, reach=REACH, projective=True)
     good = joint.share >= _MINIMUM_SHARE
     return fit.replaced(decoded[good], joint.select(good))
 

@@ -185,11 +185,10 @@ def _fit_lines(
         usual = spread(errors.reshape(flat), seen.reshape(flat), _MINIMUM_DISTANCE)
         return _OUTLIER * usual.reshape(*errors.shape[:2], 1)
 
-    fitted = reweight(solve, weights, scale, _ROUNDS)
-    unknowns, inverse = fitted.solution
+    (unknowns, inverse), _, robust = reweight(solve, weights, scale, _ROUNDS)
     errors = np.abs(offsets - unknowns @ basis.T)
     share = (seen & (errors < _PLACED)).mean(axis=2)
-    influence = (fitted.weights[..., None] * basis) @ inverse
+    influence = (robust[..., None] * basis) @ inverse
     together = np.maximum(CORRELATION / spacing, 1.0)
     parts = influence * (errors * np.sqrt(together))[..., None]
     return _Lines(unknowns, np.swapaxes(parts, 2, 3) @ parts, share)

@@ -1,4 +1,4 @@
-"""Frames of ring targets: which edges they are fitted to."""
+"""Where ring targets have edges."""
 
 from __future__ import annotations
 
@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.codes.ring import family
-from ahf_ros.detectors.ring.frames import SMALL, target_circles, unshifted
-from ahf_ros.features import frame
-from ahf_ros.features.circle_fit import Fit
+from ahf_ros.detectors.ring.target_circles import target_circles
 
 CODE = family('metashape12')
 
@@ -34,19 +32,3 @@ def test_the_number_of_edges_is_that_of_the_marked_sectors():
     circles = target_circles(words, np.zeros(2), polarity, 10, CODE)
     marked = (circles.polarity[:, circles.radii > 1] != 0).sum(axis=1)
     assert marked.tolist() == [4 * 2 * 8, 11 * 2 * 8]
-
-
-@pytest.mark.parametrize('polarity', [1, -1])
-def test_small_dots_are_read_without_and_with_the_shift_of_their_edge(polarity):
-    radii = np.array([SMALL - 2, SMALL + 5])
-    fit = Fit(
-        frame.affine_frames(np.array([50.0, 90.0]), 40.0, radii, radii, 0.0),
-        *(np.ones(2) for _ in range(4)),
-        covariance=np.tile(np.eye(2), (2, 1, 1)),
-        blur=np.full(2, 0.8),
-    )
-    which, frames = unshifted(fit, np.array([polarity, polarity]))
-    assert which.tolist() == [0, 1, 0]
-    outwards = frame.mean_radii(frames) - radii[which]
-    assert outwards == pytest.approx(np.array([0, 0.2, 0.4]) * polarity)  # in the blur, 0 to 1/2
-    assert frames[:, :2, 2] == pytest.approx(fit.frames[which, :2, 2])

@@ -1,0 +1,49 @@
+"""Where ring targets have edges: round the dot and along the marked sectors of the band."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ahf_ros.codes.ring import Family
+from ahf_ros.features.circles import Circles, dot_circles
+
+REACH = 0.45
+"""Distance from an expected edge to look for it, dot radii: less than half a gap."""
+
+_RAYS = 48  # about a dot whose band is fitted with it
+_INNER_PART = 0.4  # of a sector, to either side; next to its ends the blur rounds an arc off
+
+
+def target_circles(
+    words: np.ndarray,
+    starts: np.ndarray,
+    polarity: np.ndarray,
+    samples: int,
+    family: Family,
+) -> Circles:
+    """Return the edges of ring targets.
+
+    Parameters
+    ----------
+    words : ndarray of int64, shape (k,)
+        Code words, in any rotation.
+    starts : ndarray of float, shape (k,)
+        Where in the frame the sector of the lowest bit starts, rad counter-clockwise from +x.
+    polarity : ndarray of int, shape (k,)
+        1 for a dark target, -1 for a bright one.
+    samples : int
+        Number of points on each edge of the band, a sector.
+    family : Family
+    """
+    dot = dot_circles(polarity, _RAYS)
+    count = family.bits * samples
+    angles = 2 * np.pi * (np.arange(count) + 0.5) / count
+    sector, depth = np.divmod((angles - starts[:, None]) * family.bits / (2 * np.pi), 1)
+    bits = words[:, None] >> sector.astype(np.int64) % family.bits & 1
+    marked = np.where(np.abs(depth - 0.5) < _INNER_PART, bits, 0) * polarity[:, None]
+    return Circles(
+        np.concatenate([dot.angles, -angles, -angles]),
+        np.concatenate([dot.radii, np.repeat([family.band_inner, family.band_outer], count)]),
+        np.concatenate([dot.group, np.ones(2 * count, int)]),
+        np.concatenate([dot.polarity, -marked, marked], axis=1),
+    )
