@@ -47,7 +47,10 @@ def test_several_at_once_are_those_one_by_one():
     starts = np.stack([CORNERS + NEAR, CORNERS - NEAR])
     both = fit_sides(drawn(), starts, CELLS)
     for start, corners in zip(starts, both.corners, strict=True):
-        assert np.array_equal(fit_sides(drawn(), start[None], CELLS).corners[0], corners)
+        # BLAS may round batches of another size otherwise.
+        assert fit_sides(drawn(), start[None], CELLS).corners[0] == pytest.approx(
+            corners, abs=1e-6
+        )
     assert len(fit_sides(drawn(), np.zeros((0, 4, 2)), CELLS).corners) == 0
 
 

@@ -145,8 +145,7 @@ def test_dots_do_not_depend_on_each_other():
     )
     for index, start in enumerate(starts):
         alone = fitted(image, start)
-        # BLAS may round batches otherwise; where a profile then falls into another bin of places
-        # or blurs, centres move by less than a thousandth of what is promised.
+        # BLAS may round batches of another size otherwise.
         assert together.select(np.array([index])).frames == pytest.approx(alone.frames, abs=1e-6)
     halves = [together.select(np.array([index])) for index in (0, 1)]
     assert (Fit.joined(halves).frames == together.frames).all()

@@ -71,7 +71,7 @@ class TraditionalDetector:
         return self._identify(image, fine=True)
 
     def draft(self, image: np.ndarray) -> list[Target]:
-        """Identify as a call does, in less than half of the time, with centres to about a pixel."""
+        """Identify in less than half of the time, with centres to about a pixel."""
         return self._identify(image, fine=False)
 
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
