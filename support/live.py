@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import signal
 import subprocess
@@ -10,6 +11,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from typing import IO, Any
 from unittest import mock
 
@@ -18,10 +20,28 @@ import ahf_ros.blas  # noqa: F401  before numpy, as in processes that are ours
 PATIENCE = 60.0
 """Time after which something that does not happen is a failure, s; machines may be slow."""
 
-ROS_ENVIRONMENT = {
-    'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
-    'ROS_DOMAIN_ID': str(1 + os.getpid() % 100),  # others on this machine may be testing, too
-}
+DOMAINS = range(1, 101)
+
+
+@cache
+def ros_environment() -> dict[str, str]:
+    """Return the variables that keep ROS on this machine, in a domain that nobody else tests in.
+
+    The domain is this process's until it ends: a lock on a file says so.
+    """
+    start = os.getpid() % len(DOMAINS)
+    for domain in (*DOMAINS[start:], *DOMAINS[:start]):
+        try:
+            file = os.open(f'{tempfile.gettempdir()}/ahf_ros_domain_{domain}', os.O_CREAT)
+        except PermissionError:  # of another user
+            continue
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(file)
+            continue
+        return {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', 'ROS_DOMAIN_ID': str(domain)}
+    raise RuntimeError('all domains are taken by other tests')
 
 
 class NodeProcess:
@@ -35,7 +55,7 @@ class NodeProcess:
         self._written = [tempfile.TemporaryFile('w+') for _ in range(2)]  # noqa: SIM115
         self.process = subprocess.Popen(
             command,
-            env={**os.environ, **ROS_ENVIRONMENT},
+            env={**os.environ, **ros_environment()},
             stdout=self._written[0],
             stderr=self._written[1],
         )
@@ -134,7 +154,7 @@ def opened() -> Iterator[Graph]:
     """
     import rclpy
 
-    with mock.patch.dict(os.environ, ROS_ENVIRONMENT):
+    with mock.patch.dict(os.environ, ros_environment()):
         rclpy.init()
         graph = Graph(rclpy.create_node('test'))
         try:

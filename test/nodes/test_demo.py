@@ -16,7 +16,7 @@ import pytest
 from ahf_ros.drawing import DECODED_COLOUR, MISSED_COLOUR, WRONG_COLOUR
 from ahf_ros.interchange.image_files import read_image
 from ahf_ros.target import FilterState, Identification, Target
-from support.live import PATIENCE, ROS_ENVIRONMENT
+from support.live import PATIENCE, ros_environment
 
 pytest.importorskip('rclpy', reason='ROS 2 is not installed')
 
@@ -28,7 +28,7 @@ def demo(*options: str) -> subprocess.CompletedProcess[str]:
     """Return what `make demo` makes of options."""
     return subprocess.run(
         [sys.executable, '-m', 'ahf_ros.nodes.demo', *options],
-        env={**os.environ, **ROS_ENVIRONMENT},
+        env={**os.environ, **ros_environment()},
         capture_output=True,
         text=True,
         timeout=240,
@@ -63,7 +63,7 @@ def test_the_demo_shows_one_image_in_three_ways(tmp_path: Path) -> None:
 def test_the_demo_ends_when_a_node_does(tmp_path: Path) -> None:
     command = [sys.executable, '-m', 'ahf_ros.nodes.demo', '--output', str(tmp_path)]
     with subprocess.Popen(
-        command, env={**os.environ, **ROS_ENVIRONMENT}, stderr=subprocess.PIPE, text=True
+        command, env={**os.environ, **ros_environment()}, stderr=subprocess.PIPE, text=True
     ) as process:
         children = Path(f'/proc/{process.pid}/task/{process.pid}/children')
         limit = time.monotonic() + PATIENCE
