@@ -34,13 +34,13 @@ SCENE: dict[str, Any] = {'width': 1600, 'height': 1066, 'targets': 12}
 """What is rendered: few enough targets to see each of them in a picture of the whole."""
 
 NAMESPACE = '/demo'
-"""Of all nodes, away from the topics of others."""
+"""Namespace of all nodes, apart from the topics of others."""
 
 RATE = 1.0
 """Images per second."""
 
 WAITING_RATE = 0.001
-"""Images per second while nodes still look for each other; the first would come too late."""
+"""Images per second until all nodes are connected: the first image would be 1000 s away."""
 
 PATIENCE = 180.0
 """Longest time without an answer, s."""
@@ -136,16 +136,17 @@ def shared_memory_profile() -> Path:
 def main(arguments: list[str] | None = None) -> int:
     """Identify the same image in three ways, by nodes in processes of their own.
 
-    Ways: the detector `traditional` alone, the same with a filter that AHF finds, and the
-    detector `ring`, which needs no filter. One line says what each of them got right and wrong,
-    and one picture shows it.
+    The three ways are the detector `traditional` alone, the same with a filter that AHF finds,
+    and the detector `ring`, which needs no filter. One line for each says what was right and
+    wrong, and one picture shows it.
     """
     made = parser()
     options = made.parse_args(arguments)
     scene = {name: getattr(options, name) for name in ('light', 'ambient', 'seed')}
     try:
         IlluminationNodeSettings(frames=options.images, scene=SceneSettings(**SCENE, **scene))
-    except ValueError as error:
+        Path(options.output).mkdir(parents=True, exist_ok=True)
+    except (ValueError, OSError) as error:
         made.error(str(error))
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     for variable in PROFILE_VARIABLES:

@@ -1,10 +1,10 @@
-"""Agisoft Metashape behind the detector `command`. Untested: it needs a licence of Metashape.
+"""Agisoft Metashape behind the detector `command`. Untested, because it needs a licence.
 
-Written from the Metashape Python Reference (Chunk.addPhotos, Chunk.detectMarkers, Marker.label,
+It follows the Metashape Python Reference (Chunk.addPhotos, Chunk.detectMarkers, Marker.label,
 Marker.projections). Run it with the Python that Metashape is installed in:
 
     ahf identify *.jpg --expected 54 --detector command \
-        --command 'python metashape_detector.py' --command-timeout 300
+        --command 'python metashape_detector.py' --detector-timeout 300
 """
 
 import json

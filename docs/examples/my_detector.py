@@ -7,8 +7,7 @@ from typing import ClassVar
 
 import cv2
 import numpy as np
-from ahf_ros.detectors import DetectorSettings
-from ahf_ros.target import Target
+from ahf_ros import DetectorSettings, Target
 
 
 @dataclass(frozen=True)

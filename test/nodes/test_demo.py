@@ -83,6 +83,13 @@ def test_bad_options_of_the_demo_are_named(option: str, field: str) -> None:
     assert 'accepted is' in done.stderr
 
 
+def test_a_folder_that_cannot_be_made_is_named(tmp_path: Path) -> None:
+    (tmp_path / 'file').touch()
+    done = demo('--output', str(tmp_path / 'file'))
+    assert done.returncode == 2
+    assert str(tmp_path / 'file') in done.stderr
+
+
 def test_a_tile_tells_right_wrong_and_missed_targets_apart() -> None:
     from ahf_ros.nodes.comparison import tile
 
