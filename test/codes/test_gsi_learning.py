@@ -12,9 +12,11 @@ from ahf_ros.codes.gsi import positions_of
 from ahf_ros.codes.gsi_learning import learn_family
 from ahf_ros.codes.gsi_library import point_family
 from ahf_ros.interchange.point_lists import read_point_list
+from support import ROOT
+from support.photographs import IN_CI
 
 GSI = point_family()
-SURVEY = Path(__file__).resolve().parents[3] / 'shared' / 'gsi' / 'vstars_export.csv'
+SURVEY = ROOT.parent / 'shared' / 'gsi' / 'vstars_export.csv'
 
 
 def rotation(generator: np.random.Generator) -> np.ndarray:
@@ -139,7 +141,7 @@ def test_a_bad_dot_radius_is_refused(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert 'dot_radius is -1.0, accepted is a length above 0' in capsys.readouterr().err
 
 
-@pytest.mark.skipif(not SURVEY.exists(), reason='the survey of a telescope is not there')
+@pytest.mark.skipif(not (IN_CI or SURVEY.exists()), reason=f'there is no {SURVEY}')
 def test_the_survey_of_a_telescope_has_the_printed_design() -> None:
     learnt = learn_family(read_point_list(SURVEY), GSI, 'mine')
     scale = np.mean([target.scale for target in learnt.targets])
