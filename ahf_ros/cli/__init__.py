@@ -1,8 +1,8 @@
 """The command line `ahf`.
 
-Standard output is for programs: it gets JSON or nothing. All that is for people goes to standard
-error. The exit status is 0; 1 where a file could not be read or written, the others being done; 2
-where an argument is not accepted.
+Standard output is for programs: JSON or nothing. Messages for people go to standard error. The
+exit status is 0; 1 if a file could not be read or written, while the others are processed; 2 if an
+argument is not accepted.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Parameters
     ----------
     arguments : sequence of str, optional
-        What follows the name of the program; those of the process where None.
+        Arguments after the name of the program; those of the process where None.
 
     Returns
     -------
@@ -47,7 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         return 130
     except BrokenPipeError:
-        # Nobody reads any more; without this the interpreter complains while it closes the pipe.
+        # Without this, the interpreter reports an error when it flushes the closed pipe.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
 
@@ -59,8 +59,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument('--version', action='version', version=_version())
     commands = parser.add_subparsers(dest='subcommand', metavar='COMMAND', required=True)
     for name, command in COMMANDS.items():
-        told = command.DESCRIPTION
-        command.add_arguments(commands.add_parser(name, description=told, help=told))
+        text = command.DESCRIPTION
+        command.add_arguments(commands.add_parser(name, description=text, help=text))
     return parser
 
 

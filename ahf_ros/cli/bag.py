@@ -23,20 +23,20 @@ from ahf_ros.settings.parameter import Parameter
 if TYPE_CHECKING:
     from ahf_ros.bag.run import BagTask, Outcome
 
-DESCRIPTION = 'Identify the coded targets in the images of bags, of ROS 1 and ROS 2.'
+DESCRIPTION = 'Identify the coded targets in the images of ROS 1 and ROS 2 bags.'
 
-JOBS = Parameter('jobs', 1, 'Bags that are worked on at the same time.', minimum=1)
+JOBS = Parameter('jobs', 1, 'Number of bags processed at the same time.', minimum=1)
 OUTPUT_TOPIC = Parameter(
     'output_topic',
     'coded_targets',
-    'Topic of the answers, below that of the images unless it begins with a slash.',
+    'Topic of the answers, relative to that of the images unless it begins with a slash.',
 )
 STORAGE = Parameter(
-    'storage', 'mcap', 'Format of the bag that is written.', choices=('mcap', 'sqlite3')
+    'storage', 'mcap', 'Storage format of the output bag.', choices=('mcap', 'sqlite3')
 )
 
 PATIENCE = 0.2
-"""Time between two looks at whether a process has ended, s."""
+"""Interval between checks whether a process has ended, s."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -46,43 +46,43 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs='+',
         type=Path,
         metavar='IN',
-        help='Bags: folders of ROS 2, files .db3 and .mcap, files .bag of ROS 1.',
+        help='Bags: ROS 2 folders, .db3 or .mcap files, or ROS 1 .bag files.',
     )
     parser.add_argument(
         'target',
         type=Path,
         metavar='OUT',
-        help='The bag that is written, a folder; for several bags the folder that they are '
-        'written into. One that is not finished is gone on with.',
+        help='Output bag, a folder; for several bags, the folder for their output bags. An '
+        'unfinished output bag is continued.',
     )
     parser.add_argument(
         '--topic',
         action='append',
         default=[],
         metavar='TOPIC',
-        help='Topic of images; can be given several times. Default: all.',
+        help='Topic of images; may be repeated. Default: all image topics.',
     )
     add_option(parser, OUTPUT_TOPIC)
     add_option(parser, STORAGE)
     parser.add_argument(
-        '--debug-images', action='store_true', help='Write annotated images, too, as JPEG.'
+        '--debug-images', action='store_true', help='Also write annotated images, as JPEG.'
     )
     add_option(parser, JOBS)
     add_options(parser, IdentificationSettings)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Work through all bags.
+    """Process all bags.
 
     Returns
     -------
     int
-        0, or 1 where a bag could not be read to its end or written, or an image was refused.
+        0, or 1 if a bag could not be read completely or written, or an image was refused.
 
     Raises
     ------
     ValueError
-        If options do not fit each other.
+        If options contradict each other.
     """
     tasks = _tasks(options)
     failed = False
@@ -95,7 +95,7 @@ def run(options: argparse.Namespace) -> int:
                 print(f'ahf bag: {tasks[number].source}: {refused}', file=sys.stderr)
 
         for task, outcome in _outcomes(tasks, options.jobs, report):
-            _tell(task, outcome)
+            _report(task, outcome)
             failed |= isinstance(outcome, ValueError) or bool(outcome.refused or outcome.lost)
     return int(failed)
 
@@ -113,7 +113,9 @@ def _tasks(options: argparse.Namespace) -> list[BagTask]:
     if len(options.bags) > 1:
         targets = [options.target / bag.stem for bag in options.bags]
         if len(set(targets)) < len(targets):
-            raise ValueError('OUT would hold several bags of one name, accepted is one of each')
+            raise ValueError(
+                'OUT would hold several bags of the same name, accepted are different names'
+            )
     return [
         BagTask(
             source=source,
@@ -131,7 +133,7 @@ def _tasks(options: argparse.Namespace) -> list[BagTask]:
 def _outcomes(
     tasks: Sequence[BagTask], jobs: int, report: Any
 ) -> Iterator[tuple[BagTask, Outcome | ValueError]]:
-    """Yield what becomes of each bag, or why nothing does, as soon as it is known."""
+    """Yield the outcome of each bag, or the error that ended it, as soon as it is known."""
     if min(jobs, len(tasks)) == 1:
         for number, task in enumerate(tasks):
             yield task, _attempt(task, partial(report, number))
@@ -173,7 +175,7 @@ def _result(task: BagTask, future: Future[Outcome | ValueError]) -> Outcome | Va
     try:
         return future.result()
     except BrokenProcessPool:
-        return ValueError(f'{task.source}: the process that was at it has died')
+        return ValueError(f'{task.source}: the process that worked on it died')
 
 
 def _progress() -> Progress:
@@ -190,8 +192,8 @@ def _progress() -> Progress:
     )
 
 
-def _tell(task: BagTask, outcome: Outcome | ValueError) -> None:
-    """Say to people what became of a bag."""
+def _report(task: BagTask, outcome: Outcome | ValueError) -> None:
+    """Report the outcome of a bag on standard error."""
     if isinstance(outcome, ValueError):
         print(f'ahf bag: {outcome}', file=sys.stderr)
         return

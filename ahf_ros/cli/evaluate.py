@@ -1,4 +1,4 @@
-"""`ahf evaluate`: what was identified against what is there."""
+"""`ahf evaluate`: identified targets compared with the truth."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from ahf_ros.interchange.target_json import read_results
 from ahf_ros.interchange.truth_files import read_truth
 from ahf_ros.settings.parameter import Parameter
 
-DESCRIPTION = 'Compare what `ahf identify --json` printed with the truth.'
+DESCRIPTION = 'Compare the output of `ahf identify --json` with the truth.'
 
 TOLERANCE_PARAMETER = Parameter(
-    'tolerance', TOLERANCE, 'Largest distance of a target from the truth, px.', minimum=1e-3
+    'tolerance', TOLERANCE, 'Maximum distance between a target and the truth, px.', minimum=1e-3
 )
 
 
@@ -24,23 +24,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Give a parser the arguments of the command."""
     parser.add_argument('truth', metavar='TRUTH.csv', help='Columns image, id, x, y[, confirmed].')
     parser.add_argument(
-        'results', metavar='RESULTS.jsonl', help='One JSON object an image; - is standard input.'
+        'results', metavar='RESULTS.jsonl', help='One JSON object per image; - is standard input.'
     )
     parser.add_argument(
         '--json',
         action='store_true',
-        help='Print one JSON object an image on standard output, and a last one for all of them.',
+        help='Print one JSON object per image on standard output, and a last one for all images.',
     )
     add_option(parser, TOLERANCE_PARAMETER)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the figures of every image and of all of them.
+    """Print the figures of each image and of all images.
 
     Returns
     -------
     int
-        0, or 1 where a file could not be read.
+        0, or 1 if a file could not be read.
     """
     try:
         truth = read_truth(options.truth)
@@ -50,8 +50,8 @@ def run(options: argparse.Namespace) -> int:
         return 1
     for name in results:
         if name not in truth:
-            told = f'ahf evaluate: {name} is not in {options.truth}; all that it shows is false'
-            print(told, file=sys.stderr)
+            text = f'ahf evaluate: {name} is not in {options.truth}; its targets count as false'
+            print(text, file=sys.stderr)
     scores = evaluate(truth, results, options.tolerance)
     if options.json:
         for name, item in scores.items():
@@ -63,7 +63,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def record(image: str | None, item: Score) -> dict[str, Any]:
-    """Return the figures of an image as JSON; of all of them where its name is None."""
+    """Return the figures of an image as a JSON object; `image` is None for all images."""
     x, y, both = item.rmse or (None, None, None)
     return {
         'image': image,

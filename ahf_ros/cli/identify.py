@@ -27,29 +27,29 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Give a parser the arguments of the command."""
     parser.add_argument('images', nargs='+', metavar='IMAGE', help='Image files.')
     parser.add_argument(
-        '--json', action='store_true', help='Print one JSON object an image on standard output.'
+        '--json', action='store_true', help='Print one JSON object per image on standard output.'
     )
     parser.add_argument(
         '--overlay',
         type=Path,
         metavar='DIR',
-        help='Write each image with what was identified to this folder, as NAME_overlay.png.',
+        help='Write each image with its targets marked to this folder, as NAME_overlay.png.',
     )
     add_options(parser, IdentificationSettings)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Identify, print and draw; each image on its own, whatever came before it.
+    """Identify, print and draw each image, independently of the images before it.
 
     Returns
     -------
     int
-        0, or 1 where a file could not be read or written.
+        0, or 1 if a file could not be read or written.
 
     Raises
     ------
     ValueError
-        If options do not fit each other.
+        If options contradict each other.
     """
     settings = settings_from(options, IdentificationSettings)
     overlays = _overlay_paths(options.images, options.overlay)
@@ -62,7 +62,7 @@ def run(options: argparse.Namespace) -> int:
             if options.json:
                 names = detector.family, detector.name
                 print(json.dumps(to_json(found, path, image.shape, *names)), flush=True)
-            _tell(path, found, with_targets=not options.json)
+            _report(path, found, with_targets=not options.json)
             if overlays:
                 write_image(overlays[path], draw(image, found))
         except ValueError as error:
@@ -81,19 +81,21 @@ def _identified(
 
 
 def _overlay_paths(images: list[str], folder: Path | None) -> dict[str, Path]:
-    """Return where the overlay of each image goes; none if there is no folder for them."""
+    """Return the path of the overlay of each image; none if there is no folder for them."""
     if folder is None:
         return {}
     paths = {path: folder / f'{Path(path).stem}_overlay.png' for path in images}
     if len(set(paths.values())) < len(paths):
-        raise ValueError('overlay would hold several images of one name, accepted is one of each')
+        raise ValueError(
+            'overlay would hold several images of the same name, accepted are different names'
+        )
     return paths
 
 
 def _with_progress(images: list[str]) -> Iterator[str]:
-    """Yield the images, with a progress bar where people watch and there is something to see."""
+    """Yield the images, with a progress bar for several of them on a terminal."""
     shown = len(images) > 1 and sys.stderr.isatty()
-    # Standard output is not redirected, or JSON would end in the console of the progress bar.
+    # If standard output were redirected, JSON would go to the console of the progress bar.
     with Progress(
         console=Console(stderr=True, quiet=not shown),
         transient=True,
@@ -103,8 +105,8 @@ def _with_progress(images: list[str]) -> Iterator[str]:
         yield from progress.track(images, description='identify')
 
 
-def _tell(path: str, found: Identification, with_targets: bool) -> None:
-    """Say to people what was identified."""
+def _report(path: str, found: Identification, with_targets: bool) -> None:
+    """Report the identified targets on standard error."""
     seconds = found.filter.duration
     print(f'{path}: {summary(found)}, {seconds:.2f} s', file=sys.stderr)
     if not with_targets:

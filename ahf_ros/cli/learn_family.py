@@ -49,7 +49,7 @@ def run(options: argparse.Namespace) -> int:
     Returns
     -------
     int
-        0, or 1 where a file could not be read or written, or shows no target.
+        0, or 1 if a file could not be read or written, or has no target.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Options of the command line from settings that describe themselves."""
+"""Command line options from settings."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ _SHORT = {'expected_targets': '--expected'}
 
 
 def add_options(parser: argparse.ArgumentParser, settings: type) -> None:
-    """Give a parser one option for every parameter of a settings dataclass.
+    """Give a parser one option for each parameter of a settings dataclass.
 
     Parameters
     ----------
     parser : argparse.ArgumentParser
-        Gets `--max-radius` for the parameter `max_radius`, and `--ahf` and `--no-ahf` where one is
+        Gets `--max-radius` for the parameter `max_radius`; `--ahf` and `--no-ahf` for one that is
         true or false.
     settings : type
         Settings dataclass, as for `ahf_ros.settings.nested.flat_parameters`.
@@ -38,7 +38,7 @@ def add_option(parser: argparse.ArgumentParser, item: Parameter, **changes: Any)
     parser : argparse.ArgumentParser
     item : Parameter
     **changes
-        Arguments of `add_argument` that are to be different.
+        Arguments of `add_argument` to replace.
     """
     text = f'{item.description} Default: {item.default}; accepted: {item.accepted}.'
     arguments: dict[str, Any] = {'default': item.default, 'help': text.replace('%', '%%')}
@@ -52,27 +52,27 @@ def add_option(parser: argparse.ArgumentParser, item: Parameter, **changes: Any)
 
 
 def settings_from(options: argparse.Namespace, settings: type[Settings]) -> Settings:
-    """Return the settings that the options say.
+    """Return the settings from the values of the options.
 
     Raises
     ------
     ValueError
-        If values do not fit each other.
+        If values contradict each other.
     """
     names = [item.name for item in flat_parameters(settings)]
     return assemble(settings, {name: getattr(options, name) for name in names})
 
 
 def _converter(item: Parameter) -> Callable[[str], Any]:
-    """Return what turns the text of an option into an accepted value."""
+    """Return the function from the text of an option to its value."""
 
     def convert(text: str) -> Any:
         try:
             value = type(item.default)(text)
             item.check(value)
         except ValueError as error:
-            told = f'{item.name} is {text!r}, accepted is {item.accepted}'
-            raise argparse.ArgumentTypeError(told) from error
+            message = f'{item.name} is {text!r}, accepted is {item.accepted}'
+            raise argparse.ArgumentTypeError(message) from error
         return value
 
     return convert

@@ -16,7 +16,9 @@ from ahf_ros.synthetic.scene import SceneSettings, render
 
 DESCRIPTION = 'Render images of targets under projected light, with their truth.'
 
-COUNT = Parameter('count', 1, 'Images of each light, the seed grows by one.', minimum=1)
+COUNT = Parameter(
+    'count', 1, 'Number of images for each light, with consecutive seeds.', minimum=1
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -25,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'folder',
         type=Path,
         metavar='DIR',
-        help='Folder for LIGHT_AMBIENT_SEED.png and truth.csv, made where it does not exist.',
+        help='Folder for LIGHT_AMBIENT_SEED.png and truth.csv; created if it does not exist.',
     )
     add_option(parser, COUNT)
     for item in flat_parameters(SceneSettings):
@@ -41,12 +43,12 @@ def run(options: argparse.Namespace) -> int:
     Returns
     -------
     int
-        0, or 1 where a file could not be read or written, or a scene could not be made.
+        0, or 1 if a file could not be read or written, or a scene is impossible.
 
     Raises
     ------
     ValueError
-        If options do not fit each other.
+        If options contradict each other.
     """
     scenes = _scenes(options)
     truth_path = options.folder / 'truth.csv'

@@ -1,1 +1,1 @@
-"""Settings that describe themselves."""
+"""Settings with descriptions, defaults and accepted values."""

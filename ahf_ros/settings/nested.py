@@ -1,4 +1,4 @@
-"""Settings made of settings: laid out flat by name, and put together again."""
+"""Nested settings: flattened by name, and assembled again."""
 
 from __future__ import annotations
 
@@ -12,35 +12,35 @@ Settings = TypeVar('Settings')
 
 
 def flat_parameters(settings: type) -> tuple[Parameter, ...]:
-    """Return the parameters of a settings dataclass and of those that its fields hold.
+    """Return the parameters of a settings dataclass and of the settings nested in it.
 
     Parameters
     ----------
     settings : type
-        Settings dataclass; a field of it is a parameter or again a settings dataclass.
+        Settings dataclass, whose fields are parameters or again settings dataclasses.
 
     Raises
     ------
     ValueError
-        If a name stands for two parameters that are not the same.
+        If one name stands for two different parameters.
     """
     found: dict[str, Parameter] = {}
-    rooms = (parameters(settings), *map(flat_parameters, _parts(settings).values()))
-    for item in (item for room in rooms for item in room):
+    parts = (parameters(settings), *map(flat_parameters, _parts(settings).values()))
+    for item in (item for part in parts for item in part):
         if found.setdefault(item.name, item) != item:
             raise ValueError(f'{item.name} is the name of two different parameters')
     return tuple(found.values())
 
 
 def assemble(settings: type[Settings], values: Mapping[str, Any]) -> Settings:
-    """Return the settings with the given values, the others at their defaults.
+    """Return settings with the given values and defaults for the others.
 
     Parameters
     ----------
     settings : type
         Settings dataclass, as for `flat_parameters`.
     values : mapping of str to value
-        By name of the parameter; an integer is accepted where a number is meant.
+        Values by name of the parameter; an integer is accepted for a number.
 
     Raises
     ------
@@ -92,14 +92,14 @@ def _assembled(settings: type[Settings], values: Mapping[str, Any]) -> Settings:
 
 
 def _typed(item: Parameter, value: Any) -> Any:
-    """Return an accepted integer as the number that is meant, anything else as it is."""
+    """Return an integer that stands for a number as a number, anything else unchanged."""
     if isinstance(item.default, float) and item.accepts(value):
         return float(value)
     return value
 
 
 def _parts(settings: type) -> dict[str, type]:
-    """Return the fields that hold settings, with the type of these."""
+    """Return the types of the nested settings, by the name of their field."""
     hints = get_type_hints(settings)
     return {
         item.name: hints[item.name] for item in fields(settings) if is_dataclass(hints[item.name])

@@ -1,8 +1,7 @@
-"""Settings that describe themselves: text, default and accepted values, stated once.
+"""Parameters with description, default and accepted values, each declared once.
 
-A room that can be set has a frozen dataclass whose fields are made by `parameter`. The node
-declares its ROS parameters, the command line its options and the README its table from
-`parameters`.
+Settings are frozen dataclasses whose fields are made by `parameter`. ROS parameters, command line
+options and tables of the documentation are derived from them.
 """
 
 from __future__ import annotations
@@ -14,28 +13,28 @@ from dataclasses import dataclass, field, fields, replace
 from numbers import Integral, Real
 from typing import Any
 
-MOST_NUMBERS = 100_000
-"""Numbers that a text may list."""
+MAXIMUM_NUMBERS = 100_000
+"""Maximum count of numbers in a list."""
 
 _KEY = 'ahf_ros.settings.parameter'
 
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One setting of a settings dataclass.
+    """One parameter of a settings dataclass.
 
     Attributes
     ----------
     name : str
-        Name of the field, and of the ROS parameter.
+        Name of the field and of the ROS parameter.
     default : bool, int, float or str
-        Its type is the type of the parameter.
+        Default, whose type is that of the parameter.
     description : str
-        One sentence, with the unit where there is one.
+        One sentence, with the unit if there is one.
     minimum, maximum : float or None
         Closed bounds of a number.
     choices : tuple of str
-        The accepted texts; empty where any is accepted.
+        Accepted texts; empty if any is accepted.
     """
 
     name: str
@@ -47,7 +46,7 @@ class Parameter:
 
     @property
     def accepted(self) -> str:
-        """The accepted values in words."""
+        """Description of the accepted values."""
         if self.choices:
             return f'one of {", ".join(self.choices)}'
         kind = {bool: 'true or false', int: 'an integer', float: 'a number', str: 'a text'}
@@ -75,7 +74,7 @@ class Parameter:
         return above and (self.maximum is None or float(value) <= self.maximum)
 
     def check(self, value: object) -> None:
-        """Raise a ValueError that names the parameter, `value` and what is accepted."""
+        """Raise a ValueError with the parameter, `value` and what is accepted, unless it is."""
         if not self.accepts(value):
             raise ValueError(f'{self.name} is {value!r}, accepted is {self.accepted}')
 
@@ -89,12 +88,12 @@ def parameter(
     choices: Iterable[str] = (),
 ) -> Any:
     """Return a dataclass field that carries a `Parameter`."""
-    told = Parameter('', default, description, minimum, maximum, tuple(choices))
-    return field(default=default, metadata={_KEY: told})
+    item = Parameter('', default, description, minimum, maximum, tuple(choices))
+    return field(default=default, metadata={_KEY: item})
 
 
 def parameters(settings: Any) -> tuple[Parameter, ...]:
-    """Return the parameters of a settings dataclass (or of an instance), in their order."""
+    """Return the parameters of a settings dataclass or of an instance, in order."""
     return tuple(
         replace(item.metadata[_KEY], name=item.name)
         for item in fields(settings)
@@ -103,24 +102,25 @@ def parameters(settings: Any) -> tuple[Parameter, ...]:
 
 
 def check_parameters(settings: Any) -> None:
-    """Check every parameter of a settings instance; call it in `__post_init__`.
+    """Check all parameters of a settings instance; call it in `__post_init__`.
 
     Raises
     ------
     ValueError
-        For the first value that is not accepted, naming the parameter, the value and what is.
+        If a value is not accepted; the message names the parameter, the value and what is
+        accepted.
     """
     for item in parameters(settings):
         item.check(getattr(settings, item.name))
 
 
 def numbers_in(name: str, text: str) -> frozenset[int]:
-    """Return the numbers that a text lists, such as '1-54, 60'; none where it is empty.
+    """Return the numbers in a list of integers and ranges, such as '1-54, 60'.
 
     Raises
     ------
     ValueError
-        If it is no list of integers and ranges, or holds more than `MOST_NUMBERS`.
+        If the text is not such a list, or has more than `MAXIMUM_NUMBERS` numbers.
     """
     numbers: set[int] = set()
     for part in filter(None, re.split(r'[,\s]+', text)):
@@ -130,7 +130,7 @@ def numbers_in(name: str, text: str) -> frozenset[int]:
             raise ValueError(
                 f'{name} has {part!r}, accepted are integers and ranges such as 1-54, 60'
             )
-        if len(numbers) + last - first >= MOST_NUMBERS:
-            raise ValueError(f'{name} is {text!r}, accepted are at most {MOST_NUMBERS} numbers')
+        if len(numbers) + last - first >= MAXIMUM_NUMBERS:
+            raise ValueError(f'{name} is {text!r}, accepted are at most {MAXIMUM_NUMBERS} numbers')
         numbers.update(range(first, last + 1))
     return frozenset(numbers)

@@ -330,7 +330,7 @@ def test_bags_of_one_name_are_refused(
     recording: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     assert status(recording, recording, tmp_path / 'made') == 2
-    assert 'several bags of one name' in capfd.readouterr().err
+    assert 'several bags of the same name' in capfd.readouterr().err
 
 
 def test_a_missing_library_is_named(

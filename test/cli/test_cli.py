@@ -160,7 +160,7 @@ def test_overlays_of_one_name_are_refused(folder, tmp_path, capsys):
     other.write_bytes((folder / 'normal_0.3_4.png').read_bytes())
     arguments = ('--overlay', tmp_path, '--detector', 'traditional')
     assert status('identify', folder / other.name, other, *arguments) == 2
-    assert 'overlay would hold several images of one name' in capsys.readouterr().err
+    assert 'overlay would hold several images of the same name' in capsys.readouterr().err
 
 
 def test_stripes_need_the_filter_and_a_search_repeats_itself(tmp_path, capsys):

@@ -1,1 +1,1 @@
-"""Square markers (ArUco, AprilTag)."""
+"""Square markers: ArUco and AprilTag."""

@@ -1,6 +1,6 @@
-"""Identification of square markers, ArUco and AprilTag, by OpenCV's own detector.
+"""Identification of square markers, ArUco and AprilTag, by OpenCV's detector.
 
-OpenCV identifies; places come from `ahf_ros.detectors.square.sides`, in the image as received.
+Corners and centres are measured by `ahf_ros.detectors.square.sides` in the image as received.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from ahf_ros.detectors.square.sides import centres, fit_sides
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import Target, sorted_targets
 
-_DRAFT_DEVIATION = 0.3  # px, of a centre by corners that are those of contours
-_LEAST_SHARE = 0.3  # of the edges of each side, for a fit to count
+_DRAFT_DEVIATION = 0.3  # standard deviation of a centre from corners of contours, px
+_MINIMUM_SHARE = 0.3  # of the edges on each side, for a fit to be accepted
 
 Corners = tuple[tuple[float, float], ...]
 
@@ -27,13 +27,13 @@ Corners = tuple[tuple[float, float], ...]
 class SquareMarker(Target):
     """One identified square marker.
 
-    Its centre is where its diagonals meet, which is the image of its physical centre at any view.
-    Its ellipse is the one inscribed, its code the ID.
+    Its centre is the intersection of its diagonals, which is the image of the physical centre in
+    any view. Its ellipse is the inscribed one, its code is its ID.
 
     Attributes
     ----------
     corners : tuple of 4 tuples of 2 float
-        px, from the one that is top left where the marker is upright, clockwise.
+        Corners, px, clockwise from the top left corner of the upright marker.
     """
 
     corners: Corners = ()
@@ -50,7 +50,7 @@ class SquareDetector:
     Raises
     ------
     ValueError
-        If the family is none of square markers, or OpenCV does not have it.
+        If it is not a family of square markers, or OpenCV does not have it.
     """
 
     settings: DetectorSettings
@@ -74,7 +74,7 @@ class SquareDetector:
         return self.refine(image, self.draft(image))
 
     def draft(self, image: np.ndarray) -> list[Target]:
-        """Identify the markers of one image, corners being those of contours, to about a pixel."""
+        """Identify the markers of one image, with the corners of contours, to about a pixel."""
         check_image(image)
         gray = np.ascontiguousarray(as_gray(image).astype(np.uint8, copy=False))
         detector = cv2.aruco.ArucoDetector(dictionary(self.family))
@@ -86,15 +86,15 @@ class SquareDetector:
         return sorted_targets(found)
 
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
-        """Return markers with their places in an image, from all of their sides.
+        """Return markers with corners and centres fitted to their sides in an image.
 
         Parameters
         ----------
         image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
             The image as received.
         targets : sequence of Target
-            Found by this detector, to about two pixels. Those without sides in this image, and
-            others than `SquareMarker`, stay as they are.
+            Targets of this detector, to about two pixels. Markers without sides in this image, and
+            targets that are no `SquareMarker`, stay unchanged.
 
         Returns
         -------
@@ -118,7 +118,7 @@ class SquareDetector:
         better: dict[Target, Target] = {
             marker: by_sides
             for marker, by_sides, share in zip(markers, moved, sides.share, strict=True)
-            if share >= _LEAST_SHARE
+            if share >= _MINIMUM_SHARE
         }
         return [better.get(it, it) for it in targets]
 
@@ -126,7 +126,7 @@ class SquareDetector:
 def _markers(
     numbers: np.ndarray, corners: np.ndarray, covariances: np.ndarray
 ) -> list[SquareMarker]:
-    """Return the markers with corners, shape (k, 4, 2), in their order round each."""
+    """Return the markers with given corners, shape (k, 4, 2), in the order of `SquareMarker`."""
     corners = corners.astype(np.float64)
     first, second, third, fourth = np.moveaxis(corners, 1, 0)
     across = (second + third - first - fourth) / 4

@@ -1,8 +1,8 @@
-"""Corners of square markers, from their sides in the original image.
+"""Corners of square markers, from their sides in the image as received.
 
-A side is a straight edge with dark inside: many profiles across it are fitted, those that look
-like edges of light lose their weight, and a line is laid through the rest. Corners are where the
-lines of neighbouring sides meet, so that light next to a corner does not move it.
+A side is a straight edge with the dark side inside. Profiles across it are fitted, those that look
+like edges of light lose their weight, and a line is fitted to the rest. A corner is the
+intersection of the lines of two neighbouring sides, so that light near a corner does not move it.
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ from ahf_ros.features.profiles import (
 )
 from ahf_ros.features.robust import median, reweight, spread
 
-_PROFILES = 32  # across a side
-_ENDS = 0.06  # of a side, where the next one rounds it off
-_FARTHEST = 3.0  # to either side that an edge is looked for, px
-_IN_CELLS = 0.45  # the same, in cells of the marker: other edges lie a cell away
+_PROFILES = 32  # per side
+_ENDS = 0.06  # of a side, left out at its ends, where blur rounds the corner
+_REACH = 3.0  # maximum distance of an edge from its expected position, px
+_REACH_IN_CELLS = 0.45  # the same in cells of the marker; other edges are a cell away
 _MEASUREMENTS = 3
-_ROUNDS = 6  # of robust least squares
-_OUTLIER = 3.0  # times the usual distance from the line that quarters the weight
-_MINIMUM_DISTANCE = 0.02  # that counts as usual, px
-_PLACED = 0.25  # distance from the line within which an edge is in its place, px
-_MINIMUM_STEP = 1.0  # gray values, that the weight of an edge is computed from
-_LIGHT_REACH = 1.5  # standard deviation of the window in which the light is even, profiles
-_LIGHT_PRIOR = 1.0  # whole profiles that say as much of the slope as the prior, none, does
-_WEAK_PRIOR = 1e-3  # of a side where it is, in gray values^2 / px^2
-_DIFFERENCE = 1e-3  # px, for derivatives
-_SYSTEMATIC = 0.003  # standard deviation of what lens distortion and pixels do to a centre, px
+_ROUNDS = 6  # iterations of robust least squares
+_OUTLIER = 3.0  # distance from the line that quarters the weight, in usual distances
+_MINIMUM_DISTANCE = 0.02  # minimum of the usual distance, px
+_PLACED = 0.25  # maximum distance from the line of an edge that belongs to it, px
+_MINIMUM_STEP = 1.0  # minimum height of an edge for its weight, gray values
+_LIGHT_REACH = 1.5  # standard deviation of the window that smooths the light, profiles
+_LIGHT_PRIOR = 1.0  # weight of the prior, a slope of zero, in profiles
+_WEAK_PRIOR = 1e-3  # of the position of a side, in gray values^2 / px^2
+_DIFFERENCE = 1e-3  # step of numerical derivatives, px
+_SYSTEMATIC = 0.003  # standard deviation of the effects of lens distortion and pixels, px
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,11 +47,11 @@ class Sides:
     Attributes
     ----------
     corners : ndarray of float64, shape (k, 4, 2)
-        px, clockwise as seen.
+        Corners, clockwise in the image, px.
     share : ndarray of float64, shape (k,)
-        Share of the edges that are in their place, on the side where it is smallest.
+        Fraction of the edges that belong to their line, minimum over the four sides.
     covariance : ndarray of float64, shape (k, 2, 2)
-        Of the centre, px^2.
+        Covariance of the centre, px^2.
     """
 
     corners: np.ndarray
@@ -60,30 +60,32 @@ class Sides:
 
 
 def centres(corners: np.ndarray) -> np.ndarray:
-    """Return where the diagonals of markers meet, the images of their centres.
+    """Return the intersections of the diagonals of markers, the images of their centres.
 
     Parameters
     ----------
     corners : ndarray of float64, shape (k, 4, 2)
+        Corners, px.
 
     Returns
     -------
     ndarray of float64, shape (k, 2)
+        Centres, px.
     """
     return _meet(corners[:, 0], corners[:, 2], corners[:, 1], corners[:, 3])
 
 
 def fit_sides(gray: np.ndarray, corners: np.ndarray, cells: int) -> Sides:
-    """Move the corners of markers to where their sides meet.
+    """Return markers whose corners are the intersections of their sides.
 
     Parameters
     ----------
     gray : ndarray of float32, shape (height, width)
         Gray values from 0 to 255.
     corners : ndarray of float64, shape (k, 4, 2)
-        To about two pixels, clockwise as seen; markers are dark at their border.
+        Corners to about two pixels, clockwise in the image. The border of a marker is dark.
     cells : int
-        Of a marker along a side, the border included.
+        Number of cells along a side, including the border.
 
     Returns
     -------
@@ -108,7 +110,7 @@ def fit_sides(gray: np.ndarray, corners: np.ndarray, cells: int) -> Sides:
             edges.spacing.reshape(of_side),
         )
         met, covariance = _corners(starts, ends, normals, lines)
-        near = np.linalg.norm(met - starts, axis=2).max(axis=1) < 2 * _FARTHEST
+        near = np.linalg.norm(met - starts, axis=2).max(axis=1) < 2 * _REACH
         corners = np.where(near[:, None, None], met, starts)
         share = np.where(near, lines.share.min(axis=1), 0.0)
     return Sides(corners, share, covariance)
@@ -124,22 +126,22 @@ def _slopes(edges: Edges, weights: np.ndarray) -> np.ndarray:
 
 
 def _normals(starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """Return the directions outwards from sides, shape (k, 4, 2) all."""
-    ways = ends - starts
-    lengths = np.maximum(np.linalg.norm(ways, axis=2, keepdims=True), 1e-9)
-    return np.stack([ways[..., 1], -ways[..., 0]], axis=2) / lengths
+    """Return the outward unit normals of sides, shape (k, 4, 2)."""
+    sides = ends - starts
+    lengths = np.maximum(np.linalg.norm(sides, axis=2, keepdims=True), 1e-9)
+    return np.stack([sides[..., 1], -sides[..., 0]], axis=2) / lengths
 
 
 def _outlines(
     starts: np.ndarray, ends: np.ndarray, normals: np.ndarray, cells: int
 ) -> tuple[OutlinePoints, np.ndarray]:
-    """Return where the edges of the sides are expected, and how far along a side, 0 to 1."""
+    """Return the expected edges of the sides, and their positions along a side, 0 to 1."""
     count = len(starts)
     along = np.linspace(_ENDS, 1 - _ENDS, _PROFILES)
     points = starts[:, :, None] + along[:, None] * (ends - starts)[:, :, None]
     lengths = np.linalg.norm(ends - starts, axis=2)
     depth = np.minimum(np.roll(lengths, 1, axis=1), np.roll(lengths, -1, axis=1))
-    reach = np.minimum(_IN_CELLS * depth / cells, _FARTHEST)
+    reach = np.minimum(_REACH_IN_CELLS * depth / cells, _REACH)
 
     def repeated(of_sides: np.ndarray) -> np.ndarray:
         return np.repeat(of_sides, _PROFILES, axis=1)
@@ -157,7 +159,7 @@ def _outlines(
 
 @dataclass(frozen=True, slots=True)
 class _Lines:
-    """Lines through the edges of sides: how far outwards they are at the ends of each."""
+    """Lines fitted to the edges of sides, by their outward offsets at both ends of a side."""
 
     offsets: np.ndarray  # (k, 4, 2), px
     covariance: np.ndarray  # (k, 4, 2, 2), px^2
@@ -171,7 +173,7 @@ def _fit_lines(
     seen: np.ndarray,
     spacing: np.ndarray,
 ) -> _Lines:
-    """Lay lines through the offsets of edges, shape (k, 4, n), by robust least squares."""
+    """Fit lines to the offsets of edges, shape (k, 4, n), by robust least squares."""
     basis = np.stack([1 - along, along], axis=1)
     flat = (-1, len(along))
 
@@ -201,7 +203,7 @@ def _products(basis: np.ndarray) -> np.ndarray:
 def _corners(
     starts: np.ndarray, ends: np.ndarray, normals: np.ndarray, lines: _Lines
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return where lines of neighbouring sides meet, and the covariance of the centres."""
+    """Return the intersections of neighbouring sides, and the covariance of the centres."""
 
     def met(offsets: np.ndarray) -> np.ndarray:
         first = starts + offsets[..., :1] * normals
@@ -224,9 +226,9 @@ def _corners(
 def _meet(
     first: np.ndarray, second: np.ndarray, third: np.ndarray, fourth: np.ndarray
 ) -> np.ndarray:
-    """Return where lines from first to second meet those from third to fourth, (..., 2) all.
+    """Return the intersections of lines first-second and third-fourth, shape (..., 2) all.
 
-    Parallel ones meet nowhere: NaN.
+    Those of parallel lines are NaN.
     """
     one, other, between = second - first, fourth - third, third - first
     turn = one[..., 0] * other[..., 1] - one[..., 1] * other[..., 0]
