@@ -105,8 +105,8 @@ def create_detector(
     --------
     >>> create_detector('traditional', family='aicon14').family
     'aicon14'
-    >>> create_detector(family='apriltag_36h11').name
-    'apriltag'
+    >>> create_detector(family='metashape20').name
+    'ring'
     """
     settings = updated(settings or DetectorSettings(), values)
     name = detector_name(name, settings.family)
