@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 import ahf_ros.blas  # noqa: F401  before numpy
-from ahf_ros.detectors import create_detector
+from ahf_ros.detectors import Drafter, create_detector
 from ahf_ros.filtering.genes import PUBLISHED, TuningSettings
 from ahf_ros.filtering.genetic import GeneticSettings, search
 from ahf_ros.filtering.homomorphic import FilterSettings, HomomorphicFilter
@@ -65,7 +65,7 @@ def published(recipe: Recipe, image: np.ndarray, detector: Any, expected: int) -
 def candidates(image: np.ndarray, detector: Any, recipe: Recipe) -> tuple[float, float]:
     """Return the median time of one candidate, published and ours, s."""
     prepared, threads = HomomorphicFilter(image), os.cpu_count() or 1
-    draft = getattr(detector, 'draft', detector)
+    draft = detector.draft if isinstance(detector, Drafter) else detector
     generator = np.random.default_rng(0)
     low, high = generator.uniform(0, 1, 4 * threads), generator.uniform(1, 4, 4 * threads)
     gains = list(zip(high.tolist(), low.tolist(), strict=True))

@@ -20,7 +20,7 @@ from rich.console import Console
 from rich.progress import track
 
 import ahf_ros.blas  # noqa: F401  before numpy
-from ahf_ros.detectors import DETECTOR_NAMES, create_detector
+from ahf_ros.detectors import DETECTOR_NAMES, Drafter, create_detector
 from ahf_ros.filtering.chromosome import Gene, Values
 from ahf_ros.filtering.genes import EXTENDED, PUBLISHED, TuningSettings, tuned
 from ahf_ros.filtering.genetic import GeneticSettings, search
@@ -46,7 +46,7 @@ class Scene:
     def __init__(self, detector: str, light: str, ambient: float) -> None:
         scene = SceneSettings(width=1600, height=1066, targets=14, light=light, ambient=ambient)
         made = create_detector(detector)
-        self._identify = getattr(made, 'draft', made)
+        self._identify = made.draft if isinstance(made, Drafter) else made
         self._expected = scene.targets
         self._prepared = HomomorphicFilter(render(scene).image)
         self.known: dict[Values, int] = {}

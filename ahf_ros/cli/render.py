@@ -60,8 +60,8 @@ def run(options: argparse.Namespace) -> int:
             write_image(options.folder / name, rendering.image)
             truth[name] = rendering.truth
             write_truth(truth_path, truth)
-            told = f'{options.folder / name}: {len(rendering.targets)} targets'
-            print(told, file=sys.stderr)
+            text = f'{options.folder / name}: {len(rendering.targets)} targets'
+            print(text, file=sys.stderr)
     except ValueError as error:
         print(f'ahf render: {error}', file=sys.stderr)
         return 1
