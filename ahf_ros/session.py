@@ -136,6 +136,7 @@ def create_identifier(
         draft=used.draft if isinstance(used, Drafter) else None,
         estimate=estimate,
         interrupt=interrupt,
+        name=f'detector {used.name!r}' if isinstance(used, Detector) else 'detector',
     )
 
 

@@ -20,11 +20,15 @@ from ahf_ros.bag.definitions import (
 from ahf_ros.bag.journal import Entry, Output
 from ahf_ros.bag.source import Source
 from ahf_ros.detectors import create_detector
+from ahf_ros.detectors.contract import Unavailable
 from ahf_ros.drawing import draw
 from ahf_ros.interchange.image_messages import decode_compressed, decode_image
 from ahf_ros.interchange.target_messages import coded_target_array
 from ahf_ros.session import IdentificationSettings, create_identifier
 from ahf_ros.target import Identification
+from ahf_ros.text import printable, reason_of
+
+_REASON = 2000  # characters of why an image is refused
 
 DECODERS = {IMAGE: decode_image, COMPRESSED_IMAGE: decode_compressed}
 
@@ -86,11 +90,13 @@ class Answering:
         reason = ''
         try:
             answers = self._messages(connection, data)
+        except Unavailable:
+            raise  # it is not the fault of the image; another run may find the detector
         except ValueError as error:
-            reason = str(error)
+            reason = printable(str(error), _REASON)
         except Exception as error:
             # The others go on, whatever an image does to a decoder or a detector.
-            reason = f'{type(error).__name__}: {error}'
+            reason = reason_of(error)
         memory = self._identifiers[topic].memory
         return Entry(topic, timestamp, memory, reason), answers
 

@@ -14,8 +14,8 @@ from rosbags.interfaces import Connection, ConnectionExtRosbag2, MessageDefiniti
 from rosbags.rosbag2 import Writer
 
 from ahf_ros.bag.definitions import TypeStores
-from ahf_ros.bag.records import reason_of
 from ahf_ros.bag.source import Source
+from ahf_ros.text import reason_of
 
 UNKNOWN_HASH = f'RIHS01_{0:064x}'
 """Hash of a type whose definition is missing or not accepted."""

@@ -13,9 +13,10 @@ from ruamel.yaml.error import YAMLError
 
 from ahf_ros.bag.compression import zstd
 from ahf_ros.bag.mcap import Mcap
-from ahf_ros.bag.records import BagFile, Lost, reason_of
+from ahf_ros.bag.records import BagFile, Lost
 from ahf_ros.bag.ros1 import Ros1
 from ahf_ros.bag.sqlite import Sqlite
+from ahf_ros.text import reason_of
 
 METADATA = 'metadata.yaml'
 

@@ -43,9 +43,6 @@ class Lost:
         return f'{topics} from {start} to {stop}: {self.reason}'
 
 
-_MAXIMUM_LENGTH = 300  # characters of a reason
-
-
 class BagFile(Protocol):
     """One file of a bag.
 
@@ -80,14 +77,3 @@ def seconds(timestamp: int | None) -> str:
     sign = '-' if (timestamp or 0) < 0 else ''
     whole, part = divmod(abs(timestamp or 0), 10**9)
     return f'{sign}{whole}.{part:09}'
-
-
-def reason_of(error: BaseException) -> str:
-    """Return an error of a library as text."""
-    return printable(f'{type(error).__name__}: {error}')
-
-
-def printable(text: str) -> str:
-    """Return a text that a terminal and JSON accept, bounded in length."""
-    shown = text[:_MAXIMUM_LENGTH].encode('ascii', 'backslashreplace').decode()
-    return ''.join(it if it.isprintable() else repr(it)[1:-1] for it in shown)

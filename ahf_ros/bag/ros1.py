@@ -17,7 +17,8 @@ from rosbags.rosbag1 import Reader
 from rosbags.rosbag1.reader import Header, RecordType
 
 from ahf_ros.bag.blocks import Block, Recorded, merged
-from ahf_ros.bag.records import Lost, Message, reason_of
+from ahf_ros.bag.records import Lost, Message
+from ahf_ros.text import reason_of
 
 _MAGIC = b'#ROSBAG V2.0'
 _LARGEST_HEADER = 2**24  # bytes; the longest holds the definition of a type

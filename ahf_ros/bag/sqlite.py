@@ -17,7 +17,8 @@ from rosbags.interfaces import (
 )
 
 from ahf_ros.bag.mcap_topics import NO_DEFINITION, tolerant_qos
-from ahf_ros.bag.records import Lost, Message, reason_of
+from ahf_ros.bag.records import Lost, Message
+from ahf_ros.text import reason_of
 
 _FORMATS = {'ros2msg': MessageDefinitionFormat.MSG, 'ros2idl': MessageDefinitionFormat.IDL}
 _LAST = 2**63 - 1  # that a row can have

@@ -7,22 +7,15 @@ argument is not accepted.
 
 from __future__ import annotations
 
-import argparse
 import os
+import signal
 import sys
-from collections.abc import Sequence
-from importlib.metadata import PackageNotFoundError, version
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from types import FrameType
 
-import ahf_ros.blas  # noqa: F401  before numpy
-from ahf_ros.cli import bag, evaluate, identify, learn_family, render
-
-COMMANDS = {
-    'identify': identify,
-    'bag': bag,
-    'render': render,
-    'evaluate': evaluate,
-    'learn-family': learn_family,
-}
+INTERRUPTED, FAILED = 130, 1
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -38,34 +31,59 @@ def main(arguments: Sequence[str] | None = None) -> int:
     int
         The exit status.
     """
-    options = _parser().parse_args(arguments)
     try:
-        return COMMANDS[options.subcommand].run(options)
-    except ValueError as error:
-        print(f'ahf {options.subcommand}: error: {error}', file=sys.stderr)
-        return 2
+        # Imported here, so that Ctrl-C during the imports ends in order, too.
+        from ahf_ros.cli import commands
+
+        _replace_closed()
+        with _ending_programs():
+            status = commands.run(arguments)
+            sys.stdout.flush()
+        return status
     except KeyboardInterrupt:
-        return 130
+        return INTERRUPTED
     except BrokenPipeError:
         # Without this, the interpreter reports an error when it flushes the closed pipe.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 1
+        _discard_output()
+        return FAILED
+    except OSError as error:  # of standard output: a full disk
+        _discard_output()
+        print(f'ahf: error: {error.strerror or error}', file=sys.stderr)
+        return FAILED
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog='ahf', description='Coded photogrammetric targets under difficult light.'
-    )
-    parser.add_argument('--version', action='version', version=_version())
-    commands = parser.add_subparsers(dest='subcommand', metavar='COMMAND', required=True)
-    for name, command in COMMANDS.items():
-        text = command.DESCRIPTION
-        command.add_arguments(commands.add_parser(name, description=text, help=text))
-    return parser
-
-
-def _version() -> str:
+@contextmanager
+def _ending_programs() -> Iterator[None]:
+    """End the programs that detectors run as soon as a signal ends this process."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # signals come to the main thread
+        return
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    for number in before:
+        signal.signal(number, _end)
     try:
-        return version('ahf_ros')
-    except PackageNotFoundError:
-        return 'not installed'
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _end(number: int, _: FrameType | None) -> None:
+    from ahf_ros.detectors.external.program import end_programs
+
+    end_programs()
+    if number == signal.SIGINT:
+        raise KeyboardInterrupt
+    raise SystemExit(128 + number)
+
+
+def _replace_closed() -> None:
+    """Give a process that was started without standard output or error places to write to."""
+    for name in ('stdout', 'stderr'):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, 'w'))  # noqa: PTH123, SIM115
+
+
+def _discard_output() -> None:
+    """Leave what could not be written to standard output."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import multiprocessing
-import queue
 import sys
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +13,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from ahf_ros.cli.options import add_option, add_options, settings_from
+from ahf_ros.cli.workers import results
 from ahf_ros.session import IdentificationSettings
 from ahf_ros.settings.parameter import Parameter
 
@@ -34,9 +31,6 @@ OUTPUT_TOPIC = Parameter(
 STORAGE = Parameter(
     'storage', 'mcap', 'Storage format of the output bag.', choices=('mcap', 'sqlite3')
 )
-
-PATIENCE = 0.2
-"""Interval between checks whether a process has ended, s."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -138,22 +132,7 @@ def _outcomes(
         for number, task in enumerate(tasks):
             yield task, _attempt(task, partial(report, number))
         return
-    context = multiprocessing.get_context('spawn')
-    with context.Manager() as manager, ProcessPoolExecutor(jobs, context) as pool:
-        reports = manager.Queue()
-        running = {
-            pool.submit(_attempt, task, partial(_put, reports, number)): task
-            for number, task in enumerate(tasks)
-        }
-        while running:
-            try:
-                report(*reports.get(timeout=PATIENCE))
-                continue
-            except queue.Empty:
-                ended = [future for future in running if future.done()]
-            for future in ended:
-                task = running.pop(future)
-                yield task, _result(task, future)
+    yield from results(_attempt, tasks, min(jobs, len(tasks)), report)
 
 
 def _attempt(task: BagTask, report: Any) -> Outcome | ValueError:
@@ -165,17 +144,6 @@ def _attempt(task: BagTask, report: Any) -> Outcome | ValueError:
         return error
     except WRITING_ERRORS as error:
         return ValueError(f'{task.target} cannot be written: {error}')
-
-
-def _put(reports: Any, *report: Any) -> None:
-    reports.put(report)
-
-
-def _result(task: BagTask, future: Future[Outcome | ValueError]) -> Outcome | ValueError:
-    try:
-        return future.result()
-    except BrokenProcessPool:
-        return ValueError(f'{task.source}: the process that worked on it died')
 
 
 def _progress() -> Progress:

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import cv2
 import numpy as np
 from rich.console import Console
 from rich.progress import Progress
@@ -15,10 +16,11 @@ from rich.progress import Progress
 from ahf_ros.cli.options import add_options, settings_from
 from ahf_ros.detectors import Detector, create_detector
 from ahf_ros.drawing import draw, summary
-from ahf_ros.interchange.image_files import read_image, write_image
+from ahf_ros.interchange.image_files import orientation_note, read_image, write_image
 from ahf_ros.interchange.target_json import to_json
 from ahf_ros.session import IdentificationSettings, identify
 from ahf_ros.target import Identification
+from ahf_ros.text import reason_of
 
 DESCRIPTION = 'Identify the coded targets in images.'
 
@@ -58,6 +60,8 @@ def run(options: argparse.Namespace) -> int:
     for path in _with_progress(options.images):
         try:
             image = read_image(path)
+            if note := orientation_note(path):
+                print(note, file=sys.stderr)
             found = _identified(path, image, detector, settings)
             if options.json:
                 names = detector.family, detector.name
@@ -67,6 +71,9 @@ def run(options: argparse.Namespace) -> int:
                 write_image(overlays[path], draw(image, found))
         except ValueError as error:
             print(f'ahf identify: {error}', file=sys.stderr)
+            failed = True
+        except (MemoryError, cv2.error) as error:  # the other images may be smaller
+            print(f'ahf identify: {path}: {reason_of(error)}', file=sys.stderr)
             failed = True
     return int(failed)
 

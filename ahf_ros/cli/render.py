@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -68,14 +69,18 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _scenes(options: argparse.Namespace) -> list[SceneSettings]:
+def _scenes(options: argparse.Namespace) -> Iterator[SceneSettings]:
+    """Return the scenes one by one, having refused options that do not fit each other."""
     lights = options.light
     first = [
         settings_from(argparse.Namespace(**vars(options) | {'light': light}), SceneSettings)
         for light in lights
     ]
-    return [
+    last = options.count - 1
+    for scene in first:
+        replace(scene, seed=scene.seed + last)  # refuses a seed that is too large
+    return (
         replace(scene, seed=scene.seed + number)
         for scene in first
         for number in range(options.count)
-    ]
+    )

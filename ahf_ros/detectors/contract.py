@@ -16,6 +16,10 @@ POLARITIES = ('auto', 'dark', 'bright')
 """Colour of the dot against its surroundings; 'auto' accepts both in one image."""
 
 
+class Unavailable(ValueError):
+    """A detector cannot work at all, whatever the image is."""
+
+
 @runtime_checkable
 class Detector(Protocol):
     """A callable with a name: grayscale image in, targets out.

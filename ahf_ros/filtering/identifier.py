@@ -27,9 +27,10 @@ from ahf_ros.filtering.fusion import fused
 from ahf_ros.filtering.genes import tuned
 from ahf_ros.filtering.genetic import SearchResult, Values, search
 from ahf_ros.filtering.settings import AdaptiveSettings
-from ahf_ros.filtering.trials import DetectorFunction, Trials, checked_targets, confirmed
+from ahf_ros.filtering.trials import DetectorFunction, Trials, confirmed
 from ahf_ros.imaging.image import check_image
 from ahf_ros.target import FilterState, Identification, Target, count_codes, sorted_targets
+from ahf_ros.target_check import checked_targets
 
 Refinement = Callable[[np.ndarray, Sequence[Target]], Sequence[Target]]
 """From the image as received and targets found in a filtered one to the same targets, with centres
@@ -96,6 +97,8 @@ class Identifier:
         for.
     interrupt : callable, optional
         Called before each identification; what it raises ends `identify`.
+    name : str
+        What errors call the detector.
     clock : callable, optional
         Time in s.
 
@@ -124,6 +127,7 @@ class Identifier:
         draft: DetectorFunction | None = None,
         estimate: Estimate | None = None,
         interrupt: Callable[[], None] | None = None,
+        name: str = 'detector',
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.last_search: SearchResult | None = None
@@ -137,6 +141,7 @@ class Identifier:
         self._refine = refine
         self._estimate = estimate
         self._clock = clock
+        self._name = name
 
     def reset(self) -> None:
         """Forget what worked for earlier images."""
@@ -153,8 +158,8 @@ class Identifier:
             N, the number of coded targets in this image; that of the identifier where None. Where
             it is 0, N is estimated; without an estimate, no filter is tried. An estimate is never
             below n of the image as received. Where the settings list the IDs, N is their number
-            in any case; a target with another ID is left out, and counts against a filter as much
-            as a missing one.
+            in any case; targets with other IDs are left out, and no filter is chosen for them or
+            against them.
 
         Returns
         -------
@@ -169,7 +174,7 @@ class Identifier:
         ------
         ValueError
             If the image is not accepted, N is not an integer of at least 0, the detector or the
-            refinement does not return a list of targets with finite coordinates, or the estimate
+            refinement returns what `ahf_ros.target_check` does not accept, or the estimate
             is not an integer of at least 0.
         Exception
             Whatever the detector, the refinement or the estimate raises.
@@ -181,7 +186,9 @@ class Identifier:
         settings = self._settings
         expected = len(settings.listed) or given
         estimating = not expected and self._estimate is not None
-        trials = Trials(image, self._detector, self._draft, settings.listed, settings.filter)
+        trials = Trials(
+            image, self._detector, self._draft, settings.listed, settings.filter, self._name
+        )
         threads = settings.threads or os.cpu_count() or 1
         with ThreadPoolExecutor(threads) if threads > 1 else nullcontext() as executor:
             if estimating:
@@ -198,7 +205,7 @@ class Identifier:
         settled = (count_codes(targets), choice.expected) if estimating else None
         self.memory = Memory(choice.remembered, settled)
         if self._refine and (choice.filter or fusing or image.dtype != np.uint8):
-            targets = checked_targets(self._refine(image, targets), 'refine')
+            targets = checked_targets(self._refine(image, targets), f'refine of {self._name}')
         state = FilterState(
             evaluations=choice.evaluations,
             generations=choice.search.generations if choice.search else 0,

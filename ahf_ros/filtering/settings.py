@@ -30,7 +30,7 @@ class AdaptiveSettings:
     expected_ids: str = parameter(
         '',
         'IDs of the coded targets in every image, such as 1-54, 60; their number is N, and other '
-        'IDs are wrong.',
+        'IDs are left out.',
     )
     fusion: bool = parameter(
         False,

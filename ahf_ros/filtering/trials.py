@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from functools import partial
@@ -16,6 +15,7 @@ from ahf_ros.filtering.chromosome import Values
 from ahf_ros.filtering.genes import tuned
 from ahf_ros.filtering.homomorphic import FilterSettings, HomomorphicFilter
 from ahf_ros.target import UNDECODED, Target, count_codes
+from ahf_ros.target_check import checked_targets
 
 DetectorFunction = Callable[[np.ndarray], list[Target]]
 """From an 8-bit image, shape (height, width), to the targets in it. Called from several threads at
@@ -37,8 +37,10 @@ class Trials:
     draft : callable
         For images made from it.
     listed : frozenset of int
-        The IDs that the image may show; empty if it may show any.
+        The IDs that are searched for, others are left out; empty if all are.
     settings : FilterSettings
+    name : str
+        What errors call the detector.
 
     Attributes
     ----------
@@ -55,35 +57,33 @@ class Trials:
         draft: DetectorFunction,
         listed: frozenset[int],
         settings: FilterSettings,
+        name: str,
     ) -> None:
         self.image = image
         self._listed = listed
-        self._unexpected: dict[Values | None, int] = {}
         self.targets: dict[Values | None, list[Target]] = {}
         self._detector = detector
         self._draft = draft
         self._settings = settings
+        self._name = name
         self._lock = Lock()
         self._prepared: HomomorphicFilter | None = None
 
     def discrepancy(
         self, expected: int, values: Values | None, executor: Executor | None = None
     ) -> int:
-        """Return |N - n| through a filter, and one more for each unexpected ID."""
-        difference = abs(expected - self.count(values, executor))
-        return difference + self._unexpected[values]
+        """Return |N - n| through a filter."""
+        return abs(expected - self.count(values, executor))
 
     def count(self, values: Values | None, executor: Executor | None = None) -> int:
         """Return n through a filter."""
         if values not in self.targets:
-            found = checked_targets(self._found(values, executor), 'detector')
-            known = [
+            found = checked_targets(self._found(values, executor), self._name)
+            self.targets[values] = [
                 target
                 for target in found
                 if not self._listed or target.id == UNDECODED or target.id in self._listed
             ]
-            self._unexpected[values] = count_codes(found) - count_codes(known)
-            self.targets[values] = known
         return count_codes(self.targets[values])
 
     def reduced(self) -> Trials:
@@ -91,7 +91,8 @@ class Trials:
         height, width = self.image.shape
         size = (max(width // 2, 1), max(height // 2, 1))
         image = cv2.resize(self.image, size, interpolation=cv2.INTER_AREA)
-        return Trials(image, self._draft, self._draft, self._listed, self._settings)
+        listed, settings = self._listed, self._settings
+        return Trials(image, self._draft, self._draft, listed, settings, self._name)
 
     def of(self, tried: Sequence[Values | None]) -> list[list[Target]]:
         """Return what each filter showed; one that is listed twice counts once."""
@@ -141,22 +142,3 @@ def confirmed(
         if whole.discrepancy(expected, values, executor) == 0:
             return tuple(best[:count])
     return tuple(best)
-
-
-def checked_targets(found: Any, source: str) -> list[Target]:
-    """Return what a user's function returned, as a list.
-
-    Raises
-    ------
-    ValueError
-        If it is not a list of targets with finite coordinates; the message calls it `source`.
-    """
-    if not isinstance(found, (list, tuple)) or not all(isinstance(it, Target) for it in found):
-        raise ValueError(f'{source} returned {found!r}, accepted is a list of targets')
-    for target in found:
-        if not (math.isfinite(target.x) and math.isfinite(target.y)):
-            raise ValueError(
-                f'{source} returned target {target.id} at ({target.x}, {target.y}), '
-                'accepted are finite coordinates'
-            )
-    return list(found)

@@ -10,6 +10,12 @@ import numpy as np
 MINIMUM_SIDE = 16
 """Minimum width and height of an image, px; a smaller one cannot show a readable target."""
 
+MAXIMUM_SIDE = 32767
+"""Maximum width and height of an image, px; OpenCV resamples no larger one."""
+
+MAXIMUM_PIXELS = 2**28
+"""Maximum number of pixels of an image; a filter takes some 30 bytes for each."""
+
 HOT_SHARE = 100_000
 """One pixel in so many may be hot, that is, brighter than any light in the image."""
 
@@ -31,8 +37,8 @@ def check_image(image: Any, name: str = 'image') -> None:
     ------
     ValueError
         If `image` is not a two-dimensional array of an accepted type, is smaller than
-        `MINIMUM_SIDE`, is constant, or has a NaN, infinite or negative pixel. The message names
-        the image, what it is and what is accepted.
+        `MINIMUM_SIDE`, larger than `check_size` accepts or constant, or has a NaN, infinite or
+        negative pixel. The message names the image, what it is and what is accepted.
     """
     if not isinstance(image, np.ndarray):
         raise ValueError(f'{name} is a {type(image).__name__}, accepted is a numpy array')
@@ -47,7 +53,25 @@ def check_image(image: Any, name: str = 'image') -> None:
             f'{name} is {width} x {height} px, '
             f'accepted is at least {MINIMUM_SIDE} x {MINIMUM_SIDE} px'
         )
+    check_size(width, height, name)
     _check_values(image, name)
+
+
+def check_size(width: int, height: int, name: str = 'image') -> None:
+    """Raise a ValueError if an image is too large, be it decoded or not yet.
+
+    Parameters
+    ----------
+    width, height : int
+        Size of the image, px.
+    name : str
+        What errors call it.
+    """
+    if max(width, height) > MAXIMUM_SIDE or width * height > MAXIMUM_PIXELS:
+        raise ValueError(
+            f'{name} is {width} x {height} px, accepted are sides of at most {MAXIMUM_SIDE} px '
+            f'and at most {MAXIMUM_PIXELS} px in all'
+        )
 
 
 def _check_values(image: np.ndarray, name: str) -> None:

@@ -22,7 +22,7 @@ def checked_number(value: Any, name: str) -> float:
     """Return a value as a finite number, or raise a ValueError that calls it `name`."""
     try:
         number = float(value)
-    except (TypeError, ValueError) as error:
+    except (OverflowError, TypeError, ValueError) as error:
         raise ValueError(f'{name} is {value!r}, accepted is a number') from error
     if not math.isfinite(number):
         raise ValueError(f'{name} is {value!r}, accepted is a finite number')

@@ -7,7 +7,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from ahf_ros.imaging.image import check_size
 from ahf_ros.interchange.files import file_errors, read_bytes
+from ahf_ros.interchange.image_headers import UPRIGHT, read_header, upright
 
 SUFFIXES = ('.bmp', '.jpeg', '.jpg', '.png', '.tif', '.tiff')
 """Endings of the image files that are tested; others are tried."""
@@ -17,7 +19,7 @@ def read_image(path: str | Path) -> np.ndarray:
     """Return the image in a file as gray values.
 
     Colour is converted to gray and transparency is ignored. The orientation that a camera notes
-    in the file is not applied: the pixels are those of the sensor.
+    in the file is not applied: the pixels are those of the sensor. `orientation_note` tells of it.
 
     Parameters
     ----------
@@ -45,6 +47,14 @@ def read_image(path: str | Path) -> np.ndarray:
     return decode_bytes(read_bytes(path), str(path))
 
 
+def orientation_note(path: str | Path) -> str:
+    """Return a line for people if an image file notes an orientation, an empty text if not."""
+    orientation = read_header(read_bytes(path)).orientation
+    if orientation == UPRIGHT:
+        return ''
+    return f'{path}: orientation {orientation} is not applied; coordinates are those of the pixels'
+
+
 def decode_bytes(encoded: bytes, name: str) -> np.ndarray:
     """Return the gray values of an encoded image, as `read_image` does.
 
@@ -58,14 +68,16 @@ def decode_bytes(encoded: bytes, name: str) -> np.ndarray:
     Raises
     ------
     ValueError
-        If `encoded` is empty or not an image.
+        If `encoded` is empty, not an image or too large, which its header tells.
     """
-    content = np.frombuffer(encoded, np.uint8)
-    if not content.size:
+    content = bytes(encoded)
+    if not content:
         raise ValueError(f'{name} is empty, accepted is an image')
+    header = read_header(content)
+    check_size(header.width, header.height, name)
     flags = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
     try:
-        image = cv2.imdecode(content, flags)
+        image = cv2.imdecode(np.frombuffer(upright(content, header), np.uint8), flags)
     except cv2.error as error:  # for instance if the header says that the image is too large
         raise ValueError(f'{name} cannot be decoded: {error.err}') from error
     if image is None:

@@ -5,15 +5,26 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Iterator
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
-from ahf_ros.interchange.fields import checked_file_name, checked_integer, checked_number
+from ahf_ros.interchange.fields import checked_file_name
 from ahf_ros.interchange.files import read_text
 from ahf_ros.target import Identification, Target
+from ahf_ros.target_check import checked_targets
+from ahf_ros.text import reason_of, shown
 
-_OPTIONAL = ('semi_major', 'semi_minor', 'angle')
+_FIELDS = fields(Target)
+_ABSENT = {
+    'code': 0,
+    'semi_major': 0.0,
+    'semi_minor': 0.0,
+    'angle': 0.0,
+    'confidence': 1.0,
+    'covariance': (0.0, 0.0, 0.0, 0.0),
+}
+"""What the optional fields of a target are where they are not given."""
 
 
 def to_json(
@@ -69,11 +80,11 @@ def targets_from_json(content: Any, name: str) -> list[Target]:
     Raises
     ------
     ValueError
-        If the object is not like that or a number is not finite; the message names the field.
+        If the object is not like that or a field is not accepted; the message names the field.
     """
     if not isinstance(content, dict) or not isinstance(content.get('targets'), list):
         raise ValueError(f'{name} is not an object with a list of targets')
-    return list(_targets(content['targets'], name))
+    return checked_targets(list(_targets(content['targets'], name)), name)
 
 
 def read_results(path: str | Path) -> dict[str, tuple[Target, ...]]:
@@ -104,8 +115,8 @@ def read_results(path: str | Path) -> dict[str, tuple[Target, ...]]:
         where = f'{path}, line {number}'
         try:
             content = json.loads(line)
-        except json.JSONDecodeError as error:
-            raise ValueError(f'{where} is not JSON: {error.msg}') from error
+        except (ValueError, RecursionError) as error:  # also too deep, or a number too long
+            raise ValueError(f'{where} is not JSON: {reason_of(error)}') from error
         targets = tuple(targets_from_json(content, where))
         image = checked_file_name(content.get('image'), f'{where}: image')
         if image in results:
@@ -115,25 +126,9 @@ def read_results(path: str | Path) -> dict[str, tuple[Target, ...]]:
 
 
 def _targets(items: list[Any], name: str) -> Iterator[Target]:
+    """Yield targets whose fields are as they were read."""
     for item in items:
         if not isinstance(item, dict):
-            raise ValueError(f'{name}: target is {item!r}, accepted is an object')
-        optional = {
-            field: checked_number(item.get(field, 0), f'{name}: {field}') for field in _OPTIONAL
-        }
-        yield Target(
-            id=checked_integer(item.get('id'), f'{name}: id'),
-            code=checked_integer(item.get('code', 0), f'{name}: code'),
-            x=checked_number(item.get('x'), f'{name}: x'),
-            y=checked_number(item.get('y'), f'{name}: y'),
-            confidence=checked_number(item.get('confidence', 1), f'{name}: confidence'),
-            covariance=_covariance(item.get('covariance', [0] * 4), f'{name}: covariance'),
-            **optional,
-        )
-
-
-def _covariance(value: Any, name: str) -> tuple[float, float, float, float]:
-    if not isinstance(value, list) or len(value) != 4:
-        raise ValueError(f'{name} is {value!r}, accepted is a list of four numbers')
-    first, second, third, fourth = (checked_number(element, name) for element in value)
-    return first, second, third, fourth
+            raise ValueError(f'{name}: target is {shown(item)}, accepted is an object')
+        values = {field.name: item.get(field.name, _ABSENT.get(field.name)) for field in _FIELDS}
+        yield Target(**values)

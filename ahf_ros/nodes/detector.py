@@ -34,6 +34,7 @@ from ahf_ros.nodes.service_detector import ServiceDetector
 from ahf_ros.nodes.settings import LOSSLESS, SERVICE, DetectorNodeSettings
 from ahf_ros.nodes.worker import Worker
 from ahf_ros.srv import Identify
+from ahf_ros.text import printable, reason_of
 
 Result = TypeVar('Result')
 
@@ -48,6 +49,8 @@ ANSWERS_KEPT = 1000
 
 With a small depth, the next answer replaces one that a subscriber has not received yet.
 """
+
+_REASON = 2000  # characters of why an image is refused
 
 LOG_PERIOD = 5.0
 """Minimum time between two log lines of the same kind about images, s."""
@@ -214,11 +217,12 @@ class DetectorNode(ProcessNode):
         except Refused:
             raise
         except ValueError as error:
-            reason = str(error)
+            reason = printable(str(error), _REASON)
         except Exception as error:
             # No image may end the node, whatever it does to a detector.
-            reason = f'{type(error).__name__}: {error}'
-            self.get_logger().error(traceback.format_exc())
+            reason = reason_of(error)
+            lines = traceback.format_exc().splitlines()
+            self.get_logger().error('\n'.join(map(printable, lines)))
         self._tally.rejected += 1
         self._tally.reason = reason
         self.get_logger().warning(f'image refused: {reason}', throttle_duration_sec=LOG_PERIOD)

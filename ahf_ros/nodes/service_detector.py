@@ -17,6 +17,8 @@ from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.nodes.pipeline import STOPPING, Refused
 from ahf_ros.srv import Identify
 from ahf_ros.target import Target
+from ahf_ros.target_check import checked_targets
+from ahf_ros.text import printable
 
 _POLL = 0.2  # interval between checks that the service still exists, s
 _GONE = 3.0  # time that discovery may take, s
@@ -82,8 +84,8 @@ class ServiceDetector:
         finally:
             self._client.remove_pending_request(future)
         if not response.success:
-            raise ValueError(f'{self._named} refuses the image: {response.message}')
-        return list(identification_from(response.coded_targets).targets)
+            raise ValueError(f'{self._named} refuses the image: {printable(response.message)}')
+        return checked_targets(identification_from(response.coded_targets).targets, self._named)
 
     @property
     def _named(self) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.detectors import DetectorSettings, create_detector
+from ahf_ros.detectors.external import program
 from ahf_ros.session import identify
 
 IMAGE = np.arange(400, dtype=np.uint8).reshape(20, 20)
@@ -57,13 +58,15 @@ def test_the_path_goes_where_the_command_says(tmp_path):
         ('print("garbage")', "printed 'garbage', accepted is JSON"),
         ('', "printed '', accepted is JSON"),
         (printing('[]'), 'is not an object with a list of targets'),
+        (printing('[' * 100_000), 'accepted is JSON: RecursionError'),
+        (printing('{"targets": [{"id": 1, "x": 1, "y": 1, "code": -1}]}'), 'code is -1, accepted'),
         (printing('{"targets": [4]}'), 'target is 4, accepted is an object'),
         (printing('{"targets": [{"id": 1, "x": 2}]}'), 'y is None, accepted is a number'),
-        (printing('{"targets": [{"id": 1, "x": NaN, "y": 2}]}'), 'x is nan, accepted is a finite'),
+        (printing('{"targets": [{"id": 1, "x": NaN, "y": 2}]}'), 'x is nan, accepted is a number'),
         (printing('{"targets": [{"id": 1.5, "x": 1, "y": 2}]}'), 'id is 1.5, accepted is an int'),
         (
             printing('{"targets": [{"id": 1, "x": 1, "y": 2, "covariance": 3}]}'),
-            'covariance is 3, accepted is a list of four numbers',
+            'covariance is 3, accepted are four finite numbers',
         ),
     ],
 )
@@ -89,6 +92,13 @@ def test_a_program_that_hangs_is_ended_with_all_that_it_started(tmp_path):
             break
         time.sleep(0.1)
     assert not _runs(child)
+
+
+def test_a_program_that_writes_without_end_is_ended(tmp_path, monkeypatch):
+    monkeypatch.setattr(program, 'LARGEST_OUTPUT', 2**20)
+    script = 'import os\nwhile True:\n    os.write(1, bytes(2**16))\n'
+    with pytest.raises(ValueError, match='bytes, accepted are at most 1048576'):
+        detector(tmp_path, script, timeout=60.0)(IMAGE)
 
 
 def _runs(pid: int) -> bool:

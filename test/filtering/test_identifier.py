@@ -35,7 +35,7 @@ BRIGHT, DIM = dotted(0.1), dotted(3.0)
 
 
 def target(number, x=1.0, y=2.0):
-    return Target(number, number, x, y, 1.0, 1.0)
+    return Target(number, max(number, 0), x, y, 1.0, 1.0)
 
 
 class Dots:
@@ -321,9 +321,9 @@ def test_targets_with_the_same_id_count_once_and_are_passed_on():
     [
         (None, 'detector returned None, accepted is a list of targets'),
         ({1: 2}, 'detector returned {1: 2}'),
-        ([3], r'detector returned \[3\]'),
-        ([target(7, x=float('nan'))], r'detector returned target 7 at \(nan, 2.0\), accepted'),
-        ([target(7, y=float('inf'))], r'target 7 at \(1.0, inf\)'),
+        ([3], 'detector: target 0 is 3, accepted is a Target'),
+        ([target(7, x=float('nan'))], 'detector: target 0: x is nan, accepted'),
+        ([target(7, y=float('inf'))], 'detector: target 0: y is inf, accepted'),
     ],
 )
 def test_what_is_no_list_of_targets_is_refused(found, words):
@@ -332,7 +332,7 @@ def test_what_is_no_list_of_targets_is_refused(found, words):
 
 
 def test_a_refinement_is_held_to_the_same():
-    with pytest.raises(ValueError, match='refine returned None'):
+    with pytest.raises(ValueError, match='refine of detector returned None'):
         identify(DIM, Dots(), COUNT, refine=lambda image, targets: None)
 
 
@@ -402,7 +402,7 @@ def test_no_name_stands_for_two_settings():
 
 
 def test_ids_that_are_listed_beat_a_number():
-    """Through a filter the detector shows a listed ID more, and one that cannot be there less."""
+    """IDs that are not listed neither count nor choose a filter."""
     image = np.arange(400, dtype=np.uint8).reshape(20, 20)
 
     def detector(shown: np.ndarray) -> list[Target]:
@@ -415,6 +415,9 @@ def test_ids_that_are_listed_beat_a_number():
     found = identify(image, detector, 50, listed)
     assert [target.id for target in found.targets] == [1, 2, 3]
     assert (found.expected, found.filter.applied) == (3, True)
+    seen = identify(image, detector, 0, AdaptiveSettings(expected_ids='1-2'))
+    assert [target.id for target in seen.targets] == [1, 2]
+    assert (seen.expected, seen.filter.evaluations, seen.filter.applied) == (2, 1, False)
     only = identify(image, detector, 0, replace(listed, ahf=False))
     assert [target.id for target in only.targets] == [1, 2]
     with pytest.raises(ValueError, match="expected_ids has '3-1', accepted are integers"):

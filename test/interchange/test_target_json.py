@@ -43,13 +43,22 @@ def test_results_from_standard_input(monkeypatch):
     ('line', 'message'),
     [
         ('{"image": ', 'line 1 is not JSON'),
+        ('[' * 100_000, 'line 1 is not JSON: RecursionError'),
+        (
+            f'{{"image": "a", "targets": [{{"id": 1, "x": {"9" * 400}, "y": 3}}]}}',
+            'line 1: target 0: x is',
+        ),
+        (f'{{"image": "a", "targets": [{{"id": {"9" * 5000}}}]}}', 'line 1 is not JSON'),
         ('[]', 'line 1 is not an object with a list of targets'),
         ('{"image": "a", "targets": {}}', 'line 1 is not an object with a list of targets'),
         ('{"targets": []}', 'line 1: image is None, accepted is the name of a file'),
         ('{"image": "a", "targets": [3]}', 'line 1: target is 3, accepted is an object'),
-        ('{"image": "a", "targets": [{"id": 1, "x": 2}]}', 'line 1: y is None'),
-        ('{"image": "a", "targets": [{"id": 1.5, "x": 2, "y": 3}]}', 'line 1: id is 1.5'),
-        ('{"image": "a", "targets": [{"id": 1, "x": NaN, "y": 3}]}', 'line 1: x is nan'),
+        ('{"image": "a", "targets": [{"id": 1, "x": 2}]}', 'line 1: target 0: y is None'),
+        (
+            '{"image": "a", "targets": [{"id": 1.5, "x": 2, "y": 3}]}',
+            'line 1: target 0: id is 1.5',
+        ),
+        ('{"image": "a", "targets": [{"id": 1, "x": NaN, "y": 3}]}', 'line 1: target 0: x is nan'),
         (
             '{"image": "a", "targets": []}\n{"image": "b/a", "targets": []}',
             'line 2: a was on',

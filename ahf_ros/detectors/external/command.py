@@ -3,27 +3,20 @@
 from __future__ import annotations
 
 import json
-import os
 import shlex
-import signal
-import subprocess
 import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
 
 from ahf_ros.detectors.contract import DetectorSettings
+from ahf_ros.detectors.external.program import output_of
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.interchange.target_json import targets_from_json
 from ahf_ros.target import Target, sorted_targets
-
-LARGEST_OUTPUT = 64 * 2**20
-"""Bytes that a command may print."""
-
-_TOLD = 300  # characters of what a command said that are passed on
+from ahf_ros.text import printable, reason_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,21 +59,25 @@ class CommandDetector:
 
         Raises
         ------
+        Unavailable
+            If the command cannot be started.
         ValueError
-            If the image is not accepted; if the command cannot be started, takes longer than its
-            time limit, ends with another status than 0, or prints what is not accepted.
+            If the image is not accepted; if the command takes longer than its time limit, ends
+            with another status than 0, or prints what is not accepted.
         """
         check_image(image)
         with tempfile.TemporaryDirectory(prefix='ahf_') as folder:
             path = Path(folder, 'image.png')
             cv2.imwrite(str(path), as_gray(image).astype(np.uint8, copy=False))
-            printed = self._printed(self._words(str(path)), Path(folder))
+            words = self._words(str(path))
+            timeout = self.settings.detector_timeout
+            printed = output_of(words, Path(folder), timeout, self._named)
         try:
             record = json.loads(printed)
-        except ValueError as error:
-            told = printed[:_TOLD].strip()
+        except (ValueError, RecursionError) as error:
+            told = printable(printed.strip())
             raise ValueError(
-                f'{self._named} printed {told!r}, accepted is JSON: {error}'
+                f'{self._named} printed {told!r}, accepted is JSON: {reason_of(error)}'
             ) from error
         return sorted_targets(targets_from_json(record, self._named))
 
@@ -98,45 +95,3 @@ class CommandDetector:
         if not any('{image}' in word for word in words):
             words.append('{image}')
         return [word.replace('{image}', image) for word in words]
-
-    def _printed(self, words: list[str], folder: Path) -> str:
-        """Return what the command printed on standard output."""
-        output, errors = folder / 'output', folder / 'errors'
-        limit = self.settings.detector_timeout
-        with output.open('wb') as out, errors.open('wb') as err:
-            try:
-                process = subprocess.Popen(
-                    words, stdin=subprocess.DEVNULL, stdout=out, stderr=err, start_new_session=True
-                )
-            except OSError as error:
-                raise ValueError(f'{self._named} cannot be started: {error.strerror}') from error
-            try:
-                status = process.wait(limit)
-            except subprocess.TimeoutExpired as error:
-                raise ValueError(
-                    f'{self._named} took longer than detector_timeout, {limit:g} s'
-                ) from error
-            finally:
-                _end(process)
-        if status:
-            said = errors.read_bytes()[-_TOLD:].decode(errors='replace').strip()
-            raise ValueError(f'{self._named} ended {_ending(status)}: {said!r}')
-        if output.stat().st_size > LARGEST_OUTPUT:
-            raise ValueError(
-                f'{self._named} printed {output.stat().st_size} bytes, accepted are at most '
-                f'{LARGEST_OUTPUT}'
-            )
-        return output.read_text(encoding='utf-8', errors='replace')
-
-
-def _end(process: subprocess.Popen[Any]) -> None:
-    """End a process that has not, and all that it started."""
-    try:
-        os.killpg(process.pid, signal.SIGKILL)
-    except ProcessLookupError:
-        return
-    process.wait()
-
-
-def _ending(status: int) -> str:
-    return f'with status {status}' if status > 0 else f'by signal {-status}'

@@ -12,6 +12,8 @@ import numpy as np
 
 from ahf_ros.detectors.contract import Detector, Drafter, Refiner
 from ahf_ros.target import Target
+from ahf_ros.target_check import checked_targets
+from ahf_ros.text import reason_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,10 +47,13 @@ class GuardedDetector:
         Raises
         ------
         ValueError
-            Whatever the detector raises, with its name; or if it exceeds its time limit.
+            Whatever the detector raises, with its name; if it exceeds its time limit or returns
+            what `checked_targets` does not accept.
         """
-        found: list[Target] = self._guarded(self.detector, image)
-        return found
+        return self._checked(self.detector, image)
+
+    def _checked(self, call: Callable[..., Any], *arguments: Any) -> list[Target]:
+        return checked_targets(self._guarded(call, *arguments), f'detector {self.name!r}')
 
     def _guarded(self, call: Callable[..., Any], *arguments: Any) -> Any:
         outcome: Future[Any] = Future()
@@ -67,9 +72,7 @@ class GuardedDetector:
             )
         error = outcome.exception()
         if error is not None:
-            raise ValueError(
-                f'detector {self.name!r} failed: {type(error).__name__}: {error}'
-            ) from error
+            raise ValueError(f'detector {self.name!r} failed: {reason_of(error)}') from error
         return outcome.result()
 
 
@@ -85,15 +88,13 @@ class GuardedRefiner(GuardedDetector):
 
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> Sequence[Target]:
         """Return targets with the centres of an image; see `Refiner`."""
-        refined: Sequence[Target] = self._guarded(self.detector.refine, image, targets)
-        return refined
+        return self._checked(self.detector.refine, image, targets)
 
     def draft(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image, if possible as a `Drafter` does."""
-        found: list[Target] = self._guarded(
-            self.detector.draft if isinstance(self.detector, Drafter) else self.detector, image
-        )
-        return found
+        if isinstance(self.detector, Drafter):
+            return self._checked(self.detector.draft, image)
+        return self._checked(self.detector, image)
 
 
 def guarded(detector: Detector, timeout: float) -> GuardedDetector:

@@ -1,0 +1,121 @@
+"""Programs of the user's: run with limits of time and output, and ended with this process."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+from ahf_ros.detectors.contract import Unavailable
+from ahf_ros.text import LONGEST, printable
+
+LARGEST_OUTPUT = 64 * 2**20
+"""Bytes that a program may write to standard output or standard error."""
+
+_POLL = 0.02  # s, between two looks at a program that runs
+_running: set[subprocess.Popen[Any]] = set()
+_lock = threading.Lock()
+_ending = threading.Event()
+
+
+def output_of(words: list[str], folder: Path, timeout: float, name: str) -> str:
+    """Run a program and return what it writes to standard output.
+
+    Parameters
+    ----------
+    words : list of str
+        Program and arguments.
+    folder : Path
+        Empty folder for what it writes.
+    timeout : float
+        Time limit, s.
+    name : str
+        What errors call it.
+
+    Raises
+    ------
+    Unavailable
+        If the program cannot be started.
+    ValueError
+        If it takes longer, writes more than `LARGEST_OUTPUT`, ends with another status than 0, or
+        is ended by `end_programs`.
+    """
+    output, errors = folder / 'output', folder / 'errors'
+    with output.open('wb') as out, errors.open('wb') as err:
+        try:
+            process = subprocess.Popen(
+                words, stdin=subprocess.DEVNULL, stdout=out, stderr=err, start_new_session=True
+            )
+        except (OSError, ValueError) as error:  # ValueError: a zero byte in a word
+            reason = error.strerror if isinstance(error, OSError) else error
+            raise Unavailable(f'{name} cannot be started: {reason}') from error
+        with _lock:
+            _running.add(process)
+        try:
+            status = _awaited(process, (output, errors), timeout, name)
+        finally:
+            with _lock:
+                _running.discard(process)
+            _end(process)
+    if status:
+        said = printable(_tail(errors).decode(errors='replace').strip())
+        how = f'with status {status}' if status > 0 else f'by signal {-status}'
+        raise ValueError(f'{name} ended {how}: {said!r}')
+    return output.read_text(encoding='utf-8', errors='replace')
+
+
+def end_programs() -> None:
+    """End all programs that run, and those that would still be started; this process ends."""
+    _ending.set()
+    with _lock:
+        running = list(_running)
+    for process in running:
+        _kill(process)
+
+
+def _awaited(
+    process: subprocess.Popen[Any], files: tuple[Path, ...], timeout: float, name: str
+) -> int:
+    """Return the status of a program, or raise a ValueError as soon as it breaks a limit."""
+    limit = time.monotonic() + timeout
+    while True:
+        if _ending.is_set():
+            raise ValueError(f'{name} was ended with this process')
+        remaining = limit - time.monotonic()
+        status = None
+        try:
+            status = process.wait(max(min(_POLL, remaining), 0))
+        except subprocess.TimeoutExpired as error:
+            if remaining <= 0:
+                raise ValueError(
+                    f'{name} took longer than detector_timeout, {timeout:g} s'
+                ) from error
+        size = max(file.stat().st_size for file in files)
+        if size > LARGEST_OUTPUT:
+            raise ValueError(f'{name} wrote {size} bytes, accepted are at most {LARGEST_OUTPUT}')
+        if status is not None:
+            return status
+
+
+def _tail(path: Path) -> bytes:
+    """Return the last bytes of a file."""
+    with path.open('rb') as file:
+        file.seek(max(path.stat().st_size - LONGEST, 0))
+        return file.read()
+
+
+def _end(process: subprocess.Popen[Any]) -> None:
+    """End a process that has not, and all that it started."""
+    _kill(process)
+    process.wait()
+
+
+def _kill(process: subprocess.Popen[Any]) -> None:
+    try:
+        os.killpg(process.pid, signal.SIGKILL)
+    except ProcessLookupError:
+        return

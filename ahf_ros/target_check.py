@@ -1,0 +1,177 @@
+"""The one gate for results of detectors: behind it, targets fit into messages, JSON and overlays.
+
+Detectors of other packages, commands, services and refinements pass it. Nothing else checks.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import fields, replace
+from numbers import Real
+from typing import Any
+
+import numpy as np
+
+from ahf_ros.target import Target
+from ahf_ros.text import shown
+
+MAXIMUM_LENGTH = 100_000
+"""Maximum number of targets in a result."""
+
+MAXIMUM_PIXELS = 1e6
+"""Maximum size of a coordinate or a semi-axis, px; no image has so large a side."""
+
+MAXIMUM_VARIANCE = MAXIMUM_PIXELS**2
+"""Maximum size of an element of a covariance, px^2."""
+
+ASYMMETRY = 1e-5
+"""Difference of the two covariances of x and y that rounding may leave, as a share of the largest
+element."""
+
+
+def checked_targets(found: Any, name: str) -> list[Target]:
+    """Return a result as a list of targets of Python numbers in the ranges of `CodedTarget.msg`.
+
+    Parameters
+    ----------
+    found : object
+        What a detector or a refinement returned.
+    name : str
+        What errors call it, such as "detector 'mine'".
+
+    Raises
+    ------
+    ValueError
+        If it is not a list or tuple of `Target` with fields as `checked_target` accepts them. The
+        message names the detector, the target, the field, its value and what is accepted.
+    """
+    if not isinstance(found, (list, tuple)):
+        raise ValueError(f'{name} returned {shown(found)}, accepted is a list of targets')
+    if len(found) > MAXIMUM_LENGTH:
+        raise ValueError(
+            f'{name} returned {len(found)} targets, accepted are at most {MAXIMUM_LENGTH}'
+        )
+    return [
+        checked_target(target, f'{name}: target {number}') for number, target in enumerate(found)
+    ]
+
+
+def checked_target(target: Any, name: str) -> Target:
+    """Return a target whose fields are Python numbers in the ranges of `CodedTarget.msg`.
+
+    Parameters
+    ----------
+    target : Target
+        Its fields may be of any type. Accepted are an `id` from -1 to 2^31 - 1, a `code` from 0 to
+        2^32 - 1, finite coordinates and semi-axes, an `angle` within a turn, a `confidence` from
+        0 to 1 and a covariance that is symmetric and positive semidefinite; numpy scalars and
+        arrays are converted.
+    name : str
+        What errors call it.
+
+    Raises
+    ------
+    ValueError
+        If a field is not accepted; the message names the field, its value and what is accepted.
+    """
+    if not isinstance(target, Target):
+        raise ValueError(f'{name} is {shown(target)}, accepted is a Target')
+    values: dict[str, Any] = {}
+    changed = False
+    for item in fields(Target):
+        value = getattr(target, item.name, None)
+        values[item.name] = checked = _CHECKS[item.name](value, f'{name}: {item.name}')
+        changed |= checked is not value
+    return replace(target, **values) if changed else target
+
+
+def checked_integer(value: Any, name: str, minimum: int, maximum: int) -> int:
+    """Return a value as an int, or raise a ValueError that calls it `name`."""
+    integer = _integer(value)
+    if integer is None or not minimum <= integer <= maximum:
+        raise ValueError(
+            f'{name} is {shown(value)}, accepted is an integer from {minimum} to {maximum}'
+        )
+    return integer
+
+
+def checked_number(value: Any, name: str, minimum: float, maximum: float) -> float:
+    """Return a value as a finite float, or raise a ValueError that calls it `name`."""
+    number = _number(value)
+    if number is None or not minimum <= number <= maximum:
+        raise ValueError(
+            f'{name} is {shown(value)}, accepted is a number from {minimum:g} to {maximum:g}'
+        )
+    return number
+
+
+def _integer(value: Any) -> int | None:
+    if type(value) is int or isinstance(value, np.integer):
+        return value if type(value) is int else int(value)
+    number = _number(value)
+    return int(number) if number is not None and number.is_integer() else None
+
+
+def _number(value: Any) -> float | None:
+    """Return a finite number as float, None for anything else."""
+    if type(value) is float:
+        return value if math.isfinite(value) else None
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, Real):
+        return None
+    try:
+        number = float(value)
+    except (OverflowError, ValueError, TypeError):
+        return None
+    return number if math.isfinite(number) else None
+
+
+def _covariance(value: Any, name: str) -> tuple[float, ...]:
+    elements: Any = value if type(value) is tuple else _listed(value)
+    numbers = [_number(it) for it in elements] if len(elements) == 4 else []
+    known = [it for it in numbers if it is not None and abs(it) <= MAXIMUM_VARIANCE]
+    if len(known) == 4 and _is_covariance(*known):
+        same = all(new is old for new, old in zip(known, elements, strict=True))
+        return elements if same and elements is value else tuple(known)
+    raise ValueError(
+        f'{name} is {shown(value)}, accepted are four finite numbers, row-major, of a symmetric '
+        'positive semidefinite matrix'
+    )
+
+
+def _listed(value: Any) -> list[Any]:
+    """Return the elements of a list or an array, empty for anything else."""
+    flat = getattr(value, 'ravel', None)
+    if callable(flat):
+        value = flat().tolist()
+    return list(value) if isinstance(value, (list, tuple)) else []
+
+
+def _is_covariance(xx: float, xy: float, yx: float, yy: float) -> bool:
+    scale = max(abs(xx), abs(xy), abs(yx), abs(yy))
+    if min(xx, yy) < 0 or abs(xy - yx) > ASYMMETRY * scale:
+        return False
+    return xx * yy - xy * yx >= -ASYMMETRY * scale**2
+
+
+def _integers(minimum: int, maximum: int) -> Callable[[Any, str], int]:
+    return lambda value, name: checked_integer(value, name, minimum, maximum)
+
+
+def _numbers(minimum: float, maximum: float) -> Callable[[Any, str], float]:
+    return lambda value, name: checked_number(value, name, minimum, maximum)
+
+
+_PLACE = _numbers(-MAXIMUM_PIXELS, MAXIMUM_PIXELS)
+_AXIS = _numbers(0, MAXIMUM_PIXELS)
+_CHECKS: dict[str, Callable[[Any, str], Any]] = {
+    'id': _integers(-1, 2**31 - 1),
+    'code': _integers(0, 2**32 - 1),
+    'x': _PLACE,
+    'y': _PLACE,
+    'semi_major': _AXIS,
+    'semi_minor': _AXIS,
+    'angle': _numbers(-2 * math.pi, 2 * math.pi),
+    'confidence': _numbers(0, 1),
+    'covariance': _covariance,
+}

@@ -1,0 +1,42 @@
+"""Text of others, made fit for logs, terminals, JSON and messages."""
+
+from __future__ import annotations
+
+LONGEST = 300
+"""Number of characters of a foreign text that are passed on."""
+
+
+def printable(text: str, longest: int = LONGEST) -> str:
+    r"""Return a text with everything escaped that a log or a message may not hold.
+
+    Parameters
+    ----------
+    text : str
+        Of any length; lone surrogates and control characters are accepted.
+    longest : int
+        Number of characters that are kept.
+
+    Examples
+    --------
+    >>> printable('a' + chr(0xd800))
+    'a\\ud800'
+    """
+    shown = text[:longest].encode('utf-8', 'backslashreplace').decode()
+    return ''.join(it if it.isprintable() else ascii(it)[1:-1] for it in shown)
+
+
+def shown(value: object) -> str:
+    """Return the representation of any object, printable and of bounded length."""
+    try:
+        return printable(repr(value))
+    except Exception:  # what an object of others raises when it is asked what it is
+        return f'a {type(value).__name__}'
+
+
+def reason_of(error: BaseException) -> str:
+    """Return the type and the text of any exception, printable and of bounded length."""
+    try:
+        text = str(error)
+    except Exception:  # an exception of others may have no text
+        text = ''
+    return printable(f'{type(error).__name__}: {text}')

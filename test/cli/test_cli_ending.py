@@ -1,0 +1,180 @@
+"""The command line under signals, closed and full outputs: it ends in order, and soon."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from contextlib import nullcontext
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rosbags', reason='rosbags is not installed')
+
+from ahf_ros.bag import run
+from ahf_ros.bag.definitions import typestore
+from ahf_ros.cli import main
+from ahf_ros.interchange.image_files import write_image
+from support import bags
+
+ROOT = Path(__file__).resolve().parents[2]
+LIMIT = 300.0
+SLOW = 'import pathlib, sys, time; pathlib.Path({mark!r}).touch(); time.sleep(600)'
+
+
+def start(*arguments: object, **options: object) -> subprocess.Popen[bytes]:
+    command = [sys.executable, '-m', 'ahf_ros.cli', *map(str, arguments)]
+    return subprocess.Popen(command, cwd=ROOT, **options)  # type: ignore[call-overload,no-any-return]
+
+
+def wait_for(condition: object) -> None:
+    limit = time.monotonic() + LIMIT
+    while not condition():  # type: ignore[operator]
+        assert time.monotonic() < limit, 'it does not happen in time'
+        time.sleep(0.02)
+
+
+def running(mark: Path) -> list[int]:
+    """Return the processes on whose command line a path is."""
+    found = []
+    for folder in Path('/proc').iterdir():
+        try:
+            line = (folder / 'cmdline').read_bytes() if folder.name.isdigit() else b''
+            state = (folder / 'stat').read_text().rpartition(')')[2].split()[0] if line else 'Z'
+        except OSError:
+            continue
+        if str(mark).encode() in line and state != 'Z' and int(folder.name) != os.getpid():
+            found.append(int(folder.name))
+    return found
+
+
+def is_free(target: Path) -> bool:
+    """Return whether no process writes a bag."""
+    try:
+        with run.locked(target) if target.exists() else nullcontext():
+            return True
+    except ValueError:
+        return False
+
+
+def slow_command(tmp_path: Path) -> tuple[str, Path]:
+    mark = tmp_path / 'mark'
+    (tmp_path / 'slow.py').write_text(SLOW.format(mark=str(mark)))
+    return f'{sys.executable} {tmp_path / "slow.py"} {{image}}', mark
+
+
+@pytest.mark.parametrize(
+    ('number', 'status'), [(signal.SIGINT, 130), (signal.SIGTERM, 128 + signal.SIGTERM)]
+)
+def test_a_signal_ends_the_command_and_its_files(
+    tmp_path: Path, number: signal.Signals, status: int
+) -> None:
+    write_image(tmp_path / 'image.png', np.tile(np.arange(40, dtype=np.uint8), (30, 1)))
+    command, mark = slow_command(tmp_path)
+    (tmp_path / 'scratch').mkdir()
+    process = start(
+        'identify', tmp_path / 'image.png', '--detector', 'command', '--command', command,
+        '--expected', 3, '--detector-timeout', 600,
+        stderr=subprocess.PIPE, env={**os.environ, 'TMPDIR': str(tmp_path / 'scratch')},
+    )  # fmt: skip
+    wait_for(mark.exists)
+    sent = time.monotonic()
+    process.send_signal(number)
+    errors = process.communicate(timeout=LIMIT)[1]
+    assert time.monotonic() - sent < LIMIT
+    assert process.returncode == status, errors
+    assert b'Traceback' not in errors
+    wait_for(lambda: not running(tmp_path / 'slow.py'))
+    assert list((tmp_path / 'scratch').iterdir()) == []
+
+
+def test_workers_end_with_their_parent_and_a_rerun_is_accepted(tmp_path: Path) -> None:
+    images = [np.tile(np.arange(40, dtype=np.uint8) + it, (30, 1)) for it in range(2)]
+    sources = [
+        bags.write_ros2(tmp_path / name, bags.recorded(typestore(), images)) for name in 'ab'
+    ]
+    command, mark = slow_command(tmp_path)
+    target = tmp_path / 'made'
+    process = start(
+        'bag', *sources, target, '--jobs', 2, '--detector', 'command', '--command', command,
+        '--detector-timeout', 600,
+    )  # fmt: skip
+    wait_for(mark.exists)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    wait_for(lambda: not running(tmp_path) and all(is_free(target / name) for name in 'ab'))
+    (tmp_path / 'slow.py').write_text('print(\'{"targets": []}\')')
+    again = start(
+        'bag', *sources, target, '--jobs', 2, '--detector', 'command', '--command', command,
+        '--detector-timeout', 600,
+    )  # fmt: skip
+    assert again.wait(LIMIT) == 0
+    for name in 'ab':
+        assert len(bags.answers(target / name)) == 2
+
+
+def test_a_command_that_was_missing_is_tried_again(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    images = [np.tile(np.arange(40, dtype=np.uint8), (30, 1))]
+    source = bags.write_ros2(tmp_path / 'in', bags.recorded(typestore(), images))
+    program = tmp_path / 'program'
+    arguments = ['bag', source, tmp_path / 'out', '--detector', 'command', '--command', program]
+    assert main([*map(str, arguments)]) == 1
+    assert 'cannot be started: No such file or directory' in capfd.readouterr().err
+    program.write_text(f'#!{sys.executable}\nprint(\'{{"targets": []}}\')')
+    program.chmod(0o755)
+    assert main([*map(str, arguments)]) == 0
+    assert len(bags.answers(tmp_path / 'out')) == 1
+
+
+def test_a_full_disk_behind_standard_output_is_named(tmp_path: Path) -> None:
+    write_image(tmp_path / 'image.png', np.tile(np.arange(40, dtype=np.uint8), (30, 1)))
+    with Path('/dev/full').open('w') as full:
+        process = start(
+            'identify', '--json', '--detector', 'traditional', tmp_path / 'image.png',
+            stdout=full, stderr=subprocess.PIPE,
+        )  # fmt: skip
+        errors = process.communicate(timeout=LIMIT)[1]
+    assert process.returncode == 1
+    assert b'No space left on device' in errors and b'Traceback' not in errors
+
+
+@pytest.mark.parametrize('closed', ['2>&-', '>&-', '2>/dev/full'])
+def test_closed_outputs_do_no_harm(tmp_path: Path, closed: str) -> None:
+    write_image(tmp_path / 'image.png', np.tile(np.arange(40, dtype=np.uint8), (30, 1)))
+    words = f'{sys.executable} -m ahf_ros.cli identify --detector traditional'
+    done = subprocess.run(
+        ['sh', '-c', f'{words} {tmp_path / "image.png"} {closed}'],
+        cwd=ROOT, capture_output=True, timeout=LIMIT,
+    )  # fmt: skip
+    assert done.returncode in (0, 1)
+    assert b'Traceback' not in done.stderr and b'Traceback' not in done.stdout
+
+
+def test_many_images_are_rendered_one_by_one(tmp_path: Path) -> None:
+    process = start(
+        'render', tmp_path / 'made', '--count', 10**9, '--width', 64, '--height', 64,
+        '--targets', 1, '--dot-radius', 5, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    wait_for(lambda: (tmp_path / 'made' / 'truth.csv').exists())
+    process.send_signal(signal.SIGINT)
+    assert process.wait(LIMIT) == 130
+
+
+def test_an_interrupt_during_the_imports_ends_in_order(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Interrupting:
+        def find_spec(self, name: str, *_: object) -> None:
+            if name == 'ahf_ros.cli.commands':
+                raise KeyboardInterrupt
+
+    import ahf_ros.cli
+
+    monkeypatch.delitem(sys.modules, 'ahf_ros.cli.commands', raising=False)
+    monkeypatch.delattr(ahf_ros.cli, 'commands', raising=False)
+    monkeypatch.setattr(sys, 'meta_path', [Interrupting(), *sys.meta_path])
+    assert main(['--version']) == 130

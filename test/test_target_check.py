@@ -1,0 +1,212 @@
+"""The gate for results of detectors: what passes fits into messages; the rest is named."""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+from dataclasses import fields
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+pytest.importorskip('rosbags', reason='rosbags is not installed')
+
+from ahf_ros.bag.definitions import CODED_TARGETS, message_types, typestore
+from ahf_ros.detectors.external.guarded import guarded
+from ahf_ros.drawing import draw
+from ahf_ros.interchange.target_json import to_json
+from ahf_ros.interchange.target_messages import coded_target_array
+from ahf_ros.session import create_identifier
+from ahf_ros.target import Identification, Target
+from ahf_ros.target_check import checked_target, checked_targets
+from ahf_ros.text import printable, reason_of, shown
+
+NAMES = [item.name for item in fields(Target)]
+GOOD = Target(7, 9, 10.5, 20.25, 4.0, 3.0, 0.1, 0.9, (0.1, 0.01, 0.01, 0.2))
+STORE = typestore()
+IMAGE = np.tile(np.arange(40, dtype=np.uint8), (30, 1))
+
+
+class Hostile:
+    """Raises whatever is asked of it."""
+
+    def __repr__(self) -> str:
+        raise RuntimeError('no')
+
+    def __float__(self) -> float:
+        raise RuntimeError('no')
+
+    __str__ = __repr__
+
+
+def changed(**values: object) -> Target:
+    return Target(**{name: getattr(GOOD, name) for name in NAMES} | values)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ('field', 'value', 'accepted'),
+    [
+        ('id', 2**40, 'an integer from -1 to 2147483647'),
+        ('id', 2**31, 'an integer'),
+        ('id', -2, 'an integer'),
+        ('id', None, 'an integer'),
+        ('id', 'text', 'an integer'),
+        ('id', 5.5, 'an integer'),
+        ('id', True, 'an integer'),
+        ('code', 2**70, 'an integer from 0 to 4294967295'),
+        ('code', -1, 'an integer from 0 to 4294967295'),
+        ('x', math.nan, 'a number from -1e'),
+        ('y', math.inf, 'a number'),
+        ('y', 10**400, 'a number'),
+        ('x', '1', 'a number'),
+        ('x', Hostile(), 'a number'),
+        ('semi_major', -1.0, 'a number from 0 to 1e'),
+        ('semi_minor', 1e30, 'a number from 0'),
+        ('angle', 90.0, 'a number from -6.28319 to 6.28319'),
+        ('confidence', 1.01, 'a number from 0 to 1'),
+        ('covariance', None, 'four finite numbers'),
+        ('covariance', (1, 0, 0), 'four finite numbers'),
+        ('covariance', (1, 0, 0, -1), 'positive semidefinite'),
+        ('covariance', (1, 2, 2, 1), 'positive semidefinite'),
+        ('covariance', (1, 0.5, -0.5, 1), 'symmetric'),
+        ('covariance', (1, 0, 0, math.nan), 'four finite numbers'),
+    ],
+)
+def test_what_is_not_accepted_is_named(field, value, accepted):
+    with pytest.raises(ValueError) as caught:
+        checked_targets([GOOD, changed(**{field: value})], "detector 'mine'")
+    message = str(caught.value)
+    assert message.startswith(f"detector 'mine': target 1: {field} is ")
+    assert accepted in message
+
+
+@pytest.mark.parametrize('found', [None, 3, GOOD, [GOOD, 'x'], {GOOD: 1}, Hostile(), [Hostile()]])
+def test_what_is_no_list_of_targets_is_named(found):
+    with pytest.raises(ValueError, match=r"^detector 'mine'.* accepted is a (list of t|T)arget"):
+        checked_targets(found, "detector 'mine'")
+
+
+def test_numbers_of_numpy_are_converted():
+    target = Target(
+        np.int64(7),
+        np.uint32(9),
+        np.float32(10.5),
+        20,
+        np.float64(4),
+        np.int16(3),
+        np.float16(0.5),
+        1,
+        np.array([[1, 0], [0, 2]]),
+    )
+    checked = checked_target(target, 'x')
+    assert checked == Target(7, 9, 10.5, 20.0, 4.0, 3.0, 0.5, 1.0, (1.0, 0.0, 0.0, 2.0))
+    types = [type(getattr(checked, name)) for name in NAMES]
+    assert types == [int, int, float, float, float, float, float, float, tuple]
+    assert all(type(it) is float for it in checked.covariance)
+
+
+def test_what_is_right_stays_as_it_is():
+    assert checked_target(GOOD, 'x') is GOOD
+
+
+NUMBERS = st.one_of(
+    st.integers(-(2**70), 2**70),
+    st.floats(),
+    st.floats(width=32).map(np.float32),
+    st.integers(-(2**31), 2**31 - 1).map(np.int32),
+    st.booleans(),
+    st.none(),
+    st.text(),
+    st.complex_numbers(),
+    st.decimals(),
+    st.fractions(),
+    st.just(Hostile()),
+)
+SMALL = st.one_of(st.integers(0, 2**31 - 1), st.floats(0, 1), st.integers(0, 1))
+FIELDS = {name: st.one_of(SMALL, SMALL, SMALL, NUMBERS) for name in NAMES if name != 'covariance'}
+COVARIANCES = st.one_of(
+    st.just((0.0,) * 4),
+    st.tuples(SMALL, st.just(0), st.just(0), SMALL),
+    st.lists(NUMBERS, max_size=5),
+    st.lists(st.floats(), min_size=4, max_size=4).map(np.array),
+    NUMBERS,
+)
+TARGETS = st.builds(Target, **FIELDS, covariance=COVARIANCES)
+
+
+@settings(max_examples=300, deadline=None, derandomize=True)
+@given(st.one_of(st.lists(TARGETS, max_size=3), st.lists(NUMBERS, max_size=2), NUMBERS))
+def test_whatever_passes_fits_everywhere(found):
+    try:
+        targets = checked_targets(found, 'detector')
+    except ValueError as error:
+        assert str(error).startswith('detector') and str(error).isprintable()
+        return
+    identification = Identification(tuple(targets))
+    content = json.loads(
+        json.dumps(to_json(identification, 'a', (30, 40), 'f', 'd'), allow_nan=False)
+    )
+    assert len(content['targets']) == len(targets)
+    draw(IMAGE, identification)
+    message = coded_target_array(identification, 'f', (30, 40), header(), message_types(STORE))
+    received = STORE.deserialize_cdr(
+        bytes(STORE.serialize_cdr(message, CODED_TARGETS)), CODED_TARGETS
+    )
+    for sent, target in zip(received.targets, targets, strict=True):
+        assert (sent.id, sent.code, sent.x, sent.y) == (target.id, target.code, target.x, target.y)
+        assert sent.covariance.tolist() == list(target.covariance)
+        for name in ('semi_major', 'semi_minor', 'angle', 'confidence'):
+            assert (
+                getattr(sent, name)
+                == struct.unpack('f', struct.pack('f', getattr(target, name)))[0]
+            )
+
+
+def header() -> object:
+    types = STORE.types
+    stamp = types['builtin_interfaces/msg/Time'](sec=0, nanosec=0)
+    return types['std_msgs/msg/Header'](stamp=stamp, frame_id='')
+
+
+class Bad:
+    """A detector of another package whose results are not accepted."""
+
+    name = 'bad'
+    family = 'metashape12'
+
+    def __init__(self, found: object) -> None:
+        self.found = found
+
+    def __call__(self, image: np.ndarray) -> list[Target]:
+        if isinstance(self.found, Exception):
+            raise self.found
+        return self.found if isinstance(self.found, list) else [GOOD]
+
+    def refine(self, image: np.ndarray, targets: object) -> object:
+        return self.found
+
+
+def test_plug_ins_pass_the_gate():
+    with pytest.raises(ValueError, match=r"detector 'bad': target 0: id is 5\.5, accepted is an"):
+        guarded(Bad([changed(id=5.5)]), 5.0)(IMAGE)
+    refining = guarded(Bad((changed(x=math.nan),)), 5.0)
+    with pytest.raises(ValueError, match="detector 'bad': target 0: x is nan, accepted is a num"):
+        refining.refine(IMAGE, [GOOD])
+    with pytest.raises(ValueError, match=r"detector 'bad' failed: KeyError: .*ud800"):
+        guarded(Bad(KeyError('\ud800')), 5.0)(IMAGE)
+
+
+def test_refinements_pass_the_gate():
+    identifier = create_identifier(detector=Bad((changed(code=-1),)))
+    with pytest.raises(ValueError, match="refine of detector 'bad': target 0: code is -1"):
+        identifier.identify(IMAGE.astype(np.uint16))
+
+
+def test_texts_of_others_become_printable():
+    for text in ('a\ud800b', 'line\nline', '\x1b[31m', 'x' * 10**6):
+        assert printable(text).isprintable() and len(printable(text)) < 3000
+    assert reason_of(ValueError(Hostile())).startswith('ValueError')
+    assert shown(Hostile()) == 'a Hostile'
