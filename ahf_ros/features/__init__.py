@@ -1,1 +1,1 @@
-"""What any family of targets is found and measured by; no family is known here."""
+"""Finding and measuring targets of any family; no family is known here."""

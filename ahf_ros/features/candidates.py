@@ -83,7 +83,7 @@ def find_candidates(
 
 
 def _vote(edges: LogEdges, radii: tuple[float, float], cell: int, polarity: int) -> np.ndarray:
-    """Return the points, shape (k, 2), where enough edges at the radii point away from."""
+    """Return the points, shape (k, 2), that enough edges at the radii point away from."""
     height, width = (side // cell + 1 for side in edges.marked.shape)
     low, high = radii
     count = max(2, int(np.ceil((high - low) / (_STEP * cell))))

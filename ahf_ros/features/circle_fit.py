@@ -55,9 +55,9 @@ class Fit(ArrayRecord):
     bright : ndarray of float64, shape (k,)
         Usual gray value of the bright side.
     share : ndarray of float64, shape (k,)
-        Share of the expected edges that were found in their place.
+        Share of the expected edges that were measured where they are expected.
     deviation : ndarray of float64, shape (k,)
-        Standard deviation of the edges that were, px.
+        Standard deviation of these edges, px.
     covariance : ndarray of float64, shape (k, 2, 2)
         Of the image of the centre, px^2.
     blur : ndarray of float64, shape (k,)
@@ -90,7 +90,7 @@ def fit_dots(
     min_share: float = 0.0,
     max_contrast: float = 1.0,
 ) -> Fit:
-    """Fit the ellipses of dots, and leave out those that their edges do not bear out.
+    """Fit the ellipses of dots, and drop those that their edges do not support.
 
     Parameters
     ----------
@@ -127,10 +127,10 @@ def fit_circles(
         To about two pixels.
     circles : Circles
     reach : float
-        How far from an expected edge to look, dot radii.
+        Distance from an expected edge within which edges are measured, dot radii.
     projective : bool
-        Whether the circles have different radii, so that they show where the common centre is.
-        Without, the centre is that of the ellipse.
+        Whether the circles have different radii, so that they determine the common centre.
+        Otherwise the centre is that of the ellipse.
     rounds : int
         Number of measurements.
 

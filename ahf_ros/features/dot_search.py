@@ -36,7 +36,7 @@ def whole_dots(
     Returns
     -------
     Dots
-        No two of them the same, in px of the image, to about half a pixel.
+        Without duplicates, in px of the image, to about half a pixel.
     """
     dots = whole_outlines(pyramid.edges[0], min_radius / 2, max_radius / 2)
     dots = dots.select(np.isin(dots.polarity, polarities))
@@ -61,12 +61,12 @@ def voted_dots(
     polarities : sequence of int
         1 to find dark dots, -1 to find bright ones.
     explained : sequence of ndarray of float, each of shape (m, 2)
-        Outlines of objects that are known already, px of the image. No edge inside of one votes.
+        Outlines of objects that are known already, px of the image. Edges inside do not vote.
 
     Returns
     -------
     Dots
-        No two of them the same, those with the largest share first, in px of the image.
+        Without duplicates, those with the largest share first, in px of the image.
     """
     edges = [
         of_level.outside([(outline + 0.5) / 2**level - 0.5 for outline in explained])

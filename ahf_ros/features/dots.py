@@ -34,7 +34,7 @@ class Dots(ArrayRecord):
 
 
 def distinct(dots: Dots) -> Dots:
-    """Return the dots of which no two are the same, those with the largest share first."""
+    """Return dots without duplicates, those with the largest share first."""
     size = frame.mean_radii(dots.frames)
     order = np.argsort(dots.frames[:, 0, 2], kind='stable')  # neighbours are near in this order
     x, y, size = dots.frames[order, 0, 2], dots.frames[order, 1, 2], size[order]

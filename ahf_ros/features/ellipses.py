@@ -1,4 +1,4 @@
-"""Ellipses of dots, found about candidates despite the edges of light that cross them."""
+"""Ellipses of dots, fitted about candidates despite edges of light that cross them."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def fit_ellipses(logs: Sequence[np.ndarray], candidates: Candidates) -> Dots:
     Returns
     -------
     Dots
-        In px of the first level; only candidates that the edges bear out.
+        In px of the first level; only candidates that the edges support.
     """
     level = candidates.level - (candidates.radii[1] < _COARSE)
     shrink = 2.0 ** (candidates.level - level)
@@ -66,7 +66,7 @@ def fit_ellipses(logs: Sequence[np.ndarray], candidates: Candidates) -> Dots:
 
 
 def refine_ellipses(log: np.ndarray, frames: np.ndarray, polarity: np.ndarray) -> Dots:
-    """Refine ellipses on a logarithmic image; leave out those that its edges do not bear out.
+    """Refine ellipses on a logarithmic image, and drop those that its edges do not support.
 
     Parameters
     ----------

@@ -18,10 +18,10 @@ def best_words(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return the valid words with the most evidence.
 
-    Bands without evidence for any one are not read. Of the others every rotation of every word
-    competes at p phases, p ways to divide the band into sectors. In families of more than 50000
-    rotations only those words do that differ from the sectors' own evidence in no more than the
-    ten least certain ones.
+    Bands without evidence for any mark are not read. In the others every rotation of every word
+    competes at p phases, which are p ways to divide the band into sectors. In families of more
+    than 50000 rotations, only those words compete that differ from the sectors' own evidence in
+    the ten least certain sectors at most.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def _near_rotations(
     words = np.unique(certain[:, None] + (1 << uncertain) @ choices.T)
     numbers = _number_table(family)
     valid = words[numbers[words] > 0]
-    # Two words at least have to compete.
+    # At least two words have to compete.
     return _features(np.union1d(valid, family.words[:2]), numbers, family.bits)
 
 

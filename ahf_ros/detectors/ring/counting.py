@@ -1,8 +1,8 @@
-"""How many coded targets an image shows, where nobody knows it.
+"""Estimation of the number of coded targets in an image.
 
-Dots are found as the detector `ring` finds them. Which of them are middles of targets is told by
-what surrounds them under any light: a gap, a band whose two edges agree on where it is marked, and
-a margin. No word has to be read: a target counts also where its band is half hidden or too dark.
+Dots are found as the detector `ring` finds them. Their surroundings tell which of them are centres
+of targets: a gap, a band whose two edges agree on where it is marked, and a margin. No word is
+decoded, so that a target also counts where its band is partly hidden or too dark.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def estimate_count(image: np.ndarray, settings: DetectorSettings | None = None) 
     dots = dots.select((major >= settings.min_radius) & (major <= settings.max_radius))
     features = target_features(gray.astype(np.float32, copy=False), dots, code)
     probability = target_probability(features)
-    # No regression knows all dots that have no band; every word has two marked sectors at least.
+    # The regression has not seen every kind of dot; a word has at least two marked sectors.
     banded = features[:, _MARKED] * code.bits >= _MINIMUM_MARKED
     best_first = np.argsort(-probability, kind='stable')
     targets = dots.select(best_first[(banded & (probability >= _COUNTED))[best_first]])

@@ -37,12 +37,12 @@ class Readings(ArrayRecord):
     weakest : ndarray of float64, shape (k,)
         Evidence of the least certain sector for its own bit, in units of ln.
     contradiction : ndarray of float64, shape (k,)
-        Evidence for a mark in the steps of one unmarked sector that speak for one, in units of
-        ln; of the sector where it is largest. A spot of light can make a mark as gray as the
-        ground about it, but hardly up to its very edges.
+        Evidence of the steps at an unmarked sector for a mark, in units of ln, at the sector
+        where it is largest. A spot of light can make a mark as gray as the ground, but hardly up
+        to its very edges.
     explained : ndarray of float64, shape (k, 4)
-        Share of the steps that are as the word expects them: onto unmarked sectors at the inner
-        and the outer edge of the band, and onto marked ones at both.
+        Share of the steps that are as the word expects: onto unmarked sectors at the inner and
+        the outer edge of the band, and onto marked ones at both.
     """
 
     words: np.ndarray

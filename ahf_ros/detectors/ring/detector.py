@@ -1,9 +1,8 @@
 """Identification of ring targets that light does not break.
 
-Dots are found as whole outlines first, then, in what those do not explain, as points that many
-gradients of the logarithm of the image point away from. Their ellipses are fitted, their bands
-read by likelihood, and dot and band refined together to a projective frame, whose origin is the
-image of the target's physical centre.
+Dots are found by whole outlines first, and then by votes of the edges that these do not explain.
+Their ellipses are fitted, their bands are decoded by likelihood, and dot and band are refined
+together to a projective frame, whose origin is the image of the target's physical centre.
 """
 
 from __future__ import annotations
@@ -63,12 +62,12 @@ class RingDetector:
         return report(find_hypotheses(as_gray(image), self.settings), self.settings)
 
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
-        """Return targets with their places in an image; see `refine_centres`."""
+        """Return targets with their centres in an image; see `refine_centres`."""
         return refine_centres(image, targets, family(self.family), self.settings.polarities)
 
 
 def find_hypotheses(gray: np.ndarray, settings: DetectorSettings) -> Hypotheses:
-    """Return all dots of an image and what their bands may say, before anything is decided.
+    """Return all dots of an image and the words that their bands may show, before any decision.
 
     Parameters
     ----------
@@ -91,7 +90,7 @@ def find_hypotheses(gray: np.ndarray, settings: DetectorSettings) -> Hypotheses:
 
 
 def read_dots(gray: np.ndarray, dots: Dots, code: Family) -> Hypotheses:
-    """Fit the edges of dots, and read the bands of those that have one, some at a time.
+    """Fit the edges of dots and read the bands of the clear ones, in parts.
 
     Parameters
     ----------

@@ -1,9 +1,9 @@
-"""Evidence for marks in the band of a ring target, that light cannot easily fake.
+"""Evidence for marks on a target that light cannot easily fake.
 
-Each reading asks whether a place is marked (has the colour of the dot) or not (has that of the
-surround), and answers with the logarithm of the likelihood of marked over unmarked. The noise of
-ln(I + offset) is known from I; a density of what no hypothesis explains, such as an edge of light,
-bounds what one reading can claim.
+A point is marked where it has the colour of the dot, and unmarked where it has that of the ground.
+The evidence of a reading is the logarithm of the likelihood of marked over unmarked. The noise of
+ln(I + offset) is known from I. A density of what no hypothesis explains, such as an edge of light,
+bounds the evidence of one reading.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _LEVEL_SPREAD = 0.12  # of ln, of levels
 _FLOOR = 0.06  # density of what no hypothesis explains
 _MAXIMUM = 4.0  # evidence of one reading
 _EDGE_STEP = 0.35  # of ln, of an edge of light
-_MINIMUM_EDGES, _MAXIMUM_EDGES = 0.02, 0.5  # probability of one between neighbouring places
+_MINIMUM_EDGES, _MAXIMUM_EDGES = 0.02, 0.5  # probability of one between neighbouring points
 _MINIMUM_STEP = 0.2  # of ln, of a mark
 _DEEPEST_SHADOW = 0.1  # of the light on the dot, elsewhere on the target
 _LEVEL_BIN = 0.05  # of ln
@@ -33,7 +33,7 @@ _LEVELS = np.arange(np.log(LOG_OFFSET), np.log(255 + LOG_OFFSET) + _LEVEL_BIN, _
 
 @dataclass(frozen=True, slots=True)
 class MarkAppearance(ArrayRecord):
-    """How the marks of k targets look against their surround.
+    """How the marks of k targets look on their ground.
 
     Attributes
     ----------
@@ -67,14 +67,14 @@ def log_ratio(values: np.ndarray, others: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, slots=True)
 class LightLevels:
-    """The light on k targets, as it shows in their bright places.
+    """The light on k targets, as their bright points show it.
 
     Attributes
     ----------
     unmarked, marked : ndarray of float64, shape (k, n)
-        Densities of n levels of ln I, of unmarked and of marked places.
+        Densities of n levels of ln I, of unmarked and of marked points.
     edges : ndarray of float64, shape (k,)
-        Probability that an edge of light lies between two neighbouring places.
+        Probability that an edge of light lies between two neighbouring points.
     """
 
     unmarked: np.ndarray
@@ -94,13 +94,13 @@ class LightLevels:
 def light_levels(bright: np.ndarray, gap: np.ndarray, marks: MarkAppearance) -> LightLevels:
     """Return the light on targets.
 
-    Bright places show under which light a target lies: the density of their levels is that of all
-    its bright parts, and moved by the step of a mark that of the dark ones.
+    Bright points show under which light a target lies. The density of their levels is that of all
+    its bright parts. Shifted by the step of a mark, it is that of the dark parts.
 
     Parameters
     ----------
     bright : ndarray of float, shape (k, ...)
-        Gray values of places that are bright: the surround of dark marks, or a bright dot.
+        Gray values of bright points: the ground of dark marks, or a bright dot.
     gap : ndarray of float, shape (2, k, m)
         Gray values on two circles in the gap.
     marks : MarkAppearance
@@ -124,7 +124,7 @@ def step_evidence(
 ) -> np.ndarray:
     """Return the evidence that a step from the surround leads onto a mark.
 
-    Either the light is the same on both sides, and the step is that of a mark or none, or an edge
+    Either the light is the same on both sides, and the step is zero or that of a mark. Or an edge
     of light lies between them, and any level of the light may follow.
     """
     step = log_ratio(values, surround)
@@ -182,7 +182,7 @@ def border_evidence(
     before, after = np.roll(band, 1, axis=2), np.roll(band, -2, axis=2)
     bright = np.moveaxis(np.maximum(before, after), 0, 2)
     mark = np.moveaxis(marks.step(bright), 2, 0)
-    # A mark that makes no step cannot be told by one.
+    # The step of a mark without contrast tells nothing.
     mark = np.sign(mark) * np.maximum(np.abs(mark), _MINIMUM_STEP)
     rise = log_ratio(after, before) / mark
     floor = _FLOOR + _BORDER_FLOOR * light.edges[:, None]

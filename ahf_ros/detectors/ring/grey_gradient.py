@@ -52,7 +52,7 @@ class BandReadings(ArrayRecord):
 
 
 def read_by_gradient(
-    gray: np.ndarray, frames: np.ndarray, polarity: int, code: Family
+    gray: np.ndarray, frames: np.ndarray, polarity: int, family: Family
 ) -> BandReadings:
     """Read the bands of targets of one polarity.
 
@@ -62,12 +62,12 @@ def read_by_gradient(
     frames : ndarray of float64, shape (k, 3, 3)
     polarity : int
         1 for dark targets, -1 for bright ones.
-    code : Family
+    family : Family
     """
-    inner, outer = code.band_inner, code.band_outer
+    inner, outer = family.band_inner, family.band_outer
     gap = 1 + (inner - 1) * np.array(_GAP_DEPTHS)
     band = inner + (outer - inner) * np.array(_BAND_DEPTHS)
-    angles = -2 * np.pi * np.arange(_SAMPLES * code.bits) / (_SAMPLES * code.bits)
+    angles = -2 * np.pi * np.arange(_SAMPLES * family.bits) / (_SAMPLES * family.bits)
     radii = np.concatenate([[_DOT_RADIUS], gap, band, [outer + _MARGIN]])
     pixels = project(frames, circle_points(angles, radii))
     values = -polarity * sample(gray, pixels)  # the larger, the more like the dot
@@ -84,8 +84,8 @@ def read_by_gradient(
     margin = ((of_margin - ground) / contrast < _LEVEL)[..., 0].mean(axis=1)
     levels = ((of_band - ground) / contrast).mean(axis=2)
     profiles = np.clip(_STEEPNESS * (levels - _LEVEL) + 0.5, 0, 1)
-    means, starts, deviation, coherence = _sectors(profiles, code.bits)
-    words = (means > 0.5) @ (1 << np.arange(code.bits))
+    means, starts, deviation, coherence = _sectors(profiles, family.bits)
+    words = (means > 0.5) @ (1 << np.arange(family.bits))
     spread = np.maximum(deviation, _MINIMUM_DEVIATION)[:, None]
     odds = np.abs(2 * means - 1) / (2 * spread**2)
     certainty = np.prod(1 / (1 + np.exp(-odds)), axis=1)

@@ -28,7 +28,7 @@ class Hypotheses(ArrayRecord):
     covariance : ndarray of float64, shape (k, 2, 2)
         Of the image of the centre, px^2.
     share : ndarray of float64, shape (k,)
-        Share of the expected edges that are in their place.
+        Share of the expected edges that were measured where they are expected.
     words : ndarray of int64, shape (k,)
         In the rotation read; 0 where no word is plausible.
     margin : ndarray of float64, shape (k,)
@@ -93,8 +93,8 @@ def resolve_dots(
     Returns
     -------
     kept : ndarray of int
-        Indices of the best hypothesis of each dot. Dots on a band that has been read are its
-        sectors, and not kept.
+        Indices of the best hypothesis of each dot. Dots on the band of a certain target are its
+        sectors and are dropped.
     uncontested : ndarray of bool, shape (k,)
         Whether a hypothesis is kept and no other reading of its dot comes near to it.
     """

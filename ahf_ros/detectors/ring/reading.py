@@ -1,7 +1,7 @@
-"""The bands about dots read, and dot and band refined together.
+"""Reading of the bands about dots, with the joint refinement of dot and band.
 
-One pass goes from the samples of the band to the frames of dot and band. A band that was read
-right makes the frame better, and a better frame the reading: there are two passes.
+A pass goes from the samples of a band to the frame of dot and band. A correct reading improves the
+frame, and a better frame the reading, so there are two passes.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from ahf_ros.features.edge_shift import SMALL, unshifted
 from ahf_ros.features.sampling import sample_circles
 
 PASSES = ((5, 1), (10, 2))
-"""Over a band, each in a better frame: samples a sector, and rounds of the fit that follows."""
+"""Samples per sector and rounds of the fit of each pass."""
 
 _LEVEL_RADII = np.array([0.75, 1.4])  # dot radii, where the levels of dot and gap are read
 _LEVEL_ANGLES = 2 * np.pi * np.arange(24) / 24

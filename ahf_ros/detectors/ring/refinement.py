@@ -1,7 +1,7 @@
-"""Sub-pixel centres in the image as received, of targets that were found in another image.
+"""Sub-pixel centres in the image as received of targets that were found in a filtered image.
 
-A filter that makes targets readable moves their edges: it changes gray values next to an edge by
-what lies beyond it. Identification may come from the filtered image, places should not.
+A filter that makes targets readable also moves their edges, because it changes the gray values on
+one side of an edge by those on the other. IDs may come from a filtered image, centres should not.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from ahf_ros.features.ellipse_targets import ellipse_fields
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, Target
 
-_FIRST_RAYS, _RAYS = 24, 48  # about a dot, for its polarity and a first frame, and for its place
+_FIRST_RAYS, _RAYS = 24, 48  # about a dot, for its polarity and a first frame, and for its centre
 _MINIMUM_SHARE = 0.5  # of the expected edges, for a fit to count
 _FARTHEST, _FARTHEST_SHARE = 1.0, 0.2  # that a centre is moved: px, or radii of its dot
 
 
 @dataclass(frozen=True, slots=True)
 class _Located(ArrayRecord):
-    """Frames, covariances of their centres and shares of the edges that bear them out."""
+    """Frames, covariances of their centres, and shares of the expected edges."""
 
     frames: np.ndarray
     covariance: np.ndarray
@@ -39,14 +39,14 @@ class _Located(ArrayRecord):
 def refine_centres(
     image: np.ndarray,
     targets: Sequence[Target],
-    code: Family,
+    family: Family,
     polarities: Sequence[int] = (1, -1),
 ) -> list[Target]:
-    """Return targets with places, ellipses and covariances from the edges in an image.
+    """Return targets with centres, ellipses and covariances from the edges in an image.
 
-    Dot and band give the image of the physical centre where the band of a target can be read and
-    says what `Target.code` does; elsewhere the dot gives the centre of its ellipse. A target whose
-    edge is not found near to where it should be stays as it is. No ID changes.
+    Where the band of a target can be read and agrees with `Target.code`, dot and band together
+    give the image of the physical centre. Elsewhere the dot gives the centre of its ellipse. A
+    target without an edge near its ellipse is returned unchanged. No ID changes.
 
     Parameters
     ----------
@@ -54,9 +54,9 @@ def refine_centres(
         The image as received.
     targets : sequence of Target
         To about a pixel.
-    code : Family
+    family : Family
     polarities : sequence of int
-        What is possible: 1 for a dark dot on bright ground, -1 for a bright one on dark.
+        Those to be expected: 1 for a dark dot on bright ground, -1 for a bright one on dark.
 
     Returns
     -------
@@ -74,7 +74,7 @@ def refine_centres(
     gray = as_gray(image).astype(np.float32, copy=False)
     columns = [(it.x, it.y, it.semi_major, it.semi_minor, it.angle) for it in targets]
     start = frame.affine_frames(*np.array(columns).T)
-    located = _locate(gray, start, targets, code, polarities)
+    located = _locate(gray, start, targets, family, polarities)
     moved = np.hypot(*(located.frames[:, :2, 2] - start[:, :2, 2]).T)
     reach = np.maximum(_FARTHEST, _FARTHEST_SHARE * frame.ellipse_axes(start)[1])
     good = (located.share >= _MINIMUM_SHARE) & (moved <= reach)
@@ -89,16 +89,16 @@ def _locate(
     gray: np.ndarray,
     start: np.ndarray,
     targets: Sequence[Target],
-    code: Family,
+    family: Family,
     polarities: Sequence[int],
 ) -> _Located:
     """Return where targets are, by dot and band where the band agrees, else by the dot."""
     dots = _fit_either_polarity(gray, start, polarities)
     ids, codes = np.array([(target.id, target.code) for target in targets]).T
     decoded = np.flatnonzero((ids != UNDECODED) & (dots.share >= _MINIMUM_SHARE))
-    hypotheses, of_decoded = read_bands(gray, dots.select(decoded), code, passes=PASSES[-1:])
+    hypotheses, of_decoded = read_bands(gray, dots.select(decoded), family, passes=PASSES[-1:])
     which = decoded[of_decoded]
-    agreed = (hypotheses.words > 0) & (canonical(hypotheses.words, code)[0] == codes[which])
+    agreed = (hypotheses.words > 0) & (canonical(hypotheses.words, family)[0] == codes[which])
     agreed &= hypotheses.share >= _MINIMUM_SHARE
     # Of two hypotheses that agree on one target, the one with the larger margin comes first.
     order = np.lexsort((-hypotheses.margin, ~agreed))[: agreed.sum()]
@@ -120,6 +120,6 @@ def _fit_either_polarity(gray: np.ndarray, frames: np.ndarray, polarities: Seque
         fit_dots(gray, frames, np.full(count, polarity), rays=_FIRST_RAYS, reach=REACH, rounds=1)
         for polarity in polarities
     ]
-    # Edges of the wrong polarity are found, too, within what is flat; but they are faint.
+    # Flat parts show edges of the wrong polarity, too, but these are faint.
     best = np.argmax([fit.share * (1 - fit.contrast) for fit in fits], axis=0)
     return Fit.joined(fits).select(best * count + np.arange(count))

@@ -1,9 +1,9 @@
 """Traditional identification: threshold, contours, gates, ellipse fit, grey gradient of the band.
 
-This is the identification "TI" that the paper [1]_ drives beside Agisoft Metashape: an adaptive
+This is the identification "TI" that the paper [1]_ uses beside Agisoft Metashape: an adaptive
 threshold, contours whose perimeter and roundness are those of a dot, a least-squares ellipse, and
-the coded band read by its grey gradient in the affine frame of that ellipse. It has no defence of
-its own against uneven light, which makes it the fair test of a filter that has.
+the coded band read by its grey gradient in the affine frame of that ellipse. It has no defence
+against uneven light, which makes it a fair test of a filter.
 
 Beyond the paper, the edges of dot and band are measured at sub-pixel accuracy, and together give
 the image of the physical centre of a decoded target; that of an undecoded one is the centre of its
@@ -75,7 +75,7 @@ class TraditionalDetector:
         return self._identify(image, fine=False)
 
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
-        """Return targets with their places in an image; see `refine_centres`."""
+        """Return targets with their centres in an image; see `refine_centres`."""
         return refine_centres(image, targets, family(self.family), self.settings.polarities)
 
     def _identify(self, image: np.ndarray, fine: bool) -> list[Target]:
@@ -96,7 +96,7 @@ class TraditionalDetector:
 def _identify_dots(
     gray: np.ndarray, frames: np.ndarray, polarity: int, settings: DetectorSettings, fine: bool
 ) -> list[Target]:
-    """Return the targets among the dots, those without a code word as undecoded."""
+    """Return the targets among dots, undecoded where they have no code word."""
     covariance = np.broadcast_to(_CONTOUR_ERROR**2 * np.eye(2), (len(frames), 2, 2))
     code = family(settings.family)
     if fine:
@@ -144,7 +144,7 @@ def _fit_decoded(
 def _resolve(targets: list[Target], code: Family) -> list[Target]:
     """Return the targets with each ID left to the most certain of those that claim it.
 
-    Undecoded blobs in the band of a decoded target are its sectors, and left out.
+    Undecoded blobs in the band of a decoded target are its sectors and are dropped.
     """
     best: dict[int, Target] = {}
     contested, others = [], []
