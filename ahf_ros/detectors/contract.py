@@ -141,6 +141,7 @@ class DetectorSettings:
     command: str = parameter(
         '',
         'Program and arguments of the detector command; {image} is the path of a PNG file.',
+        read_only=True,
     )
     detector_timeout: float = parameter(
         60.0,

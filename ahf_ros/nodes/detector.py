@@ -15,12 +15,14 @@ from typing import TypeVar
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.clock import Clock, ClockType
+from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import CompressedImage, Image, PointCloud2
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import ImageMarker, MarkerArray
 
+from ahf_ros.detectors.external.program import end_programs
 from ahf_ros.drawing import draw
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.annotation_msg import target_annotations
@@ -32,6 +34,7 @@ from ahf_ros.nodes.pipeline import STOPPING, ImageMessage, Pipeline, Refused
 from ahf_ros.nodes.process import ProcessNode, run
 from ahf_ros.nodes.service_detector import ServiceDetector
 from ahf_ros.nodes.settings import LOSSLESS, SERVICE, DetectorNodeSettings
+from ahf_ros.nodes.waiting import Take, WaitingMessages
 from ahf_ros.nodes.worker import Worker
 from ahf_ros.srv import Identify
 from ahf_ros.text import printable, reason_of
@@ -50,6 +53,9 @@ ANSWERS_KEPT = 1000
 With a small depth, the next answer replaces one that a subscriber has not received yet.
 """
 
+REQUESTS_KEPT = 1000
+"""Requests to a service that may wait. The middleware drops more without an answer."""
+
 _REASON = 2000  # characters of why an image is refused
 
 LOG_PERIOD = 5.0
@@ -67,6 +73,7 @@ class DetectorNode(ProcessNode):
         super().__init__('detector')
         self._stopping = threading.Event()
         self._worker = Worker()
+        self._waiting = WaitingMessages()
         self._tally = Tally()
         name = self.get_fully_qualified_name().lstrip('/')
         self._diagnostics = Diagnostics(f'{name}: identification', self._tally)
@@ -89,12 +96,17 @@ class DetectorNode(ProcessNode):
         self._settings = ParameterSettings(self, DetectorNodeSettings, self._renew)
         self._renew()
         requests = MutuallyExclusiveCallbackGroup()
-        self.create_service(Identify, '~/identify', self._on_identify, callback_group=requests)
-        self.create_service(Trigger, '~/reset', self._on_reset, callback_group=requests)
+        kept = QoSProfile(depth=REQUESTS_KEPT)
+        for kind, name, callback in (
+            (Identify, '~/identify', self._on_identify),
+            (Trigger, '~/reset', self._on_reset),
+        ):
+            self.create_service(kind, name, callback, qos_profile=kept, callback_group=requests)
 
     def close(self) -> None:
         """Interrupt the current identification."""
         self._stopping.set()
+        end_programs()
         self._worker.stop()
 
     def _renew(self) -> None:
@@ -140,11 +152,14 @@ class DetectorNode(ProcessNode):
     def _on_image(self, message: ImageMessage) -> None:
         self._tally.received += 1
         self._compare_stamps(message.header)
-        job = partial(self._process, message, self._pipeline, time.monotonic())
-        settings = self._pipeline.settings
+        pipeline, received = self._pipeline, time.monotonic()
+        settings = pipeline.settings
         if settings.queue == LOSSLESS:
-            self._worker.append(job, len(message.data), settings.queue_memory * 2**20)
-        elif self._worker.offer(job):
+            limit = settings.queue_memory * 2**20
+            with suppress(Refused):
+                take = self._attempt(partial(self._waiting.put, message, limit))
+                self._worker.append(partial(self._process, take, pipeline, received))
+        elif self._worker.offer(partial(self._process, lambda: message, pipeline, received)):
             self._tally.dropped += 1
 
     def _compare_stamps(self, header: Header) -> None:
@@ -182,10 +197,10 @@ class DetectorNode(ProcessNode):
             response.message = STOPPING
         return response
 
-    def _process(self, message: ImageMessage, pipeline: Pipeline, received: float) -> None:
+    def _process(self, take: Take, pipeline: Pipeline, received: float) -> None:
         """Identify the targets of an image and publish the results."""
         with suppress(Refused):
-            self._attempt(partial(self._answer, message, pipeline, received))
+            self._attempt(lambda: self._answer(take(), pipeline, received))
 
     def _answer(self, message: ImageMessage, pipeline: Pipeline, received: float) -> None:
         answer = pipeline.answer(message)

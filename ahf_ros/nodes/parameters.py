@@ -88,6 +88,7 @@ def descriptor(item: Parameter) -> ParameterDescriptor:
         description=item.description,
         additional_constraints=item.accepted,
         dynamic_typing=True,
+        read_only=item.read_only,
     )
     if item.minimum is not None and item.maximum is not None:
         # Tools draw sliders from a range, which needs both ends.

@@ -93,7 +93,7 @@ class ProcessNode(Node):
     def subscribe_to_all(
         self, kind: type, topic: str, callback: Callable[[Any], None], group: CallbackGroup
     ) -> Subscription:
-        """Subscribe to every message of a topic; a full queue holds back the publisher.
+        """Subscribe to every message of a topic; the callback must take each at once.
 
         In `qos_overrides` it is called `subscription_lossless`.
         """

@@ -51,7 +51,10 @@ class NodeIdentificationSettings(IdentificationSettings):
     """Settings of an identification whose detector may also be a service of another node."""
 
     detector: str = parameter(
-        DETECTOR.default, DETECTOR.description, choices=(*DETECTOR.choices, SERVICE)
+        DETECTOR.default,
+        DETECTOR.description,
+        choices=(*DETECTOR.choices, SERVICE),
+        read_only=True,
     )
 
     def check_detector(self) -> None:
@@ -65,7 +68,12 @@ class DetectorNodeSettings:
     """Settings of the node `detector`: the identification, and how images come in."""
 
     service: str = parameter(
-        '', 'Name of the ahf_ros/srv/Identify that the detector service calls.'
+        '', 'Name of the ahf_ros/srv/Identify that the detector service calls.', read_only=True
+    )
+    allow_programs: bool = parameter(
+        False,
+        'Whether the node may start programs, as the detector command does.',
+        read_only=True,
     )
     image_transport: str = parameter(
         'raw',
@@ -80,8 +88,8 @@ class DetectorNodeSettings:
     )
     queue_memory: int = parameter(
         1024,
-        'Maximum memory of images waiting in a lossless queue, MB; a full queue holds back the '
-        'publisher. Clouds waiting for their image may take as much again; the oldest is dropped.',
+        'Maximum memory of images waiting in a lossless queue, MB; further ones wait on disk. '
+        'Clouds waiting for their image may take as much memory again; the oldest is dropped.',
         minimum=1,
         maximum=10**6,
     )
@@ -93,6 +101,11 @@ class DetectorNodeSettings:
         check_parameters(self)
         if self.service and not _SERVICE_NAME.fullmatch(self.service):
             raise ValueError(f'service is {self.service!r}, accepted is the name of a ROS service')
+        if self.identification.detector == 'command' and not self.allow_programs:
+            raise ValueError(
+                "detector is 'command' and allow_programs is False; accepted with this detector "
+                'is True, given when the node starts'
+            )
         if self.identification.detector != SERVICE:
             create_identifier(self.identification)
         elif not self.service:

@@ -21,9 +21,6 @@ class Worker:
     def __init__(self) -> None:
         self._thread = ThreadPoolExecutor(max_workers=1)
         self._lock = threading.Lock()
-        self._room = threading.Condition()
-        self._waiting = 0
-        self._stopped = False
         self._latest: Callable[[], None] | None = None
 
     def offer(self, job: Callable[[], None]) -> bool:
@@ -41,28 +38,9 @@ class Worker:
             self._submit(self._run_latest)
         return dropped
 
-    def append(self, job: Callable[[], None], size: int, limit: int) -> None:
-        """Run `job`, which handles its own errors, after all jobs that were appended before.
-
-        Return as soon as there is room for it or the worker is stopped.
-
-        Parameters
-        ----------
-        job : callable
-            Without arguments.
-        size : int
-            Memory that the job takes while it waits, in bytes.
-        limit : int
-            Maximum memory of all waiting jobs together; a single job may always wait.
-        """
-        with self._room:
-            self._room.wait_for(
-                lambda: self._stopped or not self._waiting or self._waiting + size <= limit
-            )
-            if self._stopped:
-                return
-            self._waiting += size
-        self._submit(lambda: self._run_appended(job, size))
+    def append(self, job: Callable[[], None]) -> None:
+        """Run `job`, which handles its own errors, after all jobs that were appended before."""
+        self._submit(job)
 
     def call(self, job: Callable[[], Result]) -> Result:
         """Run `job` and return its result, or raise its error.
@@ -76,9 +54,6 @@ class Worker:
 
     def stop(self) -> None:
         """Drop the waiting jobs and return when the running one has ended."""
-        with self._room:
-            self._stopped = True
-            self._room.notify_all()
         self._thread.shutdown(cancel_futures=True)
 
     def _submit(self, job: Callable[[], Result]) -> Future[Result]:
@@ -94,9 +69,3 @@ class Worker:
             job, self._latest = self._latest, None
         if job is not None:
             job()
-
-    def _run_appended(self, job: Callable[[], None], size: int) -> None:
-        with self._room:
-            self._waiting -= size
-            self._room.notify()
-        job()

@@ -35,6 +35,8 @@ class Parameter:
         Closed bounds of a number.
     choices : tuple of str
         Accepted texts; empty if any is accepted.
+    read_only : bool
+        Whether a node takes it at its start only.
     """
 
     name: str
@@ -43,6 +45,7 @@ class Parameter:
     minimum: float | None = None
     maximum: float | None = None
     choices: tuple[str, ...] = ()
+    read_only: bool = False
 
     @property
     def accepted(self) -> str:
@@ -86,9 +89,10 @@ def parameter(
     minimum: float | None = None,
     maximum: float | None = None,
     choices: Iterable[str] = (),
+    read_only: bool = False,
 ) -> Any:
     """Return a dataclass field that carries a `Parameter`."""
-    item = Parameter('', default, description, minimum, maximum, tuple(choices))
+    item = Parameter('', default, description, minimum, maximum, tuple(choices), read_only)
     return field(default=default, metadata={_KEY: item})
 
 

@@ -226,7 +226,8 @@ def test_every_parameter_says_what_it_is(graph: Any, detector: DetectorProcess) 
         ('population', 'many', ("population is 'many', accepted is an integer from 2",)),
         ('crossover', 1.5, ('crossover', '1.5', '1.0')),
         ('family', 'qr', ("family is 'qr', accepted is one of metashape12",)),
-        ('detector', 'magic', ("detector is 'magic', accepted is one of",)),
+        ('detector', 'ring', ('read-only',)),
+        ('service', '/other', ('read-only',)),
         ('ahf', 1, ('ahf is 1, accepted is true or false',)),
         ('expected_targets', -1, ('expected_targets', '-1', '0')),
         ('max_radius', math.nan, ('max_radius', 'nan')),
@@ -394,16 +395,16 @@ def test_a_refused_parameter_stops_a_node_at_the_start(
 
 
 def test_a_service_is_a_detector_and_its_end_is_named(
-    graph: Any, detector: DetectorProcess, message: Image, rendering: Rendering
+    graph: Any, message: Image, rendering: Rendering
 ) -> None:
+    nameless = graph.start('detector', *overrides(detector='service'))
+    status, errors = nameless.wait()
+    assert status == 1
+    assert "service is '', accepted is the name of a ROS service" in errors
     other = graph.start('detector', '-r', '__ns:=/other')
     graph.until(lambda: ('detector', '/other') in graph.node.get_node_names_and_namespaces())
-    chosen = ('detector', 'service'), ('service', '/other/detector/identify')
-    assert detector.set(('detector', 'service')) == (
-        False,
-        "service is '', accepted is the name of a ROS service",
-    )
-    assert detector.set(*chosen, ('expected_targets', 0)) == (True, '')
+    chosen = overrides(detector='service', service='/other/detector/identify')
+    detector = DetectorProcess(graph, '/asking', *chosen)
     found = detector.answer(message)
     assert [it.id for it in found.targets] == [it.id for it in rendering.targets]
     assert found.family == 'metashape12'
@@ -416,4 +417,3 @@ def test_a_service_is_a_detector_and_its_end_is_named(
         lambda: (it := detector.identify(image_message(rendering.image, header()))).success and it
     )
     assert len(again.coded_targets.targets) == len(rendering.targets)
-    assert detector.set(('detector', 'ring')) == (True, '')

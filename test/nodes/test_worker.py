@@ -81,42 +81,19 @@ def test_stopping_waits_for_the_job_that_runs_and_drops_the_others() -> None:
     assert done == []
 
 
-def test_what_is_appended_runs_in_order_and_waits_for_room(worker: Worker) -> None:
+def test_what_is_appended_runs_in_order(worker: Worker) -> None:
     gate, done = Gate(), list[int]()
-    worker.append(gate, 10, 10)
+    worker.append(gate)
     assert gate.begun.wait(PATIENCE)
-
-    def append() -> None:
-        for number in range(5):
-            worker.append(lambda number=number: done.append(number), 4, 10)
-
-    thread = threading.Thread(target=append)
-    thread.start()
-    thread.join(0.2)
-    assert thread.is_alive()  # two wait, a third has no room
+    for number in range(5):
+        worker.append(lambda number=number: done.append(number))
     gate.opened.set()
-    thread.join(PATIENCE)
     worker.call(lambda: None)
     assert done == list(range(5))
 
 
-def test_what_is_larger_than_the_room_waits_alone(worker: Worker) -> None:
-    done = list[int]()
-    for number in range(3):
-        worker.append(lambda number=number: done.append(number), 100, 10)
-    worker.call(lambda: None)
-    assert done == [0, 1, 2]
-
-
-def test_stopping_lets_go_who_waits_for_room() -> None:
-    worker, gate, done = Worker(), Gate(), list[int]()
-    worker.append(gate, 10, 10)
-    assert gate.begun.wait(PATIENCE)
-    worker.append(lambda: done.append(1), 10, 10)
-    thread = threading.Thread(target=worker.append, args=(lambda: done.append(2), 10, 10))
-    thread.start()
-    threading.Timer(0.1, gate.opened.set).start()
+def test_what_is_appended_after_the_end_does_not_run() -> None:
+    worker, done = Worker(), list[int]()
     worker.stop()
-    thread.join(PATIENCE)
-    assert not thread.is_alive()
+    worker.append(lambda: done.append(1))
     assert done == []

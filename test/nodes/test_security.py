@@ -1,0 +1,148 @@
+"""Who may do what: programs only at the start, and a policy that fits the node."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy', reason='ROS 2 is not installed')
+
+from rcl_interfaces.srv import SetParameters
+from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile
+from sensor_msgs.msg import Image
+from std_msgs.msg import Header
+
+from ahf_ros.msg import CodedTargetArray
+from ahf_ros.nodes.image_msg import image_message
+from ahf_ros.nodes.waiting import WaitingMessages
+from ahf_ros.srv import Identify
+
+POLICY = Path(__file__).resolve().parents[2] / 'config' / 'security_policy.xml'
+IMAGE = np.tile(np.arange(64, dtype=np.uint8), (48, 1))
+
+
+def overrides(**given: Any) -> list[str]:
+    return [word for name, value in given.items() for word in ('-p', f'{name}:={value}')]
+
+
+def set_parameter(graph: Any, node: str, name: str, value: object) -> Any:
+    request = SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()])
+    return graph.call(SetParameters, f'{node}/set_parameters', request).results[0]
+
+
+def test_programs_cannot_be_started_on_a_running_node(graph: Any, tmp_path: Path) -> None:
+    graph.start('detector', '-r', '__ns:=/safe', *overrides(allow_programs='true'))
+    mark = tmp_path / 'mark'
+    for name, value in (
+        ('command', f'touch {mark}'),
+        ('detector', 'command'),
+        ('service', '/other/identify'),
+        ('allow_programs', False),
+    ):
+        result = set_parameter(graph, '/safe/detector', name, value)
+        assert not result.successful
+        assert 'read-only' in result.reason
+    request = Identify.Request(image=image_message(IMAGE, Header()))
+    assert graph.call(Identify, '/safe/detector/identify', request).success
+    assert not mark.exists()
+
+
+def test_programs_need_to_be_allowed_at_the_start(graph: Any) -> None:
+    given = overrides(detector='command', command='some_program')
+    status, errors = graph.start('detector', *given).wait()
+    assert status == 1
+    assert "detector is 'command' and allow_programs is False" in errors
+
+
+def test_garbage_of_a_program_is_named_and_the_node_lives(graph: Any, tmp_path: Path) -> None:
+    program = tmp_path / 'program.py'
+    given = overrides(detector='command', command=f'python3 {program}', allow_programs='true')
+    node = graph.start('detector', '-r', '__ns:=/garbage', *given)
+    for target, words in (
+        ('{"id": 1, "x": 1, "y": 1, "code": -1}', 'code is -1, accepted is an integer from 0'),
+        ('{"id": 1099511627776, "x": 1, "y": 1}', 'id is 1099511627776, accepted is'),
+        ('{"id": null, "x": 1, "y": 1}', 'id is None, accepted is an integer'),
+        ('{"id": "\\ud800", "x": 1, "y": 1}', 'accepted is an integer'),
+        ('{"id": 1, "x": 1, "y": 1, "covariance": null}', 'covariance is None, accepted are'),
+    ):
+        text = f'{{"targets": [{target}]}}'
+        program.write_text(f'print({text!r})')
+        request = Identify.Request(image=image_message(IMAGE, Header()))
+        response = graph.call(Identify, '/garbage/detector/identify', request)
+        assert not response.success
+        assert words in response.message
+    program.write_text('print(\'{"targets": [{"id": 1, "x": 10, "y": 20}]}\')')
+    (found,) = graph.call(Identify, '/garbage/detector/identify', request).coded_targets.targets
+    assert (found.id, found.x, found.y) == (1, 10.0, 20.0)
+    status, errors = node.end()
+    assert status == 0
+    assert 'Traceback' not in errors
+
+
+@pytest.mark.parametrize('count', [12, 200])
+def test_all_of_many_requests_at_once_are_answered(graph: Any, count: int) -> None:
+    graph.start('detector', '-r', f'__ns:=/many{count}')
+    # Clients keep ten requests, unless told otherwise.
+    kept = QoSProfile(depth=max(count, 10))
+    name = f'/many{count}/detector/identify'
+    client = graph.node.create_client(Identify, name, qos_profile=kept)
+    graph.until(client.service_is_ready)
+    request = Identify.Request(image=image_message(IMAGE, Header()))
+    futures = [client.call_async(request) for _ in range(count)]
+    graph.until(lambda: all(it.done() for it in futures))
+    assert all(it.result().success for it in futures)
+
+
+def test_the_policy_allows_what_a_node_has(graph: Any) -> None:
+    graph.start('detector', *overrides(cloud='true'))
+    own, node = ('detector', '/'), graph.node
+    graph.until(
+        lambda: (
+            own in node.get_node_names_and_namespaces()
+            and node.count_subscribers('/points')
+            and node.count_publishers('/diagnostics')
+        )
+    )
+    root = ElementTree.parse(POLICY).getroot()
+    profile = root.find(".//enclave[@path='/ahf_ros/detector']//profile")
+    assert profile is not None
+
+    def allowed(kind: str, access: str) -> set[str]:
+        found = profile.findall(f'{kind}[@{access}="ALLOW"]/{kind[:-1]}')
+        return {f'/{it.text}'.replace('/~', '/detector') for it in found}
+
+    published = {name for name, _ in node.get_publisher_names_and_types_by_node(*own)}
+    subscribed = {name for name, _ in node.get_subscriber_names_and_types_by_node(*own)}
+    served = {name for name, _ in node.get_service_names_and_types_by_node(*own)}
+    assert published <= allowed('topics', 'publish')
+    assert subscribed <= allowed('topics', 'subscribe')
+    assert served <= allowed('services', 'reply')
+    requests = root.findall('.//services[@request="ALLOW"]/service')
+    assert [it.text for it in requests] == ['/detector/identify']
+
+
+def test_what_waits_is_bounded_in_memory_and_comes_back_in_order() -> None:
+    waiting = WaitingMessages()
+    images = [image_message(IMAGE + number, Header(frame_id=str(number))) for number in range(50)]
+    takes = [waiting.put(it, 2 * len(images[0].data)) for it in images]
+    assert waiting._memory == 2 * len(images[0].data)
+    assert [take() for take in takes] == images
+    assert (waiting._memory, waiting._segment) == (0, None)
+
+
+def test_no_image_that_exceeds_the_memory_is_lost(graph: Any) -> None:
+    graph.start('detector', '-r', '__ns:=/full', *overrides(queue='lossless', queue_memory=1))
+    answers = graph.listen(CodedTargetArray, '/full/coded_targets')
+    publisher = graph.node.create_publisher(Image, '/full/image', 100)
+    graph.until(publisher.get_subscription_count)
+    pixels = np.tile(np.arange(800, dtype=np.uint16) % 251, (600, 1)).astype(np.uint8)
+    images = [image_message(pixels, Header(frame_id=str(number))) for number in range(60)]
+    for image in images:
+        publisher.publish(image)
+    graph.until(lambda: len(answers) == len(images))
+    assert [it.header.frame_id for it in answers] == [it.header.frame_id for it in images]
