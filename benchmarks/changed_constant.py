@@ -12,7 +12,8 @@ import argparse
 import ast
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from pathlib import Path
@@ -29,10 +30,10 @@ class Changed(SourceFileLoader):
     def get_code(self, fullname: str) -> CodeType:
         """Return the code of the module, compiled from its source."""
         tree = ast.parse(self.get_data(self.path))
-        found = [node for node in tree.body if assigned(node) == self.name_of_constant]
-        if len(found) != 1:
+        replace = assigned(tree).get(self.name_of_constant)
+        if replace is None:
             raise ValueError(f'{fullname} has no constant {self.name_of_constant}')
-        found[0].value = ast.Constant(self.value)  # type: ignore[attr-defined]
+        replace(self.value)
         return compile(ast.fix_missing_locations(tree), self.path, 'exec')
 
 
@@ -60,12 +61,39 @@ class Finder(MetaPathFinder):
         return spec
 
 
-def assigned(node: ast.stmt) -> str:
-    """Return the name that a statement assigns to, where it is a single one."""
-    targets = node.targets if isinstance(node, ast.Assign) else []
-    if isinstance(node, ast.AnnAssign) and node.value is not None:
-        targets = [node.target]
-    return targets[0].id if len(targets) == 1 and isinstance(targets[0], ast.Name) else ''
+def assigned(tree: ast.Module) -> dict[str, Callable[[float], None]]:
+    """Return the names that a module assigns to, and for each what replaces its value.
+
+    A name may be alone on the left, or one of as many names as there are values on the right.
+    """
+    found: dict[str, Callable[[float], None]] = {}
+    for node in tree.body:
+        if isinstance(node, ast.AnnAssign) and node.value is not None:
+            targets, value = [node.target], node.value
+        elif isinstance(node, ast.Assign):
+            targets, value = node.targets, node.value
+        else:
+            continue
+        if len(targets) != 1:
+            continue
+        target = targets[0]
+        if isinstance(target, ast.Name):
+            found[target.id] = partial(replace_value, node)
+        elif isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
+            for number, name in enumerate(target.elts):
+                if isinstance(name, ast.Name) and len(target.elts) == len(value.elts):
+                    found[name.id] = partial(replace_element, value, number)
+    return found
+
+
+def replace_value(node: ast.Assign | ast.AnnAssign, value: float) -> None:
+    """Let a statement assign a number."""
+    node.value = ast.Constant(value)
+
+
+def replace_element(values: ast.Tuple, number: int, value: float) -> None:
+    """Let a number be one of several values."""
+    values.elts[number] = ast.Constant(value)
 
 
 def results(folder: Path) -> dict[str, Any]:

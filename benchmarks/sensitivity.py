@@ -34,7 +34,7 @@ ROOMS = ('features', 'detectors/ring')
 OTHERS = {'blobs', 'counting', 'grey_gradient', 'traditional'}
 """Modules in these rooms that `ring` does without."""
 
-BOUNDED = {'CERTAIN', '_STRAIGHT', '_WHOLE', '_MINIMUM_AGREEMENT', '_FAINTEST'}
+BOUNDED = {'_CERTAIN', '_STRAIGHT', '_WHOLE', '_MINIMUM_AGREEMENT', '_FAINTEST'}
 """Constants that are meaningful up to 1 only: their distance from 1 is halved and doubled."""
 
 LIGHTS = ('stripe', 'fine_stripe', 'lattice', 'dense_lattice')
@@ -98,7 +98,7 @@ def constants() -> Iterator[tuple[str, float]]:
             if file.stem in OTHERS:
                 continue
             module = '.'.join(file.relative_to(ROOT).with_suffix('').parts)
-            for name in map(assigned, ast.parse(file.read_text()).body):
+            for name in assigned(ast.parse(file.read_text())):
                 if not re.fullmatch('_?[A-Z][A-Z0-9_]*', name):
                     continue
                 value = getattr(import_module(module), name)

@@ -11,7 +11,9 @@ import pytest
 from ahf_ros.synthetic.scene import SceneSettings
 from benchmarks.sensitivity import Outcome, changed, constants, main, outcome, table, written
 
-CERTAIN = 'ahf_ros.detectors.ring.hypotheses.CERTAIN'  # the detector imports it
+CERTAIN = 'ahf_ros.detectors.ring.hypotheses._CERTAIN'
+SCALE = 'ahf_ros.features.profiles.USUAL_BLUR'  # circle_fit imports it
+PAIR = 'ahf_ros.features.log_edges._STRONG_EDGE'  # one of two in a line
 SCENE = SceneSettings(width=480, height=320, targets=3, dot_radius=9.0)
 
 
@@ -27,11 +29,14 @@ def test_nothing_changed_is_the_detector_as_it_is(folder: Path) -> None:
     assert outcome(folder, CERTAIN, dict(constants())[CERTAIN]) == found
 
 
-def test_a_change_reaches_modules_that_import_the_constant(folder: Path) -> None:
+def test_a_change_reaches_whatever_uses_the_constant(folder: Path) -> None:
     assert outcome(folder, CERTAIN, 1.1) == Outcome(0, 0, 0, None)
+    assert outcome(folder, SCALE, 2.0).rmse != outcome(folder).rmse
+    assert PAIR in dict(constants())
+    assert outcome(folder, PAIR, 1e9) == Outcome(0, 0, 0, None)
 
 
-@pytest.mark.parametrize('name', [f'{CERTAIN}LY', 'ahf_ros.cli.bag.PERIOD'])
+@pytest.mark.parametrize('name', [f'{CERTAIN}_NOT', 'ahf_ros.cli.bag.PERIOD'])
 def test_what_cannot_be_changed_is_no_outcome(folder: Path, name: str) -> None:
     done = subprocess.run(
         [sys.executable, '-m', 'benchmarks.changed_constant', str(folder), name, '1.0'],
@@ -54,7 +59,7 @@ def test_the_table_shows_what_changed() -> None:
     )
     assert lines.splitlines()[-2:] == [
         '| none changed | | 9 (0.010) | 9 (0.010) |',
-        '| `detectors.ring.hypotheses.CERTAIN` | 0.98 | fails | 8, 1 wrong |',
+        '| `detectors.ring.hypotheses._CERTAIN` | 0.98 | fails | 8, 1 wrong |',
     ]
 
 
