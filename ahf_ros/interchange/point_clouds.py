@@ -47,13 +47,12 @@ def organised_points(message: Any) -> np.ndarray:
         )
     if message.width < 2:
         raise ValueError(f'width is {message.width}, accepted is an integer of at least 2')
-    kind = _point_type(message)
     row = message.width * message.point_step
     points = f'a row of {message.width} points of {message.point_step} bytes'
     check_rows(message, 'row_step', row, points)
     return np.ndarray(
         (message.height, message.width),
-        kind,
+        _point_type(message),
         message.data,
         strides=(message.row_step, message.point_step),
     )

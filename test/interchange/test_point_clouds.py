@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from ahf_ros.interchange.point_clouds import FLOAT32, FLOAT64, organised_points
@@ -127,6 +127,15 @@ def sizes(most: int = 2**32 - 1) -> Any:
     point_step=sizes(),
     row_step=sizes(),
     data=st.binary(max_size=3000),
+)
+@example(
+    height=2,
+    width=2,
+    fields=[field(name, 0) for name in 'xyz'],
+    is_bigendian=False,
+    point_step=2**31,
+    row_step=0,
+    data=b'',
 )
 def test_what_is_no_cloud_is_named_and_nothing_is_read_beyond_the_data(**message: Any) -> None:
     try:
