@@ -50,7 +50,7 @@ test-oldest: $(OLDEST)/ready
 # The nodes on ROS 2 Kilted.
 test-kilted:
 	$(MAKE) DISTRIBUTION=kilted .venv-kilted/ready
-	.venv-kilted/bin/python -m pytest $$(grep -lr rclpy test --include='test_*.py')
+	.venv-kilted/bin/python -m pytest $$(grep -lrE 'rclpy|graph: ' test --include='test_*.py')
 
 clean:
 	rm -rf .venv* build

@@ -6,7 +6,7 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import redirect_stdout
 from dataclasses import dataclass
 from functools import cache
@@ -144,24 +144,33 @@ def test_a_bag(case: Case, tmp_path: Path) -> None:
 
 
 @pytest.fixture(scope='module')
-def nodes(graph: Any) -> Any:
-    """Return a node that identifies, and another one that asks the first for its targets."""
+def nodes(graph: Any) -> Callable[[Case], Any]:
+    """Return, by a case, a node with its detector and another one that asks it for targets."""
     from support.detector import DetectorProcess
 
-    first = DetectorProcess(graph, '/first')
-    second = DetectorProcess(graph, '/second', '-p', 'service:=/first/detector/identify')
-    return first, second
+    @cache
+    def with_detector(detector: str, command: str) -> tuple[DetectorProcess, DetectorProcess]:
+        own = f'detector:={detector}', f'command:={command!r}', f'allow_programs:={bool(command)}'
+        other = 'detector:=service', f'service:=/{detector}/detector/identify'
+        words, others = ([word for it in given for word in ('-p', it)] for given in (own, other))
+        first = DetectorProcess(graph, f'/{detector}', *words)
+        return first, DetectorProcess(graph, f'/asks_{detector}', *others)
+
+    return lambda case: with_detector(case.detector, case.command)
 
 
 @EVERY_CASE
-def test_the_node_and_its_service_and_a_node_that_calls_it(case: Case, nodes: Any) -> None:
+def test_the_node_and_its_service_and_a_node_that_calls_it(
+    case: Case, nodes: Callable[[Case], Any]
+) -> None:
     from std_msgs.msg import Header
 
     from ahf_ros.nodes.image_msg import image_message
 
-    first, second = nodes
+    first, second = nodes(case)
     message = image_message(image(case), Header(frame_id=str(case)))
-    assert first.set(*case.settings.items()) == (True, '')
+    free = ('family', case.family), ('expected_targets', case.expected_targets)
+    assert first.set(*free) == (True, '')
     live = first.answer(message)
     assert answer(live.family, live.targets) == by_library(case)
     first.reset()
@@ -170,7 +179,7 @@ def test_the_node_and_its_service_and_a_node_that_calls_it(case: Case, nodes: An
     served = response.coded_targets
     assert answer(served.family, served.targets) == by_library(case)
     first.reset()
-    assert second.set(('detector', 'service'), ('family', case.family)) == (True, '')
+    assert second.set(('family', case.family)) == (True, '')
     asked = second.answer(message)
     assert answer('', asked.targets)[1] == by_library(case)[1]
     assert asked.family == case.family
