@@ -28,7 +28,7 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
 from ahf_ros.msg import CodedTargetArray
-from ahf_ros.nodes.demo import PROFILE_VARIABLES
+from ahf_ros.nodes.demo import profile_variable
 from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.nodes.settings import LATEST, LOSSLESS
 from ahf_ros.synthetic.scene import SceneSettings, render
@@ -36,7 +36,7 @@ from benchmarks.filter import machine
 from support import live
 
 PROFILE = Path(__file__).resolve().parents[1] / 'config' / 'fastdds_shm.xml'
-TRANSPORTS = {'defaults': {}, PROFILE.name: dict.fromkeys(PROFILE_VARIABLES, str(PROFILE))}
+TRANSPORTS = {'defaults': {}, PROFILE.name: {profile_variable(): str(PROFILE)}}
 """Environments by the names of what they set up."""
 
 Figures = dict[str, float]

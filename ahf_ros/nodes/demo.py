@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+import xml.etree.ElementTree as ElementTree
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -47,9 +48,6 @@ PATIENCE = 180.0
 
 SHUTDOWN = 20.0
 """Time that a node is given to end, s."""
-
-PROFILE_VARIABLES = ('FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE')
-"""Where Fast DDS looks for its settings: up to Jazzy, and from Kilted on."""
 
 
 class Processes:
@@ -126,11 +124,24 @@ class Demo(Comparison):
 
 def shared_memory_profile() -> Path:
     """Return the settings of Fast DDS with room for whole images in shared memory."""
+    return _share('ahf_ros') / 'config' / 'fastdds_shm.xml'
+
+
+def profile_variable() -> str:
+    """Return the environment variable that names the settings of Fast DDS.
+
+    Kilted, which brings version 9 of rmw_fastrtps_cpp, warns of the name that Jazzy needs.
+    """
+    about = ElementTree.parse(_share('rmw_fastrtps_cpp') / 'package.xml')
+    major = int(about.findtext('version', '0').split('.')[0])
+    return f'FAST{"DDS" if major >= 9 else "RTPS"}_DEFAULT_PROFILES_FILE'
+
+
+def _share(package: str) -> Path:
     try:
-        share = Path(get_package_share_directory('ahf_ros'))
+        return Path(get_package_share_directory(package))
     except (PackageNotFoundError, OSError):  # installed with pip, where there is no index
-        share = Path(sys.prefix, 'share', 'ahf_ros')
-    return share / 'config' / 'fastdds_shm.xml'
+        return Path(sys.prefix, 'share', package)
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -149,8 +160,7 @@ def main(arguments: list[str] | None = None) -> int:
     except (ValueError, OSError) as error:
         made.error(str(error))
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-    for variable in PROFILE_VARIABLES:
-        os.environ.setdefault(variable, str(shared_memory_profile()))
+    os.environ.setdefault(profile_variable(), str(shared_memory_profile()))
     print(f'{SCENE["targets"]} targets under {options.light}, being rendered ...', flush=True)
     with Processes() as processes:
         for space, (_, parameters) in DETECTORS.items():
