@@ -10,10 +10,13 @@ import cv2
 import numpy as np
 
 from ahf_ros.imaging.image import stretched_to_8_bit
-from ahf_ros.target import UNDECODED, Identification, Target
+from ahf_ros.target import UNDECODED, DottedTarget, Identification, Target
 
 Colour = tuple[int, int, int]
 """Blue, green, red."""
+
+Ellipse = tuple[float, float, float, float, float]
+"""Centre x and y, semi-major and semi-minor axis, px, and direction of the major one, rad."""
 
 DECODED_COLOUR: Colour = (60, 230, 60)
 """Of a decoded target."""
@@ -23,6 +26,9 @@ WRONG_COLOUR: Colour = (60, 60, 255)
 
 MISSED_COLOUR: Colour = (0, 130, 255)
 """Of a target that was not identified."""
+
+DECODING_DOT_COLOUR: Colour = (255, 200, 0)
+"""Colour of the dots that are the code of a target, where dots are."""
 
 UNDECODED_COLOUR: Colour = (0, 190, 255)
 """Of a target without a code word."""
@@ -119,7 +125,11 @@ def overlay(
             colour = UNDECODED_COLOUR
         elif target in wrong:
             colour = WRONG_COLOUR
-        _draw_ellipse(canvas, target, colour, unit)
+        template, decoding = _ellipses(target)
+        for ellipse in template:
+            _draw_ellipse(canvas, ellipse, colour, unit)
+        for ellipse in decoding:
+            _draw_ellipse(canvas, ellipse, DECODING_DOT_COLOUR, unit)
         _draw_cross(canvas, target, colour, unit)
         if target.id != UNDECODED:
             _draw_label(canvas, target, colour, unit)
@@ -199,10 +209,17 @@ def _cross_out(canvas: np.ndarray, target: Target, unit: int) -> None:
             cv2.line(canvas, start, end, shade, width, cv2.LINE_AA, _SHIFT)
 
 
-def _draw_ellipse(canvas: np.ndarray, target: Target, colour: Colour, unit: int) -> None:
-    centre = (_fixed(target.x), _fixed(target.y))
-    axes = (_fixed(target.semi_major), _fixed(target.semi_minor))
-    angle = math.degrees(target.angle)
+def _ellipses(target: Target) -> tuple[Sequence[Ellipse], Sequence[Ellipse]]:
+    """Return the ellipses that all targets of the family have, and those that are the code."""
+    if isinstance(target, DottedTarget):
+        return target.dots[: target.template_dots], target.dots[target.template_dots :]
+    return ((target.x, target.y, target.semi_major, target.semi_minor, target.angle),), ()
+
+
+def _draw_ellipse(canvas: np.ndarray, ellipse: Ellipse, colour: Colour, unit: int) -> None:
+    x, y, semi_major, semi_minor, direction = ellipse
+    centre, axes = (_fixed(x), _fixed(y)), (_fixed(semi_major), _fixed(semi_minor))
+    angle = math.degrees(direction)
     for shade, width in ((_OUTLINE_COLOUR, 3 * unit), (colour, unit)):
         cv2.ellipse(canvas, centre, axes, angle, 0, 360, shade, width, cv2.LINE_AA, _SHIFT)
 

@@ -49,6 +49,27 @@ class Target:
 
 
 @dataclass(frozen=True, slots=True)
+class DottedTarget(Target):
+    """A target that consists of dots.
+
+    Attributes
+    ----------
+    dots : tuple of tuple of 5 float
+        Ellipses of its dots: centre x and y, semi-major and semi-minor axis, px, and direction,
+        rad. Those of the template come first, in the order of the printed design, then those of
+        the code.
+    template_dots : int
+        Number of the former.
+    polarity : int
+        1 for dark dots on bright ground, -1 for bright ones on dark.
+    """
+
+    dots: tuple[tuple[float, float, float, float, float], ...] = ()
+    template_dots: int = 0
+    polarity: int = 1
+
+
+@dataclass(frozen=True, slots=True)
 class TrueTarget:
     """A target that an image shows.
 

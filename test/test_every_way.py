@@ -29,6 +29,7 @@ from support import bags
 from support.packages import MINE, my_detector, write_package
 
 SCENE = {'width': 400, 'height': 300, 'targets': 4, 'dot_radius': 10.0}
+SCENES = {'gsi': SCENE | {'width': 560, 'height': 420, 'dot_radius': 5.0}}
 SQUARES = ('aruco_4x4_50', 'apriltag_36h11')
 NO_MARKERS = pytest.mark.skipif(
     not hasattr(getattr(cv2, 'aruco', None), 'ArucoDetector'),
@@ -78,7 +79,7 @@ Answer = tuple[str, list[tuple[Any, ...]]]
 
 @cache
 def image(case: Case) -> np.ndarray:
-    scene = SCENE | {'family': case.family, 'light': case.light}
+    scene = SCENES.get(case.family, SCENE) | {'family': case.family, 'light': case.light}
     return render(SceneSettings(**scene, seed=1)).image
 
 

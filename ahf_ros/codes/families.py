@@ -8,6 +8,7 @@ KINDS: dict[str, tuple[str, ...]] = {
     'ring': ring.FAMILY_NAMES,
     'aruco': square.ARUCO_NAMES,
     'apriltag': square.APRILTAG_NAMES,
+    'gsi': ('gsi',),
 }
 """The families of each kind."""
 

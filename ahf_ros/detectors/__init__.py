@@ -18,6 +18,7 @@ from ahf_ros.codes.families import FAMILY_NAMES, KINDS
 from ahf_ros.detectors.contract import Detector, DetectorSettings, Drafter, Refiner
 from ahf_ros.detectors.external.command import CommandDetector
 from ahf_ros.detectors.external.guarded import guarded
+from ahf_ros.detectors.gsi.detector import GsiDetector
 from ahf_ros.detectors.ring.counting import estimate_count
 from ahf_ros.detectors.ring.detector import RingDetector
 from ahf_ros.detectors.ring.traditional import TraditionalDetector
@@ -62,6 +63,7 @@ _ENTRIES = {
     'traditional': _Entry(TraditionalDetector, KINDS['ring']),
     'aruco': _Entry(SquareDetector, KINDS['aruco']),
     'apriltag': _Entry(SquareDetector, KINDS['apriltag']),
+    'gsi': _Entry(GsiDetector, KINDS['gsi']),
     'command': _Entry(CommandDetector, FAMILY_NAMES),
 }
 

@@ -108,6 +108,8 @@ class DetectorSettings:
     ----------
     family : str
         One of `ahf_ros.codes.families.FAMILY_NAMES`.
+    family_file : str
+        Path of a data file that describes the family `gsi` or `dots`; empty for the usual design.
     polarity : str
         One of `POLARITIES`.
     min_radius, max_radius : float
@@ -129,6 +131,9 @@ class DetectorSettings:
         'metashape12',
         'Family of the coded targets. It also chooses the detector where that is auto.',
         choices=FAMILY_NAMES,
+    )
+    family_file: str = parameter(
+        '', 'Data file that describes the family gsi or dots; empty: the usual design.'
     )
     polarity: str = parameter(
         'auto', 'Colour of the dot: dark on bright, bright on dark, or either.', choices=POLARITIES

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from ahf_ros.codes.ring import FAMILY_NAMES
-from ahf_ros.codes.square import SQUARE_NAMES
+from ahf_ros.codes.families import FAMILY_NAMES
 from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.synthetic.camera import Camera, Sensor, tilted_camera
 from ahf_ros.synthetic.covers import Cover
@@ -47,11 +46,7 @@ class SceneSettings:
     width: int = parameter(3984, 'Width of the image, px.', minimum=16, maximum=20000)
     height: int = parameter(2656, 'Height of the image, px.', minimum=16, maximum=20000)
     targets: int = parameter(54, 'Number of coded targets in the image.', minimum=0)
-    family: str = parameter(
-        'metashape12',
-        'Family of the codes.',
-        choices=(*FAMILY_NAMES, *SQUARE_NAMES, 'gsi', 'dots'),
-    )
+    family: str = parameter('metashape12', 'Family of the codes.', choices=(*FAMILY_NAMES, 'dots'))
     family_file: str = parameter(
         '', 'Data file that describes the family gsi or dots; empty: the usual design.'
     )

@@ -1,0 +1,1 @@
+"""Point-distributed targets: GSI's, and others that a data file describes."""

@@ -1,0 +1,239 @@
+"""Identification of point-distributed targets that light does not break.
+
+Dots are found as blobs, as whole outlines, and as points that many gradients of the logarithm of
+the image point away from. Groups of them that look like the template give homographies; each is
+judged by the evidence at all places of the printed design, where there should be a dot as well as
+where there should be none, so that neither a mirror image nor a chance arrangement is taken for a
+target.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ahf_ros.codes.gsi import PointFamily
+from ahf_ros.codes.gsi_library import point_family
+from ahf_ros.detectors.contract import DetectorSettings
+from ahf_ros.detectors.gsi.evidence import find_evidence
+from ahf_ros.detectors.gsi.grouping import find_templates
+from ahf_ros.detectors.gsi.hypotheses import Hypotheses, judge, plausible, resolve
+from ahf_ros.detectors.gsi.reading import read_codes
+from ahf_ros.detectors.gsi.refinement import dot_frames, measure_dots, place_targets
+from ahf_ros.features import frame
+from ahf_ros.features.dot_search import voted_dots, whole_dots
+from ahf_ros.features.dots import Dots, distinct
+from ahf_ros.features.ellipse_targets import ellipse_fields, targets_from_frames
+from ahf_ros.features.homography import local_frames
+from ahf_ros.features.log_edges import LOG_SCALE
+from ahf_ros.features.pyramid import ImagePyramid, image_pyramid
+from ahf_ros.features.small_dots import small_dots
+from ahf_ros.imaging.image import as_gray, check_image
+from ahf_ros.target import UNDECODED, DottedTarget, Target, sorted_targets
+
+_SMALL = 12.0  # largest radius of dots that are looked for as blobs, px
+_MARGIN = 0.4  # width of the margin round a dot whose outline is whole, dot radii
+_OUTLINE = 2 * np.pi * np.arange(32) / 32  # angles of the polygon that hides it
+_FARTHEST = 1.0  # that the reference point is moved by a refinement, px, or dot radii
+
+
+@dataclass(frozen=True, slots=True)
+class GsiDetector:
+    """Identify point-distributed targets: GSI's, or those that a data file describes.
+
+    Attributes
+    ----------
+    settings : DetectorSettings
+
+    Raises
+    ------
+    ValueError
+        If the data file of the family is not accepted.
+    """
+
+    name: ClassVar[str] = 'gsi'
+    settings: DetectorSettings = field(default_factory=DetectorSettings)
+
+    def __post_init__(self) -> None:
+        """Refuse a data file that is not accepted."""
+        point_family(self.settings.family_file)
+
+    @property
+    def family(self) -> str:
+        """Family of the codes."""
+        return self.settings.family
+
+    def __call__(self, image: np.ndarray) -> list[Target]:
+        """Identify the targets of one image; see `Detector`."""
+        check_image(image)
+        settings, code = self.settings, point_family(self.settings.family_file)
+        pyramid = image_pyramid(as_gray(image), settings.max_radius)
+        dots = find_dots(pyramid, settings)
+        hypotheses = find_hypotheses(pyramid, dots, code)
+        targets = report(hypotheses, code)
+        if settings.report_undecoded:
+            targets += uncoded(pyramid.gray, dots, targets, settings)
+        return sorted_targets(targets)
+
+    def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
+        """Return targets with their places in an image; see `Refiner`.
+
+        Targets other than `DottedTarget`, and those whose dots are not found near to where they
+        should be, stay as they are.
+        """
+        check_image(image)
+        code = point_family(self.settings.family_file)
+        dotted = [it for it in targets if isinstance(it, DottedTarget) and it.id != UNDECODED]
+        if not dotted:
+            return list(targets)
+        gray = as_gray(image).astype(np.float32, copy=False)
+        ellipses = np.array([it.dots for it in dotted])
+        frames = frame.affine_frames(*ellipses.reshape(-1, 5).T).reshape(*ellipses.shape[:2], 3, 3)
+        which = _dots_of(np.array([it.code for it in dotted]), code)
+        polarity = np.array([it.polarity for it in dotted])
+        placed = place_targets(
+            gray, frames, polarity, code.places[which], code.radii[which], code.reach
+        )
+        moved = np.hypot(*(placed.homographies[:, :2, 2] - [(it.x, it.y) for it in dotted]).T)
+        reach = np.maximum(_FARTHEST, _FARTHEST * np.array([it.semi_minor for it in dotted]))
+        words = np.array([it.code for it in dotted])
+        places = _fields(placed.homographies, placed.covariance, words, code)
+        better: dict[Target, Target] = {
+            target: replace(target, **place)
+            for target, place, good in zip(
+                dotted, places, (moved <= reach) & (placed.share >= 0.5), strict=True
+            )
+            if good
+        }
+        return [better.get(it, it) for it in targets]
+
+
+def find_dots(pyramid: ImagePyramid, settings: DetectorSettings) -> Dots:
+    """Return the dots of an image, no two of them the same.
+
+    Parameters
+    ----------
+    pyramid : ImagePyramid
+    settings : DetectorSettings
+    """
+    low, high, polarities = settings.min_radius, settings.max_radius, settings.polarities
+    whole = whole_dots(pyramid, low, high, polarities)
+    outlines = frame.project(whole.frames, frame.circle_points(_OUTLINE, np.array([1 + _MARGIN])))[
+        :, :, 0
+    ]
+    voted = voted_dots(pyramid, low, high, polarities, explained=outlines)
+    found = [whole, voted]
+    if low < _SMALL:
+        largest = min(high, _SMALL)
+        found.append(small_dots(pyramid.logs[0], low * 0.8, largest, polarities, LOG_SCALE))
+    return distinct(Dots.joined(found))
+
+
+def find_hypotheses(pyramid: ImagePyramid, dots: Dots, code: PointFamily) -> Hypotheses:
+    """Return the groups of dots that may be targets, with the code that each is read as.
+
+    Parameters
+    ----------
+    pyramid : ImagePyramid
+    dots : Dots
+    code : PointFamily
+    """
+    templates = find_templates(dots, code)
+    evidence = find_evidence(pyramid.logs[0], templates.homographies, templates.polarity, code)
+    readings = read_codes(evidence, code)
+    which = plausible(templates, readings, code)
+    some, words = templates.select(which), readings.words[which]
+    first = _placed(pyramid, some.homographies, some.polarity, words, code)
+    again = np.flatnonzero(first.words != words)
+    second = _placed(
+        pyramid, first.homographies[again], some.polarity[again], first.words[again], code
+    )
+    return first.replaced(again, second)
+
+
+def _placed(
+    pyramid: ImagePyramid,
+    homographies: np.ndarray,
+    polarity: np.ndarray,
+    words: np.ndarray,
+    code: PointFamily,
+) -> Hypotheses:
+    """Return hypotheses with homographies through all of their dots, read once more."""
+    dots = _dots_of(words, code)
+    places, radii = code.places[dots], code.radii[dots]
+    frames = dot_frames(homographies, places, radii)
+    placement = place_targets(pyramid.gray, frames, polarity, places, radii, code.reach)
+    evidence = find_evidence(pyramid.logs[0], placement.homographies, polarity, code)
+    return judge(polarity, placement, read_codes(evidence, code), code)
+
+
+def report(hypotheses: Hypotheses, code: PointFamily) -> list[Target]:
+    """Return the targets whose codes are certain, each ID once."""
+    some = hypotheses.select(resolve(hypotheses, code))
+    fields = _fields(some.homographies, some.covariance, some.words, code)
+    return [
+        DottedTarget(
+            id=code.number(int(word)) or 0,
+            code=int(word),
+            confidence=float(confidence),
+            template_dots=len(code.template),
+            polarity=int(polarity),
+            **of_target,
+        )
+        for word, confidence, polarity, of_target in zip(
+            some.words, some.confidence, some.polarity, fields, strict=True
+        )
+    ]
+
+
+def uncoded(
+    gray: np.ndarray, dots: Dots, targets: Sequence[Target], settings: DetectorSettings
+) -> list[Target]:
+    """Return the dots that belong to no target, as targets that are not decoded.
+
+    Parameters
+    ----------
+    gray : ndarray of float32, shape (height, width)
+    dots : Dots
+    targets : sequence of Target
+        Those that were identified.
+    settings : DetectorSettings
+    """
+    measured = measure_dots(gray, dots.frames, dots.polarity)
+    frames, found = measured.frames, measured.near.copy()
+    major = frame.ellipse_axes(frames)[0]
+    found &= (major >= settings.min_radius) & (major <= settings.max_radius)
+    for target in targets:
+        for x, y, radius, *_ in getattr(target, 'dots', ()):
+            found &= np.hypot(frames[:, 0, 2] - x, frames[:, 1, 2] - y) > radius
+    none = np.full(int(found.sum()), UNDECODED)
+    return targets_from_frames(
+        frames[found], measured.covariance[found], none, 0 * none, 0.0 * none
+    )
+
+
+def _dots_of(words: np.ndarray, code: PointFamily) -> np.ndarray:
+    """Return the indices of the dots of targets among the places of the design, shape (k, n)."""
+    count = len(code.template)
+    rows = [[*range(count), *(count + code.decoding_dots(int(word)))] for word in words]
+    return np.array(rows, int).reshape(len(words), count + code.rule.dots)
+
+
+def _fields(
+    homographies: np.ndarray, covariance: np.ndarray, words: np.ndarray, code: PointFamily
+) -> list[dict[str, Any]]:
+    """Return the fields of targets that say where they and their dots are."""
+    reference = np.zeros((1, 2))
+    radius = code.template_radii[[code.reference]]
+    fields = ellipse_fields(local_frames(homographies, reference, radius)[:, 0], covariance)
+    which = _dots_of(words, code)
+    frames = dot_frames(homographies, code.places[which], code.radii[which])
+    axes = np.stack(frame.ellipse_axes(frames.reshape(-1, 3, 3)), axis=1)
+    ellipses = np.concatenate([frames[..., :2, 2], axes.reshape(*which.shape, 3)], axis=2)
+    return [
+        {**place, 'dots': tuple(map(tuple, of_target))}
+        for place, of_target in zip(fields, ellipses.tolist(), strict=True)
+    ]

@@ -1,0 +1,282 @@
+"""Templates among the dots of an image.
+
+The ellipse of a dot tells how its neighbourhood is foreshortened, to about a fifth: seen in units
+of its ellipse the template of a target is nearly the printed one, turned. So each dot is tried in
+the role of each template dot, a partner is looked for at the right distance, and a third dot where
+these two predict it. Three dots give an affine map, which predicts the others well.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from ahf_ros.codes.gsi import PointFamily
+from ahf_ros.features import frame
+from ahf_ros.features.array_record import ArrayRecord
+from ahf_ros.features.dots import Dots
+from ahf_ros.features.homography import fit_homographies
+from ahf_ros.features.nearest_dots import NearestDots
+
+_LENGTH_ERROR = 0.35  # of a distance in units of an ellipse, relative
+_SLACK = 0.7  # added to it, dot radii
+_SIZE_RATIO = 0.55  # of two dots of a target, in ln, for their printed sizes
+_NEIGHBOURS = 64  # of a dot, the nearest ones, that may belong to its target
+_ELLIPSE_ERROR = 0.25  # of the axes of a dot, from those that three dots imply, in ln
+_ELLIPSE_PIXELS = 0.8  # added to it, px over the semi-minor axis
+_PREDICTED = 0.9  # error of a dot that is predicted by three others, dot radii
+_PERSPECTIVE = 0.06  # the same, in its distance from them
+_RESIDUAL = 0.35  # of the dots of a template about a homography, root mean square, dot radii
+_PIXELS = 0.35  # the same, px, which counts where dots are small
+_PART = 400_000  # pairs or triples of dots at a time, which bounds the memory
+_MAXIMUM_GROUPS = 8000  # of one part, for a homography to be fitted
+_MAXIMUM_TEMPLATES = 4000  # those that fit best
+_FEW = 600  # dots, up to which all template dots are tried in all roles
+
+
+@dataclass(frozen=True, slots=True)
+class Templates(ArrayRecord):
+    """k groups of dots that look like the template of a target.
+
+    Attributes
+    ----------
+    homographies : ndarray of float64, shape (k, 3, 3)
+        From the plane of the printed design (its unit, y up, about the reference) to pixels.
+    members : ndarray of int, shape (k, n)
+        Which dot is each template dot, -1 where there is none.
+    polarity : ndarray of int, shape (k,)
+    misfit : ndarray of float64, shape (k,)
+        Root mean square distance of the dots from where they should be, as a share of what is
+        accepted; a dot that is missing counts as 1.
+    """
+
+    homographies: np.ndarray
+    members: np.ndarray
+    polarity: np.ndarray
+    misfit: np.ndarray
+
+
+@dataclass(frozen=True, slots=True)
+class _Pairs:
+    """Ordered pairs of neighbours, sorted by the first one."""
+
+    first: np.ndarray  # (p,)
+    second: np.ndarray  # (p,)
+    offset: np.ndarray  # (p, 2), y up, in units of the ellipse of the first
+    start: np.ndarray  # (k + 1,), where the pairs of each dot begin
+
+
+def find_templates(dots: Dots, family: PointFamily) -> Templates:
+    """Return the groups of dots that look like templates, no group twice.
+
+    Parameters
+    ----------
+    dots : Dots
+    family : PointFamily
+        Printed design.
+
+    Returns
+    -------
+    Templates
+        Best first. They may share dots.
+    """
+    places = family.places[: len(family.template)]
+    found = [_nothing(len(places))]
+    for polarity in (1, -1):
+        of_polarity = np.flatnonzero(dots.polarity == polarity)
+        if len(of_polarity) < len(places) - 1:
+            continue
+        part = dots.select(of_polarity)
+        pairs, nearest = _neighbours(part, family), NearestDots.of(part.frames[:, :2, 2])
+        for triple in _triples(places, family.reference, len(part.frames) <= _FEW):
+            members = _members(part, pairs, nearest, family, triple)
+            templates = _fitted(part, members, family, polarity)
+            members = np.where(templates.members < 0, -1, of_polarity[templates.members])
+            found.append(replace(templates, members=members))
+    return _distinct(Templates.joined(found))
+
+
+def _triples(places: np.ndarray, reference: int, thorough: bool) -> list[tuple[int, int, int]]:
+    """Return three template dots each: one whose ellipse is used, its partner, and a third one.
+
+    The reference and the dot nearest to it are tried with the dot farthest from them, or, where
+    there is time, all dots with the two farthest.
+    """
+    gaps = np.hypot(*(places[:, None] - places).transpose(2, 0, 1))
+    roles = np.argsort(gaps[reference], kind='stable').tolist()
+    triples = []
+    for role in roles if thorough else roles[:2]:
+        arms = places - places[role]
+        for partner in np.argsort(-gaps[role], kind='stable').tolist()[: 2 if thorough else 1]:
+            third = int(np.abs(_cross(arms, arms[partner])).argmax())
+            triples.append((role, partner, third))
+    return triples
+
+
+def _nothing(count: int) -> Templates:
+    nobody = np.zeros((0, count), int)
+    return Templates(np.zeros((0, 3, 3)), nobody, np.zeros(0, int), np.zeros(0))
+
+
+def _neighbours(dots: Dots, family: PointFamily) -> _Pairs:
+    """Return the pairs of dots of similar size that one template may hold."""
+    places = family.places[: len(family.template)]
+    reach = np.hypot(*(places[:, None] - places).transpose(2, 0, 1)).max()
+    reach = (1 + _LENGTH_ERROR) * reach / family.template_radii.min() + _SLACK
+    x, y = dots.frames[:, 0, 2], dots.frames[:, 1, 2]
+    major = frame.ellipse_axes(dots.frames)[0]
+    inverse = np.linalg.inv(dots.frames[:, :2, :2])
+    order = np.argsort(x, kind='stable')
+    low = np.searchsorted(x[order], x - reach * major)
+    high = np.searchsorted(x[order], x + reach * major, side='right')
+    widest = np.log(family.template_radii.max() / family.template_radii.min())
+    parts = []
+    begin = 0
+    total = np.cumsum(high - low)
+    while begin < len(x):
+        done = total[begin - 1] if begin else 0
+        end = max(int(np.searchsorted(total, done + _PART)), begin + 1)
+        count = high[begin:end] - low[begin:end]
+        first = np.repeat(np.arange(begin, end), count)
+        inside = np.arange(len(first)) - np.repeat(np.cumsum(count) - count, count)
+        second = order[low[first] + inside]
+        near = (np.abs(y[second] - y[first]) < reach * major[first]) & (first != second)
+        near &= np.abs(np.log(major[second] / major[first])) < _SIZE_RATIO + widest
+        first, second = first[near], second[near]
+        difference = np.stack([x[second] - x[first], y[second] - y[first]], axis=1)
+        offset = (inverse[first] @ difference[..., None])[..., 0] * [1, -1]
+        distance = np.hypot(*offset.T)
+        rank = np.lexsort((distance, first))
+        first, second, offset, distance = (
+            values[rank] for values in (first, second, offset, distance)
+        )
+        place = np.arange(len(first)) - np.searchsorted(first, first)
+        near = (distance < reach) & (place < _NEIGHBOURS)
+        parts.append((first[near], second[near], offset[near]))
+        begin = end
+    if not parts:
+        parts = [(np.zeros(0, int), np.zeros(0, int), np.zeros((0, 2)))]
+    first, second, offset = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return _Pairs(first, second, offset, np.searchsorted(first, np.arange(len(x) + 1)))
+
+
+def _members(
+    dots: Dots,
+    pairs: _Pairs,
+    nearest: NearestDots,
+    family: PointFamily,
+    triple: tuple[int, int, int],
+) -> np.ndarray:
+    """Return groups of dots in which a dot has a role, shape (k, n), -1 where one is missing."""
+    places = family.places[: len(family.template)]
+    role, partner, third = triple
+    arms = (places - places[role]) / family.template_radii[role]
+    lengths = np.hypot(*arms.T)
+    distance = np.hypot(*pairs.offset.T)
+    allowed = _LENGTH_ERROR * lengths[partner] + _SLACK
+    of_partner = np.flatnonzero(np.abs(distance - lengths[partner]) < allowed)
+    degree = np.diff(pairs.start)[pairs.first[of_partner]]
+    parts = np.searchsorted(np.cumsum(degree), np.arange(0, degree.sum() + _PART, _PART))
+    found = [np.zeros((0, len(places)), int)]
+    for begin, end in pairwise(parts):
+        pair, other = _thirds(pairs, of_partner[begin:end], arms[partner], arms[third])
+        affine = _affine(pairs.offset[pair], pairs.offset[other], arms[partner], arms[third])
+        members = np.full((len(pair), len(places)), -1)
+        members[:, role] = pairs.first[pair]
+        members[:, partner], members[:, third] = pairs.second[pair], pairs.second[other]
+        base = dots.frames[pairs.first[pair]][:, :2, :2] @ [[1, 0], [0, -1]]
+        affine = base @ affine  # px a dot radius
+        good = _bears_out(dots, members[:, (role, partner, third)], affine)
+        members, affine = members[good], affine[good]
+        origin = dots.frames[members[:, role], :2, 2]
+        error = np.zeros(len(members))
+        for index in np.setdiff1d(np.arange(len(places)), (role, partner, third)):
+            expected = origin + affine @ arms[index]
+            reach = _PREDICTED + _PERSPECTIVE * lengths[index]
+            members[:, index], gap = nearest.within(expected, affine, reach)
+            error += np.where(members[:, index] < 0, 1, (gap / reach) ** 2)
+        members[(members < 0).sum(axis=1) > 1] = -1
+        kept = np.argsort(error, kind='stable')[:_MAXIMUM_GROUPS]
+        found.append(members[kept[members[kept, role] >= 0]])
+    return np.unique(np.concatenate(found), axis=0)
+
+
+def _thirds(
+    pairs: _Pairs, which: np.ndarray, partner: np.ndarray, third: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return pairs, and for each a pair with the same first dot whose second is about a third dot.
+
+    It is where the template has it, turned so that the partner is where the first pair says.
+    """
+    turn = _complex(pairs.offset[which]) / _complex(partner)
+    expected = turn / np.abs(turn) * _complex(third)
+    count = pairs.start[pairs.first[which] + 1] - pairs.start[pairs.first[which]]
+    place = np.repeat(np.arange(len(which)), count)
+    inside = np.arange(len(place)) - np.repeat(np.cumsum(count) - count, count)
+    other = pairs.start[pairs.first[which]][place] + inside
+    gap = np.abs(_complex(pairs.offset[other]) - expected[place])
+    near = gap < _LENGTH_ERROR * np.hypot(*third) + _SLACK
+    return which[place[near]], other[near]
+
+
+def _affine(
+    first: np.ndarray, second: np.ndarray, arm: np.ndarray, other: np.ndarray
+) -> np.ndarray:
+    """Return the linear maps, shape (k, 2, 2), that take two arms to their images."""
+    images = np.stack([first, second], axis=2)
+    maps: np.ndarray = images @ np.linalg.inv(np.stack([arm, other], axis=1))
+    return maps
+
+
+def _bears_out(dots: Dots, members: np.ndarray, affine: np.ndarray) -> np.ndarray:
+    """Return where the ellipses of three dots are those that their affine map implies."""
+    good = affine[:, 0, 0] * affine[:, 1, 1] < affine[:, 0, 1] * affine[:, 1, 0]  # y up, then down
+    _, minor, _ = frame.ellipse_axes(dots.frames)
+    allowed = _ELLIPSE_ERROR + _ELLIPSE_PIXELS / minor
+    inverse = np.linalg.inv(dots.frames[:, :2, :2])
+    for column in members.T:
+        relative = inverse[column] @ affine
+        square = (relative**2).sum(axis=(1, 2)) / 2
+        determinant = np.abs(_cross(relative[:, 0], relative[:, 1]))
+        half = np.sqrt(np.maximum(square**2 - determinant**2, 0))
+        large = np.log(np.maximum(square + half, 1e-9)) / 2
+        small = np.log(np.maximum(square - half, 1e-9)) / 2
+        good &= (large < allowed[column]) & (small > -allowed[column])
+    return good
+
+
+def _cross(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    area: np.ndarray = first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
+    return area
+
+
+def _complex(points: np.ndarray) -> np.ndarray:
+    values: np.ndarray = points[..., 0] + 1j * points[..., 1]
+    return values
+
+
+def _fitted(dots: Dots, members: np.ndarray, family: PointFamily, polarity: int) -> Templates:
+    """Return groups with their homographies, those that fit."""
+    places = family.places[: len(family.template)]
+    reach = np.hypot(*places.T).max()
+    there = members >= 0
+    images = dots.frames[members, :2, 2]
+    fit = fit_homographies(places, images, there.astype(float), reach)
+    expected = frame.project(fit.homographies, places)
+    squares = ((expected - images) ** 2).sum(axis=2)
+    _, minor, _ = frame.ellipse_axes(dots.frames)
+    allowed = np.maximum(_RESIDUAL * minor[members], _PIXELS)
+    relative = np.where(there, squares / allowed**2, 1.0)
+    misfit = np.sqrt(relative.mean(axis=1))
+    good = (misfit < 1) & (np.linalg.det(fit.homographies[:, :2, :2]) < 0)  # y is up, then down
+    templates = Templates(fit.homographies, members, np.full(len(members), polarity), misfit)
+    return templates.select(good)
+
+
+def _distinct(templates: Templates) -> Templates:
+    """Return the templates best first, of those with the same dots one."""
+    order = np.argsort(templates.misfit, kind='stable')
+    _, first = np.unique(templates.members[order], axis=0, return_index=True)
+    return templates.select(order[np.sort(first)[:_MAXIMUM_TEMPLATES]])

@@ -1,0 +1,81 @@
+"""Codes of targets, by the evidence at all of their places."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from ahf_ros.codes.gsi import PointFamily
+from ahf_ros.detectors.gsi.evidence import Evidence
+from ahf_ros.features.array_record import ArrayRecord
+
+_MOST_FOR, _MOST_AGAINST = 8.0, 6.0  # that one place may say
+
+
+@dataclass(frozen=True, slots=True)
+class Readings(ArrayRecord):
+    """What k groups of dots were read as.
+
+    Attributes
+    ----------
+    words : ndarray of int64, shape (k,)
+        Value of the best code.
+    margin : ndarray of float64, shape (k,)
+        Evidence for it over that for the second best, in ln.
+    support : ndarray of float64, shape (k,)
+        Evidence for a target with this code: for its dots, and against dots at all other places,
+        as a share of the most there may be.
+    weakest : ndarray of float64, shape (k,)
+        The second lowest evidence for one of its dots.
+    strangest : ndarray of float64, shape (k,)
+        The highest evidence for a dot where it has none.
+    """
+
+    words: np.ndarray
+    margin: np.ndarray
+    support: np.ndarray
+    weakest: np.ndarray
+    strangest: np.ndarray
+
+
+def read_codes(evidence: Evidence, family: PointFamily) -> Readings:
+    """Return the codes that the evidence speaks for.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        Of k groups.
+    family : PointFamily
+    """
+    count = len(family.template)
+    limited = np.clip(evidence.ratio, -_MOST_AGAINST, _MOST_FOR)
+    template, positions = limited[:, :count], limited[:, count:]
+    incidence = _incidence(family)
+    scores = positions @ incidence.T
+    order = np.argpartition(scores, -min(2, scores.shape[1]), axis=1)[:, -2:]
+    best = scores.argmax(axis=1)
+    rows = np.arange(len(scores))
+    second = np.where(order == best[:, None], -np.inf, np.take_along_axis(scores, order, axis=1))
+    margin = scores[rows, best] - np.maximum(second.max(axis=1), scores[rows, best] - 14.0)
+    marked = incidence[best] > 0
+    of_dots = np.concatenate([template, np.where(marked, positions, _MOST_FOR)], axis=1)
+    against = np.where(marked, 0.0, -positions).sum(axis=1)
+    dots = template.sum(axis=1) + np.where(marked, positions, 0.0).sum(axis=1)
+    empty = (~marked & evidence.inside[:, count:]).sum(axis=1)
+    most = (count + marked.sum(axis=1)) * _MOST_FOR + empty * _MOST_AGAINST
+    return Readings(
+        family.words[best],
+        margin,
+        (dots + against) / most,
+        np.sort(of_dots, axis=1)[:, 1],
+        np.where(marked, -_MOST_AGAINST, positions).max(axis=1, initial=-_MOST_AGAINST),
+    )
+
+
+@lru_cache(maxsize=8)
+def _incidence(family: PointFamily) -> np.ndarray:
+    """Return which positions each code has dots at, 0 or 1, shape (codes, positions)."""
+    bits = family.words[:, None] >> family.position_numbers & 1
+    return bits.astype(np.float64)

@@ -1,0 +1,171 @@
+"""Sub-pixel places of targets: a homography through all of their dots.
+
+The edges of each dot are fitted in the image as received. The centres of the ellipses are not the
+images of the centres of the dots; the homography tells the difference.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ahf_ros.features.array_record import ArrayRecord
+from ahf_ros.features.circle_fit import fit_circles
+from ahf_ros.features.circles import dot_circles
+from ahf_ros.features.frame import ellipse_axes, mean_radii, project
+from ahf_ros.features.homography import ellipse_centres, fit_homographies, local_frames
+from ahf_ros.features.robust import median
+
+_RAYS = 32  # about a dot
+_REACHES = ((2.3, 0.45), (1.1, 0.95), (0.5, 1.9))
+# Semi-minor axis of a dot, px, from where on its edge is looked for within a reach, dot radii.
+_MINIMUM_SHARE = 0.5  # of the edge of a dot, for its fit to count
+_FARTHEST, _FARTHEST_SHARE = 0.8, 0.25  # that the centre of a dot is moved: px, radii
+_UNMEASURED = 0.3  # standard deviation of a centre whose edge was not fitted, px
+_OUTLIER = 4.0  # standard deviations from which a dot loses its weight
+_MINIMUM_ERROR = 0.01  # of a centre, standard deviation, that edges of light cannot undercut, px
+_USUAL = (0.08, 0.004)  # distance of a dot from the homography, px and dot radii
+_ROUNDS = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Placement(ArrayRecord):
+    """Where k targets are.
+
+    Attributes
+    ----------
+    homographies : ndarray of float64, shape (k, 3, 3)
+        From the plane of the printed design to pixels.
+    covariance : ndarray of float64, shape (k, 2, 2)
+        Of the image of the reference point, px^2.
+    share : ndarray of float64, shape (k,)
+        Share of the dots whose edges were found where they should be.
+    misplacement : ndarray of float64, shape (k,)
+        Sum of ln(1 + (d / s)^2) over the dots but the worst, with the distance d of a dot from
+        the homography and the usual one, s.
+    growth : ndarray of float64, shape (k,)
+        Their usual radius over that which the homography implies, in ln.
+    """
+
+    homographies: np.ndarray
+    covariance: np.ndarray
+    share: np.ndarray
+    misplacement: np.ndarray
+    growth: np.ndarray
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredDots(ArrayRecord):
+    """Dots, and what their edges say.
+
+    Attributes
+    ----------
+    frames : ndarray of float64, shape (n, 3, 3)
+        As fitted; those given where no edge was found.
+    covariance : ndarray of float64, shape (n, 2, 2)
+        Of the centre of the ellipse, px^2; large where there is no edge about where it should be.
+    found : ndarray of bool, shape (n,)
+        Whether there is an edge.
+    near : ndarray of bool, shape (n,)
+        Whether it is about where it should be.
+    """
+
+    frames: np.ndarray
+    covariance: np.ndarray
+    found: np.ndarray
+    near: np.ndarray
+
+
+def measure_dots(gray: np.ndarray, frames: np.ndarray, polarity: np.ndarray) -> MeasuredDots:
+    """Fit the edges of dots.
+
+    Parameters
+    ----------
+    gray : ndarray of float32, shape (height, width)
+        Gray values from 0 to 255.
+    frames : ndarray of float64, shape (n, 3, 3)
+        Affine, to about a pixel.
+    polarity : ndarray of int, shape (n,)
+    """
+    minor = ellipse_axes(frames)[1]
+    fitted = frames.copy()
+    covariance = np.tile(_UNMEASURED**2 * np.eye(2), (len(frames), 1, 1))
+    found, near = np.zeros((2, len(frames)), bool)
+    above = np.inf
+    for smallest, reach in _REACHES:
+        which = np.flatnonzero((minor >= smallest) & (minor < above))
+        above = smallest
+        circles = dot_circles(polarity[which], _RAYS)
+        fit = fit_circles(gray, frames[which], circles, reach=reach, projective=False)
+        moved = np.hypot(*(fit.frames[:, :2, 2] - frames[which, :2, 2]).T)
+        good = fit.share >= _MINIMUM_SHARE
+        found[which], fitted[which[good]] = good, fit.frames[good]
+        good &= moved <= np.maximum(_FARTHEST, _FARTHEST_SHARE * minor[which])
+        near[which] = good
+        covariance[which[good]] = fit.covariance[good] + _MINIMUM_ERROR**2 * np.eye(2)
+    return MeasuredDots(fitted, covariance, found, near)
+
+
+def place_targets(
+    gray: np.ndarray,
+    frames: np.ndarray,
+    polarity: np.ndarray,
+    places: np.ndarray,
+    radii: np.ndarray,
+    reach: float,
+) -> Placement:
+    """Return the homographies of targets through their dots.
+
+    Parameters
+    ----------
+    gray : ndarray of float32, shape (height, width)
+        Gray values from 0 to 255.
+    frames : ndarray of float64, shape (k, n, 3, 3)
+        Of the dots of k targets, to about a pixel.
+    polarity : ndarray of int, shape (k,)
+    places : ndarray of float64, shape (k, n, 2)
+        Of the dots in the printed design, about the reference point.
+    radii : ndarray of float64, shape (k, n)
+    reach : float
+        Size of the printed design.
+    """
+    shape = frames.shape[:2]
+    signs = np.repeat(polarity, shape[1])
+    dots = measure_dots(gray, frames.reshape(-1, 3, 3), signs)
+    near, found = dots.near.reshape(shape), dots.found.reshape(shape)
+    fitted = dots.frames[:, :2, 2].reshape(*shape, 2)
+    centres = np.where(near[..., None], fitted, frames[..., :2, 2])
+    weights = np.linalg.inv(dots.covariance).reshape(*shape, 2, 2)
+    robust = weights
+    shift = np.zeros((*shape, 2))
+    for _ in range(_ROUNDS):
+        fit = fit_homographies(places, centres - shift, robust, reach)
+        expected = project(fit.homographies, places[:, :, None])[:, :, 0]
+        shift = ellipse_centres(fit.homographies, places, radii) - expected
+        error = (centres - shift - expected)[..., None]
+        squares = (error.swapaxes(2, 3) @ weights @ error)[..., 0, 0]
+        usual = np.maximum(np.median(squares, axis=1, keepdims=True), 1.0)
+        robust = weights / ((1 + squares / usual / _OUTLIER**2) ** 2)[..., None, None]
+    # Dots that lie farther from the homography than they should say how wrong the errors are.
+    free = max(2 * shape[1] - 8, 1)
+    excess = np.maximum((squares / (1 + squares / _OUTLIER**2)).sum(axis=1) / free, 1.0)
+    implied = local_frames(fit.homographies, places, radii).reshape(-1, 3, 3)
+    usual_distance = _USUAL[0] + _USUAL[1] * mean_radii(implied).reshape(shape)
+    distance = np.hypot(*np.moveaxis(fitted - shift - expected, 2, 0)) / usual_distance
+    misplaced = np.sort(np.where(found, np.log1p(distance**2), 0.0), axis=1)[:, :-1]
+    growth = np.log(mean_radii(dots.frames) / mean_radii(implied)).reshape(shape)
+    return Placement(
+        fit.homographies,
+        fit.covariance * excess[:, None, None],
+        near.mean(axis=1),
+        misplaced.sum(axis=1),
+        median(growth, found, 0.0),
+    )
+
+
+def dot_frames(homographies: np.ndarray, places: np.ndarray, radii: np.ndarray) -> np.ndarray:
+    """Return the frames of dots as ellipses, centred where these are, shape (k, n, 3, 3)."""
+    frames = local_frames(homographies, places, radii)
+    frames[..., :2, 2] = ellipse_centres(homographies, places, radii)
+    return frames

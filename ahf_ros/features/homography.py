@@ -1,0 +1,140 @@
+"""Homographies of small flat objects, fitted to the images of their points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ahf_ros.features.frame import project
+
+_ROUNDS = 3  # of linear solutions: the division by the depth is that of the one before
+_PERSPECTIVE = 0.08  # usual change of depth from the centre of an object to its edge, relative
+_WEAK = 1e-9  # weight of a prior that only makes matrices invertible
+_SMALLEST_DEPTH = 0.2  # in that of the centre
+
+
+@dataclass(frozen=True, slots=True)
+class HomographyFit:
+    """Homographies of k objects.
+
+    Attributes
+    ----------
+    homographies : ndarray of float64, shape (k, 3, 3)
+        From the plane of the object to pixels, the last element being one.
+    covariance : ndarray of float64, shape (k, 2, 2)
+        Of the image of the centre of the object, px^2, where the weights are inverse variances.
+    """
+
+    homographies: np.ndarray
+    covariance: np.ndarray
+
+
+def fit_homographies(
+    points: np.ndarray, images: np.ndarray, weights: np.ndarray, reach: float
+) -> HomographyFit:
+    """Fit homographies to the images of points, with little perspective where they do not tell.
+
+    Parameters
+    ----------
+    points : ndarray of float, shape (m, 2) or (k, m, 2)
+        In the plane of the object, about its centre.
+    images : ndarray of float, shape (k, m, 2)
+        px.
+    weights : ndarray of float, shape (k, m) or (k, m, 2, 2)
+        Inverse variances or inverse covariances of the images, 1/px^2; zero leaves a point out.
+    reach : float
+        Size of the object, from its centre, in units of `points`.
+    """
+    count = len(images)
+    scaled = np.broadcast_to(points / reach, images.shape)
+    if weights.ndim == 2:
+        weights = weights[..., None, None] * np.eye(2)
+    total = np.maximum(np.trace(weights, axis1=2, axis2=3).sum(axis=1), 1e-30)
+    share = np.trace(weights, axis1=2, axis2=3) / total[:, None]
+    middle = (share[..., None] * images).sum(axis=1)
+    size = np.sqrt((share[..., None] * (images - middle[:, None]) ** 2).sum(axis=(1, 2)))
+    size = np.maximum(size, 1e-6)[:, None]
+    target = (images - middle[:, None]) / size[..., None]
+    weights = weights * size[..., None, None] ** 2
+    prior = np.diag([_WEAK] * 6 + [_PERSPECTIVE**-2] * 2)
+    homogeneous = np.concatenate([scaled, np.ones((*scaled.shape[:2], 1))], axis=2)
+    depth = np.ones(images.shape[:2])
+    for _ in range(_ROUNDS):
+        design = np.zeros((count, scaled.shape[1], 2, 8))
+        design[:, :, 0, :3] = design[:, :, 1, 3:6] = homogeneous
+        design[..., 6:] = -target[..., None] * scaled[..., None, :]
+        design /= depth[..., None, None]
+        weighted = (weights @ design).reshape(count, 2 * scaled.shape[1], 8)
+        normal = weighted.transpose(0, 2, 1) @ design.reshape(weighted.shape) + prior
+        right = (weighted * (target / depth[..., None]).reshape(*weighted.shape[:2], 1)).sum(
+            axis=1
+        )
+        solution = np.linalg.solve(normal, right[..., None])[..., 0]
+        depth = 1 + (scaled * solution[:, None, 6:]).sum(axis=2)
+        depth = np.maximum(depth, _SMALLEST_DEPTH)
+    elements = np.concatenate([solution, np.ones((count, 1))], axis=1).reshape(-1, 3, 3)
+    elements[:, :, :2] /= reach
+    back = np.zeros((count, 3, 3))
+    back[:, 0, 0] = back[:, 1, 1] = size[:, 0]
+    back[:, :2, 2], back[:, 2, 2] = middle, 1.0
+    of_centre = np.linalg.inv(normal)[:, [[2], [5]], [2, 5]]
+    return HomographyFit(back @ elements, of_centre * size[..., None] ** 2)
+
+
+def ellipse_centres(homographies: np.ndarray, points: np.ndarray, radii: np.ndarray) -> np.ndarray:
+    """Return the centres of the ellipses that circles are seen as.
+
+    Under perspective that is not the image of the centre of the circle.
+
+    Parameters
+    ----------
+    homographies : ndarray of float64, shape (k, 3, 3)
+    points : ndarray of float, shape (m, 2) or (k, m, 2)
+        Centres of the circles in the plane of the object.
+    radii : ndarray of float, shape (m,) or (k, m)
+
+    Returns
+    -------
+    ndarray of float64, shape (k, m, 2)
+        px.
+    """
+    count = len(homographies)
+    points = np.broadcast_to(points, (count, *points.shape[-2:]))
+    radii = np.broadcast_to(radii, points.shape[:2])
+    homogeneous = np.concatenate([points, np.ones((*points.shape[:2], 1))], axis=2)
+    images = homogeneous @ homographies.transpose(0, 2, 1)
+    slope = homographies[:, None, 2, :2]
+    # The pole of the line at infinity with respect to the dual conic of the image.
+    along = radii[..., None] ** 2 * (slope @ homographies[:, :, :2].transpose(0, 2, 1))
+    pole = images * images[..., 2:] - along
+    centres: np.ndarray = pole[..., :2] / pole[..., 2:]
+    return centres
+
+
+def local_frames(homographies: np.ndarray, points: np.ndarray, radii: np.ndarray) -> np.ndarray:
+    """Return frames of circles in the plane of objects, see `ahf_ros.features.frame`.
+
+    Parameters
+    ----------
+    homographies : ndarray of float64, shape (k, 3, 3)
+    points : ndarray of float, shape (m, 2) or (k, m, 2)
+    radii : ndarray of float, shape (m,) or (k, m)
+
+    Returns
+    -------
+    ndarray of float64, shape (k, m, 3, 3)
+        Affine, with the image of the centre of the circle as their centre. Their second axis is
+        turned round where the homography is a mirror image, as from a design with y upwards.
+    """
+    count = len(homographies)
+    points = np.broadcast_to(points, (count, *points.shape[-2:]))
+    radii = np.broadcast_to(radii, points.shape[:2])
+    centres = project(homographies, points[:, :, None])[:, :, 0]
+    depth = points @ homographies[:, 2, :2, None] + homographies[:, None, 2:, 2]
+    frames = np.zeros((*points.shape[:2], 3, 3))
+    slopes = homographies[:, None, :2, :2] - centres[..., None] * homographies[:, None, 2:, :2]
+    frames[..., :2, :2] = slopes * (radii / depth[..., 0])[..., None, None]
+    frames[..., 1] *= np.sign(np.linalg.det(frames[..., :2, :2]))[..., None]
+    frames[..., :2, 2], frames[..., 2, 2] = centres, 1.0
+    return frames
