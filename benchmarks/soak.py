@@ -278,8 +278,8 @@ class Soak:
             [
                 lambda: self._set(True, expected_targets=3),
                 self._visit,
-                lambda: self._set(True, detector='ring', polarity='dark'),
-                lambda: self._set(True, detector='traditional', seed=7),
+                lambda: self._set(False, detector='ring', polarity='bright'),
+                lambda: self._set(True, polarity='dark', seed=7),
                 lambda: self._set(False, population=1, seed=8),
                 self._identify,
                 # One more than there are: filters are tried.
