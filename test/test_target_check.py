@@ -2,44 +2,26 @@
 
 from __future__ import annotations
 
-import json
 import math
-import struct
 from dataclasses import fields
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 
 pytest.importorskip('rosbags', reason='rosbags is not installed')
 
-from ahf_ros.bag.definitions import CODED_TARGETS, message_types, typestore
 from ahf_ros.detectors.external.guarded import guarded
-from ahf_ros.drawing import draw
-from ahf_ros.interchange.target_json import to_json
-from ahf_ros.interchange.target_messages import coded_target_array
 from ahf_ros.session import create_identifier
-from ahf_ros.target import Identification, Target
+from ahf_ros.target import Target
 from ahf_ros.target_check import checked_target, checked_targets
 from ahf_ros.text import printable, reason_of, shown
+from benchmarks import attack
+from benchmarks.attack import Hostile
 
 NAMES = [item.name for item in fields(Target)]
 GOOD = Target(7, 9, 10.5, 20.25, 4.0, 3.0, 0.1, 0.9, (0.1, 0.01, 0.01, 0.2))
-STORE = typestore()
 IMAGE = np.tile(np.arange(40, dtype=np.uint8), (30, 1))
-
-
-class Hostile:
-    """Raises whatever is asked of it."""
-
-    def __repr__(self) -> str:
-        raise RuntimeError('no')
-
-    def __float__(self) -> float:
-        raise RuntimeError('no')
-
-    __str__ = __repr__
 
 
 def changed(**values: object) -> Target:
@@ -112,63 +94,10 @@ def test_what_is_right_stays_as_it_is():
     assert checked_target(GOOD, 'x') is GOOD
 
 
-NUMBERS = st.one_of(
-    st.integers(-(2**70), 2**70),
-    st.floats(),
-    st.floats(width=32).map(np.float32),
-    st.integers(-(2**31), 2**31 - 1).map(np.int32),
-    st.booleans(),
-    st.none(),
-    st.text(),
-    st.complex_numbers(),
-    st.decimals(),
-    st.fractions(),
-    st.just(Hostile()),
-)
-SMALL = st.one_of(st.integers(0, 2**31 - 1), st.floats(0, 1), st.integers(0, 1))
-FIELDS = {name: st.one_of(SMALL, SMALL, SMALL, NUMBERS) for name in NAMES if name != 'covariance'}
-COVARIANCES = st.one_of(
-    st.just((0.0,) * 4),
-    st.tuples(SMALL, st.just(0), st.just(0), SMALL),
-    st.lists(NUMBERS, max_size=5),
-    st.lists(st.floats(), min_size=4, max_size=4).map(np.array),
-    NUMBERS,
-)
-TARGETS = st.builds(Target, **FIELDS, covariance=COVARIANCES)
-
-
 @settings(max_examples=300, deadline=None, derandomize=True)
-@given(st.one_of(st.lists(TARGETS, max_size=3), st.lists(NUMBERS, max_size=2), NUMBERS))
+@given(attack.RESULTS)
 def test_whatever_passes_fits_everywhere(found):
-    try:
-        targets = checked_targets(found, 'detector')
-    except ValueError as error:
-        assert str(error).startswith('detector') and str(error).isprintable()
-        return
-    identification = Identification(tuple(targets))
-    content = json.loads(
-        json.dumps(to_json(identification, 'a', (30, 40), 'f', 'd'), allow_nan=False)
-    )
-    assert len(content['targets']) == len(targets)
-    draw(IMAGE, identification)
-    message = coded_target_array(identification, 'f', (30, 40), header(), message_types(STORE))
-    received = STORE.deserialize_cdr(
-        bytes(STORE.serialize_cdr(message, CODED_TARGETS)), CODED_TARGETS
-    )
-    for sent, target in zip(received.targets, targets, strict=True):
-        assert (sent.id, sent.code, sent.x, sent.y) == (target.id, target.code, target.x, target.y)
-        assert sent.covariance.tolist() == list(target.covariance)
-        for name in ('semi_major', 'semi_minor', 'angle', 'confidence'):
-            assert (
-                getattr(sent, name)
-                == struct.unpack('f', struct.pack('f', getattr(target, name)))[0]
-            )
-
-
-def header() -> object:
-    types = STORE.types
-    stamp = types['builtin_interfaces/msg/Time'](sec=0, nanosec=0)
-    return types['std_msgs/msg/Header'](stamp=stamp, frame_id='')
+    attack.check_result(found)
 
 
 class Bad:

@@ -1,0 +1,322 @@
+"""Hostile input of every kind: what fails is a traceback, a death, or a loss that is not named.
+
+Every area tries as many inputs as its option says, always the same ones, and counts as failed
+whatever does neither succeed nor name what is wrong.
+
+    python -m benchmarks.attack [--bags 10000] [--results 10000] [--messages 10000]
+                                [--images 10000] [--tests]
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import io
+import json
+import re
+import struct
+import subprocess
+import sys
+import tempfile
+import traceback
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import cv2
+import numpy as np
+from hypothesis import strategies as st
+
+from ahf_ros.bag.assembly import finished
+from ahf_ros.bag.definitions import CODED_TARGETS, message_types, typestore
+from ahf_ros.bag.run import BagTask, answer_bag
+from ahf_ros.bag.source import Source
+from ahf_ros.drawing import draw
+from ahf_ros.filtering.settings import AdaptiveSettings
+from ahf_ros.interchange.image_files import decode_bytes
+from ahf_ros.interchange.target_json import to_json
+from ahf_ros.interchange.target_messages import coded_target_array
+from ahf_ros.session import IdentificationSettings
+from ahf_ros.target import Identification, Target
+from ahf_ros.target_check import checked_targets
+from benchmarks import fuzz
+from support import bags
+
+COUNT = 3
+"""Images of a bag."""
+
+STORAGES = ('mcap', 'sqlite3', 'ros1')
+PAGE = 4096
+TESTS = (
+    'test/bag/test_bag_damage.py',
+    'test/cli/test_cli_ending.py',
+    'test/nodes/test_security.py',
+)
+SETTINGS = IdentificationSettings(
+    detector='traditional', adaptive=AdaptiveSettings(ahf=False, threads=1)
+)
+GRAY = np.tile(np.arange(40, dtype=np.uint8), (30, 1))
+
+
+@dataclass(frozen=True, slots=True)
+class Tally:
+    """What became of the inputs of an area.
+
+    Attributes
+    ----------
+    area : str
+    tried, accepted, failed : int
+    reasons : tuple of str
+        The first failures.
+    """
+
+    area: str
+    tried: int
+    accepted: int
+    failed: int
+    reasons: tuple[str, ...] = ()
+
+
+class Hostile:
+    """Raises whatever is asked of it."""
+
+    def _refuse(self) -> str:
+        raise RuntimeError('no')
+
+    __repr__ = __str__ = __float__ = _refuse  # type: ignore[assignment]
+
+
+NUMBERS = st.one_of(
+    st.integers(-(2**70), 2**70),
+    st.floats(),
+    st.floats(width=32).map(np.float32),
+    st.integers(-(2**31), 2**31 - 1).map(np.int32),
+    st.booleans(),
+    st.none(),
+    st.text(),
+    st.complex_numbers(),
+    st.decimals(),
+    st.fractions(),
+    st.just(Hostile()),
+)
+_SMALL = st.one_of(st.integers(0, 2**31 - 1), st.floats(0, 1), st.integers(0, 1))
+_FIELDS = {
+    item.name: st.one_of(_SMALL, _SMALL, _SMALL, NUMBERS)
+    for item in fields(Target)
+    if item.name != 'covariance'
+}
+_COVARIANCES = st.one_of(
+    st.just((0.0,) * 4),
+    st.tuples(_SMALL, st.just(0), st.just(0), _SMALL),
+    st.lists(NUMBERS, max_size=5),
+    st.lists(st.floats(), min_size=4, max_size=4).map(np.array),
+    NUMBERS,
+)
+RESULTS = st.one_of(
+    st.lists(st.builds(Target, **_FIELDS, covariance=_COVARIANCES), max_size=3),
+    st.lists(NUMBERS, max_size=2),
+    NUMBERS,
+)
+"""What detectors may return."""
+
+_STORE = typestore()
+
+
+def check_result(found: object) -> bool:
+    """Check a result of a detector, and return whether it is accepted."""
+    try:
+        targets = checked_targets(found, 'detector')
+    except ValueError as error:
+        assert str(error).startswith('detector') and str(error).isprintable()
+        return False
+    identification = Identification(tuple(targets))
+    content = to_json(identification, 'a', GRAY.shape, 'f', 'd')
+    assert len(json.loads(json.dumps(content, allow_nan=False))['targets']) == len(targets)
+    draw(GRAY, identification)
+    types = message_types(_STORE)
+    header = bags.header(_STORE, 0)
+    message = coded_target_array(identification, 'f', GRAY.shape, header, types)
+    sent = bytes(_STORE.serialize_cdr(message, CODED_TARGETS))
+    received = _STORE.deserialize_cdr(sent, CODED_TARGETS)
+    for one, target in zip(received.targets, targets, strict=True):
+        assert (one.id, one.code, one.x, one.y) == (target.id, target.code, target.x, target.y)
+        assert one.covariance.tolist() == list(target.covariance)
+        for name in ('semi_major', 'semi_minor', 'angle', 'confidence'):
+            (single,) = struct.unpack('f', struct.pack('f', getattr(target, name)))
+            assert getattr(one, name) == single
+    return True
+
+
+def mutated(content: bytes, random: np.random.Generator) -> bytes:
+    """Return content with one to three damages of any kind."""
+    changed = bytearray(content)
+    for _ in range(random.integers(1, 4)):
+        place = int(random.integers(len(changed)))
+        size = int(random.integers(1, 64))
+        kind = random.integers(7)
+        if kind == 0:
+            changed[place] ^= 1 << int(random.integers(8))
+        elif kind == 1:
+            page = place // PAGE * PAGE
+            changed[page : page + PAGE] = bytes(len(changed[page : page + PAGE]))
+        elif kind == 2:
+            del changed[max(place, 1) :]
+        elif kind == 3:
+            del changed[place : place + size]
+        elif kind == 4:
+            changed[place:place] = random.bytes(size)
+        elif kind == 5:
+            changed[place : place + 8] = b'\xff' * len(changed[place : place + 8])
+        else:
+            other = int(random.integers(len(changed)))
+            changed[place : place + size] = changed[other : other + size]
+        changed = changed or bytearray(b'\0')
+    return bytes(changed)
+
+
+def check_bag(source: Path, target: Path, recorded: Counter[str]) -> bool:
+    """Process a bag and return whether it is complete; losses must be named.
+
+    Parameters
+    ----------
+    source, target : Path
+    recorded : Counter
+        Number of messages by topic before the damage.
+    """
+    try:
+        with contextlib.redirect_stderr(io.StringIO()):
+            outcome = answer_bag(BagTask(source, target, identification=SETTINGS), lambda *_: None)
+    except ValueError as error:
+        assert str(error)
+        return False
+    made: Counter[str] = Counter()
+    with Source(target) as bag:
+        made.update(item.topic for item, _, _ in bag.messages())
+        assert not bag.lost
+    assert finished(target) == outcome
+    answers = sum(count for topic, count in made.items() if topic.endswith('/coded_targets'))
+    assert answers + outcome.refused == outcome.images
+    if outcome.lost:
+        return False
+    # Without a loss that is named everything is there; a name may be what was damaged.
+    assert sum(made.values()) - answers == recorded.total(), dict(made)
+    return True
+
+
+def attack_bags(count: int) -> Tally:
+    """Process mutated bags of every kind."""
+    images = [GRAY + number for number in range(COUNT)]
+    recorded = Counter({'/image': COUNT, '/notes': COUNT})
+    random = np.random.default_rng(0)
+    with tempfile.TemporaryDirectory(prefix='ahf_attack_') as name:
+        folder = Path(name)
+        whole: dict[str, tuple[Path, Path, bytes]] = {}
+        for storage in STORAGES:
+            if storage == 'ros1':
+                source = bags.write_ros1(folder / 'in.bag', bags.recorded(bags.ros1(), images))
+                file = source
+            else:
+                source = folder / storage
+                bags.write_ros2(source, bags.recorded(typestore(), images), storage)
+                file = next(it for it in source.iterdir() if it.suffix != '.yaml')
+            whole[storage] = source, file, file.read_bytes()
+
+        def one(number: int) -> bool:
+            source, file, content = whole[STORAGES[number % len(STORAGES)]]
+            file.write_bytes(mutated(content, random))
+            with tempfile.TemporaryDirectory(dir=folder) as made:
+                return check_bag(source, Path(made) / 'out', recorded)
+
+        return _tallied('bags', count, one)
+
+
+def attack_images(count: int) -> Tally:
+    """Decode mutated image files."""
+    random = np.random.default_rng(1)
+    whole = [
+        cv2.imencode(suffix, image)[1].tobytes()
+        for suffix in ('.png', '.jpg', '.tif', '.bmp')
+        for image in (GRAY, np.dstack([GRAY] * 3))
+    ]
+
+    def one(number: int) -> bool:
+        try:
+            image = decode_bytes(mutated(whole[number % len(whole)], random), 'image')
+        except ValueError as error:
+            assert str(error).startswith('image')
+            return False
+        return image.ndim == 2
+
+    return _tallied('image files', count, one)
+
+
+def _tallied(area: str, count: int, one: Callable[[int], bool]) -> Tally:
+    """Try inputs by their numbers and count what becomes of them."""
+    accepted = 0
+    reasons: list[str] = []
+    for number in range(count):
+        try:
+            accepted += one(number)
+        except Exception:
+            reasons.append(f'{number}: {traceback.format_exc()}')
+    return Tally(area, count, accepted, len(reasons), tuple(reasons[:5]))
+
+
+def _fuzzed(area: str, count: int, check: Callable, strategy: st.SearchStrategy) -> Tally:
+    """Try what hypothesis draws; it ends with the first failure."""
+    try:
+        counted = fuzz.run(check, strategy, count)
+    except Exception:
+        return Tally(area, count, 0, 1, (traceback.format_exc(),))
+    return Tally(area, counted.total(), counted[True], 0)
+
+
+def run_tests(name: str) -> Tally:
+    """Run the tests of a file that concern hostile input, kills and signals."""
+    command = [sys.executable, '-m', 'pytest', '-q', '-p', 'no:cacheprovider', name]
+    done = subprocess.run(command, capture_output=True, text=True)
+    counts = {
+        word: int(it) for it, word in re.findall(r'(\d+) (passed|failed|error)', done.stdout)
+    }
+    failed = counts.get('failed', 0) + counts.get('error', 0)
+    tried = counts.get('passed', 0) + failed
+    reasons = (done.stdout[-3000:],) if done.returncode else ()
+    return Tally(name, tried, counts.get('passed', 0), failed or int(done.returncode > 0), reasons)
+
+
+def tallies(options: argparse.Namespace) -> Iterator[Tally]:
+    """Yield what became of each area."""
+    if options.bags:
+        yield attack_bags(options.bags)
+    if options.results:
+        yield _fuzzed('results of detectors', options.results, check_result, RESULTS)
+    if options.messages:
+        yield _fuzzed('Image messages', options.messages, fuzz.check, fuzz.images())
+        compressed = fuzz.compressed_images()
+        yield _fuzzed('compressed images', options.messages, fuzz.check_compressed, compressed)
+    if options.images:
+        yield attack_images(options.images)
+    for name in TESTS if options.tests else ():
+        yield run_tests(name)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Attack, print a table, and return 1 if anything failed."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    for name in ('bags', 'results', 'messages', 'images'):
+        parser.add_argument(f'--{name}', type=int, default=10_000, help='inputs; 0: none')
+    parser.add_argument('--tests', action='store_true', help='run the tests of endings, too')
+    options = parser.parse_args(arguments)
+    print('| area | tried | accepted | failed |\n|---|---|---|---|')
+    failed = 0
+    for tally in tallies(options):
+        print(f'| {tally.area} | {tally.tried} | {tally.accepted} | {tally.failed} |', flush=True)
+        failed += tally.failed
+        for reason in tally.reasons:
+            print(reason, file=sys.stderr)
+    return int(failed > 0)
+
+
+if __name__ == '__main__':
+    sys.exit(main())
