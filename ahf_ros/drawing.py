@@ -236,6 +236,8 @@ def _draw_cross(canvas: np.ndarray, target: Target, colour: Colour, unit: int) -
 def _draw_label(canvas: np.ndarray, target: Target, colour: Colour, unit: int) -> None:
     """Write the ID above to the right of the dot, or below to the left where the image ends."""
     scale = max(0.75 * unit, 0.6 * target.semi_major / _FONT_HEIGHT)
+    # OpenCV 5 crashes on letters that are much larger than an image can show.
+    scale = min(scale, max(canvas.shape[0] / _FONT_HEIGHT, 0.75 * unit))
     text = str(target.id)
     (width, height), _ = cv2.getTextSize(text, _FONT, scale, 2 * unit)
     offset = 0.8 * target.semi_major + 2 * unit

@@ -19,10 +19,10 @@ from ahf_ros.text import shown
 MAXIMUM_LENGTH = 100_000
 """Maximum number of targets in a result."""
 
-MAXIMUM_PIXELS = 1e6
-"""Maximum size of a coordinate or a semi-axis, px; no image has so large a side."""
+MAXIMUM_LENGTH_PX = 65536.0
+"""Maximum size of a coordinate or a semi-axis, px: twice the side of the largest image."""
 
-MAXIMUM_VARIANCE = MAXIMUM_PIXELS**2
+MAXIMUM_VARIANCE = MAXIMUM_LENGTH_PX**2
 """Maximum size of an element of a covariance, px^2."""
 
 ASYMMETRY = 1e-5
@@ -162,8 +162,8 @@ def _numbers(minimum: float, maximum: float) -> Callable[[Any, str], float]:
     return lambda value, name: checked_number(value, name, minimum, maximum)
 
 
-_PLACE = _numbers(-MAXIMUM_PIXELS, MAXIMUM_PIXELS)
-_AXIS = _numbers(0, MAXIMUM_PIXELS)
+_PLACE = _numbers(-MAXIMUM_LENGTH_PX, MAXIMUM_LENGTH_PX)
+_AXIS = _numbers(0, MAXIMUM_LENGTH_PX)
 _CHECKS: dict[str, Callable[[Any, str], Any]] = {
     'id': _integers(-1, 2**31 - 1),
     'code': _integers(0, 2**32 - 1),

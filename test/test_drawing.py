@@ -105,3 +105,11 @@ def test_the_summary_says_how_many_and_through_what():
     assert told == '1 identified of 54, gamma_high 1.2, gamma_low 0.25'
     estimated = Identification((target(7),), 54, estimated=True)
     assert summary(estimated) == '1 identified of an estimated 54, no filter'
+
+
+def test_no_size_of_a_target_crashes() -> None:
+    for size in (1e-9, 1e3, 65536.0):
+        for place in (-65536.0, 0.0, 30.0, 65536.0):
+            target = Target(7, 7, place, place, size, size, 0.3)
+            drawn = draw(np.full((60, 80), 128, np.uint8), Identification((target,)))
+            assert drawn.shape == (60, 80, 3)
