@@ -3,8 +3,9 @@
     python -m benchmarks.sensitivity [MODULE.NAME ...] [--count 10]
 
 Without names, all named numbers of `ring` and `features` that are not integers are screened on
-small scenes, and those whose change costs most are then measured on more and larger scenes. All
-scenes have development seeds and little ambient light, where the detector reaches its limits.
+small scenes. Those whose change costs most are then measured on more and larger scenes, and the
+first of these are printed. All scenes have development seeds and little ambient light, where the
+detector reaches its limits.
 """
 
 from __future__ import annotations
@@ -151,6 +152,11 @@ def measured(
     return outcome(folder), tried
 
 
+def ranked(tried: dict[str, list[Outcome]]) -> list[str]:
+    """Return the names of constants, those whose change costs most first."""
+    return sorted(tried, key=lambda name: -max(one.loss() for one in tried[name]))
+
+
 def table(names: dict[str, float], default: Outcome, tried: dict[str, list[Outcome]]) -> str:
     """Return outcomes as Markdown."""
     lines = ['| constant | value | halved | doubled |', '|---|---|---|---|']
@@ -177,14 +183,13 @@ def main() -> None:
             small = written(SMALL, Path(folder, 'small'))
             default, tried = measured(small, values, f'{len(values)} constants')
             print(table(values, default, tried), end='\n\n', file=sys.stderr)
-            costs = {name: max(one.loss() for one in of) for name, of in tried.items()}
-            most = sorted(costs, key=lambda name: -costs[name])[: options.count]
-            names = {name: values[name] for name in most}
+            names = {name: values[name] for name in ranked(tried)[: 3 * options.count // 2]}
         large = written(LARGE, Path(folder, 'large'))
         default, tried = measured(large, names, 'the table')
         total = sum(settings.targets for settings in LARGE)
         print(f'Targets with the right ID, of {total}, and the RMSE of their centres in px.\n')
-        print(table(names, default, tried))
+        shown = ranked(tried)[: options.count]
+        print(table(names, default, {name: tried[name] for name in shown}))
 
 
 if __name__ == '__main__':

@@ -9,7 +9,16 @@ from pathlib import Path
 import pytest
 
 from ahf_ros.synthetic.scene import SceneSettings
-from benchmarks.sensitivity import Outcome, changed, constants, main, outcome, table, written
+from benchmarks.sensitivity import (
+    Outcome,
+    changed,
+    constants,
+    main,
+    outcome,
+    ranked,
+    table,
+    written,
+)
 
 CERTAIN = 'ahf_ros.detectors.ring.hypotheses._CERTAIN'
 SCALE = 'ahf_ros.features.profiles.USUAL_BLUR'  # circle_fit imports it
@@ -51,6 +60,16 @@ def test_what_cannot_be_changed_is_no_outcome(folder: Path, name: str) -> None:
 def test_constants_up_to_one_approach_it() -> None:
     assert [changed(CERTAIN, 0.98, factor) for factor in (0.5, 2.0)] == pytest.approx([0.99, 0.96])
     assert changed('ahf_ros.features.dots._SAME', 0.3, 0.5) == 0.15
+
+
+def test_what_costs_most_comes_first() -> None:
+    tried = {
+        'harmless': [Outcome(9, 0, 0), Outcome(10, 0, 0)],
+        'wrong': [Outcome(8, 1, 0), Outcome(9, 0, 0)],
+        'missed': [Outcome(9, 0, 0), Outcome(7, 0, 0)],
+        'fails': [Outcome(), Outcome()],
+    }
+    assert ranked(tried) == ['wrong', 'missed', 'harmless', 'fails']
 
 
 def test_the_table_shows_what_changed() -> None:
