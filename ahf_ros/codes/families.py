@@ -9,6 +9,7 @@ KINDS: dict[str, tuple[str, ...]] = {
     'aruco': square.ARUCO_NAMES,
     'apriltag': square.APRILTAG_NAMES,
     'gsi': ('gsi',),
+    'dots': ('dots',),
 }
 """The families of each kind."""
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from ahf_ros.codes.families import FAMILY_NAMES, KINDS
 from ahf_ros.detectors.contract import Detector, DetectorSettings, Drafter, Refiner
+from ahf_ros.detectors.dots.detector import DotsDetector
 from ahf_ros.detectors.external.command import CommandDetector
 from ahf_ros.detectors.external.guarded import guarded
 from ahf_ros.detectors.gsi.detector import GsiDetector
@@ -64,6 +65,7 @@ _ENTRIES = {
     'aruco': _Entry(SquareDetector, KINDS['aruco']),
     'apriltag': _Entry(SquareDetector, KINDS['apriltag']),
     'gsi': _Entry(GsiDetector, KINDS['gsi']),
+    'dots': _Entry(DotsDetector, KINDS['dots']),
     'command': _Entry(CommandDetector, FAMILY_NAMES),
 }
 

@@ -16,8 +16,15 @@ from ahf_ros.features import frame
 from ahf_ros.features.candidates import find_candidates
 from ahf_ros.features.dots import Dots, distinct
 from ahf_ros.features.ellipses import fit_ellipses
+from ahf_ros.features.log_edges import LOG_SCALE
 from ahf_ros.features.outlines import whole_outlines
 from ahf_ros.features.pyramid import ImagePyramid
+from ahf_ros.features.small_dots import small_dots
+
+_SMALL = 12.0  # radius up to which dots are looked for as blobs, px
+_SMALLER = 0.8  # of the smallest radius, of a blob whose edge is blurred
+_MARGIN = 0.4  # width of the margin round a dot whose outline is whole, dot radii
+_OUTLINE = 2 * np.pi * np.arange(32) / 32  # angles of the polygon that hides it
 
 
 def whole_dots(
@@ -76,3 +83,32 @@ def voted_dots(
     dots = [fit_ellipses(pyramid.logs, of_range) for of_range in candidates]
     nothing = Dots(np.zeros((0, 3, 3)), np.zeros(0, int), np.zeros(0))
     return distinct(Dots.joined([nothing, *dots]))
+
+
+def all_dots(
+    pyramid: ImagePyramid, min_radius: float, max_radius: float, polarities: Sequence[int]
+) -> Dots:
+    """Return the dots of an image by all ways of finding them, of any size and view.
+
+    Parameters
+    ----------
+    pyramid : ImagePyramid
+    min_radius, max_radius : float
+        Bounds of the semi-major axis, px.
+    polarities : sequence of int
+        1 to find dark dots, -1 to find bright ones.
+
+    Returns
+    -------
+    Dots
+        No two of them the same.
+    """
+    whole = whole_dots(pyramid, min_radius, max_radius, polarities)
+    points = frame.circle_points(_OUTLINE, np.array([1 + _MARGIN]))
+    outlines = frame.project(whole.frames, points)[:, :, 0]
+    voted = voted_dots(pyramid, min_radius, max_radius, polarities, explained=outlines)
+    found = [whole, voted]
+    if min_radius < _SMALL:
+        low, high = _SMALLER * min_radius, min(max_radius, _SMALL)
+        found.append(small_dots(pyramid.logs[0], low, high, polarities, LOG_SCALE))
+    return distinct(Dots.joined(found))

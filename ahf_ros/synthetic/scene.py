@@ -46,7 +46,7 @@ class SceneSettings:
     width: int = parameter(3984, 'Width of the image, px.', minimum=16, maximum=20000)
     height: int = parameter(2656, 'Height of the image, px.', minimum=16, maximum=20000)
     targets: int = parameter(54, 'Number of coded targets in the image.', minimum=0)
-    family: str = parameter('metashape12', 'Family of the codes.', choices=(*FAMILY_NAMES, 'dots'))
+    family: str = parameter('metashape12', 'Family of the codes.', choices=FAMILY_NAMES)
     family_file: str = parameter(
         '', 'Data file that describes the family gsi or dots; empty: the usual design.'
     )

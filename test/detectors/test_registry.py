@@ -40,7 +40,7 @@ SQUARES = {'aruco': 'aruco_4x4_50', 'apriltag': 'apriltag_36h11'}
     ],
 )
 def test_every_detector_is_called_as_it_is_registered(name):
-    family = {**SQUARES, 'gsi': 'gsi'}.get(name, 'metashape12')
+    family = {**SQUARES, 'gsi': 'gsi', 'dots': 'dots'}.get(name, 'metashape12')
     made = create_detector(name, family=family, command='program')
     assert made.name == name
     assert made.family == family
@@ -49,7 +49,7 @@ def test_every_detector_is_called_as_it_is_registered(name):
 def test_every_family_chooses_a_detector():
     for family in FAMILY_NAMES:
         kind = family.partition('_')[0]
-        name = kind if kind in ('aruco', 'apriltag', 'gsi') else 'ring'
+        name = kind if kind in ('aruco', 'apriltag', 'gsi', 'dots') else 'ring'
         assert detector_name('auto', family) == name
 
 

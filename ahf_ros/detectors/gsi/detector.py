@@ -24,19 +24,14 @@ from ahf_ros.detectors.gsi.hypotheses import Hypotheses, judge, plausible, resol
 from ahf_ros.detectors.gsi.reading import read_codes
 from ahf_ros.detectors.gsi.refinement import dot_frames, measure_dots, place_targets
 from ahf_ros.features import frame
-from ahf_ros.features.dot_search import voted_dots, whole_dots
-from ahf_ros.features.dots import Dots, distinct
+from ahf_ros.features.dot_search import all_dots
+from ahf_ros.features.dots import Dots
 from ahf_ros.features.ellipse_targets import ellipse_fields, targets_from_frames
 from ahf_ros.features.homography import local_frames
-from ahf_ros.features.log_edges import LOG_SCALE
 from ahf_ros.features.pyramid import ImagePyramid, image_pyramid
-from ahf_ros.features.small_dots import small_dots
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, DottedTarget, Target, sorted_targets
 
-_SMALL = 12.0  # largest radius of dots that are looked for as blobs, px
-_MARGIN = 0.4  # width of the margin round a dot whose outline is whole, dot radii
-_OUTLINE = 2 * np.pi * np.arange(32) / 32  # angles of the polygon that hides it
 _FARTHEST = 1.0  # that the reference point is moved by a refinement, px, or dot radii
 
 
@@ -71,7 +66,8 @@ class GsiDetector:
         check_image(image)
         settings, code = self.settings, point_family(self.settings.family_file)
         pyramid = image_pyramid(as_gray(image), settings.max_radius)
-        dots = find_dots(pyramid, settings)
+        radii = settings.min_radius, settings.max_radius
+        dots = all_dots(pyramid, *radii, settings.polarities)
         hypotheses = find_hypotheses(pyramid, dots, code)
         targets = report(hypotheses, code)
         if settings.report_undecoded:
@@ -109,27 +105,6 @@ class GsiDetector:
             if good
         }
         return [better.get(it, it) for it in targets]
-
-
-def find_dots(pyramid: ImagePyramid, settings: DetectorSettings) -> Dots:
-    """Return the dots of an image, no two of them the same.
-
-    Parameters
-    ----------
-    pyramid : ImagePyramid
-    settings : DetectorSettings
-    """
-    low, high, polarities = settings.min_radius, settings.max_radius, settings.polarities
-    whole = whole_dots(pyramid, low, high, polarities)
-    outlines = frame.project(whole.frames, frame.circle_points(_OUTLINE, np.array([1 + _MARGIN])))[
-        :, :, 0
-    ]
-    voted = voted_dots(pyramid, low, high, polarities, explained=outlines)
-    found = [whole, voted]
-    if low < _SMALL:
-        largest = min(high, _SMALL)
-        found.append(small_dots(pyramid.logs[0], low * 0.8, largest, polarities, LOG_SCALE))
-    return distinct(Dots.joined(found))
 
 
 def find_hypotheses(pyramid: ImagePyramid, dots: Dots, code: PointFamily) -> Hypotheses:

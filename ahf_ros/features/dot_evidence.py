@@ -1,0 +1,92 @@
+"""Evidence for and against dots at given places, from the steps of ln I round them.
+
+Where there is a dot, the logarithm of the image has the same step along all rays, wherever the
+light falls. Where there is none, it has no step, or that of an edge of light, which crosses the
+circle on two sides and in opposite directions.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ahf_ros.features.frame import circle_points, ellipse_axes, project
+from ahf_ros.features.log_edges import LOG_SCALE
+from ahf_ros.features.sampling import sample, within
+
+_RAYS = 16
+_ANGLES = 2 * np.pi * np.arange(_RAYS) / _RAYS
+_ASIDE = (0.3, 0.7)  # bounds of the distance of samples from the circle, dot radii
+_PIXELS_ASIDE = 1.0  # that distance where it lies between them, px of the minor axis
+_DOT_SPREAD = (0.3, 0.6)  # standard deviation of steps below and above the usual one, in it
+_EMPTY_SPREAD = 0.22  # the same of steps where there is no dot
+_FLOOR = 0.12  # share of rays that edges of light disturb
+_RANGE = 3.0  # of such steps
+_CORRELATION = 2.5  # distance on the circle from where on rays tell something new, px
+_PART = 400_000  # samples at a time, which bounds the memory
+
+
+def circle_steps(log: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the steps of ln I from the inside of circles to their outside, along rays.
+
+    Parameters
+    ----------
+    log : ndarray of int16, shape (height, width)
+        LOG_SCALE ln(I + 8).
+    frames : ndarray of float64, shape (n, 3, 3)
+        Of the circles.
+
+    Returns
+    -------
+    steps : ndarray of float64, shape (n, m)
+        Positive where the outside is brighter.
+    inside : ndarray of bool, shape (n,)
+        Whether all of the circle lies in the image.
+    """
+    count = max(_PART // (2 * _RAYS), 1)
+    parts = [
+        _steps(log, frames[start : start + count])
+        for start in range(0, max(len(frames), 1), count)
+    ]
+    steps, inside = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return steps, inside
+
+
+def _steps(log: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    aside = np.clip(_PIXELS_ASIDE / ellipse_axes(frames)[1], *_ASIDE)
+    radii = np.stack([1 - aside, 1 + aside], axis=1)
+    pixels = project(frames, circle_points(_ANGLES, radii))
+    values = sample(log, pixels).astype(np.float64) / LOG_SCALE
+    inside = np.asarray(within(pixels, log.shape).all(axis=(1, 2)))
+    return values[..., 1] - values[..., 0], inside
+
+
+def dot_evidence(steps: np.ndarray, frames: np.ndarray) -> np.ndarray:
+    """Return ln of the likelihood of a dot over that of none.
+
+    Parameters
+    ----------
+    steps : ndarray of float64, shape (..., m)
+        From the dot to its ground, in the usual step of such dots.
+    frames : ndarray of float64, shape (..., 3, 3)
+        Of the dots; rays round a small dot tell less than so many independent ones.
+
+    Returns
+    -------
+    ndarray of float64, shape (...)
+    """
+    length = 2 * np.pi * np.sqrt(np.abs(np.linalg.det(frames[..., :2, :2])))
+    share = np.clip(length / _CORRELATION, 4, _RAYS) / _RAYS
+    evidence: np.ndarray = share * _log_ratio(steps).sum(axis=-1)
+    return evidence
+
+
+def _log_ratio(steps: np.ndarray) -> np.ndarray:
+    """Return ln of the likelihood of steps at a dot over that where there is none."""
+    below, above = _DOT_SPREAD
+    spread = np.where(steps < 1, below, above)
+    height = 2 / (np.sqrt(2 * np.pi) * (below + above))
+    dot = height * np.exp(-0.5 * ((steps - 1) / spread) ** 2)
+    none = np.exp(-0.5 * (steps / _EMPTY_SPREAD) ** 2) / (np.sqrt(2 * np.pi) * _EMPTY_SPREAD)
+    floor = _FLOOR / _RANGE
+    ratio: np.ndarray = np.log(((1 - _FLOOR) * dot + floor) / ((1 - _FLOOR) * none + floor))
+    return ratio

@@ -1,0 +1,113 @@
+"""Rings of dots are identified, and nothing else is."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ahf_ros.codes.dots import DOTS_DESIGN, dot_family
+from ahf_ros.detectors import create_detector
+from ahf_ros.evaluation import score
+from ahf_ros.filtering.homomorphic import HomomorphicFilter
+from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
+from ahf_ros.target import UNDECODED
+
+SIZE = {'family': 'dots', 'width': 800, 'height': 600, 'targets': 6, 'dot_radius': 10.0}
+
+
+@cache
+def rendering(**changes: object) -> Rendering:
+    return render(SceneSettings(**{**SIZE, 'seed': 4, **changes}))
+
+
+def errors(shown: Rendering, targets: list) -> np.ndarray:
+    true = {target.id: target for target in shown.targets}
+    return np.array([(it.x - true[it.id].x, it.y - true[it.id].y) for it in targets])
+
+
+@pytest.mark.parametrize(
+    ('changes', 'bound'),
+    [
+        ({}, 0.02),
+        ({'polarity': 'bright'}, 0.02),
+        ({'dot_radius': 5.0}, 0.05),
+        ({'dot_radius': 20.0, 'targets': 4}, 0.02),
+        ({'tilt': 40.0}, 0.02),
+        ({'light': 'stripe', 'dot_radius': 14.0}, 0.05),
+        ({'light': 'stripe', 'ambient': 0.12, 'dot_radius': 14.0}, 0.05),
+        ({'light': 'lattice', 'ambient': 0.12, 'dot_radius': 14.0}, 0.1),
+    ],
+)
+def test_targets_are_identified_and_placed(changes: dict, bound: float) -> None:
+    shown = rendering(**changes)
+    found = create_detector(family='dots', min_radius=3.0)(shown.image)
+    figures = score(shown.truth, found)
+    assert figures.right == len(shown.targets)
+    assert figures.wrong == figures.false_positives == 0
+    assert np.sqrt((errors(shown, found) ** 2).mean()) < bound
+    codes = {target.id: target.code for target in shown.targets}
+    assert all(target.code == codes[target.id] for target in found)
+    assert all(0.99 <= target.confidence <= 1 for target in found)
+
+
+def test_a_target_and_its_mirror_image_are_one_code() -> None:
+    shown = rendering()
+    found = create_detector(family='dots')(np.ascontiguousarray(shown.image[:, ::-1]))
+    assert [target.id for target in found] == [target.id for target in shown.targets]
+
+
+def test_marks_that_are_no_targets_are_not_reported() -> None:
+    for light in ('normal', 'stripe'):
+        shown = rendering(targets=0, distractors=25, light=light)
+        assert create_detector(family='dots')(shown.image) == []
+
+
+def test_rings_without_a_code_are_reported_on_request() -> None:
+    shown = rendering(targets=1)
+    (target,) = shown.targets
+    family = dot_family()
+    image = shown.image.astype(float)
+    y, x = np.mgrid[: image.shape[0], : image.shape[1]]
+    distance = np.hypot(x - target.x, y - target.y) / target.semi_major
+    ring = np.abs(distance - family.dot_circle) < 1.6 * family.dot_radius
+    image[ring] = np.percentile(image[ring], 95)
+    blank = image.astype(np.uint8)
+    assert create_detector(family='dots')(blank) == []
+    (found,) = create_detector(family='dots', report_undecoded=True)(blank)
+    assert (found.id, found.code, found.confidence) == (UNDECODED, 0, 0.0)
+    assert (found.x, found.y) == pytest.approx((target.x, target.y), abs=0.05)
+
+
+def test_places_come_from_the_image_as_received() -> None:
+    shown = rendering(light='stripe', dot_radius=14.0)
+    detector = create_detector(family='dots')
+    found = detector(HomomorphicFilter(shown.image).filtered(1.2, 0.4))
+    assert len(found) >= 4
+    refined = detector.refine(shown.image, found)
+    assert [target.id for target in refined] == [target.id for target in found]
+    assert np.hypot(*errors(shown, refined).T).max() < 0.1
+    assert detector.refine(shown.image, []) == []
+
+
+def test_a_design_of_ones_own_is_printed_and_identified(tmp_path: Path) -> None:
+    path = tmp_path / 'eight.json'
+    path.write_text(
+        DOTS_DESIGN.read_text()
+        .replace('"bits": 10', '"bits": 8')
+        .replace('"border_radius": 3.2', '"border_radius": 3.4')
+    )
+    scene = SceneSettings(**SIZE, family_file=str(path), seed=5)
+    shown = render(scene)
+    found = create_detector(family='dots', family_file=str(path))(shown.image)
+    figures = score(shown.truth, found)
+    assert (figures.right, figures.wrong, figures.false_positives) == (6, 0, 0)
+
+
+def test_a_bad_design_is_refused_when_the_detector_is_made(tmp_path: Path) -> None:
+    path = tmp_path / 'bad.json'
+    path.write_text(DOTS_DESIGN.read_text().replace('"bits": 10', '"bits": 2'))
+    with pytest.raises(ValueError, match=r'bad\.json, line 4: bits is 2'):
+        create_detector(family='dots', family_file=str(path))
