@@ -79,7 +79,10 @@ def _blobs(height: np.ndarray, min_radius: float, max_radius: float, polarity: i
     share = _LEVELS[polarity]
     level = cv2.convertScaleAbs(np.maximum(highest, np.uint8(least)), alpha=share)
     mask = cv2.compare(height, level, cv2.CMP_GT)
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=4)
+    # The default algorithm of OpenCV 4.5 crashes on large images with this connectivity.
+    count, labels, stats, _ = cv2.connectedComponentsWithStatsWithAlgorithm(
+        mask, 4, cv2.CV_32S, cv2.CCL_SAUF
+    )
     longest = stats[:, cv2.CC_STAT_WIDTH : cv2.CC_STAT_HEIGHT + 1].max(axis=1)
     area = stats[:, cv2.CC_STAT_AREA]
     usable = (area >= _MINIMUM_PIXELS) & (longest <= 2 * max_radius + 3)
