@@ -7,8 +7,9 @@ import signal
 import subprocess
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from ahf_ros.detectors.contract import Unavailable
 from ahf_ros.text import LONGEST, printable
@@ -18,7 +19,7 @@ LARGEST_OUTPUT = 64 * 2**20
 
 _POLL = 0.02  # s, between two looks at a program that runs
 _running: set[subprocess.Popen[Any]] = set()
-_lock = threading.Lock()
+_lock = threading.RLock()  # a signal handler may interrupt its own thread
 _ending = threading.Event()
 
 
@@ -47,14 +48,12 @@ def output_of(words: list[str], folder: Path, timeout: float, name: str) -> str:
     output, errors = folder / 'output', folder / 'errors'
     with output.open('wb') as out, errors.open('wb') as err:
         try:
-            process = subprocess.Popen(
-                words, stdin=subprocess.DEVNULL, stdout=out, stderr=err, start_new_session=True
-            )
+            # A signal interrupts the main thread only: what another one starts is always known.
+            with ThreadPoolExecutor(1) as starter:
+                process = starter.submit(_started, words, out, err).result()
         except (OSError, ValueError) as error:  # ValueError: a zero byte in a word
             reason = error.strerror if isinstance(error, OSError) else error
             raise Unavailable(f'{name} cannot be started: {reason}') from error
-        with _lock:
-            _running.add(process)
         try:
             status = _awaited(process, (output, errors), timeout, name)
         finally:
@@ -75,6 +74,18 @@ def end_programs() -> None:
         running = list(_running)
     for process in running:
         _kill(process)
+
+
+def _started(words: list[str], out: IO[bytes], err: IO[bytes]) -> subprocess.Popen[Any]:
+    """Start a program that `end_programs` ends, whenever it is called."""
+    with _lock:
+        process = subprocess.Popen(
+            words, stdin=subprocess.DEVNULL, stdout=out, stderr=err, start_new_session=True
+        )
+        _running.add(process)
+    if _ending.is_set():
+        _kill(process)
+    return process
 
 
 def _awaited(
