@@ -24,7 +24,6 @@ from ahf_ros.features.small_dots import small_dots
 _SMALL = 12.0  # radius up to which dots are looked for as blobs, px
 _SMALLER = 0.8  # of the smallest radius, of a blob whose edge is blurred
 _MARGIN = 0.4  # width of the margin round a dot whose outline is whole, dot radii
-_OUTLINE = 2 * np.pi * np.arange(32) / 32  # angles of the polygon that hides it
 
 
 def whole_dots(
@@ -104,8 +103,7 @@ def all_dots(
         No two of them the same.
     """
     whole = whole_dots(pyramid, min_radius, max_radius, polarities)
-    points = frame.circle_points(_OUTLINE, np.array([1 + _MARGIN]))
-    outlines = frame.project(whole.frames, points)[:, :, 0]
+    outlines = frame.circle_outlines(whole.frames, np.full(len(whole.frames), 1 + _MARGIN))
     voted = voted_dots(pyramid, min_radius, max_radius, polarities, explained=outlines)
     found = [whole, voted]
     if min_radius < _SMALL:
