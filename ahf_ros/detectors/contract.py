@@ -12,6 +12,9 @@ from ahf_ros.codes.families import FAMILY_NAMES
 from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.target import Target
 
+_MINIMUM_RADIUS = 4.0  # of a dot, px, where the user sets none
+_MINIMUM_RADII = {'dots': 2.5}  # of families whose dot is small beside the target
+
 POLARITIES = ('auto', 'dark', 'bright')
 """Colour of the dot against its surroundings; 'auto' accepts both in one image."""
 
@@ -113,7 +116,8 @@ class DetectorSettings:
     polarity : str
         One of `POLARITIES`.
     min_radius, max_radius : float
-        Bounds of the semi-major axis of the dot, px.
+        Bounds of the semi-major axis of the dot, px; `radii` has them with the minimum of the
+        family in the place of 0.
     report_undecoded : bool
         Whether targets whose code word is not certain are reported, with the ID `UNDECODED`.
     command : str
@@ -138,7 +142,13 @@ class DetectorSettings:
     polarity: str = parameter(
         'auto', 'Colour of the dot: dark on bright, bright on dark, or either.', choices=POLARITIES
     )
-    min_radius: float = parameter(4.0, 'Minimum radius of a dot, px.', minimum=1.0, maximum=1e4)
+    min_radius: float = parameter(
+        0.0,
+        'Minimum radius of a dot, px; 0: that of the family, 2.5 for rings of dots and 4 for '
+        'others.',
+        minimum=0.0,
+        maximum=1e4,
+    )
     max_radius: float = parameter(60.0, 'Maximum radius of a dot, px.', minimum=1.0, maximum=1e4)
     report_undecoded: bool = parameter(
         False, 'Whether to report targets whose code word is not certain, with the ID -1.'
@@ -159,11 +169,17 @@ class DetectorSettings:
     def __post_init__(self) -> None:
         """Refuse values that are not accepted."""
         check_parameters(self)
-        if self.min_radius > self.max_radius:
+        minimum, maximum = self.radii
+        if minimum > maximum:
             raise ValueError(
-                f'min_radius is {self.min_radius!r}, accepted is a number of at most max_radius, '
-                f'{self.max_radius!r}'
+                f'min_radius is {minimum!r}, accepted is a number of at most max_radius, '
+                f'{maximum!r}'
             )
+
+    @property
+    def radii(self) -> tuple[float, float]:
+        """Bounds of the semi-major axis of the dot, px, where the family has its own minimum."""
+        return self.min_radius or _MINIMUM_RADII.get(self.family, _MINIMUM_RADIUS), self.max_radius
 
     @property
     def polarities(self) -> tuple[int, ...]:

@@ -24,7 +24,7 @@ class MyDetector:
         _, _, sizes, centres = cv2.connectedComponentsWithStats(dark)
         radii = np.sqrt(sizes[1:, cv2.CC_STAT_AREA] / np.pi)
         found = sorted(zip(centres[1:].tolist(), radii.tolist(), strict=True))
-        large = [item for item in found if item[1] >= self.settings.min_radius]
+        large = [item for item in found if item[1] >= self.settings.radii[0]]
         return [
             Target(number, number, x, y, radius, radius)
             for number, ((x, y), radius) in enumerate(large, start=1)

@@ -119,7 +119,7 @@ def find_discs(pyramid: ImagePyramid, settings: DetectorSettings, code: DotFamil
     settings : DetectorSettings
     code : DotFamily
     """
-    low, high = settings.min_radius, settings.max_radius
+    low, high = settings.radii
     found = [all_dots(pyramid, low, high, settings.polarities)]
     rings = whole_dots(pyramid, low * code.ground_radius, high * code.border_radius, (1, -1))
     for radius, side in ((code.border_radius, 1), (code.ground_radius, -1)):
@@ -145,7 +145,8 @@ def _targets(
     numbers = [code.number(int(word)) for word in codes]
     ids = np.array([UNDECODED if number is None else number for number in numbers], int)
     major = ellipse_axes(fit.frames)[0]
-    shown = readings.inside & (major >= settings.min_radius) & (major <= settings.max_radius)
+    minimum, maximum = settings.radii
+    shown = readings.inside & (major >= minimum) & (major <= maximum)
     certain = (confidence >= CERTAIN) & (ids != UNDECODED)
     shown &= certain | (fit.share >= _WHOLE)
     ids = np.where(certain, ids, UNDECODED)

@@ -66,8 +66,7 @@ class GsiDetector:
         check_image(image)
         settings, code = self.settings, point_family(self.settings.family_file)
         pyramid = image_pyramid(as_gray(image), settings.max_radius)
-        radii = settings.min_radius, settings.max_radius
-        dots = all_dots(pyramid, *radii, settings.polarities)
+        dots = all_dots(pyramid, *settings.radii, settings.polarities)
         hypotheses = find_hypotheses(pyramid, dots, code)
         targets = report(hypotheses, code)
         if settings.report_undecoded:
@@ -180,7 +179,8 @@ def uncoded(
     measured = measure_dots(gray, dots.frames, dots.polarity)
     frames, found = measured.frames, measured.near.copy()
     major = frame.ellipse_axes(frames)[0]
-    found &= (major >= settings.min_radius) & (major <= settings.max_radius)
+    minimum, maximum = settings.radii
+    found &= (major >= minimum) & (major <= maximum)
     for target in targets:
         for x, y, radius, *_ in getattr(target, 'dots', ()):
             found &= np.hypot(frames[:, 0, 2] - x, frames[:, 1, 2] - y) > radius

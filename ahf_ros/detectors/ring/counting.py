@@ -66,7 +66,8 @@ def estimate_count(image: np.ndarray, settings: DetectorSettings | None = None) 
     gray = as_gray(image)
     dots = find_hypotheses(gray, settings)
     major, _, _ = frame.ellipse_axes(dots.frames)
-    dots = dots.select((major >= settings.min_radius) & (major <= settings.max_radius))
+    minimum, maximum = settings.radii
+    dots = dots.select((major >= minimum) & (major <= maximum))
     features = target_features(gray.astype(np.float32, copy=False), dots, code)
     probability = target_probability(features)
     # The regression has not seen every kind of dot; a word has at least two marked sectors.

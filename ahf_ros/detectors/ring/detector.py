@@ -77,7 +77,7 @@ def find_hypotheses(gray: np.ndarray, settings: DetectorSettings) -> Hypotheses:
         What the targets look like.
     """
     code = family(settings.family)
-    kind = (settings.min_radius, settings.max_radius, settings.polarities)
+    kind = (*settings.radii, settings.polarities)
     pyramid = image_pyramid(gray, settings.max_radius)
     dots = whole_dots(pyramid, *kind)
     whole = read_dots(pyramid.gray, dots, code)
@@ -125,7 +125,8 @@ def report(hypotheses: Hypotheses, settings: DetectorSettings) -> list[Target]:
     code = family(settings.family)
     major, _, _ = frame.ellipse_axes(hypotheses.frames)
     whole = settings.report_undecoded & (hypotheses.share >= _WHOLE)
-    of_size = (major >= settings.min_radius) & (major <= settings.max_radius)
+    minimum, maximum = settings.radii
+    of_size = (major >= minimum) & (major <= maximum)
     hypotheses = hypotheses.select(of_size & (hypotheses.certain | whole))
     hypotheses = hypotheses.select(np.lexsort((-hypotheses.margin, ~hypotheses.certain)))
     codes, ids = canonical(hypotheses.words, code)

@@ -83,7 +83,7 @@ class TraditionalDetector:
         settings, targets = self.settings, []
         gray = as_gray(image).astype(np.float32, copy=False)
         for polarity, mask in masks(stretched_to_8_bit(image), settings.polarities):
-            frames = blob_frames(mask, settings.min_radius, settings.max_radius)
+            frames = blob_frames(mask, *settings.radii)
             for start in range(0, len(frames), _PART):
                 part = frames[start : start + _PART]
                 targets += _identify_dots(gray, part, polarity, settings, fine)
@@ -122,7 +122,8 @@ def _identify_dots(
         fit = _fit_decoded(gray, fit, readings, np.flatnonzero(ids != UNDECODED), code)
         frames, covariance = fit.frames, fit.covariance
     major, _, _ = ellipse_axes(frames)
-    shown = (settings.min_radius <= major) & (major <= settings.max_radius) & readings.surrounded
+    minimum, maximum = settings.radii
+    shown = (minimum <= major) & (major <= maximum) & readings.surrounded
     confidence = np.where(ids == UNDECODED, 0.0, readings.certainty)
     codes = code.words[np.maximum(ids, 1) - 1]
     return targets_from_frames(
