@@ -1,4 +1,4 @@
-"""The file of fitted weights: what a fit writes into it, with what made it."""
+"""The files of fitted weights: what a fit writes into it, with what made it."""
 
 from __future__ import annotations
 
@@ -6,14 +6,20 @@ import json
 import re
 import subprocess
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 
 from ahf_ros.detectors.ring.fitted_weights import PATH
 
 
-def write_weights(purpose: str, seeds: Sequence[int], weights: Mapping[str, np.ndarray]) -> None:
-    """Replace one set of the file, and say from which seeds and at which commit it was fitted.
+def write_weights(
+    purpose: str,
+    seeds: Sequence[int],
+    weights: Mapping[str, np.ndarray],
+    path: Path = PATH,
+) -> None:
+    """Replace one set of a file, and say from which seeds and at which commit it was fitted.
 
     Parameters
     ----------
@@ -21,11 +27,13 @@ def write_weights(purpose: str, seeds: Sequence[int], weights: Mapping[str, np.n
         Name of the set, and of the benchmark that fits it.
     seeds : sequence of int
     weights : mapping of str to ndarray
+    path : Path
+        The file; that of the ring detector by default.
     """
-    sets = json.loads(PATH.read_text(encoding='utf-8'))
+    sets = json.loads(path.read_text(encoding='utf-8'))
     commit = subprocess.run(
         ['git', 'describe', '--always', '--dirty'],
-        cwd=PATH.parent,
+        cwd=path.parent,
         check=True,
         capture_output=True,
         text=True,
@@ -38,5 +46,5 @@ def write_weights(purpose: str, seeds: Sequence[int], weights: Mapping[str, np.n
     )
     text = json.dumps(sets, indent=2)
     text = re.sub(r'\[\s+([^]]*?)\s+\]', lambda row: f'[{" ".join(row[1].split())}]', text)
-    PATH.write_text(text + '\n', encoding='utf-8')
-    print(f'{PATH}: weights of the {purpose}')
+    path.write_text(text + '\n', encoding='utf-8')
+    print(f'{path}: weights of the {purpose}')

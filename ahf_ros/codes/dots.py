@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
+from ahf_ros.codes.cyclic import CyclicFamily, smallest_rotation
 from ahf_ros.codes.data_file import Entry, read_data_file
-from ahf_ros.codes.ring import smallest_rotation
 
 DOTS_DESIGN = Path(__file__).with_name('dots.json')
 """The design of rings of dots that this package prints."""
@@ -26,56 +26,35 @@ _BITS = (6, 20)  # of a word
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class DotFamily:
+class DotFamily(CyclicFamily):
     """The code words of one kind of ring of dots, and the proportions of its print.
 
     Attributes
     ----------
-    name, source : str
-        Name of the family, and where the design comes from.
-    bits : int
-        Number of places for small dots.
+    source : str
+        Where the design comes from.
     dot_circle, dot_radius : float
         Radius of the circle of the small dots, and their own, in radii of the disc.
     ground_radius, border_radius : float
         Inner and outer radius of the border, in radii of the disc.
-    words : ndarray of int64, shape (n,)
-        The canonical code words, ascending and read-only; index i has the ID i + 1.
     """
 
-    name: str
     source: str
-    bits: int
     dot_circle: float
     dot_radius: float
     ground_radius: float
     border_radius: float
-    words: np.ndarray
 
-    def number(self, word: int) -> int | None:
-        """Return the ID of a word in any rotation or reflection; None where there is none."""
-        if not 0 <= word < 1 << self.bits:
-            return None
-        canonical = int(smallest_bracelet(word, self.bits))
-        index = int(np.searchsorted(self.words, canonical))
-        if index < self.words.size and self.words[index] == canonical:
-            return index + 1
-        return None
+    def canonical(self, words: Any) -> np.ndarray:
+        """Return the smallest of all words that are the same code, ndarray of int64."""
+        return smallest_bracelet(words, self.bits)
 
-    def word(self, number: int) -> int:
-        """Return the canonical code word of an ID.
-
-        Raises
-        ------
-        ValueError
-            If the family has no such ID.
-        """
-        if not 1 <= number <= self.words.size:
-            raise ValueError(
-                f'number is {number!r}, accepted is an ID of {self.name} from 1 to '
-                f'{self.words.size}'
-            )
-        return int(self.words[number - 1])
+    def ids(self, words: np.ndarray) -> np.ndarray:
+        """Return the IDs of words in any rotation or reflection, 0 where there is none."""
+        codes = self.canonical(words)
+        index = np.minimum(np.searchsorted(self.words, codes), self.words.size - 1)
+        ids: np.ndarray = np.where(self.words[index] == codes, index + 1, 0)
+        return ids
 
 
 @lru_cache(maxsize=8)
@@ -118,13 +97,11 @@ def parse_design(file: Entry) -> DotFamily:
     widest = circle * sin(pi / bits)
     if radius >= widest:
         fields['dot_radius'].refuse(f'less than {widest:.3g}, so that the dots do not overlap')
-    words = np.arange(
-        1, (1 << bits) - 1
-    )  # without the ring that is empty and the one that is full
+    words = np.arange(1, (1 << bits) - 1)  # neither the empty ring nor the full one
     words = words[words == smallest_bracelet(words, bits)]
     words.setflags(write=False)
     source = fields['source'].text() if 'source' in fields else ''
-    return DotFamily(fields['family'].text(), source, bits, circle, radius, ground, border, words)
+    return DotFamily(fields['family'].text(), bits, words, source, circle, radius, ground, border)
 
 
 def smallest_bracelet(words: Any, bits: int) -> np.ndarray:

@@ -10,9 +10,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 import numpy as np
+
+from ahf_ros.codes.cyclic import CyclicFamily, smallest_rotation
 
 _BAND_RADII = {'metashape': (2.25, 3.5), 'aicon': (2.0, 3.0)}
 _VENDORS_AND_BITS = {
@@ -28,51 +29,17 @@ FAMILY_NAMES: tuple[str, ...] = tuple(_VENDORS_AND_BITS)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Family:
+class Family(CyclicFamily):
     """The code words of one kind of ring target, and the proportions of its print.
 
     Attributes
     ----------
-    name : str
-        One of `FAMILY_NAMES`.
-    bits : int
-        Number of sectors of the band.
     band_inner, band_outer : float
         Radii of the band, in radii of the dot.
-    words : ndarray of int64, shape (n,)
-        The canonical code words, ascending and read-only; index i has the ID i + 1.
     """
 
-    name: str
-    bits: int
     band_inner: float
     band_outer: float
-    words: np.ndarray
-
-    def number(self, word: int) -> int | None:
-        """Return the ID of `word`, in any rotation; None where the family does not have it."""
-        if not 0 <= word < 1 << self.bits:
-            return None
-        canonical = int(smallest_rotation(word, self.bits))
-        index = int(np.searchsorted(self.words, canonical))
-        if index < self.words.size and self.words[index] == canonical:
-            return index + 1
-        return None
-
-    def word(self, number: int) -> int:
-        """Return the canonical code word of the ID `number`.
-
-        Raises
-        ------
-        ValueError
-            If the family has no such ID.
-        """
-        if not 1 <= number <= self.words.size:
-            raise ValueError(
-                f'number is {number!r}, accepted is an ID of {self.name} from 1 to '
-                f'{self.words.size}'
-            )
-        return int(self.words[number - 1])
 
 
 @cache
@@ -112,29 +79,7 @@ def family(name: str) -> Family:
         words = words[words & (words >> half) & ((1 << half) - 1) != 0]
     words.setflags(write=False)
     inner, outer = _BAND_RADII[vendor]
-    return Family(name, bits, inner, outer, words)
-
-
-def smallest_rotation(words: Any, bits: int) -> np.ndarray:
-    """Return the smallest of all rotations of each word.
-
-    Parameters
-    ----------
-    words : array_like of int, any shape
-        Words of `bits` bits, 0 to 2^bits - 1.
-    bits : int
-        Length of a word.
-
-    Returns
-    -------
-    ndarray of int64, shape of `words`
-    """
-    rotated = np.asarray(words, dtype=np.int64)
-    smallest = rotated.copy()
-    for _ in range(bits - 1):
-        rotated = (rotated >> 1) | ((rotated & 1) << (bits - 1))
-        np.minimum(smallest, rotated, out=smallest)
-    return smallest
+    return Family(name, bits, words, inner, outer)
 
 
 def canonical(words: np.ndarray, family: Family) -> tuple[np.ndarray, np.ndarray]:

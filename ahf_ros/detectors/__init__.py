@@ -17,6 +17,7 @@ import numpy as np
 from ahf_ros.codes.families import FAMILY_NAMES, KINDS
 from ahf_ros.detectors.contract import Detector, DetectorSettings, Drafter, Refiner
 from ahf_ros.detectors.dots.detector import DotsDetector
+from ahf_ros.detectors.dots.published import PublishedDotsDetector
 from ahf_ros.detectors.external.command import CommandDetector
 from ahf_ros.detectors.external.guarded import guarded
 from ahf_ros.detectors.gsi.detector import GsiDetector
@@ -66,6 +67,7 @@ _ENTRIES = {
     'apriltag': _Entry(SquareDetector, KINDS['apriltag']),
     'gsi': _Entry(GsiDetector, KINDS['gsi']),
     'dots': _Entry(DotsDetector, KINDS['dots']),
+    'dots_published': _Entry(PublishedDotsDetector, KINDS['dots']),
     'command': _Entry(CommandDetector, FAMILY_NAMES),
 }
 

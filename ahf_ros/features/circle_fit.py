@@ -113,7 +113,7 @@ def fit_circles(
     frames: np.ndarray,
     circles: Circles,
     *,
-    reach: float,
+    reach: float | np.ndarray,
     projective: bool,
     rounds: int = 2,
 ) -> Fit:
@@ -126,7 +126,7 @@ def fit_circles(
     frames : ndarray of float64, shape (k, 3, 3)
         To about two pixels.
     circles : Circles
-    reach : float
+    reach : float or ndarray of float, shape (k, 1)
         Distance from an expected edge within which edges are measured, dot radii.
     projective : bool
         Whether the circles have different radii, so that they determine the common centre.

@@ -13,10 +13,12 @@ from ahf_ros.features.frame import circle_points, ellipse_axes, project
 from ahf_ros.features.log_edges import LOG_SCALE
 from ahf_ros.features.sampling import sample, within
 
+PIXELS_ASIDE = 1.0
+"""Distance of samples from a circle in a sharp image, px of the minor axis."""
+
 _RAYS = 16
 _ANGLES = 2 * np.pi * np.arange(_RAYS) / _RAYS
 _ASIDE = (0.3, 0.7)  # bounds of the distance of samples from the circle, dot radii
-_PIXELS_ASIDE = 1.0  # that distance where it lies between them, px of the minor axis
 _DOT_SPREAD = (0.3, 0.6)  # standard deviation of steps below and above the usual one, in it
 _EMPTY_SPREAD = 0.22  # the same of steps where there is no dot
 _FLOOR = 0.12  # share of rays that edges of light disturb
@@ -25,7 +27,9 @@ _CORRELATION = 2.5  # distance on the circle from where on rays tell something n
 _PART = 400_000  # samples at a time, which bounds the memory
 
 
-def circle_steps(log: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def circle_steps(
+    log: np.ndarray, frames: np.ndarray, aside: float | np.ndarray = PIXELS_ASIDE
+) -> tuple[np.ndarray, np.ndarray]:
     """Return the steps of ln I from the inside of circles to their outside, along rays.
 
     Parameters
@@ -34,6 +38,8 @@ def circle_steps(log: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.nd
         LOG_SCALE ln(I + 8).
     frames : ndarray of float64, shape (n, 3, 3)
         Of the circles.
+    aside : float or ndarray of float, shape (n,)
+        Distance of the samples from the circle, px of the minor axis.
 
     Returns
     -------
@@ -43,16 +49,19 @@ def circle_steps(log: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.nd
         Whether all of the circle lies in the image.
     """
     count = max(_PART // (2 * _RAYS), 1)
+    aside = np.broadcast_to(aside, len(frames))
     parts = [
-        _steps(log, frames[start : start + count])
+        _steps(log, frames[start : start + count], aside[start : start + count])
         for start in range(0, max(len(frames), 1), count)
     ]
     steps, inside = (np.concatenate(part) for part in zip(*parts, strict=True))
     return steps, inside
 
 
-def _steps(log: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    aside = np.clip(_PIXELS_ASIDE / ellipse_axes(frames)[1], *_ASIDE)
+def _steps(
+    log: np.ndarray, frames: np.ndarray, aside: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    aside = np.clip(aside / ellipse_axes(frames)[1], *_ASIDE)
     radii = np.stack([1 - aside, 1 + aside], axis=1)
     pixels = project(frames, circle_points(_ANGLES, radii))
     values = sample(log, pixels).astype(np.float64) / LOG_SCALE

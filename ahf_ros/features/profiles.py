@@ -100,7 +100,11 @@ class Edges:
 
 
 def measure_edges(
-    gray: np.ndarray, frames: np.ndarray, circles: Circles, blur: np.ndarray, reach: float
+    gray: np.ndarray,
+    frames: np.ndarray,
+    circles: Circles,
+    blur: np.ndarray,
+    reach: float | np.ndarray,
 ) -> Edges:
     """Fit blurred steps to the gray values across circles.
 
@@ -112,7 +116,7 @@ def measure_edges(
     circles : Circles
     blur : ndarray of float64, shape (k,)
         Standard deviation of the steps, px. A wrong one costs precision, and moves nothing.
-    reach : float
+    reach : float or ndarray of float, shape (k, 1)
         How far from a circle to look, dot radii.
     """
     circle = frame.circle_geometry(frames, circles.angles, circles.radii)
@@ -128,7 +132,7 @@ def measure_edges(
 
 
 def measure_outlines(
-    gray: np.ndarray, outlines: OutlinePoints, blur: np.ndarray, reach: float
+    gray: np.ndarray, outlines: OutlinePoints, blur: np.ndarray, reach: float | np.ndarray
 ) -> Edges:
     """Fit blurred steps to the gray values across the outlines of k targets.
 
@@ -139,7 +143,7 @@ def measure_outlines(
     outlines : OutlinePoints
     blur : ndarray of float64, shape (k,)
         Standard deviation of the steps, px. A wrong one costs precision, and moves nothing.
-    reach : float
+    reach : float or ndarray of float, shape (k, 1)
         How far from an outline to look, in its units.
     """
     aside = np.minimum(outlines.spacing / 4, _MAXIMUM_ASIDE)

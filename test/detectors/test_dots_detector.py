@@ -10,6 +10,7 @@ import pytest
 
 from ahf_ros.codes.dots import DOTS_DESIGN, dot_family
 from ahf_ros.detectors import create_detector
+from ahf_ros.detectors.dots.rings import CERTAIN
 from ahf_ros.evaluation import score
 from ahf_ros.filtering.homomorphic import HomomorphicFilter
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
@@ -43,14 +44,14 @@ def errors(shown: Rendering, targets: list) -> np.ndarray:
 )
 def test_targets_are_identified_and_placed(changes: dict, bound: float) -> None:
     shown = rendering(**changes)
-    found = create_detector(family='dots', min_radius=3.0)(shown.image)
+    found = create_detector(family='dots')(shown.image)
     figures = score(shown.truth, found)
     assert figures.right == len(shown.targets)
     assert figures.wrong == figures.false_positives == 0
     assert np.sqrt((errors(shown, found) ** 2).mean()) < bound
     codes = {target.id: target.code for target in shown.targets}
     assert all(target.code == codes[target.id] for target in found)
-    assert all(0.99 <= target.confidence <= 1 for target in found)
+    assert all(CERTAIN <= target.confidence <= 1 for target in found)
 
 
 def test_a_target_and_its_mirror_image_are_one_code() -> None:

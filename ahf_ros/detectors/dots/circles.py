@@ -10,9 +10,11 @@ import numpy as np
 from ahf_ros.codes.dots import DotFamily
 from ahf_ros.features.circle_fit import Fit, fit_circles
 from ahf_ros.features.circles import Circles
+from ahf_ros.features.frame import mean_radii
 
 _RAYS = 40  # round each circle
 _REACH = 0.3  # how far from a circle its edge is looked for, radii of the disc: half the border
+_SHORTEST_REACH = 1.35  # the same of small discs, px: what a profile needs
 
 
 def fit_targets(
@@ -30,9 +32,9 @@ def fit_targets(
         1 for dark targets, -1 for bright ones.
     code : DotFamily
     """
-    return fit_circles(
-        gray, frames, target_circles(polarity, code), reach=_REACH, projective=True, rounds=3
-    )
+    reach = np.maximum(_REACH, _SHORTEST_REACH / mean_radii(frames))[:, None]
+    circles = target_circles(polarity, code)
+    return fit_circles(gray, frames, circles, reach=reach, projective=True, rounds=3)
 
 
 def target_circles(polarity: np.ndarray, code: DotFamily) -> Circles:

@@ -7,15 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from ahf_ros.codes.dots import DotFamily
+from ahf_ros.detectors.dots.border_steps import border_steps
 from ahf_ros.features.array_record import ArrayRecord
-from ahf_ros.features.dot_evidence import circle_steps, dot_evidence
-from ahf_ros.features.frame import local_affine, project
+from ahf_ros.features.circle_fit import Fit
+from ahf_ros.features.dot_evidence import PIXELS_ASIDE, circle_steps, dot_evidence
+from ahf_ros.features.homography import local_frames
 
 _PHASES = 12  # of the ring, in the angle from one place to the next
-_LIMIT = 8.0  # evidence that one place may give
+_LIMIT = 12.0  # evidence that one place may give
 _FAINTEST = 0.12  # step of ln of a disc
-_BLUR = 0.9  # standard deviation of the blur, px, by which small dots are fainter than the disc
+_FAINTEST_SHARE = 0.6  # step of a dot, in the one that the blur leaves it
 _BRIGHTEST = 1.1  # step of a dot, in that of the disc
+_ASIDE = 1.2  # distance of samples from the edges of dots, blurs
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +33,10 @@ class Readings(ArrayRecord):
         At each place, for a dot or against it, limited.
     phase : ndarray of float64, shape (k,)
         Direction of the first place in the frame, rad clockwise from +x.
+    seen : ndarray of float64, shape (k,)
+        Mean step of ln I at disc and border, in that of the disc.
+    height : ndarray of float64, shape (k,)
+        Step of the dot that is seen best, in the one that the blur leaves it.
     inside : ndarray of bool, shape (k,)
         Whether the whole ring is in the image.
     """
@@ -37,38 +44,38 @@ class Readings(ArrayRecord):
     words: np.ndarray
     evidence: np.ndarray
     phase: np.ndarray
+    seen: np.ndarray
+    height: np.ndarray
     inside: np.ndarray
 
 
-def read_rings(
-    log: np.ndarray, frames: np.ndarray, polarity: np.ndarray, code: DotFamily
-) -> Readings:
+def read_rings(log: np.ndarray, fit: Fit, code: DotFamily) -> Readings:
     """Read rings of dots.
 
     Parameters
     ----------
     log : ndarray of int16, shape (height, width)
         LOG_SCALE ln(I + 8).
-    frames : ndarray of float64, shape (k, 3, 3)
-        Projective.
-    polarity : ndarray of int, shape (k,)
+    fit : Fit
+        Of disc and border of k targets.
     code : DotFamily
     """
-    count, bits = len(frames), code.bits
-    disc, _ = circle_steps(log, frames)
+    count, bits, polarity = len(fit.frames), code.bits, fit.polarity
+    disc, _ = circle_steps(log, fit.frames)
     usual = np.maximum(np.median(disc * polarity[:, None], axis=1), _FAINTEST)
     phases = 2 * np.pi / bits * np.arange(_PHASES) / _PHASES
-    angles = -(phases[:, None] + 2 * np.pi * np.arange(bits) / bits)
-    points = code.dot_circle * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
-    small = _small_frames(frames, points.reshape(-1, 2), code.dot_radius)
-    steps, inside = circle_steps(log, small.reshape(-1, 3, 3))
+    angles = (phases[:, None] - 2 * np.pi * np.arange(bits) / bits).ravel()
+    radii = np.full(angles.size, code.dot_radius)
+    small = local_frames(fit.frames, dot_points(angles, code), radii)
+    aside = np.maximum(PIXELS_ASIDE, _ASIDE * fit.blur)
+    steps, inside = circle_steps(log, small.reshape(-1, 3, 3), np.repeat(aside, _PHASES * bits))
     steps = steps.reshape(count, _PHASES, bits, steps.shape[1]) * polarity[:, None, None, None]
     steps /= usual[:, None, None, None]
     # Dots are fainter than the disc where they are small, all of them alike.
     size = np.sqrt(np.abs(np.linalg.det(small[:, 0, :2, :2])))
-    faintest = 1 - np.exp(-0.5 * (size / _BLUR) ** 2)
-    height = np.median(steps, axis=3).max(axis=(1, 2))
-    height = np.clip(height, 0.6 * faintest, _BRIGHTEST)
+    faintest = 1 - np.exp(-0.5 * (size / fit.blur) ** 2)
+    highest = np.median(steps, axis=3).max(axis=(1, 2))
+    height = np.clip(highest, _FAINTEST_SHARE * faintest, _BRIGHTEST)
     steps /= height[:, None, None, None]
     of_phases = small.reshape(count, _PHASES, bits, 3, 3)
     evidence = dot_evidence(steps, of_phases)
@@ -77,18 +84,11 @@ def read_rings(
     evidence = np.clip(evidence[np.arange(count), best], -_LIMIT, _LIMIT)
     words = (evidence > 0) @ (1 << np.arange(bits, dtype=np.int64))
     whole = np.asarray(inside.reshape(count, _PHASES * bits).all(axis=1))
-    return Readings(words, evidence, phases[best], whole)
+    seen = border_steps(log, fit.frames, polarity, code)[:, 0]
+    return Readings(words, evidence, phases[best], seen, highest / faintest, whole)
 
 
-def _small_frames(frames: np.ndarray, points: np.ndarray, radius: float) -> np.ndarray:
-    """Return the frames of circles about points of targets, shape (k, m, 3, 3)."""
-    moves = np.tile(np.eye(3), (len(points), 1, 1))
-    moves[:, :2, :2] *= radius
-    moves[:, :2, 2] = points
-    small = frames[:, None] @ moves
-    small = small / small[..., 2:, 2:]
-    affine = np.zeros_like(small)
-    affine[..., :2, :2] = local_affine(small.reshape(-1, 3, 3)).reshape(*small.shape[:2], 2, 2)
-    affine[..., :2, 2] = project(frames, points)
-    affine[..., 2, 2] = 1.0
-    return affine
+def dot_points(angles: np.ndarray, code: DotFamily) -> np.ndarray:
+    """Return the centres of small dots in directions, rad clockwise from +x, shape (..., 2)."""
+    points: np.ndarray = code.dot_circle * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    return points

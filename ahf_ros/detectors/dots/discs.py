@@ -1,0 +1,151 @@
+"""Where the discs of rings of dots may be, judged by a glance at disc and border.
+
+Any dot may be a disc, and any circle one of the edges of a border. Most are not: of the steps of
+ln I at disc and border, as the design has them, only targets show nearly all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ahf_ros.codes.dots import DotFamily
+from ahf_ros.detectors.contract import DetectorSettings
+from ahf_ros.detectors.dots.border_steps import border_steps
+from ahf_ros.detectors.dots.regions import STRAIGHT, open_regions
+from ahf_ros.features.dot_search import voted_dots, whole_dots
+from ahf_ros.features.dots import Dots, distinct
+from ahf_ros.features.frame import circle_outlines, ellipse_axes, enlarged
+from ahf_ros.features.log_edges import LOG_SCALE
+from ahf_ros.features.pyramid import ImagePyramid
+from ahf_ros.features.small_dots import small_dots
+
+_SCALES = np.geomspace(0.76, 1.32, 11)  # of the radius that a disc has, in that of its candidate
+_MINIMUM_SHARE = 0.5  # of the steps of ln at disc and border
+_MARGIN = 0.3  # about the border of a known target, disc radii
+_SMALL = 12.0  # largest radius of discs that are looked for as blobs of the whole image, px
+_SMALLER = 0.8  # of the smallest radius, of a blob whose edge is blurred
+_TOLERANCE = 0.9  # the same, of a disc whose border has a whole outline
+
+
+def whole_discs(
+    pyramid: ImagePyramid, settings: DetectorSettings, code: DotFamily, _known: np.ndarray
+) -> Dots:
+    """Return discs with a whole outline, or whose border has one.
+
+    Parameters
+    ----------
+    pyramid : ImagePyramid
+    settings : DetectorSettings
+    code : DotFamily
+    """
+    low, high = settings.radii
+    circles = whole_dots(pyramid, low, high * code.border_radius, (1, -1))
+    found = []
+    # The outer edge of the border has the polarity of the disc, the inner one the opposite.
+    for radius, side in ((1.0, 1), (code.border_radius, 1), (code.ground_radius, -1)):
+        frames = circles.frames.copy()
+        frames[:, :2, :2] /= radius
+        found.append(Dots(frames, side * circles.polarity, circles.share))
+    return judged(pyramid, _of_kind(Dots.joined(found), settings), code)
+
+
+def voted_discs(
+    pyramid: ImagePyramid, settings: DetectorSettings, code: DotFamily, known: np.ndarray
+) -> Dots:
+    """Return discs whose outline edges of light interrupt, outside of targets that are known.
+
+    Parameters
+    ----------
+    pyramid : ImagePyramid
+    settings : DetectorSettings
+    code : DotFamily
+    known : ndarray of float64, shape (k, 3, 3)
+        Frames of the targets that are known.
+    """
+    outlines = _outlines(known, code, _MARGIN)
+    voted = voted_dots(pyramid, *settings.radii, settings.polarities, outlines)
+    return judged(pyramid, voted.select(~_inside(voted, known, code)), code)
+
+
+def small_discs(
+    pyramid: ImagePyramid, settings: DetectorSettings, code: DotFamily, known: np.ndarray
+) -> Dots:
+    """Return small discs, and those seen at steep angles, as `voted_discs` does."""
+    # Edges of light end at a target, and look like no straight ones there.
+    margin = 2 * STRAIGHT / np.maximum(ellipse_axes(known)[1], 1)
+    outlines = (_outlines(known, code, margin) + 0.5) / 2 - 0.5
+    found = [Dots(np.zeros((0, 3, 3)), np.zeros(0, int), np.zeros(0))]
+    for region in open_regions(pyramid.edges[0], outlines):
+        found += _blobs(pyramid, region, settings)
+    blobs = Dots.joined(found)
+    return judged(pyramid, blobs.select(~_inside(blobs, known, code)), code)
+
+
+def _outlines(known: np.ndarray, code: DotFamily, margin: float | np.ndarray) -> np.ndarray:
+    """Return polygons about targets, px of the image, at a distance in disc radii."""
+    return circle_outlines(known, np.zeros(len(known)) + code.border_radius + margin)
+
+
+def _blobs(
+    pyramid: ImagePyramid, region: tuple[slice, slice], settings: DetectorSettings
+) -> list[Dots]:
+    """Return the blobs of a region of the image at half its size, there and at full size."""
+    low, high = settings.radii
+    found = []
+    for level in (0, 1):
+        scale = 2**level
+        smallest, largest = _SMALLER * low / scale, min(high / scale, _SMALL)
+        if smallest > largest:
+            continue
+        rows, columns = (slice(2 * it.start // scale, 2 * it.stop // scale) for it in region)
+        log = np.ascontiguousarray(pyramid.logs[level][rows, columns])
+        blobs = small_dots(log, smallest, largest, settings.polarities, LOG_SCALE)
+        blobs.frames[:, 0, 2] += columns.start
+        blobs.frames[:, 1, 2] += rows.start
+        found.append(replace(blobs, frames=enlarged(blobs.frames, level)))
+    return found
+
+
+def _inside(dots: Dots, known: np.ndarray, code: DotFamily) -> np.ndarray:
+    """Return whether the centres of dots lie in known targets, shape (k,)."""
+    inside = np.zeros(len(dots.frames), bool)
+    homogeneous = dots.frames[:, :, 2]
+    for back in np.linalg.inv(known):
+        x, y, depth = back @ homogeneous.T
+        inside |= x * x + y * y < (code.border_radius * depth) ** 2
+    return inside
+
+
+def _of_kind(dots: Dots, settings: DetectorSettings) -> Dots:
+    """Return the dots of the polarities and about the radii that are looked for."""
+    low, high = settings.radii
+    major = ellipse_axes(dots.frames)[0]
+    of_size = (major >= _TOLERANCE * low) & (major <= high / _TOLERANCE)
+    return dots.select(of_size & np.isin(dots.polarity, settings.polarities))
+
+
+def judged(pyramid: ImagePyramid, dots: Dots, code: DotFamily) -> Dots:
+    """Return the discs about which a border is seen, with the radius that fits both best.
+
+    Parameters
+    ----------
+    pyramid : ImagePyramid
+    dots : Dots
+    code : DotFamily
+
+    Returns
+    -------
+    Dots
+        No two of them the same; their share is that of the expected steps.
+    """
+    scores = border_steps(pyramid.logs[0], dots.frames, dots.polarity, code, _SCALES)
+    smooth = scores.copy()
+    smooth[:, 1:-1] = (scores[:, :-2] + 2 * scores[:, 1:-1] + scores[:, 2:]) / 4
+    best = smooth.argmax(axis=1)
+    share = scores[np.arange(len(best)), best]
+    frames = dots.frames.copy()
+    frames[:, :2, :2] *= _SCALES[best][:, None, None]
+    good = share > _MINIMUM_SHARE
+    return distinct(Dots(frames[good], dots.polarity[good], share[good]))

@@ -1,0 +1,212 @@
+"""Rings of dots as they were published: threshold, regions, ellipses, development of the ring.
+
+This is the identification of [1]_: Otsu's threshold in overlapping blocks; a dark region in a
+bright one in a dark one; least-squares ellipses of the inner and the outer circle; the ring
+between them unrolled into a rectangle, where a place that is dark with bright outside (01) has a
+dot, one that is bright (11) has none, and others are no target's. It has no defence against uneven
+light, which makes it a fair test of a filter. The centre is that of the ellipse of the outer
+circle, with the perspective bias in it.
+
+References
+----------
+.. [1] Knyaz & Sibiryakov, ISPRS Commission V, 1998.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import cv2
+import numpy as np
+
+from ahf_ros.codes.dots import DotFamily, dot_family
+from ahf_ros.detectors.contract import DetectorSettings
+from ahf_ros.detectors.dots.local_otsu import local_otsu
+from ahf_ros.detectors.dots.resolving import best_of_each
+from ahf_ros.features.ellipse_targets import targets_from_frames
+from ahf_ros.features.frame import affine_frames, circle_points, project
+from ahf_ros.features.sampling import sample, within
+from ahf_ros.imaging.image import check_image, stretched_to_8_bit
+from ahf_ros.target import UNDECODED, Target, sorted_targets
+
+_SHORTEST = 5  # points of a contour, which an ellipse takes
+_MAXIMUM_MISFIT = 0.2  # between the area of a contour and that of its ellipse, relative
+_RATIO = 1.35  # of the radii of the two circles over the printed one, at the most, or below it
+_MAXIMUM_DISTANCE = 0.4  # of their centres, radii of the disc
+_DIRECTIONS = 24  # of the development, for a place
+_MINIMUM_SHARE = 0.75  # of the samples at a place that agree about its colour
+_CONTOUR_ERROR = 0.5  # standard deviation of a point of a contour, px
+
+
+@dataclass(frozen=True, slots=True)
+class PublishedDotsDetector:
+    """The detector `dots_published`; call it with an image.
+
+    Attributes
+    ----------
+    settings : DetectorSettings
+
+    Raises
+    ------
+    ValueError
+        If the data file of the family is not accepted.
+    """
+
+    name: ClassVar[str] = 'dots_published'
+    settings: DetectorSettings = field(default_factory=DetectorSettings)
+
+    def __post_init__(self) -> None:
+        """Refuse a data file that is not accepted."""
+        dot_family(self.settings.family_file)
+
+    @property
+    def family(self) -> str:
+        """Family of the codes."""
+        return self.settings.family
+
+    def __call__(self, image: np.ndarray) -> list[Target]:
+        """Identify the targets of one image; see `Detector`.
+
+        The blocks of the threshold are as wide as a target whose disc has the geometric mean of
+        the smallest and the largest radius.
+        """
+        check_image(image)
+        settings, code = self.settings, dot_family(self.settings.family_file)
+        gray = stretched_to_8_bit(image)
+        side = 2 * code.border_radius * np.sqrt(np.prod(settings.radii))
+        height = gray.astype(np.float32) - local_otsu(gray, round(side))
+        targets: list[Target] = []
+        for polarity in settings.polarities:
+            frames, points = _concentric(polarity * height < 0, settings, code)
+            targets += _identified(polarity * height, frames, points, code)
+        targets = best_of_each(targets, code.border_radius)
+        if not settings.report_undecoded:
+            targets = [target for target in targets if target.id != UNDECODED]
+        return sorted_targets(targets)
+
+
+def _concentric(
+    mask: np.ndarray, settings: DetectorSettings, code: DotFamily
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the targets that regions of a mask look like.
+
+    Parameters
+    ----------
+    mask : ndarray of bool, shape (height, width)
+        Whether a pixel has the colour of the disc.
+    settings : DetectorSettings
+    code : DotFamily
+
+    Returns
+    -------
+    frames : ndarray of float64, shape (k, 3, 3)
+        Of the discs, from the ellipses of the outer circles.
+    points : ndarray of int, shape (k,)
+        Number of points on the contour of each.
+    """
+    contours, hierarchy = cv2.findContours(
+        mask.astype(np.uint8), cv2.RETR_TREE, cv2.CHAIN_APPROX_NONE
+    )
+    low, high = settings.radii
+    found, points = [], []
+    for index, contour in enumerate(contours):
+        # The outline of a region in a hole of another one; outlines and holes alternate.
+        hole = hierarchy[0, index, 3]
+        if hole < 0 or hierarchy[0, hole, 3] < 0:
+            continue
+        disc, outer = _ellipse(contour, 0.5), _ellipse(contours[hole], -0.5)
+        if disc is None or outer is None or not low <= max(disc[2:4]) <= high:
+            continue
+        if _matches(disc, outer, code):
+            found.append(outer)
+            points.append(len(contours[hole]))
+    frames = affine_frames(*np.reshape(found, (-1, 5)).T)
+    frames[:, :2, :2] /= code.ground_radius
+    return frames, np.array(points, int)
+
+
+def _ellipse(contour: np.ndarray, shift: float) -> tuple[float, ...] | None:
+    """Return centre, semi-axes and direction of the ellipse of a contour; None of other shapes.
+
+    Contours run through the centres of pixels, `shift` px inside of the edge.
+    """
+    if len(contour) < _SHORTEST:
+        return None
+    (x, y), (width, height), angle = cv2.fitEllipse(contour)
+    area = cv2.contourArea(contour)
+    if abs(np.pi / 4 * width * height - area) > _MAXIMUM_MISFIT * area:
+        return None
+    return x, y, width / 2 + shift, height / 2 + shift, float(np.deg2rad(angle))
+
+
+def _matches(disc: tuple[float, ...], outer: tuple[float, ...], code: DotFamily) -> bool:
+    """Return whether two ellipses have the centres and the sizes of the circles of a target."""
+    ratios = np.divide(sorted(outer[2:4]), sorted(disc[2:4])) / code.ground_radius
+    distance = np.hypot(outer[0] - disc[0], outer[1] - disc[1])
+    alike = bool((np.abs(np.log(ratios)) < np.log(_RATIO)).all())
+    return alike and bool(distance < _MAXIMUM_DISTANCE * min(disc[2:4]))
+
+
+def _identified(
+    height: np.ndarray, frames: np.ndarray, points: np.ndarray, code: DotFamily
+) -> list[Target]:
+    """Return the targets that a threshold shows, undecoded where a place is neither 01 nor 11.
+
+    Parameters
+    ----------
+    height : ndarray of float32, shape (height, width)
+        Negative where a pixel has the colour of the disc.
+    frames : ndarray of float64, shape (k, 3, 3)
+    points : ndarray of int, shape (k,)
+    code : DotFamily
+    """
+    words, clarity, inside = _develop(height, frames, code)
+    ids = np.where(clarity >= _MINIMUM_SHARE, code.ids(words), 0)
+    ids = np.where(ids > 0, ids, UNDECODED)
+    certainty = np.where(ids == UNDECODED, 0.0, clarity)
+    error = 2 * _CONTOUR_ERROR**2 / np.maximum(points, 1)
+    covariance = error[:, None, None] * np.eye(2)
+    shown = np.flatnonzero(inside)
+    return targets_from_frames(
+        *(column[shown] for column in (frames, covariance, ids, code.canonical(words), certainty))
+    )
+
+
+def _develop(
+    height: np.ndarray, frames: np.ndarray, code: DotFamily
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Read the rings between the two circles, unrolled into rectangles.
+
+    Returns
+    -------
+    words : ndarray of int64, shape (k,)
+    clarity : ndarray of float64, shape (k,)
+        Share of the samples that agree with the word where it is the least; 0 where the outside
+        of the dots is not bright.
+    inside : ndarray of bool, shape (k,)
+        Whether the ring lies in the image.
+    """
+    count = code.bits * _DIRECTIONS
+    angles = -2 * np.pi * np.arange(count) / count
+    outside = (code.dot_circle + code.dot_radius + code.ground_radius) / 2
+    pixels = project(frames, circle_points(angles, np.array([code.dot_circle, outside])))
+    dark = sample(height, pixels) < 0
+    inside = np.asarray(within(pixels, height.shape).all(axis=(1, 2)))
+    # The first place is where the dots of all places, laid on top of each other, have theirs.
+    folded = dark[..., 0].reshape(-1, code.bits, _DIRECTIONS).sum(axis=1)
+    turns = np.exp(2j * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS)
+    middle = np.angle(folded @ turns) / (2 * np.pi) * _DIRECTIONS
+    half = max(round(_DIRECTIONS * _place_share(code) / 2), 1)
+    window = np.arange(-half, half + 1) + _DIRECTIONS * np.arange(code.bits)[:, None]
+    columns = (np.rint(middle).astype(int)[:, None, None] + window) % count
+    rows = np.arange(len(frames))[:, None, None]
+    dots, clear = dark[rows, columns, 0].mean(axis=2), ~dark[rows, columns, 1]
+    words = (dots > 0.5) @ (1 << np.arange(code.bits, dtype=np.int64))
+    clarity = np.minimum(np.maximum(dots, 1 - dots), clear.mean(axis=2)).min(axis=1)
+    return words, clarity, inside
+
+
+def _place_share(code: DotFamily) -> float:
+    """Return the share of the distance from dot to dot that the inner half of a dot takes."""
+    return code.dot_radius / code.dot_circle / (2 * np.pi / code.bits)

@@ -1,0 +1,180 @@
+"""Rings of dots that may be targets, and which of them are reported."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ahf_ros.codes.dots import DotFamily
+from ahf_ros.detectors.contract import DetectorSettings
+from ahf_ros.detectors.dots.circles import fit_targets
+from ahf_ros.detectors.dots.confidence import (
+    MAXIMUM_SHARE,
+    target_features,
+    target_probability,
+    word_features,
+    word_probability,
+)
+from ahf_ros.detectors.dots.reading import dot_points, read_rings
+from ahf_ros.detectors.dots.resolving import best_of_each
+from ahf_ros.features.array_record import ArrayRecord
+from ahf_ros.features.dots import Dots
+from ahf_ros.features.ellipse_targets import ellipse_fields
+from ahf_ros.features.frame import ellipse_axes
+from ahf_ros.features.homography import local_frames
+from ahf_ros.features.pyramid import ImagePyramid
+from ahf_ros.target import UNDECODED, DottedTarget
+
+CERTAIN = 0.95
+"""Confidence from which a target is reported."""
+
+_PART = 512  # discs fitted at a time, which bounds the memory
+_PLAUSIBLE = 0.4  # share of the edges of disc and border, for the ring to be read
+_FAINTEST = 0.85  # contrast of a disc, dark over bright
+
+
+@dataclass(frozen=True, slots=True)
+class Rings(ArrayRecord):
+    """k rings of dots.
+
+    Attributes
+    ----------
+    frames, covariance : ndarray of float64, shape (k, 3, 3) and (k, 2, 2)
+        Of the discs, and of their centres, px^2.
+    polarity : ndarray of int, shape (k,)
+        1 for dark targets, -1 for bright ones.
+    words : ndarray of int64, shape (k,)
+        As read, counter-clockwise in the image from the first place.
+    phase : ndarray of float64, shape (k,)
+        Direction of that place in the frame, rad clockwise from +x.
+    target_features, word_features : ndarray of float64, shape (k, n) and (k, m)
+        As `confidence` weighs them.
+    """
+
+    frames: np.ndarray
+    covariance: np.ndarray
+    polarity: np.ndarray
+    words: np.ndarray
+    phase: np.ndarray
+    target_features: np.ndarray
+    word_features: np.ndarray
+
+    @property
+    def of_target(self) -> np.ndarray:
+        """Probability that there is a target, shape (k,)."""
+        return target_probability(self.target_features)
+
+    @property
+    def whole(self) -> np.ndarray:
+        """Whether disc and border are seen as in good light, shape (k,)."""
+        return np.asarray((self.target_features[:, :2] >= MAXIMUM_SHARE).all(axis=1))
+
+    @property
+    def of_word(self) -> np.ndarray:
+        """Probability that there is a target with that word, shape (k,)."""
+        return self.of_target * word_probability(self.word_features)
+
+
+def read_discs(pyramid: ImagePyramid, discs: Dots, code: DotFamily) -> Rings:
+    """Return the rings of dots about discs, as far as they lie in the image.
+
+    Parameters
+    ----------
+    pyramid : ImagePyramid
+    discs : Dots
+    code : DotFamily
+    """
+    count = max(len(discs.frames), 1)
+    return Rings.joined(
+        [
+            _read_part(pyramid, discs.select(np.s_[start : start + _PART]), code)
+            for start in range(0, count, _PART)
+        ]
+    )
+
+
+def _read_part(pyramid: ImagePyramid, discs: Dots, code: DotFamily) -> Rings:
+    fit = fit_targets(pyramid.gray, discs.frames, discs.polarity, code)
+    fit = fit.select((fit.share >= _PLAUSIBLE) & (fit.contrast <= _FAINTEST))
+    readings = read_rings(pyramid.logs[0], fit, code)
+    fit, readings = fit.select(readings.inside), readings.select(readings.inside)
+    return Rings(
+        fit.frames,
+        fit.covariance,
+        fit.polarity,
+        readings.words,
+        readings.phase,
+        target_features(readings, fit),
+        word_features(readings, fit),
+    )
+
+
+def report(rings: Rings, settings: DetectorSettings, code: DotFamily) -> list[DottedTarget]:
+    """Return one target for each place and each ID, the most certain one.
+
+    Parameters
+    ----------
+    rings : Rings
+    settings : DetectorSettings
+    code : DotFamily
+    """
+    major = ellipse_axes(rings.frames)[0]
+    minimum, maximum = settings.radii
+    ids = code.ids(rings.words)
+    decoded = (rings.of_word >= CERTAIN) & (ids > 0)
+    shown = decoded | (settings.report_undecoded & (rings.whole | (rings.of_target >= CERTAIN)))
+    which = np.flatnonzero(shown & (major >= minimum) & (major <= maximum))
+    targets = _targets(rings.select(which), np.where(decoded, ids, UNDECODED)[which], code)
+    return best_of_each(targets, code.border_radius)
+
+
+def _targets(rings: Rings, ids: np.ndarray, code: DotFamily) -> list[DottedTarget]:
+    decoded = ids != UNDECODED
+    places = ellipse_fields(rings.frames, rings.covariance)
+    codes = np.where(decoded, code.canonical(rings.words), 0).tolist()
+    certainty = np.where(decoded, rings.of_word, 0.0).tolist()
+    words = np.where(decoded, rings.words, 0).tolist()
+    return [
+        DottedTarget(
+            id=identifier,
+            code=of_code,
+            confidence=sure,
+            polarity=sign,
+            **ellipses(frame[None], word, phase, code),
+            **place,
+        )
+        for identifier, of_code, sure, sign, frame, word, phase, place in zip(
+            ids.tolist(),
+            codes,
+            certainty,
+            rings.polarity.tolist(),
+            rings.frames,
+            words,
+            rings.phase.tolist(),
+            places,
+            strict=True,
+        )
+    ]
+
+
+def ellipses(frame: np.ndarray, word: int, phase: float, code: DotFamily) -> dict[str, Any]:
+    """Return the ellipses of disc, border and dots as `DottedTarget` has them.
+
+    Parameters
+    ----------
+    frame : ndarray of float64, shape (1, 3, 3)
+    word : int
+        As read from the first place, counter-clockwise in the image.
+    phase : float
+        Direction of that place in the frame, rad clockwise from +x.
+    code : DotFamily
+    """
+    which = np.flatnonzero(word >> np.arange(code.bits) & 1)
+    points = dot_points(phase - 2 * np.pi * which / code.bits, code)
+    points = np.concatenate([np.zeros((2, 2)), points])
+    radii = np.array([1.0, code.border_radius] + [code.dot_radius] * len(which))
+    frames = local_frames(frame, points, radii)[0]
+    columns = (frames[:, 0, 2], frames[:, 1, 2], *ellipse_axes(frames))
+    return {'dots': tuple(zip(*(of.tolist() for of in columns), strict=True)), 'template_dots': 2}

@@ -1,0 +1,145 @@
+"""How far the confidence of rings of dots can be trusted, and the weights that it rests on.
+
+Scenes of all sizes, views, blurs and lights, with targets and with marks that are none, are
+rendered, and every plausible reading of the detector `dots` is compared with the truth. The table
+shows the reliability of the weights in force, by condition. With --fit, two logistic regressions
+are fitted to the readings instead, and written to the file of fitted weights. Seeds from 101 on
+are for tests, those below for development.
+
+    python -m benchmarks.dots_confidence [--seeds 101 102]
+    python -m benchmarks.dots_confidence --fit 1 2 3
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from itertools import pairwise, product
+
+import numpy as np
+from rich.console import Console
+from rich.progress import track
+
+from ahf_ros.codes.dots import dot_family
+from ahf_ros.detectors.contract import DetectorSettings
+from ahf_ros.detectors.dots.confidence import WEIGHTS, target_probability, word_probability
+from ahf_ros.detectors.dots.detector import find_rings
+from ahf_ros.features.array_record import ArrayRecord
+from ahf_ros.features.pyramid import image_pyramid
+from ahf_ros.imaging.image import as_gray
+from ahf_ros.synthetic.patterns import LIGHT_NAMES
+from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
+from benchmarks.confidence import CLASSES, NEAR, logistic_regression
+from benchmarks.weights import write_weights
+
+PER_RADIUS = 6.4
+"""Width of a target in radii of its disc."""
+
+WIDTHS = (22, 24, 26, 29, 36, 48, 60, 90)
+"""Of targets in clean light, px."""
+
+AMBIENT = (0.3, 0.12, 0.04, 0.02)
+"""Ambient light, as a share of the projector's."""
+
+
+@dataclass(frozen=True, slots=True)
+class Compared(ArrayRecord):
+    """Readings, and whether they are of targets, and right, shape (k,) each."""
+
+    target_features: np.ndarray
+    word_features: np.ndarray
+    of_target: np.ndarray
+    right: np.ndarray
+
+
+def scenes(seed: int) -> Iterator[tuple[str, SceneSettings]]:
+    """Yield conditions and scenes."""
+    base = SceneSettings(family='dots', width=1500, height=1000, targets=20, seed=seed)
+    for width in WIDTHS:
+        yield 'size', replace(base, targets=40, dot_radius=width / PER_RADIUS)
+    generator = np.random.default_rng(seed)
+    for light, ambient in product(LIGHT_NAMES[1:], AMBIENT):
+        radius = float(generator.choice([8, 11, 14, 18]))
+        colour = str(generator.choice(['dark', 'bright']))
+        count = round(3000 / radius**2)
+        scene = replace(base, targets=count, dot_radius=radius, polarity=colour)
+        yield f'ambient {ambient}', replace(scene, light=light, ambient=ambient)
+    for tilt, radius in product((30.0, 45.0, 60.0, 70.0), (8.0, 14.0)):
+        scene = replace(base, targets=12, tilt=tilt, focal_length=3.0, dot_radius=radius)
+        yield 'oblique', scene
+    for blur, radius in product((1.3, 1.8, 2.3), (7.0, 12.0)):
+        yield 'blur', replace(base, blur=blur, dot_radius=radius)
+    for electrons, radius in product((1000.0, 300.0, 100.0), (4.5, 9.0)):
+        yield 'noise', replace(base, full_well=electrons, dot_radius=radius)
+    for light in LIGHT_NAMES:
+        marks = replace(base, targets=0, distractors=40, dot_radius=10.0, light=light)
+        yield 'no targets', marks
+    for family, light in product(('metashape12', 'aicon14'), ('normal', 'stripe', 'lattice')):
+        yield 'no targets', replace(base, family=family, light=light, dot_radius=12.0)
+
+
+def compared(scene: Rendering) -> Compared:
+    """Return all plausible readings of a scene, compared with the truth."""
+    settings, code = DetectorSettings(family='dots'), dot_family()
+    pyramid = image_pyramid(as_gray(scene.image), settings.max_radius)
+    rings = find_rings(pyramid, settings, code)
+    targets = scene.targets if scene.settings.family == 'dots' else ()
+    x, y, true = np.array([(it.x, it.y, it.id) for it in targets]).reshape(-1, 3).T
+    near = np.hypot(rings.frames[:, :1, 2] - x, rings.frames[:, 1:2, 2] - y) < NEAR
+    right = near & (code.ids(rings.words)[:, None] == true)
+    return Compared(
+        rings.target_features, rings.word_features, near.any(axis=1), right.any(axis=1)
+    )
+
+
+def gathered(seeds: Iterable[int]) -> dict[str, Compared]:
+    """Return the readings of the scenes of some seeds by condition."""
+    wanted = [named for seed in seeds for named in scenes(seed)]
+    parts: dict[str, list[Compared]] = {}
+    for condition, scene in track(wanted, 'scenes', console=Console(stderr=True)):
+        parts.setdefault(condition, []).append(compared(render(scene)))
+    return {condition: Compared.joined(of) for condition, of in parts.items()}
+
+
+def fitted(seeds: Iterable[int]) -> dict[str, np.ndarray]:
+    """Return intercepts and weights of both regressions on the scenes of some seeds."""
+    every = Compared.joined(list(gathered(seeds).values()))
+    some = every.select(every.of_target)
+    return {
+        'target': np.round(logistic_regression(every.target_features, every.of_target), 2),
+        'word': np.round(logistic_regression(some.word_features, some.right), 2),
+    }
+
+
+def reliability(seeds: Iterable[int]) -> Iterator[str]:
+    """Yield the lines of the table of confidences and how often they are right."""
+    conditions = gathered(seeds)
+    conditions['all'] = Compared.joined(list(conditions.values()))
+    yield '| condition | confidence | readings | mean confidence | share right |'
+    yield '|---|---|---|---|---|'
+    for condition, some in conditions.items():
+        stated = target_probability(some.target_features) * word_probability(some.word_features)
+        for low, high in pairwise(CLASSES):
+            within = (stated >= low) & (stated < high)
+            if within.any():
+                yield (
+                    f'| {condition} | {low} to {high} | {within.sum()} '
+                    f'| {stated[within].mean():.4f} | {some.right[within].mean():.4f} |'
+                )
+
+
+def main() -> None:
+    """Write weights, or print their reliability as Markdown."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument('--fit', type=int, nargs='+', metavar='SEED', help='fit the weights anew')
+    parser.add_argument('--seeds', type=int, nargs='+', default=[101, 102])
+    options = parser.parse_args()
+    if options.fit:
+        write_weights('dots_confidence', options.fit, fitted(options.fit), WEIGHTS)
+    else:
+        print('\n'.join(reliability(options.seeds)))
+
+
+if __name__ == '__main__':
+    main()
