@@ -96,6 +96,8 @@ def overlay(
 ) -> np.ndarray:
     """Return an image in colour with the dot, the centre and the ID of every target.
 
+    The family is beside the ID if there are targets of several families.
+
     Parameters
     ----------
     image : ndarray, shape (height, width)
@@ -117,6 +119,7 @@ def overlay(
     """
     canvas = cv2.cvtColor(stretched_to_8_bit(image), cv2.COLOR_GRAY2BGR)
     unit = unit or _pen(image)
+    several = len({target.family for target in targets if target.family}) > 1
     for target in missed:
         _cross_out(canvas, target, unit)
     for target in targets:
@@ -132,7 +135,8 @@ def overlay(
             _draw_ellipse(canvas, ellipse, DECODING_DOT_COLOUR, unit)
         _draw_cross(canvas, target, colour, unit)
         if target.id != UNDECODED:
-            _draw_label(canvas, target, colour, unit)
+            name = f'{target.id} {target.family}' if several else str(target.id)
+            _draw_label(canvas, target, name, colour, unit)
     return canvas
 
 
@@ -155,11 +159,13 @@ def side_by_side(rows: Sequence[Sequence[Tile]], width: int) -> np.ndarray:
 
 
 def summary(identification: Identification) -> str:
-    """Return n, N and the filter of an identification in words."""
+    """Return n, N, the filter and whether the image is mirrored, in words."""
     words = f'{identification.count} identified'
     if identification.expected or identification.estimated:
         estimated = 'an estimated ' if identification.estimated else ''
         words += f' of {estimated}{identification.expected}'
+    if identification.mirrored:
+        words += ', mirrored'
     used = identification.filter
     if not used.applied:
         return f'{words}, no filter'
@@ -233,12 +239,11 @@ def _draw_cross(canvas: np.ndarray, target: Target, colour: Colour, unit: int) -
             cv2.line(canvas, start, end, shade, width, cv2.LINE_AA, _SHIFT)
 
 
-def _draw_label(canvas: np.ndarray, target: Target, colour: Colour, unit: int) -> None:
-    """Write the ID above to the right of the dot, or below to the left where the image ends."""
+def _draw_label(canvas: np.ndarray, target: Target, text: str, colour: Colour, unit: int) -> None:
+    """Write a text above to the right of the dot, or below to the left where the image ends."""
     scale = max(0.75 * unit, 0.6 * target.semi_major / _FONT_HEIGHT)
     # OpenCV 5 crashes on letters that are much larger than an image can show.
     scale = min(scale, max(canvas.shape[0] / _FONT_HEIGHT, 0.75 * unit))
-    text = str(target.id)
     (width, height), _ = cv2.getTextSize(text, _FONT, scale, 2 * unit)
     offset = 0.8 * target.semi_major + 2 * unit
     left, bottom = target.x + offset, target.y - offset

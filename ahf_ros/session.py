@@ -8,12 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from ahf_ros.codes.families import mirrored_number
 from ahf_ros.detectors import (
     DETECTOR,
     Detector,
     DetectorSettings,
     Drafter,
     Refiner,
+    check_expected_ids,
     create_detector,
     detector_name,
     estimator,
@@ -23,7 +25,7 @@ from ahf_ros.filtering.settings import AdaptiveSettings
 from ahf_ros.filtering.trials import DetectorFunction
 from ahf_ros.settings.nested import updated
 from ahf_ros.settings.parameter import check_parameters, parameter
-from ahf_ros.target import Identification
+from ahf_ros.target import Identification, Target
 
 MAXIMUM_TARGETS = 100_000
 """Maximum of N."""
@@ -124,6 +126,8 @@ def create_identifier(
         values, detector = values | {'detector': detector}, None
     settings = updated(settings or IdentificationSettings(), values)
     used = detector or create_detector(settings.detector, settings.detection)
+    if isinstance(used, Detector) and settings.adaptive.listed:
+        check_expected_ids(settings.adaptive.listed, used.name, settings.detection)
     estimate = None
     if settings.estimate_expected:
         _check_family(used, settings.detection)
@@ -136,6 +140,7 @@ def create_identifier(
         draft=used.draft if isinstance(used, Drafter) else None,
         estimate=estimate,
         interrupt=interrupt,
+        mirrored=_mirrored_id,
         name=f'detector {used.name!r}' if isinstance(used, Detector) else 'detector',
     )
 
@@ -173,6 +178,11 @@ def identify(
     True
     """
     return create_identifier(settings, detector, **values).identify(image)
+
+
+def _mirrored_id(target: Target) -> int | None:
+    """Return the ID that a target has in a mirror, None if that is unknown."""
+    return mirrored_number(target.family, target.code)
 
 
 def _check_family(detector: DetectorFunction, settings: DetectorSettings) -> None:

@@ -30,6 +30,8 @@ class Target:
         Probability that `id` is right, 0 to 1.
     covariance : tuple of 4 float
         Row-major covariance of (x, y), px^2.
+    family : str
+        Name of the family of the code; empty if undecoded or unknown.
 
     Examples
     --------
@@ -46,6 +48,12 @@ class Target:
     angle: float = 0.0
     confidence: float = 1.0
     covariance: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    family: str = ''
+
+    @property
+    def key(self) -> tuple[str, int]:
+        """Family and ID, which no two targets share."""
+        return self.family, self.id
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,6 +161,9 @@ class Identification:
         The filter that gave the targets.
     estimated : bool
         Whether `expected` was estimated from the image.
+    mirrored : bool
+        Whether the image seems to be mirrored: most IDs read are not among the expected ones, and
+        most would be in a mirror.
 
     Examples
     --------
@@ -165,18 +176,19 @@ class Identification:
     expected: int = 0
     filter: FilterState = field(default_factory=FilterState)
     estimated: bool = False
+    mirrored: bool = False
 
     @property
     def count(self) -> int:
-        """n, the number of distinct IDs identified."""
+        """n, the number of distinct targets identified, by family and ID."""
         return count_codes(self.targets)
 
 
 def sorted_targets(targets: Iterable[Target]) -> list[Target]:
-    """Return targets by ascending ID, those of one ID from top to bottom and left to right."""
-    return sorted(targets, key=lambda target: (target.id, target.y, target.x))
+    """Return targets by ascending ID, those of one ID by family, from top to bottom, from left."""
+    return sorted(targets, key=lambda target: (target.id, target.family, target.y, target.x))
 
 
 def count_codes(targets: Iterable[Target]) -> int:
-    """Return the number of distinct IDs among `targets`, undecoded targets excluded."""
-    return len({target.id for target in targets} - {UNDECODED})
+    """Return the number of distinct targets by family and ID, undecoded ones excluded."""
+    return len({target.key for target in targets if target.id != UNDECODED})

@@ -25,6 +25,9 @@ MAXIMUM_LENGTH_PX = 65536.0
 MAXIMUM_VARIANCE = MAXIMUM_LENGTH_PX**2
 """Maximum size of an element of a covariance, px^2."""
 
+MAXIMUM_TEXT = 200
+"""Maximum number of characters of the name of a family."""
+
 ASYMMETRY = 1e-5
 """Difference of the two covariances of x and y that rounding may leave, as a share of the largest
 element."""
@@ -65,8 +68,8 @@ def checked_target(target: Any, name: str) -> Target:
     target : Target
         Its fields may be of any type. Accepted are an `id` from -1 to 2^31 - 1, a `code` from 0 to
         2^32 - 1, finite coordinates and semi-axes, an `angle` within a turn, a `confidence` from
-        0 to 1 and a covariance that is symmetric and positive semidefinite; numpy scalars and
-        arrays are converted.
+        0 to 1, a covariance that is symmetric and positive semidefinite, and a `family` that is a
+        printable text; numpy scalars and arrays are converted.
     name : str
         What errors call it.
 
@@ -94,6 +97,16 @@ def checked_integer(value: Any, name: str, minimum: int, maximum: int) -> int:
             f'{name} is {shown(value)}, accepted is an integer from {minimum} to {maximum}'
         )
     return integer
+
+
+def checked_text(value: Any, name: str) -> str:
+    """Return a value as a printable text, or raise a ValueError that calls it `name`."""
+    if isinstance(value, str) and len(value) <= MAXIMUM_TEXT and value.isprintable():
+        return value if type(value) is str else str(value)
+    raise ValueError(
+        f'{name} is {shown(value)}, accepted is a printable text of at most {MAXIMUM_TEXT} '
+        'characters'
+    )
 
 
 def checked_number(value: Any, name: str, minimum: float, maximum: float) -> float:
@@ -174,4 +187,5 @@ _CHECKS: dict[str, Callable[[Any, str], Any]] = {
     'angle': _numbers(-2 * math.pi, 2 * math.pi),
     'confidence': _numbers(0, 1),
     'covariance': _covariance,
+    'family': checked_text,
 }

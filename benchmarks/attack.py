@@ -111,6 +111,7 @@ _GOOD = {
     'angle': st.floats(-6, 6),
     'confidence': st.floats(0, 1),
     'covariance': st.tuples(_VARIANCES, st.just(0), st.just(0.0), _VARIANCES),
+    'family': st.sampled_from(('', 'metashape12')),
 }
 _BAD = st.one_of(
     NUMBERS,

@@ -103,6 +103,8 @@ def test_the_summary_says_how_many_and_through_what():
     through = FilterState(applied=True, gamma_high=1.2, gamma_low=0.25)
     told = summary(Identification((target(7),), 54, through))
     assert told == '1 identified of 54, gamma_high 1.2, gamma_low 0.25'
+    mirrored = Identification((target(7),), 54, mirrored=True)
+    assert summary(mirrored) == '1 identified of 54, mirrored, no filter'
     estimated = Identification((target(7),), 54, estimated=True)
     assert summary(estimated) == '1 identified of an estimated 54, no filter'
 

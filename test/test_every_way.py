@@ -31,6 +31,7 @@ from support.packages import MINE, my_detector, write_package
 SCENE = {'width': 400, 'height': 300, 'targets': 4, 'dot_radius': 10.0}
 SCENES = {'gsi': SCENE | {'width': 560, 'height': 420, 'dot_radius': 5.0}}
 SQUARES = ('aruco_4x4_50', 'apriltag_36h11')
+BOTH = 'metashape12,aicon14'
 NO_MARKERS = pytest.mark.skipif(
     not hasattr(getattr(cv2, 'aruco', None), 'ArucoDetector'),
     reason=f'OpenCV {cv2.__version__} has no square markers',
@@ -61,6 +62,7 @@ class Case:
 CASES = (
     *(Case(family) for family in FAMILY_NAMES if not family.startswith(('aruco', 'apriltag'))),
     *(Case(family) for family in SQUARES),
+    *(Case(families) for families in (BOTH, 'auto')),
     Case(detector='traditional', light='stripe', expected_targets=4),
     Case(detector='command', command=COMMAND),
     Case(detector=MINE),
@@ -79,8 +81,10 @@ Answer = tuple[str, list[tuple[Any, ...]]]
 
 @cache
 def image(case: Case) -> np.ndarray:
-    scene = SCENES.get(case.family, SCENE) | {'family': case.family, 'light': case.light}
-    return render(SceneSettings(**scene, seed=1)).image
+    names = BOTH.split(',') if case.family in (BOTH, 'auto') else [case.family]
+    light = {'light': case.light}
+    scenes = [SCENES.get(name, SCENE) | {'family': name} | light for name in names]
+    return np.hstack([render(SceneSettings(**scene, seed=1)).image for scene in scenes])
 
 
 @cache
@@ -96,7 +100,7 @@ def by_library(case: Case) -> Answer:
 
 def answer(family: str, targets: Any) -> Answer:
     """Return an answer from targets or from messages of targets."""
-    return family, [(it.id, it.code, it.x, it.y, *it.covariance) for it in targets]
+    return family, [(it.id, it.family, it.code, it.x, it.y, *it.covariance) for it in targets]
 
 
 @pytest.fixture(scope='module', autouse=True)
@@ -125,7 +129,9 @@ def ahf(*words: object, case: Case) -> str:
 @EVERY_CASE
 def test_the_library_identifies_something(case: Case) -> None:
     _, targets = by_library(case)
-    assert len({number for number, *_ in targets}) >= 3
+    expected = BOTH.split(',') if case.family in (BOTH, 'auto') else [case.family]
+    for family in expected:
+        assert len({number for number, of, *_ in targets if of in (family, '')}) >= 3
 
 
 @EVERY_CASE

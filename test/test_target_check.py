@@ -20,7 +20,7 @@ from benchmarks import attack
 from benchmarks.attack import Hostile
 
 NAMES = [item.name for item in fields(Target)]
-GOOD = Target(7, 9, 10.5, 20.25, 4.0, 3.0, 0.1, 0.9, (0.1, 0.01, 0.01, 0.2))
+GOOD = Target(7, 9, 10.5, 20.25, 4.0, 3.0, 0.1, 0.9, (0.1, 0.01, 0.01, 0.2), 'aicon12')
 IMAGE = np.tile(np.arange(40, dtype=np.uint8), (30, 1))
 
 
@@ -55,6 +55,11 @@ def changed(**values: object) -> Target:
         ('covariance', (1, 2, 2, 1), 'positive semidefinite'),
         ('covariance', (1, 0.5, -0.5, 1), 'symmetric'),
         ('covariance', (1, 0, 0, math.nan), 'four finite numbers'),
+        ('family', None, 'a printable text of at most 200 characters'),
+        ('family', 7, 'a printable text'),
+        ('family', 'a' * 201, 'a printable text'),
+        ('family', 'two\nlines', 'a printable text'),
+        ('family', '\ud800', 'a printable text'),
     ],
 )
 def test_what_is_not_accepted_is_named(field, value, accepted):
@@ -82,11 +87,12 @@ def test_numbers_of_numpy_are_converted():
         np.float16(0.5),
         1,
         np.array([[1, 0], [0, 2]]),
+        np.str_('aicon12'),
     )
     checked = checked_target(target, 'x')
-    assert checked == Target(7, 9, 10.5, 20.0, 4.0, 3.0, 0.5, 1.0, (1.0, 0.0, 0.0, 2.0))
+    assert checked == Target(7, 9, 10.5, 20.0, 4.0, 3.0, 0.5, 1.0, (1.0, 0.0, 0.0, 2.0), 'aicon12')
     types = [type(getattr(checked, name)) for name in NAMES]
-    assert types == [int, int, float, float, float, float, float, float, tuple]
+    assert types == [int, int, float, float, float, float, float, float, tuple, str]
     assert all(type(it) is float for it in checked.covariance)
 
 

@@ -18,7 +18,7 @@ from ahf_ros.detectors import Detector, create_detector
 from ahf_ros.drawing import draw, summary
 from ahf_ros.interchange.image_files import orientation_note, read_image, write_image
 from ahf_ros.interchange.target_json import to_json
-from ahf_ros.session import IdentificationSettings, identify
+from ahf_ros.session import IdentificationSettings, create_identifier, identify
 from ahf_ros.target import Identification
 from ahf_ros.text import reason_of
 
@@ -56,6 +56,7 @@ def run(options: argparse.Namespace) -> int:
     settings = settings_from(options, IdentificationSettings)
     overlays = _overlay_paths(options.images, options.overlay)
     detector = create_detector(settings.detector, settings.detection)
+    create_identifier(settings, detector)  # refuses what does not fit together, before any image
     failed = False
     for path in _with_progress(options.images):
         try:
@@ -116,11 +117,17 @@ def _report(path: str, found: Identification, with_targets: bool) -> None:
     """Report the identified targets on standard error."""
     seconds = found.filter.duration
     print(f'{path}: {summary(found)}, {seconds:.2f} s', file=sys.stderr)
+    if found.mirrored:
+        print(
+            f'{path}: the image seems to be mirrored: most IDs are not among the expected ones, '
+            'and most would be in a mirror',
+            file=sys.stderr,
+        )
     if not with_targets:
         return
     for target in found.targets:
         print(
-            f'{target.id:>8} {target.x:10.3f} {target.y:10.3f} px'
+            f'{target.id:>8} {target.family:<11} {target.x:10.3f} {target.y:10.3f} px'
             f'  semi-axes {target.semi_major:.2f} {target.semi_minor:.2f} px'
             f'  confidence {target.confidence:.3f}',
             file=sys.stderr,

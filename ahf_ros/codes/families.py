@@ -1,8 +1,15 @@
-"""All families of coded targets, by the kind of their print."""
+"""All families of coded targets, by the kind of their print, and lists of families."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+from itertools import combinations
+
+import numpy as np
+
 from ahf_ros.codes import ring, square
+from ahf_ros.codes.dots import dot_family
+from ahf_ros.codes.gsi_library import point_family
 
 KINDS: dict[str, tuple[str, ...]] = {
     'ring': ring.FAMILY_NAMES,
@@ -15,3 +22,176 @@ KINDS: dict[str, tuple[str, ...]] = {
 
 FAMILY_NAMES = tuple(name for names in KINDS.values() for name in names)
 """The families that `family` accepts."""
+
+AUTO = 'auto'
+"""Stands for all families of `LISTED`."""
+
+LISTED = KINDS['ring']
+"""The families of which several may be given, separated by commas: they are read together."""
+
+ACCEPTED = (
+    f'one of {", ".join(FAMILY_NAMES)}; several of {", ".join(LISTED)}, separated by commas; or '
+    f'{AUTO} for all of these'
+)
+"""Description of what `family` accepts."""
+
+_SHOWN = 10  # IDs in an error
+
+
+def families_in(text: str) -> tuple[str, ...]:
+    """Return the families that a text names.
+
+    Parameters
+    ----------
+    text : str
+        A family, several ring families separated by commas, or 'auto' for all of them.
+
+    Returns
+    -------
+    tuple of str
+        Names of different families, in the order of the text.
+
+    Raises
+    ------
+    ValueError
+        If there is no family; if one is unknown or named twice; if two are of different kinds or
+        have the same print; or if families of their kind are not read together.
+
+    Examples
+    --------
+    >>> families_in('metashape12, aicon14')
+    ('metashape12', 'aicon14')
+    >>> families_in('auto') == LISTED
+    True
+    """
+    if text == AUTO:
+        return LISTED
+    names = tuple(part.strip() for part in text.split(','))
+    shown = f'family is {text!r}'
+    for name in names:
+        if name not in FAMILY_NAMES:
+            where = f'{shown}, which names {name!r}' if len(names) > 1 else shown
+            raise ValueError(f'{where}, accepted is {ACCEPTED}')
+    if len(names) > 1:
+        _check_list(names, shown)
+    return names
+
+
+def numbers_of(name: str, file: str = '') -> Sequence[int]:
+    """Return the IDs of a family, ascending.
+
+    Parameters
+    ----------
+    name : str
+        One of `FAMILY_NAMES`.
+    file : str
+        Data file that describes the family, for `gsi` and `dots`; the usual one where empty.
+
+    Raises
+    ------
+    ValueError
+        If there is no such family, or the data file is not accepted.
+    """
+    if name == 'gsi':
+        return sorted(point_family(file).numbers.tolist())
+    if name == 'dots':
+        return range(1, dot_family(file).words.size + 1)
+    if name in square.SQUARE_NAMES:
+        return range(square.dictionary(name).bytesList.shape[0])
+    return range(1, ring.family(name).words.size + 1)
+
+
+def check_numbers(field: str, numbers: Iterable[int], families: Sequence[str], file: str) -> None:
+    """Refuse numbers that are no ID of any of some families.
+
+    Parameters
+    ----------
+    field : str
+        What errors call the numbers.
+    numbers : iterable of int
+    families : sequence of str
+        Some of `FAMILY_NAMES`.
+    file : str
+        As for `numbers_of`.
+
+    Raises
+    ------
+    ValueError
+        If there are such numbers; the message names them.
+    """
+    missing = sorted(set(numbers))
+    for name in families:
+        known = frozenset(numbers_of(name, file))
+        missing = [number for number in missing if number not in known]
+    if not missing:
+        return
+    shown = ', '.join(map(str, missing[:_SHOWN]))
+    if len(missing) > _SHOWN:
+        shown += f' and {len(missing) - _SHOWN} more'
+    ranges = [(name, numbers_of(name, file)) for name in families]
+    accepted = ', '.join(f'{name} from {all_[0]} to {all_[-1]}' for name, all_ in ranges)
+    raise ValueError(f'{field} has {shown}, accepted are IDs of {accepted}')
+
+
+def mirrored_number(name: str, code: int) -> int | None:
+    """Return the ID that a code has in a mirror.
+
+    Parameters
+    ----------
+    name : str
+        Name of a family.
+    code : int
+        One of its code words.
+
+    Returns
+    -------
+    int or None
+        The same ID for a symmetric target; None for families that cannot be read in a mirror.
+
+    Examples
+    --------
+    >>> mirrored_number('metashape12', 71)
+    12
+    """
+    if name not in ring.FAMILY_NAMES:
+        return None
+    family = ring.family(name)
+    return family.number(ring.mirrored(code, family.bits))
+
+
+def _check_list(names: Sequence[str], shown: str) -> None:
+    """Refuse families that cannot be read together."""
+    kinds = {name: kind for kind, of_kind in KINDS.items() for name in of_kind}
+    for first, second in combinations(names, 2):
+        if first == second:
+            raise ValueError(f'{shown}, which names {first} twice, accepted is each family once')
+        if kinds[first] != kinds[second]:
+            raise ValueError(
+                f'{shown}, but {first} is read by the detector {kinds[first]} and {second} by the '
+                f'detector {kinds[second]}; accepted are families of one detector, which reads '
+                'them together'
+            )
+        if _same_print(first, second):
+            raise ValueError(
+                f'{shown}, but targets of {first} and {second} have the same print; accepted is '
+                'one of them'
+            )
+    if names[0] not in LISTED:
+        raise ValueError(
+            f'{shown}, but the detector {kinds[names[0]]} reads one family; accepted are several '
+            f'of {", ".join(LISTED)}'
+        )
+
+
+def _same_print(first: str, second: str) -> bool:
+    """Return whether targets of two families of one kind have the same print."""
+    if first in ring.FAMILY_NAMES:
+        one, other = ring.family(first), ring.family(second)
+        same = (one.bits, one.band_inner, one.band_outer) == (
+            other.bits,
+            other.band_inner,
+            other.band_outer,
+        )
+        return same and bool(np.intersect1d(one.words, other.words).size)
+    # The dictionaries of ArUco with one number of cells begin with the same markers.
+    return first in square.ARUCO_NAMES and first.rpartition('_')[0] == second.rpartition('_')[0]

@@ -71,7 +71,7 @@ def family(name: str) -> Family:
     if name not in _VENDORS_AND_BITS:
         raise ValueError(f'family is {name!r}, accepted is one of {", ".join(FAMILY_NAMES)}')
     vendor, bits = _VENDORS_AND_BITS[name]
-    words = _even_canonical_words(bits)[:-1]  # without all ones, a ring that has no sectors
+    words = _even_canonical_words(bits)
     half = bits // 2
     if vendor == 'metashape':
         words = words[words > (1 << half) + 1]
@@ -80,6 +80,17 @@ def family(name: str) -> Family:
     words.setflags(write=False)
     inner, outer = _BAND_RADII[vendor]
     return Family(name, bits, words, inner, outer)
+
+
+def mirrored(word: int, bits: int) -> int:
+    """Return a word as it reads in a mirror, in some rotation.
+
+    Examples
+    --------
+    >>> f'{mirrored(0b1011, 6):06b}'
+    '110100'
+    """
+    return int(f'{word:0{bits}b}'[::-1], 2)
 
 
 def canonical(words: np.ndarray, family: Family) -> tuple[np.ndarray, np.ndarray]:
@@ -120,8 +131,9 @@ def sectors(word: int, bits: int) -> np.ndarray:
 
 
 def _even_canonical_words(bits: int) -> np.ndarray:
-    """Return the words of even parity that are their own smallest rotation, ascending."""
-    words = np.arange(1 << bits, dtype=np.int64)
+    """Return the words of even parity, not all ones, that are their own smallest rotation."""
+    # Any other word than zero has a smaller rotation if it is even or has its highest bit.
+    words = np.append(0, np.arange(1, 1 << (bits - 1), 2, dtype=np.int64))
     parity = np.zeros_like(words)
     for bit in range(bits):
         parity ^= words >> bit & 1

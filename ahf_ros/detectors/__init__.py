@@ -7,14 +7,14 @@ points of the group `ahf_ros.detectors`: the name of a detector, and a callable 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 import numpy as np
 
-from ahf_ros.codes.families import FAMILY_NAMES, KINDS
+from ahf_ros.codes.families import FAMILY_NAMES, KINDS, check_numbers, families_in
 from ahf_ros.detectors.contract import Detector, DetectorSettings, Drafter, Refiner
 from ahf_ros.detectors.dots.detector import DotsDetector
 from ahf_ros.detectors.dots.published import PublishedDotsDetector
@@ -38,6 +38,7 @@ __all__ = [
     'DetectorSettings',
     'Drafter',
     'Refiner',
+    'check_expected_ids',
     'create_detector',
     'detector_name',
     'estimator',
@@ -57,18 +58,23 @@ class _Entry:
     create: Callable[[DetectorSettings], Detector]
     families: tuple[str, ...]
     estimate: Callable[[np.ndarray, DetectorSettings], int] | None = None
+    several: bool = False  # families at a time
+    own_ids: bool = False  # rather than those of the families
+
+    def reads(self, families: tuple[str, ...]) -> bool:
+        return set(families) <= set(self.families) and (self.several or len(families) == 1)
 
 
 # The detector of a family is the first one that lists it.
 _ENTRIES = {
-    'ring': _Entry(RingDetector, KINDS['ring'], estimate_count),
+    'ring': _Entry(RingDetector, KINDS['ring'], estimate_count, several=True),
     'traditional': _Entry(TraditionalDetector, KINDS['ring']),
     'aruco': _Entry(SquareDetector, KINDS['aruco']),
     'apriltag': _Entry(SquareDetector, KINDS['apriltag']),
     'gsi': _Entry(GsiDetector, KINDS['gsi']),
     'dots': _Entry(DotsDetector, KINDS['dots']),
     'dots_published': _Entry(PublishedDotsDetector, KINDS['dots']),
-    'command': _Entry(CommandDetector, FAMILY_NAMES),
+    'command': _Entry(CommandDetector, FAMILY_NAMES, several=True, own_ids=True),
 }
 
 _ADDED: dict[str, EntryPoint] = {
@@ -129,24 +135,46 @@ def detector_name(name: str, family: str) -> str:
     name : str
         One of `DETECTOR_NAMES`, or 'auto' for the detector of the family.
     family : str
-        One of `FAMILY_NAMES`.
+        One of `FAMILY_NAMES`, or several as `families_in` accepts them.
 
     Raises
     ------
     ValueError
-        If there is no such detector, or it does not identify the family.
+        If there is no such detector, or it does not identify the family or several of them.
     """
     DETECTOR.check(name)
-    fitting = [of for of, entry in _ENTRIES.items() if family in entry.families]
+    families = families_in(family)
+    fitting = [of for of, entry in _ENTRIES.items() if entry.reads(families)]
     if name == AUTO:
         return fitting[0]
     if name in _ENTRIES and name not in fitting:
+        several = ', alone or together' if _ENTRIES[name].several else ''
         raise ValueError(
             f'detector is {name!r} and family is {family!r}; accepted with this family is one of '
             f'{", ".join((AUTO, *fitting, *_ADDED))}, and with this detector one of '
-            f'{", ".join(_ENTRIES[name].families)}'
+            f'{", ".join(_ENTRIES[name].families)}{several}'
         )
     return name
+
+
+def check_expected_ids(ids: Iterable[int], name: str, settings: DetectorSettings) -> None:
+    """Refuse IDs that a detector cannot report.
+
+    Parameters
+    ----------
+    ids : iterable of int
+    name : str
+        Name of the detector. One that is no part of this package may report any ID.
+    settings : DetectorSettings
+        What the targets look like.
+
+    Raises
+    ------
+    ValueError
+        If there are IDs that none of the families has.
+    """
+    if name in _ENTRIES and not _ENTRIES[name].own_ids:
+        check_numbers('expected_ids', ids, settings.families, settings.family_file)
 
 
 def estimator(settings: DetectorSettings) -> Callable[[np.ndarray], int]:

@@ -8,7 +8,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from ahf_ros.codes.families import FAMILY_NAMES
+from ahf_ros.codes.families import ACCEPTED, families_in
 from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.target import Target
 
@@ -45,7 +45,7 @@ class Detector(Protocol):
 
     @property
     def family(self) -> str:
-        """Family of the targets that it identifies, as in results."""
+        """Family of its targets, as in results, or several as the settings list them."""
         ...
 
     def __call__(self, image: np.ndarray) -> list[Target]:
@@ -110,7 +110,8 @@ class DetectorSettings:
     Attributes
     ----------
     family : str
-        One of `ahf_ros.codes.families.FAMILY_NAMES`.
+        One of `ahf_ros.codes.families.FAMILY_NAMES`, several ring families separated by commas, or
+        'auto' for all of these; `families` has them one by one.
     family_file : str
         Path of a data file that describes the family `gsi` or `dots`; empty for the usual design.
     polarity : str
@@ -133,8 +134,9 @@ class DetectorSettings:
 
     family: str = parameter(
         'metashape12',
-        'Family of the coded targets. It also chooses the detector where that is auto.',
-        choices=FAMILY_NAMES,
+        'Family of the coded targets, or several. It also chooses the detector where that is '
+        'auto.',
+        form=ACCEPTED,
     )
     family_file: str = parameter(
         '', 'Data file that describes the family gsi or dots; empty: the usual design.'
@@ -169,12 +171,18 @@ class DetectorSettings:
     def __post_init__(self) -> None:
         """Refuse values that are not accepted."""
         check_parameters(self)
+        families_in(self.family)
         minimum, maximum = self.radii
         if minimum > maximum:
             raise ValueError(
                 f'min_radius is {minimum!r}, accepted is a number of at most max_radius, '
                 f'{maximum!r}'
             )
+
+    @property
+    def families(self) -> tuple[str, ...]:
+        """The families that `family` names."""
+        return families_in(self.family)
 
     @property
     def radii(self) -> tuple[float, float]:

@@ -28,6 +28,7 @@ def targets_from_frames(
     ids: np.ndarray,
     codes: np.ndarray,
     confidence: np.ndarray,
+    family: str | np.ndarray,
 ) -> list[Target]:
     """Return targets, in the order given.
 
@@ -42,10 +43,13 @@ def targets_from_frames(
     codes : ndarray of int, shape (k,)
         Code words; 0 is reported where the ID is `UNDECODED`.
     confidence : ndarray of float64, shape (k,)
+    family : str, or ndarray of str, shape (k,)
+        Names of the families of the codes; none is reported where the ID is `UNDECODED`.
     """
-    codes = np.where(ids == UNDECODED, 0, codes)
-    rows = (ids.tolist(), codes.tolist(), confidence.tolist(), ellipse_fields(frames, covariance))
+    undecoded = ids == UNDECODED
+    columns = (ids, np.where(undecoded, 0, codes), confidence, np.where(undecoded, '', family))
+    rows = (*(column.tolist() for column in columns), ellipse_fields(frames, covariance))
     return [
-        Target(id=identifier, code=code, confidence=certainty, **fields)
-        for identifier, code, certainty, fields in zip(*rows, strict=True)
+        Target(id=identifier, code=code, confidence=certainty, family=name, **fields)
+        for identifier, code, certainty, name, fields in zip(*rows, strict=True)
     ]

@@ -50,16 +50,16 @@ def fused(results: Sequence[Sequence[Target]]) -> list[Target]:
         Sorted by ID; each as the best of its filters shows it.
     """
     claims: list[_Claim] = []
-    by_id: dict[int, list[_Claim]] = {}
+    by_key: dict[tuple[str, int], list[_Claim]] = {}
     for index, targets in enumerate(results):
         for target in targets:
             if target.id == UNDECODED:
                 continue
-            same = [claim for claim in by_id.get(target.id, []) if claim.near(target)]
+            same = [claim for claim in by_key.get(target.key, []) if claim.near(target)]
             if not same:
                 same = [_Claim(target, index)]
                 claims.append(same[0])
-                by_id.setdefault(target.id, []).append(same[0])
+                by_key.setdefault(target.key, []).append(same[0])
             same[0].filters.add(index)
     kept = [
         claim.target
@@ -69,7 +69,7 @@ def fused(results: Sequence[Sequence[Target]]) -> list[Target]:
             len(claim.filters) >= _MAJORITY * len(other.filters)
             for other in claims
             if other is not claim
-            and (other.target.id == claim.target.id or claim.near(other.target))
+            and (other.target.key == claim.target.key or claim.near(other.target))
         )
     ]
     return sorted_targets(kept)

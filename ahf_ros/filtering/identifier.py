@@ -26,6 +26,7 @@ import numpy as np
 from ahf_ros.filtering.fusion import fused
 from ahf_ros.filtering.genes import tuned
 from ahf_ros.filtering.genetic import SearchResult, Values, search
+from ahf_ros.filtering.mirroring import MirroredId, is_mirrored
 from ahf_ros.filtering.settings import AdaptiveSettings
 from ahf_ros.filtering.trials import DetectorFunction, Trials, confirmed
 from ahf_ros.imaging.image import check_image
@@ -97,6 +98,8 @@ class Identifier:
         for.
     interrupt : callable, optional
         Called before each identification; what it raises ends `identify`.
+    mirrored : callable, optional
+        From a target to the ID that it has in a mirror, None if that is unknown.
     name : str
         What errors call the detector.
     clock : callable, optional
@@ -127,6 +130,7 @@ class Identifier:
         draft: DetectorFunction | None = None,
         estimate: Estimate | None = None,
         interrupt: Callable[[], None] | None = None,
+        mirrored: MirroredId | None = None,
         name: str = 'detector',
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -141,6 +145,7 @@ class Identifier:
         self._refine = refine
         self._estimate = estimate
         self._clock = clock
+        self._mirrored = mirrored
         self._name = name
 
     def reset(self) -> None:
@@ -214,7 +219,12 @@ class Identifier:
         if choice.filter:
             state = replace(state, applied=True, **asdict(tuned(image.shape, choice.filter)))
         ordered = sorted_targets(targets)
-        return Identification(tuple(ordered), choice.expected, state, estimating)
+        mirrored = self._mirrored is not None and is_mirrored(
+            trials.targets[choice.filter] + trials.others[choice.filter],
+            settings.listed,
+            self._mirrored,
+        )
+        return Identification(tuple(ordered), choice.expected, state, estimating, mirrored)
 
     def _steady(self, trials: Trials, executor: Executor | None) -> _Choice | None:
         """Return the filter and N of the image before if it still shows the same n."""

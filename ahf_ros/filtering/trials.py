@@ -48,6 +48,8 @@ class Trials:
         As given.
     targets : dict
         From the values of a filter to its targets; None stands for the image as received.
+    others : dict
+        The same for the targets whose IDs are not listed.
     """
 
     def __init__(
@@ -62,6 +64,7 @@ class Trials:
         self.image = image
         self._listed = listed
         self.targets: dict[Values | None, list[Target]] = {}
+        self.others: dict[Values | None, list[Target]] = {}
         self._detector = detector
         self._draft = draft
         self._settings = settings
@@ -79,11 +82,12 @@ class Trials:
         """Return n through a filter."""
         if values not in self.targets:
             found = checked_targets(self._found(values, executor), self._name)
-            self.targets[values] = [
-                target
-                for target in found
-                if not self._listed or target.id == UNDECODED or target.id in self._listed
-            ]
+            wanted = self._listed | {UNDECODED}
+            listed, others = found, []
+            if self._listed:
+                listed = [target for target in found if target.id in wanted]
+                others = [target for target in found if target.id not in wanted]
+            self.others[values], self.targets[values] = others, listed
         return count_codes(self.targets[values])
 
     def reduced(self) -> Trials:

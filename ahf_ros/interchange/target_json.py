@@ -23,6 +23,7 @@ _ABSENT = {
     'angle': 0.0,
     'confidence': 1.0,
     'covariance': (0.0, 0.0, 0.0, 0.0),
+    'family': '',
 }
 """What the optional fields of a target are where they are not given."""
 
@@ -45,7 +46,7 @@ def to_json(
     shape : tuple of int
         Height and width of the image, px.
     family : str
-        Name of the family of targets.
+        What was looked for: a family, or several as the settings list them.
     detector : str
         Name of the detector.
     """
@@ -60,6 +61,7 @@ def to_json(
         'detector': detector,
         'expected': identification.expected,
         'estimated': identification.estimated,
+        'mirrored': identification.mirrored,
         'targets': [asdict(target) for target in identification.targets],
         'filter': used,
         'elapsed_s': elapsed,

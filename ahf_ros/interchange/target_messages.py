@@ -32,7 +32,7 @@ def coded_target_array(
     identification : Identification
         The identification of one image.
     family : str
-        Name of the family of the targets.
+        What was looked for: a family, or several as the settings list them.
     shape : tuple of int
         Height and width of the image, px.
     header : std_msgs/Header
@@ -53,6 +53,7 @@ def coded_target_array(
         family=family,
         expected=identification.expected,
         estimated=identification.estimated,
+        mirrored=identification.mirrored,
         targets=[_coded_target(target, types) for target in identification.targets],
         filter=types.FilterState(**asdict(identification.filter)),
     )
@@ -68,6 +69,7 @@ def identification_from(message: Any) -> Identification:
         message.expected,
         FilterState(**_values(FilterState, message.filter)),
         message.estimated,
+        message.mirrored,
     )
 
 

@@ -106,6 +106,8 @@ class Diagnostics:
         if rejected_clouds and not rejected:
             level = DiagnosticStatus.WARN
             message = f'{rejected_clouds} clouds rejected: {clouds.reason}'
+        if tally.last.mirrored and level == DiagnosticStatus.OK:
+            level, message = DiagnosticStatus.WARN, 'the last image seems to be mirrored'
         if tally.mistaken:
             level, message = DiagnosticStatus.WARN, tally.mistaken
         used = tally.last.filter
@@ -121,6 +123,7 @@ class Diagnostics:
             'identified (n)': tally.last.count,
             'expected (N)': tally.last.expected,
             'N estimated': tally.last.estimated,
+            'mirrored': tally.last.mirrored,
             'filter applied': used.applied,
             'gamma_high': f'{used.gamma_high:.2f}',
             'gamma_low': f'{used.gamma_low:.2f}',

@@ -37,6 +37,9 @@ class Parameter:
         Accepted texts; empty if any is accepted.
     read_only : bool
         Whether a node takes it at its start only.
+    form : str
+        Description of the accepted texts where the settings check them; empty if `choices` or the
+        type say it.
     """
 
     name: str
@@ -46,10 +49,13 @@ class Parameter:
     maximum: float | None = None
     choices: tuple[str, ...] = ()
     read_only: bool = False
+    form: str = ''
 
     @property
     def accepted(self) -> str:
         """Description of the accepted values."""
+        if self.form:
+            return self.form
         if self.choices:
             return f'one of {", ".join(self.choices)}'
         kind = {bool: 'true or false', int: 'an integer', float: 'a number', str: 'a text'}
@@ -90,9 +96,10 @@ def parameter(
     maximum: float | None = None,
     choices: Iterable[str] = (),
     read_only: bool = False,
+    form: str = '',
 ) -> Any:
     """Return a dataclass field that carries a `Parameter`."""
-    item = Parameter('', default, description, minimum, maximum, tuple(choices), read_only)
+    item = Parameter('', default, description, minimum, maximum, tuple(choices), read_only, form)
     return field(default=default, metadata={_KEY: item})
 
 

@@ -268,7 +268,7 @@ def _coded_targets(
         x, y = camera.project(mark.centre[None])[0].tolist()
         ellipse = camera.circle(mark.centre, design.radius * mark.radius)
         marks.append(mark)
-        targets.append(Target(number, design.code, x, y, *ellipse))
+        targets.append(Target(number, design.code, x, y, *ellipse, family=settings.family))
     return marks, targets, placements
 
 

@@ -21,8 +21,8 @@ from ahf_ros.synthetic.scene import SceneSettings
 ROOT = Path(__file__).resolve().parents[2]
 SCENE = ['--width', '640', '--height', '480', '--targets', '6', '--dot-radius', '10']
 KEYS = (
-    'image width height family detector expected estimated targets filter elapsed_s',
-    'id code x y semi_major semi_minor angle confidence covariance',
+    'image width height family detector expected estimated mirrored targets filter elapsed_s',
+    'id code x y semi_major semi_minor angle confidence covariance family',
     'applied gamma_high gamma_low cutoff attenuation evaluations generations',
 )
 

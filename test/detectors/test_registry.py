@@ -59,6 +59,8 @@ def test_every_family_chooses_a_detector():
     [
         ('aruco', 'metashape12', ['auto, ring, traditional, command', 'aruco_4x4_50, ']),
         ('ring', 'apriltag_36h11', ['auto, apriltag, command', 'one of metashape12, ']),
+        ('traditional', 'auto', ['auto, ring, command', 'one of metashape12, ']),
+        ('aruco', 'metashape12,aicon12', ['auto, ring, command', 'aruco_4x4_50, ']),
     ],
 )
 def test_a_detector_that_does_not_identify_the_family_is_refused(name, family, accepted):

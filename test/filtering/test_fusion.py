@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ahf_ros.filtering.fusion import fused
@@ -40,6 +42,12 @@ def test_one_id_at_two_places():
     here, there = [at(1, 100)], [at(1, 400)]
     assert places([here, there, here, here]) == [(1, 100)]
     assert places([here, there, here, there]) == []
+
+
+def test_one_id_of_two_families_is_two_targets():
+    here, there = [replace(at(1, 100), family='aicon12')], [replace(at(1, 400), family='aicon14')]
+    assert places([[*here, *there], here, there]) == [(1, 100), (1, 400)]
+    assert places([here, there, [*here, *there]]) == [(1, 100), (1, 400)]
 
 
 def test_undecoded_targets_are_left_out_and_nothing_is_nothing():

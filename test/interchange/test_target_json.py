@@ -13,11 +13,12 @@ from ahf_ros.target import FilterState, Identification, Target
 
 def test_what_becomes_json_is_read_again():
     covariance = (0.1, 0.01, 0.01, 0.2)
-    target = Target(7, 19, 1.25, 2.5, 20.0, 18.0, 0.3, 0.9, covariance)
+    target = Target(7, 19, 1.25, 2.5, 20.0, 18.0, 0.3, 0.9, covariance, 'aicon14')
     found = Identification((target,), 4, FilterState(True, 2.0, 0.5, 80.0, 1.5, 9, 1, 0.25), True)
     printed = json.loads(json.dumps(to_json(found, 'in/a.png', (30, 20), 'ring12', 'ring')))
     assert targets_from_json(printed, 'record') == [target]
     assert (printed['width'], printed['height']) == (20, 30)
+    assert (printed['family'], printed['mirrored']) == ('ring12', False)
     assert (printed['elapsed_s'], printed['filter']['evaluations']) == (0.25, 9)
 
 
@@ -32,6 +33,7 @@ def test_results_need_only_ids_and_places(tmp_path):
     assert list(results) == ['a.png', 'b.png']
     (target,) = results['a.png']
     assert (target.id, target.x, target.y) == (4, 1.5, 2.0)
+    assert target.family == ''
 
 
 def test_results_from_standard_input(monkeypatch):
@@ -59,6 +61,10 @@ def test_results_from_standard_input(monkeypatch):
             'line 1: target 0: id is 1.5',
         ),
         ('{"image": "a", "targets": [{"id": 1, "x": NaN, "y": 3}]}', 'line 1: target 0: x is nan'),
+        (
+            '{"image": "a", "targets": [{"id": 1, "x": 2, "y": 3, "family": 4}]}',
+            'line 1: target 0: family is 4, accepted is a printable text',
+        ),
         (
             '{"image": "a", "targets": []}\n{"image": "b/a", "targets": []}',
             'line 2: a was on',

@@ -17,22 +17,36 @@ FOUND = Identification(
     (
         Target(UNDECODED, 0, -0.25, 1e-9, 4.5, 4.25, -1.5, 0.5),
         Target(
-            516, 2**20 - 1, 3983.123456789, 2655.5, 20.0, 19.5, 0.25, 1.0, (1e-4, 0.0, 0.0, 4e-4)
+            id=516,
+            code=2**20 - 1,
+            x=3983.123456789,
+            y=2655.5,
+            semi_major=20.0,
+            semi_minor=19.5,
+            angle=0.25,
+            confidence=1.0,
+            covariance=(1e-4, 0.0, 0.0, 4e-4),
+            family='metashape20',
         ),
     ),
     54,
     FilterState(True, 2.75, 0.5, 1700.25, 2.25, 200, 12, 3.5),
+    True,
     True,
 )
 
 
 def test_nothing_is_lost_on_the_way() -> None:
     header = Header(frame_id='camera')
-    sent = coded_target_array(FOUND, 'metashape20', (2656, 3984), header, msg)
+    sent = coded_target_array(FOUND, 'metashape20,aicon14', (2656, 3984), header, msg)
     received = deserialize_message(serialize_message(sent), CodedTargetArray)
     assert identification_from(received) == FOUND
     assert received.header == header
-    assert (received.width, received.height, received.family) == (3984, 2656, 'metashape20')
+    assert (received.width, received.height, received.family) == (
+        3984,
+        2656,
+        'metashape20,aicon14',
+    )
 
 
 def test_nothing_identified_is_a_message_too() -> None:

@@ -24,6 +24,7 @@ from ahf_ros.codes.dots import DotFamily, dot_family
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.dots.local_otsu import local_otsu
 from ahf_ros.detectors.dots.resolving import best_of_each
+from ahf_ros.detectors.dots.rings import FAMILY
 from ahf_ros.features.ellipse_targets import targets_from_frames
 from ahf_ros.features.frame import affine_frames, circle_points, project
 from ahf_ros.features.sampling import sample, within
@@ -169,7 +170,8 @@ def _identified(
     covariance = error[:, None, None] * np.eye(2)
     shown = np.flatnonzero(inside)
     return targets_from_frames(
-        *(column[shown] for column in (frames, covariance, ids, code.canonical(words), certainty))
+        *(column[shown] for column in (frames, covariance, ids, code.canonical(words), certainty)),
+        FAMILY,
     )
 
 

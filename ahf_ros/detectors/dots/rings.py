@@ -27,6 +27,9 @@ from ahf_ros.features.homography import local_frames
 from ahf_ros.features.pyramid import ImagePyramid
 from ahf_ros.target import UNDECODED, DottedTarget
 
+FAMILY = 'dots'
+"""Name of the family, whichever data file describes it."""
+
 CERTAIN = 0.95
 """Confidence from which a target is reported."""
 
@@ -142,6 +145,7 @@ def _targets(rings: Rings, ids: np.ndarray, code: DotFamily) -> list[DottedTarge
             code=of_code,
             confidence=sure,
             polarity=sign,
+            family='' if identifier == UNDECODED else FAMILY,
             **ellipses(frame[None], word, phase, code),
             **place,
         )

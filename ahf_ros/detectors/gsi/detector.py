@@ -32,6 +32,7 @@ from ahf_ros.features.pyramid import ImagePyramid, image_pyramid
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, DottedTarget, Target, sorted_targets
 
+_FAMILY = 'gsi'  # whichever data file describes it
 _FARTHEST = 1.0  # that the reference point is moved by a refinement, px, or dot radii
 
 
@@ -153,6 +154,7 @@ def report(hypotheses: Hypotheses, code: PointFamily) -> list[Target]:
             id=code.number(int(word)) or 0,
             code=int(word),
             confidence=float(confidence),
+            family=_FAMILY,
             template_dots=len(code.template),
             polarity=int(polarity),
             **of_target,
@@ -186,7 +188,7 @@ def uncoded(
             found &= np.hypot(frames[:, 0, 2] - x, frames[:, 1, 2] - y) > radius
     none = np.full(int(found.sum()), UNDECODED)
     return targets_from_frames(
-        frames[found], measured.covariance[found], none, 0 * none, 0.0 * none
+        frames[found], measured.covariance[found], none, 0 * none, 0.0 * none, ''
     )
 
 

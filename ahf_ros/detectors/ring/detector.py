@@ -8,7 +8,7 @@ together to a projective frame, whose origin is the image of the target's physic
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -37,7 +37,7 @@ _MARGIN = 0.4  # width of the quiet margin round a dot or a band, dot radii
 
 @dataclass(frozen=True, slots=True)
 class RingDetector:
-    """Identify ring targets (Schneider type) of one family.
+    """Identify ring targets (Schneider type) of one family or of several.
 
     Attributes
     ----------
@@ -53,17 +53,22 @@ class RingDetector:
 
     @property
     def family(self) -> str:
-        """Family of the codes."""
+        """Family of the codes, or several as the settings list them."""
         return self.settings.family
 
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image; see `Detector`."""
         check_image(image)
-        return report(find_hypotheses(as_gray(image), self.settings), self.settings)
+        gray, found = as_gray(image), []
+        for name in self.settings.families:
+            settings = replace(self.settings, family=name)
+            found += report(find_hypotheses(gray, settings), settings)
+        return sorted_targets(_apart(found)) if len(self.settings.families) > 1 else found
 
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
         """Return targets with their centres in an image; see `refine_centres`."""
-        return refine_centres(image, targets, family(self.family), self.settings.polarities)
+        code = family(self.settings.families[0])
+        return refine_centres(image, targets, code, self.settings.polarities)
 
 
 def find_hypotheses(gray: np.ndarray, settings: DetectorSettings) -> Hypotheses:
@@ -136,6 +141,15 @@ def report(hypotheses: Hypotheses, settings: DetectorSettings) -> list[Target]:
     if not settings.report_undecoded:
         kept = kept[certain[kept]]
     some = hypotheses.select(kept)
-    return sorted_targets(
-        targets_from_frames(some.frames, some.covariance, ids[kept], codes[kept], some.confidence)
-    )
+    columns = (some.frames, some.covariance, ids[kept], codes[kept], some.confidence)
+    return sorted_targets(targets_from_frames(*columns, settings.family))
+
+
+def _apart(targets: Sequence[Target]) -> list[Target]:
+    """Return the targets of several families, of those of one dot the most certain."""
+    kept: list[Target] = []
+    for target in sorted(targets, key=lambda target: -target.confidence):
+        distances = [np.hypot(target.x - other.x, target.y - other.y) for other in kept]
+        if all(it > target.semi_minor for it in distances):
+            kept.append(target)
+    return kept

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ahf_ros.codes import ring
 from ahf_ros.codes.ring import Family, canonical
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.reading import PASSES, read_bands
@@ -55,6 +56,7 @@ def refine_centres(
     targets : sequence of Target
         To about a pixel.
     family : Family
+        Of the targets that do not say theirs.
     polarities : sequence of int
         Those to be expected: 1 for a dark dot on bright ground, -1 for a bright one on dark.
 
@@ -94,19 +96,42 @@ def _locate(
 ) -> _Located:
     """Return where targets are, by dot and band where the band agrees, else by the dot."""
     dots = _fit_either_polarity(gray, start, polarities)
-    ids, codes = np.array([(target.id, target.code) for target in targets]).T
-    decoded = np.flatnonzero((ids != UNDECODED) & (dots.share >= _MINIMUM_SHARE))
-    hypotheses, of_decoded = read_bands(gray, dots.select(decoded), family, passes=PASSES[-1:])
-    which = decoded[of_decoded]
-    agreed = (hypotheses.words > 0) & (canonical(hypotheses.words, family)[0] == codes[which])
-    agreed &= hypotheses.share >= _MINIMUM_SHARE
-    # Of two hypotheses that agree on one target, the one with the larger margin comes first.
-    order = np.lexsort((-hypotheses.margin, ~agreed))[: agreed.sum()]
+    decoded = np.flatnonzero(
+        [target.id != UNDECODED for target in targets] & (dots.share >= _MINIMUM_SHARE)
+    )
+    hypotheses, which = _agreeing(gray, dots, decoded, targets, family)
+    # Of two hypotheses on one target, the one with the larger margin comes first.
+    order = np.argsort(-hypotheses.margin, kind='stable')
     by_band, best = np.unique(which[order], return_index=True)
     rest = np.setdiff1d(np.arange(len(targets)), by_band)
     alone = fit_dots(gray, start[rest], dots.polarity[rest], rays=_RAYS, reach=REACH)
     located = _located(dots).replaced(rest, _located(alone))
     return located.replaced(by_band, _located(hypotheses.select(order[best])))
+
+
+def _agreeing(
+    gray: np.ndarray,
+    dots: Fit,
+    decoded: np.ndarray,
+    targets: Sequence[Target],
+    family: Family,
+) -> tuple[Hypotheses, np.ndarray]:
+    """Return readings that agree with the codes of targets, and the target that each is of."""
+    codes = np.array([target.code for target in targets])
+    names = np.array(
+        [it.family if it.family in ring.FAMILY_NAMES else family.name for it in targets]
+    )
+    parts, of_parts = [], []
+    for name in dict.fromkeys(names[decoded].tolist() or [family.name]):
+        of_family = decoded[names[decoded] == name]
+        code = family if name == family.name else ring.family(name)
+        read, of_read = read_bands(gray, dots.select(of_family), code, passes=PASSES[-1:])
+        which = of_family[of_read]
+        agreed = (read.words > 0) & (canonical(read.words, code)[0] == codes[which])
+        agreed &= read.share >= _MINIMUM_SHARE
+        parts.append(read.select(agreed))
+        of_parts.append(which[agreed])
+    return Hypotheses.joined(parts), np.concatenate(of_parts)
 
 
 def _located(of: Fit | Hypotheses) -> _Located:

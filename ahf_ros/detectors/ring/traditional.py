@@ -127,7 +127,7 @@ def _identify_dots(
     confidence = np.where(ids == UNDECODED, 0.0, readings.certainty)
     codes = code.words[np.maximum(ids, 1) - 1]
     return targets_from_frames(
-        *(column[shown] for column in (frames, covariance, ids, codes, confidence))
+        frames[shown], covariance[shown], ids[shown], codes[shown], confidence[shown], code.name
     )
 
 

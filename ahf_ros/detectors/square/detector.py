@@ -82,7 +82,9 @@ class SquareDetector:
         if not corners:
             return []
         covariances = np.tile(_DRAFT_DEVIATION**2 * np.eye(2), (len(numbers), 1, 1))
-        found = _markers(numbers.ravel(), np.reshape(corners, (-1, 4, 2)), covariances)
+        found = _markers(
+            numbers.ravel(), np.reshape(corners, (-1, 4, 2)), covariances, self.family
+        )
         return sorted_targets(found)
 
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
@@ -114,7 +116,7 @@ class SquareDetector:
         corners = np.array([it.corners for it in markers])
         sides = fit_sides(gray, corners, dictionary(self.family).markerSize + 2)
         numbers = np.array([it.id for it in markers])
-        moved = _markers(numbers, sides.corners, sides.covariance)
+        moved = _markers(numbers, sides.corners, sides.covariance, self.family)
         better: dict[Target, Target] = {
             marker: by_sides
             for marker, by_sides, share in zip(markers, moved, sides.share, strict=True)
@@ -124,7 +126,7 @@ class SquareDetector:
 
 
 def _markers(
-    numbers: np.ndarray, corners: np.ndarray, covariances: np.ndarray
+    numbers: np.ndarray, corners: np.ndarray, covariances: np.ndarray, family: str
 ) -> list[SquareMarker]:
     """Return the markers with given corners, shape (k, 4, 2), in the order of `SquareMarker`."""
     corners = corners.astype(np.float64)
@@ -143,6 +145,7 @@ def _markers(
             semi_minor=float(minor),
             angle=float(angle),
             covariance=tuple(covariance.ravel().tolist()),
+            family=family,
             corners=tuple((float(u), float(v)) for u, v in of_marker),
         )
         for number, (x, y), (major, minor), angle, covariance, of_marker in zip(
