@@ -169,10 +169,8 @@ def _identified(
     error = 2 * _CONTOUR_ERROR**2 / np.maximum(points, 1)
     covariance = error[:, None, None] * np.eye(2)
     shown = np.flatnonzero(inside)
-    return targets_from_frames(
-        *(column[shown] for column in (frames, covariance, ids, code.canonical(words), certainty)),
-        FAMILY,
-    )
+    ids, codes, certainty = ids[shown], code.canonical(words)[shown], certainty[shown]
+    return targets_from_frames(frames[shown], covariance[shown], ids, codes, certainty, FAMILY)
 
 
 def _develop(
