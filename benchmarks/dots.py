@@ -6,19 +6,20 @@ centres in px. Then follow images without targets, the reliability of the confid
 that `dots` takes beside `ring` in the same run. Seeds from 101 on are for tests: nothing in the
 package was chosen by looking at them.
 
-    python -m benchmarks.dots [--parts scenes ...] [--seeds 101 102] [--json FILE]
+    python -m benchmarks.dots [--parts scenes ...] [--seeds 101] [--json FILE]
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from statistics import median
 from typing import Any
 
+import numpy as np
 from rich.console import Console
 from rich.progress import track
 
@@ -30,7 +31,7 @@ from benchmarks.dots_confidence import PER_RADIUS, reliability
 from benchmarks.filter import machine
 from benchmarks.identification import FIRST_TEST_SEED, Row
 from benchmarks.speed import seconds
-from benchmarks.textures import SIZE, textured_image
+from benchmarks.textures import SIZE, lookalikes, textured_image
 
 METHODS = (
     ('dots', False),
@@ -44,7 +45,7 @@ WIDTHS = (24, 29, 36, 48, 60, 90)
 """Of targets in clean light, px."""
 
 PARTS = ('scenes', 'textures', 'confidence', 'time')
-TEXTURES = 800
+TEXTURES, LOOKALIKES = 800, 100
 FIRST_TEXTURE = 100_000
 """Seed of the first textured image; those of development are below."""
 
@@ -119,16 +120,16 @@ def scene_table(records: Sequence[dict[str, Any]]) -> Iterator[str]:
         yield f'| {" | ".join((*head, *cells, nees, duration))} |'
 
 
-def texture_reports() -> dict[str, int]:
-    """Return the number of targets reported in textured images, by detector."""
+def reports(images: Callable[[int], np.ndarray], count: int) -> dict[str, int]:
+    """Return the number of targets reported in images without any, by detector."""
     detectors = [create_detector(name, FAMILY) for name in ('dots', 'dots_published')]
-    reports = {detector.name: 0 for detector in detectors}
-    seeds = range(FIRST_TEXTURE, FIRST_TEXTURE + TEXTURES)
-    for seed in track(seeds, 'textures', console=Console(stderr=True)):
-        image = textured_image(seed)
+    found = {detector.name: 0 for detector in detectors}
+    seeds = range(FIRST_TEXTURE, FIRST_TEXTURE + count)
+    for seed in track(seeds, images.__name__, console=Console(stderr=True)):
+        image = images(seed)
         for detector in detectors:
-            reports[detector.name] += len(detector(image))
-    return reports
+            found[detector.name] += len(detector(image))
+    return found
 
 
 def times(seed: int) -> Iterator[dict[str, Any]]:
@@ -162,8 +163,12 @@ def lines(report: dict[str, Any]) -> Iterator[str]:
         yield from scene_table(report['rows'])
     if 'textures' in report:
         width, height = SIZE
-        told = ', '.join(f'`{name}` {count}' for name, count in report['textures'].items())
-        yield from ('', f'Reports in {TEXTURES} textured images of {width} x {height} px: {told}.')
+        for what, part in (
+            (f'{TEXTURES} textured images', 'textures'),
+            (f'{LOOKALIKES} images of rings in rings with dots', 'lookalikes'),
+        ):
+            told = ', '.join(f'`{name}` {count}' for name, count in report[part].items())
+            yield from ('', f'Reports in {what} of {width} x {height} px: {told}.')
     if 'confidence' in report:
         yield from ('', 'Of the readings of `dots` with a confidence in the given range:', '')
         yield from report['confidence']
@@ -182,18 +187,23 @@ def main() -> None:
         formatter_class=argparse.ArgumentDefaultsHelpFormatter,
     )
     parser.add_argument('--parts', nargs='+', choices=PARTS, default=PARTS)
-    parser.add_argument('--seeds', nargs='+', type=int, default=[101, 102])
-    parser.add_argument('--json', type=Path, metavar='FILE', help='also write a JSON object')
+    parser.add_argument('--seeds', nargs='+', type=int, default=[FIRST_TEST_SEED])
+    parser.add_argument(
+        '--json', type=Path, metavar='FILE', help='also write a JSON object; other parts stay'
+    )
     options = parser.parse_args()
     seeds = options.seeds
-    report: dict[str, Any] = {'seeds': seeds, 'machine': machine()}
-    report['test'] = min(seeds) >= FIRST_TEST_SEED
+    report: dict[str, Any] = {}
+    if options.json and options.json.exists():
+        report = json.loads(options.json.read_text())
+    report.update(seeds=seeds, machine=machine(), test=min(seeds) >= FIRST_TEST_SEED)
     if 'time' in options.parts:
         report['times'] = list(times(seeds[0]))
     if 'scenes' in options.parts:
         report['rows'] = scene_rows(seeds)
     if 'textures' in options.parts:
-        report['textures'] = texture_reports()
+        report['textures'] = reports(textured_image, TEXTURES)
+        report['lookalikes'] = reports(lookalikes, LOOKALIKES)
     if 'confidence' in options.parts:
         report['confidence'] = list(reliability(seeds[:1]))
     if options.json:

@@ -13,7 +13,7 @@ are for tests, those below for development.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
 
@@ -30,7 +30,9 @@ from ahf_ros.features.pyramid import image_pyramid
 from ahf_ros.imaging.image import as_gray
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
+from ahf_ros.target import Target
 from benchmarks.confidence import CLASSES, NEAR, logistic_regression
+from benchmarks.textures import lookalikes
 from benchmarks.weights import write_weights
 
 PER_RADIUS = 6.4
@@ -38,6 +40,9 @@ PER_RADIUS = 6.4
 
 WIDTHS = (22, 24, 26, 29, 36, 48, 60, 90)
 """Of targets in clean light, px."""
+
+LOOKALIKES = 40
+"""Images of rings that are no targets, for each seed."""
 
 AMBIENT = (0.3, 0.12, 0.04, 0.02)
 """Ambient light, as a share of the projector's."""
@@ -81,10 +86,13 @@ def scenes(seed: int) -> Iterator[tuple[str, SceneSettings]]:
 
 def compared(scene: Rendering) -> Compared:
     """Return all plausible readings of a scene, compared with the truth."""
+    return _compared(scene.image, scene.targets if scene.settings.family == 'dots' else ())
+
+
+def _compared(image: np.ndarray, targets: Sequence[Target]) -> Compared:
     settings, code = DetectorSettings(family='dots'), dot_family()
-    pyramid = image_pyramid(as_gray(scene.image), settings.max_radius)
+    pyramid = image_pyramid(as_gray(image), settings.max_radius)
     rings = find_rings(pyramid, settings, code)
-    targets = scene.targets if scene.settings.family == 'dots' else ()
     x, y, true = np.array([(it.x, it.y, it.id) for it in targets]).reshape(-1, 3).T
     near = np.hypot(rings.frames[:, :1, 2] - x, rings.frames[:, 1:2, 2] - y) < NEAR
     right = near & (code.ids(rings.words)[:, None] == true)
@@ -93,16 +101,19 @@ def compared(scene: Rendering) -> Compared:
     )
 
 
-def gathered(seeds: Iterable[int]) -> dict[str, Compared]:
+def gathered(seeds: Sequence[int]) -> dict[str, Compared]:
     """Return the readings of the scenes of some seeds by condition."""
     wanted = [named for seed in seeds for named in scenes(seed)]
     parts: dict[str, list[Compared]] = {}
     for condition, scene in track(wanted, 'scenes', console=Console(stderr=True)):
         parts.setdefault(condition, []).append(compared(render(scene)))
+    for seed in seeds:
+        images = map(lookalikes, range(LOOKALIKES * seed, LOOKALIKES * (seed + 1)))
+        parts.setdefault('lookalikes', []).extend(_compared(image, ()) for image in images)
     return {condition: Compared.joined(of) for condition, of in parts.items()}
 
 
-def fitted(seeds: Iterable[int]) -> dict[str, np.ndarray]:
+def fitted(seeds: Sequence[int]) -> dict[str, np.ndarray]:
     """Return intercepts and weights of both regressions on the scenes of some seeds."""
     every = Compared.joined(list(gathered(seeds).values()))
     some = every.select(every.of_target)
@@ -112,7 +123,7 @@ def fitted(seeds: Iterable[int]) -> dict[str, np.ndarray]:
     }
 
 
-def reliability(seeds: Iterable[int]) -> Iterator[str]:
+def reliability(seeds: Sequence[int]) -> Iterator[str]:
     """Yield the lines of the table of confidences and how often they are right."""
     conditions = gathered(seeds)
     conditions['all'] = Compared.joined(list(conditions.values()))

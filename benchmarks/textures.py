@@ -22,8 +22,18 @@ def textured_image(seed: int) -> np.ndarray:
     is seen obliquely, blurred and noisy.
     """
     generator = np.random.default_rng(seed)
-    kinds = (_grain, _bricks, _foliage, _pebbles, _text, _dot_grid, _rings, _blots)
-    reflectance = _seen(kinds[seed % len(kinds)](generator), generator)
+    kinds = (_grain, _bricks, _foliage, _pebbles, _text, _dot_grid, _blots)
+    return _photograph(kinds[seed % len(kinds)](generator), generator)
+
+
+def lookalikes(seed: int) -> np.ndarray:
+    """Return an image of rings in rings with dots, such as dials and tyres, as `textured_image`."""
+    generator = np.random.default_rng(seed)
+    return _photograph(_rings(generator), generator)
+
+
+def _photograph(texture: np.ndarray, generator: np.random.Generator) -> np.ndarray:
+    reflectance = _seen(texture, generator)
     image = 225 / 255 * np.maximum(reflectance, 10) * _light(generator)
     image = cv2.GaussianBlur(image, (0, 0), generator.uniform(0.5, 1.2))
     noise = generator.uniform(0.5, 4) * generator.standard_normal(image.shape)

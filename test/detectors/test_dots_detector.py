@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import json
 from functools import cache
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
 from ahf_ros.codes.dots import DOTS_DESIGN, dot_family
 from ahf_ros.detectors import create_detector
+from ahf_ros.detectors.dots.confidence import WEIGHTS
+from ahf_ros.detectors.dots.regions import open_regions
 from ahf_ros.detectors.dots.rings import CERTAIN
 from ahf_ros.evaluation import score
+from ahf_ros.features.pyramid import image_pyramid
 from ahf_ros.filtering.homomorphic import HomomorphicFilter
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
-from ahf_ros.target import UNDECODED
+from ahf_ros.target import UNDECODED, DottedTarget
 
 SIZE = {'family': 'dots', 'width': 800, 'height': 600, 'targets': 6, 'dot_radius': 10.0}
 
@@ -35,7 +40,10 @@ def errors(shown: Rendering, targets: list) -> np.ndarray:
         ({}, 0.02),
         ({'polarity': 'bright'}, 0.02),
         ({'dot_radius': 5.0}, 0.05),
+        ({'dot_radius': 3.75, 'radius_spread': 0.0, 'targets': 20}, 0.15),
         ({'dot_radius': 20.0, 'targets': 4}, 0.02),
+        ({'tilt': 65.0, 'focal_length': 3.0, 'targets': 4}, 0.05),
+        ({'blur': 1.5}, 0.05),
         ({'tilt': 40.0}, 0.02),
         ({'light': 'stripe', 'dot_radius': 14.0}, 0.05),
         ({'light': 'stripe', 'ambient': 0.12, 'dot_radius': 14.0}, 0.05),
@@ -112,3 +120,40 @@ def test_a_bad_design_is_refused_when_the_detector_is_made(tmp_path: Path) -> No
     path.write_text(DOTS_DESIGN.read_text().replace('"bits": 10', '"bits": 2'))
     with pytest.raises(ValueError, match=r'bad\.json, line 4: bits is 2'):
         create_detector(family='dots', family_file=str(path))
+
+
+def test_disc_border_and_dots_come_with_every_target() -> None:
+    shown = rendering(dot_radius=14.0, targets=4)
+    family = dot_family()
+    for target in create_detector(family='dots')(shown.image):
+        assert isinstance(target, DottedTarget)
+        assert (target.template_dots, target.polarity) == (2, 1)
+        assert len(target.dots) == 2 + bin(target.code).count('1')
+        (x, y, radius, *_), border = target.dots[:2]
+        assert (x, y, radius) == (target.x, target.y, target.semi_major)
+        assert border[2] == pytest.approx(family.border_radius * radius, rel=0.01)
+        ground = np.median(shown.image)
+        for x, y, *_ in target.dots[2:]:
+            assert shown.image[round(y), round(x)] < 0.6 * ground
+
+
+def test_every_weight_has_its_feature_and_says_what_made_it() -> None:
+    made = json.loads(WEIGHTS.read_text(encoding='utf-8'))['dots_confidence']
+    assert (len(made['target']), len(made['word'])) == (6, 5)
+    seeds = ' '.join(map(str, made['seeds']))
+    assert made['command'] == f'python -m benchmarks.dots_confidence --fit {seeds}'
+    assert max(made['seeds']) < 101  # those from 101 on are for tests
+    assert made['commit']
+
+
+def test_only_edges_that_nothing_explains_open_a_region() -> None:
+    image = np.full((600, 800), 200, np.uint8)
+    image[:, 700:] = 60
+    cv2.circle(image, (150, 200), 20, 40, -1, cv2.LINE_AA)
+    edges = image_pyramid(image, 60.0).edges[0]
+    (region,) = open_regions(edges, np.zeros((0, 4, 2)))
+    rows, columns = region
+    assert rows.start <= 90 and rows.stop >= 110 and columns.start <= 65 and columns.stop >= 85
+    assert columns.stop < 350
+    known = 75 + np.array([[(-30.0, -5.0), (30.0, -5.0), (30.0, 55.0), (-30.0, 55.0)]])
+    assert open_regions(edges, known) == []

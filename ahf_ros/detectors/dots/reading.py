@@ -31,6 +31,8 @@ class Readings(ArrayRecord):
         As read, counter-clockwise in the image from any place.
     evidence : ndarray of float64, shape (k, n)
         At each place, for a dot or against it, limited.
+    between : ndarray of float64, shape (k,)
+        The highest evidence for a dot halfway between places, where no target has any.
     phase : ndarray of float64, shape (k,)
         Direction of the first place in the frame, rad clockwise from +x.
     seen : ndarray of float64, shape (k,)
@@ -43,6 +45,7 @@ class Readings(ArrayRecord):
 
     words: np.ndarray
     evidence: np.ndarray
+    between: np.ndarray
     phase: np.ndarray
     seen: np.ndarray
     height: np.ndarray
@@ -81,11 +84,14 @@ def read_rings(log: np.ndarray, fit: Fit, code: DotFamily) -> Readings:
     evidence = dot_evidence(steps, of_phases)
     # Between the places nothing is seen; the right phase is the one that sees most of the dots.
     best = np.maximum(evidence, 0).sum(axis=2).argmax(axis=1)
+    halfway = (best + _PHASES // 2) % _PHASES
+    between = evidence[np.arange(count), halfway].max(axis=1)
     evidence = np.clip(evidence[np.arange(count), best], -_LIMIT, _LIMIT)
     words = (evidence > 0) @ (1 << np.arange(bits, dtype=np.int64))
     whole = np.asarray(inside.reshape(count, _PHASES * bits).all(axis=1))
     seen = border_steps(log, fit.frames, polarity, code)[:, 0]
-    return Readings(words, evidence, phases[best], seen, highest / faintest, whole)
+    between = np.clip(between, -_LIMIT, _LIMIT)
+    return Readings(words, evidence, between, phases[best], seen, highest / faintest, whole)
 
 
 def dot_points(angles: np.ndarray, code: DotFamily) -> np.ndarray:

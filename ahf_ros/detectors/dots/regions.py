@@ -42,14 +42,14 @@ def open_regions(edges: LogEdges, outlines: np.ndarray) -> list[tuple[slice, sli
     ).reshape(rows, columns)
     of_four = 4 * cv2.blur(of_tiles.astype(np.float32), (2, 2), borderType=cv2.BORDER_CONSTANT)
     wide = cv2.dilate((of_four >= _MINIMUM_EDGES).astype(np.uint8), np.ones((3, 3), np.uint8))
-    count, _, boxes, _ = cv2.connectedComponentsWithStats(wide, connectivity=4)
-    area = boxes[1:, cv2.CC_STAT_WIDTH] * boxes[1:, cv2.CC_STAT_HEIGHT]
-    if count > 1 and area.sum() > _MOST * rows * columns:
+    contours, _ = cv2.findContours(wide, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+    boxes = [cv2.boundingRect(contour) for contour in contours]
+    if sum(across * tall for _, _, across, tall in boxes) > _MOST * rows * columns:
         return [(slice(0, height), slice(0, width))]
     return [
         (
             slice(_TILE * top, min(_TILE * (top + tall), height)),
             slice(_TILE * left, min(_TILE * (left + across), width)),
         )
-        for left, top, across, tall, _ in boxes[1:].tolist()
+        for left, top, across, tall in boxes
     ]
