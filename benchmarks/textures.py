@@ -27,7 +27,7 @@ def textured_image(seed: int) -> np.ndarray:
 
 
 def lookalikes(seed: int) -> np.ndarray:
-    """Return an image of rings in rings with dots, such as dials and tyres, as `textured_image`."""
+    """Return an image of rings in rings with dots, as of dials, like `textured_image`."""
     generator = np.random.default_rng(seed)
     return _photograph(_rings(generator), generator)
 

@@ -22,8 +22,6 @@ MAXIMUM_SHARE = 0.85
 """Of the steps at disc and border, and of their edges; that of a target in good light."""
 
 _MAXIMUM_HEIGHT = 0.5  # beyond which it says no more, of a dot, in the one that the blur leaves it
-_MAXIMUM_BETWEEN = 2.0  # beyond which it says no more, evidence
-_MAXIMUM_MISSING = 0.25  # the same, share of steps
 _MINIMUM_DOUBT = -6.0  # below which it says no more, ln of the odds that a place misleads
 _OF_TARGET, _OF_WORD = read_weights(WEIGHTS, 'dots_confidence', 'target', 'word')
 
@@ -39,19 +37,17 @@ def target_features(readings: Readings, fit: Fit) -> np.ndarray:
 
     Returns
     -------
-    ndarray of float64, shape (k, 5)
+    ndarray of float64, shape (k, 3)
         The share of the steps of ln I at disc and border; the share of the edges in their place;
-        the step of the dot that is seen best, in the one that the blur leaves it; the evidence
-        for dots between the places; how far the steps fall short of the edges, other than by
-        blur, as they do where circles have other radii. All limited.
+        the step of the dot that is seen best, in the one that the blur leaves it. All limited.
     """
-    missing = fit.share - readings.seen - fit.blur / fit.size
-    return np.column_stack(
+    return np.stack(
         [
-            _shared_features(readings, fit),
-            np.clip(readings.between, -_MAXIMUM_BETWEEN, _MAXIMUM_BETWEEN),
-            np.clip(missing, 0, _MAXIMUM_MISSING),
-        ]
+            np.minimum(readings.seen, MAXIMUM_SHARE),
+            np.minimum(fit.share, MAXIMUM_SHARE),
+            np.clip(readings.height, 0, _MAXIMUM_HEIGHT),
+        ],
+        axis=1,
     )
 
 
@@ -66,22 +62,11 @@ def word_features(readings: Readings, fit: Fit) -> np.ndarray:
     Returns
     -------
     ndarray of float64, shape (k, 4)
-        ln of the odds that the evidence at any one place misleads, limited; then the first three
-        of `target_features`.
+        ln of the odds that the evidence at any one place misleads, limited; then
+        `target_features`.
     """
     doubt = np.log(np.exp(-np.abs(readings.evidence)).sum(axis=1))
-    return np.column_stack([np.maximum(doubt, _MINIMUM_DOUBT), _shared_features(readings, fit)])
-
-
-def _shared_features(readings: Readings, fit: Fit) -> np.ndarray:
-    return np.stack(
-        [
-            np.minimum(readings.seen, MAXIMUM_SHARE),
-            np.minimum(fit.share, MAXIMUM_SHARE),
-            np.clip(readings.height, 0, _MAXIMUM_HEIGHT),
-        ],
-        axis=1,
-    )
+    return np.column_stack([np.maximum(doubt, _MINIMUM_DOUBT), target_features(readings, fit)])
 
 
 def target_probability(features: np.ndarray) -> np.ndarray:

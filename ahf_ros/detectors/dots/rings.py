@@ -35,6 +35,8 @@ CERTAIN = 0.95
 
 _PART = 512  # discs fitted at a time, which bounds the memory
 _PLAUSIBLE = 0.4  # share of the edges of disc and border, for the ring to be read
+_MISSING = 0.15  # share of the steps that are missing where there are edges, beyond the blur's
+_BETWEEN = 2.0  # evidence for a dot halfway between places, where targets have none
 _FAINTEST = 0.85  # contrast of a disc, dark over bright
 
 
@@ -102,7 +104,10 @@ def _read_part(pyramid: ImagePyramid, discs: Dots, code: DotFamily) -> Rings:
     fit = fit_targets(pyramid.gray, discs.frames, discs.polarity, code)
     fit = fit.select((fit.share >= _PLAUSIBLE) & (fit.contrast <= _FAINTEST))
     readings = read_rings(pyramid.logs[0], fit, code)
-    fit, readings = fit.select(readings.inside), readings.select(readings.inside)
+    # Circles of other radii can have their edges within reach, but not the steps.
+    missing = fit.share - readings.seen - fit.blur / fit.size
+    likely = (missing <= _MISSING) & (readings.between <= _BETWEEN) & readings.inside
+    fit, readings = fit.select(likely), readings.select(likely)
     return Rings(
         fit.frames,
         fit.covariance,
