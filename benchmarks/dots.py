@@ -51,7 +51,7 @@ FIRST_TEXTURE = 100_000
 
 ROUNDS = 5
 FAMILY = DetectorSettings(family='dots')
-_BASE = SceneSettings(family='dots', width=1992, height=1328, targets=48, dot_radius=14.0)
+_BASE = SceneSettings(family='dots', width=1600, height=1200, targets=30, dot_radius=14.0)
 
 
 def scenes() -> Iterator[tuple[str, str, SceneSettings]]:
@@ -67,7 +67,7 @@ def scenes() -> Iterator[tuple[str, str, SceneSettings]]:
             scene = replace(_BASE, light=light, ambient=ambient, dot_radius=60 / PER_RADIUS)
             yield 'light, 60 px', f'{light} {ambient}', scene
     for tilt in (30.0, 45.0, 60.0, 70.0):
-        yield 'tilt', f'{tilt:g} deg', replace(_BASE, tilt=tilt, focal_length=3.0, targets=24)
+        yield 'tilt', f'{tilt:g} deg', replace(_BASE, tilt=tilt, focal_length=3.0, targets=20)
     for blur in (1.5, 2.0):
         yield 'blur', f'{blur} px', replace(_BASE, blur=blur, dot_radius=10.0)
     for electrons in (1000.0, 300.0):
@@ -76,7 +76,7 @@ def scenes() -> Iterator[tuple[str, str, SceneSettings]]:
     for light in ('normal', 'stripe', 'lattice'):
         yield 'bright', f'{light} 0.3', replace(_BASE, polarity='bright', light=light)
     for light in ('normal', 'stripe', 'lattice'):
-        marks = replace(_BASE, targets=0, distractors=50, light=light)
+        marks = replace(_BASE, targets=0, distractors=40, light=light)
         yield 'no targets', f'{light} 0.3', marks
 
 

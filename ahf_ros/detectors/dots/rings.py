@@ -35,7 +35,8 @@ CERTAIN = 0.95
 
 _PART = 512  # discs fitted at a time, which bounds the memory
 _PLAUSIBLE = 0.4  # share of the edges of disc and border, for the ring to be read
-_MISSING = 0.15  # share of the steps that are missing where there are edges, beyond the blur's
+_MISSING = 0.1  # share of the steps that are missing where there are edges, beyond the blur's
+_OF_BLUR = 2.0  # share of the steps that blur hides, in its radii of the disc
 _BETWEEN = 2.0  # evidence for a dot halfway between places, where targets have none
 _FAINTEST = 0.85  # contrast of a disc, dark over bright
 
@@ -105,7 +106,7 @@ def _read_part(pyramid: ImagePyramid, discs: Dots, code: DotFamily) -> Rings:
     fit = fit.select((fit.share >= _PLAUSIBLE) & (fit.contrast <= _FAINTEST))
     readings = read_rings(pyramid.logs[0], fit, code)
     # Circles of other radii can have their edges within reach, but not the steps.
-    missing = fit.share - readings.seen - fit.blur / fit.size
+    missing = fit.share - readings.seen - _OF_BLUR * fit.blur / fit.size
     likely = (missing <= _MISSING) & (readings.between <= _BETWEEN) & readings.inside
     fit, readings = fit.select(likely), readings.select(likely)
     return Rings(
