@@ -102,9 +102,9 @@ def _blobs(
         rows, columns = (slice(2 * it.start // scale, 2 * it.stop // scale) for it in region)
         log = np.ascontiguousarray(pyramid.logs[level][rows, columns])
         blobs = small_dots(log, smallest, largest, settings.polarities, LOG_SCALE)
-        blobs.frames[:, 0, 2] += columns.start
-        blobs.frames[:, 1, 2] += rows.start
-        found.append(replace(blobs, frames=enlarged(blobs.frames, level)))
+        frames = blobs.frames.copy()
+        frames[:, :2, 2] += (columns.start, rows.start)
+        found.append(replace(blobs, frames=enlarged(frames, level)))
     return found
 
 

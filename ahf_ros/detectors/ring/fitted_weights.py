@@ -6,10 +6,11 @@ and `benchmarks.counting` fit them anew and write the file.
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
+
+from ahf_ros.features.logistic import read_weights
 
 PATH = Path(__file__).with_suffix('.json')
 """The data file."""
@@ -25,5 +26,4 @@ def fitted_weights(purpose: str, *names: str) -> tuple[np.ndarray, ...]:
     *names : str
         Names of the arrays.
     """
-    weights = json.loads(PATH.read_text(encoding='utf-8'))[purpose]
-    return tuple(np.array(weights[name], np.float64) for name in names)
+    return read_weights(PATH, purpose, *names)
