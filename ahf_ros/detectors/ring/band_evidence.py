@@ -42,12 +42,15 @@ class BandEvidence:
         For a mark, of these steps and of the levels in the band.
     onto, off : ndarray of float64, shape (k, m)
         For a border onto a mark and off it, against none, after each angle.
+    edges : ndarray of float64, shape (k,)
+        Probability of an edge of light between two neighbouring points.
     """
 
     steps: np.ndarray
     marked: np.ndarray
     onto: np.ndarray
     off: np.ndarray
+    edges: np.ndarray
 
 
 def band_evidence(
@@ -68,11 +71,15 @@ def band_evidence(
     dark = (marks.polarity > 0)[:, None]
     bright = np.where(dark, samples.ground, np.concatenate([samples.dot, samples.dot]))
     light = light_levels(np.moveaxis(bright, 0, 2), samples.gap, marks)
-    along = 2 * np.pi * inner * size / samples.visible.shape[1]
-    weight = np.clip(along / _CORRELATION, _MINIMUM_ALONG, 1)[:, None] * samples.visible
-    steps = [weight * step_evidence(ground, band, marks, light) for ground, band in samples.edges]
-    marked = sum(steps) + weight * level_evidence(samples.band, light)
+    along = 2 * np.pi * inner * size / samples.visible.shape[2]
+    weight = np.clip(along / _CORRELATION, _MINIMUM_ALONG, 1)[:, None]
+    steps = [
+        weight * visible * step_evidence(*edge, marks, light)
+        for edge, visible in zip(samples.edges, samples.visible, strict=True)
+    ]
+    marked = sum(steps) + weight * samples.visible[0] * level_evidence(samples.band, light)
     across = (outer - inner) * size / len(samples.band)
-    weight = np.clip(across / _CORRELATION, _MINIMUM_ACROSS, 1)[:, None] * samples.visible
+    weight = np.clip(across / _CORRELATION, _MINIMUM_ACROSS, 1)[:, None]
+    weight = weight * samples.visible.all(axis=0)
     onto, off = (weight * border for border in border_evidence(samples.band, marks, light))
-    return BandEvidence(np.stack(steps), marked, onto, off)
+    return BandEvidence(np.stack(steps), marked, onto, off, light.edges)

@@ -34,10 +34,12 @@ class BandSamples:
         In the gap between dot and band, away from their edges.
     dot : ndarray of float32, shape (2, k, m)
         In the dot.
+    on_edges : ndarray of float32, shape (2, k, m)
+        On the inner and on the outer edge of the band.
     beside : ndarray of float64, shape (k, 1)
         Distance of readings beside an edge from it, dot radii.
-    visible : ndarray of bool, shape (k, m)
-        Whether the image shows all of these.
+    visible : ndarray of bool, shape (2, k, m)
+        Whether the image shows the readings beside the inner edge, and those beside the outer one.
     """
 
     inner_ground: np.ndarray
@@ -47,6 +49,7 @@ class BandSamples:
     band: np.ndarray
     gap: np.ndarray
     dot: np.ndarray
+    on_edges: np.ndarray
     beside: np.ndarray
     visible: np.ndarray
 
@@ -89,17 +92,15 @@ def sample_bands(
             inner + (outer - inner) * np.array(_BAND_DEPTHS),
             1 + (inner - 1) * np.array(_GAP_DEPTHS),
             np.array(_DOT_RADII),
+            [inner, outer],
         ]
     )
     edges = np.array([inner, inner, outer, outer]) + beside * np.array([-1, 1, -1, 1])
     radii = np.concatenate([edges, np.broadcast_to(fixed, (len(frames), len(fixed)))], axis=1)
     values = sample_circles(gray, frames, angles, radii)
     values = np.moveaxis(np.maximum(values, 0), 2, 0)
-    ends = np.cumsum([4, len(_BAND_DEPTHS), len(_GAP_DEPTHS)])
-    of_edges, band, gap, dot = np.split(values, ends)
-    limit = frame.circle_points(angles, np.array([outer + _FARTHEST]))[:, 0]
-    visible = within(frame.project(frames, limit), gray.shape)
-    inner_ground, inner_band, outer_band, outer_ground = of_edges
-    return BandSamples(
-        inner_ground, inner_band, outer_band, outer_ground, band, gap, dot, beside, visible
-    )
+    ends = np.cumsum([4, len(_BAND_DEPTHS), len(_GAP_DEPTHS), len(_DOT_RADII)])
+    beside_edges, band, gap, dot, on_edges = np.split(values, ends)
+    limits = frame.circle_points(angles, np.array([inner, outer]) + beside)
+    visible = within(frame.project(frames, limits), gray.shape)
+    return BandSamples(*beside_edges, band, gap, dot, on_edges, beside, np.moveaxis(visible, 2, 0))

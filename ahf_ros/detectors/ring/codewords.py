@@ -6,16 +6,20 @@ from functools import cache
 
 import numpy as np
 
-from ahf_ros.codes.ring import Family
+from ahf_ros.codes.ring import Family, canonical
 
 _EXHAUSTIVE = 50_000  # rotations of words, up to which all of them compete
 _MINIMUM_EVIDENCE = 10.0  # for ones, in units of ln
+
+COMPETITORS = 24
+"""Number of words of each band that are returned, more than there are rotations of one."""
+
 _UNCERTAIN = 10  # sectors whose bits are varied where not all words compete
 
 
 def best_words(
     sectors: np.ndarray, onto: np.ndarray, off: np.ndarray, family: Family
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the valid words with the most evidence.
 
     Bands without evidence for any mark are not read. In the others every rotation of every word
@@ -26,7 +30,7 @@ def best_words(
     Parameters
     ----------
     sectors : ndarray of float, shape (k, p, n)
-        Evidence for one in each of the n bits of k bands.
+        Evidence for one over zero in each of the n bits of k bands.
     onto, off : ndarray of float, shape (k, p, n)
         Evidence for zero followed by one, and for one followed by zero, at the border after each
         sector, over equal bits.
@@ -34,56 +38,67 @@ def best_words(
 
     Returns
     -------
-    words : ndarray of int64, shape (k,)
-        The best word, in the rotation read; 0 where there is none.
-    phases : ndarray of int, shape (k,)
-        Its phase.
-    margins : ndarray of float64, shape (k,)
-        Its evidence over that of the best word with another ID.
-    weakest : ndarray of float64, shape (k,)
-        Evidence of the least certain sector for its own bit.
+    words : ndarray of int64, shape (k, COMPETITORS)
+        In the rotation read, the best first; 0 where there is none.
+    phases : ndarray of int, shape (k, COMPETITORS)
+        The best phase of each.
+    scores : ndarray of float32, shape (k, COMPETITORS)
+        Evidence for each, over a word without ones.
     """
     # A border between the bits a and b gives onto (1 - a) b + off a (1 - b).
     single = sectors + off + np.roll(onto, 1, axis=2)
     evidence = np.concatenate([single, -(onto + off)], axis=2).astype(np.float32)
-    words = np.zeros(len(sectors), np.int64)
-    phases, margins = np.zeros(len(sectors), np.intp), np.zeros(len(sectors))
+    words = np.zeros((len(sectors), COMPETITORS), np.int64)
+    phases = np.zeros(words.shape, np.intp)
+    scores = np.zeros(words.shape, np.float32)
     everything = len(family.words) * family.bits <= _EXHAUSTIVE
     hopeful = np.maximum(sectors, 0).sum(axis=2).max(axis=1) > _MINIMUM_EVIDENCE
     for index in np.flatnonzero(hopeful):
-        competing, starts, features = (
+        competing, features = (
             _all_rotations(family) if everything else _near_rotations(single[index], family)
         )
-        scores = evidence[index] @ features
-        of_word = scores.max(axis=0)
-        best = of_word.argmax()
-        words[index], phases[index] = competing[best], scores[:, best].argmax()
-        second, first = np.partition(np.maximum.reduceat(of_word, starts), -2)[-2:]
-        margins[index] = first - second
-    own = np.take_along_axis(sectors, phases[:, None, None], axis=1)[:, 0]
-    bits = 2 * (words[:, None] >> np.arange(family.bits) & 1) - 1
-    return words, phases, margins, (own * bits).min(axis=1)
+        of_phases = evidence[index] @ features
+        of_word = of_phases.max(axis=0)
+        # Where fewer words compete, the last ones are repeated.
+        best = np.argpartition(of_word, -min(COMPETITORS, len(of_word)))[-COMPETITORS:]
+        best = np.resize(best[np.argsort(-of_word[best], kind='stable')], COMPETITORS)
+        words[index], scores[index] = competing[best], of_word[best]
+        phases[index] = of_phases[:, best].argmax(axis=0)
+    return words, phases, scores
+
+
+def margins(words: np.ndarray, scores: np.ndarray, best: np.ndarray, family: Family) -> np.ndarray:
+    """Return the evidence for the best words over those of other IDs, shape (k,).
+
+    Parameters
+    ----------
+    words : ndarray of int64, shape (k, c)
+    scores : ndarray of float, shape (k, c)
+        Evidence for each.
+    best : ndarray of int, shape (k,)
+        Indices of the best ones.
+    family : Family
+    """
+    ids, rows = canonical(words, family)[1], np.arange(len(words))
+    others = np.where(ids == ids[rows, best][:, None], -np.inf, scores).max(axis=1)
+    return np.where(np.isfinite(others), scores[rows, best] - others, 0)
 
 
 @cache
-def _all_rotations(family: Family) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _all_rotations(family: Family) -> tuple[np.ndarray, np.ndarray]:
     """Return the features of all rotations of all words, see `_features`."""
-    numbers = _number_table(family)
-    return _features(np.flatnonzero(numbers), numbers, family.bits)
+    return _features(np.flatnonzero(_number_table(family)), family.bits)
 
 
-def _near_rotations(
-    single: np.ndarray, family: Family
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _near_rotations(single: np.ndarray, family: Family) -> tuple[np.ndarray, np.ndarray]:
     """Return the features of the words near to what the sectors say at any of the phases."""
     uncertain = np.argsort(np.abs(single), axis=1)[:, :_UNCERTAIN]
     certain = (single > 0) @ (1 << np.arange(family.bits)) & ~(1 << uncertain).sum(axis=1)
     choices = np.arange(1 << _UNCERTAIN)[:, None] >> np.arange(_UNCERTAIN) & 1
     words = np.unique(certain[:, None] + (1 << uncertain) @ choices.T)
-    numbers = _number_table(family)
-    valid = words[numbers[words] > 0]
+    valid = words[_number_table(family)[words] > 0]
     # At least two words have to compete.
-    return _features(np.union1d(valid, family.words[:2]), numbers, family.bits)
+    return _features(np.union1d(valid, family.words[:2]), family.bits)
 
 
 @cache
@@ -97,14 +112,10 @@ def _number_table(family: Family) -> np.ndarray:
     return numbers
 
 
-def _features(
-    words: np.ndarray, numbers: np.ndarray, bits: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return words in the order of their IDs, where each ID starts, and what evidence weighs.
+def _features(words: np.ndarray, bits: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return words and what evidence weighs, shape (2 n, number of words).
 
-    The last is of shape (2 n, number of words): the bits and the products of neighbouring ones.
+    These are the bits and the products of neighbouring ones.
     """
-    words = words[np.argsort(numbers[words], kind='stable')]
-    starts = np.flatnonzero(np.diff(numbers[words], prepend=0))
     ones = (words >> np.arange(bits)[:, None] & 1).astype(np.float32)
-    return words, starts, np.concatenate([ones, ones * np.roll(ones, -1, axis=0)])
+    return words, np.concatenate([ones, ones * np.roll(ones, -1, axis=0)])

@@ -20,7 +20,7 @@ _OF_TARGET, _OF_WORD = fitted_weights('confidence', 'target', 'word')
 OF_TARGET = len(_OF_TARGET) - 1
 """Number of the features that tell targets from patterns of light; the others tell words."""
 
-FEATURES = OF_TARGET + len(_OF_WORD) - 1
+FEATURES = OF_TARGET + len(_OF_WORD) - 1 + 4
 """Number of the features that `confidence` weighs."""
 
 
@@ -41,6 +41,7 @@ def confidence_features(readings: Readings, fit: Fit) -> np.ndarray:
         radii; ln of the contrast. Of the word: ln(1 + margin), the contradiction, and the
         explained share of all steps.
     """
+    stretches = (readings.hidden & ~np.roll(readings.hidden, 1, axis=1)).sum(axis=1)
     return np.stack(
         [
             readings.explained[:, 2:].min(axis=1),
@@ -50,6 +51,10 @@ def confidence_features(readings: Readings, fit: Fit) -> np.ndarray:
             np.log1p(np.maximum(readings.margin, 0)),
             readings.contradiction,
             readings.explained.mean(axis=1),
+            readings.unexplained,
+            readings.hidden.mean(axis=1),
+            stretches,
+            np.sign(readings.support) * np.log1p(np.abs(readings.support)),
         ],
         axis=1,
     )
@@ -63,7 +68,7 @@ def confidence(features: np.ndarray) -> np.ndarray:
     features : ndarray of float, shape (k, FEATURES)
         As `confidence_features` gives them.
     """
-    target, word = np.split(features, [OF_TARGET], axis=1)
+    target, word = np.split(features[:, :7], [OF_TARGET], axis=1)
     return _logistic(target, _OF_TARGET) * _logistic(word, _OF_WORD)
 
 

@@ -144,7 +144,7 @@ def target_features(gray: np.ndarray, dots: Hypotheses, code: Family) -> np.ndar
     marks = _mark_appearance(inside, outside, step)
     bright = np.where((marks.polarity > 0)[:, None], samples.ground, inside)
     light = light_levels(np.moveaxis(bright, 0, 2), samples.gap, marks)
-    visible = samples.visible
+    visible = samples.visible.all(axis=0)
     seen = np.maximum(visible.sum(axis=1), 1)
 
     def mean(of_angles: np.ndarray) -> np.ndarray:

@@ -12,14 +12,17 @@ import numpy as np
 from ahf_ros.codes.ring import Family
 from ahf_ros.detectors.ring.band_evidence import BandEvidence
 from ahf_ros.detectors.ring.band_samples import BandSamples
-from ahf_ros.detectors.ring.codewords import best_words
+from ahf_ros.detectors.ring.codewords import best_words, margins
 from ahf_ros.detectors.ring.evidence import MarkAppearance, log_ratio
 from ahf_ros.features.array_record import ArrayRecord
 
 _AGREEMENT = 0.35  # of ln, or of the step of a mark, between a step and what a word expects
-_MINIMUM_MARGIN = 3.0  # of a plausible word
+_MINIMUM_MARGIN = 3.0  # of a plausible word where light has edges; elsewhere anything else
+_FEW_EDGES = 0.05  # probability of an edge of light between neighbours
 _MINIMUM_WEAKEST = -60.0  # evidence of a sector, against its bit in a plausible word
-_MINIMUM_EXPLAINED = 0.25  # share of the steps that a plausible word explains
+
+MINIMUM_EXPLAINED = 0.25
+"""Share of the steps that a plausible word explains."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,8 +37,9 @@ class Readings(ArrayRecord):
         Where in the frame the sector of the lowest bit starts, rad counter-clockwise from +x.
     margin : ndarray of float64, shape (k,)
         Evidence for the best word over the best one of another ID, in units of ln.
-    weakest : ndarray of float64, shape (k,)
-        Evidence of the least certain sector for its own bit, in units of ln.
+    support : ndarray of float64, shape (k,)
+        The same, of the steps and levels that light and print explain, if nothing is hidden;
+        negative where they speak for another ID, by as much as for that one over the next.
     contradiction : ndarray of float64, shape (k,)
         Evidence of the steps at an unmarked sector for a mark, in units of ln, at the sector
         where it is largest. A spot of light can make a mark as gray as the ground, but hardly up
@@ -43,20 +47,23 @@ class Readings(ArrayRecord):
     explained : ndarray of float64, shape (k, 4)
         Share of the steps that are as the word expects: onto unmarked sectors at the inner and
         the outer edge of the band, and onto marked ones at both.
+    unexplained : ndarray of float64, shape (k,)
+        Evidence for arcs of any length over that for the word, in units of ln.
+    hidden : ndarray of bool, shape (k, m)
+        Whether something hides the band at each angle.
+    plausible : ndarray of bool, shape (k,)
+        Whether it is worth a closer look.
     """
 
     words: np.ndarray
     start: np.ndarray
     margin: np.ndarray
-    weakest: np.ndarray
+    support: np.ndarray
     contradiction: np.ndarray
     explained: np.ndarray
-
-    @property
-    def plausible(self) -> np.ndarray:
-        """Whether it is worth a closer look, ndarray of bool, shape (k,)."""
-        explained = self.explained.min(axis=1) > _MINIMUM_EXPLAINED
-        return (self.margin > _MINIMUM_MARGIN) & (self.weakest > _MINIMUM_WEAKEST) & explained
+    unexplained: np.ndarray
+    hidden: np.ndarray
+    plausible: np.ndarray
 
 
 def sector_angles(family: Family, samples_per_sector: int) -> np.ndarray:
@@ -85,38 +92,108 @@ def decode(
     marks : MarkAppearance
     family : Family
     """
-    count = evidence.marked.shape[1]
-    per_sector = count // family.bits
-    words, phases, margin, weakest = best_words(*_by_phase(evidence, per_sector), family)
-    sector = (np.arange(count) - phases[:, None]) % count // per_sector
-    bits = (words[:, None] >> sector & 1).astype(bool)
-    explained = _explained(samples, marks, bits)
-    against = np.where(bits, 0, np.maximum(evidence.steps, 0).sum(axis=0))
-    contradiction = _of_sectors(against, sector, family.bits).max(axis=1)
-    start = 2 * np.pi * phases / count
-    return Readings(words, start, margin, weakest, contradiction, explained)
+    per_sector = evidence.marked.shape[1] // family.bits
+    angles = sectors_by_phase(per_sector, family)
+    last, marked = angles[..., -1], evidence.marked[:, angles].sum(axis=3)
+    words, phases, scores = best_words(
+        marked, evidence.onto[:, last], evidence.off[:, last], family
+    )
+    margin = margins(words, scores, np.zeros(len(words), np.intp), family)
+    words, phases = words[:, 0], phases[:, 0]
+    bits = bits_at(words, phases, per_sector, family)
+    own = _of_sectors(np.where(bits, 1, -1) * evidence.marked, phases, family.bits)
+    minimum = np.where(evidence.edges < _FEW_EDGES, 0, _MINIMUM_MARGIN)
+    explained, contradiction = explanation(
+        samples, evidence, marks, words, phases, np.zeros(bits.shape, bool), family
+    )
+    plausible = (margin > minimum) & (own.min(axis=1) > _MINIMUM_WEAKEST)
+    return Readings(
+        words,
+        2 * np.pi * phases / bits.shape[1],
+        margin,
+        margin,
+        contradiction,
+        explained,
+        np.zeros(len(words)),
+        np.zeros(bits.shape, bool),
+        plausible & (explained.min(axis=1) > MINIMUM_EXPLAINED),
+    )
 
 
-def _by_phase(
-    evidence: BandEvidence, per_sector: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the evidence of sectors and of borders for every phase, each (k, phases, bits)."""
-    count = evidence.marked.shape[1]
+def explanation(
+    samples: BandSamples,
+    evidence: BandEvidence,
+    marks: MarkAppearance,
+    words: np.ndarray,
+    phases: np.ndarray,
+    hidden: np.ndarray,
+    family: Family,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return how far the steps are as words expect them, where the band is not hidden.
+
+    Parameters
+    ----------
+    samples, evidence, marks, family
+        As for `decode`.
+    words, phases : ndarray of int, shape (k,)
+    hidden : ndarray of bool, shape (k, m)
+
+    Returns
+    -------
+    explained : ndarray of float64, shape (k, 4)
+    contradiction : ndarray of float64, shape (k,)
+        As in `Readings`.
+    """
+    bits = bits_at(words, phases, hidden.shape[1] // family.bits, family)
+    against = np.where(bits | hidden, 0, np.maximum(evidence.steps, 0).sum(axis=0))
+    contradiction = _of_sectors(against, phases, family.bits).max(axis=1)
+    return _explained(samples, marks, bits, ~hidden), contradiction
+
+
+def sectors_by_phase(per_sector: int, family: Family) -> np.ndarray:
+    """Return the indices of the angles of every sector at each phase.
+
+    Returns
+    -------
+    ndarray of int, shape (per_sector, family.bits, per_sector)
+    """
+    count = family.bits * per_sector
     first = np.arange(per_sector)[:, None] + np.arange(0, count, per_sector)
-    angles = (first[..., None] + np.arange(per_sector)) % count
-    last = angles[..., -1]
-    return evidence.marked[:, angles].sum(axis=3), evidence.onto[:, last], evidence.off[:, last]
+    return (first[..., None] + np.arange(per_sector)) % count
 
 
-def _of_sectors(values: np.ndarray, sector: np.ndarray, bits: int) -> np.ndarray:
-    """Return the sums of values (k, angles) over the sectors that they are of, shape (k, bits)."""
+def bits_at(words: np.ndarray, phases: np.ndarray, per_sector: int, family: Family) -> np.ndarray:
+    """Return whether words have a mark at each angle.
+
+    Parameters
+    ----------
+    words, phases : ndarray of int, shape (...)
+    per_sector : int
+        Number of angles of a sector.
+    family : Family
+
+    Returns
+    -------
+    ndarray of bool, shape (..., family.bits * per_sector)
+    """
+    count = family.bits * per_sector
+    sector = (np.arange(count) - phases[..., None]) % count // per_sector
+    return (words[..., None] >> sector & 1).astype(bool)
+
+
+def _of_sectors(values: np.ndarray, phases: np.ndarray, bits: int) -> np.ndarray:
+    """Return the sums of values (k, angles) over sectors, at phases (k,), shape (k, bits)."""
+    count = values.shape[1]
+    sector = (np.arange(count) - phases[:, None]) % count // (count // bits)
     keys = sector + bits * np.arange(len(sector))[:, None]
     sums = np.bincount(keys.ravel(), values.ravel(), bits * len(sector))
     return sums.reshape(len(sector), bits)
 
 
-def _explained(samples: BandSamples, marks: MarkAppearance, bits: np.ndarray) -> np.ndarray:
-    """Return the shares of steps that are as words expect them, shape (k, 4)."""
+def _explained(
+    samples: BandSamples, marks: MarkAppearance, bits: np.ndarray, seen: np.ndarray
+) -> np.ndarray:
+    """Return the shares of the steps seen that are as words expect them, shape (k, 4)."""
     agree = []
     for ground, band in samples.edges:
         step = log_ratio(band, ground)
@@ -125,9 +202,11 @@ def _explained(samples: BandSamples, marks: MarkAppearance, bits: np.ndarray) ->
         allowed = _AGREEMENT * np.maximum(np.abs(mark), 1)
         as_mark = (np.abs(step - mark) < allowed) & (np.abs(mark) > _AGREEMENT)
         agree.append(np.where(bits, as_mark, np.abs(step) < _AGREEMENT))
-    shares = [
-        (of_edge & which).sum(axis=1) / np.maximum(which.sum(axis=1), 1)
-        for which in (~bits & samples.visible, bits & samples.visible)
-        for of_edge in agree
-    ]
+    shares = []
+    for which in (~bits & seen, bits & seen):
+        for of_edge, visible in zip(agree, samples.visible, strict=True):
+            counted = which & visible
+            of_all = counted.sum(axis=1)
+            share = (of_edge & counted).sum(axis=1) / np.maximum(of_all, 1)
+            shares.append(np.where(of_all > 0, share, 1.0))
     return np.stack(shares, axis=1)

@@ -16,6 +16,7 @@ from ahf_ros.detectors.ring.band_samples import sample_bands
 from ahf_ros.detectors.ring.decoding import decode, sector_angles
 from ahf_ros.detectors.ring.evidence import MarkAppearance
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
+from ahf_ros.detectors.ring.occluded_decoding import decode_occluded
 from ahf_ros.detectors.ring.target_circles import REACH, target_circles
 from ahf_ros.features.circle_fit import Fit, fit_circles
 from ahf_ros.features.edge_shift import SMALL, unshifted
@@ -60,6 +61,8 @@ def read_bands(
         samples = sample_bands(gray, frames, marks.blur, angles, family)
         evidence = band_evidence(samples, marks, frames, family)
         readings = decode(samples, evidence, marks, family)
+        if (per_sector, rounds) == PASSES[-1]:
+            readings = decode_occluded(samples, evidence, readings, marks, frames, family)
         good = readings.plausible
         read, readings, marks = read[good], readings.select(good), marks.select(good)
         words, starts = readings.words, readings.start

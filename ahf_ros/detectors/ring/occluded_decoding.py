@@ -1,0 +1,123 @@
+"""Decoding of bands that something may hide in part.
+
+An edge of a shadow and that of a hand look alike. `decode` takes everything for light. Here what
+light and print do not explain may be hidden, for every word alike, and the word has to be the only
+one without it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ahf_ros.codes.ring import Family, canonical
+from ahf_ros.detectors.ring.band_evidence import BandEvidence
+from ahf_ros.detectors.ring.band_samples import BandSamples
+from ahf_ros.detectors.ring.codewords import best_words, margins
+from ahf_ros.detectors.ring.decoding import (
+    MINIMUM_EXPLAINED,
+    Readings,
+    bits_at,
+    explanation,
+    sectors_by_phase,
+)
+from ahf_ros.detectors.ring.evidence import MarkAppearance
+from ahf_ros.detectors.ring.occlusion import (
+    HiddenEvidence,
+    best_explanations,
+    clearest,
+    explained_words,
+    hidden_evidence,
+    nothing_better,
+    sector_evidence,
+    turned,
+)
+from ahf_ros.detectors.ring.print_evidence import print_evidence
+from ahf_ros.features.array_record import ArrayRecord
+
+_MAXIMUM_MARGIN = 13.0  # what looks like the ground over two sectors makes any word another one
+_CLEAR_MARGIN = 30.0  # where nothing is hidden, of words that no hypothesis can defeat
+_CLEAR = 2.0  # evidence for any states over the word's own, of such words
+
+
+@dataclass(frozen=True, slots=True)
+class _Words(ArrayRecord):
+    """Words, their phases and margins, and what explains them best."""
+
+    words: np.ndarray
+    phases: np.ndarray
+    margin: np.ndarray
+    unexplained: np.ndarray
+    hidden: np.ndarray
+
+
+def decode_occluded(
+    samples: BandSamples,
+    evidence: BandEvidence,
+    readings: Readings,
+    marks: MarkAppearance,
+    frames: np.ndarray,
+    family: Family,
+) -> Readings:
+    """Return the words with the most evidence, whatever hides a part of the band.
+
+    Parameters
+    ----------
+    samples, evidence, marks, family
+        As for `decode`.
+    readings : Readings
+        What `decode` read.
+    frames : ndarray of float64, shape (k, 3, 3)
+        Right to a tenth of a dot radius at the band.
+    """
+    of = hidden_evidence(print_evidence(samples, evidence, marks, frames, family))
+    count = of.onto.shape[1]
+    phases = np.rint(readings.start * count / (2 * np.pi)).astype(np.intp)
+    bits = bits_at(readings.words, phases, count // family.bits, family)
+    better = nothing_better(of, bits)
+    plain = _Words(
+        readings.words,
+        phases,
+        np.minimum(readings.margin, _MAXIMUM_MARGIN),
+        better,
+        np.zeros(bits.shape, bool),
+    )
+    clear = (readings.words > 0) & (readings.margin > _CLEAR_MARGIN) & (better < _CLEAR)
+    others = np.flatnonzero(~clear)
+    best = plain.replaced(others, _competing(of.select(others), family))
+    (_, before), (_, after) = (canonical(of.words, family) for of in (readings, best))
+    same = (readings.words > 0) & (before == after)
+    explained, contradiction = explanation(
+        samples, evidence, marks, best.words, best.phases, best.hidden, family
+    )
+    return Readings(
+        best.words,
+        2 * np.pi * best.phases / count,
+        best.margin,
+        np.where(same, readings.margin, -readings.margin),
+        contradiction,
+        explained,
+        best.unexplained,
+        best.hidden,
+        (best.words > 0) & (explained.min(axis=1) > MINIMUM_EXPLAINED),
+    )
+
+
+def _competing(of: HiddenEvidence, family: Family) -> _Words:
+    """Return the words that all hypotheses of what is hidden leave."""
+    per_sector = of.onto.shape[1] // family.bits
+    angles = sectors_by_phase(per_sector, family)
+    ground, mark = np.moveaxis(sector_evidence(of, angles), 1, 0)
+    last = angles[..., -1]
+    words, phases, _ = best_words(mark - ground, of.onto[:, last], of.off[:, last], family)
+    order = clearest(of)
+    of = turned(of, order)
+    bits = np.take_along_axis(bits_at(words, phases, per_sector, family), order[:, None], axis=2)
+    scores = explained_words(of, bits)
+    best, rows = scores.argmax(axis=1), np.arange(len(words))
+    turned_hidden, unexplained = best_explanations(of, bits[rows, best])
+    hidden = np.empty_like(turned_hidden)
+    np.put_along_axis(hidden, order, turned_hidden, axis=1)
+    margin = np.minimum(margins(words, scores, best, family), _MAXIMUM_MARGIN)
+    return _Words(words[rows, best], phases[rows, best], margin, unexplained, hidden)

@@ -1,0 +1,131 @@
+"""Scenes under every condition that the confidence of ring targets has to bear.
+
+The disturbances are other ones than those of `benchmarks.disturbed`: other gray values, widths and
+distances. Only the kinds are the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+
+from ahf_ros.codes.ring import FAMILY_NAMES, family
+from ahf_ros.synthetic.patterns import LIGHT_NAMES, benchmark_lights
+from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.target import TrueTarget
+from benchmarks import occluders
+from benchmarks.exposure import Exposure
+from benchmarks.lookalikes import LOOKALIKES
+from benchmarks.sheets import COLUMNS, ROWS, mark_sheet, random_numbers, target_sheet
+
+SHADOWS = (0.3, 0.08, 0.04, 0.02)
+"""Ambient light of the smaller scenes, as a share of the projector's."""
+
+GRAYS = (61.0, 75.0, 105.0, 150.0, 190.0, 220.0)
+"""Gray values of what covers targets, from ink to paper."""
+
+CELLS = COLUMNS * ROWS
+
+
+class Scene(NamedTuple):
+    """An image, what it shows, and the family that it is read as."""
+
+    condition: str
+    image: np.ndarray
+    truth: Sequence[TrueTarget]
+    family: str
+
+
+def scenes(seed: int) -> Iterator[Scene]:
+    """Yield scenes under every condition."""
+    for settings in lit(seed):
+        rendering = render(settings)
+        yield Scene('light', rendering.image, rendering.truth, settings.family)
+    yield from disturbed(seed)
+    yield from strange(seed)
+
+
+def lit(seed: int) -> Iterator[SceneSettings]:
+    """Yield scenes under all lights as in the figures, and smaller ones in deeper shadow."""
+    for light, ambient in benchmark_lights():
+        yield SceneSettings(light=light, ambient=ambient, seed=seed)
+    generator = np.random.default_rng(seed)
+    for light, ambient in product(LIGHT_NAMES[1:], SHADOWS):
+        radius = float(generator.choice([9, 14, 20, 24]))
+        yield SceneSettings(
+            width=2000,
+            height=1334,
+            targets=round(6400 / radius**2),
+            dot_radius=radius,
+            family=str(generator.choice(FAMILY_NAMES)),
+            polarity=str(generator.choice(['dark', 'bright'])),
+            tilt=float(generator.choice([0, 30, 50])),
+            light=light,
+            ambient=ambient,
+            seed=seed,
+        )
+
+
+def exposures() -> Iterator[tuple[str, Exposure]]:
+    """Yield disturbances of whole sheets, with their conditions."""
+    yield 'clean', Exposure()
+    for gray in GRAYS:
+        over = 'cover like paper' if gray == GRAYS[-1] else 'cover'
+        for occluder in (
+            occluders.over_sectors(1.5, gray),
+            occluders.over_sectors(2.5, gray),
+            occluders.paper(1.7, gray),
+            occluders.paper(2.4, gray),
+            occluders.finger(1.6, gray),
+            occluders.disc(0.8, gray),
+        ):
+            yield over, Exposure(occluder=occluder)
+    for radius, levels in ((0.7, 150.0), (0.8, 300.0), (1.2, 250.0), (1.7, 120.0)):
+        yield 'glare', Exposure(glare=occluders.highlight(radius, levels))
+    for white, contrast, noise in ((150.0, 30.0, 2.0), (90.0, 12.0, 0.8), (200.0, 7.0, 0.6)):
+        yield 'faint', Exposure(levels=(white, white - contrast, noise))
+    for light in (2.0, 3.5, 0.02):
+        yield 'exposure', Exposure(light=light)
+
+
+def disturbed(seed: int) -> Iterator[Scene]:
+    """Yield sheets of targets that are covered, glossy, faint or badly exposed."""
+    generator = np.random.default_rng([seed, 5])
+    for index, (condition, exposure) in enumerate(exposures()):
+        name = str(generator.choice(FAMILY_NAMES))
+        sheet = target_sheet(
+            name,
+            random_numbers(name, CELLS, seed + 1000 * index)[0],
+            seed + 1000 * index,
+            radius=float(generator.choice([6, 9, 13, 18])),
+            bright=bool(generator.random() < 0.3),
+        )
+        yield Scene(condition, sheet.photograph(exposure), sheet.truth, name)
+    for name in FAMILY_NAMES:
+        numbers = random_numbers(name, CELLS, seed)[0]
+        sheet = target_sheet(name, numbers, seed, radius=float(generator.choice([8, 14])))
+        for distance in (5.0, 6.0):
+            exposure = Exposure(occluder=occluders.other_target(name, distance))
+            yield Scene('another target', sheet.photograph(exposure), sheet.truth, name)
+
+
+def strange(seed: int) -> Iterator[Scene]:
+    """Yield targets read as those of another family, marks that are no targets, and clutter."""
+    generator = np.random.default_rng([seed, 6])
+    for shown in FAMILY_NAMES:
+        radius = float(generator.choice([6, 9, 13, 18]))
+        numbers = random_numbers(shown, CELLS, seed)[0]
+        image = target_sheet(shown, numbers, seed, radius=radius).photograph(Exposure())
+        for name in FAMILY_NAMES:
+            if name != shown:
+                yield Scene('other family', image, (), name)
+    for kind, draw in LOOKALIKES.items():
+        for name in FAMILY_NAMES:
+            inks = list(map(partial(draw, family(name)), [generator] * CELLS))
+            radius = float(generator.choice([9, 13, 18]))
+            image = mark_sheet(inks, seed, radius=radius).photograph(Exposure())
+            yield Scene('clutter' if kind == 'clutter' else 'look-alikes', image, (), name)
