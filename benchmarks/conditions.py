@@ -31,13 +31,28 @@ GRAYS = (61.0, 75.0, 105.0, 150.0, 190.0, 220.0)
 CELLS = COLUMNS * ROWS
 
 
+COMMON = ('light', 'clean', 'exposure')
+"""Conditions that most targets are under; the others are rare."""
+
+
 class Scene(NamedTuple):
-    """An image, what it shows, and the family that it is read as."""
+    """An image, what it shows, and the family that it is read as.
+
+    Attributes
+    ----------
+    condition : str
+    image : ndarray of uint8, shape (height, width)
+    truth : sequence of TrueTarget
+    family : str
+    others : bool
+        Whether the image shows other targets of the family as well.
+    """
 
     condition: str
     image: np.ndarray
     truth: Sequence[TrueTarget]
     family: str
+    others: bool = False
 
 
 def scenes(seed: int) -> Iterator[Scene]:
@@ -110,7 +125,7 @@ def disturbed(seed: int) -> Iterator[Scene]:
         sheet = target_sheet(name, numbers, seed, radius=float(generator.choice([8, 14])))
         for distance in (5.0, 6.0):
             exposure = Exposure(occluder=occluders.other_target(name, distance))
-            yield Scene('another target', sheet.photograph(exposure), sheet.truth, name)
+            yield Scene('another target', sheet.photograph(exposure), sheet.truth, name, True)
 
 
 def strange(seed: int) -> Iterator[Scene]:

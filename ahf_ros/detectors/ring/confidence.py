@@ -1,8 +1,9 @@
 """The probability that a reading is right.
 
-There has to be a target, no pattern of light that resembles one, and its word has to be right.
-Each is a logistic regression on rendered scenes under all lights, see `fitted_weights`.
-`benchmarks.confidence` shows how far the result can be trusted.
+There has to be a target, no pattern of light that resembles one, no target of another family; and
+its word has to be right, whatever hides a part of it. A logistic regression on rendered scenes
+under all lights, with covers, glare, other families and clutter, weighs what tells so; see
+`fitted_weights`. `benchmarks.confidence` shows how far the result can be trusted.
 """
 
 from __future__ import annotations
@@ -11,21 +12,23 @@ import numpy as np
 
 from ahf_ros.detectors.ring.decoding import Readings
 from ahf_ros.detectors.ring.fitted_weights import fitted_weights
+from ahf_ros.detectors.ring.regression import probability
 from ahf_ros.features.circle_fit import Fit
 
 _MINIMUM_DEVIATION = 0.001  # of edges, below which it says no more, dot radii
 _MINIMUM_CONTRAST = 0.25  # of prints; a smaller one speaks no more for a target
-_OF_TARGET, _OF_WORD = fitted_weights('confidence', 'target', 'word')
+_MINIMUM_MARGIN = 1.0  # below which a word is no better than another one
+_REGRESSION = fitted_weights('confidence', 'means', 'deviations', 'weights')
 
-OF_TARGET = len(_OF_TARGET) - 1
-"""Number of the features that tell targets from patterns of light; the others tell words."""
-
-FEATURES = OF_TARGET + len(_OF_WORD) - 1 + 4
+FEATURES = len(_REGRESSION[0])
 """Number of the features that `confidence` weighs."""
+
+MARGIN = 0
+"""The feature that is ln(1 + margin)."""
 
 
 def confidence_features(readings: Readings, fit: Fit) -> np.ndarray:
-    """Return what tells targets from patterns of light, and right readings from wrong ones.
+    """Return what tells right readings from others.
 
     Parameters
     ----------
@@ -36,25 +39,26 @@ def confidence_features(readings: Readings, fit: Fit) -> np.ndarray:
     Returns
     -------
     ndarray of float64, shape (k, FEATURES)
-        Of the target: the smaller explained share of the steps onto marks, at the inner and the
-        outer edge of the band; the share of the edges in their place; ln of their deviation in dot
-        radii; ln of the contrast. Of the word: ln(1 + margin), the contradiction, and the
-        explained share of all steps.
+        ln(1 + margin); ln(1 + what is unexplained); the root of the hidden share of the band; the
+        explained share of all steps; the share of the edges in their place; the smaller explained
+        share of the steps onto marks, at the inner and the outer edge of the band; ln of the
+        deviation of the edges in dot radii; ln(1 + contradiction); the support, signed, as
+        ln(1 + its size); ln of the size in px; ln(1 + the price of covers); ln of the contrast.
     """
-    stretches = (readings.hidden & ~np.roll(readings.hidden, 1, axis=1)).sum(axis=1)
     return np.stack(
         [
-            readings.explained[:, 2:].min(axis=1),
-            fit.share,
-            np.log(fit.deviation / fit.size + _MINIMUM_DEVIATION),
-            np.log(np.maximum(fit.contrast, _MINIMUM_CONTRAST)),
             np.log1p(np.maximum(readings.margin, 0)),
-            readings.contradiction,
+            np.log1p(np.maximum(readings.unexplained, 0)),
+            np.sqrt(readings.hidden.mean(axis=1)),
             readings.explained.mean(axis=1),
-            readings.unexplained,
-            readings.hidden.mean(axis=1),
-            stretches,
+            fit.share,
+            readings.explained[:, 2:].min(axis=1),
+            np.log(fit.deviation / fit.size + _MINIMUM_DEVIATION),
+            np.log1p(readings.contradiction),
             np.sign(readings.support) * np.log1p(np.abs(readings.support)),
+            np.log(fit.size),
+            np.log1p(readings.price),
+            np.log(np.maximum(fit.contrast, _MINIMUM_CONTRAST)),
         ],
         axis=1,
     )
@@ -68,9 +72,5 @@ def confidence(features: np.ndarray) -> np.ndarray:
     features : ndarray of float, shape (k, FEATURES)
         As `confidence_features` gives them.
     """
-    target, word = np.split(features[:, :7], [OF_TARGET], axis=1)
-    return _logistic(target, _OF_TARGET) * _logistic(word, _OF_WORD)
-
-
-def _logistic(features: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    return 1 / (1 + np.exp(-(weights[0] + features @ weights[1:])))
+    only = features[:, MARGIN] > np.log1p(_MINIMUM_MARGIN)
+    return np.where(only, probability(features, *_REGRESSION), 0.0)

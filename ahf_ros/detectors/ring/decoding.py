@@ -51,6 +51,8 @@ class Readings(ArrayRecord):
         Evidence for arcs of any length over that for the word, in units of ln.
     hidden : ndarray of bool, shape (k, m)
         Whether something hides the band at each angle.
+    price : ndarray of float64, shape (k,)
+        Evidence that it takes to believe so, beyond the usual, because the light has edges.
     plausible : ndarray of bool, shape (k,)
         Whether it is worth a closer look.
     """
@@ -63,6 +65,7 @@ class Readings(ArrayRecord):
     explained: np.ndarray
     unexplained: np.ndarray
     hidden: np.ndarray
+    price: np.ndarray
     plausible: np.ndarray
 
 
@@ -116,6 +119,7 @@ def decode(
         explained,
         np.zeros(len(words)),
         np.zeros(bits.shape, bool),
+        np.zeros(len(words)),
         plausible & (explained.min(axis=1) > MINIMUM_EXPLAINED),
     )
 

@@ -100,6 +100,7 @@ def decode_occluded(
         explained,
         best.unexplained,
         best.hidden,
+        of.price,
         (best.words > 0) & (explained.min(axis=1) > MINIMUM_EXPLAINED),
     )
 
