@@ -18,6 +18,7 @@ from ahf_ros.synthetic.patterns import LIGHT_NAMES, benchmark_lights
 from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import TrueTarget
 from benchmarks import occluders
+from benchmarks.disturbed import blurred, compressed, noisy
 from benchmarks.exposure import Exposure
 from benchmarks.lookalikes import LOOKALIKES
 from benchmarks.sheets import COLUMNS, ROWS, mark_sheet, random_numbers, target_sheet
@@ -31,7 +32,7 @@ GRAYS = (61.0, 75.0, 105.0, 150.0, 190.0, 220.0)
 CELLS = COLUMNS * ROWS
 
 
-COMMON = ('light', 'clean', 'exposure')
+COMMON = ('light', 'clean', 'exposure', 'quality')
 """Conditions that most targets are under; the others are rare."""
 
 
@@ -105,6 +106,18 @@ def exposures() -> Iterator[tuple[str, Exposure]]:
         yield 'faint', Exposure(levels=(white, white - contrast, noise))
     for light in (2.0, 3.5, 0.02):
         yield 'exposure', Exposure(light=light)
+    for white, ink in ((100.0, 50.0), (150.0, 88.0), (230.0, 110.0), (120.0, 25.0)):
+        yield 'quality', Exposure(levels=(white, ink, 1.2))
+    for develop in (
+        partial(blurred, 1.2),
+        partial(blurred, 1.8),
+        partial(blurred, 2.5),
+        partial(noisy, 6.0),
+        partial(noisy, 20.0),
+        partial(compressed, 40),
+        partial(compressed, 10),
+    ):
+        yield 'quality', Exposure(develop=develop)
 
 
 def disturbed(seed: int) -> Iterator[Scene]:

@@ -52,32 +52,36 @@ def exposures() -> dict[str, Exposure]:
         rows[f'{contrast} gray levels, noise {noise}'] = Exposure(levels=levels)
     for white, dark in ((180, 120), (160, 120), (90, 60), (240, 200), (100, 60)):
         rows[f'{dark} on {white}'] = Exposure(levels=(white, dark, 1.0))
-    rows['gamma 0.3'] = Exposure(develop=partial(_power, 0.3))
+    rows['gamma 0.3'] = Exposure(develop=partial(power, 0.3))
     for light in (3.0, 4.0, 0.01):
         rows[f'exposed {light:g} times'] = Exposure(light=light)
     for blur in (2.0, 3.0):
-        rows[f'blur of {blur:g} px'] = Exposure(develop=partial(_blurred, blur))
+        rows[f'blur of {blur:g} px'] = Exposure(develop=partial(blurred, blur))
     for noise in (10.0, 30.0):
-        rows[f'noise of {noise:g}'] = Exposure(develop=partial(_noisy, noise))
+        rows[f'noise of {noise:g}'] = Exposure(develop=partial(noisy, noise))
     for quality in (30, 5):
-        rows[f'JPEG {quality}'] = Exposure(develop=partial(_compressed, quality))
+        rows[f'JPEG {quality}'] = Exposure(develop=partial(compressed, quality))
     return rows
 
 
-def _power(exponent: float, image: np.ndarray, _: np.random.Generator) -> np.ndarray:
+def power(exponent: float, image: np.ndarray, _: np.random.Generator) -> np.ndarray:
+    """Return an image with another gamma."""
     return np.rint(255 * (image / 255) ** exponent).astype(np.uint8)
 
 
-def _blurred(blur: float, image: np.ndarray, _: np.random.Generator) -> np.ndarray:
+def blurred(blur: float, image: np.ndarray, _: np.random.Generator) -> np.ndarray:
+    """Return an image blurred with a standard deviation in px."""
     return cv2.GaussianBlur(image, (0, 0), blur)
 
 
-def _noisy(noise: float, image: np.ndarray, generator: np.random.Generator) -> np.ndarray:
+def noisy(noise: float, image: np.ndarray, generator: np.random.Generator) -> np.ndarray:
+    """Return an image with noise of a standard deviation in gray values."""
     values = image + noise * generator.standard_normal(image.shape)
     return np.rint(np.clip(values, 0, 255)).astype(np.uint8)
 
 
-def _compressed(quality: int, image: np.ndarray, _: np.random.Generator) -> np.ndarray:
+def compressed(quality: int, image: np.ndarray, _: np.random.Generator) -> np.ndarray:
+    """Return an image after JPEG compression."""
     _, code = cv2.imencode('.jpg', image, [cv2.IMWRITE_JPEG_QUALITY, quality])
     return cv2.imdecode(code, cv2.IMREAD_GRAYSCALE)
 

@@ -16,7 +16,7 @@ from ahf_ros.detectors.ring.regression import probability
 from ahf_ros.features.circle_fit import Fit
 
 _MINIMUM_DEVIATION = 0.001  # of edges, below which it says no more, dot radii
-_MINIMUM_CONTRAST = 0.25  # of prints; a smaller one speaks no more for a target
+_MANY = 3  # hidden stretches; more say no more
 _MINIMUM_MARGIN = 1.0  # below which a word is no better than another one
 _REGRESSION = fitted_weights('confidence', 'means', 'deviations', 'weights')
 
@@ -43,8 +43,10 @@ def confidence_features(readings: Readings, fit: Fit) -> np.ndarray:
         explained share of all steps; the share of the edges in their place; the smaller explained
         share of the steps onto marks, at the inner and the outer edge of the band; ln of the
         deviation of the edges in dot radii; ln(1 + contradiction); the support, signed, as
-        ln(1 + its size); ln of the size in px; ln(1 + the price of covers); ln of the contrast.
+        ln(1 + its size); ln of the size in px; ln(1 + the price of covers); the number
+        of hidden stretches.
     """
+    stretches = (readings.hidden & ~np.roll(readings.hidden, 1, axis=1)).sum(axis=1)
     return np.stack(
         [
             np.log1p(np.maximum(readings.margin, 0)),
@@ -58,7 +60,7 @@ def confidence_features(readings: Readings, fit: Fit) -> np.ndarray:
             np.sign(readings.support) * np.log1p(np.abs(readings.support)),
             np.log(fit.size),
             np.log1p(readings.price),
-            np.log(np.maximum(fit.contrast, _MINIMUM_CONTRAST)),
+            np.minimum(stretches, _MANY),
         ],
         axis=1,
     )
