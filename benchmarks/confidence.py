@@ -21,9 +21,8 @@ from rich.progress import track
 
 from ahf_ros.codes.ring import canonical, family
 from ahf_ros.detectors.contract import DetectorSettings
-from ahf_ros.detectors.ring.confidence import confidence
+from ahf_ros.detectors.ring.confidence import HIDDEN, MARGIN, UNEXPLAINED, confidence, terms
 from ahf_ros.detectors.ring.detector import find_hypotheses
-from ahf_ros.detectors.ring.regression import terms
 from ahf_ros.imaging.image import as_gray
 from benchmarks.conditions import COMMON, Scene, scenes
 from benchmarks.weights import write_weights
@@ -37,8 +36,9 @@ CLASSES = (0.0, 0.5, 0.9, 0.95, 0.98, 0.99, 0.999, 1.0)
 RARE = 0.1
 """Weight of a reading under a condition that is not common, in the fit."""
 
-_PRIOR = 3.0  # inverse variance of scaled weights
-_LONGEST_STEP = 4.0  # of a scaled weight, in one iteration
+_PRIOR = 1.0  # inverse variance of scaled weights
+_ITERATIONS = 5000
+_NO_SPREAD = 1e-9
 _MINIMUM_MARGIN = np.log1p(1.0)  # of readings that count
 _TRACE = np.log1p(1.0)  # what is unexplained where something leaves a trace
 
@@ -74,47 +74,63 @@ def gathered(seeds: Iterable[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return features, right, condition
 
 
-def logistic_regression(
-    features: np.ndarray, right: np.ndarray, counts: np.ndarray | None = None, prior: float = 1.0
-) -> np.ndarray:
-    """Return intercept and weights with the highest likelihood, under a weak prior.
+def logistic_regression(features: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Return intercept and weights with the highest likelihood, under a weak prior."""
+    mean, spread = features.mean(axis=0), features.std(axis=0)
+    basis = np.column_stack([np.ones(len(features)), (features - mean) / spread])
+    prior = np.diag([0.0] + [1.0] * features.shape[1])
+    weights = np.zeros(basis.shape[1])
+    for _ in range(100):
+        probability = 1 / (1 + np.exp(-basis @ weights))
+        gradient = basis.T @ (probability - right) + prior @ weights
+        curvature = (basis.T * (probability * (1 - probability))) @ basis + prior
+        weights -= np.linalg.solve(curvature, gradient)
+    slopes = weights[1:] / spread
+    return np.concatenate([[weights[0] - slopes @ mean], slopes])
+
+
+def rising_regression(
+    features: np.ndarray, right: np.ndarray, counts: np.ndarray
+) -> tuple[float, np.ndarray]:
+    """Return intercept and weights of a logistic regression, none of which is negative.
+
+    Accelerated projected gradients (Nesterov 1983; Beck and Teboulle 2009) find those with the
+    highest likelihood under a weak prior.
 
     Parameters
     ----------
     features : ndarray of float, shape (k, n)
     right : ndarray of bool, shape (k,)
-    counts : ndarray of float, shape (k,), optional
-        How often each row counts; once where None.
-    prior : float
-        Inverse variance of the weights of scaled features.
+    counts : ndarray of float, shape (k,)
+        How often each row counts.
     """
-    counts = np.ones(len(features)) if counts is None else counts
-    mean, spread = features.mean(axis=0), features.std(axis=0)
+    mean, spread = features.mean(axis=0), features.std(axis=0) + _NO_SPREAD
     basis = np.column_stack([np.ones(len(features)), (features - mean) / spread])
-    curve = np.diag([0.0] + [prior] * features.shape[1])
-    weights = np.zeros(basis.shape[1])
-    for _ in range(100):
-        probability = 1 / (1 + np.exp(-basis @ weights))
-        gradient = basis.T @ (counts * (probability - right)) + curve @ weights
-        curvature = (basis.T * (counts * probability * (1 - probability))) @ basis + curve
-        step = np.linalg.solve(curvature, gradient)
-        weights -= step * min(1, _LONGEST_STEP / np.abs(step).max())
+    prior = np.append(0.0, np.full(features.shape[1], _PRIOR))
+    steepest = np.linalg.eigvalsh((basis.T * counts / 4) @ basis)[-1] + _PRIOR
+    weights = ahead = np.zeros(basis.shape[1])
+    momentum = 1.0
+    for _ in range(_ITERATIONS):
+        probability = 1 / (1 + np.exp(-np.clip(basis @ ahead, -30, 30)))
+        gradient = basis.T @ (counts * (probability - right)) + prior * ahead
+        after = ahead - gradient / steepest
+        after[1:] = np.maximum(after[1:], 0)
+        faster = (1 + np.sqrt(1 + 4 * momentum**2)) / 2
+        ahead = after + (momentum - 1) / faster * (after - weights)
+        weights, momentum = after, faster
     slopes = weights[1:] / spread
-    return np.concatenate([[weights[0] - slopes @ mean], slopes])
+    return weights[0] - slopes @ mean, slopes
 
 
 def fitted(seeds: Iterable[int]) -> dict[str, np.ndarray]:
     """Return the numbers of the regression on the scenes of some seeds, by their names."""
     features, right, condition = gathered(seeds)
-    margin, unexplained, hidden = features[:, :3].T
     # A cover without a trace cannot be told, nor can a word that is printed alike in two families.
-    no_trace = ~right & (unexplained < _TRACE) & (hidden == 0)
-    told = (margin > _MINIMUM_MARGIN) & ~no_trace
-    features, right, condition = features[told], right[told], condition[told]
-    means, deviations = (np.round(of(features, axis=0), 3) for of in (np.mean, np.std))
+    no_trace = ~right & (features[:, UNEXPLAINED] < _TRACE) & (features[:, HIDDEN] == 0)
+    told = (features[:, MARGIN] > _MINIMUM_MARGIN) & ~no_trace
     counts = np.where(np.isin(condition, COMMON), 1.0, RARE)
-    weights = logistic_regression(terms(features, means, deviations)[:, 1:], right, counts, _PRIOR)
-    return {'means': means, 'deviations': deviations, 'weights': np.round(weights, 3)}
+    intercept, weights = rising_regression(terms(features[told]), right[told], counts[told])
+    return {'intercept': np.round(intercept, 3), 'weights': np.round(weights, 3)}
 
 
 def reliability(seeds: Iterable[int]) -> Iterator[str]:

@@ -6,17 +6,20 @@ import json
 
 import pytest
 
-from ahf_ros.detectors.ring.confidence import FEATURES, OF_TARGET
+from ahf_ros.detectors.ring.confidence import FEATURES
 from ahf_ros.detectors.ring.fitted_weights import PATH, fitted_weights
 
 
-def test_there_is_a_weight_for_every_feature_and_an_intercept():
-    target, word = fitted_weights('confidence', 'target', 'word')
-    assert (len(target), len(word)) == (OF_TARGET + 1, FEATURES - OF_TARGET + 1)
-    means, deviations, weights = fitted_weights('counting', 'means', 'deviations', 'weights')
+@pytest.mark.parametrize('purpose', ['confidence', 'counting'])
+def test_there_is_a_weight_for_every_feature_each_product_and_an_intercept(purpose):
+    means, deviations, weights = fitted_weights(purpose, 'means', 'deviations', 'weights')
     count = len(means) + 1
     assert (len(deviations), len(weights)) == (len(means), count * (count + 1) // 2)
     assert deviations.min() > 0
+
+
+def test_the_confidence_weighs_every_feature():
+    assert len(fitted_weights('confidence', 'means')[0]) == FEATURES
 
 
 @pytest.mark.parametrize('purpose', ['confidence', 'counting'])

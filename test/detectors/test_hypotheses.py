@@ -112,11 +112,23 @@ def test_readings_are_taken_over_where_they_belong():
         blur=np.full(1, 0.8),
     )
     one = np.ones(1)
-    readings = Readings(np.array([71]), 0 * one, 100 * one, 5 * one, 0 * one, np.ones((1, 4)))
+    readings = Readings(
+        words=np.array([71]),
+        start=0 * one,
+        margin=13 * one,
+        support=100 * one,
+        contradiction=0 * one,
+        explained=np.ones((1, 4)),
+        unexplained=0 * one,
+        hidden=np.zeros((1, 120), bool),
+        price=0 * one,
+        plausible=one > 0,
+    )
     found = unread.replaced(np.array([1]), Hypotheses.read(readings, better))
     assert found.words.tolist() == [0, 71]
     assert found.frames[:, 0, 2].tolist() == [10.0, 20.5]
     assert found.share.tolist() == [0.8, 1.0]
+    assert found.margin.tolist() == [0.0, 100.0]
     assert found.confidence[0] == 0 and found.confidence[1] > 0.9
     assert fit.frames[1, 0, 2] == 20.0  # what was given is not changed
     assert not unread.words.any()

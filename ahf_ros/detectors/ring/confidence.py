@@ -1,30 +1,59 @@
 """The probability that a reading is right.
 
 There has to be a target, no pattern of light that resembles one, no target of another family; and
-its word has to be right, whatever hides a part of it. A logistic regression on rendered scenes
-under all lights, with covers, glare, other families and clutter, weighs what tells so; see
-`fitted_weights`. `benchmarks.confidence` shows how far the result can be trusted.
+its word has to be right, whatever hides a part of it. Rendered scenes under all lights, with
+covers, glare, other families and clutter, say how much each feature of a reading tells of that: a
+logistic regression on piecewise linear functions, each of which only rises with what speaks for a
+reading, so that it holds where no scene was rendered as well. `benchmarks.confidence` fits it and
+shows how far it can be trusted.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
 from ahf_ros.detectors.ring.decoding import Readings
 from ahf_ros.detectors.ring.fitted_weights import fitted_weights
-from ahf_ros.detectors.ring.regression import probability
 from ahf_ros.features.circle_fit import Fit
 
 _MINIMUM_DEVIATION = 0.001  # of edges, below which it says no more, dot radii
-_MANY = 3  # hidden stretches; more say no more
 _MINIMUM_MARGIN = 1.0  # below which a word is no better than another one
-_REGRESSION = fitted_weights('confidence', 'means', 'deviations', 'weights')
+_USUAL_PRICE = 4.0  # of covers, beyond the usual, that halves what is unexplained
+_FULL_SIZE = 12.0  # radius of a dot from which evidence grows no more, px
 
-FEATURES = len(_REGRESSION[0])
+
+class _Feature(NamedTuple):
+    """What a feature is, whether it speaks for a reading or against it, and where it bends."""
+
+    about: str
+    sign: int
+    knots: tuple[float, ...]
+
+
+_FEATURES = (
+    _Feature('ln(1 + margin)', 1, (0.8, 1.3, 1.8, 2.2, 2.64)),
+    _Feature('ln(1 + unexplained)', -1, (0.0, 1.0, 1.8, 2.4, 2.8, 3.2)),
+    _Feature('the same, less where light has edges', -1, (0.0, 1.0, 1.8, 2.4, 2.8)),
+    _Feature('the same, more where dots are small', -1, (0.0, 1.0, 1.8, 2.4, 2.8, 3.4)),
+    _Feature('root of the hidden share of the band', -1, (0.0, 0.2, 0.3, 0.4, 0.5)),
+    _Feature('number of hidden stretches', -1, (0.0, 1.0, 2.0)),
+    _Feature('explained share of all steps', 1, (0.6, 0.75, 0.85, 0.92, 0.97)),
+    _Feature('share of the edges in their place', 1, (0.6, 0.7, 0.8, 0.9, 0.96)),
+    _Feature('explained share of the steps onto marks', 1, (0.4, 0.6, 0.75, 0.85, 0.93)),
+    _Feature('ln of the deviation of the edges', -1, (-6.0, -5.5, -5.0, -4.5, -4.0)),
+    _Feature('ln(1 + contradiction)', -1, (0.0, 0.5, 1.0, 1.5, 2.2)),
+    _Feature('ln(1 + support), signed', 1, (-5.0, -2.0, 0.0, 2.0, 3.0, 4.0, 5.0)),
+)
+
+FEATURES = len(_FEATURES)
 """Number of the features that `confidence` weighs."""
 
-MARGIN = 0
-"""The feature that is ln(1 + margin)."""
+MARGIN, UNEXPLAINED, HIDDEN = 0, 1, 4
+"""Places of three of them."""
+
+_INTERCEPT, _WEIGHTS = fitted_weights('confidence', 'intercept', 'weights')
 
 
 def confidence_features(readings: Readings, fit: Fit) -> np.ndarray:
@@ -39,31 +68,52 @@ def confidence_features(readings: Readings, fit: Fit) -> np.ndarray:
     Returns
     -------
     ndarray of float64, shape (k, FEATURES)
-        ln(1 + margin); ln(1 + what is unexplained); the root of the hidden share of the band; the
-        explained share of all steps; the share of the edges in their place; the smaller explained
-        share of the steps onto marks, at the inner and the outer edge of the band; ln of the
-        deviation of the edges in dot radii; ln(1 + contradiction); the support, signed, as
-        ln(1 + its size); ln of the size in px; ln(1 + the price of covers); the number
-        of hidden stretches.
+        As `_FEATURES` names them; deviations in dot radii, the share of the steps onto marks the
+        smaller one of those at the inner and the outer edge of the band.
     """
-    stretches = (readings.hidden & ~np.roll(readings.hidden, 1, axis=1)).sum(axis=1)
+    unexplained = np.maximum(readings.unexplained, 0)
+    in_light = unexplained / (1 + readings.price / _USUAL_PRICE)
+    in_size = in_light * np.maximum(_FULL_SIZE / fit.size, 1)
+    starts = readings.hidden & ~np.roll(readings.hidden, 1, axis=1)
     return np.stack(
         [
             np.log1p(np.maximum(readings.margin, 0)),
-            np.log1p(np.maximum(readings.unexplained, 0)),
+            np.log1p(unexplained),
+            np.log1p(in_light),
+            np.log1p(in_size),
             np.sqrt(readings.hidden.mean(axis=1)),
+            starts.sum(axis=1),
             readings.explained.mean(axis=1),
             fit.share,
             readings.explained[:, 2:].min(axis=1),
             np.log(fit.deviation / fit.size + _MINIMUM_DEVIATION),
             np.log1p(readings.contradiction),
             np.sign(readings.support) * np.log1p(np.abs(readings.support)),
-            np.log(fit.size),
-            np.log1p(readings.price),
-            np.minimum(stretches, _MANY),
         ],
         axis=1,
     )
+
+
+def terms(features: np.ndarray) -> np.ndarray:
+    """Return what the regression weighs, each of which speaks for a reading.
+
+    A feature that speaks for it counts up to each knot, one that speaks against it from each on.
+
+    Parameters
+    ----------
+    features : ndarray of float, shape (k, FEATURES)
+        As `confidence_features` gives them.
+
+    Returns
+    -------
+    ndarray of float64, shape (k, n)
+    """
+    columns = [
+        np.minimum(values, knot) if feature.sign > 0 else -np.maximum(values - knot, 0)
+        for feature, values in zip(_FEATURES, features.T, strict=True)
+        for knot in feature.knots
+    ]
+    return np.stack(columns, axis=1)
 
 
 def confidence(features: np.ndarray) -> np.ndarray:
@@ -74,5 +124,6 @@ def confidence(features: np.ndarray) -> np.ndarray:
     features : ndarray of float, shape (k, FEATURES)
         As `confidence_features` gives them.
     """
-    only = features[:, MARGIN] > np.log1p(_MINIMUM_MARGIN)
-    return np.where(only, probability(features, *_REGRESSION), 0.0)
+    one_word = features[:, MARGIN] > np.log1p(_MINIMUM_MARGIN)
+    probability = 1 / (1 + np.exp(-(_INTERCEPT + terms(features) @ _WEIGHTS)))
+    return np.where(one_word, probability, 0.0)

@@ -22,7 +22,6 @@ from ahf_ros.detectors.ring.evidence import (
 )
 from ahf_ros.detectors.ring.fitted_weights import fitted_weights
 from ahf_ros.detectors.ring.hypotheses import Hypotheses, resolve_dots
-from ahf_ros.detectors.ring.regression import probability
 from ahf_ros.features import frame
 from ahf_ros.features.profiles import USUAL_BLUR
 from ahf_ros.features.sampling import sample_circles
@@ -34,10 +33,11 @@ _FAINTEST = 0.9  # gray value of dark over bright
 _MINIMUM_CONTRAST = 0.05
 _CLEAR = 1.0  # evidence, in units of ln, that is more than noise
 _WHOLE_STEP = 0.5  # of the usual step of the dot's edge
+_MAXIMUM = 4.0  # scaled feature; more says no more
 _MARKED = 7  # the feature that is the share of angles with a mark
 _MINIMUM_MARKED = 1.0  # sectors of a band with a mark at both edges
 _COUNTED = 0.75  # probability of being a target, from which a dot counts
-_REGRESSION = fitted_weights('counting', 'means', 'deviations', 'weights')
+_MEANS, _DEVIATIONS, _WEIGHTS = fitted_weights('counting', 'means', 'deviations', 'weights')
 
 
 def estimate_count(image: np.ndarray, settings: DetectorSettings | None = None) -> int:
@@ -69,11 +69,11 @@ def estimate_count(image: np.ndarray, settings: DetectorSettings | None = None) 
     minimum, maximum = settings.radii
     dots = dots.select((major >= minimum) & (major <= maximum))
     features = target_features(gray.astype(np.float32, copy=False), dots, code)
-    likely = target_probability(features)
+    probability = target_probability(features)
     # The regression has not seen every kind of dot; a word has at least two marked sectors.
     banded = features[:, _MARKED] * code.bits >= _MINIMUM_MARKED
-    best_first = np.argsort(-likely, kind='stable')
-    targets = dots.select(best_first[(banded & (likely >= _COUNTED))[best_first]])
+    best_first = np.argsort(-probability, kind='stable')
+    targets = dots.select(best_first[(banded & (probability >= _COUNTED))[best_first]])
     count = len(targets.words)
     distinct, _ = resolve_dots(targets, np.zeros(count), np.ones(count, bool), code)
     return len(distinct)
@@ -90,7 +90,27 @@ def target_probability(features: np.ndarray) -> np.ndarray:
     features : ndarray of float, shape (k, n)
         As `target_features` gives them.
     """
-    return probability(features, *_REGRESSION)
+    return 1 / (1 + np.exp(-(terms(features, _MEANS, _DEVIATIONS) @ _WEIGHTS)))
+
+
+def terms(features: np.ndarray, means: np.ndarray, deviations: np.ndarray) -> np.ndarray:
+    """Return what the regression weighs: one, scaled features, and their products two by two.
+
+    Parameters
+    ----------
+    features : ndarray of float, shape (k, n)
+    means, deviations : ndarray of float, shape (n,)
+        Usual value and standard deviation of each.
+
+    Returns
+    -------
+    ndarray of float64, shape (k, (n + 1) (n + 2) / 2)
+        The ones come first.
+    """
+    scaled = np.clip((features - means) / deviations, -_MAXIMUM, _MAXIMUM)
+    factors = np.column_stack([np.ones(len(scaled)), scaled])
+    first, second = np.triu_indices(factors.shape[1])
+    return factors[:, first] * factors[:, second]
 
 
 def target_features(gray: np.ndarray, dots: Hypotheses, code: Family) -> np.ndarray:

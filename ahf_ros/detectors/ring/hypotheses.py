@@ -13,7 +13,7 @@ from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.circle_fit import Fit
 
-_CERTAIN = 0.98  # confidence from which a word is reported
+_CERTAIN = 0.95  # confidence from which a word is reported
 _CLEARLY = 2.0  # times the evidence of another claim to the same ID or dot
 
 
@@ -71,7 +71,7 @@ class Hypotheses(ArrayRecord):
             fit.covariance,
             fit.share,
             readings.words,
-            readings.margin,
+            np.maximum(readings.margin, readings.support),
             features,
             confidence(features),
         )
