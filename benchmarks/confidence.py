@@ -37,7 +37,7 @@ RARE = 0.1
 """Weight of a reading under a condition that is not common, in the fit."""
 
 _PRIOR = 1.0  # inverse variance of scaled weights
-_ITERATIONS = 5000
+_ITERATIONS = 3000
 _NO_SPREAD = 1e-9
 _MINIMUM_MARGIN = np.log1p(1.0)  # of readings that count
 _TRACE = np.log1p(1.0)  # what is unexplained where something leaves a trace

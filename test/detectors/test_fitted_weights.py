@@ -4,22 +4,24 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
 
-from ahf_ros.detectors.ring.confidence import FEATURES
+from ahf_ros.detectors.ring.confidence import FEATURES, terms
 from ahf_ros.detectors.ring.fitted_weights import PATH, fitted_weights
 
 
-@pytest.mark.parametrize('purpose', ['confidence', 'counting'])
-def test_there_is_a_weight_for_every_feature_each_product_and_an_intercept(purpose):
-    means, deviations, weights = fitted_weights(purpose, 'means', 'deviations', 'weights')
+def test_the_count_has_a_weight_for_every_feature_each_product_and_an_intercept():
+    means, deviations, weights = fitted_weights('counting', 'means', 'deviations', 'weights')
     count = len(means) + 1
     assert (len(deviations), len(weights)) == (len(means), count * (count + 1) // 2)
     assert deviations.min() > 0
 
 
-def test_the_confidence_weighs_every_feature():
-    assert len(fitted_weights('confidence', 'means')[0]) == FEATURES
+def test_the_confidence_only_rises_with_what_speaks_for_a_reading():
+    weights = fitted_weights('confidence', 'weights')[0]
+    assert terms(np.zeros((1, FEATURES))).shape == (1, len(weights))
+    assert weights.min() >= 0
 
 
 @pytest.mark.parametrize('purpose', ['confidence', 'counting'])
