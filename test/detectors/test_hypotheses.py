@@ -124,7 +124,9 @@ def test_readings_are_taken_over_where_they_belong():
         price=0 * one,
         plausible=one > 0,
     )
-    found = unread.replaced(np.array([1]), Hypotheses.read(readings, better))
+    found = unread.replaced(
+        np.array([1]), Hypotheses.read(readings, better, unread.select(np.array([1])))
+    )
     assert found.words.tolist() == [0, 71]
     assert found.frames[:, 0, 2].tolist() == [10.0, 20.5]
     assert found.share.tolist() == [0.8, 1.0]

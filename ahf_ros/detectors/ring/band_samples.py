@@ -103,4 +103,16 @@ def sample_bands(
     beside_edges, band, gap, dot, on_edges = np.split(values, ends)
     limits = frame.circle_points(angles, np.array([inner, outer]) + beside)
     visible = within(frame.project(frames, limits), gray.shape)
-    return BandSamples(*beside_edges, band, gap, dot, on_edges, beside, np.moveaxis(visible, 2, 0))
+    inner_ground, inner_band, outer_band, outer_ground = beside_edges
+    return BandSamples(
+        inner_ground,
+        inner_band,
+        outer_band,
+        outer_ground,
+        band,
+        gap,
+        dot,
+        on_edges,
+        beside,
+        np.moveaxis(visible, 2, 0),
+    )

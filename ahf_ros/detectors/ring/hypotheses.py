@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,7 +13,8 @@ from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.circle_fit import Fit
 
-_CERTAIN = 0.95  # confidence from which a word is reported
+_CERTAIN = 0.94  # confidence from which a word is reported
+_LIKELY = 0.5  # confidence from which a word tells where the edges of its band are
 _CLEARLY = 2.0  # times the evidence of another claim to the same ID or dot
 
 
@@ -63,18 +64,37 @@ class Hypotheses(ArrayRecord):
         )
 
     @staticmethod
-    def read(readings: Readings, fit: Fit) -> Hypotheses:
-        """Return bands that are read, with the frames of dot and band."""
+    def read(readings: Readings, fit: Fit, dots: Hypotheses) -> Hypotheses:
+        """Return bands that are read, with the frames of dot and band where their word is likely.
+
+        Parameters
+        ----------
+        readings : Readings
+        fit : Fit
+            Of dot and band.
+        dots : Hypotheses
+            The same dots, whose bands are not read.
+        """
         features = confidence_features(readings, fit)
-        return Hypotheses(
+        certainty = confidence(features)
+        likely = certainty >= _LIKELY
+        every = Hypotheses(
             fit.frames,
             fit.covariance,
             fit.share,
             readings.words,
             np.maximum(readings.margin, readings.support),
             features,
-            confidence(features),
+            certainty,
         )
+        alone = dots.select(~likely)
+        doubtful = replace(
+            every.select(~likely),
+            frames=alone.frames,
+            covariance=alone.covariance,
+            share=alone.share,
+        )
+        return every.replaced(~likely, doubtful)
 
 
 def resolve_dots(

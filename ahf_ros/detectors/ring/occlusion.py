@@ -81,10 +81,16 @@ def clearest(of: HiddenEvidence) -> np.ndarray:
 
 def turned(of: HiddenEvidence, order: np.ndarray) -> HiddenEvidence:
     """Return the evidence with its angles in an order, shape (k, m)."""
-    by_bit = (of.seen, of.anything, of.like_ground)
+
+    def of_bits(part: np.ndarray) -> np.ndarray:
+        return np.take_along_axis(part, order[:, None], axis=2)
+
     return HiddenEvidence(
-        *(np.take_along_axis(part, order[:, None], axis=2) for part in by_bit),
-        *(np.take_along_axis(part, order, axis=1) for part in (of.onto, of.off)),
+        of_bits(of.seen),
+        of_bits(of.anything),
+        of_bits(of.like_ground),
+        np.take_along_axis(of.onto, order, axis=1),
+        np.take_along_axis(of.off, order, axis=1),
         of.price,
     )
 

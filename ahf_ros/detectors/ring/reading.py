@@ -70,7 +70,7 @@ def read_bands(
         fit = fit_circles(gray, frames[good], circles, reach=REACH, projective=True, rounds=rounds)
         frames = fit.frames
     unread = Hypotheses.unread(dots.select(which))
-    return unread.replaced(read, Hypotheses.read(readings, fit)), which
+    return unread.replaced(read, Hypotheses.read(readings, fit, unread.select(read))), which
 
 
 def mark_appearance(gray: np.ndarray, dots: Fit) -> MarkAppearance:
