@@ -32,6 +32,7 @@ from ahf_ros.bag.assembly import finished
 from ahf_ros.bag.definitions import CODED_TARGETS, message_types, typestore
 from ahf_ros.bag.run import BagTask, answer_bag
 from ahf_ros.bag.source import Source
+from ahf_ros.detectors import DetectorSettings
 from ahf_ros.drawing import draw
 from ahf_ros.filtering.settings import AdaptiveSettings
 from ahf_ros.interchange.image_files import decode_bytes
@@ -54,7 +55,8 @@ TESTS = (
     'test/nodes/test_security.py',
 )
 SETTINGS = IdentificationSettings(
-    detector='traditional', adaptive=AdaptiveSettings(ahf=False, threads=1)
+    detection=DetectorSettings(family='aruco_4x4_50'),
+    adaptive=AdaptiveSettings(ahf=False, threads=1),
 )
 GRAY = np.tile(np.arange(40, dtype=np.uint8), (30, 1))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -45,8 +46,9 @@ def definition_folder() -> Path:
     raise FileNotFoundError(f'no .msg files of ahf_ros in {" or ".join(map(str, places))}')
 
 
+@cache
 def typestore() -> Typestore:
-    """Return the message types of ROS 2 Jazzy and of this package."""
+    """Return the message types of ROS 2 Jazzy and of this package; nobody adds any."""
     store = get_typestore(Stores.ROS2_JAZZY)
     types = {}
     for name in _NAMES:

@@ -226,7 +226,11 @@ def _size(part: str) -> int:
 
 
 def _metadata(folder: Path) -> Any:
-    return YAML(typ='safe').load((folder / METADATA).read_text(encoding='utf-8'))
+    text = (folder / METADATA).read_text(encoding='utf-8')
+    try:
+        return json.loads(text)  # as `_replace` writes it; YAML takes far longer to parse
+    except ValueError:
+        return YAML(typ='safe').load(text)
 
 
 def _replace(path: Path, content: Any) -> None:
