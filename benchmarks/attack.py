@@ -10,55 +10,35 @@ whatever does neither succeed nor name what is wrong.
 from __future__ import annotations
 
 import argparse
-import contextlib
-import io
 import json
 import re
 import struct
 import subprocess
 import sys
-import tempfile
 import traceback
-from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 import cv2
 import numpy as np
 from hypothesis import strategies as st
 
-from ahf_ros.bag.assembly import finished
 from ahf_ros.bag.definitions import CODED_TARGETS, message_types, typestore
-from ahf_ros.bag.run import BagTask, answer_bag
-from ahf_ros.bag.source import Source
-from ahf_ros.detectors import DetectorSettings
 from ahf_ros.drawing import draw
-from ahf_ros.filtering.settings import AdaptiveSettings
 from ahf_ros.interchange.image_files import decode_bytes
 from ahf_ros.interchange.target_json import to_json
 from ahf_ros.interchange.target_messages import coded_target_array
-from ahf_ros.session import IdentificationSettings
 from ahf_ros.target import Identification, Target
 from ahf_ros.target_check import checked_targets
 from benchmarks import fuzz
+from benchmarks.attack_bags import GRAY, hostile_bags, mutated
 from support import bags
 
-COUNT = 3
-"""Images of a bag."""
-
-STORAGES = ('mcap', 'sqlite3', 'ros1')
-PAGE = 4096
 TESTS = (
     'test/bag/test_bag_damage.py',
     'test/cli/test_cli_ending.py',
     'test/nodes/test_security.py',
 )
-SETTINGS = IdentificationSettings(
-    detection=DetectorSettings(family='aruco_4x4_50'),
-    adaptive=AdaptiveSettings(ahf=False, threads=1),
-)
-GRAY = np.tile(np.arange(40, dtype=np.uint8), (30, 1))
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,87 +145,10 @@ def check_result(found: object) -> bool:
     return True
 
 
-def mutated(content: bytes, random: np.random.Generator) -> bytes:
-    """Return content with one to three damages of any kind."""
-    changed = bytearray(content)
-    for _ in range(random.integers(1, 4)):
-        place = int(random.integers(len(changed)))
-        size = int(random.integers(1, 64))
-        kind = random.integers(7)
-        if kind == 0:
-            changed[place] ^= 1 << int(random.integers(8))
-        elif kind == 1:
-            page = place // PAGE * PAGE
-            changed[page : page + PAGE] = bytes(len(changed[page : page + PAGE]))
-        elif kind == 2:
-            del changed[max(place, 1) :]
-        elif kind == 3:
-            del changed[place : place + size]
-        elif kind == 4:
-            changed[place:place] = random.bytes(size)
-        elif kind == 5:
-            changed[place : place + 8] = b'\xff' * len(changed[place : place + 8])
-        else:
-            other = int(random.integers(len(changed)))
-            changed[place : place + size] = changed[other : other + size]
-        changed = changed or bytearray(b'\0')
-    return bytes(changed)
-
-
-def check_bag(source: Path, target: Path, recorded: Counter[str]) -> bool:
-    """Process a bag and return whether it is complete; losses must be named.
-
-    Parameters
-    ----------
-    source, target : Path
-    recorded : Counter
-        Number of messages by topic before the damage.
-    """
-    try:
-        with contextlib.redirect_stderr(io.StringIO()):
-            outcome = answer_bag(BagTask(source, target, identification=SETTINGS), lambda *_: None)
-    except ValueError as error:
-        assert str(error)
-        return False
-    made: Counter[str] = Counter()
-    with Source(target) as bag:
-        made.update(item.topic for item, _, _ in bag.messages())
-        assert not bag.lost
-    assert finished(target) == outcome
-    answers = sum(count for topic, count in made.items() if topic.endswith('/coded_targets'))
-    assert answers + outcome.refused == outcome.images
-    if outcome.lost:
-        return False
-    # Without a loss that is named everything is there; a name may be what was damaged.
-    assert sum(made.values()) - answers == recorded.total(), dict(made)
-    return True
-
-
 def attack_bags(count: int) -> Tally:
-    """Process mutated bags of every kind."""
-    images = [GRAY + number for number in range(COUNT)]
-    recorded = Counter({'/image': COUNT, '/notes': COUNT})
-    random = np.random.default_rng(0)
-    with tempfile.TemporaryDirectory(prefix='ahf_attack_') as name:
-        folder = Path(name)
-        whole: dict[str, tuple[Path, Path, bytes]] = {}
-        for storage in STORAGES:
-            if storage == 'ros1':
-                source = bags.write_ros1(folder / 'in.bag', bags.recorded(bags.ros1(), images))
-                file = source
-            else:
-                source = folder / storage
-                bags.write_ros2(source, bags.recorded(typestore(), images), storage)
-                file = next(it for it in source.iterdir() if it.suffix != '.yaml')
-            whole[storage] = source, file, file.read_bytes()
-
-        def one(number: int) -> bool:
-            source, file, content = whole[STORAGES[number % len(STORAGES)]]
-            file.write_bytes(mutated(content, random))
-            with tempfile.TemporaryDirectory(dir=folder) as made:
-                return check_bag(source, Path(made) / 'out', recorded)
-
-        return _tallied('bags', count, one)
+    """Process hostile bags of every kind."""
+    with hostile_bags() as attack:
+        return _tallied('bags', count, attack)
 
 
 def attack_images(count: int) -> Tally:

@@ -48,7 +48,7 @@ class NodeProcess:
     """A node of this package that runs in a process of its own."""
 
     def __init__(self, node: str, *arguments: str) -> None:
-        command = [sys.executable, '-m', f'ahf_ros.nodes.{node}', '--ros-args', *arguments]
+        command = [sys.executable, '-m', 'ahf_ros.nodes', node, '--ros-args', *arguments]
         self.awaited = False
         self.output = ''
         # Not pipes, which hold up a process of which nobody reads the log.

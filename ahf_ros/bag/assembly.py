@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -11,10 +12,13 @@ from pathlib import Path
 from ahf_ros.bag.answering import AnswerTopics
 from ahf_ros.bag.copying import Copy
 from ahf_ros.bag.definitions import typestore
-from ahf_ros.bag.folder import METADATA
+from ahf_ros.bag.folder import MALFORMED, METADATA
 from ahf_ros.bag.journal import Entry, Journal, Output, custom_data
-from ahf_ros.bag.source import Source
+from ahf_ros.bag.other_messages import NAME as OTHER_MESSAGES
+from ahf_ros.bag.other_messages import OtherMessages, check_others
+from ahf_ros.bag.source import Source, is_ros
 from ahf_ros.bag.writing import BagWriter
+from ahf_ros.text import reason_of
 
 TASK_KEY = 'ahf_ros'
 """Under which a bag keeps what it was made from."""
@@ -39,12 +43,16 @@ class Outcome:
         Messages that are missing, with topic and time where they are known.
     left_out : tuple of str
         What else of the source the new bag does not have.
+    others : int
+        Number of messages in `ahf_ros.bag.other_messages.NAME`, because a ROS 2 bag cannot hold
+        them.
     """
 
     images: int
     refused: int
     lost: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
+    others: int = 0
 
 
 def assemble(
@@ -80,8 +88,9 @@ def assemble(
         for name, value in source.metadata.custom.items():
             writer.set_custom_data(name, value)
         writer.set_custom_data(TASK_KEY, kept)
-        copy = Copy(source, writer)
-        answers = _write(source, target, topics, journal, writer, copy)
+        with OtherMessages(bag / OTHER_MESSAGES) as others:
+            copy = Copy(source, writer, others)
+            answers = _write(source, target, topics, journal, writer, copy)
         written = sum(writer.counts.values())
         if written != answers + copy.counts.total():
             raise ValueError(
@@ -89,8 +98,10 @@ def assemble(
                 f'{copy.counts.total()} of {source.path} and {answers} answers'
             )
         refused = sum(bool(entry.reason) for entry in journal.entries)
-        lost = (*source.lost, *source.foreign, *copy.refused)
-        outcome = Outcome(len(journal.entries), refused, lost, tuple(source.left_out))
+        lost = (*source.lost, *copy.refused)
+        left_out = (*others.described, *source.left_out)
+        total = sum(others.counts.values())
+        outcome = Outcome(len(journal.entries), refused, lost, left_out, total)
         writer.set_custom_data(OUTCOME_KEY, json.dumps(asdict(outcome)))
     for file in sorted(bag.iterdir(), key=lambda file: file.name == METADATA):
         # The metadata last: it says which files are the bag.
@@ -110,23 +121,26 @@ def finished(target: Path) -> Outcome | None:
     if done is None:
         return None
     try:
+        fields = json.loads(done)
+        for name in ('lost', 'left_out'):
+            fields[name] = tuple(fields[name])
+        outcome = Outcome(**fields)
         with Source(target) as made:
-            counts: dict[str, int] = {}
+            counts: Counter[str] = Counter()
             for item in made.connections:
-                counts[item.topic] = counts.get(item.topic, 0) + item.msgcount
+                counts[item.topic] += item.msgcount
             made.check_counts(counts)
             lost = '; '.join(made.lost)
-    except ValueError as error:
-        lost = str(error)
+        if outcome.others:
+            check_others(target / OTHER_MESSAGES, outcome.others)
+    except MALFORMED as error:
+        lost = str(error) if isinstance(error, ValueError) else reason_of(error)
     if lost:
         raise ValueError(
             f'{target} was finished and is damaged: {lost}; accepted is another name, or '
             'to remove it'
         )
-    fields = json.loads(done)
-    for name in ('lost', 'left_out'):
-        fields[name] = tuple(fields[name])
-    return Outcome(**fields)
+    return outcome
 
 
 def remove_assembled(target: Path) -> None:
@@ -159,12 +173,13 @@ def _write(
         for name, kind in to.types.items()
     }
     entries: Iterator[tuple[Entry, list[Output]]] = journal.answers()
-    read: dict[str, int] = {}
-    answers = 0
+    read: Counter[str] = Counter()
+    answers = images_read = 0
     for connection, timestamp, data in source.messages():
         copy.write(connection, timestamp, data)
-        read[connection.topic] = read.get(connection.topic, 0) + 1
-        if connection.topic in topics:
+        read[connection.topic] += 1
+        if connection.topic in topics and is_ros(connection):
+            images_read += 1
             entry, outputs = next(entries, (None, []))
             if entry is None:
                 break
@@ -173,7 +188,6 @@ def _write(
             for name, message in outputs:
                 writer.write(connections[name], timestamp, message)
     expected = len(journal.entries)
-    images_read = sum(read.get(topic, 0) for topic in topics)
     if images_read != expected:
         lost = '; '.join(source.lost) or 'no damage was found'
         raise ValueError(

@@ -14,7 +14,8 @@ from rosbags.interfaces import Connection, ConnectionExtRosbag2, MessageDefiniti
 from rosbags.rosbag2 import Writer
 
 from ahf_ros.bag.definitions import TypeStores
-from ahf_ros.bag.source import Source
+from ahf_ros.bag.other_messages import OtherMessages
+from ahf_ros.bag.source import Source, is_ros
 from ahf_ros.text import reason_of
 
 UNKNOWN_HASH = f'RIHS01_{0:064x}'
@@ -32,15 +33,18 @@ class Copy:
         Bag that is copied.
     writer : Writer
         Bag that is written. All topics of the source are added at once.
+    others : OtherMessages
+        Takes the messages that a ROS 2 bag cannot hold.
 
     Attributes
     ----------
     counts : Counter
-        Number of messages written, by topic.
+        Number of messages written to the bag, by topic.
     """
 
-    def __init__(self, source: Source, writer: Writer) -> None:
+    def __init__(self, source: Source, writer: Writer, others: OtherMessages) -> None:
         self._writer = writer
+        self._others = others
         self._targets: dict[tuple[int, int], _Target] = {}
         self._reasons: dict[str, str] = {}  # by topic that cannot be converted
         self._refused: Counter[tuple[str, str]] = Counter()
@@ -63,6 +67,9 @@ class Copy:
 
     def write(self, connection: Connection, timestamp: int, data: bytes) -> None:
         """Write a message of the source."""
+        if not is_ros(connection):
+            self._others.write(connection, timestamp, data)
+            return
         target = self._targets.get((connection.id, id(connection.owner)))
         if target is None:
             self._refused[connection.topic, self._reasons[connection.topic]] += 1
@@ -99,12 +106,12 @@ def _added(writer: Writer, item: Connection, stores: TypeStores) -> Connection:
         if (known.topic, known.msgtype, known.ext) == (item.topic, item.msgtype, item.ext):
             return known
     definition, digest = item.msgdef.data, item.digest
+    undefined = item.msgdef.format == MessageDefinitionFormat.NONE
     with suppress(Exception):
         # Types that are not accepted are copied with the hash of unknown types.
-        store = stores.of(item)
-        if item.msgdef.format == MessageDefinitionFormat.NONE:
-            definition, _ = store.generate_msgdef(item.msgtype, ros_version=2)
-        digest = digest or store.hash_rihs01(item.msgtype)
+        if undefined:
+            definition, _ = stores.of(item).generate_msgdef(item.msgtype, ros_version=2)
+        digest = digest or stores.of(item).hash_rihs01(item.msgtype)
     return writer.add_connection(
         item.topic,
         item.msgtype,

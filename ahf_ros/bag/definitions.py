@@ -23,6 +23,9 @@ CODED_TARGETS = 'ahf_ros/msg/CodedTargetArray'
 COMPRESSED_IMAGE = 'sensor_msgs/msg/CompressedImage'
 IMAGE = 'sensor_msgs/msg/Image'
 
+LONGEST_DEFINITION = 2**17
+"""Characters of a definition of a type that is parsed, which takes seconds."""
+
 _NAMES = ('CodedTarget', 'CodedTargetArray', 'FilterState')
 _IDL_SEPARATOR = '=' * 80 + '\n'
 
@@ -132,6 +135,8 @@ def _is_ros1(item: Connection) -> bool:
 def _types(item: Connection) -> dict[str, Any]:
     """Return the types in the definition of a connection."""
     text = item.msgdef.data
+    if len(text) > LONGEST_DEFINITION:
+        raise ValueError(f'it has {len(text)} characters, accepted are {LONGEST_DEFINITION}')
     if item.msgdef.format == MessageDefinitionFormat.MSG:
         return get_types_from_msg(text, item.msgtype)
     if not text.startswith(f'{_IDL_SEPARATOR}IDL: '):

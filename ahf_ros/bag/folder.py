@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -19,6 +20,9 @@ from ahf_ros.bag.sqlite import Sqlite
 from ahf_ros.text import reason_of
 
 METADATA = 'metadata.yaml'
+
+MALFORMED = (OSError, YAMLError, LookupError, TypeError, ValueError, RecursionError)
+"""What reading metadata that are missing, damaged or of another kind raises."""
 
 _KINDS: dict[str, Callable[[Path], BagFile]] = {'.bag': Ros1, '.db3': Sqlite, '.mcap': Mcap}
 _COMPRESSED = '.zstd'
@@ -57,8 +61,7 @@ def read_metadata(folder: Path) -> Metadata:
         If there are none, or they are not as ROS 2 writes them.
     """
     try:
-        text = (folder / METADATA).read_text(encoding='utf-8')
-        about: Any = YAML(typ='safe').load(text)['rosbag2_bagfile_information']
+        about = load_metadata(folder)['rosbag2_bagfile_information']
         counts: dict[str, int] = {}
         for item in about['topics_with_message_count']:
             topic = str(item['topic_metadata']['name'])
@@ -70,8 +73,17 @@ def read_metadata(folder: Path) -> Metadata:
             counts,
             {str(name): str(value) for name, value in custom.items()},
         )
-    except (OSError, YAMLError, AttributeError, LookupError, TypeError, ValueError) as error:
+    except (*MALFORMED, AttributeError, OverflowError) as error:
         raise ValueError(f'{METADATA}: {reason_of(error)}') from error
+
+
+def load_metadata(folder: Path) -> Any:
+    """Return the content of the metadata of a bag; raises what `MALFORMED` lists."""
+    text = (folder / METADATA).read_text(encoding='utf-8')
+    try:
+        return json.loads(text)  # as this package writes it; YAML takes far longer to parse
+    except ValueError:
+        return YAML(typ='safe').load(text)
 
 
 def open_files(
@@ -117,6 +129,14 @@ def open_files(
     return (files if names else sorted(files, key=lambda file: file.start)), lost
 
 
+def unlisted_files(path: Path, names: tuple[str, ...]) -> list[str]:
+    """Return a line about each file of a bag that its metadata do not list, if they list any."""
+    if not names:
+        return []
+    found = sorted(it.name for it in path.iterdir() if _kind(it) in _KINDS)
+    return [f'{name}, which {METADATA} does not list' for name in found if name not in names]
+
+
 def _kind(path: Path) -> str:
     return Path(path.stem).suffix if path.suffix == _COMPRESSED else path.suffix
 
@@ -126,6 +146,8 @@ def _opened(path: Path, scratch: Path, lost: list[Lost]) -> BagFile:
     kind = _kind(path)
     if kind not in _KINDS:
         raise ValueError(f'its ending is {path.suffix!r}, accepted is {", ".join(_KINDS)}')
+    if not path.is_dir() and path.exists() and not path.is_file():
+        raise ValueError('it is not a regular file')
     if path.suffix == _COMPRESSED:
         path = _decompressed(path, scratch, lost)
     return _KINDS[kind](path)

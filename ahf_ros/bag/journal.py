@@ -20,12 +20,9 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
-
 from ahf_ros.bag.definitions import typestore
-from ahf_ros.bag.folder import METADATA
-from ahf_ros.bag.writing import BagWriter
+from ahf_ros.bag.folder import MALFORMED, METADATA, load_metadata
+from ahf_ros.bag.writing import BagWriter, as_yaml
 from ahf_ros.filtering.identifier import Memory
 
 PROGRESS = '/ahf_bag/progress'
@@ -90,7 +87,7 @@ def begin(folder: Path, topics: Mapping[str, str], origin: str) -> None:
             for topic, kind in {**topics, PROGRESS: _STRING}.items():
                 writer.add_connection(topic, kind, typestore=store)
         (bag / f'{bag.name}.db3').rename(bag / _EMPTY)
-        content = _metadata(bag)
+        content = load_metadata(bag)
         content[_INFORMATION]['relative_file_paths'] = [_EMPTY]
         _replace(bag / METADATA, content)
         bag.rename(folder)
@@ -113,7 +110,7 @@ class Journal:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._store = typestore()
-        self._content = _metadata(folder)
+        self._content = load_metadata(folder)
         self._parts: list[str] = self._content[_INFORMATION]['relative_file_paths']
         self._remove_others()
         self._counts: Counter[str] = Counter()
@@ -133,7 +130,7 @@ class Journal:
         while len(last := self._parts[-MERGED:]) == MERGED and len(set(map(_size, last))) == 1:
             merged = self._write_part(_first(last[0]), MERGED * _size(last[0]), self._rows(last))
             self._parts[-MERGED:] = [merged]
-        self._write_metadata()
+        self._writeload_metadata()
         self._remove_others()
 
     def answers(self) -> Iterator[tuple[Entry, list[Output]]]:
@@ -184,7 +181,7 @@ class Journal:
         memory = {name: value and tuple(value) for name, value in fields['memory'].items()}
         return Entry(**fields | {'memory': Memory(**memory)})
 
-    def _write_metadata(self) -> None:
+    def _writeload_metadata(self) -> None:
         """Write which files are valid, the number of messages, and their times."""
         about = self._content[_INFORMATION]
         times = [entry.timestamp for entry in self.entries]
@@ -206,8 +203,8 @@ class Journal:
 def custom_data(folder: Path) -> dict[str, str]:
     """Return the custom data of a bag; empty if there are none or the folder is no bag."""
     try:
-        return _metadata(folder)[_INFORMATION]['custom_data'] or {}
-    except (OSError, YAMLError, KeyError, TypeError):
+        return load_metadata(folder)[_INFORMATION]['custom_data'] or {}
+    except MALFORMED:
         return {}
 
 
@@ -225,16 +222,8 @@ def _size(part: str) -> int:
     return int(part.removesuffix(_SUFFIX).split('-')[1])
 
 
-def _metadata(folder: Path) -> Any:
-    text = (folder / METADATA).read_text(encoding='utf-8')
-    try:
-        return json.loads(text)  # as `_replace` writes it; YAML takes far longer to parse
-    except ValueError:
-        return YAML(typ='safe').load(text)
-
-
 def _replace(path: Path, content: Any) -> None:
     """Replace a file atomically."""
     new = path.with_name(_NEW)
-    new.write_text(json.dumps(content, indent=1), encoding='utf-8')  # JSON is YAML
+    new.write_text(as_yaml(content), encoding='utf-8')
     new.replace(path)

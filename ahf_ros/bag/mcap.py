@@ -19,7 +19,7 @@ from rosbags.interfaces import Connection
 
 from ahf_ros.bag.blocks import Block, Recorded, merged
 from ahf_ros.bag.mcap_topics import Topics, name_at
-from ahf_ros.bag.records import Lost, Message
+from ahf_ros.bag.records import Lost, Message, Schema
 
 MAGIC = b'\x89MCAP0\r\n'
 
@@ -71,6 +71,10 @@ class Mcap:
         """What a copy does not have; complete once the messages were read."""
         times = ['publish times and sequence numbers'] if self._differs else []
         return self._others + times
+
+    def schema(self, connection: Connection) -> Schema | None:
+        """Return the schema of a topic; see `BagFile`."""
+        return self._topics.schema(connection.id)
 
     def messages(self, selected: list[Connection]) -> Iterator[Message | Lost]:
         """Yield the messages of some topics in the order of time; see `BagFile`."""

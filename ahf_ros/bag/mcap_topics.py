@@ -16,12 +16,16 @@ from rosbags.interfaces import (
 )
 from rosbags.rosbag2.metadata import parse_qos
 
+from ahf_ros.bag.records import Schema
+
 _FORMATS = {
     'ros2msg': MessageDefinitionFormat.MSG,
     'ros2idl': MessageDefinitionFormat.IDL,
     'omgidl': MessageDefinitionFormat.IDL,
 }
 NO_DEFINITION = MessageDefinition(MessageDefinitionFormat.NONE, '')
+_LONGEST_QOS = 2**16  # characters; what takes a second to parse
+_NO_SCHEMA = Schema('', '', b'')
 
 
 class _Channel(NamedTuple):
@@ -42,23 +46,16 @@ class Topics:
 
     def __init__(self, owner: object) -> None:
         self._owner = owner
-        self._schemas: dict[int, tuple[str, MessageDefinition]] = {}
+        self._schemas: dict[int, Schema] = {}
         self._channels: dict[int, _Channel] = {}
 
     def add_schema(self, content: bytes) -> None:
-        """Add the schema of a record, unless it is known.
-
-        A definition in a language other than ROS has is left out: messages are copied as bytes.
-        """
+        """Add the schema of a record, unless it is known."""
         (number,) = struct.unpack_from('<H', content)
         name, place = _string(content, 2)
         encoding, place = _string(content, place)
-        definition = NO_DEFINITION
-        if encoding in _FORMATS:
-            with suppress(UnicodeDecodeError):
-                text = _bytes(content, place)[0].decode()
-                definition = MessageDefinition(_FORMATS[encoding], text)
-        self._schemas.setdefault(number, (name, definition))
+        data, _ = _bytes(content, place)
+        self._schemas.setdefault(number, Schema(name, encoding, data))
 
     def add_channel(self, content: bytes) -> None:
         """Add the channel of a record, unless it is known."""
@@ -72,6 +69,10 @@ class Topics:
             key, place = _string(metadata, place)
             pairs[key], place = _string(metadata, place)
         self._channels.setdefault(number, _Channel(schema, topic, encoding, pairs))
+
+    def schema(self, channel: int) -> Schema | None:
+        """Return the schema of a channel, None where there is none."""
+        return self._schemas.get(self._channels[channel].schema)
 
     def know(self, channels: Iterable[int] | None) -> bool:
         """Return whether all of some channels are defined, False where they are not known."""
@@ -91,17 +92,27 @@ class Topics:
         ]
 
     def _connection(self, number: int, channel: _Channel, count: int) -> Connection:
-        kind, definition = self._schemas.get(channel.schema, ('', NO_DEFINITION))
+        schema = self._schemas.get(channel.schema, _NO_SCHEMA)
         qos = tolerant_qos(channel.metadata.get('offered_qos_profiles', ''))
         digest = channel.metadata.get('topic_type_hash', '')
         extension = ConnectionExtRosbag2(channel.encoding, qos)
+        definition = _definition(schema)
         return Connection(
-            number, channel.topic, kind, definition, digest, count, extension, self._owner
+            number, channel.topic, schema.name, definition, digest, count, extension, self._owner
         )
+
+
+def _definition(schema: Schema) -> MessageDefinition:
+    """Return a schema for rosbags, without a definition where it is in no language of ROS."""
+    with suppress(UnicodeDecodeError, KeyError):
+        return MessageDefinition(_FORMATS[schema.encoding], schema.data.decode())
+    return NO_DEFINITION
 
 
 def tolerant_qos(text: Any) -> list[Qos]:
     """Return the QoS that publishers offered, none where it is not as ROS writes it."""
+    if isinstance(text, str) and len(text) > _LONGEST_QOS:
+        return []
     try:
         return parse_qos(text)
     except Exception:

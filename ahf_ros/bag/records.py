@@ -43,6 +43,23 @@ class Lost:
         return f'{topics} from {start} to {stop}: {self.reason}'
 
 
+@dataclass(frozen=True, slots=True)
+class Schema:
+    """What describes the messages of a channel of MCAP.
+
+    Attributes
+    ----------
+    name : str
+    encoding : str
+        Language of the description, such as 'ros2msg' or 'protobuf'.
+    data : bytes
+    """
+
+    name: str
+    encoding: str
+    data: bytes
+
+
 class BagFile(Protocol):
     """One file of a bag.
 
@@ -62,6 +79,10 @@ class BagFile(Protocol):
     @property
     def left_out(self) -> list[str]:
         """Other contents that cannot be copied; complete after all messages were read."""
+        ...
+
+    def schema(self, connection: Connection) -> Schema | None:
+        """Return the schema of a topic as it was recorded, None where there is none."""
         ...
 
     def messages(self, selected: list[Connection]) -> Iterator[Message | Lost]:

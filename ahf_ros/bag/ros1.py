@@ -56,6 +56,9 @@ class Ros1:
             for _, item in sorted(self._known.items())
         ]
 
+    def schema(self, connection: Connection) -> None:
+        """Return None: only MCAP has schemas; see `BagFile`."""
+
     def messages(self, selected: list[Connection]) -> Iterator[Message | Lost]:
         """Yield the messages of some topics in the order of time; see `BagFile`."""
         yield from self._lost

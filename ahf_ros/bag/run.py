@@ -12,7 +12,7 @@ import json
 import os
 import sqlite3
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -28,6 +28,7 @@ from ahf_ros.bag.assembly import (
     finished,
     remove_assembled,
 )
+from ahf_ros.bag.folder import MALFORMED
 from ahf_ros.bag.journal import PROGRESS, Entry, Journal, begin, custom_data, remove_parts
 from ahf_ros.bag.records import seconds
 from ahf_ros.bag.source import Source
@@ -170,10 +171,11 @@ def _flat(values: dict[str, Any]) -> dict[str, Any]:
 
 def _check_target(target: Path, origin: dict[str, Any]) -> None:
     """Raise a ValueError unless a bag was begun with the same task."""
-    begun = custom_data(target).get(TASK_KEY)
-    if begun is None:
+    before: dict[str, Any] = {}
+    with suppress(*MALFORMED):
+        before = dict(json.loads(custom_data(target).get(TASK_KEY, '{}')))
+    if not before:
         raise ValueError(f'{target} exists, accepted is a new name or a bag that was begun here')
-    before = json.loads(begun)
     for name in before | origin:
         if before.get(name) != origin.get(name):
             raise ValueError(

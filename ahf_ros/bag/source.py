@@ -12,10 +12,11 @@ from rosbags.interfaces import Connection, ConnectionExtRosbag1, ConnectionExtRo
 
 from ahf_ros.bag.compression import ZSTD_MAGIC, decompress
 from ahf_ros.bag.definitions import COMPRESSED_IMAGE, IMAGE, TypeStores
-from ahf_ros.bag.folder import Metadata, open_files, read_metadata
+from ahf_ros.bag.folder import Metadata, open_files, read_metadata, unlisted_files
 from ahf_ros.bag.records import Lost, Message
 
 _SERIALIZATION = 'cdr'
+_MAXIMUM_TOPICS = 2000  # time to write a bag grows with the square of their number
 _MAXIMUM_LINES = 100  # about lost messages; more are only counted
 
 
@@ -30,7 +31,9 @@ class Source:
     Attributes
     ----------
     connections : list of rosbags.interfaces.Connection
-        All topics; one that was recorded in several ways has several connections.
+        All topics of ROS; one that was recorded in several ways has several connections.
+    foreign : list of rosbags.interfaces.Connection
+        Topics whose messages are serialized in another way than those of ROS.
     metadata : Metadata
         Contents of metadata.yaml.
     stores : TypeStores
@@ -47,7 +50,7 @@ class Source:
         self.stores = TypeStores()
         self.metadata = Metadata()
         self._lost: dict[Lost, None] = {}  # an ordered set
-        self._foreign: list[Connection] = []
+        self.foreign: list[Connection] = []
         self._stack = ExitStack()
         if not path.exists():
             raise ValueError(f'{path} does not exist, accepted is a bag')
@@ -69,7 +72,11 @@ class Source:
             self._note(missing)
         self.connections: list[Connection] = []
         for item in (it for file in self._files for it in file.connections):
-            (self.connections if _is_ros(item) else self._foreign).append(item)
+            (self.connections if is_ros(item) else self.foreign).append(item)
+        if (count := len(self.connections) + len(self.foreign)) > _MAXIMUM_TOPICS:
+            raise ValueError(
+                f'{self.path} has {count} topics, accepted are at most {_MAXIMUM_TOPICS}'
+            )
 
     def __enter__(self) -> Source:
         """Return itself."""
@@ -94,12 +101,8 @@ class Source:
     @property
     def left_out(self) -> list[str]:
         """What a copy lacks besides messages; complete after all messages were read."""
-        return [it for file in self._files for it in file.left_out]
-
-    @property
-    def foreign(self) -> list[str]:
-        """Topics whose messages ROS 2 cannot read, so a ROS 2 bag cannot hold them."""
-        return [f'{it.topic}: messages are serialized as {_encoding(it)}' for it in self._foreign]
+        others = unlisted_files(self.path, self.metadata.files)
+        return [*(it for file in self._files for it in file.left_out), *others]
 
     def size(self) -> int:
         """Return the total size of the files of the bag, bytes."""
@@ -118,6 +121,8 @@ class Source:
         accepted = [topic for topic, kind in kinds.items() if kind in (IMAGE, COMPRESSED_IMAGE)]
         if not accepted:
             lost = f'; not readable: {"; ".join(self.lost)}' if self._lost else ''
+            kinds = {item.topic: encoding(item) for item in self.foreign}
+            lost += ''.join(f'; {topic} is serialized as {it}' for topic, it in kinds.items())
             raise ValueError(
                 f'{self.path} has no images, accepted are topics of {IMAGE} or '
                 f'{COMPRESSED_IMAGE}{lost}'
@@ -141,13 +146,12 @@ class Source:
         return self.stores.deserialize(connection, data)
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[Message]:
-        """Yield the messages of some or all topics, and note which are lost."""
+        """Yield the messages of some topics of ROS, or all messages; note which are lost."""
+        wanted = [it for it in self.connections if topics is None or it.topic in topics]
+        if topics is None:
+            wanted += self.foreign
         for file in self._files:
-            selected = [
-                it
-                for it in self.connections
-                if it.owner is file and (topics is None or it.topic in topics)
-            ]
+            selected = [it for it in wanted if it.owner is file]
             for item in file.messages(selected) if selected else ():
                 plain = item if isinstance(item, Lost) else self._plain(item)
                 if isinstance(plain, Lost):
@@ -158,13 +162,9 @@ class Source:
     def check_counts(self, counts: dict[str, int]) -> None:
         """Note the topics of which fewer messages were read than the metadata count."""
         for topic, count in self.metadata.counts.items():
-            if (read := counts.get(topic, 0)) < count and topic not in self._foreign_topics:
+            if (read := counts.get(topic, 0)) < count:
                 reason = f'{read} of {count} messages were read'
                 self._note(Lost((topic,), None, None, reason))
-
-    @property
-    def _foreign_topics(self) -> set[str]:
-        return {item.topic for item in self._foreign}
 
     def _note(self, item: Lost) -> None:
         self._lost[item] = None
@@ -183,9 +183,11 @@ class Source:
             return Lost((item.topic,), time, time, str(error))
 
 
-def _encoding(item: Connection) -> str:
+def encoding(item: Connection) -> str:
+    """Return how the messages of a topic are serialized."""
     return item.ext.serialization_format if isinstance(item.ext, ConnectionExtRosbag2) else 'ros1'
 
 
-def _is_ros(item: Connection) -> bool:
-    return _encoding(item) in (_SERIALIZATION, 'ros1')
+def is_ros(item: Connection) -> bool:
+    """Return whether a bag of ROS 2 can hold the messages of a topic."""
+    return isinstance(item.ext, ConnectionExtRosbag1) or encoding(item) == _SERIALIZATION

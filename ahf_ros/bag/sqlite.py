@@ -16,12 +16,18 @@ from rosbags.interfaces import (
     MessageDefinitionFormat,
 )
 
+from ahf_ros.bag.compression import LARGEST
 from ahf_ros.bag.mcap_topics import NO_DEFINITION, tolerant_qos
 from ahf_ros.bag.records import Lost, Message
-from ahf_ros.text import reason_of
+from ahf_ros.text import reason_of, shown
 
 _FORMATS = {'ros2msg': MessageDefinitionFormat.MSG, 'ros2idl': MessageDefinitionFormat.IDL}
-_LAST = 2**63 - 1  # that a row can have
+_FIRST, _LAST = -(2**63), 2**63 - 1  # numbers that a row can have
+_TABLES = {
+    'topics': {'id', 'name', 'type', 'serialization_format'},
+    'messages': {'topic_id', 'timestamp', 'data'},
+}
+"""Tables that are read, and columns that they must have."""
 _ROW = np.dtype([('time', np.int64), ('row', np.int64), ('topic', np.int64)])
 
 
@@ -42,6 +48,7 @@ class Sqlite:
         self.left_out = []
         try:
             with closing(self._open()) as database:
+                _check_tables(database)
                 topics = self._topics(database)
                 self._rows = self._scan(database)
         except sqlite3.Error as error:
@@ -59,6 +66,9 @@ class Sqlite:
             self._lost.append(Lost((), None, None, reason))
         self.start = int(self._rows['time'][0]) if len(self._rows) else 0
 
+    def schema(self, connection: Connection) -> None:
+        """Return None: only MCAP has schemas; see `BagFile`."""
+
     def messages(self, selected: list[Connection]) -> Iterator[Message | Lost]:
         """Yield the messages of some topics in the order of time; see `BagFile`."""
         yield from self._lost
@@ -67,10 +77,8 @@ class Sqlite:
         with closing(self._open()) as database:
             for time, row, topic in rows.tolist():
                 try:
-                    query = 'SELECT data FROM messages WHERE id = ?'
-                    (data,) = database.execute(query, (row,)).fetchone()
-                    yield topics[topic], time, bytes(data)
-                except (sqlite3.Error, TypeError) as error:
+                    yield topics[topic], time, _data(database, row)
+                except (sqlite3.Error, TypeError, ValueError) as error:
                     yield Lost((topics[topic].topic,), time, time, reason_of(error))
 
     def _open(self) -> sqlite3.Connection:
@@ -87,32 +95,33 @@ class Sqlite:
             for name in ('offered_qos_profiles', 'type_description_hash')
         )
         definitions = _definitions(database)
-        return [
-            Connection(
-                number,
-                topic,
-                kind,
-                definitions.get(kind, NO_DEFINITION),
-                digest or '',
-                0,
-                ConnectionExtRosbag2(encoding, tolerant_qos(qos)),
-                self,
-            )
-            for number, topic, kind, encoding, qos, digest in database.execute(
-                f'SELECT id, name, type, serialization_format, {qos}, {digest} FROM topics'
-            )
-        ]
+        topics: list[Connection] = []
+        for number, topic, kind, encoding, offered, hashed in database.execute(
+            f'SELECT id, name, type, serialization_format, {qos}, {digest} FROM topics'
+        ):
+            if not all(isinstance(it, str) for it in (topic, kind, encoding)):
+                words = f'{shown(topic)} of type {shown(kind)}, serialized as {shown(encoding)}'
+                self._lost.append(Lost((), None, None, f'topic {shown(number)} is {words}'))
+                continue
+            definition = definitions.get(kind, NO_DEFINITION)
+            extension = ConnectionExtRosbag2(encoding, tolerant_qos(offered))
+            known = hashed if isinstance(hashed, str) else ''
+            topics.append(Connection(number, topic, kind, definition, known, 0, extension, self))
+        return topics
 
     def _scan(self, database: sqlite3.Connection) -> np.ndarray:
         """Return the rows that can be read, in the order of time."""
         rows: list[tuple[int, int, int]] = []
-        following = 0
-        query = 'SELECT timestamp, id, topic_id FROM messages WHERE id >= ? ORDER BY id'
+        following = _FIRST
+        query = 'SELECT timestamp, rowid, topic_id FROM messages WHERE rowid >= ? ORDER BY rowid'
         while True:
             try:
                 for row in database.execute(query, (following,)):
                     time, number, topic = (int(it) for it in row)
-                    rows.append((time, number, topic))
+                    if time < 0:
+                        self._lost.append(Lost((), None, None, f'{time} ns is not a time'))
+                    else:
+                        rows.append((time, number, topic))
                 break
             except (sqlite3.Error, TypeError, ValueError, OverflowError) as error:
                 first = rows[-1][1] + 1 if rows else following
@@ -127,11 +136,33 @@ class Sqlite:
         return table[np.argsort(table, order=('time', 'row'))]
 
 
+def _check_tables(database: sqlite3.Connection) -> None:
+    """Refuse a file where a view or computed columns stand for what should be recorded."""
+    for name, needed in _TABLES.items():
+        query = "SELECT type, sql FROM sqlite_master WHERE name = ? AND type IN ('table', 'view')"
+        kind, made = database.execute(query, (name,)).fetchone() or ('missing', '')
+        if kind != 'table' or not str(made).upper().startswith('CREATE TABLE'):
+            raise sqlite3.DatabaseError(f'{name} is not a table')
+        columns = {row[1] for row in database.execute(f'PRAGMA table_info({name})')}
+        if missing := needed - columns:
+            raise sqlite3.DatabaseError(f'{name} has no columns {", ".join(sorted(missing))}')
+
+
+def _data(database: sqlite3.Connection, row: int) -> bytes:
+    """Return the data of a message, which are looked at before they are read."""
+    query = 'SELECT typeof(data), length(data) FROM messages WHERE rowid = ?'
+    kind, size = database.execute(query, (row,)).fetchone()
+    if kind != 'blob' or size > LARGEST:
+        raise ValueError(f'{size} bytes of type {kind}, accepted are at most {LARGEST} of blob')
+    query = 'SELECT data FROM messages WHERE rowid = ?'
+    return bytes(database.execute(query, (row,)).fetchone()[0])
+
+
 def _readable(database: sqlite3.Connection, row: int) -> tuple[int, int] | None:
     """Return the next row behind a damage and its time, None where there is none."""
 
     def after(least: int) -> tuple[int, int] | None:
-        query = 'SELECT id, timestamp FROM messages WHERE id >= ? ORDER BY id LIMIT 1'
+        query = 'SELECT rowid, timestamp FROM messages WHERE rowid >= ? ORDER BY rowid LIMIT 1'
         with suppress(sqlite3.Error, TypeError, ValueError):
             number, time = database.execute(query, (least,)).fetchone()
             return int(number), int(time)
@@ -159,6 +190,6 @@ def _definitions(database: sqlite3.Connection) -> dict[str, MessageDefinition]:
         return {
             kind: MessageDefinition(_FORMATS[form], text)
             for kind, form, text in database.execute(query)
-            if form in _FORMATS
+            if form in _FORMATS and isinstance(text, str)
         }
     return {}

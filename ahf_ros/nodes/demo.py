@@ -75,7 +75,7 @@ class Processes:
         """Start a node in a namespace."""
         given = [word for name, value in parameters.items() for word in ('-p', f'{name}:={value}')]
         names = ('-r', f'__ns:={space}', '-r', f'image:={NAMESPACE}/image')
-        command = (sys.executable, '-m', f'ahf_ros.nodes.{node}', '--ros-args', *names, *given)
+        command = (sys.executable, '-m', 'ahf_ros.nodes', node, '--ros-args', *names, *given)
         self._started.append(subprocess.Popen(command))
 
     def any_ended(self) -> bool:
@@ -190,7 +190,3 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument('--seed', type=int, default=scene.seed, help='seed of the first image')
     made.add_argument('--output', default='demo', help='folder for pictures')
     return made
-
-
-if __name__ == '__main__':
-    sys.exit(main())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import threading
 import time
 import traceback
@@ -266,7 +265,3 @@ class DetectorNode(ProcessNode):
 def main(arguments: list[str] | None = None) -> int:
     """Run the node."""
     return run(DetectorNode, arguments)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

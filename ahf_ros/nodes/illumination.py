@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
 from functools import partial
 
@@ -119,7 +118,3 @@ def camera_info(rendering: Rendering) -> CameraInfo:
 def main(arguments: list[str] | None = None) -> int:
     """Run the node."""
     return run(IlluminationNode, arguments)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 import os
-import signal
 import sys
 import threading
 from collections.abc import Callable
@@ -23,13 +22,13 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
 from rclpy.task import Future
 
+from ahf_ros.nodes.signals import ignore, signalled
+from ahf_ros.text import reason_of
+
 ARENAS = 2
 """Number of memory arenas that the threads of a node share; glibc would give each its own."""
 
 _M_ARENA_MAX = -8  # of glibc's malloc.h
-
-ENDING = {signal.SIGINT, signal.SIGTERM}
-"""Signals that end a node."""
 
 
 class Ending(Future):
@@ -47,6 +46,15 @@ class Ending(Future):
         if not self._waited_for:
             self._waited_for = True
             super().add_done_callback(callback)
+
+
+class JoiningExecutor(MultiThreadedExecutor):
+    """An executor whose shutdown waits for callbacks, which rclpy's does not up to Kilted."""
+
+    def shutdown(self, timeout_sec: float | None = None) -> bool:
+        """Wait until the callbacks that have begun have ended, then shut down."""
+        self._executor.shutdown(wait=True)
+        return super().shutdown(timeout_sec)
 
 
 class ProcessNode(Node):
@@ -121,22 +129,22 @@ def run(make_node: Callable[[], ProcessNode], arguments: list[str] | None = None
     Returns
     -------
     int
-        Exit status: that of the node, 0 after a signal, 1 if a parameter given at the start is
-        refused, with the reason on stderr.
+        Exit status: that of the node, 0 after a signal, 1 if the node cannot start with these
+        arguments, with the reason on stderr.
     """
     _share_memory()
-    signalled = _signalled()
-    rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+    arrived = signalled()
     try:
+        rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
         node = make_node()
-    except (ValueError, ParameterException) as error:
-        print(error, file=sys.stderr)
-        rclpy.shutdown()
+    except (ValueError, ParameterException, RuntimeError) as error:
+        print(error if isinstance(error, ValueError) else reason_of(error), file=sys.stderr)
+        rclpy.try_shutdown()
         return 1
-    threading.Thread(target=_end_at_signal, args=(node.ended, signalled), daemon=True).start()
+    threading.Thread(target=_end_at_signal, args=(node.ended, arrived), daemon=True).start()
     # One thread for a service that takes as long as an identification, one for an image that waits
     # for room in the queue, one for everything short.
-    executor = MultiThreadedExecutor(num_threads=3)
+    executor = JoiningExecutor(num_threads=3)
     executor.add_node(node)
     try:
         executor.spin_until_future_complete(node.ended)
@@ -145,9 +153,7 @@ def run(make_node: Callable[[], ProcessNode], arguments: list[str] | None = None
         executor.shutdown()
         node.destroy_node()
         rclpy.shutdown()
-        for number in ENDING:
-            # Python and the middleware still need some tenths of a second to shut down.
-            signal.signal(number, signal.SIG_IGN)
+        ignore()
     return node.ended.result()
 
 
@@ -160,20 +166,6 @@ def _share_memory() -> None:
         ctypes.CDLL(None).mallopt(_M_ARENA_MAX, ARENAS)
 
 
-def _signalled() -> int:
-    """Return a file descriptor that becomes readable after a signal.
-
-    So a node shuts down in order, and a second signal does not interrupt that: a terminal and a
-    launch file both send one for the same Ctrl-C.
-    """
-    signalled, written = os.pipe()
-    os.set_blocking(written, False)
-    signal.set_wakeup_fd(written)
-    for number in ENDING:
-        signal.signal(number, lambda *_: None)
-    return signalled
-
-
-def _end_at_signal(ended: Future, signalled: int) -> None:
-    os.read(signalled, 1)
+def _end_at_signal(ended: Future, arrived: int) -> None:
+    os.read(arrived, 1)
     ended.set_result(0)

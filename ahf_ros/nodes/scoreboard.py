@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 
 from std_msgs.msg import Header
@@ -89,7 +88,3 @@ def _stamp(header: Header) -> tuple[int, int]:
 def main(arguments: list[str] | None = None) -> int:
     """Run the node."""
     return run(Scoreboard, arguments)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

@@ -27,7 +27,7 @@ GRAY = np.full((240, 320), 120, np.uint8)
 def demo(*options: str) -> subprocess.CompletedProcess[str]:
     """Return what `make demo` makes of options."""
     return subprocess.run(
-        [sys.executable, '-m', 'ahf_ros.nodes.demo', *options],
+        [sys.executable, '-m', 'ahf_ros.nodes', 'demo', *options],
         env={**os.environ, **ros_environment()},
         capture_output=True,
         text=True,
@@ -61,7 +61,7 @@ def test_the_demo_shows_one_image_in_three_ways(tmp_path: Path) -> None:
 
 
 def test_the_demo_ends_when_a_node_does(tmp_path: Path) -> None:
-    command = [sys.executable, '-m', 'ahf_ros.nodes.demo', '--output', str(tmp_path)]
+    command = [sys.executable, '-m', 'ahf_ros.nodes', 'demo', '--output', str(tmp_path)]
     with subprocess.Popen(
         command, env={**os.environ, **ros_environment()}, stderr=subprocess.PIPE, text=True
     ) as process:

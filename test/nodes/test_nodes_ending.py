@@ -1,0 +1,105 @@
+"""Nodes that end, or do not even start: in order, and without a traceback."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip('rclpy', reason='ROS 2 is not installed')
+
+import rclpy
+
+from ahf_ros.nodes.process import JoiningExecutor
+from ahf_ros.nodes.start import NODES
+from support import live
+
+SIGNALLED = """
+import os, signal, sys
+from ahf_ros.nodes.start import start
+
+class Signalling:
+    def find_spec(self, name, *_):
+        if name == 'rclpy':
+            os.kill(os.getpid(), signal.{number})
+
+sys.meta_path.insert(0, Signalling())
+sys.exit(start({node!r}))
+"""
+
+
+def run(*command: str, **environment: str) -> tuple[int, str]:
+    """Return exit status and error output of a process."""
+    done = subprocess.run(
+        [sys.executable, *command],
+        env={**os.environ, **live.ros_environment(), **environment},
+        capture_output=True,
+        text=True,
+        timeout=live.PATIENCE,
+    )
+    return done.returncode, done.stderr
+
+
+@pytest.mark.parametrize(('node', 'number'), [('detector', 'SIGINT'), ('demo', 'SIGTERM')])
+def test_a_signal_during_the_imports_ends_in_order(node: str, number: str) -> None:
+    assert node in NODES
+    assert run('-c', SIGNALLED.format(node=node, number=number)) == (0, '')
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'reason'),
+    [
+        (['--params-file', '/nowhere'], 'params file'),
+        (['-r', '__ns:=/bad-name'], '__ns:=/bad-name'),
+        (['-p', 'qos_overrides./image.subscription.reliability:=foo'], 'foo'),
+    ],
+)
+def test_what_ros_does_not_accept_is_told_in_a_line(arguments: list[str], reason: str) -> None:
+    status, errors = run('-m', 'ahf_ros.nodes', 'detector', '--ros-args', *arguments)
+    assert status == 1
+    assert reason in errors.splitlines()[-1]
+    assert 'Traceback' not in errors
+
+
+def test_a_node_that_has_to_be_secure_and_cannot_be_does_not_run(tmp_path: Path) -> None:
+    (tmp_path / 'enclaves' / 'node').mkdir(parents=True)
+    status, errors = run(
+        *('-m', 'ahf_ros.nodes', 'detector', '--ros-args', '--enclave', '/node'),
+        ROS_SECURITY_KEYSTORE=str(tmp_path),
+        ROS_SECURITY_ENABLE='true',
+        ROS_SECURITY_STRATEGY='Enforce',
+    )
+    assert status == 1
+    assert 'RCLError' in errors.splitlines()[-1]
+    assert 'Traceback' not in errors
+
+
+def test_a_name_that_no_node_has_is_refused() -> None:
+    status, errors = run('-m', 'ahf_ros.nodes', 'detektor')
+    assert (status, errors) == (1, f'accepted is the name of a node: {", ".join(NODES)}\n')
+
+
+def test_the_end_waits_for_callbacks(graph: Any) -> None:
+    began, released = threading.Event(), threading.Event()
+    ended: list[bool] = []
+
+    def callback() -> None:
+        began.set()
+        ended.append(released.wait(live.PATIENCE))
+
+    node = rclpy.create_node('ending')
+    timer = node.create_timer(0.001, callback)
+    executor = JoiningExecutor(num_threads=2)
+    executor.add_node(node)
+    while not began.is_set():
+        executor.spin_once(timeout_sec=0.01)
+    threading.Timer(0.2, released.set).start()
+    executor.shutdown()
+    assert ended[0]
+    node.destroy_timer(timer)
+    node.destroy_node()
