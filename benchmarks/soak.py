@@ -48,11 +48,17 @@ NAME = '/soak/detector'
 WAITING = 20
 """Most images that are sent and not yet answered."""
 
-LOOKS = 200
+LOOKS = 400
 """How often memory, threads and files are looked at."""
 
 WARM = 0.2
 """Share of the images after which memory has to keep its size."""
+
+SPREAD = 0.02
+"""Share of its size by which memory may differ from it then."""
+
+LIMIT = 200.0
+"""Maximum memory of the node, MB."""
 
 
 @dataclass(frozen=True)
@@ -361,11 +367,22 @@ def report(soak: Soak, seconds: float) -> dict[str, Any]:
         'memory when warm (MB)': round(middle, 1),
         'minimum, relative to that': round(min(it.memory for it in warm) / middle, 4),
         'maximum, relative to that': round(max(it.memory for it in warm) / middle, 4),
+        'maximum (MB)': round(max(it.memory for it in soak.looks), 1),
+        'limit (MB)': LIMIT,
         'threads when warm': min(it.threads for it in warm),
         'threads at the end': last.threads,
         'open files when warm': min(it.files for it in warm),
         'open files at the end': last.files,
     }
+
+
+def kept(figures: dict[str, Any]) -> bool:
+    """Return whether every image was answered rightly, in memory of constant size."""
+    spread = max(
+        figures['maximum, relative to that'] - 1, 1 - figures['minimum, relative to that']
+    )
+    answered = figures['answered'] == figures['images'] and not figures['unexpected IDs']
+    return answered and spread <= SPREAD and figures['maximum (MB)'] <= LIMIT
 
 
 def markdown(figures: dict[str, Any], looks: list[Look]) -> str:
@@ -395,7 +412,7 @@ def main() -> int:
     if options.json:
         written = {**figures, 'machine': machine(), 'looks': [asdict(it) for it in soak.looks]}
         options.json.write_text(json.dumps(written, indent=1))
-    return 0
+    return int(not kept(figures))
 
 
 if __name__ == '__main__':
