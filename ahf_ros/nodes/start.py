@@ -6,7 +6,13 @@ from importlib import import_module
 
 from ahf_ros.nodes.signals import has_arrived, ignore, signalled
 
-NODES = ('demo', 'detector', 'illumination', 'scoreboard')
+NODES = {
+    'demo': 'ahf_ros.nodes.demo',
+    'detector': 'ahf_ros.nodes.detector',
+    'illumination': 'ahf_ros.nodes.illumination',
+    'scoreboard': 'ahf_ros.nodes.scoreboard',
+}
+"""Modules whose `main` runs a node, by the name of the node."""
 
 
 def start(node: str, arguments: list[str] | None = None) -> int:
@@ -15,12 +21,11 @@ def start(node: str, arguments: list[str] | None = None) -> int:
     Parameters
     ----------
     node : str
-        Name of the module whose `main` runs it.
     arguments : list of str, optional
         Command line arguments; those of the process where None.
     """
     signalled()
-    module = import_module(f'ahf_ros.nodes.{node}')
+    module = import_module(NODES[node])
     if has_arrived():
         ignore()
         return 0
