@@ -25,8 +25,9 @@ from rich.progress import track
 
 from ahf_ros.codes.ring import FAMILY_NAMES, family
 from ahf_ros.detectors import DetectorSettings, create_detector
-from ahf_ros.detectors.ring.counting import estimate_count, target_features, terms
+from ahf_ros.detectors.ring.counting import estimate_count
 from ahf_ros.detectors.ring.detector import RingDetector, find_hypotheses
+from ahf_ros.detectors.ring.surroundings import target_features, terms
 from ahf_ros.evaluation import score
 from ahf_ros.features import frame
 from ahf_ros.imaging.image import as_gray

@@ -15,7 +15,9 @@ import numpy as np
 
 from ahf_ros.codes.cyclic import CyclicFamily, smallest_rotation
 
-_BAND_RADII = {'metashape': (2.25, 3.5), 'aicon': (2.0, 3.0)}
+BAND_RADII = {'metashape': (2.25, 3.5), 'aicon': (2.0, 3.0)}
+"""Inner and outer radius of the bands that vendors print, in radii of the dot."""
+
 _VENDORS_AND_BITS = {
     'metashape12': ('metashape', 12),
     'metashape14': ('metashape', 14),
@@ -40,6 +42,20 @@ class Family(CyclicFamily):
 
     band_inner: float
     band_outer: float
+
+    @property
+    def band(self) -> tuple[float, float]:
+        """Radii of the band, in radii of the dot."""
+        return self.band_inner, self.band_outer
+
+    def with_band(self, inner: float, outer: float) -> Family:
+        """Return the same words on a band of other radii."""
+        return Family(self.name, self.bits, self.words, inner, outer)
+
+
+def sector_count(name: str) -> int:
+    """Return the number of sectors of a family, without its words."""
+    return _VENDORS_AND_BITS[name][1]
 
 
 @cache
@@ -78,7 +94,7 @@ def family(name: str) -> Family:
     else:
         words = words[words & (words >> half) & ((1 << half) - 1) != 0]
     words.setflags(write=False)
-    inner, outer = _BAND_RADII[vendor]
+    inner, outer = BAND_RADII[vendor]
     return Family(name, bits, words, inner, outer)
 
 

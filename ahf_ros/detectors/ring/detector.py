@@ -8,15 +8,16 @@ together to a projective frame, whose origin is the image of the target's physic
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from ahf_ros.codes.ring import Family, canonical, family
+from ahf_ros.codes.ring import family
 from ahf_ros.detectors.contract import DetectorSettings
+from ahf_ros.detectors.ring.competition import PART, by_clear_dots, read_families
 from ahf_ros.detectors.ring.hypotheses import Hypotheses, resolve_dots, resolve_ids
-from ahf_ros.detectors.ring.reading import read_bands
 from ahf_ros.detectors.ring.refinement import refine_centres
+from ahf_ros.detectors.ring.same_prints import decoded, settle_same_prints
 from ahf_ros.detectors.ring.target_circles import REACH
 from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import Fit, fit_dots
@@ -31,7 +32,6 @@ _RAYS = 24  # about a dot
 _MINIMUM_SHARE = 0.5  # of the edge of a dot, for its band to be read
 _FAINTEST = 0.8  # contrast of a dot, dark over bright, for its band to be read
 _WHOLE = 0.9  # share of the edge of a dot that is reported without a word
-_PART = 256  # dots read at a time, which bounds the memory
 _MARGIN = 0.4  # width of the quiet margin round a dot or a band, dot radii
 
 
@@ -59,11 +59,7 @@ class RingDetector:
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image; see `Detector`."""
         check_image(image)
-        gray, found = as_gray(image), []
-        for name in self.settings.families:
-            settings = replace(self.settings, family=name)
-            found += report(find_hypotheses(gray, settings), settings)
-        return sorted_targets(_apart(found)) if len(self.settings.families) > 1 else found
+        return report(find_hypotheses(as_gray(image), self.settings), self.settings)
 
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
         """Return targets with their centres in an image; see `refine_centres`."""
@@ -81,75 +77,59 @@ def find_hypotheses(gray: np.ndarray, settings: DetectorSettings) -> Hypotheses:
     settings : DetectorSettings
         What the targets look like.
     """
-    code = family(settings.family)
+    families = [family(name) for name in settings.families]
     kind = (*settings.radii, settings.polarities)
     pyramid = image_pyramid(gray, settings.max_radius)
-    dots = whole_dots(pyramid, *kind)
-    whole = read_dots(pyramid.gray, dots, code)
+    dots = _fitted(pyramid.gray, whole_dots(pyramid, *kind))
+    families = by_clear_dots(pyramid.gray, dots, families)
+    whole = read_families(pyramid.gray, dots, families)
     explained = whole.certain | (whole.share >= _WHOLE)
-    radii = np.where(whole.certain, code.band_outer, 1.0) + _MARGIN
-    outlines = frame.circle_outlines(whole.frames[explained], radii[explained])
-    dots = voted_dots(pyramid, *kind, explained=outlines)
-    voted = read_dots(pyramid.gray, dots, code)
+    radii = np.where(whole.certain, whole.reach / frame.ellipse_axes(whole.frames)[1], 1.0)
+    outlines = frame.circle_outlines(whole.frames[explained], radii[explained] + _MARGIN)
+    dots = _fitted(pyramid.gray, voted_dots(pyramid, *kind, explained=outlines))
+    if not whole.certain.any():
+        families = by_clear_dots(pyramid.gray, dots, families)
+    voted = read_families(pyramid.gray, dots, families)
     return Hypotheses.joined([whole, voted])
-
-
-def read_dots(gray: np.ndarray, dots: Dots, code: Family) -> Hypotheses:
-    """Fit the edges of dots and read the bands of the clear ones, in parts.
-
-    Parameters
-    ----------
-    gray : ndarray of float32, shape (height, width)
-        Gray values from 0 to 255.
-    dots : Dots
-    code : Family
-    """
-    parts = []
-    for start in range(0, max(len(dots.frames), 1), _PART):
-        part = dots.select(slice(start, start + _PART))
-        hypotheses, _ = read_bands(gray, _fitted(gray, part), code)
-        parts.append(hypotheses)
-    return Hypotheses.joined(parts)
 
 
 def _fitted(gray: np.ndarray, dots: Dots) -> Fit:
     """Return the fits of the dots whose bands are worth reading."""
-    return fit_dots(
-        gray,
-        dots.frames,
-        dots.polarity,
-        rays=_RAYS,
-        reach=REACH,
-        min_share=_MINIMUM_SHARE,
-        max_contrast=_FAINTEST,
-    )
+    parts = []
+    for start in range(0, max(len(dots.frames), 1), PART):
+        part = dots.select(slice(start, start + PART))
+        fit = fit_dots(
+            gray,
+            part.frames,
+            part.polarity,
+            rays=_RAYS,
+            reach=REACH,
+            min_share=_MINIMUM_SHARE,
+            max_contrast=_FAINTEST,
+        )
+        parts.append(fit)
+    return Fit.joined(parts)
 
 
 def report(hypotheses: Hypotheses, settings: DetectorSettings) -> list[Target]:
     """Return the targets to report: one for each dot, and one for each ID at the most."""
-    code = family(settings.family)
     major, _, _ = frame.ellipse_axes(hypotheses.frames)
     whole = settings.report_undecoded & (hypotheses.share >= _WHOLE)
     minimum, maximum = settings.radii
     of_size = (major >= minimum) & (major <= maximum)
-    hypotheses = hypotheses.select(of_size & (hypotheses.certain | whole))
+    hypotheses = settle_same_prints(hypotheses.select(of_size), settings.families)
+    whole = whole[of_size]
+    hypotheses = hypotheses.select(hypotheses.certain | whole)
     hypotheses = hypotheses.select(np.lexsort((-hypotheses.margin, ~hypotheses.certain)))
-    codes, ids = canonical(hypotheses.words, code)
-    kept, uncontested = resolve_dots(hypotheses, ids, hypotheses.certain, code)
-    certain = resolve_ids(hypotheses, ids, hypotheses.certain & uncontested)
+    names, codes, ids = decoded(hypotheses)
+    keys = np.unique(
+        [f'{name} {number}' for name, number in zip(names, ids, strict=True)], return_inverse=True
+    )[1]
+    kept, uncontested = resolve_dots(hypotheses, keys, hypotheses.certain, hypotheses.reach)
+    certain = resolve_ids(hypotheses, keys, hypotheses.certain & uncontested)
     ids = np.where(certain, ids, UNDECODED)
     if not settings.report_undecoded:
         kept = kept[certain[kept]]
     some = hypotheses.select(kept)
     columns = (some.frames, some.covariance, ids[kept], codes[kept], some.confidence)
-    return sorted_targets(targets_from_frames(*columns, settings.family))
-
-
-def _apart(targets: Sequence[Target]) -> list[Target]:
-    """Return the targets of several families, of those of one dot the most certain."""
-    kept: list[Target] = []
-    for target in sorted(targets, key=lambda target: -target.confidence):
-        distances = [np.hypot(target.x - other.x, target.y - other.y) for other in kept]
-        if all(it > target.semi_minor for it in distances):
-            kept.append(target)
-    return kept
+    return sorted_targets(targets_from_frames(*columns, names[kept]))

@@ -9,6 +9,7 @@ import numpy as np
 from ahf_ros.codes.ring import Family
 from ahf_ros.detectors.ring.confidence import FEATURES, confidence, confidence_features
 from ahf_ros.detectors.ring.decoding import Readings
+from ahf_ros.detectors.ring.other_prints import sharpness
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.circle_fit import Fit
@@ -38,6 +39,10 @@ class Hypotheses(ArrayRecord):
         What the confidence is computed from, see `confidence_features`.
     confidence : ndarray of float64, shape (k,)
         Probability that the word is right.
+    families : ndarray of Family, shape (k,)
+        Those of the words.
+    sharpness : ndarray of float64, shape (k,)
+        How well the edges agree with the word and the print, see `other_prints.sharpness`.
     """
 
     frames: np.ndarray
@@ -47,24 +52,40 @@ class Hypotheses(ArrayRecord):
     margin: np.ndarray
     features: np.ndarray
     confidence: np.ndarray
+    families: np.ndarray
+    sharpness: np.ndarray
 
     @property
     def certain(self) -> np.ndarray:
         """Whether words are certain enough to be reported, ndarray of bool, shape (k,)."""
         return self.confidence >= _CERTAIN
 
+    @property
+    def reach(self) -> np.ndarray:
+        """Radii of the targets with their bands, px, ndarray of float64, shape (k,)."""
+        _, minor, _ = frame.ellipse_axes(self.frames)
+        return minor * np.array([code.band_outer for code in self.families])
+
     @staticmethod
-    def unread(dots: Fit) -> Hypotheses:
+    def unread(dots: Fit, family: Family) -> Hypotheses:
         """Return dots whose bands are not read."""
         count = len(dots.frames)
         words, nothing = np.zeros(count, np.int64), np.zeros(count)
         features = np.zeros((count, FEATURES))
         return Hypotheses(
-            dots.frames, dots.covariance, dots.share, words, nothing, features, nothing
+            dots.frames,
+            dots.covariance,
+            dots.share,
+            words,
+            nothing,
+            features,
+            nothing,
+            np.full(count, family, object),
+            nothing,
         )
 
     @staticmethod
-    def read(readings: Readings, fit: Fit, dots: Hypotheses) -> Hypotheses:
+    def read(readings: Readings, fit: Fit, dots: Hypotheses, foreign: np.ndarray) -> Hypotheses:
         """Return bands that are read, with the frames of dot and band where their word is likely.
 
         Parameters
@@ -74,9 +95,11 @@ class Hypotheses(ArrayRecord):
             Of dot and band.
         dots : Hypotheses
             The same dots, whose bands are not read.
+        foreign : ndarray of bool, shape (k,)
+            Whether the bands are of another print, so that no word is likely.
         """
         features = confidence_features(readings, fit)
-        certainty = confidence(features)
+        certainty = np.where(foreign, 0.0, confidence(features))
         likely = certainty >= _LIKELY
         every = Hypotheses(
             fit.frames,
@@ -86,6 +109,8 @@ class Hypotheses(ArrayRecord):
             np.maximum(readings.margin, readings.support),
             features,
             certainty,
+            dots.families,
+            sharpness(fit),
         )
         alone = dots.select(~likely)
         doubtful = replace(
@@ -98,7 +123,7 @@ class Hypotheses(ArrayRecord):
 
 
 def resolve_dots(
-    hypotheses: Hypotheses, ids: np.ndarray, certain: np.ndarray, family: Family
+    hypotheses: Hypotheses, ids: np.ndarray, certain: np.ndarray, reach: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Resolve which hypotheses on the same dot to keep.
 
@@ -107,8 +132,10 @@ def resolve_dots(
     hypotheses : Hypotheses
         In the order of their evidence, the best first.
     ids : ndarray of int, shape (k,)
+        Equal where words are the same.
     certain : ndarray of bool, shape (k,)
-    family : Family
+    reach : ndarray of float64, shape (k,)
+        Radii of the targets with their bands, px.
 
     Returns
     -------
@@ -118,8 +145,7 @@ def resolve_dots(
     uncontested : ndarray of bool, shape (k,)
         Whether a hypothesis is kept and no other reading of its dot comes near to it.
     """
-    major, minor, _ = frame.ellipse_axes(hypotheses.frames)
-    reach = np.where(certain, family.band_outer * minor, major)
+    reach = np.where(certain, reach, frame.ellipse_axes(hypotheses.frames)[0])
     centres, margin = hypotheses.frames[:, :2, 2], hypotheses.margin
     uncontested = np.ones(len(ids), bool)
     kept: list[int] = []
@@ -139,7 +165,7 @@ def resolve_dots(
 def resolve_ids(hypotheses: Hypotheses, ids: np.ndarray, certain: np.ndarray) -> np.ndarray:
     """Return which hypotheses are certain and clearly the best claim to their ID, shape (k,).
 
-    Parameters are those of `resolve_dots`.
+    Parameters are as for `resolve_dots`.
     """
     certain = certain.copy()
     for identifier in np.unique(ids[certain]):

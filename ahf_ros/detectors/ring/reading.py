@@ -17,6 +17,7 @@ from ahf_ros.detectors.ring.decoding import decode, sector_angles
 from ahf_ros.detectors.ring.evidence import MarkAppearance
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.occluded_decoding import decode_occluded
+from ahf_ros.detectors.ring.other_prints import of_other_prints
 from ahf_ros.detectors.ring.target_circles import REACH, target_circles
 from ahf_ros.features.circle_fit import Fit, fit_circles
 from ahf_ros.features.edge_shift import SMALL, unshifted
@@ -55,7 +56,7 @@ def read_bands(
     """
     marks = mark_appearance(gray, dots)
     which, frames = unshifted(dots)
-    marks, read = marks.select(which), np.arange(len(which))
+    marks, read, alone = marks.select(which), np.arange(len(which)), frames
     for per_sector, rounds in passes:
         angles = sector_angles(family, per_sector)
         samples = sample_bands(gray, frames, marks.blur, angles, family)
@@ -69,8 +70,11 @@ def read_bands(
         circles = target_circles(words, starts, marks.polarity, per_sector, family)
         fit = fit_circles(gray, frames[good], circles, reach=REACH, projective=True, rounds=rounds)
         frames = fit.frames
-    unread = Hypotheses.unread(dots.select(which))
-    return unread.replaced(read, Hypotheses.read(readings, fit, unread.select(read))), which
+    foreign = of_other_prints(gray, alone[read], fit, words, starts, per_sector, family)
+    unread = Hypotheses.unread(dots.select(which), family)
+    return unread.replaced(
+        read, Hypotheses.read(readings, fit, unread.select(read), foreign)
+    ), which
 
 
 def mark_appearance(gray: np.ndarray, dots: Fit) -> MarkAppearance:
