@@ -26,13 +26,15 @@ def hypotheses(places: list[tuple[float, float]], margins: list[float]) -> Hypot
         margin=np.array(margins),
         features=np.zeros((count, FEATURES)),
         confidence=np.ones(count),
+        families=np.full(count, CODE, object),
+        sharpness=np.full(count, 5.0),
     )
 
 
 def resolved(places, margins, ids, certain=None):
     certain = np.ones(len(places), bool) if certain is None else np.array(certain)
     found = hypotheses(places, margins)
-    kept, uncontested = resolve_dots(found, np.array(ids), certain, CODE)
+    kept, uncontested = resolve_dots(found, np.array(ids), certain, found.reach)
     return kept.tolist(), uncontested.tolist()
 
 
@@ -99,7 +101,7 @@ def test_readings_are_taken_over_where_they_belong():
         covariance=np.tile(np.eye(2), (2, 1, 1)),
         blur=np.full(2, 0.8),
     )
-    unread = Hypotheses.unread(fit)
+    unread = Hypotheses.unread(fit, CODE)
     assert not unread.words.any() and not unread.confidence.any()
     better = Fit(
         frames=frame.affine_frames([20.5], 5.0, 4.0, 3.0, 0.0),
@@ -124,13 +126,14 @@ def test_readings_are_taken_over_where_they_belong():
         price=0 * one,
         plausible=one > 0,
     )
-    found = unread.replaced(
-        np.array([1]), Hypotheses.read(readings, better, unread.select(np.array([1])))
-    )
+    dot, whole = unread.select(np.array([1])), np.zeros(1, bool)
+    found = unread.replaced(np.array([1]), Hypotheses.read(readings, better, dot, whole))
     assert found.words.tolist() == [0, 71]
     assert found.frames[:, 0, 2].tolist() == [10.0, 20.5]
     assert found.share.tolist() == [0.8, 1.0]
     assert found.margin.tolist() == [0.0, 100.0]
     assert found.confidence[0] == 0 and found.confidence[1] > 0.9
+    foreign = Hypotheses.read(readings, better, dot, ~whole)
+    assert (foreign.words[0], foreign.confidence[0]) == (71, 0.0)
     assert fit.frames[1, 0, 2] == 20.0  # what was given is not changed
     assert not unread.words.any()
