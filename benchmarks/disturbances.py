@@ -3,9 +3,9 @@
     python -m benchmarks.disturbances [--tables disturbances ...] [--families metashape12 ...]
 
 Every row of the first table is a disturbance of sheets of targets; a cell has right and wrong IDs
-and false positives. The second table reads the targets of each family as those of the others, and
-the photographs of the panel as well; the third reads marks that are no targets. Seeds from 101 on
-are for tests: nothing in the package was chosen by looking at them.
+and false positives. The second table reads the targets of each family as those of the others and
+as those of all, and the photographs of the panel as well; the third reads marks that are no
+targets. Seeds from 101 on are for tests: nothing in the package was chosen by looking at them.
 """
 
 from __future__ import annotations
@@ -14,8 +14,9 @@ import argparse
 import json
 import os
 import sys
+import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ import numpy as np
 from rich.console import Console
 from rich.progress import track
 
+from ahf_ros.codes.families import AUTO
 from ahf_ros.codes.ring import FAMILY_NAMES, family
 from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.detectors.contract import Detector
@@ -39,6 +41,8 @@ from benchmarks.sheets import COLUMNS, ROWS, mark_sheet
 LOOKALIKE_COUNT = 300
 """Marks of each kind that are no targets."""
 
+_NO_ID = 2**31 - 1  # of any family
+
 
 @dataclass(slots=True)
 class Count:
@@ -52,6 +56,8 @@ class Count:
         IDs at the place of their target, at that of another one, and anywhere else.
     stated : list of float
         Confidences of the reports that are not right.
+    seconds : float
+        Time of the processor for these images.
     """
 
     expected: int = 0
@@ -59,6 +65,7 @@ class Count:
     wrong: int = 0
     false: int = 0
     stated: list[float] = field(default_factory=list)
+    seconds: float = 0.0
 
     def add(self, truth: Sequence[TrueTarget], targets: Sequence[Target]) -> None:
         """Add the reports of one image."""
@@ -70,6 +77,15 @@ class Count:
         self.stated += [
             target.confidence for target, kind in zip(targets, kinds, strict=True) if kind != RIGHT
         ]
+
+    def join(self, other: Count) -> None:
+        """Add the reports of other images."""
+        self.expected += other.expected
+        self.right += other.right
+        self.wrong += other.wrong
+        self.false += other.false
+        self.stated += other.stated
+        self.seconds += other.seconds
 
     def above(self, confidence: float) -> int:
         """Return how many reports with more than a confidence are not right."""
@@ -86,11 +102,14 @@ def detector(name: str, target_family: str) -> Detector:
     return create_detector(name, DetectorSettings(family=target_family))
 
 
-def counted(detect: Detector, scenes: Iterator[Scene]) -> Count:
+def counted(detect: Callable[[np.ndarray], list[Target]], scenes: Iterator[Scene]) -> Count:
     """Return the reports of some scenes."""
     count = Count()
     for image, truth in scenes:
-        count.add(truth, detect(image))
+        started = time.process_time()
+        targets = detect(image)
+        count.seconds += time.process_time() - started
+        count.add(truth, targets)
     return count
 
 
@@ -107,23 +126,44 @@ def disturbance_table(options: argparse.Namespace) -> dict[str, dict[str, Count]
 
 
 def family_table(options: argparse.Namespace) -> dict[str, dict[str, Count]]:
-    """Return the reports by family of the targets and family that they are read as."""
+    """Return the reports by family of the targets and family, or all, that they are read as."""
     table: dict[str, dict[str, Count]] = {}
+    read_as = (*FAMILY_NAMES, *([AUTO] if options.detector == 'ring' else []))
     for shown in _shown(FAMILY_NAMES, 'families'):
         sheets = Targets(shown, options.count, options.seed, options.bright).sheets()
         scenes = [(sheet.photograph(Exposure()), sheet.truth) for sheet in sheets]
-        for name in FAMILY_NAMES:
-            seen = ((image, truth if name == shown else []) for image, truth in scenes)
-            table.setdefault(shown, {})[name] = counted(detector(options.detector, name), seen)
+        for name in read_as:
+            detect = of_family(detector(options.detector, name), shown if name == AUTO else name)
+            seen = ((image, truth if name in (shown, AUTO) else []) for image, truth in scenes)
+            table.setdefault(shown, {})[name] = counted(detect, seen)
     folder = Path(os.environ.get('AHF_PHOTOS', PHOTOS)) / 'panel'
     panel = read_truth(folder / 'truth.csv') if folder.exists() else {}
     for photograph, truth in _shown(panel.items(), 'photographs'):
         image = read_image(folder / photograph)
         row = table.setdefault('photographs of aicon14', {})
-        for name in FAMILY_NAMES:
-            targets = detector(options.detector, name)(image)
-            row.setdefault(name, Count()).add(truth if name == 'aicon14' else [], targets)
+        for name in read_as:
+            expected = truth if name in ('aicon14', AUTO) else []
+            detect = of_family(
+                detector(options.detector, name), 'aicon14' if name == AUTO else name
+            )
+            row.setdefault(name, Count()).join(counted(detect, iter([(image, expected)])))
+    if AUTO in read_as:
+        own = {**{name: name for name in FAMILY_NAMES}, 'photographs of aicon14': 'aicon14'}
+        one = sum(table[row][own[row]].seconds for row in table)
+        print(
+            f'all families take {sum(row[AUTO].seconds for row in table.values()) / one:.2f} '
+            'times the time of the right one'
+        )
     return table
+
+
+def of_family(detect: Detector, name: str) -> Callable[[np.ndarray], list[Target]]:
+    """Return a detector whose targets of other families than one have an ID that is none."""
+
+    def detected(image: np.ndarray) -> list[Target]:
+        return [it if it.family == name else replace(it, id=_NO_ID) for it in detect(image)]
+
+    return detected
 
 
 def lookalike_table(options: argparse.Namespace) -> dict[str, dict[str, Count]]:
