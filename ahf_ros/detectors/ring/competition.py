@@ -22,10 +22,10 @@ from ahf_ros.features.circle_fit import Fit
 PART = 256
 """Dots read at a time, which bounds the memory."""
 
-_CLEAREST = 24  # dots among which targets are looked for that tell which family comes first
+_CLEAREST = 48  # dots among which targets are looked for that tell which family comes first
 _READ = 8  # of these, that are read
 _MOST = 0.8  # of those read, whose words settle it
-_BLUNTER = 0.5  # than usual, from which a certain word is contested by other families
+_BLUNTER = 0.4  # than usual, from which a certain word is contested by other families
 _SHARPER = 0.2  # than the word of another family, to be the word of a dot
 _LIKELY = 0.2  # probability of a target, for a dot to be read as other families, too
 
@@ -65,8 +65,9 @@ def _by_words(
     for index, code in enumerate(ordered if which.size else ()):
         read, of_dot = read_bands(gray, dots.select(which), code)
         np.maximum.at(sharp[index], of_dot, np.where(read.certain, read.sharpness, 0.0))
-        if (sharp[index] > SHARP).sum() > _MOST * len(which):
-            break
+        of_print = index + 1 < len(ordered) and ordered[index + 1].band == code.band
+        if not of_print and (sharp > SHARP).any(axis=0).sum() > _MOST * len(which):
+            break  # other prints are not as sharp
     won = np.bincount(sharp.argmax(axis=0)[sharp.any(axis=0)], minlength=len(ordered))
     return [ordered[index] for index in np.argsort(-won, kind='stable')], bool(won.any())
 
@@ -123,7 +124,7 @@ def _settled(dots: Fit, found: Hypotheses) -> np.ndarray:
     settled = np.zeros(len(dots.frames), bool)
     if not len(certain.words):
         return settled
-    usual = min(SHARP, float(np.median(certain.sharpness)) - _BLUNTER)
+    usual = float(np.median(certain.sharpness)) - _BLUNTER
     certain = certain.select(certain.sharpness >= usual)
     for (x, y), reach in zip(certain.frames[:, :2, 2], certain.reach, strict=True):
         settled |= np.hypot(dots.frames[:, 0, 2] - x, dots.frames[:, 1, 2] - y) < reach
