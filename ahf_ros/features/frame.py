@@ -215,6 +215,11 @@ def moved(frames: np.ndarray, changes: np.ndarray) -> np.ndarray:
     return product / product[:, 2:, 2:]
 
 
+def translated(frames: np.ndarray, x: float, y: float) -> np.ndarray:
+    """Return frames, shape (k, 3, 3), in the pixels of an image that shows (0, 0) at (x, y)."""
+    return np.array([[1.0, 0, x], [0, 1.0, y], [0, 0, 1.0]]) @ frames
+
+
 def enlarged(frames: np.ndarray, level: int) -> np.ndarray:
     """Return frames in the pixels of the image that was halved `level` times to give theirs."""
     scale = 2.0**level

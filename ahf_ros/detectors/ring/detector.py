@@ -15,6 +15,7 @@ import numpy as np
 from ahf_ros.codes.ring import family
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.ring.competition import PART, by_clear_dots, read_families
+from ahf_ros.detectors.ring.faint import with_faint
 from ahf_ros.detectors.ring.hypotheses import Hypotheses, resolve_dots, resolve_ids
 from ahf_ros.detectors.ring.refinement import refine_centres
 from ahf_ros.detectors.ring.same_prints import decoded, settle_same_prints
@@ -76,6 +77,16 @@ def find_hypotheses(gray: np.ndarray, settings: DetectorSettings) -> Hypotheses:
         Gray values from 0 to 255.
     settings : DetectorSettings
         What the targets look like.
+    """
+    return with_faint(
+        gray, read_image(gray, settings), lambda part: read_image(part, settings)
+    )
+
+
+def read_image(gray: np.ndarray, settings: DetectorSettings) -> Hypotheses:
+    """Return the dots and words that an image shows at its own contrast.
+
+    Parameters are those of `find_hypotheses`.
     """
     families = [family(name) for name in settings.families]
     kind = (*settings.radii, settings.polarities)

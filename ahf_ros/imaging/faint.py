@@ -1,0 +1,155 @@
+"""Parts of an image whose contrast is faint, stretched to that of a print.
+
+Haze, gloss, washed-out paper and the gamma of a camera add much the same gray to ink and paper.
+What remains of their contrast may be too small a ratio to be looked at, and yet be many times the
+noise. Taking that gray away and multiplying the rest gives back what a clear image would show,
+with more noise. A linear change of gray values moves no edge.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from ahf_ros.imaging.logarithm import LOG_OFFSET
+
+TILE = 64
+"""Side of the tiles of which the contrast is measured, px."""
+
+INK, PAPER = 55.0, 220.0
+"""Gray values to which the darkest and the brightest of the neighbourhood are stretched."""
+
+_HALF = TILE // 2  # side of a tile in the image at half its size
+_EXTREMES = 8  # pixels of a tile of that image that may be darker or brighter than the extremes
+_MAXIMUM_RANGE = 0.5  # of ln, where contrast is faint
+_MINIMUM_RANGE = 14.0  # in deviations of the noise of the image at half its size
+_STEPS = 16  # pixels of a tile of that image that have steps of at least
+_MINIMUM_STEP = 0.4  # of the range
+_CLEAR_STEP = 10.0  # deviations of the noise
+_ROUNDING = 0.15  # noise of gray values that are whole numbers, in that image
+_MEDIAN = 0.6745 * 6  # of sizes of second differences both ways, in deviations of the noise
+
+
+@dataclass(frozen=True, slots=True)
+class FaintPart:
+    """A part of an image, stretched.
+
+    Attributes
+    ----------
+    x, y : int
+        Its first pixel in the image.
+    gray : ndarray of float32, shape (height, width)
+        Gray values from 0 to 255.
+    """
+
+    x: int
+    y: int
+    gray: np.ndarray
+
+
+def faint_parts(gray: np.ndarray) -> Iterator[FaintPart]:
+    """Yield the parts of an image with clear edges of faint contrast.
+
+    Parameters
+    ----------
+    gray : ndarray of uint8 or float32, shape (height, width)
+        Gray values from 0 to 255.
+    """
+    low, high, faint = measure_tiles(gray)
+    if not faint.any():
+        return
+    box = np.ones((3, 3), np.uint8)
+    around = cv2.dilate(faint.astype(np.uint8), box)
+    low, high = _spread(low, faint), _spread(high, faint)
+    count, labels, boxes, _ = cv2.connectedComponentsWithStats(around, connectivity=8)
+    for label in range(1, count):
+        left, top, width, height, _ = boxes[label]
+        rows, columns = slice(top, top + height), slice(left, left + width)
+        part = gray[TILE * top : TILE * (top + height), TILE * left : TILE * (left + width)]
+        within = labels[rows, columns] == label
+        stretched = _stretched(part, low[rows, columns], high[rows, columns], within)
+        yield FaintPart(TILE * int(left), TILE * int(top), stretched)
+
+
+def measure_tiles(gray: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the extremes around each tile of an image, and whether their contrast is faint.
+
+    Parameters
+    ----------
+    gray : ndarray of uint8 or float32, shape (height, width)
+
+    Returns
+    -------
+    low, high : ndarray of float32, shape (rows, columns)
+        Gray values, of the tile and its neighbours.
+    faint : ndarray of bool, shape (rows, columns)
+        Whether the range is small, but the tile has edges of such a height, clear of noise.
+    """
+    rows, columns = (-(-side // TILE) for side in gray.shape)
+    size = (columns * _HALF, rows * _HALF)
+    height, width = (max(side // 2, 1) for side in gray.shape)
+    half = cv2.resize(
+        gray.astype(np.float32, copy=False), (width, height), interpolation=cv2.INTER_AREA
+    )
+    half = cv2.copyMakeBorder(
+        half, 0, size[1] - height, 0, size[0] - width, borderType=cv2.BORDER_REPLICATE
+    )
+    tiles = np.partition(_tiles(half), (_EXTREMES, -1 - _EXTREMES), axis=2)
+    box = np.ones((3, 3), np.uint8)
+    low = cv2.erode(tiles[..., _EXTREMES], box)
+    high = cv2.dilate(tiles[..., -1 - _EXTREMES], box)
+    faint = np.log((high + LOG_OFFSET) / (low + LOG_OFFSET)) < _MAXIMUM_RANGE
+    faint &= high - low > _MINIMUM_RANGE * _ROUNDING
+    if faint.any():
+        noise, step = _noise(half, faint), _steps(half, faint)
+        contrast = (high - low)[faint]
+        clear = (contrast > _MINIMUM_RANGE * noise) & (step > _CLEAR_STEP * noise)
+        faint[faint] = clear & (step > _MINIMUM_STEP * contrast)
+    return low, high, faint
+
+
+def _tiles(half: np.ndarray) -> np.ndarray:
+    """Return the pixels by tile, shape (rows, columns, pixels)."""
+    rows, columns = (side // _HALF for side in half.shape)
+    split = half.reshape(rows, _HALF, columns, _HALF).swapaxes(1, 2)
+    return split.reshape(rows, columns, _HALF * _HALF)
+
+
+def _noise(half: np.ndarray, which: np.ndarray) -> np.ndarray:
+    second = np.array([1, -2, 1], np.float32)
+    sizes = np.abs(cv2.sepFilter2D(half, -1, second, second))
+    return np.hypot(np.median(_tiles(sizes)[which], axis=1) / _MEDIAN, _ROUNDING)
+
+
+def _steps(half: np.ndarray, which: np.ndarray) -> np.ndarray:
+    first = np.array([[-1, 0, 1]], np.float32)
+    sizes = np.maximum(
+        np.abs(cv2.filter2D(half, -1, first)), np.abs(cv2.filter2D(half, -1, first.T))
+    )
+    return np.partition(_tiles(sizes)[which], -_STEPS, axis=1)[:, -_STEPS]
+
+
+def _spread(values: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Return values with those of unknown tiles next to known ones from these."""
+    weights = known.astype(np.float32)
+    sums = cv2.blur(values * weights, (3, 3), borderType=cv2.BORDER_CONSTANT)
+    total = cv2.blur(weights, (3, 3), borderType=cv2.BORDER_CONSTANT)
+    return np.where(known, values, sums / np.maximum(total, 1e-6))
+
+
+def _stretched(
+    part: np.ndarray, low: np.ndarray, high: np.ndarray, within: np.ndarray
+) -> np.ndarray:
+    height, width = part.shape
+    size = (TILE * low.shape[1], TILE * low.shape[0])
+    zero, unit = (
+        cv2.resize(of_tiles, size, interpolation=cv2.INTER_LINEAR)[:height, :width]
+        for of_tiles in (low, np.maximum(high - low, 1.0))
+    )
+    gray = (part - zero) * ((PAPER - INK) / unit) + INK
+    outside = np.repeat(np.repeat(~within, TILE, axis=0), TILE, axis=1)[:height, :width]
+    gray[outside] = PAPER
+    return np.clip(gray, 0, 255).astype(np.float32)
