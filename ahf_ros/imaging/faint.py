@@ -22,14 +22,16 @@ TILE = 64
 INK, PAPER = 55.0, 220.0
 """Gray values to which the darkest and the brightest of the neighbourhood are stretched."""
 
-_HALF = TILE // 2  # side of a tile in the image at half its size
-_EXTREMES = 8  # pixels of a tile of that image that may be darker or brighter than the extremes
+# All that follows refers to the image at half its size.
+_HALF = TILE // 2  # side of a tile, px
+_EXTREMES = 8  # pixels of a tile that may be darker or brighter than its extremes
 _MAXIMUM_RANGE = 0.5  # of ln, where contrast is faint
-_MINIMUM_RANGE = 14.0  # in deviations of the noise of the image at half its size
-_STEPS = 16  # pixels of a tile of that image that have steps of at least
-_MINIMUM_STEP = 0.4  # of the range
-_CLEAR_STEP = 10.0  # deviations of the noise
-_ROUNDING = 0.15  # noise of gray values that are whole numbers, in that image
+_MINIMUM_RANGE = 14.0  # of gray values, in standard deviations of the noise
+_STEPS = 16  # pixels of a tile that have a step, at least
+_MINIMUM_STEP = 0.4  # height of a step, in the range
+_CLEAR_STEP = 10.0  # the same, in standard deviations of the noise
+_ROUNDING = 0.15  # noise of gray values that were whole numbers
+_NO_WEIGHT = 1e-6  # instead of no known tile
 _MEDIAN = 0.6745 * 6  # of sizes of second differences both ways, in deviations of the noise
 
 
@@ -119,12 +121,14 @@ def _tiles(half: np.ndarray) -> np.ndarray:
 
 
 def _noise(half: np.ndarray, which: np.ndarray) -> np.ndarray:
+    """Return the noise of some tiles, from the median of the second differences both ways."""
     second = np.array([1, -2, 1], np.float32)
     sizes = np.abs(cv2.sepFilter2D(half, -1, second, second))
     return np.hypot(np.median(_tiles(sizes)[which], axis=1) / _MEDIAN, _ROUNDING)
 
 
 def _steps(half: np.ndarray, which: np.ndarray) -> np.ndarray:
+    """Return the height that `_STEPS` pixels of some tiles have as a step across two pixels."""
     first = np.array([[-1, 0, 1]], np.float32)
     sizes = np.maximum(
         np.abs(cv2.filter2D(half, -1, first)), np.abs(cv2.filter2D(half, -1, first.T))
@@ -137,12 +141,13 @@ def _spread(values: np.ndarray, known: np.ndarray) -> np.ndarray:
     weights = known.astype(np.float32)
     sums = cv2.blur(values * weights, (3, 3), borderType=cv2.BORDER_CONSTANT)
     total = cv2.blur(weights, (3, 3), borderType=cv2.BORDER_CONSTANT)
-    return np.where(known, values, sums / np.maximum(total, 1e-6))
+    return np.where(known, values, sums / np.maximum(total, _NO_WEIGHT))
 
 
 def _stretched(
     part: np.ndarray, low: np.ndarray, high: np.ndarray, within: np.ndarray
 ) -> np.ndarray:
+    """Return a part whose tiles have these extremes, stretched within and of paper elsewhere."""
     height, width = part.shape
     size = (TILE * low.shape[1], TILE * low.shape[0])
     zero, unit = (

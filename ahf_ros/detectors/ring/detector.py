@@ -78,9 +78,7 @@ def find_hypotheses(gray: np.ndarray, settings: DetectorSettings) -> Hypotheses:
     settings : DetectorSettings
         What the targets look like.
     """
-    return with_faint(
-        gray, read_image(gray, settings), lambda part: read_image(part, settings)
-    )
+    return with_faint(gray, read_image(gray, settings), lambda part: read_image(part, settings))
 
 
 def read_image(gray: np.ndarray, settings: DetectorSettings) -> Hypotheses:
