@@ -30,6 +30,7 @@ _MINIMUM_RANGE = 14.0  # of gray values, in standard deviations of the noise
 _STEPS = 16  # pixels of a tile that have a step, at least
 _MINIMUM_STEP = 0.4  # height of a step, in the range
 _CLEAR_STEP = 10.0  # the same, in standard deviations of the noise
+_GROUP = 2  # faint tiles side by side, for the part to be worth reading
 _ROUNDING = 0.15  # noise of gray values that were whole numbers
 _NO_WEIGHT = 1e-6  # instead of no known tile
 _MEDIAN = 0.6745 * 6  # of sizes of second differences both ways, in deviations of the noise
@@ -61,6 +62,7 @@ def faint_parts(gray: np.ndarray) -> Iterator[FaintPart]:
         Gray values from 0 to 255.
     """
     low, high, faint = measure_tiles(gray)
+    faint = _in_groups(faint)
     if not faint.any():
         return
     box = np.ones((3, 3), np.uint8)
@@ -134,6 +136,12 @@ def _steps(half: np.ndarray, which: np.ndarray) -> np.ndarray:
         np.abs(cv2.filter2D(half, -1, first)), np.abs(cv2.filter2D(half, -1, first.T))
     )
     return np.partition(_tiles(sizes)[which], -_STEPS, axis=1)[:, -_STEPS]
+
+
+def _in_groups(faint: np.ndarray) -> np.ndarray:
+    """Return the faint tiles that have faint neighbours."""
+    _, labels, boxes, _ = cv2.connectedComponentsWithStats(faint.astype(np.uint8), connectivity=8)
+    return faint & (boxes[labels, cv2.CC_STAT_AREA] >= _GROUP)
 
 
 def _spread(values: np.ndarray, known: np.ndarray) -> np.ndarray:
