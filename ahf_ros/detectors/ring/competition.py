@@ -25,7 +25,8 @@ PART = 256
 _CLEAREST = 48  # dots among which targets are looked for that tell which family comes first
 _READ = 8  # of these, that are read
 _MOST = 0.8  # of those read, whose words settle it
-_BLUNTER = 0.4  # than usual, from which a certain word is contested by other families
+_SHARPEST = 5.1  # sharpness of edges that are those of no other word
+_BLUNTER = 0.8  # than usual, from which a certain word is contested by other families
 _SHARPER = 0.2  # than the word of another family, to be the word of a dot
 _LIKELY = 0.2  # probability of a target, for a dot to be read as other families, too
 
@@ -66,8 +67,9 @@ def _by_words(
         read, of_dot = read_bands(gray, dots.select(which), code)
         np.maximum.at(sharp[index], of_dot, np.where(read.certain, read.sharpness, 0.0))
         of_print = index + 1 < len(ordered) and ordered[index + 1].band == code.band
-        if not of_print and (sharp > SHARP).any(axis=0).sum() > _MOST * len(which):
-            break  # other prints are not as sharp
+        enough = _SHARPEST if of_print else SHARP  # where other words, or prints, may be as sharp
+        if (sharp > enough).any(axis=0).sum() > _MOST * len(which):
+            break
     won = np.bincount(sharp.argmax(axis=0)[sharp.any(axis=0)], minlength=len(ordered))
     return [ordered[index] for index in np.argsort(-won, kind='stable')], bool(won.any())
 
