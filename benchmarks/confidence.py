@@ -21,7 +21,7 @@ from rich.progress import track
 
 from ahf_ros.codes.ring import canonical, family
 from ahf_ros.detectors.contract import DetectorSettings
-from ahf_ros.detectors.ring.confidence import HIDDEN, MARGIN, UNEXPLAINED, confidence, terms
+from ahf_ros.detectors.ring.confidence import HIDDEN, MARGIN, UNEXPLAINED, confidence, even, terms
 from ahf_ros.detectors.ring.detector import find_hypotheses
 from ahf_ros.imaging.image import as_gray
 from benchmarks.conditions import COMMON, Scene, scenes
@@ -129,8 +129,11 @@ def fitted(seeds: Iterable[int]) -> dict[str, np.ndarray]:
     no_trace = ~right & (features[:, UNEXPLAINED] < _TRACE) & (features[:, HIDDEN] == 0)
     told = (features[:, MARGIN] > _MINIMUM_MARGIN) & ~no_trace
     counts = np.where(np.isin(condition, COMMON), 1.0, RARE)
-    intercept, weights = rising_regression(terms(features[told]), right[told], counts[told])
-    return {'intercept': np.round(intercept, 3), 'weights': np.round(weights, 3)}
+    parts = [told & of for of in (even(features), ~even(features))]
+    fits = [rising_regression(terms(features[of]), right[of], counts[of]) for of in parts]
+    (at_even, of_even), (at_edges, of_edges) = fits
+    numbers = {'intercepts': np.array([at_even, at_edges]), 'even': of_even, 'edges': of_edges}
+    return {name: np.round(values, 3) for name, values in numbers.items()}
 
 
 def reliability(seeds: Iterable[int]) -> Iterator[str]:

@@ -144,15 +144,19 @@ def test_confidence_is_a_probability_that_grows_with_the_evidence():
     assert (sure <= 1).all()
     for worse in (
         of(replace(readings, margin=readings.margin / 10)),
-        of(replace(readings, contradiction=readings.contradiction + 20)),
         of(replace(readings, explained=readings.explained / 2)),
         of(readings, share=0.5),
-        of(readings, deviation=0.5),
         of(replace(readings, unexplained=readings.unexplained + 40)),
         of(replace(readings, support=-readings.support)),
     ):
         assert (worse >= 0).all()
         assert (worse < sure).all()
+    for no_better in (
+        of(replace(readings, contradiction=readings.contradiction + 20)),
+        of(replace(readings, hidden=~readings.hidden)),
+        of(readings, deviation=0.5),
+    ):
+        assert (no_better <= sure).all()
 
 
 @pytest.mark.parametrize('light', ['normal', 'stripe', 'lattice', 'spots'])

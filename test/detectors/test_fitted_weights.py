@@ -19,9 +19,11 @@ def test_the_count_has_a_weight_for_every_feature_each_product_and_an_intercept(
 
 
 def test_the_confidence_only_rises_with_what_speaks_for_a_reading():
-    weights = fitted_weights('confidence', 'weights')[0]
-    assert terms(np.zeros((1, FEATURES))).shape == (1, len(weights))
-    assert weights.min() >= 0
+    intercepts, *both = fitted_weights('confidence', 'intercepts', 'even', 'edges')
+    assert intercepts.shape == (2,)
+    for weights in both:
+        assert terms(np.zeros((1, FEATURES))).shape == (1, len(weights))
+        assert weights.min() >= 0
 
 
 @pytest.mark.parametrize('purpose', ['confidence', 'counting'])

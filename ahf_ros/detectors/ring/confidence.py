@@ -4,8 +4,9 @@ There has to be a target, no pattern of light that resembles one, no target of a
 its word has to be right, whatever hides a part of it. Rendered scenes under all lights, with
 covers, glare, other families and clutter, say how much each feature of a reading tells of that: a
 logistic regression on piecewise linear functions, each of which only rises with what speaks for a
-reading, so that it holds where no scene was rendered as well. `benchmarks.confidence` fits it and
-shows how far it can be trusted.
+reading, so that it holds where no scene was rendered as well. What the features say is one thing
+where the light is even and another where it has many edges, so that there are two regressions.
+`benchmarks.confidence` fits them and shows how far they can be trusted.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from ahf_ros.features.circle_fit import Fit
 
 _MINIMUM_DEVIATION = 0.001  # of edges, below which it says no more, dot radii
 _MINIMUM_MARGIN = 1.0  # below which a word is no better than another one
+_EVEN = 1.0  # price of covers, beyond the usual, up to which the light is even
 _USUAL_PRICE = 4.0  # of covers, beyond the usual, that halves what is unexplained
 _FULL_SIZE = 12.0  # radius of a dot from which evidence grows no more, px
 
@@ -47,13 +49,13 @@ _FEATURES = (
     _Feature('ln(1 + support), signed', 1, (-5.0, -2.0, 0.0, 2.0, 3.0, 4.0, 5.0)),
 )
 
-FEATURES = len(_FEATURES)
-"""Number of the features that `confidence` weighs."""
+FEATURES = len(_FEATURES) + 1
+"""Number of the features that `confidence` takes: those it weighs, and the price of covers."""
 
 MARGIN, UNEXPLAINED, HIDDEN = 0, 1, 4
 """Places of three of them."""
 
-_INTERCEPT, _WEIGHTS = fitted_weights('confidence', 'intercept', 'weights')
+_INTERCEPTS, *_WEIGHTS = fitted_weights('confidence', 'intercepts', 'even', 'edges')
 
 
 def confidence_features(readings: Readings, fit: Fit) -> np.ndarray:
@@ -69,7 +71,8 @@ def confidence_features(readings: Readings, fit: Fit) -> np.ndarray:
     -------
     ndarray of float64, shape (k, FEATURES)
         As `_FEATURES` names them; deviations in dot radii, the share of the steps onto marks the
-        smaller one of those at the inner and the outer edge of the band.
+        smaller one of those at the inner and the outer edge of the band. The last one is the price
+        of covers beyond the usual, which is large where the light has many edges.
     """
     unexplained = np.maximum(readings.unexplained, 0)
     in_light = unexplained / (1 + readings.price / _USUAL_PRICE)
@@ -89,13 +92,20 @@ def confidence_features(readings: Readings, fit: Fit) -> np.ndarray:
             np.log(fit.deviation / fit.size + _MINIMUM_DEVIATION),
             np.log1p(readings.contradiction),
             np.sign(readings.support) * np.log1p(np.abs(readings.support)),
+            readings.price,
         ],
         axis=1,
     )
 
 
+def even(features: np.ndarray) -> np.ndarray:
+    """Return whether the light on targets is even, ndarray of bool, shape (k,)."""
+    is_even: np.ndarray = features[:, -1] <= _EVEN
+    return is_even
+
+
 def terms(features: np.ndarray) -> np.ndarray:
-    """Return what the regression weighs, each of which speaks for a reading.
+    """Return what the regressions weigh, each of which speaks for a reading.
 
     A feature that speaks for it counts up to each knot, one that speaks against it from each on.
 
@@ -110,7 +120,7 @@ def terms(features: np.ndarray) -> np.ndarray:
     """
     columns = [
         np.minimum(values, knot) if feature.sign > 0 else -np.maximum(values - knot, 0)
-        for feature, values in zip(_FEATURES, features.T, strict=True)
+        for feature, values in zip(_FEATURES, features.T[:-1], strict=True)
         for knot in feature.knots
     ]
     return np.stack(columns, axis=1)
@@ -124,6 +134,7 @@ def confidence(features: np.ndarray) -> np.ndarray:
     features : ndarray of float, shape (k, FEATURES)
         As `confidence_features` gives them.
     """
+    weighed = _INTERCEPTS + terms(features) @ np.stack(_WEIGHTS, axis=1)
+    probability = 1 / (1 + np.exp(-np.where(even(features), *weighed.T)))
     one_word = features[:, MARGIN] > np.log1p(_MINIMUM_MARGIN)
-    probability = 1 / (1 + np.exp(-(_INTERCEPT + terms(features) @ _WEIGHTS)))
     return np.where(one_word, probability, 0.0)
