@@ -21,6 +21,7 @@ from ahf_ros.detectors.dots.published import PublishedDotsDetector
 from ahf_ros.detectors.external.command import CommandDetector
 from ahf_ros.detectors.external.guarded import guarded
 from ahf_ros.detectors.gsi.detector import GsiDetector
+from ahf_ros.detectors.gsi.published import PublishedGsiDetector
 from ahf_ros.detectors.ring.counting import estimate_count
 from ahf_ros.detectors.ring.detector import RingDetector
 from ahf_ros.detectors.ring.traditional import TraditionalDetector
@@ -72,6 +73,7 @@ _ENTRIES = {
     'aruco': _Entry(SquareDetector, KINDS['aruco']),
     'apriltag': _Entry(SquareDetector, KINDS['apriltag']),
     'gsi': _Entry(GsiDetector, KINDS['gsi']),
+    'gsi_published': _Entry(PublishedGsiDetector, KINDS['gsi']),
     'dots': _Entry(DotsDetector, KINDS['dots']),
     'dots_published': _Entry(PublishedDotsDetector, KINDS['dots']),
     'command': _Entry(CommandDetector, FAMILY_NAMES, several=True, own_ids=True),
