@@ -53,8 +53,8 @@ def parse_family(file: Entry) -> PointFamily:
     )
     radius = fields['dot_radius'].number(1e-9, 'a length above 0')
     template = {name: _dot(entry, radius) for name, entry in fields['template'].items()}
-    if not 4 <= len(template) <= 12:
-        fields['template'].refuse('a mapping of 4 to 12 names to [x, y] or [x, y, radius]')
+    if not 3 <= len(template) <= 12:
+        fields['template'].refuse('a mapping of 3 to 12 names to [x, y] or [x, y, radius]')
     reference = fields['reference'].text()
     if reference not in template:
         fields['reference'].refuse(f'one of {", ".join(template)}')

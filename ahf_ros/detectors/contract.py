@@ -13,7 +13,7 @@ from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.target import Target
 
 _MINIMUM_RADIUS = 4.0  # of a dot, px, where the user sets none
-_MINIMUM_RADII = {'dots': 2.5}  # of families whose dot is small beside the target
+_MINIMUM_RADII = {'gsi': 2.0, 'dots': 2.5}  # of families whose dot is small beside the target
 
 POLARITIES = ('auto', 'dark', 'bright')
 """Colour of the dot against its surroundings; 'auto' accepts both in one image."""

@@ -103,10 +103,42 @@ def all_dots(
         No two of them the same.
     """
     whole = whole_dots(pyramid, min_radius, max_radius, polarities)
+    return with_other_dots(pyramid, whole, min_radius, max_radius, polarities)
+
+
+def with_other_dots(
+    pyramid: ImagePyramid,
+    whole: Dots,
+    min_radius: float,
+    max_radius: float,
+    polarities: Sequence[int],
+    explained: Sequence[np.ndarray] | np.ndarray = (),
+) -> Dots:
+    """Return dots with a whole outline, and those without one.
+
+    Parameters
+    ----------
+    pyramid : ImagePyramid
+    whole : Dots
+        As `whole_dots` gives them.
+    min_radius, max_radius : float
+        Bounds of the semi-major axis, px.
+    polarities : sequence of int
+        1 to find dark dots, -1 to find bright ones.
+    explained : sequence of ndarray of float, each of shape (m, 2)
+        Outlines of objects that are known already, px of the image. No others are looked for
+        inside.
+
+    Returns
+    -------
+    Dots
+        No two of them the same.
+    """
     outlines = frame.circle_outlines(whole.frames, np.full(len(whole.frames), 1 + _MARGIN))
-    voted = voted_dots(pyramid, min_radius, max_radius, polarities, explained=outlines)
-    found = [whole, voted]
+    known = [*outlines, *explained]
+    found = [whole, voted_dots(pyramid, min_radius, max_radius, polarities, explained=known)]
     if min_radius < _SMALL:
         low, high = _SMALLER * min_radius, min(max_radius, _SMALL)
-        found.append(small_dots(pyramid.logs[0], low, high, polarities, LOG_SCALE))
+        small = small_dots(pyramid.logs[0], low, high, polarities, LOG_SCALE, explained)
+        found.append(small)
     return distinct(Dots.joined(found))

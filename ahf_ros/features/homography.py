@@ -138,3 +138,14 @@ def local_frames(homographies: np.ndarray, points: np.ndarray, radii: np.ndarray
     frames[..., 1] *= np.sign(np.linalg.det(frames[..., :2, :2]))[..., None]
     frames[..., :2, 2], frames[..., 2, 2] = centres, 1.0
     return frames
+
+
+def reference_frames(homographies: np.ndarray, radius: float) -> np.ndarray:
+    """Return the frames of circles about the origin of the plane of objects, shape (k, 3, 3).
+
+    Parameters
+    ----------
+    homographies : ndarray of float64, shape (k, 3, 3)
+    radius : float
+    """
+    return local_frames(homographies, np.zeros((1, 2)), np.array([radius]))[:, 0]

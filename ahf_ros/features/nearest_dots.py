@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-_CELL = 2.0  # of the map, px
+_CELL = 2.0  # smallest one of the map, px
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,18 +20,30 @@ class NearestDots:
         px.
     corner : ndarray of float64, shape (2,)
         Place of the first cell, px.
+    cell : float
+        Its side, px.
     index : ndarray of int32, shape (rows, columns)
     """
 
     centres: np.ndarray
     corner: np.ndarray
+    cell: float
     index: np.ndarray
 
     @classmethod
-    def of(cls, centres: np.ndarray) -> NearestDots:
-        """Return the map of at least one dot."""
+    def of(cls, centres: np.ndarray, error: float = 0.0) -> NearestDots:
+        """Return the map of at least one dot.
+
+        Parameters
+        ----------
+        centres : ndarray of float64, shape (k, 2)
+            px.
+        error : float
+            By how much a dot may be farther away than the nearest one, px.
+        """
+        cell = max(error, _CELL)
         corner = centres.min(axis=0)
-        cells = np.rint((centres - corner) / _CELL).astype(int)
+        cells = np.rint((centres - corner) / cell).astype(int)
         empty = np.full(cells.max(axis=0)[::-1] + 1, 255, np.uint8)
         empty[cells[:, 1], cells[:, 0]] = 0
         _, labels = cv2.distanceTransformWithLabels(
@@ -39,7 +51,7 @@ class NearestDots:
         )
         dot = np.zeros(labels.max() + 1, np.int32)
         dot[labels[cells[:, 1], cells[:, 0]]] = np.arange(len(cells))
-        return cls(centres, corner, dot[labels])
+        return cls(centres, corner, cell, dot[labels])
 
     def within(
         self, places: np.ndarray, units: np.ndarray, reach: float
@@ -55,7 +67,7 @@ class NearestDots:
         reach : float
         """
         last = np.array(self.index.shape[::-1]) - 1
-        column, row = np.clip(np.rint((places - self.corner) / _CELL), 0, last).astype(int).T
+        column, row = np.clip(np.rint((places - self.corner) / self.cell), 0, last).astype(int).T
         found = self.index[row, column]
         gap = np.linalg.inv(units) @ (self.centres[found] - places)[..., None]
         distance = np.hypot(gap[:, 0, 0], gap[:, 1, 0])

@@ -6,7 +6,7 @@ along. In even light they need none.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import cv2
 import numpy as np
@@ -22,10 +22,13 @@ _MINIMUM_STEP = 0.2  # of ln, from the ground to the dot
 _LEVELS = {-1: 0.62, 1: 0.4}  # of the step of ln, about halfway in gray values
 _REDUCTION = 4  # of the image in which the ground is looked for
 _REACH = 4  # px about a pixel, in which the highest step is looked for
+_NEAR = np.ones((2 * _REACH + 1, 2 * _REACH + 1), np.uint8)
 _BLUR = 0.15  # px^2, variance that blur adds to a dot that is cut off at half of its height
 _MINIMUM_MINOR = 0.6  # px
 _MINIMUM_PIXELS = 4
 _FILLED = (0.7, 1.35)  # pixels of a dot over the area of its ellipse
+_TILE = 32  # side of the tiles of which empty ones are left out, px
+_MOST_TILES = 0.3  # of the image; where there are more, it is looked at as a whole
 
 
 def small_dots(
@@ -34,6 +37,7 @@ def small_dots(
     max_radius: float,
     polarities: Sequence[int],
     log_scale: float,
+    explained: Sequence[np.ndarray] | np.ndarray = (),
 ) -> Dots:
     """Return the dots that stand out of an even ground all the way round.
 
@@ -47,6 +51,8 @@ def small_dots(
         1 to find dark dots, -1 to find bright ones.
     log_scale : float
         Units of `log` in one unit of ln.
+    explained : sequence of ndarray of float, each of shape (m, 2)
+        Outlines of objects that are known already, px. No dots are looked for inside.
 
     Returns
     -------
@@ -67,32 +73,24 @@ def small_dots(
         ground = cv2.morphologyEx(reduced, operation, kernel)
         ground = cv2.resize(ground, (width, height), interpolation=cv2.INTER_LINEAR)
         pair = (ground, eight_bit) if polarity > 0 else (eight_bit, ground)
-        found.append(_blobs(cv2.subtract(*pair), min_radius, max_radius, polarity))
+        steps = cv2.subtract(*pair)
+        for outline in explained:
+            cv2.fillConvexPoly(steps, np.rint(outline).astype(np.int32), 0)
+        found.append(_blobs(steps, min_radius, max_radius, polarity))
     return Dots.joined(found)
 
 
 def _blobs(height: np.ndarray, min_radius: float, max_radius: float, polarity: int) -> Dots:
     """Return the blobs of an image of steps that have the shape of a dot."""
-    near = np.ones((2 * _REACH + 1, 2 * _REACH + 1), np.uint8)
     least = _MINIMUM_STEP / _LN_RANGE * 255
-    highest = cv2.dilate(height, near)
-    share = _LEVELS[polarity]
-    level = cv2.convertScaleAbs(np.maximum(highest, np.uint8(least)), alpha=share)
-    mask = cv2.compare(height, level, cv2.CMP_GT)
-    # The default algorithm of OpenCV 4.5 crashes on large images with this connectivity.
-    count, labels, stats, _ = cv2.connectedComponentsWithStatsWithAlgorithm(
-        mask, 4, cv2.CV_32S, cv2.CCL_SAUF
-    )
+    x, y, label, stats = _connected(height, least, _LEVELS[polarity])
+    count = len(stats)
     longest = stats[:, cv2.CC_STAT_WIDTH : cv2.CC_STAT_HEIGHT + 1].max(axis=1)
     area = stats[:, cv2.CC_STAT_AREA]
     usable = (area >= _MINIMUM_PIXELS) & (longest <= 2 * max_radius + 3)
     usable &= longest >= 2 * min_radius - 2
-    usable[0] = False
-    pixels = cv2.findNonZero(mask)
-    if pixels is None or not usable.any():
+    if not usable.any():
         return Dots(np.zeros((0, 3, 3)), np.zeros(0, int), np.zeros(0))
-    x, y = pixels.reshape(-1, 2).T
-    label = labels[y, x]
     kept = usable[label]
     x, y, label = x[kept].astype(np.float64), y[kept].astype(np.float64), label[kept]
     peak = np.zeros(count)
@@ -116,3 +114,63 @@ def _blobs(height: np.ndarray, min_radius: float, max_radius: float, polarity: i
     which = best(np.flatnonzero(good), -peak[good], MAXIMUM_BLOBS, 'small dots')
     frames = affine_frames(centre_x, centre_y, major, minor, np.arctan2(xy, (xx - yy) / 2) / 2)
     return Dots(frames[which], np.full(len(which), polarity), np.ones(len(which)))
+
+
+def _connected(
+    height: np.ndarray, least: float, share: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return columns, rows and labels of the pixels of all blobs, and OpenCV's table of these."""
+    found = []
+    total = 0
+    for top, left, part, own in _parts(height, int(share * least)):
+        level = cv2.convertScaleAbs(
+            np.maximum(cv2.dilate(part, _NEAR), np.uint8(least)), alpha=share
+        )
+        mask = cv2.compare(part, level, cv2.CMP_GT)
+        if own is not None:
+            mask &= own
+        # The default algorithm of OpenCV 4.5 crashes on large images with this connectivity.
+        _, labels, stats, _ = cv2.connectedComponentsWithStatsWithAlgorithm(
+            mask, 4, cv2.CV_32S, cv2.CCL_SAUF
+        )
+        pixels = cv2.findNonZero(mask)
+        if pixels is not None:
+            x, y = pixels.reshape(-1, 2).T
+            found.append((x + left, y + top, labels[y, x] + (total - 1), stats[1:]))
+            total += len(stats) - 1
+    nothing = np.zeros(0, np.int32)
+    found.append((nothing, nothing, nothing, np.zeros((0, 5), np.int32)))
+    x, y, label, stats = (np.concatenate(column) for column in zip(*found, strict=True))
+    return x, y, label, stats
+
+
+def _parts(
+    height: np.ndarray, above: int
+) -> Iterator[tuple[int, int, np.ndarray, np.ndarray | None]]:
+    """Yield the parts of an image that hold its pixels above a value, connected ones in one.
+
+    Each comes with its first row and column, and a mask of what in it is not in another part; the
+    image as a whole where that is not much more. A margin is as wide as `_NEAR` reaches.
+    """
+    pixels = cv2.findNonZero(cv2.compare(height, above, cv2.CMP_GT))
+    if pixels is None:
+        return
+    tiles = np.zeros([-(-side // _TILE) for side in height.shape], np.uint8)
+    x, y = pixels.reshape(-1, 2).T
+    tiles[y // _TILE, x // _TILE] = 1
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(tiles)
+    extents = stats[1:, cv2.CC_STAT_WIDTH] * stats[1:, cv2.CC_STAT_HEIGHT]
+    if extents.sum() > _MOST_TILES * tiles.size:
+        yield 0, 0, height, None
+        return
+    for number in range(1, count):
+        column, row, columns, rows, _ = stats[number].tolist()
+        own = labels[row : row + rows, column : column + columns] == number
+        own = np.kron(own.astype(np.uint8), np.full((_TILE, _TILE), 255, np.uint8))
+        own = cv2.copyMakeBorder(own, *[_REACH] * 4, cv2.BORDER_CONSTANT, value=0)
+        top, left = row * _TILE - _REACH, column * _TILE - _REACH
+        bottom, right = top + own.shape[0], left + own.shape[1]
+        own = own[max(-top, 0) :, max(-left, 0) :]
+        top, left = max(top, 0), max(left, 0)
+        part = height[top:bottom, left:right]
+        yield top, left, part, np.ascontiguousarray(own[: part.shape[0], : part.shape[1]])

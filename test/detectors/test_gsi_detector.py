@@ -184,9 +184,9 @@ rule: {dots: 3, minimum_distance: 6, first_own_number: 1}
 
 
 def test_a_family_of_ones_own_is_printed_and_identified(tmp_path: Path) -> None:
-    # Four large dots and three small ones, after the description of Hattori's targets.
+    # Three large dots and three small ones, after the description of Hattori's targets.
     path = tmp_path / 'six.yaml'
-    path.write_text(OWN.replace('  left:', '  right: [16, -14, 3]\n  left:'))
+    path.write_text(OWN)
     family = point_family(str(path))
     scene = SceneSettings(
         width=900, height=700, targets=4, family='gsi', family_file=str(path), dot_radius=5, seed=2
@@ -200,9 +200,9 @@ def test_a_family_of_ones_own_is_printed_and_identified(tmp_path: Path) -> None:
 
 
 def test_a_bad_data_file_is_refused_when_the_detector_is_made(tmp_path: Path) -> None:
-    path = tmp_path / 'three.yaml'
-    path.write_text(OWN)
-    with pytest.raises(ValueError, match=r'three\.yaml, line 7: template .*4 to 12 names'):
+    path = tmp_path / 'two.yaml'
+    path.write_text(OWN.replace('  left: [-14, -6, 3]\n', ''))
+    with pytest.raises(ValueError, match=r'two\.yaml, line 7: template .*3 to 12 names'):
         create_detector(family='gsi', family_file=str(path))
 
 

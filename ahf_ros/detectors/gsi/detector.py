@@ -18,16 +18,17 @@ import numpy as np
 from ahf_ros.codes.gsi import PointFamily
 from ahf_ros.codes.gsi_library import point_family
 from ahf_ros.detectors.contract import DetectorSettings
+from ahf_ros.detectors.gsi.confidence import confidence_features
 from ahf_ros.detectors.gsi.evidence import find_evidence
 from ahf_ros.detectors.gsi.grouping import find_templates
-from ahf_ros.detectors.gsi.hypotheses import Hypotheses, judge, plausible, resolve
+from ahf_ros.detectors.gsi.hypotheses import Hypotheses, inside, plausible, resolve
 from ahf_ros.detectors.gsi.reading import read_codes
 from ahf_ros.detectors.gsi.refinement import dot_frames, measure_dots, place_targets
 from ahf_ros.features import frame
-from ahf_ros.features.dot_search import all_dots
+from ahf_ros.features.dot_search import whole_dots, with_other_dots
 from ahf_ros.features.dots import Dots
 from ahf_ros.features.ellipse_targets import ellipse_fields, targets_from_frames
-from ahf_ros.features.homography import local_frames
+from ahf_ros.features.homography import reference_frames
 from ahf_ros.features.pyramid import ImagePyramid, image_pyramid
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, DottedTarget, Target, sorted_targets
@@ -67,8 +68,7 @@ class GsiDetector:
         check_image(image)
         settings, code = self.settings, point_family(self.settings.family_file)
         pyramid = image_pyramid(as_gray(image), settings.max_radius)
-        dots = all_dots(pyramid, *settings.radii, settings.polarities)
-        hypotheses = find_hypotheses(pyramid, dots, code)
+        hypotheses, dots = find_hypotheses(pyramid, settings, code)
         targets = report(hypotheses, code)
         if settings.report_undecoded:
             targets += uncoded(pyramid.gray, dots, targets, settings)
@@ -107,7 +107,33 @@ class GsiDetector:
         return [better.get(it, it) for it in targets]
 
 
-def find_hypotheses(pyramid: ImagePyramid, dots: Dots, code: PointFamily) -> Hypotheses:
+def find_hypotheses(
+    pyramid: ImagePyramid, settings: DetectorSettings, code: PointFamily
+) -> tuple[Hypotheses, Dots]:
+    """Return the groups of dots that may be targets, and all dots outside of certain targets.
+
+    Dots whose outlines are whole cost little. Where they make certain targets, no others are
+    looked for.
+
+    Parameters
+    ----------
+    pyramid : ImagePyramid
+    settings : DetectorSettings
+        What the targets look like.
+    code : PointFamily
+    """
+    kind = (*settings.radii, settings.polarities)
+    whole = whole_dots(pyramid, *kind)
+    first = read_targets(pyramid, whole, code, rivals=False)
+    certain = first.select(resolve(first, code))
+    frames = reference_frames(certain.homographies, code.reach)
+    rest = whole.select(~inside(whole.frames[:, :2, 2], frames))
+    outlines = frame.circle_outlines(frames, np.ones(len(frames)))
+    dots = with_other_dots(pyramid, rest, *kind, explained=outlines)
+    return Hypotheses.joined([certain, read_targets(pyramid, dots, code, rivals=True)]), dots
+
+
+def read_targets(pyramid: ImagePyramid, dots: Dots, code: PointFamily, rivals: bool) -> Hypotheses:
     """Return the groups of dots that may be targets, with the code that each is read as.
 
     Parameters
@@ -115,11 +141,13 @@ def find_hypotheses(pyramid: ImagePyramid, dots: Dots, code: PointFamily) -> Hyp
     pyramid : ImagePyramid
     dots : Dots
     code : PointFamily
+    rivals : bool
+        As for `plausible`.
     """
     templates = find_templates(dots, code)
     evidence = find_evidence(pyramid.logs[0], templates.homographies, templates.polarity, code)
     readings = read_codes(evidence, code)
-    which = plausible(templates, readings, code)
+    which = plausible(templates, readings, code, rivals)
     some, words = templates.select(which), readings.words[which]
     first = _placed(pyramid, some.homographies, some.polarity, words, code)
     again = np.flatnonzero(first.words != words)
@@ -142,7 +170,14 @@ def _placed(
     frames = dot_frames(homographies, places, radii)
     placement = place_targets(pyramid.gray, frames, polarity, places, radii, code.reach)
     evidence = find_evidence(pyramid.logs[0], placement.homographies, polarity, code)
-    return judge(polarity, placement, read_codes(evidence, code), code)
+    readings = read_codes(evidence, code)
+    return Hypotheses(
+        placement.homographies,
+        placement.covariance,
+        polarity,
+        readings.words,
+        confidence_features(placement, readings, code),
+    )
 
 
 def report(hypotheses: Hypotheses, code: PointFamily) -> list[Target]:
@@ -203,9 +238,8 @@ def _fields(
     homographies: np.ndarray, covariance: np.ndarray, words: np.ndarray, code: PointFamily
 ) -> list[dict[str, Any]]:
     """Return the fields of targets that say where they and their dots are."""
-    reference = np.zeros((1, 2))
-    radius = code.template_radii[[code.reference]]
-    fields = ellipse_fields(local_frames(homographies, reference, radius)[:, 0], covariance)
+    radius = float(code.template_radii[code.reference])
+    fields = ellipse_fields(reference_frames(homographies, radius), covariance)
     which = _dots_of(words, code)
     frames = dot_frames(homographies, code.places[which], code.radii[which])
     axes = np.stack(frame.ellipse_axes(frames.reshape(-1, 3, 3)), axis=1)

@@ -14,25 +14,23 @@ from itertools import pairwise
 import numpy as np
 
 from ahf_ros.codes.gsi import PointFamily
+from ahf_ros.detectors.gsi.pairs import PART, Pairs, neighbours
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.dots import Dots
 from ahf_ros.features.homography import fit_homographies
 from ahf_ros.features.nearest_dots import NearestDots
 
-_LENGTH_ERROR = 0.35  # of a distance in units of an ellipse, relative
-_SLACK = 0.7  # added to it, dot radii
-_SIZE_RATIO = 0.55  # of two dots of a target, in ln, for their printed sizes
-_NEIGHBOURS = 64  # of a dot, the nearest ones, that may belong to its target
+_LENGTH_ERROR = (0.35, 0.7)  # of a distance in units of an ellipse: share of it, and dot radii
+_LENGTH_ERROR_OF_MANY = (0.25, 0.5)  # the same, where there are many dots
 _ELLIPSE_ERROR = 0.25  # of the axes of a dot, from those that three dots imply, in ln
 _ELLIPSE_PIXELS = 0.8  # added to it, px over the semi-minor axis
 _PREDICTED = 0.9  # error of a dot that is predicted by three others, dot radii
 _PERSPECTIVE = 0.06  # the same, in its distance from them
 _RESIDUAL = 0.35  # of the dots of a template about a homography, root mean square, dot radii
 _PIXELS = 0.35  # the same, px, which counts where dots are small
-_PART = 400_000  # pairs or triples of dots at a time, which bounds the memory
-_MAXIMUM_GROUPS = 8000  # of one part, for a homography to be fitted
-_MAXIMUM_TEMPLATES = 4000  # those that fit best
+_MAXIMUM_GROUPS = 2000  # of one part, for a homography to be fitted
+_MAXIMUM_TEMPLATES = 2000  # of one polarity, those that fit best
 _FEW = 600  # dots, up to which all template dots are tried in all roles
 
 
@@ -58,16 +56,6 @@ class Templates(ArrayRecord):
     misfit: np.ndarray
 
 
-@dataclass(frozen=True, slots=True)
-class _Pairs:
-    """Ordered pairs of neighbours, sorted by the first one."""
-
-    first: np.ndarray  # (p,)
-    second: np.ndarray  # (p,)
-    offset: np.ndarray  # (p, 2), y up, in units of the ellipse of the first
-    start: np.ndarray  # (k + 1,), where the pairs of each dot begin
-
-
 def find_templates(dots: Dots, family: PointFamily) -> Templates:
     """Return the groups of dots that look like templates, no group twice.
 
@@ -89,27 +77,36 @@ def find_templates(dots: Dots, family: PointFamily) -> Templates:
         if len(of_polarity) < len(places) - 1:
             continue
         part = dots.select(of_polarity)
-        pairs, nearest = _neighbours(part, family), NearestDots.of(part.frames[:, :2, 2])
-        for triple in _triples(places, family.reference, len(part.frames) <= _FEW):
+        centres, smallest = part.frames[:, :2, 2], frame.ellipse_axes(part.frames)[1].min()
+        few = len(centres) <= _FEW
+        triples = _triples(places, family.reference, few)
+        error = _LENGTH_ERROR if few else _LENGTH_ERROR_OF_MANY
+        pairs, nearest = (
+            neighbours(part, family, triples, error),
+            NearestDots.of(centres, smallest / 3),
+        )
+        templates = [_nothing(len(places))]
+        for triple in triples:
             members = _members(part, pairs, nearest, family, triple)
-            templates = _fitted(part, members, family, polarity)
-            members = np.where(templates.members < 0, -1, of_polarity[templates.members])
-            found.append(replace(templates, members=members))
-    return _distinct(Templates.joined(found))
+            templates.append(_fitted(part, members, family, polarity))
+        best = _distinct(Templates.joined(templates))
+        members = np.where(best.members < 0, -1, of_polarity[best.members])
+        found.append(replace(best, members=members))
+    every = Templates.joined(found)
+    return every.select(np.argsort(every.misfit, kind='stable'))
 
 
 def _triples(places: np.ndarray, reference: int, thorough: bool) -> list[tuple[int, int, int]]:
     """Return three template dots each: one whose ellipse is used, its partner, and a third one.
 
-    The reference and the dot nearest to it are tried with the dot farthest from them, or, where
-    there is time, all dots with the two farthest.
+    The reference is tried with the two dots farthest from it, or, where there is time, all dots
+    with the two farthest.
     """
     gaps = np.hypot(*(places[:, None] - places).transpose(2, 0, 1))
-    roles = np.argsort(gaps[reference], kind='stable').tolist()
     triples = []
-    for role in roles if thorough else roles[:2]:
+    for role in range(len(places)) if thorough else [reference]:
         arms = places - places[role]
-        for partner in np.argsort(-gaps[role], kind='stable').tolist()[: 2 if thorough else 1]:
+        for partner in np.argsort(-gaps[role], kind='stable').tolist()[:2]:
             third = int(np.abs(_cross(arms, arms[partner])).argmax())
             triples.append((role, partner, third))
     return triples
@@ -120,51 +117,9 @@ def _nothing(count: int) -> Templates:
     return Templates(np.zeros((0, 3, 3)), nobody, np.zeros(0, int), np.zeros(0))
 
 
-def _neighbours(dots: Dots, family: PointFamily) -> _Pairs:
-    """Return the pairs of dots of similar size that one template may hold."""
-    places = family.places[: len(family.template)]
-    reach = np.hypot(*(places[:, None] - places).transpose(2, 0, 1)).max()
-    reach = (1 + _LENGTH_ERROR) * reach / family.template_radii.min() + _SLACK
-    x, y = dots.frames[:, 0, 2], dots.frames[:, 1, 2]
-    major = frame.ellipse_axes(dots.frames)[0]
-    inverse = np.linalg.inv(dots.frames[:, :2, :2])
-    order = np.argsort(x, kind='stable')
-    low = np.searchsorted(x[order], x - reach * major)
-    high = np.searchsorted(x[order], x + reach * major, side='right')
-    widest = np.log(family.template_radii.max() / family.template_radii.min())
-    parts = []
-    begin = 0
-    total = np.cumsum(high - low)
-    while begin < len(x):
-        done = total[begin - 1] if begin else 0
-        end = max(int(np.searchsorted(total, done + _PART)), begin + 1)
-        count = high[begin:end] - low[begin:end]
-        first = np.repeat(np.arange(begin, end), count)
-        inside = np.arange(len(first)) - np.repeat(np.cumsum(count) - count, count)
-        second = order[low[first] + inside]
-        near = (np.abs(y[second] - y[first]) < reach * major[first]) & (first != second)
-        near &= np.abs(np.log(major[second] / major[first])) < _SIZE_RATIO + widest
-        first, second = first[near], second[near]
-        difference = np.stack([x[second] - x[first], y[second] - y[first]], axis=1)
-        offset = (inverse[first] @ difference[..., None])[..., 0] * [1, -1]
-        distance = np.hypot(*offset.T)
-        rank = np.lexsort((distance, first))
-        first, second, offset, distance = (
-            values[rank] for values in (first, second, offset, distance)
-        )
-        place = np.arange(len(first)) - np.searchsorted(first, first)
-        near = (distance < reach) & (place < _NEIGHBOURS)
-        parts.append((first[near], second[near], offset[near]))
-        begin = end
-    if not parts:
-        parts = [(np.zeros(0, int), np.zeros(0, int), np.zeros((0, 2)))]
-    first, second, offset = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return _Pairs(first, second, offset, np.searchsorted(first, np.arange(len(x) + 1)))
-
-
 def _members(
     dots: Dots,
-    pairs: _Pairs,
+    pairs: Pairs,
     nearest: NearestDots,
     family: PointFamily,
     triple: tuple[int, int, int],
@@ -174,19 +129,17 @@ def _members(
     role, partner, third = triple
     arms = (places - places[role]) / family.template_radii[role]
     lengths = np.hypot(*arms.T)
-    distance = np.hypot(*pairs.offset.T)
-    allowed = _LENGTH_ERROR * lengths[partner] + _SLACK
-    of_partner = np.flatnonzero(np.abs(distance - lengths[partner]) < allowed)
-    degree = np.diff(pairs.start)[pairs.first[of_partner]]
-    parts = np.searchsorted(np.cumsum(degree), np.arange(0, degree.sum() + _PART, _PART))
+    partners, thirds = pairs.at(arms[partner]), pairs.at(arms[third])
+    degree = np.diff(thirds.start)[partners.first]
+    parts = np.searchsorted(np.cumsum(degree), np.arange(0, degree.sum() + PART, PART))
     found = [np.zeros((0, len(places)), int)]
     for begin, end in pairwise(parts):
-        pair, other = _thirds(pairs, of_partner[begin:end], arms[partner], arms[third])
-        affine = _affine(pairs.offset[pair], pairs.offset[other], arms[partner], arms[third])
-        members = np.full((len(pair), len(places)), -1)
-        members[:, role] = pairs.first[pair]
-        members[:, partner], members[:, third] = pairs.second[pair], pairs.second[other]
-        base = dots.frames[pairs.first[pair]][:, :2, :2] @ [[1, 0], [0, -1]]
+        first, other = _thirds(partners, slice(begin, end), thirds, arms[partner], arms[third])
+        affine = _affine(partners.offset[first], thirds.offset[other], arms[partner], arms[third])
+        members = np.full((len(first), len(places)), -1)
+        members[:, role] = partners.first[first]
+        members[:, partner], members[:, third] = partners.second[first], thirds.second[other]
+        base = dots.frames[members[:, role], :2, :2] @ [[1, 0], [0, -1]]
         affine = base @ affine  # px a dot radius
         good = _bears_out(dots, members[:, (role, partner, third)], affine)
         members, affine = members[good], affine[good]
@@ -204,21 +157,23 @@ def _members(
 
 
 def _thirds(
-    pairs: _Pairs, which: np.ndarray, partner: np.ndarray, third: np.ndarray
+    partners: Pairs, part: slice, thirds: Pairs, partner: np.ndarray, third: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return pairs, and for each a pair with the same first dot whose second is about a third dot.
 
     It is where the template has it, turned so that the partner is where the first pair says.
     """
-    turn = _complex(pairs.offset[which]) / _complex(partner)
+    of_partner, of_third = _complex(partners.offset[part]), _complex(thirds.offset)
+    turn = of_partner / _complex(partner)
     expected = turn / np.abs(turn) * _complex(third)
-    count = pairs.start[pairs.first[which] + 1] - pairs.start[pairs.first[which]]
-    place = np.repeat(np.arange(len(which)), count)
+    begin = thirds.start[partners.first[part]]
+    count = thirds.start[partners.first[part] + 1] - begin
+    place = np.repeat(np.arange(len(begin)), count)
     inside = np.arange(len(place)) - np.repeat(np.cumsum(count) - count, count)
-    other = pairs.start[pairs.first[which]][place] + inside
-    gap = np.abs(_complex(pairs.offset[other]) - expected[place])
-    near = gap < _LENGTH_ERROR * np.hypot(*third) + _SLACK
-    return which[place[near]], other[near]
+    other = begin[place] + inside
+    gap = np.abs(of_third[other] - expected[place])
+    near = gap < thirds.error_at(np.hypot(*third))
+    return part.start + place[near], other[near]
 
 
 def _affine(

@@ -1,4 +1,4 @@
-"""Identification of GSI's targets as it was published: fixed thresholds, an invariant, an affine map.
+"""Identification of GSI's targets as published: fixed thresholds, an invariant, an affine map.
 
 The six steps of Wang et al. [1]_:
 
@@ -33,11 +33,12 @@ from ahf_ros.detectors.gsi.published_decoding import LARGEST_BIAS, Decoded, chec
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, DottedTarget, Target, sorted_targets
 
+_FAMILY = 'gsi'  # whichever data file describes it
 _THRESHOLD = 100  # gray value between dots and ground
 _AREA = (30.0, 1000.0)  # of a dot, px
 _PERIMETER = (20.0, 500.0)  # px
 _MINIMUM_ROUNDNESS = 0.6  # 4 pi area / perimeter^2
-_MINIMUM_POINTS = 5  # of a contour, which an ellipse takes
+_MINIMUM_POINTS = 14  # of a contour: neighbours are at most 2^0.5 px apart
 _CONTOUR_ERROR = 0.2  # standard deviation of the centre of an ellipse, px
 
 
@@ -90,9 +91,7 @@ class PublishedGsiDetector:
         return sorted_targets([*best.values(), *single])
 
 
-def find_dots(
-    gray: np.ndarray, polarity: int, min_radius: float, max_radius: float
-) -> np.ndarray:
+def find_dots(gray: np.ndarray, polarity: int, min_radius: float, max_radius: float) -> np.ndarray:
     """Return the ellipses of dots: steps 1 and 2.
 
     Parameters
@@ -113,10 +112,11 @@ def find_dots(
     contours, _ = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     ellipses = []
     for contour in contours:
+        if not _MINIMUM_POINTS <= len(contour) <= _PERIMETER[1]:
+            continue
         area, perimeter = cv2.contourArea(contour), cv2.arcLength(contour, closed=True)
         if (
-            len(contour) < _MINIMUM_POINTS
-            or not _AREA[0] <= area <= _AREA[1]
+            not _AREA[0] <= area <= _AREA[1]
             or not _PERIMETER[0] <= perimeter <= _PERIMETER[1]
             or 4 * np.pi * area < _MINIMUM_ROUNDNESS * perimeter**2
         ):
@@ -148,6 +148,7 @@ def _targets(
                 angle=angle,
                 covariance=(_CONTOUR_ERROR**2, 0.0, 0.0, _CONTOUR_ERROR**2),
                 confidence=float(1 - bias / LARGEST_BIAS),
+                family=_FAMILY,
                 dots=tuple(map(tuple, dots[members].tolist())),
                 template_dots=len(code.template),
                 polarity=polarity,

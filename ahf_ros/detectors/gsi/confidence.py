@@ -1,0 +1,82 @@
+"""The probability that a target is what it was read as: a logistic regression.
+
+The weights are in `fitted_weights.json`, which says what made them. `benchmarks.gsi_confidence`
+fits them, and shows how far the result can be trusted.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ahf_ros.codes.gsi import PointFamily
+from ahf_ros.detectors.gsi.reading import Readings
+from ahf_ros.detectors.gsi.refinement import Placement
+from ahf_ros.features.frame import ellipse_axes
+from ahf_ros.features.homography import reference_frames
+from ahf_ros.features.logistic import logistic, read_weights
+
+WEIGHTS = Path(__file__).with_name('fitted_weights.json')
+"""The data file."""
+
+_GROWTH = (0.03, 0.4, 0.15)  # that is usual: of any dot, of the minor axis in px, of its 4th power
+_EXCESS = 0.02  # of growth, that counts as 1
+_SHARE = 0.8  # of dots whose edges are found, from which on no more are asked for
+_PERSPECTIVE = 0.08  # change of depth from the centre to the edge of a target, that counts as 1
+_MEASURABLE = 2.0  # semi-minor axis of dots whose edges can be found, px
+_MOST = 30.0  # of these squares
+
+(_OF_TARGET,) = read_weights(WEIGHTS, 'gsi_confidence', 'weights')
+
+
+def confidence_features(
+    placement: Placement, readings: Readings, family: PointFamily
+) -> np.ndarray:
+    """Return what tells targets from chance arrangements, and right codes from wrong ones.
+
+    Parameters
+    ----------
+    placement : Placement
+        Of k hypotheses.
+    readings : Readings
+        At the places where it puts them.
+    family : PointFamily
+
+    Returns
+    -------
+    ndarray of float64, shape (k, 7)
+        Support, weakest dot and margin of the reading; the misplacement; the square of the growth
+        of the dots over what is usual, and that of the perspective, both up to a bound; and the
+        share of the dots whose edges are missing.
+    """
+    radius = float(family.template_radii[family.reference])
+    minor = np.maximum(ellipse_axes(reference_frames(placement.homographies, radius))[1], 0.1)
+    always, linear, steep = _GROWTH
+    usual = always + linear / minor + steep / minor**4
+    growth = np.maximum(np.abs(placement.growth) - usual, 0) / _EXCESS
+    perspective = placement.homographies[:, 2, :2] * family.reach / _PERSPECTIVE
+    missing = np.where(minor >= _MEASURABLE, np.maximum(_SHARE - placement.share, 0), 0.0)
+    return np.stack(
+        [
+            readings.support,
+            readings.weakest,
+            readings.margin,
+            placement.misplacement,
+            np.minimum(growth**2, _MOST),
+            np.minimum((perspective**2).sum(axis=1), _MOST),
+            missing,
+        ],
+        axis=1,
+    )
+
+
+def probability(features: np.ndarray) -> np.ndarray:
+    """Return the probabilities that hypotheses are right, shape (k,).
+
+    Parameters
+    ----------
+    features : ndarray of float64, shape (k, 7)
+        As `confidence_features` gives them.
+    """
+    return logistic(features, _OF_TARGET)

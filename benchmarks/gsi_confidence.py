@@ -1,0 +1,145 @@
+"""How far the confidence of point-distributed targets can be trusted, and the weights behind it.
+
+Scenes of GSI's targets under all lights, of all sizes and views, are rendered, also without any
+target, and with targets that lack a decoding dot, which have no right code. Every hypothesis of
+the detector `gsi` is compared with the truth. The table shows the reliability of the weights in
+force, by condition. With --fit, a logistic regression is fitted to the hypotheses and written to
+the file of fitted weights. Seeds from 101 on are for tests, those below for development.
+
+    python -m benchmarks.gsi_confidence [--seeds 101 102]
+    python -m benchmarks.gsi_confidence --fit 1 2 3 4
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from itertools import pairwise, product
+
+import numpy as np
+from rich.console import Console
+from rich.progress import track
+
+from ahf_ros.codes.gsi_library import point_family
+from ahf_ros.detectors import DetectorSettings, create_detector
+from ahf_ros.detectors.gsi.confidence import WEIGHTS, probability
+from ahf_ros.detectors.gsi.detector import find_hypotheses
+from ahf_ros.features.pyramid import image_pyramid
+from ahf_ros.synthetic.patterns import LIGHT_NAMES
+from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
+from ahf_ros.target import DottedTarget
+from benchmarks.confidence import CLASSES, NEAR, logistic_regression
+from benchmarks.weights import write_weights
+
+BASE = SceneSettings(
+    family='gsi', width=1300, height=900, targets=6, dot_radius=5.0, focal_length=6.0
+)
+"""A scene, of which others differ."""
+
+COVERED = 2
+"""Targets of a scene that lack a decoding dot."""
+
+
+def scenes(seed: int) -> Iterator[tuple[str, SceneSettings]]:
+    """Yield the condition and the settings of every scene of a seed."""
+    generator = np.random.default_rng(seed)
+    for light, ambient in product(LIGHT_NAMES[1:], (0.3, 0.12, 0.04)):
+        radius = float(generator.choice([5.0, 6.0, 8.0, 10.0]))
+        polarity = str(generator.choice(['dark', 'bright']))
+        changes = {'dot_radius': radius, 'polarity': polarity, 'seed': seed}
+        yield light, replace(BASE, light=light, ambient=ambient, **changes)
+    for tilt, radius in product((0.0, 45.0, 70.0, 80.0), (2.5, 4.0, 5.0)):
+        polarity = str(generator.choice(['dark', 'bright']))
+        scene = replace(BASE, tilt=tilt, dot_radius=radius, polarity=polarity, targets=12)
+        yield 'even light', replace(scene, seed=seed)
+    for light in ('normal', 'stripe', 'lattice'):
+        clutter = replace(BASE, targets=0, distractors=30, dot_radius=8.0, light=light)
+        yield 'no targets', replace(clutter, seed=seed)
+
+
+def with_covered_dots(scene: Rendering, count: int) -> tuple[np.ndarray, set[int]]:
+    """Return an image in which some targets lack a decoding dot, and their IDs.
+
+    Parameters
+    ----------
+    scene : Rendering
+    count : int
+        Number of these targets, of those that are identified.
+    """
+    image, covered = scene.image.copy(), set()
+    shown = {target.id for target in scene.targets}
+    for target in create_detector(family='gsi')(image):
+        if target.id in shown and len(covered) < count and isinstance(target, DottedTarget):
+            covered.add(target.id)
+            x, y, radius, *_ = target.dots[-len(covered)]
+            half = round(1.6 * radius + 2)
+            rows, columns = (slice(max(round(at) - half, 0), round(at) + half) for at in (y, x))
+            patch = image[rows, columns]
+            patch[...] = np.median(
+                np.concatenate([patch[0], patch[-1], patch[:, 0], patch[:, -1]])
+            )
+    return image, covered
+
+
+def hypotheses(scene: Rendering) -> tuple[np.ndarray, np.ndarray]:
+    """Return the features of all hypotheses, and which are right."""
+    code = point_family()
+    image, covered = with_covered_dots(scene, COVERED)
+    settings = DetectorSettings(family='gsi')
+    found, _ = find_hypotheses(image_pyramid(image, settings.max_radius), settings, code)
+    x, y = (found.homographies[:, :2, 2] / found.homographies[:, 2:, 2]).T
+    right = np.zeros(len(found.words), bool)
+    for target in scene.targets:
+        if target.id not in covered:
+            near = np.hypot(x - target.x, y - target.y) < NEAR
+            right |= near & (found.words == target.code)
+    return found.features, right
+
+
+def gathered(seeds: Iterable[int]) -> tuple[list[str], np.ndarray, np.ndarray]:
+    """Return conditions, features and rightness of the hypotheses of the scenes of some seeds."""
+    wanted = [item for seed in seeds for item in scenes(seed)]
+    conditions, parts = [], []
+    for condition, settings in track(wanted, 'scenes', console=Console(stderr=True)):
+        features, right = hypotheses(render(settings))
+        conditions += [condition] * len(right)
+        parts.append((features, right))
+    features, right = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return conditions, features, right
+
+
+def reliability(seeds: Iterable[int]) -> Iterator[str]:
+    """Yield the lines of the table of confidences, and how often they are right, by condition."""
+    names, features, right = gathered(seeds)
+    of_each = np.array(names)
+    stated = probability(features)
+    yield '| condition | confidence | hypotheses | mean confidence | share right |'
+    yield '|---|---|---|---|---|'
+    for condition in ('all', *dict.fromkeys(names)):
+        here = (of_each == condition) | (condition == 'all')
+        for low, high in pairwise(CLASSES):
+            within = here & (stated >= low) & ((stated < high) | (high == CLASSES[-1]))
+            if within.any():
+                yield (
+                    f'| {condition} | {low} to {high} | {within.sum()} '
+                    f'| {stated[within].mean():.4f} | {right[within].mean():.4f} |'
+                )
+
+
+def main() -> None:
+    """Write weights, or print their reliability as Markdown."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument('--fit', type=int, nargs='+', metavar='SEED', help='fit the weights anew')
+    parser.add_argument('--seeds', type=int, nargs='+', default=[101])
+    options = parser.parse_args()
+    if options.fit:
+        _, features, right = gathered(options.fit)
+        weights = np.round(logistic_regression(features, right), 2)
+        write_weights('gsi_confidence', options.fit, {'weights': weights}, WEIGHTS)
+    else:
+        print('\n'.join(reliability(options.seeds)))
+
+
+if __name__ == '__main__':
+    main()
