@@ -146,8 +146,8 @@ class DetectorSettings:
     )
     min_radius: float = parameter(
         0.0,
-        'Minimum radius of a dot, px; 0: that of the family, 2.5 for rings of dots and 4 for '
-        'others.',
+        'Minimum radius of a dot, px; 0: that of the family, 2 for point-distributed targets, 2.5 '
+        'for rings of dots and 4 for others.',
         minimum=0.0,
         maximum=1e4,
     )
