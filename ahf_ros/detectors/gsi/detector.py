@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
+import cv2
 import numpy as np
 
 from ahf_ros.codes.gsi import PointFamily
@@ -21,7 +22,13 @@ from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.gsi.confidence import confidence_features
 from ahf_ros.detectors.gsi.evidence import find_evidence
 from ahf_ros.detectors.gsi.grouping import find_templates
-from ahf_ros.detectors.gsi.hypotheses import Hypotheses, inside, plausible, resolve
+from ahf_ros.detectors.gsi.hypotheses import (
+    OBVIOUS,
+    Hypotheses,
+    inside,
+    plausible,
+    resolve,
+)
 from ahf_ros.detectors.gsi.reading import read_codes
 from ahf_ros.detectors.gsi.refinement import dot_frames, measure_dots, place_targets
 from ahf_ros.features import frame
@@ -34,6 +41,7 @@ from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, DottedTarget, Target, sorted_targets
 
 _FAMILY = 'gsi'  # whichever data file describes it
+_MARGIN = 0.5  # about the dots of certain targets, dot radii
 _FARTHEST = 1.0  # that the reference point is moved by a refinement, px, or dot radii
 
 
@@ -112,7 +120,7 @@ def find_hypotheses(
 ) -> tuple[Hypotheses, Dots]:
     """Return the groups of dots that may be targets, and all dots outside of certain targets.
 
-    Dots whose outlines are whole cost little. Where they make certain targets, no others are
+    Dots whose outlines are whole cost little. Where they make obvious targets, no others are
     looked for.
 
     Parameters
@@ -125,11 +133,15 @@ def find_hypotheses(
     kind = (*settings.radii, settings.polarities)
     whole = whole_dots(pyramid, *kind)
     first = read_targets(pyramid, whole, code, rivals=False)
-    certain = first.select(resolve(first, code))
-    frames = reference_frames(certain.homographies, code.reach)
-    rest = whole.select(~inside(whole.frames[:, :2, 2], frames))
-    outlines = frame.circle_outlines(frames, np.ones(len(frames)))
-    dots = with_other_dots(pyramid, rest, *kind, explained=outlines)
+    certain = first.select(resolve(first, code, OBVIOUS))
+    which = _dots_of(certain.words, code)
+    places, radii = code.places[which], code.radii[which]
+    rest, explained = np.ones(len(whole.frames), bool), []
+    for frames in dot_frames(certain.homographies, places, (1 + _MARGIN) * radii):
+        rest &= ~inside(whole.frames[:, :2, 2], frames)
+        corners = frame.circle_outlines(frames, np.ones(len(frames))).reshape(-1, 2)
+        explained.append(cv2.convexHull(corners.astype(np.float32))[:, 0])
+    dots = with_other_dots(pyramid, whole.select(rest), *kind, explained=explained)
     return Hypotheses.joined([certain, read_targets(pyramid, dots, code, rivals=True)]), dots
 
 

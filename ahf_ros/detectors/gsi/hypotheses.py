@@ -16,6 +16,9 @@ from ahf_ros.features.homography import reference_frames
 CERTAIN = 0.99
 """Confidence from which a target is reported."""
 
+OBVIOUS = 0.9999
+"""Confidence from which a target is not weighed against others in its place."""
+
 _PLAUSIBLE = 0.75  # support of a hypothesis that is followed up
 _MAXIMUM = 250  # hypotheses that are followed up, those with the most support
 _MISFIT = 0.1  # support that a misfit of 1 of the template costs in the order of these
@@ -83,17 +86,19 @@ def plausible(
     return order[kept]
 
 
-def resolve(hypotheses: Hypotheses, family: PointFamily) -> np.ndarray:
+def resolve(hypotheses: Hypotheses, family: PointFamily, minimum: float = CERTAIN) -> np.ndarray:
     """Return the indices of the certain hypotheses, of each target and each code the best one.
 
     Parameters
     ----------
     hypotheses : Hypotheses
     family : PointFamily
+    minimum : float
+        Of their confidence.
     """
     confidence = hypotheses.confidence
     order = np.argsort(-confidence, kind='stable')
-    order = order[confidence[order] >= CERTAIN]
+    order = order[confidence[order] >= minimum]
     units = reference_frames(hypotheses.homographies[order], family.reach * _SAME)
     words, kept = hypotheses.words[order], []
     free = np.ones(len(order), bool)
