@@ -128,7 +128,7 @@ def _connected(
         )
         mask = cv2.compare(part, level, cv2.CMP_GT)
         if own is not None:
-            mask &= own
+            mask = cv2.bitwise_and(mask, own)
         # The default algorithm of OpenCV 4.5 crashes on large images with this connectivity.
         _, labels, stats, _ = cv2.connectedComponentsWithStatsWithAlgorithm(
             mask, 4, cv2.CV_32S, cv2.CCL_SAUF
@@ -152,9 +152,10 @@ def _parts(
     Each comes with its first row and column, and a mask of what in it is not in another part; the
     image as a whole where that is not much more. A margin is as wide as `_NEAR` reaches.
     """
-    pixels = cv2.findNonZero(cv2.compare(height, above, cv2.CMP_GT))
-    if pixels is None:
+    mask = cv2.threshold(height, above, 255, cv2.THRESH_BINARY)[1]
+    if not mask.any():
         return
+    pixels = cv2.findNonZero(mask)
     tiles = np.zeros([-(-side // _TILE) for side in height.shape], np.uint8)
     x, y = pixels.reshape(-1, 2).T
     tiles[y // _TILE, x // _TILE] = 1
@@ -167,7 +168,7 @@ def _parts(
         column, row, columns, rows, _ = stats[number].tolist()
         own = labels[row : row + rows, column : column + columns] == number
         own = np.kron(own.astype(np.uint8), np.full((_TILE, _TILE), 255, np.uint8))
-        own = cv2.copyMakeBorder(own, *[_REACH] * 4, cv2.BORDER_CONSTANT, value=0)
+        own = np.pad(own, _REACH)
         top, left = row * _TILE - _REACH, column * _TILE - _REACH
         bottom, right = top + own.shape[0], left + own.shape[1]
         own = own[max(-top, 0) :, max(-left, 0) :]
