@@ -6,6 +6,7 @@ covers, glare, other families and clutter, say how much each feature of a readin
 logistic regression on piecewise linear functions, each of which only rises with what speaks for a
 reading, so that it holds where no scene was rendered as well. What the features say is one thing
 where the light is even and another where it has many edges, so that there are two regressions.
+Their probability is multiplied by that of the margin, which is a log likelihood ratio.
 `benchmarks.confidence` fits them and shows how far they can be trusted.
 """
 
@@ -20,7 +21,6 @@ from ahf_ros.detectors.ring.fitted_weights import fitted_weights
 from ahf_ros.features.circle_fit import Fit
 
 _MINIMUM_DEVIATION = 0.001  # of edges, below which it says no more, dot radii
-_MINIMUM_MARGIN = 1.0  # below which a word is no better than another one
 _EVEN = 1.0  # price of covers, beyond the usual, up to which the light is even
 _USUAL_PRICE = 4.0  # of covers, beyond the usual, that halves what is unexplained
 _FULL_SIZE = 12.0  # radius of a dot from which evidence grows no more, px
@@ -135,6 +135,9 @@ def confidence(features: np.ndarray) -> np.ndarray:
         As `confidence_features` gives them.
     """
     weighed = _INTERCEPTS + terms(features) @ np.stack(_WEIGHTS, axis=1)
-    probability = 1 / (1 + np.exp(-np.where(even(features), *weighed.T)))
-    one_word = features[:, MARGIN] > np.log1p(_MINIMUM_MARGIN)
-    return np.where(one_word, probability, 0.0)
+    margin = np.expm1(features[:, MARGIN])
+    return _logistic(np.where(even(features), *weighed.T)) * _logistic(margin)
+
+
+def _logistic(evidence: np.ndarray) -> np.ndarray:
+    return 1 / (1 + np.exp(-evidence))

@@ -14,7 +14,7 @@ from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.circle_fit import Fit
 
-_CERTAIN = 0.91  # confidence from which a word is reported
+_CERTAIN = 0.9  # confidence from which a word is reported
 _LIKELY = 0.5  # confidence from which a word tells where the edges of its band are
 _CLEARLY = 2.0  # times the evidence of another claim to the same ID or dot
 
