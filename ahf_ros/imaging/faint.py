@@ -24,7 +24,8 @@ INK, PAPER = 55.0, 220.0
 
 # All that follows refers to the image at half its size.
 _HALF = TILE // 2  # side of a tile, px
-_EXTREMES = 8  # pixels of a tile that may be darker or brighter than its extremes
+_EXTREMES = 2  # sampled pixels of a tile that may be darker or brighter than its extremes
+_SAMPLED = 4  # every so many pixels of a tile are sampled for its extremes
 _MAXIMUM_RANGE = 0.5  # of ln, where contrast is faint
 _MINIMUM_RANGE = 14.0  # of gray values, in standard deviations of the noise
 _STEPS = 16  # pixels of a tile that have a step, at least
@@ -101,17 +102,18 @@ def measure_tiles(gray: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     half = cv2.copyMakeBorder(
         half, 0, size[1] - height, 0, size[0] - width, borderType=cv2.BORDER_REPLICATE
     )
-    tiles = np.partition(_tiles(half), (_EXTREMES, -1 - _EXTREMES), axis=2)
+    tiles = np.partition(_tiles(half)[..., ::_SAMPLED], (_EXTREMES, -1 - _EXTREMES), axis=2)
     box = np.ones((3, 3), np.uint8)
     low = cv2.erode(tiles[..., _EXTREMES], box)
     high = cv2.dilate(tiles[..., -1 - _EXTREMES], box)
     faint = np.log((high + LOG_OFFSET) / (low + LOG_OFFSET)) < _MAXIMUM_RANGE
     faint &= high - low > _MINIMUM_RANGE * _ROUNDING
     if faint.any():
-        noise, step = _noise(half, faint), _steps(half, faint)
-        contrast = (high - low)[faint]
-        clear = (contrast > _MINIMUM_RANGE * noise) & (step > _CLEAR_STEP * noise)
-        faint[faint] = clear & (step > _MINIMUM_STEP * contrast)
+        noise, contrast = _noise(half, faint), (high - low)[faint]
+        clear = contrast > _MINIMUM_RANGE * noise
+        faint[faint] = clear
+        step, noise, contrast = _steps(half, faint), noise[clear], contrast[clear]
+        faint[faint] = (step > _CLEAR_STEP * noise) & (step > _MINIMUM_STEP * contrast)
     return low, high, faint
 
 
@@ -126,16 +128,16 @@ def _noise(half: np.ndarray, which: np.ndarray) -> np.ndarray:
     """Return the noise of some tiles, from the median of the second differences both ways."""
     second = np.array([1, -2, 1], np.float32)
     sizes = np.abs(cv2.sepFilter2D(half, -1, second, second))
-    return np.hypot(np.median(_tiles(sizes)[which], axis=1) / _MEDIAN, _ROUNDING)
+    return np.hypot(np.median(_tiles(sizes)[..., ::_SAMPLED][which], axis=1) / _MEDIAN, _ROUNDING)
 
 
 def _steps(half: np.ndarray, which: np.ndarray) -> np.ndarray:
     """Return the height that `_STEPS` pixels of some tiles have as a step across two pixels."""
-    first = np.array([[-1, 0, 1]], np.float32)
-    sizes = np.maximum(
-        np.abs(cv2.filter2D(half, -1, first)), np.abs(cv2.filter2D(half, -1, first.T))
-    )
-    return np.partition(_tiles(sizes)[which], -_STEPS, axis=1)[:, -_STEPS]
+    tiles = _tiles(half)[which].reshape(-1, _HALF, _HALF)
+    across = np.abs(tiles[:, 1:-1, 2:] - tiles[:, 1:-1, :-2])
+    down = np.abs(tiles[:, 2:, 1:-1] - tiles[:, :-2, 1:-1])
+    sizes = np.maximum(across, down).reshape(len(tiles), (_HALF - 2) ** 2)
+    return np.partition(sizes, -_STEPS, axis=1)[:, -_STEPS]
 
 
 def _in_groups(faint: np.ndarray) -> np.ndarray:

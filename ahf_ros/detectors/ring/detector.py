@@ -78,13 +78,21 @@ def find_hypotheses(gray: np.ndarray, settings: DetectorSettings) -> Hypotheses:
     settings : DetectorSettings
         What the targets look like.
     """
-    return with_faint(gray, read_image(gray, settings), lambda part: read_image(part, settings))
+    found = read_image(gray, settings)
+    return with_faint(gray, found, lambda part: read_image(part, settings, whole_only=True))
 
 
-def read_image(gray: np.ndarray, settings: DetectorSettings) -> Hypotheses:
+def read_image(
+    gray: np.ndarray, settings: DetectorSettings, *, whole_only: bool = False
+) -> Hypotheses:
     """Return the dots and words that an image shows at its own contrast.
 
-    Parameters are those of `find_hypotheses`.
+    Parameters
+    ----------
+    gray, settings
+        As for `find_hypotheses`.
+    whole_only : bool
+        Whether only dots with a whole outline are looked for.
     """
     families = [family(name) for name in settings.families]
     kind = (*settings.radii, settings.polarities)
@@ -92,6 +100,8 @@ def read_image(gray: np.ndarray, settings: DetectorSettings) -> Hypotheses:
     dots = _fitted(pyramid.gray, whole_dots(pyramid, *kind))
     families = by_clear_dots(pyramid.gray, dots, families)
     whole = read_families(pyramid.gray, dots, families)
+    if whole_only:
+        return whole
     explained = whole.certain | (whole.share >= _WHOLE)
     radii = np.where(whole.certain, whole.reach / frame.ellipse_axes(whole.frames)[1], 1.0)
     outlines = frame.circle_outlines(whole.frames[explained], radii[explained] + _MARGIN)

@@ -54,6 +54,8 @@ def read_bands(
     which : ndarray of int, shape (m,)
         The dot that each is of.
     """
+    if not len(dots.frames):
+        return Hypotheses.unread(dots, family), np.zeros(0, np.intp)
     marks = mark_appearance(gray, dots)
     which, frames = unshifted(dots)
     marks, read, alone = marks.select(which), np.arange(len(which)), frames
