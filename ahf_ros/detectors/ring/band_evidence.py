@@ -26,8 +26,13 @@ from ahf_ros.detectors.ring.evidence import (
 )
 from ahf_ros.features.frame import mean_radii
 
-_CORRELATION = 2.5  # px between independent readings
-_MINIMUM_ALONG, _MINIMUM_ACROSS = 0.08, 0.1  # weight of a reading among many that are alike
+CORRELATION = 2.5
+"""Distance of independent readings, px."""
+
+MINIMUM_ALONG = 0.08
+"""Weight of a reading along the band among many that are alike."""
+
+_MINIMUM_ACROSS = 0.1  # the same, across the band
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,14 +77,14 @@ def band_evidence(
     bright = np.where(dark, samples.ground, np.concatenate([samples.dot, samples.dot]))
     light = light_levels(np.moveaxis(bright, 0, 2), samples.gap, marks)
     along = 2 * np.pi * inner * size / samples.visible.shape[2]
-    weight = np.clip(along / _CORRELATION, _MINIMUM_ALONG, 1)[:, None]
+    weight = np.clip(along / CORRELATION, MINIMUM_ALONG, 1)[:, None]
     steps = [
         weight * visible * step_evidence(*edge, marks, light)
         for edge, visible in zip(samples.edges, samples.visible, strict=True)
     ]
     marked = sum(steps) + weight * samples.visible[0] * level_evidence(samples.band, light)
     across = (outer - inner) * size / len(samples.band)
-    weight = np.clip(across / _CORRELATION, _MINIMUM_ACROSS, 1)[:, None]
+    weight = np.clip(across / CORRELATION, _MINIMUM_ACROSS, 1)[:, None]
     weight = weight * samples.visible.all(axis=0)
     onto, off = (weight * border for border in border_evidence(samples.band, marks, light))
     return BandEvidence(np.stack(steps), marked, onto, off, light.edges)

@@ -15,7 +15,9 @@ import numpy as np
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
-_NOISE = 1.2  # gray values, of 255
+NOISE = 1.2
+"""Usual noise of gray values from 0 to 255."""
+
 _SURROUND_SPREAD = 0.16  # of ln, of steps where there is no edge
 _MARK_SPREAD, _MARK_TAIL = 0.16, 0.35  # of ln, of the step of a mark, and towards more
 _BORDER_SPREAD = 0.2  # of steps along the band, in steps of a mark
@@ -27,8 +29,12 @@ _EDGE_STEP = 0.35  # of ln, of an edge of light
 _MINIMUM_EDGES, _MAXIMUM_EDGES = 0.02, 0.5  # probability of one between neighbouring points
 _MINIMUM_STEP = 0.2  # of ln, of a mark
 _DEEPEST_SHADOW = 0.1  # of the light on the dot, elsewhere on the target
-_LEVEL_BIN = 0.05  # of ln
-_LEVELS = np.arange(np.log(LOG_OFFSET), np.log(255 + LOG_OFFSET) + _LEVEL_BIN, _LEVEL_BIN)
+
+LEVEL_BIN = 0.05
+"""Distance of two levels, of ln."""
+
+LEVELS = np.arange(np.log(LOG_OFFSET), np.log(255 + LOG_OFFSET) + LEVEL_BIN, LEVEL_BIN)
+"""The levels of ln I that densities are of."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +89,7 @@ class LightLevels:
 
     def densities(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the densities of gray values (k, ...) where unmarked and where marked."""
-        bins = _bins(_flat(values))
+        bins = level_bins(_flat(values))
         tables = (self.unmarked, self.marked)
         unmarked, marked = (
             np.take_along_axis(table, bins, axis=1).reshape(values.shape) for table in tables
@@ -105,10 +111,10 @@ def light_levels(bright: np.ndarray, gap: np.ndarray, marks: MarkAppearance) -> 
         Gray values on two circles in the gap.
     marks : MarkAppearance
     """
-    seen = _bins(_flat(bright))
-    levels = np.broadcast_to(np.exp(_LEVELS) - LOG_OFFSET, (len(seen), len(_LEVELS)))
-    moved = _LEVELS - np.abs(marks.step(levels)) - _LEVELS[0]
-    moved = np.clip(np.rint(moved / _LEVEL_BIN).astype(np.intp), 0, len(_LEVELS) - 1)
+    seen = level_bins(_flat(bright))
+    levels = np.broadcast_to(np.exp(LEVELS) - LOG_OFFSET, (len(seen), len(LEVELS)))
+    moved = LEVELS - np.abs(marks.step(levels)) - LEVELS[0]
+    moved = np.clip(np.rint(moved / LEVEL_BIN).astype(np.intp), 0, len(LEVELS) - 1)
     dark, light = _density(np.take_along_axis(moved, seen, axis=1)), _density(seen)
     of_dark_marks = (marks.polarity > 0)[:, None]
     edges = (np.abs(log_ratio(gap[1], gap[0])) > _EDGE_STEP).mean(axis=1)
@@ -128,18 +134,36 @@ def step_evidence(
     of light lies between them, and any level of the light may follow.
     """
     step = log_ratio(values, surround)
-    noise = _NOISE * np.hypot(1 / (values + LOG_OFFSET), 1 / (surround + LOG_OFFSET))
-    unmarked = _normal(step, np.hypot(_SURROUND_SPREAD, noise))
-    expected = marks.step(np.maximum(values, surround))
-    error = (step - expected) * np.sign(expected)
-    spread, tail = np.hypot(_MARK_SPREAD, noise), np.hypot(_MARK_TAIL, noise)
-    width = np.where(error > 0, tail, spread)
-    marked = _normal(error, width) * width / ((spread + tail) / 2)
+    noise = NOISE * np.hypot(1 / (values + LOG_OFFSET), 1 / (surround + LOG_OFFSET))
+    unmarked = normal_density(step, np.hypot(_SURROUND_SPREAD, noise))
+    marked = mark_step_density(step, np.maximum(values, surround), marks, noise)
     edges = light.edges[:, None]
     other_unmarked, other_marked = light.densities(values)
     marked = (1 - edges) * marked + edges * other_marked
     unmarked = (1 - edges) * unmarked + edges * other_unmarked
     return _limited(marked, unmarked)
+
+
+def mark_step_density(
+    step: np.ndarray, bright: np.ndarray, marks: MarkAppearance, noise: np.ndarray
+) -> np.ndarray:
+    """Return the densities of steps of ln I that lead onto a mark.
+
+    Parameters
+    ----------
+    step : ndarray of float, shape (k, ...)
+    bright : ndarray of float, shape (k, ...)
+        Gray values of the bright side.
+    marks : MarkAppearance
+    noise : ndarray of float, shape (k, ...)
+        Of the steps.
+    """
+    expected = marks.step(bright)
+    error = (step - expected) * np.sign(expected)
+    spread, tail = np.hypot(_MARK_SPREAD, noise), np.hypot(_MARK_TAIL, noise)
+    width = np.where(error > 0, tail, spread)
+    density: np.ndarray = normal_density(error, width) * width / ((spread + tail) / 2)
+    return density
 
 
 def level_evidence(values: np.ndarray, light: LightLevels) -> np.ndarray:
@@ -158,19 +182,19 @@ def _flat(values: np.ndarray) -> np.ndarray:
     return values.reshape(len(values), int(np.prod(values.shape[1:])))
 
 
-def _bins(values: np.ndarray) -> np.ndarray:
-    """Return the bins of gray values among `_LEVELS`."""
-    bins = np.rint((np.log(np.maximum(values, 0) + LOG_OFFSET) - _LEVELS[0]) / _LEVEL_BIN)
-    return np.clip(bins.astype(np.intp), 0, len(_LEVELS) - 1)
+def level_bins(values: np.ndarray) -> np.ndarray:
+    """Return the bins of gray values among `LEVELS`."""
+    bins = np.rint((np.log(np.maximum(values, 0) + LOG_OFFSET) - LEVELS[0]) / LEVEL_BIN)
+    return np.clip(bins.astype(np.intp), 0, len(LEVELS) - 1)
 
 
 def _density(bins: np.ndarray) -> np.ndarray:
     """Return the smoothed densities of k sets of bins, shape (k, number of levels)."""
-    size = len(_LEVELS)
+    size = len(LEVELS)
     keys = (bins + size * np.arange(len(bins))[:, None]).ravel()
     counts = np.bincount(keys, minlength=size * len(bins)).reshape(len(bins), size)
     distance = np.arange(size)[:, None] - np.arange(size)
-    kernel = np.exp(-0.5 * (distance * _LEVEL_BIN / _LEVEL_SPREAD) ** 2)
+    kernel = np.exp(-0.5 * (distance * LEVEL_BIN / _LEVEL_SPREAD) ** 2)
     kernel /= _LEVEL_SPREAD * np.sqrt(2 * np.pi)
     return counts / max(bins.shape[1], 1) @ kernel
 
@@ -187,10 +211,11 @@ def border_evidence(
     rise = log_ratio(after, before) / mark
     floor = _FLOOR + _BORDER_FLOOR * light.edges[:, None]
     onto, none, off = (
-        np.log(_normal(rise - height, _BORDER_SPREAD) + floor) for height in (1, 0, -1)
+        np.log(normal_density(rise - height, _BORDER_SPREAD) + floor) for height in (1, 0, -1)
     )
     return (onto - none).sum(axis=0), (off - none).sum(axis=0)
 
 
-def _normal(values: np.ndarray, spread: np.ndarray | float) -> np.ndarray:
+def normal_density(values: np.ndarray, spread: np.ndarray | float) -> np.ndarray:
+    """Return the densities of values under a normal distribution about 0."""
     return np.exp(-0.5 * (values / spread) ** 2) / (spread * np.sqrt(2 * np.pi))

@@ -12,7 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from ahf_ros.detectors.ring.band_samples import BandSamples
-from ahf_ros.detectors.ring.evidence import MarkAppearance, log_ratio
+from ahf_ros.detectors.ring.evidence import (
+    LEVEL_BIN,
+    LEVELS,
+    MarkAppearance,
+    level_bins,
+    log_ratio,
+    normal_density,
+)
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
@@ -24,13 +31,8 @@ _MAXIMUM_SPREAD = 0.12  # of the ground, but for noise
 _DEVIATIONS = 2.0  # usual deviations of the ground, that make up a spread
 _STEP_SPREAD = 1.33  # spreads of levels, that make up that of a step
 _STEP_SPREADS = (0.08, 0.16)
-_BIN = 0.05  # of ln
-_LEVELS = np.arange(np.log(LOG_OFFSET), np.log(255 + LOG_OFFSET) + _BIN, _BIN)
-_DISTANCES = np.arange(len(_LEVELS))[:, None] - np.arange(len(_LEVELS))
-_KERNELS = [
-    np.exp(-0.5 * (_DISTANCES * _BIN / spread) ** 2) / (spread * np.sqrt(2 * np.pi))
-    for spread in _SPREADS
-]
+_DISTANCES = np.arange(len(LEVELS))[:, None] - np.arange(len(LEVELS))
+_KERNELS = [normal_density(_DISTANCES * LEVEL_BIN, spread) for spread in _SPREADS]
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,10 +88,10 @@ def seen_light(
     high_spread = np.maximum(spread, noise / gray)
     low_spread = np.maximum(np.maximum(spread, _MINIMUM_MARK_SPREAD), noise / dark_gray)
 
-    seen = bins(bright)
-    grays = np.broadcast_to(np.exp(_LEVELS) - LOG_OFFSET, (len(seen), len(_LEVELS)))
-    inked = _LEVELS - np.abs(marks.step(grays)) - _LEVELS[0]
-    inked = np.clip(np.rint(inked / _BIN).astype(np.intp), 0, len(_LEVELS) - 1)
+    seen = level_bins(bright)
+    grays = np.broadcast_to(np.exp(LEVELS) - LOG_OFFSET, (len(seen), len(LEVELS)))
+    inked = LEVELS - np.abs(marks.step(grays)) - LEVELS[0]
+    inked = np.clip(np.rint(inked / LEVEL_BIN).astype(np.intp), 0, len(LEVELS) - 1)
     high = _density(seen, weights, high_spread)
     low = _density(np.take_along_axis(inked, seen, axis=1), weights, low_spread)
     return Light(
@@ -99,12 +101,6 @@ def seen_light(
         edges,
         deviation,
     )
-
-
-def bins(values: np.ndarray) -> np.ndarray:
-    """Return the bins of gray values among the levels of `Light`."""
-    levels = (np.log(values + LOG_OFFSET) - _LEVELS[0]) / _BIN
-    return np.clip(np.rint(levels).astype(np.intp), 0, len(_LEVELS) - 1)
 
 
 def _agrees(ground: np.ndarray, inked: np.ndarray, marks: MarkAppearance) -> np.ndarray:
@@ -124,7 +120,7 @@ def _weighted_median(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
 
 def _density(seen: np.ndarray, weights: np.ndarray, spread: np.ndarray) -> np.ndarray:
     """Return the densities of k sets of bins with a spread each, shape (k, number of levels)."""
-    size = len(_LEVELS)
+    size = len(LEVELS)
     keys = (seen + size * np.arange(len(seen))[:, None]).ravel()
     counts = np.bincount(keys, weights.ravel(), size * len(seen)).reshape(len(seen), size)
     counts = counts / np.maximum(weights.sum(axis=1), 1e-9)[:, None]

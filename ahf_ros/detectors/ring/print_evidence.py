@@ -19,18 +19,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from ahf_ros.codes.ring import Family
-from ahf_ros.detectors.ring.band_evidence import BandEvidence
+from ahf_ros.detectors.ring.band_evidence import CORRELATION, MINIMUM_ALONG, BandEvidence
 from ahf_ros.detectors.ring.band_samples import BandSamples
-from ahf_ros.detectors.ring.evidence import MarkAppearance, log_ratio
-from ahf_ros.detectors.ring.light import Light, bins, seen_light
+from ahf_ros.detectors.ring.evidence import (
+    NOISE,
+    MarkAppearance,
+    level_bins,
+    log_ratio,
+    mark_step_density,
+    normal_density,
+)
+from ahf_ros.detectors.ring.light import Light, seen_light
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.frame import mean_radii
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
-_CORRELATION = 2.5  # px between independent readings
-_MINIMUM_ALONG = 0.08  # weight of a reading among many that are alike
-_NOISE = 1.2  # gray values, of 255
-_MARK_SPREAD, _MARK_TAIL = 0.16, 0.35  # of ln, of the step of a mark, and towards more
 _FLOOR = 0.06  # density of what no hypothesis explains
 _GROUND_FLOOR = 0.03  # the same, of gap and margin
 _GROUND_WEIGHT = 0.4  # of a reading of them, many of which are alike
@@ -119,7 +122,7 @@ def print_evidence(
                 for step, first, second in zip(steps, *of_levels, strict=True)
             ]
         )
-    weight = np.clip(along / _CORRELATION, _MINIMUM_ALONG, 1)[:, None] * samples.visible
+    weight = np.clip(along / CORRELATION, MINIMUM_ALONG, 1)[:, None] * samples.visible
     weighted = np.array(halves) * weight[:, None]  # half, bit, k, m
     inked = np.stack(
         [tables.may_be_ink(ground) for ground in (samples.inner_ground, samples.outer_ground)], 1
@@ -146,30 +149,30 @@ class _Tables:
 
     def on_ground(self, values: np.ndarray) -> np.ndarray:
         """Return the evidence of gap or margin for being free."""
-        return np.take_along_axis(self._on_ground, bins(values), axis=1)
+        return np.take_along_axis(self._on_ground, level_bins(values), axis=1)
 
     def in_band(self, values: np.ndarray) -> list[np.ndarray]:
         """Return the evidence of the band for ground and for a mark."""
-        places = bins(values)
+        places = level_bins(values)
         return [np.take_along_axis(table, places, axis=1) for table in self._in_band]
 
     def densities(self, values: np.ndarray) -> list[np.ndarray]:
         """Return the densities of values under the light, on ground and on marks."""
-        places = bins(values)
+        places = level_bins(values)
         return [np.take_along_axis(table, places, axis=1) for table in self._densities]
 
     def may_be_ink(self, values: np.ndarray) -> np.ndarray:
         """Return whether values are those of marks."""
-        return np.take_along_axis(self._inked, bins(values), axis=1)
+        return np.take_along_axis(self._inked, level_bins(values), axis=1)
 
 
 def _noise(gap: np.ndarray, along: np.ndarray) -> np.ndarray:
     """Return the noise of gray values, shape (k,), from readings that are far enough apart."""
-    lags = np.clip(np.ceil(_CORRELATION / along), 1, gap.shape[2] // 4).astype(int)
+    lags = np.clip(np.ceil(CORRELATION / along), 1, gap.shape[2] // 4).astype(int)
     later = (np.arange(gap.shape[2]) + lags[:, None]) % gap.shape[2]
     change = [np.take_along_axis(of, later, axis=1) - of for of in gap]
     usual = np.median(np.abs(np.concatenate(change, axis=1)), axis=1) * 1.4826 / np.sqrt(2)
-    return np.maximum(_NOISE, usual)
+    return np.maximum(NOISE, usual)
 
 
 def _glare(samples: BandSamples) -> np.ndarray:
@@ -194,12 +197,8 @@ def _steps(
     """Return the evidence of steps across an edge of the band for ground and for a mark."""
     step = log_ratio(band, ground)
     noise = noise[:, None] * np.hypot(1 / (band + LOG_OFFSET), 1 / (ground + LOG_OFFSET))
-    flat = _normal(step, np.hypot(light.spread[:, None], noise))
-    expected = marks.step(np.maximum(band, ground))
-    error = (step - expected) * np.sign(expected)
-    spread, tail = np.hypot(_MARK_SPREAD, noise), np.hypot(_MARK_TAIL, noise)
-    width = np.where(error > 0, tail, spread)
-    inked = _normal(error, width) * width / ((spread + tail) / 2)
+    flat = normal_density(step, np.hypot(light.spread[:, None], noise))
+    inked = mark_step_density(step, np.maximum(band, ground), marks, noise)
     edges = light.edges[:, None]
     anything = _PLAIN * flat + (1 - _PLAIN) * _ANY_STEP
     evidence = [
@@ -209,11 +208,7 @@ def _steps(
     dark = np.minimum(ground, band)
     middle = (on_edge - dark) / np.maximum(np.abs(ground - band), 1)
     sure = (1 - _MISPLACED) * (1 - np.maximum(edges - _MINIMUM_EDGES, 0)) ** _EVEN
-    density = sure * _normal(middle - _MIDDLE, _MIDDLE_SPREAD) + (1 - sure) * _ANY_MIDDLE
+    density = sure * normal_density(middle - _MIDDLE, _MIDDLE_SPREAD) + (1 - sure) * _ANY_MIDDLE
     of_place = np.clip(np.log(density / _ANY_MIDDLE), *_MIDDLE_RANGE)
     evidence[1] += np.where(np.abs(step) > _MIDDLE_STEP, of_place, 0)
     return evidence
-
-
-def _normal(values: np.ndarray, spread: np.ndarray | float) -> np.ndarray:
-    return np.exp(-0.5 * (values / spread) ** 2) / (spread * np.sqrt(2 * np.pi))
