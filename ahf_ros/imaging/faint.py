@@ -24,8 +24,8 @@ INK, PAPER = 55.0, 220.0
 
 # All that follows refers to the image at half its size.
 _HALF = TILE // 2  # side of a tile, px
-_EXTREMES = 2  # sampled pixels of a tile that may be darker or brighter than its extremes
-_SAMPLED = 4  # every so many pixels of a tile are sampled for its extremes
+_EXTREMES = 2  # columns of a tile that may hold darker or brighter pixels than its extremes
+_SAMPLED = 4  # every so many columns of a tile are sampled for its noise
 _MAXIMUM_RANGE = 0.5  # of ln, where contrast is faint
 _MINIMUM_RANGE = 14.0  # of gray values, in standard deviations of the noise
 _STEPS = 16  # pixels of a tile that have a step, at least
@@ -93,51 +93,68 @@ def measure_tiles(gray: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     faint : ndarray of bool, shape (rows, columns)
         Whether the range is small, but the tile has edges of such a height, clear of noise.
     """
-    rows, columns = (-(-side // TILE) for side in gray.shape)
-    size = (columns * _HALF, rows * _HALF)
-    height, width = (max(side // 2, 1) for side in gray.shape)
-    half = cv2.resize(
-        gray.astype(np.float32, copy=False), (width, height), interpolation=cv2.INTER_AREA
-    )
-    half = cv2.copyMakeBorder(
-        half, 0, size[1] - height, 0, size[0] - width, borderType=cv2.BORDER_REPLICATE
-    )
-    tiles = np.partition(_tiles(half)[..., ::_SAMPLED], (_EXTREMES, -1 - _EXTREMES), axis=2)
-    box = np.ones((3, 3), np.uint8)
-    low = cv2.erode(tiles[..., _EXTREMES], box)
-    high = cv2.dilate(tiles[..., -1 - _EXTREMES], box)
+    half = _half(gray)
+    low, high = _extremes(half)
     faint = np.log((high + LOG_OFFSET) / (low + LOG_OFFSET)) < _MAXIMUM_RANGE
     faint &= high - low > _MINIMUM_RANGE * _ROUNDING
-    if faint.any():
-        noise, contrast = _noise(half, faint), (high - low)[faint]
-        clear = contrast > _MINIMUM_RANGE * noise
-        faint[faint] = clear
-        step, noise, contrast = _steps(half, faint), noise[clear], contrast[clear]
-        faint[faint] = (step > _CLEAR_STEP * noise) & (step > _MINIMUM_STEP * contrast)
+    for row in np.flatnonzero(faint.any(axis=1)):
+        tiles = half[row * _HALF : (row + 1) * _HALF]
+        faint[row] &= _has_clear_edges(tiles, high[row] - low[row], faint[row])
     return low, high, faint
 
 
-def _tiles(half: np.ndarray) -> np.ndarray:
-    """Return the pixels by tile, shape (rows, columns, pixels)."""
-    rows, columns = (side // _HALF for side in half.shape)
-    split = half.reshape(rows, _HALF, columns, _HALF).swapaxes(1, 2)
-    return split.reshape(rows, columns, _HALF * _HALF)
+def _half(gray: np.ndarray) -> np.ndarray:
+    """Return an image at half its size, in whole tiles, float32."""
+    rows, columns = (-(-side // TILE) for side in gray.shape)
+    height, width = (max(side // 2, 1) for side in gray.shape)
+    half = np.empty((height, width), np.float32)
+    for top in range(0, height, _HALF):  # what is converted stays in the cache of the processor
+        part = half[top : top + _HALF]
+        values = gray[2 * top : 2 * (top + len(part))].astype(np.float32, copy=False)
+        cv2.resize(values, part.shape[::-1], dst=part, interpolation=cv2.INTER_AREA)
+    below, beside = rows * _HALF - height, columns * _HALF - width
+    return cv2.copyMakeBorder(half, 0, below, 0, beside, borderType=cv2.BORDER_REFLECT)
 
 
-def _noise(half: np.ndarray, which: np.ndarray) -> np.ndarray:
-    """Return the noise of some tiles, from the median of the second differences both ways."""
-    second = np.array([1, -2, 1], np.float32)
-    sizes = np.abs(cv2.sepFilter2D(half, -1, second, second))
-    return np.hypot(np.median(_tiles(sizes)[..., ::_SAMPLED][which], axis=1) / _MEDIAN, _ROUNDING)
+def _extremes(half: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the extremes of tiles and their neighbours, a few columns of each left out."""
+    split = half.reshape(len(half) // _HALF, _HALF, half.shape[1])
+    box, last = np.ones((3, 3), np.uint8), -1 - _EXTREMES
+    of_columns = (split.min(axis=1), split.max(axis=1))
+    darkest, brightest = (of.reshape(len(split), -1, _HALF) for of in of_columns)
+    low = np.partition(darkest, _EXTREMES, axis=2)[..., _EXTREMES]
+    high = np.partition(brightest, last, axis=2)[..., last]
+    return cv2.erode(low, box), cv2.dilate(high, box)
 
 
-def _steps(half: np.ndarray, which: np.ndarray) -> np.ndarray:
-    """Return the height that `_STEPS` pixels of some tiles have as a step across two pixels."""
-    tiles = _tiles(half)[which].reshape(-1, _HALF, _HALF)
-    across = np.abs(tiles[:, 1:-1, 2:] - tiles[:, 1:-1, :-2])
-    down = np.abs(tiles[:, 2:, 1:-1] - tiles[:, :-2, 1:-1])
-    sizes = np.maximum(across, down).reshape(len(tiles), (_HALF - 2) ** 2)
-    return np.partition(sizes, -_STEPS, axis=1)[:, -_STEPS]
+def _has_clear_edges(row: np.ndarray, contrast: np.ndarray, which: np.ndarray) -> np.ndarray:
+    """Return the tiles of a row whose contrast has edges and is clear of noise, among some."""
+    sizes = np.zeros_like(row)
+    across = cv2.absdiff(row[1:-1, 2:], row[1:-1, :-2])
+    cv2.max(across, cv2.absdiff(row[2:, 1:-1], row[:-2, 1:-1]), dst=sizes[1:-1, 1:-1])
+    which = which & _many_higher(sizes, _MINIMUM_STEP * contrast)
+    if which.any():
+        noise = np.full(len(which), np.inf)
+        noise[which] = _noise(row.reshape(_HALF, len(which), _HALF)[:, which])
+        which &= contrast > _MINIMUM_RANGE * noise
+        which &= _many_higher(sizes, _CLEAR_STEP * noise)
+    return which
+
+
+def _many_higher(sizes: np.ndarray, heights: np.ndarray) -> np.ndarray:
+    """Return the tiles of a row that have `_STEPS` steps of more than a height each."""
+    higher = sizes > np.repeat(heights.astype(np.float32), _HALF)
+    columns = np.add.reduce(higher, axis=0, dtype=np.uint8)
+    enough: np.ndarray = columns.reshape(len(heights), _HALF).sum(axis=1) >= _STEPS
+    return enough
+
+
+def _noise(tiles: np.ndarray) -> np.ndarray:
+    """Return the noise of tiles (height, k, width), from second differences both ways."""
+    down = tiles[:-2] - 2 * tiles[1:-1] + tiles[2:]
+    left, middle, right = (down[..., shift : _HALF - 2 + shift : _SAMPLED] for shift in range(3))
+    sizes = np.abs(left - 2 * middle + right)
+    return np.hypot(np.median(sizes, axis=(0, 2)) / _MEDIAN, _ROUNDING)
 
 
 def _in_groups(faint: np.ndarray) -> np.ndarray:
