@@ -14,6 +14,7 @@ from ahf_ros.detectors import (
     Detector,
     DetectorSettings,
     Drafter,
+    Expecting,
     Refiner,
     check_expected_ids,
     create_detector,
@@ -126,8 +127,10 @@ def create_identifier(
         values, detector = values | {'detector': detector}, None
     settings = updated(settings or IdentificationSettings(), values)
     used = detector or create_detector(settings.detector, settings.detection)
-    if isinstance(used, Detector) and settings.adaptive.listed:
-        check_expected_ids(settings.adaptive.listed, used.name, settings.detection)
+    listed = settings.adaptive.listed
+    if isinstance(used, Detector) and listed:
+        check_expected_ids(listed, used.name, settings.detection)
+        used = used.expecting(listed) if isinstance(used, Expecting) else used
     estimate = None
     if settings.estimate_expected:
         _check_family(used, settings.detection)

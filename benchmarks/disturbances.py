@@ -24,10 +24,10 @@ import numpy as np
 from rich.console import Console
 from rich.progress import track
 
-from ahf_ros.codes.families import AUTO
+from ahf_ros.codes.families import AUTO, KINDS
 from ahf_ros.codes.ring import FAMILY_NAMES, family
 from ahf_ros.detectors import DetectorSettings, create_detector
-from ahf_ros.detectors.contract import Detector
+from ahf_ros.detectors.contract import Detector, Expecting
 from ahf_ros.evaluation import FALSE, RIGHT, WRONG, judge
 from ahf_ros.interchange.image_files import read_image
 from ahf_ros.interchange.truth_files import read_truth
@@ -37,9 +37,19 @@ from benchmarks.exposure import Exposure
 from benchmarks.identification import PHOTOS
 from benchmarks.lookalikes import LOOKALIKES
 from benchmarks.sheets import COLUMNS, ROWS, mark_sheet
+from benchmarks.traceless import far_apart
 
 LOOKALIKE_COUNT = 300
 """Marks of each kind that are no targets."""
+
+TARGETS = (*FAMILY_NAMES, *KINDS['aruco'], *KINDS['apriltag'])
+"""Families that can be disturbed; families, look-alikes and expected IDs are of rings."""
+
+COVERED_SECTORS = 3
+"""Sectors that may be covered of targets whose IDs are chosen far apart."""
+
+COVERED_ROWS = ('over', 'paper', 'finger', 'spot', 'highlight')
+"""Parts of the names of rows whose targets are covered."""
 
 _NO_ID = 2**31 - 1  # of any family
 
@@ -125,10 +135,25 @@ def disturbance_table(options: argparse.Namespace) -> dict[str, dict[str, Count]
     return table
 
 
+def expected_table(options: argparse.Namespace) -> dict[str, dict[str, Count]]:
+    """Return the reports of covered targets whose IDs are a known set, chosen far apart."""
+    table: dict[str, dict[str, Count]] = {}
+    for name in options.families:
+        ids = far_apart(family(name), COVERED_SECTORS, options.seed)
+        detect = detector(options.detector, name)
+        if isinstance(detect, Expecting):
+            detect = detect.expecting(frozenset(ids))
+        targets = Targets(name, options.count, options.seed, options.bright, ids)
+        for row, scenes in _shown(targets.rows(), name):
+            if any(part in row for part in options.rows or COVERED_ROWS):
+                table.setdefault(row, {})[f'{name}, {len(ids)} IDs'] = counted(detect, scenes)
+    return table
+
+
 def family_table(options: argparse.Namespace) -> dict[str, dict[str, Count]]:
     """Return the reports by family of the targets and family, or all, that they are read as."""
     table: dict[str, dict[str, Count]] = {}
-    read_as = (*FAMILY_NAMES, *([AUTO] if options.detector == 'ring' else []))
+    read_as = (*FAMILY_NAMES, *([AUTO] if options.detector == AUTO else []))
     for shown in _shown(FAMILY_NAMES, 'families'):
         sheets = Targets(shown, options.count, options.seed, options.bright).sheets()
         scenes = [(sheet.photograph(Exposure()), sheet.truth) for sheet in sheets]
@@ -192,6 +217,7 @@ def _shown(items: Any, what: str) -> Iterator[Any]:
 
 TABLES: dict[str, Callable[[argparse.Namespace], dict[str, dict[str, Count]]]] = {
     'disturbances': disturbance_table,
+    'expected': expected_table,
     'families': family_table,
     'look-alikes': lookalike_table,
 }
@@ -213,9 +239,9 @@ def parser() -> argparse.ArgumentParser:
         description=__doc__.split('\n\n')[0],
         formatter_class=argparse.ArgumentDefaultsHelpFormatter,
     )
-    made.add_argument('--detector', choices=('ring', 'traditional'), default='ring')
+    made.add_argument('--detector', choices=('auto', 'traditional'), default='auto')
     made.add_argument('--tables', nargs='+', choices=TABLES, default=list(TABLES))
-    made.add_argument('--families', nargs='+', choices=FAMILY_NAMES, default=FAMILY_NAMES)
+    made.add_argument('--families', nargs='+', choices=TARGETS, default=FAMILY_NAMES)
     made.add_argument('--rows', nargs='+', default=[], help='rows with one of these in their name')
     made.add_argument('--count', type=int, default=216, help='targets of a row')
     made.add_argument('--seed', type=int, default=101, help='of the first sheet')

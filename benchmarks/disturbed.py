@@ -100,18 +100,21 @@ class Targets:
         Of the first sheet.
     bright : bool
         Whether they are bright on dark.
+    among : tuple of int
+        Their IDs; any of the family where it is empty.
     """
 
     name: str
     count: int
     seed: int
     bright: bool = False
+    among: tuple[int, ...] = ()
 
     def sheets(self) -> list[Sheet]:
         """Return whole sheets."""
         return [
             target_sheet(self.name, numbers, self.seed + index, bright=self.bright)
-            for index, numbers in enumerate(random_numbers(self.name, self.count, self.seed))
+            for index, numbers in enumerate(self._numbers())
         ]
 
     def rows(self) -> Iterator[tuple[str, Iterator[Scene]]]:
@@ -126,6 +129,9 @@ class Targets:
         for distance in (3.2, 2.6):
             yield f'border of the image {distance} dot radii away', self._cut(distance)
 
+    def _numbers(self) -> list[np.ndarray]:
+        return random_numbers(self.name, self.count, self.seed, self.among)
+
     def _exposed(self, sheets: list[Sheet], exposure: Exposure) -> Iterator[Scene]:
         for sheet in sheets:
             yield sheet.photograph(exposure), sheet.truth
@@ -138,7 +144,7 @@ class Targets:
 
     def _cut(self, distance: float) -> Iterator[Scene]:
         """Yield rows of targets that each side of an image cuts at a distance from the centres."""
-        numbers = np.concatenate(random_numbers(self.name, self.count, self.seed))
+        numbers = np.concatenate(self._numbers())
         for index, start in enumerate(range(0, len(numbers), COLUMNS)):
             row = target_sheet(
                 self.name,

@@ -7,7 +7,7 @@ pixels and blurred alike by the lens. Glare is added before the sensor saturates
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import cv2
@@ -191,9 +191,16 @@ def mark_sheet(
     return _drawn_sheet('', drawn, seed, radius, COLUMNS, 0.1, False)
 
 
-def random_numbers(name: str, count: int, seed: int) -> list[np.ndarray]:
-    """Return the IDs of as many sheets as `count` targets fill; none twice on one sheet."""
-    if name in FAMILY_NAMES:
+def random_numbers(
+    name: str, count: int, seed: int, among: Sequence[int] = ()
+) -> list[np.ndarray]:
+    """Return the IDs of as many sheets as `count` targets fill; none twice on one sheet.
+
+    They are some of `among`, of all where it is empty.
+    """
+    if among:
+        every = np.array(among)
+    elif name in FAMILY_NAMES:
         every = np.arange(1, family(name).words.size + 1)
     else:
         every = np.arange(len(dictionary(name).bytesList))

@@ -15,6 +15,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ahf_ros.codes.cyclic import smallest_rotation
 from ahf_ros.codes.ring import FAMILY_NAMES, Family, canonical, family
 from benchmarks import occluders
 from benchmarks.exposure import Cell, Occluder
@@ -77,6 +78,33 @@ def shares(code: Family, cover: Occluder, count: int, seed: int) -> tuple[float,
             left = int(word & ~np.sum((share >= 1 - _FREE) << np.arange(code.bits)))
             alike += code.number(left) is not None and not _same(word, left, code)
     return alike / count, untouched / count
+
+
+def far_apart(code: Family, sectors: int, seed: int) -> tuple[int, ...]:
+    """Return IDs of which no two can look alike, up to a number of sectors of each covered.
+
+    Parameters
+    ----------
+    code : Family
+    sectors : int
+        Largest number of neighbouring sectors that are covered.
+    seed : int
+        Of the order in which IDs are tried.
+    """
+    windows = [
+        sum(1 << (start + step) % code.bits for step in range(count))
+        for count in range(sectors + 1)
+        for start in range(code.bits)
+    ]
+    seen: set[int] = set()
+    chosen = []
+    for index in np.random.default_rng([seed, 8]).permutation(len(code.words)).tolist():
+        left = code.words[index] & ~np.array(windows)
+        looks = set(smallest_rotation(left, code.bits).tolist())
+        if not looks & seen:
+            chosen.append(index + 1)
+            seen |= looks
+    return tuple(sorted(chosen))
 
 
 def _same(word: int, other: int, code: Family) -> bool:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ahf_ros.codes.families import FAMILY_NAMES, KINDS, check_numbers, families_in
-from ahf_ros.detectors.contract import Detector, DetectorSettings, Drafter, Refiner
+from ahf_ros.detectors.contract import Detector, DetectorSettings, Drafter, Expecting, Refiner
 from ahf_ros.detectors.dots.detector import DotsDetector
 from ahf_ros.detectors.dots.published import PublishedDotsDetector
 from ahf_ros.detectors.external.command import CommandDetector
@@ -38,6 +38,7 @@ __all__ = [
     'Detector',
     'DetectorSettings',
     'Drafter',
+    'Expecting',
     'Refiner',
     'check_expected_ids',
     'create_detector',

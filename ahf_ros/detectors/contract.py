@@ -103,6 +103,21 @@ class Drafter(Protocol):
         ...
 
 
+@runtime_checkable
+class Expecting(Protocol):
+    """A detector that reads doubtful targets better if it knows which IDs are likely."""
+
+    def expecting(self, ids: frozenset[int]) -> Detector:
+        """Return the same detector for images that show these IDs, and hardly any others.
+
+        Parameters
+        ----------
+        ids : frozenset of int
+            Others are reported where nothing speaks for one of these.
+        """
+        ...
+
+
 @dataclass(frozen=True, slots=True)
 class DetectorSettings:
     """What the targets in the image look like.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -15,10 +15,15 @@ COMPETITORS = 24
 """Number of words of each band that are returned, more than there are rotations of one."""
 
 _UNCERTAIN = 10  # sectors whose bits are varied where not all words compete
+_UNEXPECTED = 30.0  # evidence against words that are not expected, more than for a cover
 
 
 def best_words(
-    sectors: np.ndarray, onto: np.ndarray, off: np.ndarray, family: Family
+    sectors: np.ndarray,
+    onto: np.ndarray,
+    off: np.ndarray,
+    family: Family,
+    expected: frozenset[int] = frozenset(),
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the valid words with the most evidence.
 
@@ -35,6 +40,8 @@ def best_words(
         Evidence for zero followed by one, and for one followed by zero, at the border after each
         sector, over equal bits.
     family : Family
+    expected : frozenset of int
+        As for `prior`.
 
     Returns
     -------
@@ -43,7 +50,7 @@ def best_words(
     phases : ndarray of int, shape (k, COMPETITORS)
         The best phase of each.
     scores : ndarray of float32, shape (k, COMPETITORS)
-        Evidence for each, over a word without ones.
+        Evidence for each, over a word without ones, with the prior.
     """
     # A border between the bits a and b gives onto (1 - a) b + off a (1 - b).
     single = sectors + off + np.roll(onto, 1, axis=2)
@@ -55,9 +62,11 @@ def best_words(
     hopeful = np.maximum(sectors, 0).sum(axis=2).max(axis=1) > _MINIMUM_EVIDENCE
     for index in np.flatnonzero(hopeful):
         competing, features = (
-            _all_rotations(family) if everything else _near_rotations(single[index], family)
+            _all_rotations(family)
+            if everything
+            else _near_rotations(single[index], family, expected)
         )
-        of_phases = evidence[index] @ features
+        of_phases = evidence[index] @ features + prior(competing, family, expected)
         of_word = of_phases.max(axis=0)
         # Where fewer words compete, the last ones are repeated.
         best = np.argpartition(of_word, -min(COMPETITORS, len(of_word)))[-COMPETITORS:]
@@ -65,6 +74,20 @@ def best_words(
         words[index], scores[index] = competing[best], of_word[best]
         phases[index] = of_phases[:, best].argmax(axis=0)
     return words, phases, scores
+
+
+def prior(words: np.ndarray, family: Family, expected: frozenset[int]) -> np.ndarray:
+    """Return the evidence for words before they are read, float32, of their shape.
+
+    Parameters
+    ----------
+    words : ndarray of int64
+        In any rotation.
+    family : Family
+    expected : frozenset of int
+        IDs of the words that are likely; all are alike where it is empty.
+    """
+    return _prior_table(family, expected)[words]
 
 
 def margins(words: np.ndarray, scores: np.ndarray, best: np.ndarray, family: Family) -> np.ndarray:
@@ -90,15 +113,37 @@ def _all_rotations(family: Family) -> tuple[np.ndarray, np.ndarray]:
     return _features(np.flatnonzero(_number_table(family)), family.bits)
 
 
-def _near_rotations(single: np.ndarray, family: Family) -> tuple[np.ndarray, np.ndarray]:
-    """Return the features of the words near to what the sectors say at any of the phases."""
+def _near_rotations(
+    single: np.ndarray, family: Family, expected: frozenset[int]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the features of the words near to what the sectors say at any of the phases.
+
+    Those that are expected compete as well.
+    """
     uncertain = np.argsort(np.abs(single), axis=1)[:, :_UNCERTAIN]
     certain = (single > 0) @ (1 << np.arange(family.bits)) & ~(1 << uncertain).sum(axis=1)
     choices = np.arange(1 << _UNCERTAIN)[:, None] >> np.arange(_UNCERTAIN) & 1
     words = np.unique(certain[:, None] + (1 << uncertain) @ choices.T)
     valid = words[_number_table(family)[words] > 0]
     # At least two words have to compete.
-    return _features(np.union1d(valid, family.words[:2]), family.bits)
+    words = np.concatenate([valid, family.words[:2], _rotations(family, expected)])
+    return _features(np.unique(words), family.bits)
+
+
+@lru_cache(maxsize=8)
+def _rotations(family: Family, numbers: frozenset[int]) -> np.ndarray:
+    """Return all rotations of the words with some IDs."""
+    return np.flatnonzero(np.isin(_number_table(family), list(numbers)))
+
+
+@lru_cache(maxsize=8)
+def _prior_table(family: Family, expected: frozenset[int]) -> np.ndarray:
+    """Return the evidence for all words of n bits before they are read."""
+    table = np.zeros(1 << family.bits, np.float32)
+    if expected:
+        table -= _UNEXPECTED
+        table[_rotations(family, expected)] = 0
+    return table
 
 
 @cache

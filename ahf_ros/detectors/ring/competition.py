@@ -74,7 +74,12 @@ def _by_words(
     return [ordered[index] for index in np.argsort(-won, kind='stable')], bool(won.any())
 
 
-def read_families(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> Hypotheses:
+def read_families(
+    gray: np.ndarray,
+    dots: Fit,
+    families: Sequence[Family],
+    expected: frozenset[int] = frozenset(),
+) -> Hypotheses:
     """Read the bands about dots as words of several families.
 
     Parameters
@@ -85,6 +90,8 @@ def read_families(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> Hy
         Of k dots.
     families : sequence of Family
         The first one reads all dots, the others those that are not certain yet.
+    expected : frozenset of int
+        IDs that are likely to be there; all are alike where it is empty.
 
     Returns
     -------
@@ -92,7 +99,7 @@ def read_families(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> Hy
         At least one of each dot.
     """
     first, *others = families
-    found = _read(gray, dots, first)
+    found = _read(gray, dots, first, expected)
     if not others:
         return found
     dots = dots.select(~_settled(dots, found))
@@ -105,17 +112,17 @@ def read_families(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> Hy
         for some in (best_first[:_READ], best_first[_READ:]):
             if not len(some):
                 break
-            read = _read(gray, dots.select(some), code)
+            read = _read(gray, dots.select(some), code, expected)
             parts.append(read.select(read.words > 0))
             if not read.certain.any():
                 break
     return _contested(Hypotheses.joined(parts))
 
 
-def _read(gray: np.ndarray, dots: Fit, code: Family) -> Hypotheses:
+def _read(gray: np.ndarray, dots: Fit, code: Family, expected: frozenset[int]) -> Hypotheses:
     parts = []
     for start in range(0, max(len(dots.frames), 1), PART):
-        read, _ = read_bands(gray, dots.select(slice(start, start + PART)), code)
+        read, _ = read_bands(gray, dots.select(slice(start, start + PART)), code, expected)
         parts.append(read)
     return Hypotheses.joined(parts)
 

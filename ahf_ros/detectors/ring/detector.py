@@ -8,7 +8,7 @@ together to a projective frame, whose origin is the image of the target's physic
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -43,9 +43,12 @@ class RingDetector:
     Attributes
     ----------
     settings : DetectorSettings
+    expected : frozenset of int
+        IDs that are likely to be there; all are alike where it is empty.
     """
 
     settings: DetectorSettings = field(default_factory=DetectorSettings)
+    expected: frozenset[int] = frozenset()
 
     @property
     def name(self) -> str:
@@ -60,15 +63,21 @@ class RingDetector:
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image; see `Detector`."""
         check_image(image)
-        return report(find_hypotheses(as_gray(image), self.settings), self.settings)
+        return report(find_hypotheses(as_gray(image), self.settings, self.expected), self.settings)
 
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
         """Return targets with their centres in an image; see `refine_centres`."""
         code = family(self.settings.families[0])
-        return refine_centres(image, targets, code, self.settings.polarities)
+        return refine_centres(image, targets, code, self.settings.polarities, self.expected)
+
+    def expecting(self, ids: frozenset[int]) -> RingDetector:
+        """Return a detector that knows which IDs are likely; see `Expecting`."""
+        return replace(self, expected=ids)
 
 
-def find_hypotheses(gray: np.ndarray, settings: DetectorSettings) -> Hypotheses:
+def find_hypotheses(
+    gray: np.ndarray, settings: DetectorSettings, expected: frozenset[int] = frozenset()
+) -> Hypotheses:
     """Return all dots of an image and the words that their bands may show, before any decision.
 
     Parameters
@@ -77,19 +86,27 @@ def find_hypotheses(gray: np.ndarray, settings: DetectorSettings) -> Hypotheses:
         Gray values from 0 to 255.
     settings : DetectorSettings
         What the targets look like.
+    expected : frozenset of int
+        IDs that are likely to be there; all are alike where it is empty.
     """
-    found = read_image(gray, settings)
-    return with_faint(gray, found, lambda part: read_image(part, settings, whole_only=True))
+    found = read_image(gray, settings, expected)
+    return with_faint(
+        gray, found, lambda part: read_image(part, settings, expected, whole_only=True)
+    )
 
 
 def read_image(
-    gray: np.ndarray, settings: DetectorSettings, *, whole_only: bool = False
+    gray: np.ndarray,
+    settings: DetectorSettings,
+    expected: frozenset[int] = frozenset(),
+    *,
+    whole_only: bool = False,
 ) -> Hypotheses:
     """Return the dots and words that an image shows at its own contrast.
 
     Parameters
     ----------
-    gray, settings
+    gray, settings, expected
         As for `find_hypotheses`.
     whole_only : bool
         Whether only dots with a whole outline are looked for.
@@ -99,7 +116,7 @@ def read_image(
     pyramid = image_pyramid(gray, settings.max_radius)
     dots = _fitted(pyramid.gray, whole_dots(pyramid, *kind))
     families = by_clear_dots(pyramid.gray, dots, families)
-    whole = read_families(pyramid.gray, dots, families)
+    whole = read_families(pyramid.gray, dots, families, expected)
     if whole_only:
         return whole
     explained = whole.certain | (whole.share >= _WHOLE)
@@ -108,7 +125,7 @@ def read_image(
     dots = _fitted(pyramid.gray, voted_dots(pyramid, *kind, explained=outlines))
     if not whole.certain.any():
         families = by_clear_dots(pyramid.gray, dots, families)
-    voted = read_families(pyramid.gray, dots, families)
+    voted = read_families(pyramid.gray, dots, families, expected)
     return Hypotheses.joined([whole, voted])
 
 

@@ -25,6 +25,7 @@ from ahf_ros.imaging.logarithm import LOG_OFFSET
 
 _AGREEMENT = 0.35  # of the step of a mark, between it and a step that confirms the light
 _MINIMUM_STEP = 0.5  # of ln, that this is a share of
+_UNUSUAL, _MINIMUM_UNUSUAL = 4.0, 0.08  # times the usual deviation of steps, and of ln
 _SPREADS = np.array([0.05, 0.065, 0.08, 0.1, 0.12, 0.16, 0.22, 0.3, 0.42])  # of levels of ln I
 _MINIMUM_MARK_SPREAD = 0.1  # of marks
 _MAXIMUM_SPREAD = 0.12  # of the ground, but for noise
@@ -76,6 +77,7 @@ def seen_light(
     dark = (marks.polarity > 0)[:, None]
     sides = [(samples.gap[0], samples.dot[1]), *samples.edges]
     agree = [_agrees(ground, inked, marks) for ground, inked in sides]
+    agree[0] &= _of_one_light(*sides[0])
     agree[1:] = [agree[1] & agree[2]] * 2
     bright = np.concatenate([np.where(dark, *side) for side in sides], axis=1)
     weights = np.concatenate(agree, axis=1).astype(np.float64)
@@ -108,6 +110,14 @@ def _agrees(ground: np.ndarray, inked: np.ndarray, marks: MarkAppearance) -> np.
     expected = marks.step(np.maximum(ground, inked))
     allowed = _AGREEMENT * np.maximum(np.abs(expected), _MINIMUM_STEP)
     return np.abs(log_ratio(inked, ground) - expected) < allowed
+
+
+def _of_one_light(ground: np.ndarray, inked: np.ndarray) -> np.ndarray:
+    """Return whether steps from ground to ink are as usual, so that nothing covers the ground."""
+    step = log_ratio(inked, ground)
+    off = np.abs(step - np.median(step, axis=1, keepdims=True))
+    usual = 1.4826 * np.median(off, axis=1, keepdims=True)
+    return off < np.maximum(_UNUSUAL * usual, _MINIMUM_UNUSUAL)
 
 
 def _weighted_median(values: np.ndarray, weights: np.ndarray) -> np.ndarray:

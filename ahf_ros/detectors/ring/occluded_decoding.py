@@ -14,7 +14,7 @@ import numpy as np
 from ahf_ros.codes.ring import Family, canonical
 from ahf_ros.detectors.ring.band_evidence import BandEvidence
 from ahf_ros.detectors.ring.band_samples import BandSamples
-from ahf_ros.detectors.ring.codewords import best_words, margins
+from ahf_ros.detectors.ring.codewords import best_words, margins, prior
 from ahf_ros.detectors.ring.decoding import (
     MINIMUM_EXPLAINED,
     Readings,
@@ -38,6 +38,7 @@ from ahf_ros.features.array_record import ArrayRecord
 
 _MAXIMUM_MARGIN = 13.0  # what looks like the ground over two sectors makes any word another one
 _CLEAR_MARGIN = 30.0  # where nothing is hidden, of words that no hypothesis can defeat
+_DRAW = 5.0  # lead of a word that is not expected, which is as good as none
 _CLEAR = 2.0  # evidence for any states over the word's own, of such words
 
 
@@ -59,6 +60,7 @@ def decode_occluded(
     marks: MarkAppearance,
     frames: np.ndarray,
     family: Family,
+    expected: frozenset[int] = frozenset(),
 ) -> Readings:
     """Return the words with the most evidence, whatever hides a part of the band.
 
@@ -70,6 +72,8 @@ def decode_occluded(
         What `decode` read.
     frames : ndarray of float64, shape (k, 3, 3)
         Right to a tenth of a dot radius at the band.
+    expected : frozenset of int
+        IDs that are likely to be there; all are alike where it is empty.
     """
     of = hidden_evidence(print_evidence(samples, evidence, marks, frames, family))
     count = of.onto.shape[1]
@@ -84,8 +88,9 @@ def decode_occluded(
         np.zeros(bits.shape, bool),
     )
     clear = (readings.words > 0) & (readings.margin > _CLEAR_MARGIN) & (better < _CLEAR)
+    clear &= prior(readings.words, family, expected) == 0
     others = np.flatnonzero(~clear)
-    best = plain.replaced(others, _competing(of.select(others), family))
+    best = plain.replaced(others, _competing(of.select(others), family, expected))
     (_, before), (_, after) = (canonical(of.words, family) for of in (readings, best))
     same = (readings.words > 0) & (before == after)
     explained, contradiction = explanation(
@@ -105,20 +110,27 @@ def decode_occluded(
     )
 
 
-def _competing(of: HiddenEvidence, family: Family) -> _Words:
+def _competing(of: HiddenEvidence, family: Family, expected: frozenset[int]) -> _Words:
     """Return the words that all hypotheses of what is hidden leave."""
     per_sector = of.onto.shape[1] // family.bits
     angles = sectors_by_phase(per_sector, family)
     ground, mark = np.moveaxis(sector_evidence(of, angles), 1, 0)
     last = angles[..., -1]
-    words, phases, _ = best_words(mark - ground, of.onto[:, last], of.off[:, last], family)
+    words, phases, _ = best_words(
+        mark - ground, of.onto[:, last], of.off[:, last], family, expected
+    )
     order = clearest(of)
     of = turned(of, order)
     bits = np.take_along_axis(bits_at(words, phases, per_sector, family), order[:, None], axis=2)
-    scores = explained_words(of, bits)
+    read = explained_words(of, bits)
+    scores = read + prior(words, family, expected)
     best, rows = scores.argmax(axis=1), np.arange(len(words))
     turned_hidden, unexplained = best_explanations(of, bits[rows, best])
     hidden = np.empty_like(turned_hidden)
     np.put_along_axis(hidden, order, turned_hidden, axis=1)
-    margin = np.minimum(margins(words, scores, best, family), _MAXIMUM_MARGIN)
+    # What is expected wins a draw, but an ID that is read clearly is no other one.
+    margin = np.minimum(
+        margins(words, scores, best, family), margins(words, read, best, family) + _DRAW
+    )
+    margin = np.minimum(margin, _MAXIMUM_MARGIN)
     return _Words(words[rows, best], phases[rows, best], margin, unexplained, hidden)

@@ -17,7 +17,7 @@ from ahf_ros.detectors.ring.print_evidence import PrintEvidence
 from ahf_ros.features.array_record import ArrayRecord
 
 _ANYTHING, _LIKE_GROUND = 5.0, 9.0  # price of something that hides a stretch of the band
-_FARTHER_ANYTHING, _FARTHER_LIKE_GROUND = 0.1, 0.2  # price of hiding it at one more angle
+_FARTHER = 0.1  # price of hiding it at one more angle
 _EDGES_OF_LIGHT = 60.0  # what the share of edges of light, and the unevenness, add to both
 _UNEVEN_LIGHT = 60.0
 _USUAL = 0.02  # of either
@@ -60,9 +60,12 @@ def hidden_evidence(evidence: PrintEvidence) -> HiddenEvidence:
     seen = halves.sum(axis=2)
     # Something as dark as ink may end near an edge of the band and look like that of a mark.
     inked = np.where(evidence.inked[:, ::-1], np.maximum(mark, ground), ground)
-    anything = np.maximum(np.stack([inked, mark], axis=1), 0).sum(axis=2) - _FARTHER_ANYTHING
+    # What lies before the band may leave the ground beside it free.
+    beside = np.maximum(evidence.free, 0)[:, None]
+    anything = np.maximum(np.stack([inked, mark], axis=1), beside).sum(axis=2)
+    anything -= _FARTHER
     either = np.maximum(mark, ground).sum(axis=1)
-    like_ground = np.stack([seen[:, 0], either], axis=1) - _FARTHER_LIKE_GROUND
+    like_ground = np.stack([seen[:, 0], either], axis=1) - _FARTHER
     before, after = _windows(seen)
     onto = evidence.onto * _probability(before[:, 0]) * _probability(after[:, 1])
     off = evidence.off * _probability(before[:, 1]) * _probability(after[:, 0])

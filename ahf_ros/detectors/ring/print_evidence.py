@@ -62,6 +62,8 @@ class PrintEvidence(ArrayRecord):
     ----------
     halves : ndarray of float64, shape (k, 2, 2, m)
         Of ground and of a mark, over anything else, in the inner and the outer half of the band.
+    free : ndarray of float64, shape (k, 2, m)
+        Of the ground beside the inner half and beside the outer one, which is part of these.
     inked : ndarray of bool, shape (k, 2, m)
         Whether something as dark as ink (as bright, for bright marks) lies on the ground beside
         the inner and the outer edge of the band.
@@ -74,6 +76,7 @@ class PrintEvidence(ArrayRecord):
     """
 
     halves: np.ndarray
+    free: np.ndarray
     inked: np.ndarray
     onto: np.ndarray
     off: np.ndarray
@@ -108,7 +111,7 @@ def print_evidence(
     grounds = [(*samples.gap, samples.inner_ground), (samples.outer_ground,)]
     glare = _glare(samples)
     band = samples.band
-    halves = []
+    halves, free = [], []
     for half, (readings, levels) in enumerate(
         zip(grounds, ((band[0], band[1]), (band[2], band[1])), strict=True)
     ):
@@ -116,6 +119,7 @@ def print_evidence(
         on_ground -= glare * sum(of >= _SATURATED for of in readings) / len(readings)
         steps = _steps(*samples.edges[half], samples.on_edges[half], marks, light, tables, noise)
         of_levels = [tables.in_band(of) for of in levels]
+        free.append(on_ground)
         halves.append(
             [
                 on_ground + step + (first + 0.5 * second) / len(band)
@@ -124,11 +128,13 @@ def print_evidence(
         )
     weight = np.clip(along / CORRELATION, MINIMUM_ALONG, 1)[:, None] * samples.visible
     weighted = np.array(halves) * weight[:, None]  # half, bit, k, m
+    beside = np.array(free) * weight  # half, k, m
     inked = np.stack(
         [tables.may_be_ink(ground) for ground in (samples.inner_ground, samples.outer_ground)], 1
     )
     return PrintEvidence(
         weighted.transpose(2, 1, 0, 3),
+        beside.transpose(1, 0, 2),
         inked,
         evidence.onto,
         evidence.off,

@@ -33,7 +33,11 @@ _PRINTED = 0.25  # usual contrast of prints
 
 
 def read_bands(
-    gray: np.ndarray, dots: Fit, family: Family, passes: Sequence[tuple[int, int]] = PASSES
+    gray: np.ndarray,
+    dots: Fit,
+    family: Family,
+    expected: frozenset[int] = frozenset(),
+    passes: Sequence[tuple[int, int]] = PASSES,
 ) -> tuple[Hypotheses, np.ndarray]:
     """Read the bands about dots, and refine dot and band together.
 
@@ -44,6 +48,8 @@ def read_bands(
     dots : Fit
         Of k dots.
     family : Family
+    expected : frozenset of int
+        IDs that are likely to be there; all are alike where it is empty.
     passes : sequence of (int, int)
         As `PASSES` has them; one is enough where frames are right to a tenth of a pixel.
 
@@ -65,7 +71,9 @@ def read_bands(
         evidence = band_evidence(samples, marks, frames, family)
         readings = decode(samples, evidence, marks, family)
         if (per_sector, rounds) == PASSES[-1]:
-            readings = decode_occluded(samples, evidence, readings, marks, frames, family)
+            readings = decode_occluded(
+                samples, evidence, readings, marks, frames, family, expected
+            )
         good = readings.plausible
         read, readings, marks = read[good], readings.select(good), marks.select(good)
         words, starts = readings.words, readings.start

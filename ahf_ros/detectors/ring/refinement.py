@@ -42,6 +42,7 @@ def refine_centres(
     targets: Sequence[Target],
     family: Family,
     polarities: Sequence[int] = (1, -1),
+    expected: frozenset[int] = frozenset(),
 ) -> list[Target]:
     """Return targets with centres, ellipses and covariances from the edges in an image.
 
@@ -59,6 +60,8 @@ def refine_centres(
         Of the targets that do not say theirs.
     polarities : sequence of int
         Those to be expected: 1 for a dark dot on bright ground, -1 for a bright one on dark.
+    expected : frozenset of int
+        IDs that are likely to be there; all are alike where it is empty.
 
     Returns
     -------
@@ -76,7 +79,7 @@ def refine_centres(
     gray = as_gray(image).astype(np.float32, copy=False)
     columns = [(it.x, it.y, it.semi_major, it.semi_minor, it.angle) for it in targets]
     start = frame.affine_frames(*np.array(columns).T)
-    located = _locate(gray, start, targets, family, polarities)
+    located = _locate(gray, start, targets, family, polarities, expected)
     moved = np.hypot(*(located.frames[:, :2, 2] - start[:, :2, 2]).T)
     reach = np.maximum(_FARTHEST, _FARTHEST_SHARE * frame.ellipse_axes(start)[1])
     good = (located.share >= _MINIMUM_SHARE) & (moved <= reach)
@@ -93,13 +96,14 @@ def _locate(
     targets: Sequence[Target],
     family: Family,
     polarities: Sequence[int],
+    expected: frozenset[int],
 ) -> _Located:
     """Return where targets are, by dot and band where the band agrees, else by the dot."""
     dots = _fit_either_polarity(gray, start, polarities)
     decoded = np.flatnonzero(
         [target.id != UNDECODED for target in targets] & (dots.share >= _MINIMUM_SHARE)
     )
-    hypotheses, which = _agreeing(gray, dots, decoded, targets, family)
+    hypotheses, which = _agreeing(gray, dots, decoded, targets, family, expected)
     # Of two hypotheses on one target, the one with the larger margin comes first.
     order = np.argsort(-hypotheses.margin, kind='stable')
     by_band, best = np.unique(which[order], return_index=True)
@@ -115,6 +119,7 @@ def _agreeing(
     decoded: np.ndarray,
     targets: Sequence[Target],
     family: Family,
+    expected: frozenset[int],
 ) -> tuple[Hypotheses, np.ndarray]:
     """Return readings that agree with the codes of targets, and the target that each is of."""
     codes = np.array([target.code for target in targets])
@@ -125,7 +130,8 @@ def _agreeing(
     for name in dict.fromkeys(names[decoded].tolist() or [family.name]):
         of_family = decoded[names[decoded] == name]
         code = family if name == family.name else ring.family(name)
-        read, of_read = read_bands(gray, dots.select(of_family), code, passes=PASSES[-1:])
+        some = dots.select(of_family)
+        read, of_read = read_bands(gray, some, code, expected, PASSES[-1:])
         which = of_family[of_read]
         agreed = (read.words > 0) & (canonical(read.words, code)[0] == codes[which])
         agreed &= read.share >= _MINIMUM_SHARE
