@@ -24,6 +24,7 @@ PART = 256
 
 _CLEAREST = 48  # dots among which targets are looked for that tell which family comes first
 _READ = 8  # of these, that are read
+_MANY = 5  # of these, most of whose words settle it however blunt they are
 _MOST = 0.8  # of those read, whose words settle it
 _SHARPEST = 5.1  # sharpness of edges that are those of no other word
 _BLUNTER = 0.8  # than usual, from which a certain word is contested by other families
@@ -67,7 +68,9 @@ def _by_words(
         read, of_dot = read_bands(gray, dots.select(which), code)
         np.maximum.at(sharp[index], of_dot, np.where(read.certain, read.sharpness, 0.0))
         of_print = index + 1 < len(ordered) and ordered[index + 1].band == code.band
-        enough = _SHARPEST if of_print else SHARP  # where other words, or prints, may be as sharp
+        # Where other words, or prints, may be as sharp; a foreign family never reads so many.
+        enough = _SHARPEST if of_print else SHARP
+        enough = 0.0 if len(which) >= _MANY else enough
         if (sharp > enough).any(axis=0).sum() > _MOST * len(which):
             break
     won = np.bincount(sharp.argmax(axis=0)[sharp.any(axis=0)], minlength=len(ordered))

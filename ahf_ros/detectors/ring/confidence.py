@@ -22,6 +22,8 @@ from ahf_ros.features.circle_fit import Fit
 
 _MINIMUM_DEVIATION = 0.001  # of edges, below which it says no more, dot radii
 _EVEN = 1.0  # price of covers, beyond the usual, up to which the light is even
+_MANY_EDGES = 3.0  # the same, from which it has many edges
+_CLEAR_SUPPORT = np.log1p(25.0)  # of a word, if nothing but light lies on it
 _USUAL_PRICE = 4.0  # of covers, beyond the usual, that halves what is unexplained
 _FULL_SIZE = 12.0  # radius of a dot from which evidence grows no more, px
 
@@ -52,8 +54,8 @@ _FEATURES = (
 FEATURES = len(_FEATURES) + 1
 """Number of the features that `confidence` takes: those it weighs, and the price of covers."""
 
-MARGIN, UNEXPLAINED, HIDDEN = 0, 1, 4
-"""Places of three of them."""
+MARGIN, UNEXPLAINED, HIDDEN, SUPPORT = 0, 1, 4, 11
+"""Places of four of them."""
 
 _INTERCEPTS, *_WEIGHTS = fitted_weights('confidence', 'intercepts', 'even', 'edges')
 
@@ -102,6 +104,20 @@ def even(features: np.ndarray) -> np.ndarray:
     """Return whether the light on targets is even, ndarray of bool, shape (k,)."""
     is_even: np.ndarray = features[:, -1] <= _EVEN
     return is_even
+
+
+def plain_in_light(features: np.ndarray) -> np.ndarray:
+    """Return whether light has many edges, and a word is clear if these are all there is.
+
+    The price of covers is high there, and hardly anything else looks like that.
+
+    Parameters
+    ----------
+    features : ndarray of float, shape (k, FEATURES)
+        As `confidence_features` gives them.
+    """
+    clear: np.ndarray = features[:, SUPPORT] > _CLEAR_SUPPORT
+    return clear & (features[:, -1] > _MANY_EDGES)
 
 
 def terms(features: np.ndarray) -> np.ndarray:

@@ -7,7 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ahf_ros.codes.ring import Family
-from ahf_ros.detectors.ring.confidence import FEATURES, confidence, confidence_features
+from ahf_ros.detectors.ring.confidence import (
+    FEATURES,
+    confidence,
+    confidence_features,
+    plain_in_light,
+)
 from ahf_ros.detectors.ring.decoding import Readings
 from ahf_ros.detectors.ring.other_prints import sharpness
 from ahf_ros.features import frame
@@ -15,6 +20,7 @@ from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.circle_fit import Fit
 
 _CERTAIN = 0.9  # confidence from which a word is reported
+_CERTAIN_IN_LIGHT = 0.7  # the same, where light alone explains what else there is
 _LIKELY = 0.5  # confidence from which a word tells where the edges of its band are
 _CLEARLY = 2.0  # times the evidence of another claim to the same ID or dot
 
@@ -58,7 +64,8 @@ class Hypotheses(ArrayRecord):
     @property
     def certain(self) -> np.ndarray:
         """Whether words are certain enough to be reported, ndarray of bool, shape (k,)."""
-        return self.confidence >= _CERTAIN
+        in_light = (self.confidence >= _CERTAIN_IN_LIGHT) & plain_in_light(self.features)
+        return (self.confidence >= _CERTAIN) | in_light
 
     @property
     def reach(self) -> np.ndarray:
