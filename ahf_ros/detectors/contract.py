@@ -29,7 +29,8 @@ class Detector(Protocol):
 
     A detector keeps nothing between calls, may be called from several threads at once and returns
     the same targets for the same image. The image is its only input, so a filtered image is as
-    good as one taken by a camera. A detector may also be a `Refiner`, and a `Drafter` with it.
+    good as one taken by a camera. A detector may also be a `Refiner`, and a `Drafter` with it, and
+    `Expecting`.
 
     Examples
     --------

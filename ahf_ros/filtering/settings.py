@@ -29,8 +29,8 @@ class AdaptiveSettings:
     )
     expected_ids: str = parameter(
         '',
-        'IDs of the coded targets in every image, such as 1-54, 60; their number is N, and other '
-        'IDs are left out.',
+        'IDs of the coded targets in every image, such as 1-54, 60; their number is N, other '
+        'IDs are left out, and doubtful targets are weighed with them.',
     )
     fusion: bool = parameter(
         False,

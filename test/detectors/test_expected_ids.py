@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from ahf_ros import create_identifier
 from ahf_ros.codes.ring import family
 from ahf_ros.detectors import Expecting, create_detector
+from ahf_ros.detectors.external.guarded import guarded
 from ahf_ros.evaluation import RIGHT, WRONG, judge
+from ahf_ros.target import Target
 from benchmarks import occluders
 from benchmarks.exposure import Exposure
 from benchmarks.sheets import target_sheet
@@ -15,6 +18,7 @@ from benchmarks.traceless import far_apart
 
 FAMILY = family('metashape12')
 IDS = far_apart(FAMILY, 3, 31)
+IMAGE = np.zeros((8, 8), np.uint8)
 PAPER_ON_PAPER = Exposure(occluder=occluders.over_sectors(2, 220.0, whole=True))
 
 
@@ -66,3 +70,28 @@ def test_ids_that_are_not_expected_are_never_read_as_expected_ones():
     assert isinstance(detector, Expecting)
     read = kinds(detector.expecting(others)(sheet.photograph(Exposure())), sheet.truth)
     assert read.count(RIGHT) == len(read) > 0
+
+
+class Plugin:
+    """A detector of another package that is told which IDs are expected."""
+
+    name, family = 'mine', 'metashape12'
+
+    def __init__(self, ids=()):
+        self.ids = ids
+
+    def __call__(self, image):
+        return [Target(id=number, x=1.0, y=1.0) for number in sorted(self.ids)]
+
+    def expecting(self, ids):
+        if 13 in ids:
+            raise RuntimeError('not that one')
+        return Plugin(ids)
+
+
+def test_a_detector_of_another_package_is_told_the_ids():
+    detector = guarded(Plugin(), 5.0)
+    assert [it.id for it in detector.expecting(frozenset({7, 3}))(IMAGE)] == [3, 7]
+    assert detector(IMAGE) == []
+    with pytest.raises(ValueError, match="detector 'mine' failed.*not that one"):
+        detector.expecting(frozenset({13}))

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ahf_ros.detectors.contract import Detector, Drafter, Refiner
+from ahf_ros.detectors.contract import Detector, Drafter, Expecting, Refiner
 from ahf_ros.target import Target
 from ahf_ros.target_check import checked_targets
 from ahf_ros.text import reason_of
@@ -51,6 +51,12 @@ class GuardedDetector:
             what `checked_targets` does not accept.
         """
         return self._checked(self.detector, image)
+
+    def expecting(self, ids: frozenset[int]) -> GuardedDetector:
+        """Return the same for a detector that was told the IDs, if it is `Expecting`."""
+        if not isinstance(self.detector, Expecting):
+            return self
+        return guarded(self._guarded(self.detector.expecting, ids), self.timeout)
 
     def _checked(self, call: Callable[..., Any], *arguments: Any) -> list[Target]:
         return checked_targets(self._guarded(call, *arguments), f'detector {self.name!r}')
