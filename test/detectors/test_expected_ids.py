@@ -81,7 +81,7 @@ class Plugin:
         self.ids = ids
 
     def __call__(self, image):
-        return [Target(id=number, x=1.0, y=1.0) for number in sorted(self.ids)]
+        return [Target(number, 1, 4.0, 4.0, 2.0, 2.0) for number in sorted(self.ids)]
 
     def expecting(self, ids):
         if 13 in ids:
