@@ -18,10 +18,10 @@ import numpy as np
 
 from ahf_ros.detectors.ring.decoding import Readings
 from ahf_ros.detectors.ring.fitted_weights import fitted_weights
+from ahf_ros.detectors.ring.occlusion import EVEN
 from ahf_ros.features.circle_fit import Fit
 
 _MINIMUM_DEVIATION = 0.001  # of edges, below which it says no more, dot radii
-_EVEN = 1.0  # price of covers, beyond the usual, up to which the light is even
 _MANY_EDGES = 3.0  # the same, from which it has many edges
 _CLEAR_SUPPORT = np.log1p(25.0)  # of a word, if nothing but light lies on it
 _USUAL_PRICE = 4.0  # of covers, beyond the usual, that halves what is unexplained
@@ -102,7 +102,7 @@ def confidence_features(readings: Readings, fit: Fit) -> np.ndarray:
 
 def even(features: np.ndarray) -> np.ndarray:
     """Return whether the light on targets is even, ndarray of bool, shape (k,)."""
-    is_even: np.ndarray = features[:, -1] <= _EVEN
+    is_even: np.ndarray = features[:, -1] <= EVEN
     return is_even
 
 

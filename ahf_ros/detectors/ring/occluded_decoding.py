@@ -24,6 +24,7 @@ from ahf_ros.detectors.ring.decoding import (
 )
 from ahf_ros.detectors.ring.evidence import MarkAppearance
 from ahf_ros.detectors.ring.occlusion import (
+    EVEN,
     HiddenEvidence,
     best_explanations,
     clearest,
@@ -39,6 +40,7 @@ from ahf_ros.features.array_record import ArrayRecord
 _MAXIMUM_MARGIN = 13.0  # what looks like the ground over two sectors makes any word another one
 _CLEAR_MARGIN = 30.0  # where nothing is hidden, of words that no hypothesis can defeat
 _DRAW = 5.0  # lead of a word that is not expected, which is as good as none
+_MOST_HIDDEN = 0.85  # share of a band that light hides, of which some marks are made up
 _CLEAR = 2.0  # evidence for any states over the word's own, of such words
 
 
@@ -96,6 +98,7 @@ def decode_occluded(
     explained, contradiction = explanation(
         samples, evidence, marks, best.words, best.phases, best.hidden, family
     )
+    seen = (best.hidden.mean(axis=1) < _MOST_HIDDEN) | (of.price <= EVEN)
     return Readings(
         best.words,
         2 * np.pi * best.phases / count,
@@ -106,7 +109,7 @@ def decode_occluded(
         best.unexplained,
         best.hidden,
         of.price,
-        (best.words > 0) & (explained.min(axis=1) > MINIMUM_EXPLAINED),
+        (best.words > 0) & seen & (explained.min(axis=1) > MINIMUM_EXPLAINED),
     )
 
 
