@@ -22,15 +22,14 @@ _EDGES_OF_LIGHT = 60.0  # what the share of edges of light, and the unevenness, 
 _UNEVEN_LIGHT = 60.0
 _USUAL = 0.02  # of either
 _MAXIMUM_PRICE = 20.0  # of what they add
-
-EVEN = 1.0
-"""Price of what hides a band, beyond the usual, up to which the light is even."""
-
 _SECTOR = 2.0  # price of a hidden stretch of a sector, where sectors are looked at one by one
 _EDGE = 3.5  # price of an edge of a mark
 _MAXIMUM_END = 3.0  # evidence for an end of something like the ground on a mark
 _NEVER = -1e9
 _NEAR = 3  # angles on either side of a border, by which it is seen or not
+
+EVEN = 1.0
+"""Price of what hides a band, beyond the usual, up to which the light is even."""
 
 
 @dataclass(frozen=True, slots=True)
