@@ -138,11 +138,11 @@ def fit_circles(
     -------
     Fit
     """
-    blur = np.full(len(frames), USUAL_BLUR)
+    blur, window = np.full(len(frames), USUAL_BLUR), _window(circles)
     for _ in range(rounds):
         edges = measure_edges(gray, frames, circles, blur, reach)
         blur = np.clip(blur + median(edges.softness, edges.visible, 0.0), *BLURS)
-        changes, fit = _solve(frames, circles, edges, blur, projective)
+        changes, fit = _solve(frames, circles, window, edges, blur, projective)
         changes = np.clip(changes, -_MAXIMUM_CHANGE, _MAXIMUM_CHANGE)
         frames = frame.moved(frames, changes[:, : 7 if projective else 5])
     affine = frame.local_affine(frames)
@@ -152,11 +152,16 @@ def fit_circles(
 
 
 def _solve(
-    frames: np.ndarray, circles: Circles, edges: Edges, blur: np.ndarray, projective: bool
+    frames: np.ndarray,
+    circles: Circles,
+    window: np.ndarray,
+    edges: Edges,
+    blur: np.ndarray,
+    projective: bool,
 ) -> tuple[np.ndarray, Fit]:
     """Return the changes of the frames that bring the circles onto the edges."""
     own = weigh_edges(edges)
-    light = _light(edges, own.weights, circles)
+    light = _light(edges, own.weights, circles, window)
     displacement = (edges.offset - edges.sensitivity * light.slope) / edges.scale
     noise = _NOISE * np.sqrt(2 * np.sqrt(np.pi) * USUAL_BLUR)
     deviation = noise / np.maximum(edges.bright - edges.dark, _MINIMUM_STEP) / edges.scale
@@ -193,14 +198,14 @@ def _solve(
     return changes, fit
 
 
-def _light(edges: Edges, weights: np.ndarray, circles: Circles) -> LightSlope:
+def _light(edges: Edges, weights: np.ndarray, circles: Circles, window: np.ndarray) -> LightSlope:
     """Return the slope of the light along the circles."""
     common = common_slope(edges.slope, circles.polarity, weights)
     prior = _LIGHT_PRIOR / edges.scale.mean(axis=1, keepdims=True)
     # Where edges were sharpened, none of their slopes is the light's.
     prior *= (1 + (common / _SHARPENED) ** 2) ** 2
     slopes = edges.slope - circles.polarity * common
-    return smooth_slopes(slopes, weights, _window(circles), prior)
+    return smooth_slopes(slopes, weights, window, prior)
 
 
 def _window(circles: Circles) -> np.ndarray:

@@ -66,7 +66,9 @@ def best_words(
             if everything
             else _near_rotations(single[index], family, expected)
         )
-        of_phases = evidence[index] @ features + prior(competing, family, expected)
+        of_phases = evidence[index] @ features
+        if expected:
+            of_phases += prior(competing, family, expected)
         of_word = of_phases.max(axis=0)
         # Where fewer words compete, the last ones are repeated.
         best = np.argpartition(of_word, -min(COMPETITORS, len(of_word)))[-COMPETITORS:]
