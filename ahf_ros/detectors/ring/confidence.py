@@ -24,6 +24,11 @@ from ahf_ros.features.circle_fit import Fit
 _MINIMUM_DEVIATION = 0.001  # of edges, below which it says no more, dot radii
 _MANY_EDGES = 3.0  # the same, from which it has many edges
 _CLEAR_SUPPORT = np.log1p(25.0)  # of a word, if nothing but light lies on it
+_ARCS = 2.6  # ln(1 + unexplained), from which arcs of any length are likelier
+_MOSTLY_HIDDEN = 0.5  # root of the hidden share, from which little is left to be arcs
+_SMALL = 0.35  # difference of both that tells small dots, of which blur makes arcs
+_CERTAIN = 0.9  # confidence from which words are reported
+_CERTAIN_IN_LIGHT, _CERTAIN_OF_ARCS = 0.7, 0.96  # the same, in light with many edges, and of arcs
 _USUAL_PRICE = 4.0  # of covers, beyond the usual, that halves what is unexplained
 _FULL_SIZE = 12.0  # radius of a dot from which evidence grows no more, px
 
@@ -54,8 +59,8 @@ _FEATURES = (
 FEATURES = len(_FEATURES) + 1
 """Number of the features that `confidence` takes: those it weighs, and the price of covers."""
 
-MARGIN, UNEXPLAINED, HIDDEN, SUPPORT = 0, 1, 4, 11
-"""Places of four of them."""
+MARGIN, UNEXPLAINED, IN_LIGHT, IN_SIZE, HIDDEN, SUPPORT = 0, 1, 2, 3, 4, 11
+"""Places of some of them."""
 
 _INTERCEPTS, *_WEIGHTS = fitted_weights('confidence', 'intercepts', 'even', 'edges')
 
@@ -106,18 +111,24 @@ def even(features: np.ndarray) -> np.ndarray:
     return is_even
 
 
-def plain_in_light(features: np.ndarray) -> np.ndarray:
-    """Return whether light has many edges, and a word is clear if these are all there is.
+def minimum_confidence(features: np.ndarray) -> np.ndarray:
+    """Return the confidences from which words are reported, ndarray of float64, shape (k,).
 
-    The price of covers is high there, and hardly anything else looks like that.
+    Where light has many edges, and a word is clear if these are all there is, hardly anything else
+    looks like that. Where a word needs something that hides a part of the band, and arcs of any
+    length explain what is left far better, it may as well be no target.
 
     Parameters
     ----------
     features : ndarray of float, shape (k, FEATURES)
         As `confidence_features` gives them.
     """
-    clear: np.ndarray = features[:, SUPPORT] > _CLEAR_SUPPORT
-    return clear & (features[:, -1] > _MANY_EDGES)
+    price, hidden = features[:, -1], features[:, HIDDEN]
+    in_light = (features[:, SUPPORT] > _CLEAR_SUPPORT) & (price > _MANY_EDGES)
+    like_arcs = even(features) & (features[:, UNEXPLAINED] > _ARCS)
+    like_arcs &= (hidden > 0) & (hidden < _MOSTLY_HIDDEN)
+    like_arcs &= features[:, IN_SIZE] - features[:, IN_LIGHT] < _SMALL
+    return np.select([in_light, like_arcs], [_CERTAIN_IN_LIGHT, _CERTAIN_OF_ARCS], _CERTAIN)
 
 
 def terms(features: np.ndarray) -> np.ndarray:

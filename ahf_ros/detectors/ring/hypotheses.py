@@ -11,7 +11,7 @@ from ahf_ros.detectors.ring.confidence import (
     FEATURES,
     confidence,
     confidence_features,
-    plain_in_light,
+    minimum_confidence,
 )
 from ahf_ros.detectors.ring.decoding import Readings
 from ahf_ros.detectors.ring.other_prints import sharpness
@@ -19,8 +19,6 @@ from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.circle_fit import Fit
 
-_CERTAIN = 0.9  # confidence from which a word is reported
-_CERTAIN_IN_LIGHT = 0.7  # the same, where light alone explains what else there is
 _LIKELY = 0.5  # confidence from which a word tells where the edges of its band are
 _CLEARLY = 2.0  # times the evidence of another claim to the same ID or dot
 
@@ -64,8 +62,8 @@ class Hypotheses(ArrayRecord):
     @property
     def certain(self) -> np.ndarray:
         """Whether words are certain enough to be reported, ndarray of bool, shape (k,)."""
-        in_light = (self.confidence >= _CERTAIN_IN_LIGHT) & plain_in_light(self.features)
-        return (self.confidence >= _CERTAIN) | in_light
+        certain: np.ndarray = self.confidence >= minimum_confidence(self.features)
+        return certain
 
     @property
     def reach(self) -> np.ndarray:
