@@ -19,9 +19,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from ahf_ros.target import UNDECODED, Target, TrueTarget, Truth
+from ahf_ros.text import printable
 
 TOLERANCE = 5.0
 """Maximum distance of a report from its target, px."""
+
+MAXIMUM_PAIRS = 4_000_000
+"""Maximum number of pairs of a report and a target whose x differ by no more than the tolerance:
+0.7 GB of memory."""
 
 RIGHT = 'right'
 """Report with the ID of its target; at most one per target."""
@@ -131,7 +136,7 @@ def judge(
     Raises
     ------
     ValueError
-        If `tolerance` is not a number above 0.
+        If `tolerance` is not a number above 0, or more than `MAXIMUM_PAIRS` are to be compared.
     """
     if not tolerance > 0:
         raise ValueError(f'tolerance is {tolerance!r}, accepted is a number above 0')
@@ -255,7 +260,7 @@ def _row(name: str, item: Score) -> tuple[str, ...]:
     counts = (item.expected, item.reported, item.found, item.right)
     shares = (item.correctness, item.recall, item.decoding)
     return (
-        name,
+        printable(name),
         *map(str, counts),
         *('-' if share is None else f'{100 * share:.1f}' for share in shares),
         str(item.wrong),
@@ -269,10 +274,22 @@ def _pairs(
 ) -> list[tuple[int, int]]:
     """Return pairs of indices of reports and targets within the tolerance, the nearest first."""
     true_centres, centres = (
-        np.array([(target.x, target.y) for target in targets]).reshape(-1, 2)
+        np.array([(target.x, target.y) for target in targets], float).reshape(-1, 2)
         for targets in (truth, reported)
     )
-    distances = np.linalg.norm(centres[:, None] - true_centres, axis=2)
-    near = np.argwhere(distances <= tolerance)
-    order = np.argsort(distances[distances <= tolerance], kind='stable')
-    return [(int(report), int(target)) for report, target in near[order]]
+    order = np.argsort(true_centres[:, 0], kind='stable')
+    columns = true_centres[order, 0]
+    first = np.searchsorted(columns, centres[:, 0] - tolerance, 'left')
+    counts = np.searchsorted(columns, centres[:, 0] + tolerance, 'right') - first
+    if counts.sum() > MAXIMUM_PAIRS:
+        raise ValueError(
+            f'tolerance is {tolerance:g} px, within which there are {counts.sum()} pairs of '
+            f'{len(reported)} reports and {len(truth)} targets in x, accepted are {MAXIMUM_PAIRS}'
+        )
+    reports = np.repeat(np.arange(len(reported)), counts)
+    starts = np.repeat(first - np.concatenate([[0], np.cumsum(counts)[:-1]]), counts)
+    targets = order[starts + np.arange(len(reports))]
+    distances = np.linalg.norm(centres[reports] - true_centres[targets], axis=1)
+    near = np.flatnonzero(distances <= tolerance)
+    near = near[np.lexsort((targets[near], reports[near], distances[near]))]
+    return list(zip(reports[near].tolist(), targets[near].tolist(), strict=True))

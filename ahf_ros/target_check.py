@@ -13,11 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from ahf_ros.target import Target
+from ahf_ros.target import UNDECODED, Target
 from ahf_ros.text import shown
 
 MAXIMUM_LENGTH = 100_000
 """Maximum number of targets in a result."""
+
+MAXIMUM_ID = 2**31 - 1
+"""Maximum ID, that of the message."""
 
 MAXIMUM_LENGTH_PX = 65536.0
 """Maximum size of a coordinate or a semi-axis, px: twice the side of the largest image."""
@@ -178,7 +181,7 @@ def _numbers(minimum: float, maximum: float) -> Callable[[Any, str], float]:
 _PLACE = _numbers(-MAXIMUM_LENGTH_PX, MAXIMUM_LENGTH_PX)
 _AXIS = _numbers(0, MAXIMUM_LENGTH_PX)
 _CHECKS: dict[str, Callable[[Any, str], Any]] = {
-    'id': _integers(-1, 2**31 - 1),
+    'id': _integers(UNDECODED, MAXIMUM_ID),
     'code': _integers(0, 2**32 - 1),
     'x': _PLACE,
     'y': _PLACE,

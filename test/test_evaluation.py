@@ -6,6 +6,7 @@ import math
 
 import pytest
 
+from ahf_ros import evaluation
 from ahf_ros.evaluation import (
     FALSE,
     FOUND,
@@ -133,6 +134,21 @@ def test_the_table_shows_wrong_and_false_ones():
 def test_the_table_of_nothing():
     line = table({'a.png': score((), ())}).splitlines()[1]
     assert ' '.join(line.split()) == 'a.png 0 0 0 0 - - - 0 0 - - -'
+
+
+def test_no_number_of_targets_takes_all_memory(monkeypatch):
+    monkeypatch.setattr(evaluation, 'MAXIMUM_PAIRS', 8)
+    assert kinds(*(report(number, 10.0) for number in range(8)))[:2] == [WRONG, RIGHT]
+    with pytest.raises(
+        ValueError, match=r'9 pairs of 9 reports and 3 targets in x, accepted are 8'
+    ):
+        judge(TRUTH, [report(number, 10.0) for number in range(9)])
+
+
+def test_names_of_images_are_printable():
+    shown = table({'\x1b[31m\n': Score(0, 0, 0, 0, 0, 0)}).splitlines()
+    assert len(shown) == 3
+    assert shown[1].startswith('\\x1b[31m\\n ')
 
 
 @pytest.mark.parametrize('tolerance', [0, -1, math.nan])

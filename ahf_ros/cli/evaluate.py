@@ -12,6 +12,7 @@ from ahf_ros.evaluation import TOLERANCE, Score, evaluate, table, total
 from ahf_ros.interchange.target_json import read_results
 from ahf_ros.interchange.truth_files import read_truth
 from ahf_ros.settings.parameter import Parameter
+from ahf_ros.text import printable
 
 DESCRIPTION = 'Compare the output of `ahf identify --json` with the truth.'
 
@@ -40,19 +41,22 @@ def run(options: argparse.Namespace) -> int:
     Returns
     -------
     int
-        0, or 1 if a file could not be read.
+        0, or 1 if a file could not be read or compared.
     """
     try:
         truth = read_truth(options.truth)
         results = read_results(options.results)
+        scores = evaluate(truth, results, options.tolerance)
     except ValueError as error:
         print(f'ahf evaluate: {error}', file=sys.stderr)
         return 1
     for name in results:
         if name not in truth:
-            text = f'ahf evaluate: {name} is not in {options.truth}; its targets count as false'
-            print(text, file=sys.stderr)
-    scores = evaluate(truth, results, options.tolerance)
+            print(
+                f'ahf evaluate: {printable(name)} is not in {options.truth}; its targets count as '
+                'false',
+                file=sys.stderr,
+            )
     if options.json:
         for name, item in scores.items():
             print(json.dumps(record(name, item)))

@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 from ahf_ros.settings.nested import assemble, flat_parameters
 from ahf_ros.settings.parameter import Parameter
+from ahf_ros.text import shown
 
 Settings = TypeVar('Settings')
 
@@ -71,7 +72,7 @@ def _converter(item: Parameter) -> Callable[[str], Any]:
             value = type(item.default)(text)
             item.check(value)
         except ValueError as error:
-            message = f'{item.name} is {text!r}, accepted is {item.accepted}'
+            message = f'{item.name} is {shown(text)}, accepted is {item.accepted}'
             raise argparse.ArgumentTypeError(message) from error
         return value
 

@@ -6,33 +6,39 @@ import math
 from pathlib import PurePath
 from typing import Any
 
+from ahf_ros.text import shown
 
-def checked_integer(value: Any, name: str) -> int:
-    """Return a value as an integer, or raise a ValueError that calls it `name`."""
+
+def parsed_integer(text: Any, name: str, minimum: int, maximum: int) -> int:
+    """Return the integer that a text holds, or raise a ValueError that calls it `name`."""
     try:
-        number = int(value)
-    except (OverflowError, TypeError, ValueError) as error:
-        raise ValueError(f'{name} is {value!r}, accepted is an integer') from error
-    if isinstance(value, float) and number != value:
-        raise ValueError(f'{name} is {value!r}, accepted is an integer')
+        number = int(text)
+    except (TypeError, ValueError):
+        number = None
+    if number is None or not minimum <= number <= maximum:
+        raise ValueError(
+            f'{name} is {shown(text)}, accepted is an integer from {minimum} to {maximum}'
+        )
     return number
 
 
-def checked_number(value: Any, name: str) -> float:
-    """Return a value as a finite number, or raise a ValueError that calls it `name`."""
+def parsed_number(text: Any, name: str, minimum: float, maximum: float) -> float:
+    """Return the number that a text holds, or raise a ValueError that calls it `name`."""
     try:
-        number = float(value)
-    except (OverflowError, TypeError, ValueError) as error:
-        raise ValueError(f'{name} is {value!r}, accepted is a number') from error
-    if not math.isfinite(number):
-        raise ValueError(f'{name} is {value!r}, accepted is a finite number')
+        number = float(text)
+    except (TypeError, ValueError):
+        number = math.nan
+    if not minimum <= number <= maximum:
+        raise ValueError(
+            f'{name} is {shown(text)}, accepted is a number from {minimum:g} to {maximum:g}'
+        )
     return number
 
 
 def checked_file_name(value: Any, name: str) -> str:
     """Return the file name of a path without folders, or raise a ValueError that names it."""
     if not isinstance(value, str) or not PurePath(value).name:
-        raise ValueError(f'{name} is {value!r}, accepted is the name of a file')
+        raise ValueError(f'{name} is {shown(value)}, accepted is the name of a file')
     return PurePath(value).name
 
 

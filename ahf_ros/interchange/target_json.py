@@ -110,7 +110,7 @@ def read_results(path: str | Path) -> dict[str, tuple[Target, ...]]:
         the same name; the message names both.
     """
     results: dict[str, tuple[Target, ...]] = {}
-    text = sys.stdin.read() if path == '-' else read_text(path)
+    text = _standard_input() if path == '-' else read_text(path)
     for number, line in enumerate(text.splitlines(), start=1):
         if not line.strip():
             continue
@@ -125,6 +125,13 @@ def read_results(path: str | Path) -> dict[str, tuple[Target, ...]]:
             raise ValueError(f'{where}: {image} was on an earlier line, accepted is one an image')
         results[image] = targets
     return results
+
+
+def _standard_input() -> str:
+    try:
+        return sys.stdin.read()
+    except (AttributeError, OSError, UnicodeDecodeError) as error:  # None where it is closed
+        raise ValueError(f'- cannot be read: {reason_of(error)}') from error
 
 
 def _targets(items: list[Any], name: str) -> Iterator[Target]:

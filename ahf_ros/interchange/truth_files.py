@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import csv
 from pathlib import Path
+from typing import Any
 
-from ahf_ros.interchange.fields import checked_file_name, checked_integer, checked_number
+from ahf_ros.interchange.fields import checked_file_name, parsed_integer, parsed_number
 from ahf_ros.interchange.files import file_errors, read_text
-from ahf_ros.target import TrueTarget, Truth
+from ahf_ros.target import UNDECODED, TrueTarget, Truth
+from ahf_ros.target_check import MAXIMUM_ID, MAXIMUM_LENGTH_PX
 
 
 def read_truth(path: str | Path) -> dict[str, tuple[TrueTarget, ...]]:
@@ -30,23 +32,22 @@ def read_truth(path: str | Path) -> dict[str, tuple[TrueTarget, ...]]:
         If the file cannot be read or a line is not as described; the message names both.
     """
     rows = csv.DictReader(read_text(path).splitlines())
-    missing = {'image', 'id', 'x', 'y'} - set(rows.fieldnames or ())
-    if missing:
-        raise ValueError(f'{path} has no column {", ".join(sorted(missing))}')
     truth: dict[str, list[TrueTarget]] = {}
     images: dict[str, str] = {}
-    for row in rows:
-        where = f'{path}, line {rows.line_num}'
-        target = TrueTarget(
-            checked_integer(row['id'], f'{where}: id'),
-            checked_number(row['x'], f'{where}: x'),
-            checked_number(row['y'], f'{where}: y'),
-            checked_integer(row.get('confirmed', 1), f'{where}: confirmed') != 0,
-        )
-        name = checked_file_name(row['image'], f'{where}: image')
-        if images.setdefault(name, row['image']) != row['image']:
-            raise ValueError(f'{where}: {name} is in two folders, accepted is one image a name')
-        truth.setdefault(name, []).append(target)
+    try:
+        missing = {'image', 'id', 'x', 'y'} - set(rows.fieldnames or ())
+        if missing:
+            raise ValueError(f'{path} has no column {", ".join(sorted(missing))}')
+        for row in rows:
+            where = f'{path}, line {rows.line_num}'
+            name = checked_file_name(row['image'], f'{where}: image')
+            if images.setdefault(name, row['image']) != row['image']:
+                raise ValueError(
+                    f'{where}: {name} is in two folders, accepted is one image a name'
+                )
+            truth.setdefault(name, []).append(_target(row, where))
+    except csv.Error as error:
+        raise ValueError(f'{path}, line {rows.line_num + 1}: {error}') from error
     return {name: tuple(targets) for name, targets in truth.items()}
 
 
@@ -75,3 +76,13 @@ def write_truth(path: str | Path, truth: Truth) -> None:
         Path(path).open('w', encoding='utf-8', newline='') as file,
     ):
         csv.writer(file, lineterminator='\n').writerows(rows)
+
+
+def _target(row: dict[str, Any], where: str) -> TrueTarget:
+    place = -MAXIMUM_LENGTH_PX, MAXIMUM_LENGTH_PX
+    return TrueTarget(
+        parsed_integer(row['id'], f'{where}: id', UNDECODED, MAXIMUM_ID),
+        parsed_number(row['x'], f'{where}: x', *place),
+        parsed_number(row['y'], f'{where}: y', *place),
+        parsed_integer(row.get('confirmed', 1), f'{where}: confirmed', 0, 1) == 1,
+    )

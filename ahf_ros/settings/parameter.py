@@ -13,6 +13,8 @@ from dataclasses import dataclass, field, fields, replace
 from numbers import Integral, Real
 from typing import Any
 
+from ahf_ros.text import shown
+
 MAXIMUM_NUMBERS = 100_000
 """Maximum count of numbers in a list."""
 
@@ -75,17 +77,21 @@ class Parameter:
             return isinstance(value, bool)
         if isinstance(self.default, str):
             return isinstance(value, str) and (not self.choices or value in self.choices)
-        if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
+        if isinstance(value, bool) or not isinstance(value, Real):
             return False
         if isinstance(self.default, int) and not isinstance(value, Integral):
             return False
-        above = self.minimum is None or float(value) >= self.minimum
-        return above and (self.maximum is None or float(value) <= self.maximum)
+        try:
+            number = float(value)
+        except OverflowError:  # an integer of hundreds of digits
+            return False
+        above = self.minimum is None or number >= self.minimum
+        return math.isfinite(number) and above and (self.maximum is None or number <= self.maximum)
 
     def check(self, value: object) -> None:
         """Raise a ValueError with the parameter, `value` and what is accepted, unless it is."""
         if not self.accepts(value):
-            raise ValueError(f'{self.name} is {value!r}, accepted is {self.accepted}')
+            raise ValueError(f'{self.name} is {shown(value)}, accepted is {self.accepted}')
 
 
 def parameter(
@@ -139,9 +145,11 @@ def numbers_in(name: str, text: str) -> frozenset[int]:
         first, last = (int(found[1]), int(found[2] or found[1])) if found else (1, 0)
         if first > last:
             raise ValueError(
-                f'{name} has {part!r}, accepted are integers and ranges such as 1-54, 60'
+                f'{name} has {shown(part)}, accepted are integers and ranges such as 1-54, 60'
             )
         if len(numbers) + last - first >= MAXIMUM_NUMBERS:
-            raise ValueError(f'{name} is {text!r}, accepted are at most {MAXIMUM_NUMBERS} numbers')
+            raise ValueError(
+                f'{name} is {shown(text)}, accepted are at most {MAXIMUM_NUMBERS} numbers'
+            )
         numbers.update(range(first, last + 1))
     return frozenset(numbers)

@@ -41,6 +41,13 @@ def test_results_from_standard_input(monkeypatch):
     assert read_results('-') == {'a.png': ()}
 
 
+@pytest.mark.parametrize('given', [None, io.TextIOWrapper(io.BytesIO(b'\xff'), 'utf-8')])
+def test_standard_input_that_is_closed_or_no_text_is_named(monkeypatch, given):
+    monkeypatch.setattr('sys.stdin', given)
+    with pytest.raises(ValueError, match=r'^- cannot be read: '):
+        read_results('-')
+
+
 @pytest.mark.parametrize(
     ('line', 'message'),
     [

@@ -28,11 +28,19 @@ def test_truth_in_another_order_with_folders_and_no_confirmed(tmp_path):
         ('image,id,x\n', 'has no column y'),
         ('', 'has no column id, image, x, y'),
         ('image,id,x,y\na.png,1,2,far\n', "line 2: y is 'far', accepted is a number"),
-        ('image,id,x,y\na.png,1,nan,2\n', "line 2: x is 'nan', accepted is a finite number"),
+        ('image,id,x,y\na.png,1,nan,2\n', "line 2: x is 'nan', accepted is a number from"),
         ('image,id,x,y\na.png,one,1,2\n', "line 2: id is 'one', accepted is an integer"),
         ('image,id,x,y\na.png,1\n', 'line 2: x is None, accepted is a number'),
         ('image,id,x,y\n,1,2,3\n', "line 2: image is '', accepted is the name of a file"),
         ('image,id,x,y\ni/a,1,2,3\nj/a,1,2,3\n', 'line 3: a is in two folders'),
+        (
+            f'image,id,x,y\na,{"9" * 400},2,3\n',
+            "line 2: id is '999.*, accepted is an integer from",
+        ),
+        (f'image,id,x,y\na,{"9" * 5000},2,3\n', "line 2: id is '999.*, accepted is an integer"),
+        ('image,id,x,y\na,1,1e308,3\n', "line 2: x is '1e308', accepted is a number from -65536"),
+        (f'image,id,x,y\na,1,{"1" * 200_000},3\n', 'line 2: field larger than field limit'),
+        (f'image,id,x,y,{"x" * 200_000}\n', 'line 1: field larger than field limit'),
     ],
 )
 def test_truth_that_cannot_be_used_is_named(tmp_path, text, message):
@@ -40,6 +48,7 @@ def test_truth_that_cannot_be_used_is_named(tmp_path, text, message):
     with pytest.raises(ValueError, match=message) as caught:
         read_truth(tmp_path / 'truth.csv')
     assert str(tmp_path / 'truth.csv') in str(caught.value)
+    assert len(str(caught.value)) < 1000
 
 
 def test_truth_that_is_no_text_is_named(tmp_path):
