@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import fields
+from itertools import islice
 from numbers import Real
 from typing import Any
 
@@ -54,12 +55,13 @@ def checked_targets(found: Any, name: str) -> list[Target]:
     """
     if not isinstance(found, (list, tuple)):
         raise ValueError(f'{name} returned {shown(found)}, accepted is a list of targets')
-    if len(found) > MAXIMUM_LENGTH:
+    items = list(islice(found, MAXIMUM_LENGTH + 1))
+    if len(items) > MAXIMUM_LENGTH:
         raise ValueError(
-            f'{name} returned {len(found)} targets, accepted are at most {MAXIMUM_LENGTH}'
+            f'{name} returned more targets than are accepted, at most {MAXIMUM_LENGTH}'
         )
     return [
-        checked_target(target, f'{name}: target {number}') for number, target in enumerate(found)
+        checked_target(target, f'{name}: target {number}') for number, target in enumerate(items)
     ]
 
 
@@ -84,12 +86,12 @@ def checked_target(target: Any, name: str) -> Target:
     if not isinstance(target, Target):
         raise ValueError(f'{name} is {shown(target)}, accepted is a Target')
     values: dict[str, Any] = {}
-    changed = False
+    changed = type(target) is not Target
     for item in fields(Target):
         value = getattr(target, item.name, None)
         values[item.name] = checked = _CHECKS[item.name](value, f'{name}: {item.name}')
         changed |= checked is not value
-    return replace(target, **values) if changed else target
+    return Target(**values) if changed else target
 
 
 def checked_integer(value: Any, name: str, minimum: int, maximum: int) -> int:
@@ -156,11 +158,10 @@ def _covariance(value: Any, name: str) -> tuple[float, ...]:
 
 
 def _listed(value: Any) -> list[Any]:
-    """Return the elements of a list or an array, empty for anything else."""
-    flat = getattr(value, 'ravel', None)
-    if callable(flat):
-        value = flat().tolist()
-    return list(value) if isinstance(value, (list, tuple)) else []
+    """Return the first elements of a list or those of an array, empty for anything else."""
+    if isinstance(value, np.ndarray):
+        return value.ravel().tolist() if value.size == 4 else []
+    return list(islice(value, 5)) if isinstance(value, (list, tuple)) else []
 
 
 def _is_covariance(xx: float, xy: float, yx: float, yy: float) -> bool:

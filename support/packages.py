@@ -22,6 +22,23 @@ def write_package(folder: Path, module: str, body: str = EXAMPLE.read_text()) ->
     (told / 'entry_points.txt').write_text(f'[{GROUP}]\n{MINE} = {module}:MyDetector\n')
 
 
+SLOW = """
+import pathlib, time
+class MyDetector:
+    name = family = 'mine'
+    calls = 0
+    def __init__(self, settings):
+        pass
+    def __call__(self, image):
+        MyDetector.calls += 1
+        if MyDetector.calls > {fast}:
+            pathlib.Path({mark!r}).touch()
+            time.sleep(600)
+        return []
+"""
+"""A detector that touches a file and hangs from a call on."""
+
+
 def my_detector() -> Detector:
     """Return the detector of the example in the documentation."""
     made: Detector = runpy.run_path(str(EXAMPLE))['MyDetector'](DetectorSettings())

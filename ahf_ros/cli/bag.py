@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Iterator, Sequence
+from contextlib import redirect_stdout
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -139,7 +140,8 @@ def _attempt(task: BagTask, report: Any) -> Outcome | ValueError:
     from ahf_ros.bag.run import WRITING_ERRORS, answer_bag
 
     try:
-        return answer_bag(task, report)
+        with redirect_stdout(sys.stderr):  # what detectors of others print
+            return answer_bag(task, report)
     except ValueError as error:
         return error
     except WRITING_ERRORS as error:

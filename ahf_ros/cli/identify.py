@@ -6,7 +6,9 @@ import argparse
 import json
 import sys
 from collections.abc import Iterator
+from contextlib import redirect_stdout
 from pathlib import Path
+from typing import TextIO
 
 import cv2
 import numpy as np
@@ -53,6 +55,12 @@ def run(options: argparse.Namespace) -> int:
     ValueError
         If options contradict each other.
     """
+    output = sys.stdout
+    with redirect_stdout(sys.stderr):  # what detectors of others print is not JSON
+        return _run(options, output)
+
+
+def _run(options: argparse.Namespace, output: TextIO) -> int:
     settings = settings_from(options, IdentificationSettings)
     overlays = _overlay_paths(options.images, options.overlay)
     detector = create_detector(settings.detector, settings.detection)
@@ -66,7 +74,8 @@ def run(options: argparse.Namespace) -> int:
             found = _identified(path, image, detector, settings)
             if options.json:
                 names = detector.family, detector.name
-                print(json.dumps(to_json(found, path, image.shape, *names)), flush=True)
+                content = to_json(found, path, image.shape, *names)
+                print(json.dumps(content), file=output, flush=True)
             _report(path, found, with_targets=not options.json)
             if overlays:
                 write_image(overlays[path], draw(image, found))

@@ -28,6 +28,7 @@ from ahf_ros.detectors.ring.traditional import TraditionalDetector
 from ahf_ros.detectors.square.detector import SquareDetector
 from ahf_ros.settings.nested import updated
 from ahf_ros.settings.parameter import Parameter
+from ahf_ros.text import printable, reason_of
 
 __all__ = [
     'AUTO',
@@ -127,7 +128,7 @@ def create_detector(
     name = detector_name(name, settings.family)
     if name in _ENTRIES:
         return _ENTRIES[name].create(settings)
-    return guarded(_loaded(_ADDED[name])(settings), settings.detector_timeout)
+    return _added(_ADDED[name], settings)
 
 
 def detector_name(name: str, family: str) -> str:
@@ -205,12 +206,12 @@ def estimator(settings: DetectorSettings) -> Callable[[np.ndarray], int]:
     return lambda image: count(image, settings)
 
 
-def _loaded(point: EntryPoint) -> Callable[[DetectorSettings], Detector]:
+def _added(point: EntryPoint, settings: DetectorSettings) -> Detector:
+    """Return a detector of another package, which may raise anything."""
     try:
-        made: Callable[[DetectorSettings], Detector] = point.load()
-    except Exception as error:  # whatever the other package raises when it is imported
+        return guarded(point.load()(settings), settings.detector_timeout)
+    except (Exception, SystemExit) as error:
+        reason = printable(str(error)) if isinstance(error, ValueError) else reason_of(error)
         raise ValueError(
-            f'detector is {point.name!r}, but {point.value} cannot be loaded: '
-            f'{type(error).__name__}: {error}'
+            f'detector is {point.name!r}, but {point.value} cannot be loaded: {reason}'
         ) from error
-    return made

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -19,7 +20,7 @@ from ahf_ros.bag import run
 from ahf_ros.bag.definitions import typestore
 from ahf_ros.cli import main
 from ahf_ros.interchange.image_files import write_image
-from support import bags
+from support import bags, packages
 
 ROOT = Path(__file__).resolve().parents[2]
 LIMIT = 300.0
@@ -90,6 +91,42 @@ def test_a_signal_ends_the_command_and_its_files(
     assert b'Traceback' not in errors
     wait_for(lambda: not running(tmp_path / 'slow.py'))
     assert list((tmp_path / 'scratch').iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ('number', 'fast'),
+    [(signal.SIGTERM, 0), (signal.SIGINT, 1)],  # a search calls it in other threads
+)
+def test_a_signal_does_not_wait_for_a_detector_of_another_package(
+    tmp_path: Path, number: signal.Signals, fast: int
+) -> None:
+    mark = tmp_path / 'mark'
+    packages.write_package(tmp_path, 'hanging', packages.SLOW.format(fast=fast, mark=str(mark)))
+    write_image(tmp_path / 'image.png', np.tile(np.arange(40, dtype=np.uint8), (30, 1)))
+    process = start(
+        'identify', tmp_path / 'image.png', '--detector', 'mine', '--expected', 3,
+        '--detector-timeout', 600, stderr=subprocess.PIPE,
+        env={**os.environ, 'PYTHONPATH': f'{ROOT}{os.pathsep}{tmp_path}'},
+    )  # fmt: skip
+    wait_for(mark.exists)
+    process.send_signal(number)
+    errors = process.communicate(timeout=LIMIT)[1]
+    assert process.returncode == (130 if number == signal.SIGINT else 128 + number), errors
+    assert b'Traceback' not in errors
+
+
+def test_what_a_detector_prints_is_not_in_the_json(tmp_path: Path) -> None:
+    body = packages.EXAMPLE.read_text().replace('radii = np', "print('noise')\n        radii = np")
+    packages.write_package(tmp_path, 'printing', body)
+    write_image(tmp_path / 'image.png', np.tile(np.arange(40, dtype=np.uint8), (30, 1)))
+    process = start(
+        'identify', '--json', tmp_path / 'image.png', '--detector', 'mine',
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        env={**os.environ, 'PYTHONPATH': f'{ROOT}{os.pathsep}{tmp_path}'},
+    )  # fmt: skip
+    output, errors = process.communicate(timeout=LIMIT)
+    assert b'noise' in errors
+    assert json.loads(output)['detector'] == 'mine'
 
 
 def test_workers_end_with_their_parent_and_a_rerun_is_accepted(tmp_path: Path) -> None:

@@ -186,6 +186,71 @@ def test_a_detector_of_another_package_may_fail_and_hang(tmp_path, monkeypatch, 
         detector.refine(image, [])
 
 
+HOSTILE = """
+import sys
+from ahf_ros import Target
+class MyDetector:
+    name, family = 'mine', {family}
+    def __init__(self, settings):
+        {made}
+    def __call__(self, image):
+        image[:] = 0
+        {called}
+"""
+ENDLESS = """class Endless(list):
+            def __iter__(self):
+                while True:
+                    yield Target(7, 19, 1.0, 2.0, 4.0, 3.0)
+        return Endless()"""
+RAISING = """class Raising(Target):
+            def __getattribute__(self, name):
+                raise RuntimeError('no fields')
+        return [Raising(7, 19, 1.0, 2.0, 4.0, 3.0)]"""
+
+
+@pytest.mark.parametrize(
+    ('number', 'family', 'made', 'reason'),
+    [
+        (0, '5', 'pass', 'family is 5, accepted is a printable text of at most 200 characters'),
+        (1, 'chr(0xD800)', 'pass', r"family is '\ud800', accepted is a printable text of at most"),
+        (2, 'property(lambda _: 1 / 0)', 'pass', 'name or family cannot be read: ZeroDivisionE'),
+        (3, "'a'", "raise KeyError('weights')", "KeyError: 'weights'"),
+        (4, "'a'", 'raise ValueError(chr(0xD800))', r'\ud800'),
+        (5, "'a'", 'sys.exit(0)', 'SystemExit: 0'),
+    ],
+)
+def test_a_detector_of_another_package_that_cannot_be_made(
+    tmp_path, monkeypatch, number, family, made, reason
+):
+    module = f'package_not_made_{number}'
+    body = HOSTILE.format(family=family, made=made, called='pass')
+    registry = added(tmp_path, monkeypatch, module, body)
+    with pytest.raises(ValueError) as raised:
+        registry['create_detector']('mine')
+    expected = f"detector is 'mine', but {module}:MyDetector cannot be loaded: {reason}"
+    assert str(raised.value).startswith(expected)
+
+
+@pytest.mark.parametrize(
+    ('number', 'called', 'message'),
+    [
+        (0, ENDLESS, "detector 'mine' returned more targets than are accepted, at most 100000"),
+        (1, RAISING, "detector 'mine' failed: RuntimeError: no fields"),
+        (2, 'sys.exit(0)', "detector 'mine' failed: SystemExit: 0"),
+    ],
+)
+def test_no_result_of_another_package_gets_past_its_guard(
+    tmp_path, monkeypatch, number, called, message
+):
+    body = HOSTILE.format(family="'mine'", made='pass', called=called)
+    registry = added(tmp_path, monkeypatch, f'package_with_results_{number}', body)
+    image = np.full((20, 20), 9, np.uint8)
+    with pytest.raises(ValueError) as raised:
+        registry['create_detector']('mine')(image)
+    assert str(raised.value) == message
+    assert (image == 9).all()
+
+
 def test_a_search_ends_when_a_detector_hangs_in_it(tmp_path, monkeypatch):
     body = FAILING.replace('image.max() == 1', 'image.max() > 100')
     registry = added(tmp_path, monkeypatch, 'package_that_hangs', body)

@@ -13,11 +13,15 @@ import pytest
 
 pytest.importorskip('rclpy', reason='ROS 2 is not installed')
 
+import numpy as np
 import rclpy
+from sensor_msgs.msg import Image
+from std_msgs.msg import Header
 
+from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.nodes.process import JoiningExecutor
 from ahf_ros.nodes.start import NODES
-from support import live
+from support import live, packages
 
 SIGNALLED = """
 import os, signal, sys
@@ -82,6 +86,20 @@ def test_a_node_that_has_to_be_secure_and_cannot_be_does_not_run(tmp_path: Path)
 def test_a_name_that_no_node_has_is_refused() -> None:
     status, errors = run('-m', 'ahf_ros.nodes', 'detektor')
     assert (status, errors) == (1, f'accepted is the name of a node: {", ".join(NODES)}\n')
+
+
+def test_the_end_does_not_wait_for_a_detector_of_another_package(
+    graph: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mark = tmp_path / 'mark'
+    packages.write_package(tmp_path, 'hanging', packages.SLOW.format(fast=0, mark=str(mark)))
+    monkeypatch.setenv('PYTHONPATH', f'{tmp_path}{os.pathsep}{os.environ.get("PYTHONPATH", "")}')
+    given = ('-p', 'detector:=mine', '-p', 'detector_timeout:=600.0')
+    node = graph.start('detector', '-r', '__ns:=/hanging', *given)
+    image = graph.publisher(Image, '/hanging/image')
+    image.publish(image_message(np.tile(np.arange(40, dtype=np.uint8), (30, 1)), Header()))
+    graph.until(mark.exists)
+    assert node.end()[0] == 0
 
 
 def test_the_end_waits_for_callbacks(graph: Any) -> None:

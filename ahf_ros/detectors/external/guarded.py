@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, wait
 from dataclasses import dataclass
 from threading import Thread
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
 from ahf_ros.detectors.contract import Detector, Drafter, Expecting, Refiner
+from ahf_ros.detectors.external import ending
 from ahf_ros.target import Target
-from ahf_ros.target_check import checked_targets
+from ahf_ros.target_check import checked_targets, checked_text
 from ahf_ros.text import reason_of
+
+Result = TypeVar('Result')
 
 
 @dataclass(frozen=True, slots=True)
 class GuardedDetector:
-    """A detector with a time limit, all of whose errors are a ValueError.
+    """A detector with a time limit, all of whose errors are a ValueError; `guarded` makes it.
 
     Attributes
     ----------
@@ -26,60 +30,74 @@ class GuardedDetector:
     timeout : float
         Time limit for one image, s. A call that takes longer goes on in its thread, which cannot
         be stopped and ends with the process.
+    name, family : str
+        Name of the detector and family of its targets.
     """
 
     detector: Detector
     timeout: float
-
-    @property
-    def name(self) -> str:
-        """Name of the detector."""
-        return self.detector.name
-
-    @property
-    def family(self) -> str:
-        """Family of its targets."""
-        return self.detector.family
+    name: str
+    family: str
 
     def __call__(self, image: np.ndarray) -> list[Target]:
-        """Identify the targets of one image; see `Detector`.
+        """Identify the targets of one image, of which the detector gets a copy; see `Detector`.
 
         Raises
         ------
         ValueError
             Whatever the detector raises, with its name; if it exceeds its time limit or returns
-            what `checked_targets` does not accept.
+            what `checked_targets` does not accept; if this process ends meanwhile.
         """
-        return self._checked(self.detector, image)
+        return self._targets(self.detector, image)
 
     def expecting(self, ids: frozenset[int]) -> GuardedDetector:
         """Return the same for a detector that was told the IDs, if it is `Expecting`."""
-        if not isinstance(self.detector, Expecting):
+        detector = self.detector
+        if not isinstance(detector, Expecting):
             return self
-        return guarded(self._guarded(self.detector.expecting, ids), self.timeout)
+        return self._awaited(lambda: guarded(self._of(detector.expecting, ids), self.timeout))
 
-    def _checked(self, call: Callable[..., Any], *arguments: Any) -> list[Target]:
-        return checked_targets(self._guarded(call, *arguments), f'detector {self.name!r}')
+    def _targets(self, call: Callable[..., Any], image: np.ndarray, *more: Any) -> list[Target]:
+        copied = image.copy()
+        return self._awaited(lambda: checked_targets(self._of(call, copied, *more), self._title))
 
-    def _guarded(self, call: Callable[..., Any], *arguments: Any) -> Any:
-        outcome: Future[Any] = Future()
+    def _of(self, call: Callable[..., Any], *arguments: Any) -> Any:
+        """Return what the detector returns, or raise a ValueError with its name."""
+        try:
+            return call(*arguments)
+        except BaseException as error:
+            raise ValueError(f'{self._title} failed: {reason_of(error)}') from error
 
-        def work() -> None:
+    def _awaited(self, work: Callable[[], Result]) -> Result:
+        """Return the result of work in a thread, within the time limit."""
+        outcome: Future[Result] = Future()
+
+        def run() -> None:
             try:
-                outcome.set_result(call(*arguments))
-            except BaseException as error:  # raised again by the caller
+                outcome.set_result(work())
+            except ValueError as error:
                 outcome.set_exception(error)
+            except BaseException as error:  # what is returned may raise anything, too
+                failure = ValueError(f'{self._title} failed: {reason_of(error)}')
+                failure.__cause__ = error
+                outcome.set_exception(failure)
 
-        Thread(target=work, name=f'detector {self.name}', daemon=True).start()
-        wait([outcome], self.timeout)
+        Thread(target=run, name=f'detector {self.name}', daemon=True).start()
+        limit = time.monotonic() + self.timeout
+        while not outcome.done() and not ending.has_begun():
+            remaining = limit - time.monotonic()
+            if remaining <= 0:
+                raise ValueError(
+                    f'{self._title} took longer than detector_timeout, {self.timeout:g} s'
+                )
+            wait([outcome], min(ending.POLL, remaining))
         if not outcome.done():
-            raise ValueError(
-                f'detector {self.name!r} took longer than detector_timeout, {self.timeout:g} s'
-            )
-        error = outcome.exception()
-        if error is not None:
-            raise ValueError(f'detector {self.name!r} failed: {reason_of(error)}') from error
+            raise ValueError(f'{self._title} was ended with this process')
         return outcome.result()
+
+    @property
+    def _title(self) -> str:
+        return f'detector {self.name!r}'
 
 
 class RefiningDetector(Detector, Refiner, Protocol):
@@ -94,17 +112,29 @@ class GuardedRefiner(GuardedDetector):
 
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> Sequence[Target]:
         """Return targets with the centres of an image; see `Refiner`."""
-        return self._checked(self.detector.refine, image, targets)
+        return self._targets(self.detector.refine, image, targets)
 
     def draft(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image, if possible as a `Drafter` does."""
         if isinstance(self.detector, Drafter):
-            return self._checked(self.detector.draft, image)
-        return self._checked(self.detector, image)
+            return self._targets(self.detector.draft, image)
+        return self._targets(self.detector, image)
 
 
 def guarded(detector: Detector, timeout: float) -> GuardedDetector:
-    """Return a detector with a time limit, in s, that is a `Refiner` if `detector` is one."""
-    if isinstance(detector, Refiner):
-        return GuardedRefiner(detector, timeout)
-    return GuardedDetector(detector, timeout)
+    """Return a detector with a time limit, in s, that is a `Refiner` if `detector` is one.
+
+    Raises
+    ------
+    ValueError
+        If its name or its family is not a printable text.
+    """
+    try:
+        name, family = (checked_text(getattr(detector, it), it) for it in ('name', 'family'))
+        if isinstance(detector, Refiner):
+            return GuardedRefiner(detector, timeout, name, family)
+    except ValueError:
+        raise
+    except Exception as error:  # attributes of others may raise anything
+        raise ValueError(f'name or family cannot be read: {reason_of(error)}') from error
+    return GuardedDetector(detector, timeout, name, family)

@@ -12,15 +12,14 @@ from pathlib import Path
 from typing import IO, Any
 
 from ahf_ros.detectors.contract import Unavailable
+from ahf_ros.detectors.external import ending
 from ahf_ros.text import LONGEST, printable
 
 LARGEST_OUTPUT = 64 * 2**20
 """Bytes that a program may write to standard output or standard error."""
 
-_POLL = 0.02  # s, between two looks at a program that runs
 _running: set[subprocess.Popen[Any]] = set()
 _lock = threading.RLock()  # a signal handler may interrupt its own thread
-_ending = threading.Event()
 
 
 def output_of(words: list[str], folder: Path, timeout: float, name: str) -> str:
@@ -69,7 +68,7 @@ def output_of(words: list[str], folder: Path, timeout: float, name: str) -> str:
 
 def end_programs() -> None:
     """End all programs that run, and those that would still be started; this process ends."""
-    _ending.set()
+    ending.begin()
     with _lock:
         running = list(_running)
     for process in running:
@@ -83,7 +82,7 @@ def _started(words: list[str], out: IO[bytes], err: IO[bytes]) -> subprocess.Pop
             words, stdin=subprocess.DEVNULL, stdout=out, stderr=err, start_new_session=True
         )
         _running.add(process)
-    if _ending.is_set():
+    if ending.has_begun():
         _kill(process)
     return process
 
@@ -94,12 +93,12 @@ def _awaited(
     """Return the status of a program, or raise a ValueError as soon as it breaks a limit."""
     limit = time.monotonic() + timeout
     while True:
-        if _ending.is_set():
+        if ending.has_begun():
             raise ValueError(f'{name} was ended with this process')
         remaining = limit - time.monotonic()
         status = None
         try:
-            status = process.wait(max(min(_POLL, remaining), 0))
+            status = process.wait(max(min(ending.POLL, remaining), 0))
         except subprocess.TimeoutExpired as error:
             if remaining <= 0:
                 raise ValueError(
