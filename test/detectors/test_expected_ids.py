@@ -93,5 +93,5 @@ def test_a_detector_of_another_package_is_told_the_ids():
     detector = guarded(Plugin(), 5.0)
     assert [it.id for it in detector.expecting(frozenset({7, 3}))(IMAGE)] == [3, 7]
     assert detector(IMAGE) == []
-    with pytest.raises(ValueError, match="detector 'mine' failed.*not that one"):
+    with pytest.raises(ValueError, match=r"detector 'mine' failed.*not that one"):
         detector.expecting(frozenset({13}))

@@ -52,10 +52,12 @@ class GuardedDetector:
 
     def expecting(self, ids: frozenset[int]) -> GuardedDetector:
         """Return the same for a detector that was told the IDs, if it is `Expecting`."""
-        detector = self.detector
-        if not isinstance(detector, Expecting):
+        return self._awaited(lambda: self._told(ids))
+
+    def _told(self, ids: frozenset[int]) -> GuardedDetector:
+        if not isinstance(self.detector, Expecting):
             return self
-        return self._awaited(lambda: guarded(self._of(detector.expecting, ids), self.timeout))
+        return guarded(self._of(self.detector.expecting, ids), self.timeout)
 
     def _targets(self, call: Callable[..., Any], image: np.ndarray, *more: Any) -> list[Target]:
         copied = image.copy()
@@ -116,9 +118,12 @@ class GuardedRefiner(GuardedDetector):
 
     def draft(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image, if possible as a `Drafter` does."""
-        if isinstance(self.detector, Drafter):
-            return self._targets(self.detector.draft, image)
-        return self._targets(self.detector, image)
+        return self._targets(self._drafted, image)
+
+    def _drafted(self, image: np.ndarray) -> list[Target]:
+        return (self.detector.draft if isinstance(self.detector, Drafter) else self.detector)(
+            image
+        )
 
 
 def guarded(detector: Detector, timeout: float) -> GuardedDetector:
