@@ -11,7 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ahf_ros.codes.ring import Family
+from ahf_ros.codes.ring import FAMILY_NAMES, Family, family
+from ahf_ros.detectors.ring.confidence import IN_LIGHT
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.other_prints import SHARP
 from ahf_ros.detectors.ring.reading import read_bands
@@ -29,6 +30,7 @@ _MOST = 0.8  # of those read, whose words settle it
 _SHARPEST = 5.1  # sharpness of edges that are those of no other word
 _BLUNTER = 0.8  # than usual, from which a certain word is contested by other families
 _SHARPER = 0.2  # than the word of another family, to be the word of a dot
+_UNEXPLAINED = np.log1p(3.5)  # evidence for arcs of any length, that may be other words
 _LIKELY = 0.2  # probability of a target, for a dot to be read as other families, too
 
 
@@ -102,7 +104,7 @@ def read_families(
         At least one of each dot.
     """
     first, *others = families
-    found = _read(gray, dots, first, expected)
+    found = _against_other_words(gray, dots, _read(gray, dots, first, expected), families)
     if not others:
         return found
     dots = dots.select(~_settled(dots, found))
@@ -120,6 +122,29 @@ def read_families(
             if not read.certain.any():
                 break
     return _contested(Hypotheses.joined(parts))
+
+
+def _against_other_words(
+    gray: np.ndarray, dots: Fit, found: Hypotheses, families: Sequence[Family]
+) -> Hypotheses:
+    """Return hypotheses of which none is certain where a family that is not read agrees better.
+
+    Families of one print differ in the number of sectors. What a word leaves unexplained shows
+    where the band may be one of theirs; `of_other_prints` tells other prints.
+    """
+    doubtful = found.certain & (found.features[:, IN_LIGHT] > _UNEXPLAINED)
+    read = {code.name for code in families}
+    rivals = [
+        family(name)
+        for name in FAMILY_NAMES
+        if name not in read and family(name).band == families[0].band
+    ]
+    if not doubtful.any() or not rivals:
+        return found
+    away = found.frames[doubtful, None, :2, 2] - dots.frames[:, :2, 2]
+    some = dots.select(np.unique(np.hypot(away[..., 0], away[..., 1]).argmin(axis=1)))
+    parts = [_read(gray, some, code, frozenset()) for code in rivals]
+    return _contested(Hypotheses.joined([found, *parts])).select(slice(len(found.words)))
 
 
 def _read(gray: np.ndarray, dots: Fit, code: Family, expected: frozenset[int]) -> Hypotheses:
