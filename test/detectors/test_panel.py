@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 import pytest
 
-from ahf_ros.detectors import DetectorSettings
+from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.detectors.ring.counting import estimate_count
 from ahf_ros.evaluation import FALSE, evaluate, judge, total
 from ahf_ros.interchange.image_files import read_image
@@ -84,7 +84,7 @@ def test_recall_and_wrong_ids_on_the_panel(panel):
     assert figures.expected == 546
     assert figures.wrong == 0
     assert figures.recall == figures.decoding
-    assert figures.right >= 544  # measured: 544
+    assert figures.right >= 544  # measured: 546
     assert figures.rmse[2] < 0.025  # measured: 0.022 px; the truth is good to 0.02
 
 
@@ -104,6 +104,13 @@ def test_nothing_on_the_panel_is_made_up(panel):
                 errors = predicted(truth, name, target.id) - (target.x, target.y)
                 assert len(errors) >= 2, (name, target)
                 assert np.median(np.linalg.norm(errors, axis=1)) < NEAR, (name, target)
+
+
+def test_words_of_another_number_of_sectors_contest_those_that_are_read():
+    photographs = sorted(PANEL.glob('*.png'))[:3]
+    detect = create_detector('ring', family='aicon12')
+    reported = sum(len(detect(read_image(path))) for path in photographs)
+    assert reported <= 6  # measured: 2; 24 where no other family contests them
 
 
 def test_each_photograph_has_a_line_with_its_size_and_time(panel):
