@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TypeAlias
 
 import numpy as np
@@ -69,14 +70,13 @@ class Pipeline:
         detector: Detector | None = None,
     ) -> None:
         self.settings = settings
-        self._stopping = stopping
         identification = settings.identification
         self._detector = detector or create_detector(
             identification.detector, identification.detection
         )
-        self._identifier = create_identifier(
-            identification, self._detector, interrupt=self._check_running
-        )
+        # No method of this object: with a cycle of references, it would stay in memory for long.
+        interrupt = partial(_check_running, stopping)
+        self._identifier = create_identifier(identification, self._detector, interrupt=interrupt)
 
     def answer(self, message: ImageMessage, expected: int | None = None) -> ImageAnswer:
         """Identify the targets of an image.
@@ -119,6 +119,7 @@ class Pipeline:
         """Forget what worked for earlier images."""
         self._identifier.reset()
 
-    def _check_running(self) -> None:
-        if self._stopping.is_set():
-            raise Refused(STOPPING)
+
+def _check_running(stopping: threading.Event) -> None:
+    if stopping.is_set():
+        raise Refused(STOPPING)

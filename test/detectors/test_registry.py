@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import runpy
+import time
+import weakref
 
 import cv2
 import numpy as np
@@ -20,6 +23,7 @@ from ahf_ros.detectors import (
     detector_name,
     estimator,
 )
+from ahf_ros.detectors.external.guarded import guarded
 from ahf_ros.session import IdentificationSettings, identify
 from support.packages import EXAMPLE, write_package
 
@@ -249,6 +253,29 @@ def test_no_result_of_another_package_gets_past_its_guard(
         registry['create_detector']('mine')(image)
     assert str(raised.value) == message
     assert (image == 9).all()
+
+
+def test_no_image_that_a_detector_failed_on_stays_in_memory():
+    images = []
+
+    class Failing:
+        name = family = 'failing'
+
+        def __call__(self, image):
+            images.append(weakref.ref(image))
+            raise RuntimeError('no')
+
+    gc.collect()
+    gc.disable()
+    try:
+        with pytest.raises(ValueError, match="detector 'failing' failed: RuntimeError: no"):
+            guarded(Failing(), 60.0)(np.zeros((20, 20), np.uint8))
+        limit = time.monotonic() + 60
+        while images[0]() is not None:  # until the thread has ended, too
+            assert time.monotonic() < limit
+            time.sleep(0.01)
+    finally:
+        gc.enable()
 
 
 def test_a_search_ends_when_a_detector_hangs_in_it(tmp_path, monkeypatch):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import threading
+import weakref
 
 import numpy as np
 import pytest
@@ -32,3 +34,17 @@ def test_places_come_from_the_image_as_received():
     assert len(found) == len(truth)
     errors = [(it.x - truth[it.id].x, it.y - truth[it.id].y) for it in found]
     assert np.sqrt(np.mean(np.square(errors)) * 2) < 0.015
+
+
+def test_nothing_of_old_settings_stays_in_memory() -> None:
+    """Cycles of references are collected rarely, and every change of a parameter made one."""
+    gc.collect()
+    gc.disable()
+    try:
+        made = pipeline.Pipeline(assemble(DetectorNodeSettings, {}), threading.Event())
+        made.answer(image_message(np.eye(48, dtype=np.uint8), Header()), 0)
+        before = weakref.ref(made)
+        del made
+        assert before() is None
+    finally:
+        gc.enable()

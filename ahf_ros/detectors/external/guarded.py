@@ -73,18 +73,8 @@ class GuardedDetector:
     def _awaited(self, work: Callable[[], Result]) -> Result:
         """Return the result of work in a thread, within the time limit."""
         outcome: Future[Result] = Future()
-
-        def run() -> None:
-            try:
-                outcome.set_result(work())
-            except ValueError as error:
-                outcome.set_exception(error)
-            except BaseException as error:  # what is returned may raise anything, too
-                failure = ValueError(f'{self._title} failed: {reason_of(error)}')
-                failure.__cause__ = error
-                outcome.set_exception(failure)
-
-        Thread(target=run, name=f'detector {self.name}', daemon=True).start()
+        name = f'detector {self.name}'
+        Thread(target=self._run, args=(work, outcome), name=name, daemon=True).start()
         limit = time.monotonic() + self.timeout
         while not outcome.done() and not ending.has_begun():
             remaining = limit - time.monotonic()
@@ -95,7 +85,23 @@ class GuardedDetector:
             wait([outcome], min(ending.POLL, remaining))
         if not outcome.done():
             raise ValueError(f'{self._title} was ended with this process')
-        return outcome.result()
+        try:
+            return outcome.result()
+        finally:
+            del outcome  # an exception holds this frame: no cycle of references, with images
+
+    def _run(self, work: Callable[[], Result], outcome: Future[Result]) -> None:
+        try:
+            outcome.set_result(work())
+        except ValueError as error:
+            outcome.set_exception(error)
+        except BaseException as error:  # what is returned may raise anything, too
+            failure = ValueError(f'{self._title} failed: {reason_of(error)}')
+            failure.__cause__ = error
+            outcome.set_exception(failure)
+            del failure
+        finally:
+            del outcome
 
     @property
     def _title(self) -> str:
