@@ -1,10 +1,11 @@
 """Hostile input of every kind: what fails is a traceback, a death, or a loss that is not named.
 
 Every area tries as many inputs as its option says, always the same ones, and counts as failed
-whatever does neither succeed nor name what is wrong.
+whatever does neither succeed nor name what is wrong. At the end, the tests run that concern kills,
+signals, programs, limits and files of others. The whole takes half an hour.
 
     python -m benchmarks.attack [--bags 10000] [--results 10000] [--messages 10000]
-                                [--images 10000] [--tests]
+                                [--images 10000] [--no-tests]
 """
 
 from __future__ import annotations
@@ -36,8 +37,17 @@ from support import bags
 
 TESTS = (
     'test/bag/test_bag_damage.py',
+    'test/bag/test_bag_hostile.py',
     'test/cli/test_cli_ending.py',
+    'test/detectors/test_command.py',
+    'test/detectors/test_registry.py',
+    'test/interchange/test_image_headers.py',
+    'test/interchange/test_target_json.py',
+    'test/interchange/test_truth_files.py',
+    'test/nodes/test_nodes_ending.py',
+    'test/nodes/test_nodes_robust.py',
     'test/nodes/test_security.py',
+    'test/test_target_check.py',
 )
 
 
@@ -226,7 +236,9 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     for name in ('bags', 'results', 'messages', 'images'):
         parser.add_argument(f'--{name}', type=int, default=10_000, help='inputs; 0: none')
-    parser.add_argument('--tests', action='store_true', help='run the tests of endings, too')
+    parser.add_argument(
+        '--tests', action=argparse.BooleanOptionalAction, default=True, help='run the tests, too'
+    )
     options = parser.parse_args(arguments)
     print('| area | tried | accepted | failed |\n|---|---|---|---|')
     failed = 0
