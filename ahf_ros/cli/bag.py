@@ -173,3 +173,9 @@ def _report(task: BagTask, outcome: Outcome | ValueError) -> None:
         print(f'ahf bag: {task.source}: missing: {lost}', file=sys.stderr)
     for left_out in outcome.left_out:
         print(f'ahf bag: {task.source}: left out: {left_out}', file=sys.stderr)
+    if outcome.refused or outcome.lost:
+        print(
+            f'ahf bag: {task.target}: what was not accepted or is missing is not tried again; '
+            'to do so, remove this bag or name another one',
+            file=sys.stderr,
+        )

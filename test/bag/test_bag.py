@@ -214,7 +214,9 @@ def test_what_is_refused_is_named_and_the_others_go_on(
     source = bags.write_ros2(tmp_path / 'in', messages)
     for _ in range(2):  # the second run finds it done, and says the same
         assert status(source, tmp_path / 'out') == 1
-        assert '4 images answered, 2 of them not accepted' in capfd.readouterr().err
+        errors = capfd.readouterr().err
+        assert '4 images answered, 2 of them not accepted' in errors
+        assert 'is not tried again; to do so, remove this bag or name another one' in errors
     assert status(source, tmp_path / 'new') == 1
     errors = capfd.readouterr().err
     assert "/image at 1700000000.000000002 s: encoding is 'unheard of', accepted is" in errors
