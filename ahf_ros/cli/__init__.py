@@ -17,6 +17,9 @@ from types import FrameType
 
 INTERRUPTED, FAILED = 130, 1
 
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+"""Signals that end a process; the last one unless nohup has it ignored."""
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command.
@@ -58,19 +61,24 @@ def _ending_programs() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield  # signals come to the main thread
         return
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    for number in before:
+    before = {number: signal.getsignal(number) for number in ENDING}
+    ignored = before[signal.SIGHUP] == signal.SIG_IGN
+    heeded = ENDING[:-1] if ignored else ENDING
+    for number in heeded:
         signal.signal(number, _end)
     try:
         yield
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        for number in heeded:
+            if signal.getsignal(number) is _end:
+                signal.signal(number, before[number])
 
 
 def _end(number: int, _: FrameType | None) -> None:
     from ahf_ros.detectors.external.program import end_programs
 
+    for each in ENDING:  # the second one of a pair interrupts nothing
+        signal.signal(each, signal.SIG_IGN)
     end_programs()
     if number == signal.SIGINT:
         raise KeyboardInterrupt

@@ -79,7 +79,8 @@ def _begin(reports: Any, alive: Connection) -> None:
     """Prepare a worker: it ends in order by a signal, and as soon as its parent is gone."""
     global _reports
     _reports = reports
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent gets it, too, and ends
+    for number in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)  # the parent gets it, too, and ends
     signal.signal(signal.SIGTERM, _end)
     threading.Thread(target=_watch, args=(alive,), daemon=True).start()
 

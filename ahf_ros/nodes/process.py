@@ -117,7 +117,7 @@ class ProcessNode(Node):
 
 
 def run(make_node: Callable[[], ProcessNode], arguments: list[str] | None = None) -> int:
-    """Run a node until it ends itself or receives SIGINT or SIGTERM.
+    """Run a node until it ends itself or receives one of `signals.ENDING`.
 
     Parameters
     ----------

@@ -7,8 +7,8 @@ import select
 import signal
 from functools import cache
 
-ENDING = (signal.SIGINT, signal.SIGTERM)
-"""Signals that end a node."""
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+"""Signals that end a node; the last one unless nohup has it ignored."""
 
 
 @cache
@@ -21,7 +21,8 @@ def signalled() -> int:
     readable, written = os.pipe()
     os.set_blocking(written, False)
     signal.set_wakeup_fd(written)
-    for number in ENDING:
+    ignored = signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+    for number in ENDING[:-1] if ignored else ENDING:
         signal.signal(number, lambda *_: None)
     return readable
 

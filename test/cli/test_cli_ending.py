@@ -29,7 +29,11 @@ SLOW = 'import pathlib, sys, time; pathlib.Path({mark!r}).touch(); time.sleep(60
 
 def start(*arguments: object, **options: object) -> subprocess.Popen[bytes]:
     command = [sys.executable, '-m', 'ahf_ros.cli', *map(str, arguments)]
-    return subprocess.Popen(command, cwd=ROOT, **options)  # type: ignore[call-overload,no-any-return]
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)  # also where the tests run with nohup
+    try:
+        return subprocess.Popen(command, cwd=ROOT, **options)  # type: ignore[call-overload,no-any-return]
+    finally:
+        signal.signal(signal.SIGHUP, before)
 
 
 def wait_for(condition: object) -> None:
@@ -69,7 +73,12 @@ def slow_command(tmp_path: Path) -> tuple[str, Path]:
 
 
 @pytest.mark.parametrize(
-    ('number', 'status'), [(signal.SIGINT, 130), (signal.SIGTERM, 128 + signal.SIGTERM)]
+    ('number', 'status'),
+    [
+        (signal.SIGINT, 130),
+        (signal.SIGTERM, 128 + signal.SIGTERM),
+        (signal.SIGHUP, 128 + signal.SIGHUP),
+    ],
 )
 def test_a_signal_ends_the_command_and_its_files(
     tmp_path: Path, number: signal.Signals, status: int
@@ -83,10 +92,10 @@ def test_a_signal_ends_the_command_and_its_files(
         stderr=subprocess.PIPE, env={**os.environ, 'TMPDIR': str(tmp_path / 'scratch')},
     )  # fmt: skip
     wait_for(mark.exists)
-    sent = time.monotonic()
-    process.send_signal(number)
+    for _ in range(2):  # a terminal and a launcher both send one
+        process.send_signal(number)
+        time.sleep(0.005)
     errors = process.communicate(timeout=LIMIT)[1]
-    assert time.monotonic() - sent < LIMIT
     assert process.returncode == status, errors
     assert b'Traceback' not in errors
     wait_for(lambda: not running(tmp_path / 'slow.py'))

@@ -32,6 +32,7 @@ class Signalling:
         if name == 'rclpy':
             os.kill(os.getpid(), signal.{number})
 
+signal.signal(signal.{number}, signal.SIG_DFL)  # also where the tests run with nohup
 sys.meta_path.insert(0, Signalling())
 sys.exit(start({node!r}))
 """
@@ -49,7 +50,9 @@ def run(*command: str, **environment: str) -> tuple[int, str]:
     return done.returncode, done.stderr
 
 
-@pytest.mark.parametrize(('node', 'number'), [('detector', 'SIGINT'), ('demo', 'SIGTERM')])
+@pytest.mark.parametrize(
+    ('node', 'number'), [('detector', 'SIGINT'), ('demo', 'SIGTERM'), ('detector', 'SIGHUP')]
+)
 def test_a_signal_during_the_imports_ends_in_order(node: str, number: str) -> None:
     assert node in NODES
     assert run('-c', SIGNALLED.format(node=node, number=number)) == (0, '')
