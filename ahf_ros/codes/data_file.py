@@ -118,6 +118,8 @@ def read_data_file(path: str | Path) -> Entry:
         If the file cannot be read or is neither, naming the line.
     """
     source = str(path)
+    if Path(path).exists() and not Path(path).is_file():
+        raise ValueError(f'{source} cannot be read: it is not a regular file')
     try:
         with Path(path).open('rb') as stream:
             content = stream.read(_LARGEST_FILE + 1)
@@ -135,7 +137,24 @@ def read_data_file(path: str | Path) -> Entry:
         raise ValueError(f'{source}, line {line}: {problem}; accepted is JSON or YAML') from error
     except (YAMLError, ValueError, RecursionError) as error:
         raise ValueError(f'{source} is neither JSON nor YAML: {error}') from error
+    _refuse_aliases(source, value)
     return Entry(source, '', 1, value)
+
+
+def _refuse_aliases(source: str, value: Any) -> None:
+    """Refuse YAML that holds a part twice: written out, it may be of any size."""
+    seen: set[int] = set()
+    waiting = [value]
+    while waiting:
+        item = waiting.pop()
+        if isinstance(item, (CommentedMap, CommentedSeq)):
+            if id(item) in seen:
+                raise ValueError(
+                    f'{source}, line {item.lc.line + 1}: an alias stands for this part elsewhere, '
+                    'accepted are data without aliases'
+                )
+            seen.add(id(item))
+            waiting += item.values() if isinstance(item, CommentedMap) else item
 
 
 def _plain(value: Any) -> Any:

@@ -155,7 +155,9 @@ class DetectorSettings:
         form=ACCEPTED,
     )
     family_file: str = parameter(
-        '', 'Data file that describes the family gsi or dots; empty: the usual design.'
+        '',
+        'Data file that describes the family gsi or dots; empty: the usual design.',
+        read_only=True,
     )
     polarity: str = parameter(
         'auto', 'Colour of the dot: dark on bright, bright on dark, or either.', choices=POLARITIES

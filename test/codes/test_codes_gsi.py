@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from itertools import combinations
 from pathlib import Path
 
@@ -172,6 +173,18 @@ def test_two_codes_of_one_number_and_broken_files_name_their_line(tmp_path: Path
     (tmp_path / 'bytes.json').write_bytes(b'\xff\xfe\x00')
     with pytest.raises(ValueError, match=r'bytes\.json cannot be read'):
         point_family(str(tmp_path / 'bytes.json'))
+
+
+def test_files_that_never_end_are_refused(tmp_path: Path) -> None:
+    lines = ['a0: &a0 [1, 2]']
+    lines += [f'a{n}: &a{n} [{", ".join([f"*a{n - 1}"] * 9)}]' for n in range(1, 30)]
+    (tmp_path / 'bomb.yaml').write_text('\n'.join(lines))
+    with pytest.raises(ValueError, match=r'bomb\.yaml, line \d+: an alias stands for this part'):
+        point_family(str(tmp_path / 'bomb.yaml'))
+    os.mkfifo(tmp_path / 'queue.yaml')
+    for path in (tmp_path / 'queue.yaml', Path('/dev/zero')):
+        with pytest.raises(ValueError, match=rf'{path} cannot be read: it is not a regular file'):
+            point_family(str(path))
 
 
 def test_dots_on_one_line_are_no_template(tmp_path: Path) -> None:

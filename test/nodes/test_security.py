@@ -35,7 +35,9 @@ def set_parameter(graph: Any, node: str, name: str, value: object) -> Any:
     return graph.call(SetParameters, f'{node}/set_parameters', request).results[0]
 
 
-def test_programs_cannot_be_started_on_a_running_node(graph: Any, tmp_path: Path) -> None:
+def test_programs_cannot_be_started_nor_files_read_on_a_running_node(
+    graph: Any, tmp_path: Path
+) -> None:
     graph.start('detector', '-r', '__ns:=/safe', *overrides(allow_programs='true'))
     mark = tmp_path / 'mark'
     for name, value in (
@@ -43,6 +45,7 @@ def test_programs_cannot_be_started_on_a_running_node(graph: Any, tmp_path: Path
         ('detector', 'command'),
         ('service', '/other/identify'),
         ('allow_programs', False),
+        ('family_file', '/etc/hostname'),
     ):
         result = set_parameter(graph, '/safe/detector', name, value)
         assert not result.successful
