@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from ahf_ros.nodes.settings import DetectorNodeSettings
 from ahf_ros.settings.nested import flat_parameters
 from ahf_ros.settings.parameter import Parameter
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
+from benchmarks.disturbances import TABLES, Count, markdown
 
 ROOT = Path(__file__).resolve().parent.parent
 AMBIENT = ('0.3', '0.12', '0.04')
@@ -69,6 +71,16 @@ def others() -> str:
     return table(rows)
 
 
+def disturbed(name: str, file: str = 'disturbances') -> str:
+    """Return one of the tables of `benchmarks.disturbances`."""
+    report = json.loads((ROOT / 'docs' / 'figures' / f'{file}.json').read_text())
+    counts = {
+        row: {column: Count(**of) for column, of in cells.items()}
+        for row, cells in report[name].items()
+    }
+    return markdown(name, counts) + '\n'
+
+
 def read(name: str) -> dict[tuple[str, str], dict[str, Any]]:
     """Return the rows of a benchmark by group and name."""
     report = json.loads((ROOT / 'docs' / 'figures' / f'{name}.json').read_text())
@@ -94,6 +106,12 @@ PAGES: dict[str, dict[str, Callable[[], str]]] = {
     'README.md': {'summary': summary},
     'docs/parameters.md': {'parameters': parameters},
     'docs/figures.md': {'lights': lights, 'others': others},
+    'docs/figures/disturbances.md': {
+        **{name: partial(disturbed, name) for name in TABLES},
+        'other families': partial(disturbed, 'disturbances', 'disturbances_families'),
+        'square markers': partial(disturbed, 'disturbances', 'disturbances_square'),
+        'traditional': partial(disturbed, 'disturbances', 'disturbances_traditional'),
+    },
 }
 """The tables of each page."""
 
