@@ -48,17 +48,42 @@ def circle_steps(
     inside : ndarray of bool, shape (n,)
         Whether all of the circle lies in the image.
     """
+    sides, inside = circle_sides(log, frames, aside)
+    return sides[..., 1] - sides[..., 0], inside
+
+
+def circle_sides(
+    log: np.ndarray, frames: np.ndarray, aside: float | np.ndarray = PIXELS_ASIDE
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return ln(I + 8) at the inside of circles and at their outside, along rays.
+
+    Parameters
+    ----------
+    log : ndarray of int16, shape (height, width)
+        LOG_SCALE ln(I + 8).
+    frames : ndarray of float64, shape (n, 3, 3)
+        Of the circles.
+    aside : float or ndarray of float, shape (n,)
+        Distance of the samples from the circle, px of the minor axis.
+
+    Returns
+    -------
+    sides : ndarray of float64, shape (n, m, 2)
+        The inside, then the outside.
+    inside : ndarray of bool, shape (n,)
+        Whether all of the circle lies in the image.
+    """
     count = max(_PART // (2 * _RAYS), 1)
     aside = np.broadcast_to(aside, len(frames))
     parts = [
-        _steps(log, frames[start : start + count], aside[start : start + count])
+        _sides(log, frames[start : start + count], aside[start : start + count])
         for start in range(0, max(len(frames), 1), count)
     ]
-    steps, inside = (np.concatenate(part) for part in zip(*parts, strict=True))
-    return steps, inside
+    sides, inside = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return sides, inside
 
 
-def _steps(
+def _sides(
     log: np.ndarray, frames: np.ndarray, aside: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     aside = np.clip(aside / ellipse_axes(frames)[1], *_ASIDE)
@@ -66,10 +91,12 @@ def _steps(
     pixels = project(frames, circle_points(_ANGLES, radii))
     values = sample(log, pixels).astype(np.float64) / LOG_SCALE
     inside = np.asarray(within(pixels, log.shape).all(axis=(1, 2)))
-    return values[..., 1] - values[..., 0], inside
+    return values, inside
 
 
-def dot_evidence(steps: np.ndarray, frames: np.ndarray) -> np.ndarray:
+def dot_evidence(
+    steps: np.ndarray, frames: np.ndarray, noise: float | np.ndarray = 0.0
+) -> np.ndarray:
     """Return ln of the likelihood of a dot over that of none.
 
     Parameters
@@ -78,24 +105,38 @@ def dot_evidence(steps: np.ndarray, frames: np.ndarray) -> np.ndarray:
         From the dot to its ground, in the usual step of such dots.
     frames : ndarray of float64, shape (..., 3, 3)
         Of the dots; rays round a small dot tell less than so many independent ones.
+    noise : float or ndarray of float64, shape (..., m)
+        Standard deviation of the steps by noise, in the unit of `steps`.
 
     Returns
     -------
     ndarray of float64, shape (...)
     """
-    length = 2 * np.pi * np.sqrt(np.abs(np.linalg.det(frames[..., :2, :2])))
-    share = np.clip(length / _CORRELATION, 4, _RAYS) / _RAYS
-    evidence: np.ndarray = share * _log_ratio(steps).sum(axis=-1)
+    evidence: np.ndarray = independent_rays(frames) * _log_ratio(steps, noise).sum(axis=-1)
     return evidence
 
 
-def _log_ratio(steps: np.ndarray) -> np.ndarray:
+def independent_rays(frames: np.ndarray) -> np.ndarray:
+    """Return the share of the rays round dots that count as independent, shape (...).
+
+    Parameters
+    ----------
+    frames : ndarray of float64, shape (..., 3, 3)
+    """
+    length = 2 * np.pi * np.sqrt(np.abs(np.linalg.det(frames[..., :2, :2])))
+    share: np.ndarray = np.clip(length / _CORRELATION, 4, _RAYS) / _RAYS
+    return share
+
+
+def _log_ratio(steps: np.ndarray, noise: float | np.ndarray) -> np.ndarray:
     """Return ln of the likelihood of steps at a dot over that where there is none."""
-    below, above = _DOT_SPREAD
+    below, above, empty = (
+        np.hypot(spread, noise) for spread in (*_DOT_SPREAD, _EMPTY_SPREAD)
+    )
     spread = np.where(steps < 1, below, above)
     height = 2 / (np.sqrt(2 * np.pi) * (below + above))
     dot = height * np.exp(-0.5 * ((steps - 1) / spread) ** 2)
-    none = np.exp(-0.5 * (steps / _EMPTY_SPREAD) ** 2) / (np.sqrt(2 * np.pi) * _EMPTY_SPREAD)
+    none = np.exp(-0.5 * (steps / empty) ** 2) / (np.sqrt(2 * np.pi) * empty)
     floor = _FLOOR / _RANGE
     ratio: np.ndarray = np.log(((1 - _FLOOR) * dot + floor) / ((1 - _FLOOR) * none + floor))
     return ratio

@@ -26,6 +26,7 @@ _NEAR = np.ones((2 * _REACH + 1, 2 * _REACH + 1), np.uint8)
 _BLUR = 0.15  # px^2, variance that blur adds to a dot that is cut off at half of its height
 _MINIMUM_MINOR = 0.6  # px
 _MINIMUM_PIXELS = 4
+_WIDENED = 1.5  # px, of the radius of a dot by blur
 _FILLED = (0.7, 1.35)  # pixels of a dot over the area of its ellipse
 _TILE = 32  # side of the tiles of which empty ones are left out, px
 _MOST_TILES = 0.3  # of the image; where there are more, it is looked at as a whole
@@ -83,82 +84,79 @@ def small_dots(
 def _blobs(height: np.ndarray, min_radius: float, max_radius: float, polarity: int) -> Dots:
     """Return the blobs of an image of steps that have the shape of a dot."""
     least = _MINIMUM_STEP / _LN_RANGE * 255
-    x, y, label, stats = _connected(height, least, _LEVELS[polarity])
-    count = len(stats)
-    longest = stats[:, cv2.CC_STAT_WIDTH : cv2.CC_STAT_HEIGHT + 1].max(axis=1)
-    area = stats[:, cv2.CC_STAT_AREA]
-    usable = (area >= _MINIMUM_PIXELS) & (longest <= 2 * max_radius + 3)
-    usable &= longest >= 2 * min_radius - 2
-    if not usable.any():
+    largest = _FILLED[1] * np.pi * (max_radius + _WIDENED) ** 2
+    x, y, size = _connected(height, least, _LEVELS[polarity], largest)
+    if not len(size):
         return Dots(np.zeros((0, 3, 3)), np.zeros(0, int), np.zeros(0))
-    kept = usable[label]
-    x, y, label = x[kept].astype(np.float64), y[kept].astype(np.float64), label[kept]
-    peak = np.zeros(count)
-    np.maximum.at(peak, label, height[y.astype(int), x.astype(int)])
-    size = np.maximum(np.bincount(label, minlength=count), 1)
+    start = np.cumsum(size) - size
+    peak = np.maximum.reduceat(height[y, x], start)
+    x, y = x.astype(np.float64), y.astype(np.float64)
+    longest = 1 + np.maximum(
+        np.maximum.reduceat(x, start) - np.minimum.reduceat(x, start), y[start + size - 1] - y[start]
+    )
 
     def mean(values: np.ndarray) -> np.ndarray:
-        means: np.ndarray = np.bincount(label, values, minlength=count) / size
+        means: np.ndarray = np.add.reduceat(values, start) / size
         return means
 
     centre_x, centre_y = mean(x), mean(y)
-    x, y = x - centre_x[label], y - centre_y[label]
+    x, y = x - np.repeat(centre_x, size), y - np.repeat(centre_y, size)
     xx, xy, yy = mean(x * x), mean(x * y), mean(y * y)
     middle, half = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
     ellipse = np.pi * 4 * np.sqrt(np.maximum(xx * yy - xy * xy, 0))
     filled = size / np.maximum(ellipse, 1e-9)
     major = 2 * np.sqrt(np.maximum(middle + half - _BLUR, 0))
     minor = 2 * np.sqrt(np.maximum(middle - half - _BLUR, (_MINIMUM_MINOR / 2) ** 2))
-    good = usable & (major >= min_radius) & (major <= max_radius) & (peak >= least)
+    good = (longest >= 2 * min_radius - 2) & (longest <= 2 * max_radius + 3) & (peak >= least)
+    good &= (major >= min_radius) & (major <= max_radius)
     good &= (ellipse > 0) & (filled < _FILLED[1]) & (filled > _FILLED[0])
-    which = best(np.flatnonzero(good), -peak[good], MAXIMUM_BLOBS, 'small dots')
+    which = best(np.flatnonzero(good), -peak[good].astype(float), MAXIMUM_BLOBS, 'small dots')
     frames = affine_frames(centre_x, centre_y, major, minor, np.arctan2(xy, (xx - yy) / 2) / 2)
     return Dots(frames[which], np.full(len(which), polarity), np.ones(len(which)))
 
 
 def _connected(
-    height: np.ndarray, least: float, share: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return columns, rows and labels of the pixels of all blobs, and OpenCV's table of these."""
-    found = []
-    total = 0
-    for top, left, part, own in _parts(height, int(share * least)):
+    height: np.ndarray, least: float, share: float, largest: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return columns and rows of the pixels of all blobs, blob by blob, and how many each has."""
+    none = np.zeros(0, np.int32)
+    found = [(none, none, none)]
+    for top, left, part, own in _parts(height, least):
         level = cv2.convertScaleAbs(
             np.maximum(cv2.dilate(part, _NEAR), np.uint8(least)), alpha=share
         )
         mask = cv2.compare(part, level, cv2.CMP_GT)
         if own is not None:
             mask = cv2.bitwise_and(mask, own)
-        # The default algorithm of OpenCV 4.5 crashes on large images with this connectivity.
-        _, labels, stats, _ = cv2.connectedComponentsWithStatsWithAlgorithm(
-            mask, 4, cv2.CV_32S, cv2.CCL_SAUF
-        )
         pixels = cv2.findNonZero(mask)
-        if pixels is not None:
-            x, y = pixels.reshape(-1, 2).T
-            found.append((x + left, y + top, labels[y, x] + (total - 1), stats[1:]))
-            total += len(stats) - 1
-    nothing = np.zeros(0, np.int32)
-    found.append((nothing, nothing, nothing, np.zeros((0, 5), np.int32)))
-    x, y, label, stats = (np.concatenate(column) for column in zip(*found, strict=True))
-    return x, y, label, stats
+        if pixels is None:
+            continue
+        # The default algorithm of OpenCV 4.5 crashes on large images with this connectivity.
+        _, labels = cv2.connectedComponentsWithAlgorithm(mask, 4, cv2.CV_32S, cv2.CCL_SAUF)
+        x, y = pixels.reshape(-1, 2).T
+        label = labels[y, x]
+        size = np.bincount(label)
+        size[(size < _MINIMUM_PIXELS) | (size > largest)] = 0
+        kept = np.flatnonzero(size[label])
+        order = kept[np.argsort(label[kept], kind='stable')]
+        found.append((x[order] + left, y[order] + top, size[size > 0].astype(np.int32)))
+    x, y, size = (np.concatenate(column) for column in zip(*found, strict=True))
+    return x, y, size
 
 
 def _parts(
-    height: np.ndarray, above: int
+    height: np.ndarray, least: float
 ) -> Iterator[tuple[int, int, np.ndarray, np.ndarray | None]]:
-    """Yield the parts of an image that hold its pixels above a value, connected ones in one.
+    """Yield the parts of an image that hold blobs with a pixel of a value, connected ones in one.
 
     Each comes with its first row and column, and a mask of what in it is not in another part; the
     image as a whole where that is not much more. A margin is as wide as `_NEAR` reaches.
     """
-    mask = cv2.threshold(height, above, 255, cv2.THRESH_BINARY)[1]
-    if not mask.any():
-        return
-    pixels = cv2.findNonZero(mask)
-    tiles = np.zeros([-(-side // _TILE) for side in height.shape], np.uint8)
-    x, y = pixels.reshape(-1, 2).T
-    tiles[y // _TILE, x // _TILE] = 1
+    tall, wide = (-(-side // _TILE) for side in height.shape)
+    margins = (0, tall * _TILE - height.shape[0], 0, wide * _TILE - height.shape[1])
+    padded = cv2.copyMakeBorder(height, *margins, cv2.BORDER_CONSTANT)
+    highest = padded.reshape(tall, _TILE, -1).max(axis=1).reshape(tall, wide, _TILE).max(axis=2)
+    tiles = cv2.dilate((highest >= least).astype(np.uint8), np.ones((3, 3), np.uint8))
     count, labels, stats, _ = cv2.connectedComponentsWithStats(tiles)
     extents = stats[1:, cv2.CC_STAT_WIDTH] * stats[1:, cv2.CC_STAT_HEIGHT]
     if extents.sum() > _MOST_TILES * tiles.size:

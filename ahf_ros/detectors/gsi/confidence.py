@@ -20,6 +20,9 @@ from ahf_ros.features.logistic import logistic, read_weights
 WEIGHTS = Path(__file__).with_name('fitted_weights.json')
 """The data file."""
 
+FEATURES = 7
+"""What the probability depends on, see `confidence_features`."""
+
 _GROWTH = (0.03, 0.4, 0.15)  # that is usual: of any dot, of the minor axis in px, of its 4th power
 _EXCESS = 0.02  # of growth, that counts as 1
 _SHARE = 0.8  # of dots whose edges are found, from which on no more are asked for

@@ -26,6 +26,7 @@ from ahf_ros.detectors.gsi.hypotheses import (
     OBVIOUS,
     Hypotheses,
     inside,
+    no_hypotheses,
     plausible,
     resolve,
 )
@@ -157,12 +158,18 @@ def read_targets(pyramid: ImagePyramid, dots: Dots, code: PointFamily, rivals: b
         As for `plausible`.
     """
     templates = find_templates(dots, code)
+    if not len(templates.homographies):
+        return no_hypotheses()
     evidence = find_evidence(pyramid.logs[0], templates.homographies, templates.polarity, code)
     readings = read_codes(evidence, code)
     which = plausible(templates, readings, code, rivals)
+    if not len(which):
+        return no_hypotheses()
     some, words = templates.select(which), readings.words[which]
     first = _placed(pyramid, some.homographies, some.polarity, words, code)
     again = np.flatnonzero(first.words != words)
+    if not len(again):
+        return first
     second = _placed(
         pyramid, first.homographies[again], some.polarity[again], first.words[again], code
     )

@@ -1,6 +1,7 @@
 """Evidence for and against a dot at each place of a target.
 
-The usual step of ln I is that of its template dots.
+The template dots tell how dark ink is beside paper. Where little light falls, ln(I + 8) has smaller
+steps than that; the brighter side of an edge tells how small, and noise counts for more.
 """
 
 from __future__ import annotations
@@ -11,10 +12,25 @@ import numpy as np
 
 from ahf_ros.codes.gsi import PointFamily
 from ahf_ros.features.array_record import ArrayRecord
-from ahf_ros.features.dot_evidence import circle_steps, dot_evidence
+from ahf_ros.features.dot_evidence import circle_sides, dot_evidence, independent_rays
+from ahf_ros.features.frame import ellipse_axes
 from ahf_ros.features.homography import local_frames
+from ahf_ros.features.robust import median
+from ahf_ros.imaging.logarithm import LOG_OFFSET
 
 _FAINTEST = 0.12  # step of ln of a dot
+_SMALLEST = 0.02  # the same where there is hardly any light
+_NOISE = 0.08  # of a step of ln, standard deviation
+_BIN = 0.06  # of ln(I + 8), of the levels of ink and paper
+_BINS = int(np.ceil(np.log(263 / 8) / _BIN)) + 1
+_SPREAD = 0.1  # of a level, standard deviation
+_FLOOR = 0.05  # density of levels that no template dot shows
+_SHARE = 0.3  # of rays, whose inner ends tell something of their own
+_FARTHER = 0.4  # distance from the edge of a dot of more samples of its levels, dot radii
+
+_DISTANCE = _BIN * np.subtract.outer(np.arange(_BINS), np.arange(_BINS))
+_SMOOTHING = np.exp(-0.5 * (_DISTANCE / _SPREAD) ** 2)
+_SMOOTHING /= _SMOOTHING.sum(axis=1, keepdims=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +44,7 @@ class Evidence(ArrayRecord):
     inside : ndarray of bool, shape (k, m)
         Whether it is.
     step : ndarray of float64, shape (k,)
-        Usual step of ln of the template dots, from the ground to the dot.
+        Usual step of ln of the template dots in the light, from the ground to the dot.
     """
 
     ratio: np.ndarray
@@ -49,12 +65,49 @@ def find_evidence(
     polarity : ndarray of int, shape (k,)
     family : PointFamily
     """
-    shape = (len(homographies), len(family.places))
+    shape, count = (len(homographies), len(family.places)), len(family.template)
     frames = local_frames(homographies, family.places, family.radii)
-    steps, inside = circle_steps(log, frames.reshape(-1, 3, 3))
-    steps = steps.reshape(*shape, steps.shape[1]) * polarity[:, None, None]
-    template = np.median(steps[:, : len(family.template)], axis=2)
-    usual = np.median(template, axis=1)
-    relative = steps / np.maximum(usual, _FAINTEST)[:, None, None]
-    inside = inside.reshape(shape)
-    return Evidence(np.where(inside, dot_evidence(relative, frames), 0.0), inside, usual)
+    sides, inside = circle_sides(log, frames.reshape(-1, 3, 3))
+    sides, inside = sides.reshape(*shape, *sides.shape[1:]), inside.reshape(shape)
+    steps = (sides[..., 1] - sides[..., 0]) * polarity[:, None, None]
+    brighter = np.maximum(np.exp(sides.max(axis=3)) - LOG_OFFSET, 0.0)
+    usual, light = (it[:, :count].reshape(len(steps), count * steps.shape[2]) for it in (steps, brighter))
+    lit = light >= np.median(light, axis=1, keepdims=True)
+    usual = median(usual, lit, 0.0)
+    light = np.maximum(median(light, lit, 0.0), 1.0)
+    ink = ((light + LOG_OFFSET) * np.exp(-np.maximum(usual, _FAINTEST)) - LOG_OFFSET) / light
+    ink = np.clip(ink, 0.0, np.exp(-_FAINTEST))[:, None, None]
+    expected = np.log((brighter + LOG_OFFSET) / (ink * brighter + LOG_OFFSET))
+    expected = np.maximum(expected, _SMALLEST)
+    ratio = dot_evidence(steps / expected, frames, _NOISE / expected)
+    single = frames.reshape(-1, 3, 3)
+    farther, _ = circle_sides(log, single, _FARTHER * ellipse_axes(single)[1])
+    levels = np.concatenate([sides, farther.reshape(sides.shape)], axis=2)
+    ratio[:, count:] += _level_evidence(levels, frames, count)
+    return Evidence(np.where(inside, ratio, 0.0), inside, usual)
+
+
+def _level_evidence(sides: np.ndarray, frames: np.ndarray, count: int) -> np.ndarray:
+    """Return the evidence for dots at positions from the levels of ink and paper.
+
+    Projected light has few levels: paper without light has another one than ink in the light.
+    """
+    ink, paper = (_densities(sides[:, :count, :, side]) for side in (0, 1))
+    ratio = np.log((ink + _FLOOR) / (paper + _FLOOR))
+    bins = _bins(sides[:, count:, :, 0])
+    rows = np.arange(len(sides))[:, None, None]
+    return _SHARE * independent_rays(frames[:, count:]) * ratio[rows, bins].sum(axis=2)
+
+
+def _bins(values: np.ndarray) -> np.ndarray:
+    """Return the numbers of the bins of values of ln(I + 8)."""
+    bins = ((values - np.log(LOG_OFFSET)) / _BIN).astype(int)
+    return np.clip(bins, 0, _BINS - 1)
+
+
+def _densities(values: np.ndarray) -> np.ndarray:
+    """Return the densities of the values of each of k targets, smoothed, shape (k, bins)."""
+    bins = _bins(values.reshape(len(values), int(np.prod(values.shape[1:])))) + _BINS * np.arange(len(values))[:, None]
+    counts = np.bincount(bins.ravel(), minlength=_BINS * len(values)).reshape(-1, _BINS)
+    densities: np.ndarray = counts @ _SMOOTHING / (bins.shape[1] * _BIN)
+    return densities

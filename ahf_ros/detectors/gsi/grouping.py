@@ -8,7 +8,9 @@ these two predict it. Three dots give an affine map, which predicts the others w
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache, partial
 from itertools import pairwise
 
 import numpy as np
@@ -18,7 +20,7 @@ from ahf_ros.detectors.gsi.pairs import PART, Pairs, neighbours
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.dots import Dots
-from ahf_ros.features.homography import fit_homographies
+from ahf_ros.features.homography import fit_homographies, local_frames
 from ahf_ros.features.nearest_dots import NearestDots
 
 _LENGTH_ERROR = (0.35, 0.7)  # of a distance in units of an ellipse: share of it, and dot radii
@@ -31,6 +33,7 @@ _RESIDUAL = 0.35  # of the dots of a template about a homography, root mean squa
 _PIXELS = 0.35  # the same, px, which counts where dots are small
 _MAXIMUM_GROUPS = 2000  # of one part, for a homography to be fitted
 _MAXIMUM_TEMPLATES = 2000  # of one polarity, those that fit best
+_STRAY = 3  # dots at the positions of a target that do not belong to it
 _FEW = 600  # dots, up to which all template dots are tried in all roles
 
 
@@ -81,14 +84,14 @@ def find_templates(dots: Dots, family: PointFamily) -> Templates:
         few = len(centres) <= _FEW
         triples = _triples(places, family.reference, few)
         error = _LENGTH_ERROR if few else _LENGTH_ERROR_OF_MANY
-        pairs, nearest = (
-            neighbours(part, family, triples, error),
-            NearestDots.of(centres, smallest / 3),
-        )
+        pairs = neighbours(part, family, triples, error)
+        nearest = cache(partial(NearestDots.of, centres, smallest / 3))
         templates = [_nothing(len(places))]
         for triple in triples:
             members = _members(part, pairs, nearest, family, triple)
-            templates.append(_fitted(part, members, family, polarity))
+            if len(members):
+                fitted = _fitted(part, members, family, polarity)
+                templates.append(fitted.select(_mostly_empty(fitted, nearest(), family)))
         best = _distinct(Templates.joined(templates))
         members = np.where(best.members < 0, -1, of_polarity[best.members])
         found.append(replace(best, members=members))
@@ -120,7 +123,7 @@ def _nothing(count: int) -> Templates:
 def _members(
     dots: Dots,
     pairs: Pairs,
-    nearest: NearestDots,
+    nearest: Callable[[], NearestDots],
     family: PointFamily,
     triple: tuple[int, int, int],
 ) -> np.ndarray:
@@ -142,13 +145,15 @@ def _members(
         base = dots.frames[members[:, role], :2, :2] @ [[1, 0], [0, -1]]
         affine = base @ affine  # px a dot radius
         good = _bears_out(dots, members[:, (role, partner, third)], affine)
+        if not good.any():
+            continue
         members, affine = members[good], affine[good]
         origin = dots.frames[members[:, role], :2, 2]
         error = np.zeros(len(members))
         for index in np.setdiff1d(np.arange(len(places)), (role, partner, third)):
             expected = origin + affine @ arms[index]
             reach = _PREDICTED + _PERSPECTIVE * lengths[index]
-            members[:, index], gap = nearest.within(expected, affine, reach)
+            members[:, index], gap = nearest().within(expected, affine, reach)
             error += np.where(members[:, index] < 0, 1, (gap / reach) ** 2)
         members[(members < 0).sum(axis=1) > 1] = -1
         kept = np.argsort(error, kind='stable')[:_MAXIMUM_GROUPS]
@@ -225,9 +230,23 @@ def _fitted(dots: Dots, members: np.ndarray, family: PointFamily, polarity: int)
     allowed = np.maximum(_RESIDUAL * minor[members], _PIXELS)
     relative = np.where(there, squares / allowed**2, 1.0)
     misfit = np.sqrt(relative.mean(axis=1))
-    good = (misfit < 1) & (np.linalg.det(fit.homographies[:, :2, :2]) < 0)  # y is up, then down
+    good = (misfit < 1) & (np.linalg.det(fit.homographies) < 0)  # y is up, then down
     templates = Templates(fit.homographies, members, np.full(len(members), polarity), misfit)
     return templates.select(good)
+
+
+def _mostly_empty(
+    templates: Templates, nearest: NearestDots, family: PointFamily
+) -> np.ndarray:
+    """Return where not many more positions than those of a code have a dot nearby."""
+    count = len(family.template)
+    frames = local_frames(templates.homographies, family.places[count:], family.radii[count:])
+    single = frames.reshape(-1, 3, 3)
+    found, _ = nearest.within(single[:, :2, 2], single[:, :2, :2], 1.0)
+    found = np.sort(found.reshape(frames.shape[:2]), axis=1)
+    different = (np.diff(found, axis=1, prepend=-1) > 0).sum(axis=1)
+    empty: np.ndarray = different <= family.rule.dots + _STRAY
+    return empty
 
 
 def _distinct(templates: Templates) -> Templates:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ahf_ros.codes.gsi import PointFamily
-from ahf_ros.detectors.gsi.confidence import probability
+from ahf_ros.detectors.gsi.confidence import FEATURES, probability
 from ahf_ros.detectors.gsi.grouping import Templates
 from ahf_ros.detectors.gsi.reading import Readings
 from ahf_ros.features.array_record import ArrayRecord
@@ -23,6 +23,8 @@ _PLAUSIBLE = 0.75  # support of a hypothesis that is followed up
 _MAXIMUM = 250  # hypotheses that are followed up, those with the most support
 _MISFIT = 0.1  # support that a misfit of 1 of the template costs in the order of these
 _EQUAL = 1.0  # distance of the reference points of equal hypotheses, dot radii
+_APART = 0.8  # distance of the reference points of different targets, in their reach
+_CLEARLY = 0.12  # support by which the better one of two groups that lie closer is better
 _SAME = 0.4  # distance of the reference points of the same target in its reach
 
 
@@ -54,6 +56,13 @@ class Hypotheses(ArrayRecord):
         return probability(self.features)
 
 
+def no_hypotheses() -> Hypotheses:
+    """Return the record of none."""
+    nobody = np.zeros(0, int)
+    nowhere, unmeasured = np.zeros((0, 3, 3)), np.zeros((0, 2, 2))
+    return Hypotheses(nowhere, unmeasured, nobody, nobody, np.zeros((0, FEATURES)))
+
+
 def plausible(
     templates: Templates, readings: Readings, family: PointFamily, rivals: bool
 ) -> np.ndarray:
@@ -72,15 +81,16 @@ def plausible(
     order = np.argsort(-rank, kind='stable')
     order = order[readings.support[order] >= _PLAUSIBLE]
     equal = family.template_radii[family.reference] * _EQUAL
-    radius = equal if rivals else family.reach * _SAME
-    units = reference_frames(templates.homographies[order], float(radius))
+    units = reference_frames(templates.homographies[order], float(equal))
+    around = reference_frames(templates.homographies[order], family.reach * _APART)
     free = np.ones(len(order), bool)
-    words, kept = readings.words[order], []
+    words, support, kept = readings.words[order], readings.support[order], []
     for position in range(len(order)):
         if free[position]:
             kept.append(position)
-            same = (words == words[position]) | (not rivals)
-            free &= ~(_within(units, position) & same)
+            free &= ~(_within(units, position) & (words == words[position]))
+            worse = support < support[position] - (_CLEARLY if rivals else 0.0)
+            free &= ~(_within(around, position) & worse)
             if len(kept) == _MAXIMUM:
                 break
     return order[kept]

@@ -16,7 +16,7 @@ PART = 400_000
 """Pairs or triples of dots at a time, which bounds the memory."""
 
 _SIZE_RATIO = 0.55  # of two dots of a target, in ln, for their printed sizes
-_NEIGHBOURS = 64  # of a dot, the nearest ones, that may belong to its target
+_CROWD = 5  # times the dots of a target, from which on so many neighbours make a pattern of light
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +83,7 @@ def neighbours(
     major = frame.ellipse_axes(dots.frames)[0]
     inverse = np.linalg.inv(dots.frames[:, :2, :2])
     widest = np.log(family.template_radii.max() / family.template_radii.min())
+    crowd = _CROWD * (len(places) + family.rule.dots)
     parts = [(np.zeros(0, int), np.zeros(0, int), np.zeros((0, 2)))]
     for first, second in pairs_within(centres, reach * major, PART):
         near = np.abs(np.log(major[second] / major[first])) < _SIZE_RATIO + widest
@@ -90,12 +91,8 @@ def neighbours(
         difference = centres[second] - centres[first]
         offset = (inverse[first] @ difference[..., None])[..., 0] * [1, -1]
         distance = np.hypot(*offset.T)
-        order = np.lexsort((distance, first))
-        first, second, offset, distance = (
-            values[order] for values in (first, second, offset, distance)
-        )
-        place = np.arange(len(first)) - np.searchsorted(first, first)
-        near = (distance < reach) & (place < _NEIGHBOURS)
+        near = distance < reach
+        near &= np.bincount(first, near, len(centres))[first] < crowd
         parts.append((first[near], second[near], offset[near]))
     first, second, offset = (np.concatenate(column) for column in zip(*parts, strict=True))
     start = np.searchsorted(first, np.arange(len(centres) + 1))
