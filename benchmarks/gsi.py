@@ -32,6 +32,7 @@ from ahf_ros.interchange.image_files import read_image
 from ahf_ros.session import identify
 from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import TrueTarget
+from benchmarks.dot_patterns import dot_grid
 from benchmarks.filter import machine
 from benchmarks.identification import FIRST_TEST_SEED, Row
 from support import PHOTOS
@@ -105,23 +106,8 @@ def lights() -> Iterator[Case]:
 def filtered() -> Iterator[Case]:
     """Yield stripes for the search of filters."""
     for ambient in (0.3, 0.12, 0.04):
-        scene = replace(LARGE, light='stripe', ambient=ambient, width=2400, height=1600)
-        yield f'stripe {ambient:g}', rendered(replace(scene, targets=20))
-
-
-def dot_grid(seed: int) -> Scene:
-    """Return a regular grid of 2,000 dots that belong to no target."""
-    generator = np.random.default_rng(seed)
-    image = np.full((2656, 3984), 215, np.uint8)
-    across, down = np.meshgrid(np.arange(50), np.arange(40))
-    turn = np.deg2rad(generator.uniform(0, 5))
-    for x, y in zip(across.ravel(), down.ravel(), strict=True):
-        column, row = 300 + 64 * x, 100 + 60 * y
-        centre = (column - np.sin(turn) * row * 0.3, row + np.sin(turn) * column * 0.02)
-        place = tuple(round(16 * float(value)) for value in centre)
-        cv2.circle(image, place, 16 * 8, 40, -1, cv2.LINE_AA, shift=4)
-    noise = generator.normal(0, 2, image.shape)
-    return np.clip(cv2.GaussianBlur(image, (0, 0), 0.8) + noise, 0, 255).astype(np.uint8), ()
+        scene = replace(LARGE, light='stripe', ambient=ambient, targets=20)
+        yield f'stripe {ambient:g}', rendered(replace(scene, width=2400, height=1600))
 
 
 def texture(seed: int) -> Scene:
@@ -141,7 +127,7 @@ def photograph(path: Path) -> Callable[[int], Scene]:
 
 def without_targets() -> Iterator[Case]:
     """Yield images that show no target of GSI."""
-    yield 'regular grid of 2,000 dots', dot_grid
+    yield 'regular grid of 2,000 dots', lambda seed: (dot_grid(seed), ())
     for light in ('lattice', 'dense_lattice'):
         yield f'{light} 0.3', rendered(replace(LARGE, targets=0, light=light))
     yield '100 distractors', rendered(replace(LARGE, targets=0, distractors=100))

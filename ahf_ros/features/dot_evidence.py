@@ -130,9 +130,7 @@ def independent_rays(frames: np.ndarray) -> np.ndarray:
 
 def _log_ratio(steps: np.ndarray, noise: float | np.ndarray) -> np.ndarray:
     """Return ln of the likelihood of steps at a dot over that where there is none."""
-    below, above, empty = (
-        np.hypot(spread, noise) for spread in (*_DOT_SPREAD, _EMPTY_SPREAD)
-    )
+    below, above, empty = (np.hypot(spread, noise) for spread in (*_DOT_SPREAD, _EMPTY_SPREAD))
     spread = np.where(steps < 1, below, above)
     height = 2 / (np.sqrt(2 * np.pi) * (below + above))
     dot = height * np.exp(-0.5 * ((steps - 1) / spread) ** 2)

@@ -26,7 +26,6 @@ _NEAR = np.ones((2 * _REACH + 1, 2 * _REACH + 1), np.uint8)
 _BLUR = 0.15  # px^2, variance that blur adds to a dot that is cut off at half of its height
 _MINIMUM_MINOR = 0.6  # px
 _MINIMUM_PIXELS = 4
-_WIDENED = 1.5  # px, of the radius of a dot by blur
 _FILLED = (0.7, 1.35)  # pixels of a dot over the area of its ellipse
 _TILE = 32  # side of the tiles of which empty ones are left out, px
 _MOST_TILES = 0.3  # of the image; where there are more, it is looked at as a whole
@@ -84,16 +83,14 @@ def small_dots(
 def _blobs(height: np.ndarray, min_radius: float, max_radius: float, polarity: int) -> Dots:
     """Return the blobs of an image of steps that have the shape of a dot."""
     least = _MINIMUM_STEP / _LN_RANGE * 255
-    largest = _FILLED[1] * np.pi * (max_radius + _WIDENED) ** 2
-    x, y, size = _connected(height, least, _LEVELS[polarity], largest)
+    x, y, size = _connected(height, least, _LEVELS[polarity], 2 * max_radius + 3)
     if not len(size):
         return Dots(np.zeros((0, 3, 3)), np.zeros(0, int), np.zeros(0))
     start = np.cumsum(size) - size
     peak = np.maximum.reduceat(height[y, x], start)
     x, y = x.astype(np.float64), y.astype(np.float64)
-    longest = 1 + np.maximum(
-        np.maximum.reduceat(x, start) - np.minimum.reduceat(x, start), y[start + size - 1] - y[start]
-    )
+    width = np.maximum.reduceat(x, start) - np.minimum.reduceat(x, start)
+    longest = 1 + np.maximum(width, y[start + size - 1] - y[start])  # rows ascend in a blob
 
     def mean(values: np.ndarray) -> np.ndarray:
         means: np.ndarray = np.add.reduceat(values, start) / size
@@ -107,7 +104,7 @@ def _blobs(height: np.ndarray, min_radius: float, max_radius: float, polarity: i
     filled = size / np.maximum(ellipse, 1e-9)
     major = 2 * np.sqrt(np.maximum(middle + half - _BLUR, 0))
     minor = 2 * np.sqrt(np.maximum(middle - half - _BLUR, (_MINIMUM_MINOR / 2) ** 2))
-    good = (longest >= 2 * min_radius - 2) & (longest <= 2 * max_radius + 3) & (peak >= least)
+    good = (longest >= 2 * min_radius - 2) & (peak >= least)
     good &= (major >= min_radius) & (major <= max_radius)
     good &= (ellipse > 0) & (filled < _FILLED[1]) & (filled > _FILLED[0])
     which = best(np.flatnonzero(good), -peak[good].astype(float), MAXIMUM_BLOBS, 'small dots')
@@ -116,9 +113,9 @@ def _blobs(height: np.ndarray, min_radius: float, max_radius: float, polarity: i
 
 
 def _connected(
-    height: np.ndarray, least: float, share: float, largest: float
+    height: np.ndarray, least: float, share: float, longest: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return columns and rows of the pixels of all blobs, blob by blob, and how many each has."""
+    """Return columns and rows of the pixels of small blobs, one by one, and how many each has."""
     none = np.zeros(0, np.int32)
     found = [(none, none, none)]
     for top, left, part, own in _parts(height, least):
@@ -128,18 +125,19 @@ def _connected(
         mask = cv2.compare(part, level, cv2.CMP_GT)
         if own is not None:
             mask = cv2.bitwise_and(mask, own)
-        pixels = cv2.findNonZero(mask)
+        # The default algorithm of OpenCV 4.5 crashes on large images with this connectivity.
+        _, labels, stats, _ = cv2.connectedComponentsWithStatsWithAlgorithm(
+            mask, 4, cv2.CV_32S, cv2.CCL_SAUF
+        )
+        extent = stats[:, cv2.CC_STAT_WIDTH : cv2.CC_STAT_HEIGHT + 1].max(axis=1)
+        small = (extent <= longest) & (stats[:, cv2.CC_STAT_AREA] >= _MINIMUM_PIXELS)
+        small[0] = False
+        pixels = cv2.findNonZero(small.view(np.uint8).take(labels))
         if pixels is None:
             continue
-        # The default algorithm of OpenCV 4.5 crashes on large images with this connectivity.
-        _, labels = cv2.connectedComponentsWithAlgorithm(mask, 4, cv2.CV_32S, cv2.CCL_SAUF)
         x, y = pixels.reshape(-1, 2).T
-        label = labels[y, x]
-        size = np.bincount(label)
-        size[(size < _MINIMUM_PIXELS) | (size > largest)] = 0
-        kept = np.flatnonzero(size[label])
-        order = kept[np.argsort(label[kept], kind='stable')]
-        found.append((x[order] + left, y[order] + top, size[size > 0].astype(np.int32)))
+        order = np.argsort(labels[y, x], kind='stable')
+        found.append((x[order] + left, y[order] + top, stats[small, cv2.CC_STAT_AREA]))
     x, y, size = (np.concatenate(column) for column in zip(*found, strict=True))
     return x, y, size
 

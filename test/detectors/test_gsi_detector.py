@@ -217,3 +217,26 @@ def test_overlays_tell_template_and_decoding_dots_apart() -> None:
         column, row = round(x), round(y)
         around = canvas[row - half : row + half + 1, column - half : column + half + 1]
         assert (np.abs(around.astype(int) - colour).max(axis=2) < 30).any()
+
+
+def test_templates_are_not_mirrored_wherever_they_are() -> None:
+    # Far from the origin of the image, perspective dominates the upper left of a homography.
+    family = point_family()
+    places = np.concatenate([family.places[:5], family.places[[5, 9, 30]]])
+    depth = 1 + places @ [0.004, -0.003]
+    x, y = (places @ [[1.2, -0.9], [0.9, 0.4]] / depth[:, None]).T * 4 + [[3800.0], [2400.0]]
+    size = np.full(len(x), 5.0)
+    frames = affine_frames(x, y, size, 0.5 * size, 0 * size - 0.6)
+    dots = Dots(frames, np.ones(len(x), int), np.ones(len(x)))
+    templates = find_templates(dots, family)
+    assert len(templates.misfit)
+    assert (np.linalg.det(templates.homographies) < 0).all()
+
+
+def test_paper_in_a_dark_stripe_is_not_taken_for_a_dot() -> None:
+    # As wide as a dot, a stripe has the outline of one on most of its circumference.
+    shown = rendering(light='stripe', ambient=0.04, dot_radius=10.0, targets=4, width=1300)
+    found = create_detector(family='gsi')(shown.image)
+    figures = score(shown.truth, found)
+    assert figures.right >= 3
+    assert figures.wrong == figures.false_positives == 0

@@ -1,7 +1,7 @@
 """Evidence for and against a dot at each place of a target.
 
-The template dots tell how dark ink is beside paper. Where little light falls, ln(I + 8) has smaller
-steps than that; the brighter side of an edge tells how small, and noise counts for more.
+The template dots tell how dark ink is beside paper. Where little light falls, ln(I + 8) has
+smaller steps than that. The brighter side of an edge tells how small; noise counts for more.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _FAINTEST = 0.12  # step of ln of a dot
 _SMALLEST = 0.02  # the same where there is hardly any light
 _NOISE = 0.08  # of a step of ln, standard deviation
 _BIN = 0.06  # of ln(I + 8), of the levels of ink and paper
-_BINS = int(np.ceil(np.log(263 / 8) / _BIN)) + 1
+_BINS = int(np.ceil(np.log((255 + LOG_OFFSET) / LOG_OFFSET) / _BIN)) + 1
 _SPREAD = 0.1  # of a level, standard deviation
 _FLOOR = 0.05  # density of levels that no template dot shows
 _SHARE = 0.3  # of rays, whose inner ends tell something of their own
@@ -43,13 +43,10 @@ class Evidence(ArrayRecord):
         ln of the likelihood of a dot over that of none; 0 where the place is not in the image.
     inside : ndarray of bool, shape (k, m)
         Whether it is.
-    step : ndarray of float64, shape (k,)
-        Usual step of ln of the template dots in the light, from the ground to the dot.
     """
 
     ratio: np.ndarray
     inside: np.ndarray
-    step: np.ndarray
 
 
 def find_evidence(
@@ -70,21 +67,27 @@ def find_evidence(
     sides, inside = circle_sides(log, frames.reshape(-1, 3, 3))
     sides, inside = sides.reshape(*shape, *sides.shape[1:]), inside.reshape(shape)
     steps = (sides[..., 1] - sides[..., 0]) * polarity[:, None, None]
-    brighter = np.maximum(np.exp(sides.max(axis=3)) - LOG_OFFSET, 0.0)
-    usual, light = (it[:, :count].reshape(len(steps), count * steps.shape[2]) for it in (steps, brighter))
-    lit = light >= np.median(light, axis=1, keepdims=True)
-    usual = median(usual, lit, 0.0)
-    light = np.maximum(median(light, lit, 0.0), 1.0)
-    ink = ((light + LOG_OFFSET) * np.exp(-np.maximum(usual, _FAINTEST)) - LOG_OFFSET) / light
-    ink = np.clip(ink, 0.0, np.exp(-_FAINTEST))[:, None, None]
-    expected = np.log((brighter + LOG_OFFSET) / (ink * brighter + LOG_OFFSET))
-    expected = np.maximum(expected, _SMALLEST)
+    expected = _expected_steps(sides, steps, count)
     ratio = dot_evidence(steps / expected, frames, _NOISE / expected)
     single = frames.reshape(-1, 3, 3)
     farther, _ = circle_sides(log, single, _FARTHER * ellipse_axes(single)[1])
     levels = np.concatenate([sides, farther.reshape(sides.shape)], axis=2)
     ratio[:, count:] += _level_evidence(levels, frames, count)
-    return Evidence(np.where(inside, ratio, 0.0), inside, usual)
+    return Evidence(np.where(inside, ratio, 0.0), inside)
+
+
+def _expected_steps(sides: np.ndarray, steps: np.ndarray, count: int) -> np.ndarray:
+    """Return the steps of ln(I + 8) that dots have in the light that falls on each ray."""
+    brighter = np.maximum(np.exp(sides.max(axis=3)) - LOG_OFFSET, 0.0)
+    rays = (len(steps), count * steps.shape[2])
+    usual, light = steps[:, :count].reshape(rays), brighter[:, :count].reshape(rays)
+    lit = light >= np.median(light, axis=1, keepdims=True)
+    usual = np.maximum(median(usual, lit, 0.0), _FAINTEST)
+    light = np.maximum(median(light, lit, 0.0), 1.0)
+    ink = ((light + LOG_OFFSET) * np.exp(-usual) - LOG_OFFSET) / light
+    ink = np.clip(ink, 0.0, np.exp(-_FAINTEST))[:, None, None]
+    expected = np.log((brighter + LOG_OFFSET) / (ink * brighter + LOG_OFFSET))
+    return np.maximum(expected, _SMALLEST)
 
 
 def _level_evidence(sides: np.ndarray, frames: np.ndarray, count: int) -> np.ndarray:
@@ -107,7 +110,8 @@ def _bins(values: np.ndarray) -> np.ndarray:
 
 def _densities(values: np.ndarray) -> np.ndarray:
     """Return the densities of the values of each of k targets, smoothed, shape (k, bins)."""
-    bins = _bins(values.reshape(len(values), int(np.prod(values.shape[1:])))) + _BINS * np.arange(len(values))[:, None]
-    counts = np.bincount(bins.ravel(), minlength=_BINS * len(values)).reshape(-1, _BINS)
-    densities: np.ndarray = counts @ _SMOOTHING / (bins.shape[1] * _BIN)
+    count = len(values)
+    bins = _bins(values) + _BINS * np.arange(count)[:, None, None]
+    counts = np.bincount(bins.ravel(), minlength=_BINS * count).reshape(count, _BINS)
+    densities: np.ndarray = counts @ _SMOOTHING / (bins[0].size * _BIN if count else 1.0)
     return densities

@@ -235,9 +235,7 @@ def _fitted(dots: Dots, members: np.ndarray, family: PointFamily, polarity: int)
     return templates.select(good)
 
 
-def _mostly_empty(
-    templates: Templates, nearest: NearestDots, family: PointFamily
-) -> np.ndarray:
+def _mostly_empty(templates: Templates, nearest: NearestDots, family: PointFamily) -> np.ndarray:
     """Return where not many more positions than those of a code have a dot nearby."""
     count = len(family.template)
     frames = local_frames(templates.homographies, family.places[count:], family.radii[count:])

@@ -12,7 +12,7 @@ from ahf_ros.detectors.gsi.evidence import Evidence
 from ahf_ros.features.array_record import ArrayRecord
 
 _MOST_FOR, _MOST_AGAINST = 8.0, 6.0  # that one place may say on whether there is a target
-_CLEAREST = 20.0  # that it may say on which one
+_CLEAREST = 20.0  # that it may say for a dot on which one
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,7 @@ def read_codes(evidence: Evidence, family: PointFamily) -> Readings:
     limited = np.clip(evidence.ratio, -_MOST_AGAINST, _MOST_FOR)
     template, positions = limited[:, :count], limited[:, count:]
     incidence = _incidence(family)
-    scores = np.clip(evidence.ratio[:, count:], -_CLEAREST, _CLEAREST) @ incidence.T
+    scores = np.clip(evidence.ratio[:, count:], -_MOST_AGAINST, _CLEAREST) @ incidence.T
     order = np.argpartition(scores, -min(2, scores.shape[1]), axis=1)[:, -2:]
     best = scores.argmax(axis=1)
     rows = np.arange(len(scores))

@@ -1,0 +1,51 @@
+"""The benchmark of point-distributed targets prints both detectors beside each other."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from benchmarks import dot_patterns, gsi
+
+SMALL = replace(gsi.LARGE, width=700, height=500, targets=2, dot_radius=6.0)
+
+
+def test_every_row_has_the_figures_of_both_detectors() -> None:
+    cases = [('two targets', gsi.rendered(SMALL))]
+    rows = gsi.measured('views', iter(cases), [1])
+    assert list(rows) == ['gsi', 'gsi_published']
+    for (row,) in rows.values():
+        figures = row.record()
+        assert (figures['right'], figures['wrong'], figures['false_positives']) == (2, 0, 0)
+    head, rule, line = gsi.markdown(rows).splitlines()
+    assert head.count('|') == rule.count('|') == line.count('|')
+    assert line.startswith('| two targets | 2 of 2 | 0 | 0 | 0.0')
+
+
+def test_tables_have_all_that_the_figures_ask_for() -> None:
+    names = {table: [name for name, _ in cases()] for table, (_, cases) in gsi.TABLES.items()}
+    assert {f'{tilt} deg' for tilt in (0, 60, 65, 70, 75, 80)} <= set(names['views'])
+    lights = {
+        f'{light} {ambient}'
+        for light in ('stripe', 'lattice', 'fringe', 'shadow')
+        for ambient in (0.3, 0.12, 0.04)
+    }
+    assert lights == set(names['lights'])
+    assert len(names['sizes']) == 9
+    assert len(names['ahf']) == 3
+
+
+def test_the_grid_has_all_of_its_dots_in_the_image() -> None:
+    image = dot_patterns.dot_grid(5)
+    assert image.shape == dot_patterns.SIZE[::-1]
+    assert np.array_equal(image, dot_patterns.dot_grid(5))
+    dark = (image < 128).sum() / (np.pi * 8**2)
+    assert abs(dark - dot_patterns.COLUMNS * dot_patterns.ROWS) < 40
+
+
+def test_patterns_are_told_with_reports_and_times() -> None:
+    row = {'name': 'lattice', **{it: {'reports': 0, 'seconds': 1.25} for it in ('gsi', 'dots')}}
+    head, rule, line = dot_patterns.table([row]).splitlines()
+    assert head.count('|') == rule.count('|') == line.count('|')
+    assert line == '| lattice | 0 | 1.25 | 0 | 1.25 |'

@@ -1,0 +1,30 @@
+"""Pairs of points that are near to each other."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ahf_ros.features.neighbours import pairs_within
+
+
+@pytest.mark.parametrize('part', [7, 100_000])
+def test_pairs_are_those_within_reach_of_the_first(part: int) -> None:
+    generator = np.random.default_rng(1)
+    points = generator.uniform(-50, 400, (150, 2))
+    reach = generator.uniform(5, 90, 150)
+    parts = list(pairs_within(points, reach, part))
+    first, second = (np.concatenate(column) for column in zip(*parts, strict=True))
+    gap = np.abs(points[:, None] - points).max(axis=2)
+    expected = np.argwhere((gap < reach[:, None]) & ~np.eye(150, dtype=bool))
+    assert (np.diff(first) >= 0).all()
+    assert sorted(zip(first, second, strict=True)) == [tuple(pair) for pair in expected.tolist()]
+    assert (len(parts) > 5) == (part == 7)
+    firsts = [set(of_part.tolist()) for of_part, _ in parts]
+    assert sum(map(len, firsts)) == len(set().union(*firsts))  # no point is in two parts
+
+
+def test_one_point_and_none_have_no_neighbours() -> None:
+    for count in (0, 1):
+        parts = pairs_within(np.zeros((count, 2)), np.full(count, 9.0), 10)
+        assert not sum(len(first) for first, _ in parts)
