@@ -55,7 +55,7 @@ def images(seed: int) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def measured(seeds: Sequence[int]) -> Iterator[dict[str, Any]]:
-    """Yield reports and processor time of each family in each pattern, the longest of the seeds."""
+    """Yield the reports of each family in each pattern, and the longest processor time."""
     detectors = {family: create_detector(family=family) for family in FAMILIES}
     rows: dict[str, dict[str, Any]] = {}
     for seed in seeds:

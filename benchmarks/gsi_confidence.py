@@ -1,13 +1,14 @@
 """How far the confidence of point-distributed targets can be trusted, and the weights behind it.
 
 Scenes of GSI's targets under all lights, of all sizes and views, are rendered, also without any
-target, and with targets that lack a decoding dot, which have no right code. Every hypothesis of
-the detector `gsi` is compared with the truth. The table shows the reliability of the weights in
-force, by condition. With --fit, a logistic regression is fitted to the hypotheses and written to
-the file of fitted weights. Seeds from 101 on are for tests, those below for development.
+target, with targets that lack a decoding dot, which have no right code, and textures. Every
+hypothesis of the detector `gsi` is compared with the truth. The table shows the reliability of the
+weights in force, by condition. With --fit, a logistic regression whose weights have the right sign
+is fitted to the hypotheses and written to the file of fitted weights. Seeds from 101 on are for
+tests, those below for development.
 
     python -m benchmarks.gsi_confidence [--seeds 101 102]
-    python -m benchmarks.gsi_confidence --fit 1 2 3 4
+    python -m benchmarks.gsi_confidence --fit 1 2
 """
 
 from __future__ import annotations
@@ -25,11 +26,13 @@ from ahf_ros.codes.gsi_library import point_family
 from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.detectors.gsi.confidence import WEIGHTS, probability
 from ahf_ros.detectors.gsi.detector import find_hypotheses
+from ahf_ros.detectors.gsi.hypotheses import Hypotheses
 from ahf_ros.features.pyramid import image_pyramid
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 from ahf_ros.target import DottedTarget
-from benchmarks.confidence import CLASSES, NEAR, logistic_regression
+from benchmarks.confidence import CLASSES, NEAR, rising_regression
+from benchmarks.gsi import texture
 from benchmarks.weights import write_weights
 
 BASE = SceneSettings(
@@ -39,6 +42,12 @@ BASE = SceneSettings(
 
 COVERED = 2
 """Targets of a scene that lack a decoding dot."""
+
+TEXTURES = 6
+"""Textured images of a seed, which show no target."""
+
+SIGNS = np.array([1, 1, 1, -1, -1, -1, -1])
+"""Of the weights: support, weakest dot and margin speak for a target, all else against it."""
 
 
 def scenes(seed: int) -> Iterator[tuple[str, SceneSettings]]:
@@ -84,10 +93,8 @@ def with_covered_dots(scene: Rendering, count: int) -> tuple[np.ndarray, set[int
 
 def hypotheses(scene: Rendering) -> tuple[np.ndarray, np.ndarray]:
     """Return the features of all hypotheses, and which are right."""
-    code = point_family()
     image, covered = with_covered_dots(scene, COVERED)
-    settings = DetectorSettings(family='gsi')
-    found, _ = find_hypotheses(image_pyramid(image, settings.max_radius), settings, code)
+    found = found_in(image)
     x, y = (found.homographies[:, :2, 2] / found.homographies[:, 2:, 2]).T
     right = np.zeros(len(found.words), bool)
     for target in scene.targets:
@@ -97,16 +104,34 @@ def hypotheses(scene: Rendering) -> tuple[np.ndarray, np.ndarray]:
     return found.features, right
 
 
+def found_in(image: np.ndarray) -> Hypotheses:
+    """Return the hypotheses of the detector."""
+    settings = DetectorSettings(family='gsi')
+    pyramid = image_pyramid(image, settings.max_radius)
+    return find_hypotheses(pyramid, settings, point_family())[0]
+
+
 def gathered(seeds: Iterable[int]) -> tuple[list[str], np.ndarray, np.ndarray]:
-    """Return conditions, features and rightness of the hypotheses of the scenes of some seeds."""
-    wanted = [item for seed in seeds for item in scenes(seed)]
+    """Return conditions, features and rightness of the hypotheses of the images of some seeds."""
     conditions, parts = [], []
-    for condition, settings in track(wanted, 'scenes', console=Console(stderr=True)):
-        features, right = hypotheses(render(settings))
-        conditions += [condition] * len(right)
-        parts.append((features, right))
+    for seed in seeds:
+        for condition, settings in track(
+            list(scenes(seed)), f'scenes of {seed}', console=Console(stderr=True)
+        ):
+            parts.append(hypotheses(render(settings)))
+            conditions += [condition] * len(parts[-1][1])
+        for number in range(TEXTURES):
+            features = found_in(texture(100 * seed + number)[0]).features
+            parts.append((features, np.zeros(len(features), bool)))
+            conditions += ['no targets'] * len(features)
     features, right = (np.concatenate(column) for column in zip(*parts, strict=True))
     return conditions, features, right
+
+
+def fitted(features: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Return intercept and weights of the regression, shape (8,)."""
+    intercept, slopes = rising_regression(SIGNS * features, right, np.ones(len(right)))
+    return np.round(np.append(intercept, SIGNS * slopes), 3) + 0.0
 
 
 def reliability(seeds: Iterable[int]) -> Iterator[str]:
@@ -135,8 +160,8 @@ def main() -> None:
     options = parser.parse_args()
     if options.fit:
         _, features, right = gathered(options.fit)
-        weights = np.round(logistic_regression(features, right), 2)
-        write_weights('gsi_confidence', options.fit, {'weights': weights}, WEIGHTS)
+        weights = {'weights': fitted(features, right)}
+        write_weights('gsi_confidence', options.fit, weights, WEIGHTS)
     else:
         print('\n'.join(reliability(options.seeds)))
 

@@ -16,6 +16,7 @@ from ahf_ros.drawing import DECODED_COLOUR, DECODING_DOT_COLOUR, draw
 from ahf_ros.evaluation import score
 from ahf_ros.features.dots import Dots
 from ahf_ros.features.frame import affine_frames
+from ahf_ros.features.homography import local_frames
 from ahf_ros.filtering.homomorphic import HomomorphicFilter
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 from ahf_ros.target import UNDECODED, DottedTarget, Identification
@@ -222,21 +223,24 @@ def test_overlays_tell_template_and_decoding_dots_apart() -> None:
 def test_templates_are_not_mirrored_wherever_they_are() -> None:
     # Far from the origin of the image, perspective dominates the upper left of a homography.
     family = point_family()
-    places = np.concatenate([family.places[:5], family.places[[5, 9, 30]]])
-    depth = 1 + places @ [0.004, -0.003]
-    x, y = (places @ [[1.2, -0.9], [0.9, 0.4]] / depth[:, None]).T * 4 + [[3800.0], [2400.0]]
-    size = np.full(len(x), 5.0)
-    frames = affine_frames(x, y, size, 0.5 * size, 0 * size - 0.6)
-    dots = Dots(frames, np.ones(len(x), int), np.ones(len(x)))
+    slopes, centre, depth = [[0.86, -1.29], [-0.97, -3.30]], [3287.0, 1778.0], [-4.5e-4, 4.8e-4]
+    homography = np.vstack(
+        [np.column_stack([slopes + np.outer(centre, depth), centre]), [*depth, 1]]
+    )
+    assert np.linalg.det(homography[:2, :2]) > 0 > np.linalg.det(homography)
+    which = [0, 1, 2, 3, 4, 5, 9, 30]
+    frames = local_frames(homography[None], family.places[which], family.radii[which])[0]
+    dots = Dots(frames, np.ones(len(which), int), np.ones(len(which)))
     templates = find_templates(dots, family)
-    assert len(templates.misfit)
+    found = templates.homographies[:, :2, 2] / templates.homographies[:, 2:, 2]
+    assert np.hypot(*(found - centre).T).min() < 0.1
     assert (np.linalg.det(templates.homographies) < 0).all()
 
 
 def test_paper_in_a_dark_stripe_is_not_taken_for_a_dot() -> None:
     # As wide as a dot, a stripe has the outline of one on most of its circumference.
-    shown = rendering(light='stripe', ambient=0.04, dot_radius=10.0, targets=4, width=1300)
+    shown = rendering(light='stripe', ambient=0.04, dot_radius=10.0, targets=3, width=1300)
     found = create_detector(family='gsi')(shown.image)
     figures = score(shown.truth, found)
-    assert figures.right >= 3
+    assert figures.right >= 2
     assert figures.wrong == figures.false_positives == 0
