@@ -13,10 +13,10 @@ from ahf_ros.detectors.gsi.reading import Readings
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.homography import reference_frames
 
-CERTAIN = 0.99
+CERTAIN = 0.95
 """Confidence from which a target is reported."""
 
-OBVIOUS = 0.9999
+OBVIOUS = 0.99
 """Confidence from which a target is not weighed against others in its place."""
 
 _PLAUSIBLE = 0.75  # support of a hypothesis that is followed up
