@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache
+from functools import lru_cache
 
 import numpy as np
 
@@ -105,7 +105,7 @@ def _best_ellipses(
     return fitted, scores[np.arange(len(points)), best]
 
 
-@cache
+@lru_cache(maxsize=16)  # a megabyte each; radii may be set to any number while a node runs
 def _templates(low: float, high: float) -> tuple[np.ndarray, ...]:
     """Return weights that average steps along ellipses, the sampled radii, and the ellipses."""
     radii = np.geomspace(_NEAREST * low, _FARTHEST * high, _BINS)
