@@ -5,7 +5,7 @@ messages among them that are no images. Meanwhile parameters change, also those 
 subscribe anew, services are called, and other participants come, look at its images for a while
 and go. Every image has to be answered with the IDs that it shows, every message that is none has
 to be counted as rejected; memory, threads and open files of the process are looked at all along,
-each time with no image in work, so that they can be compared. The limit is for the peak in between.
+each time with no image in work, so that they compare. The limit is for the peak in between.
 
     python -m benchmarks.soak [--frames 20000] [--json FILE]
 """
