@@ -10,6 +10,7 @@ from __future__ import annotations
 import fcntl
 import json
 import os
+import re
 import sqlite3
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -42,6 +43,7 @@ Report = Callable[[int, int, str], None]
 unknown, and the reason why this image was refused, empty if it was not."""
 
 _FORMAT = 2  # version of the journal and of the data stored in a bag
+_TOPIC_NAME = re.compile(r'/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*', re.ASCII)
 _IRRELEVANT = ('source', 'target', 'threads')  # settings that do not change the bag
 
 
@@ -134,6 +136,11 @@ def locked(target: Path) -> Iterator[None]:
 
 def _answer_topics(task: BagTask, source: Source) -> dict[str, AnswerTopics]:
     """Return the topics of the results by topic of the images."""
+    if not _TOPIC_NAME.fullmatch(task.output_topic):
+        raise ValueError(
+            f'output_topic is {task.output_topic!r}, accepted are names of letters, digits and _, '
+            'none of which starts with a digit, separated by /'
+        )
     images = source.image_topics(task.topics)
     if task.output_topic.startswith('/') and len(images) > 1:
         raise ValueError(

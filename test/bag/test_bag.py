@@ -264,6 +264,8 @@ def test_a_bag_without_metadata_is_read(
         (['--topic', '/notes'], 'topic /notes is of std_msgs/msg/String, accepted is one of /im'),
         (['--topic', '/magic'], 'topic /magic does not exist, accepted is one of /image'),
         (['--output-topic', '/notes'], 'has a topic /notes, accepted is another output_topic'),
+        (['--output-topic', 'a b?'], "output_topic is 'a b?', accepted are names of letters"),
+        (['--output-topic', ''], "output_topic is '', accepted are names of letters"),
     ],
 )
 def test_bad_topics_are_named(
