@@ -86,12 +86,19 @@ def checked_target(target: Any, name: str) -> Target:
     if not isinstance(target, Target):
         raise ValueError(f'{name} is {shown(target)}, accepted is a Target')
     values: dict[str, Any] = {}
-    changed = type(target) is not Target
+    changed = not _only_adds_fields(type(target))
     for item in fields(Target):
         value = getattr(target, item.name, None)
         values[item.name] = checked = _CHECKS[item.name](value, f'{name}: {item.name}')
         changed |= checked is not value
     return Target(**values) if changed else target
+
+
+def _only_adds_fields(kind: type[Target]) -> bool:
+    """Return whether the fields of a target of this class are read as those of any other."""
+    own = kind.__mro__[: kind.__mro__.index(Target)]
+    same = all(item.name not in vars(base) for base in own for item in fields(Target))
+    return same and kind.__getattribute__ is Target.__getattribute__
 
 
 def checked_integer(value: Any, name: str, minimum: int, maximum: int) -> int:
