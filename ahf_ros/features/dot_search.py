@@ -84,28 +84,6 @@ def voted_dots(
     return distinct(Dots.joined([nothing, *dots]))
 
 
-def all_dots(
-    pyramid: ImagePyramid, min_radius: float, max_radius: float, polarities: Sequence[int]
-) -> Dots:
-    """Return the dots of an image by all ways of finding them, of any size and view.
-
-    Parameters
-    ----------
-    pyramid : ImagePyramid
-    min_radius, max_radius : float
-        Bounds of the semi-major axis, px.
-    polarities : sequence of int
-        1 to find dark dots, -1 to find bright ones.
-
-    Returns
-    -------
-    Dots
-        No two of them the same.
-    """
-    whole = whole_dots(pyramid, min_radius, max_radius, polarities)
-    return with_other_dots(pyramid, whole, min_radius, max_radius, polarities)
-
-
 def with_other_dots(
     pyramid: ImagePyramid,
     whole: Dots,

@@ -89,6 +89,8 @@ def prior(words: np.ndarray, family: Family, expected: frozenset[int]) -> np.nda
     expected : frozenset of int
         IDs of the words that are likely; all are alike where it is empty.
     """
+    if not expected:
+        return np.zeros(words.shape, np.float32)
     return _prior_table(family, expected)[words]
 
 
@@ -141,10 +143,8 @@ def _rotations(family: Family, numbers: frozenset[int]) -> np.ndarray:
 @lru_cache(maxsize=8)
 def _prior_table(family: Family, expected: frozenset[int]) -> np.ndarray:
     """Return the evidence for all words of n bits before they are read."""
-    table = np.zeros(1 << family.bits, np.float32)
-    if expected:
-        table -= _UNEXPECTED
-        table[_rotations(family, expected)] = 0
+    table = np.full(1 << family.bits, -_UNEXPECTED, np.float32)
+    table[_rotations(family, expected)] = 0
     return table
 
 

@@ -70,9 +70,9 @@ def _by_words(
         read, of_dot = read_bands(gray, dots.select(which), code)
         np.maximum.at(sharp[index], of_dot, np.where(read.certain, read.sharpness, 0.0))
         of_print = index + 1 < len(ordered) and ordered[index + 1].band == code.band
-        # Where other words, or prints, may be as sharp; a foreign family never reads so many.
-        enough = _SHARPEST if of_print else SHARP
-        enough = 0.0 if len(which) >= _MANY else enough
+        enough = _SHARPEST if of_print else SHARP  # where other words, or prints, may be as sharp
+        if len(which) >= _MANY:
+            enough = 0.0  # a foreign family never reads so many
         if (sharp > enough).any(axis=0).sum() > _MOST * len(which):
             break
     won = np.bincount(sharp.argmax(axis=0)[sharp.any(axis=0)], minlength=len(ordered))
@@ -133,17 +133,15 @@ def _against_other_words(
     where the band may be one of theirs; `of_other_prints` tells other prints.
     """
     doubtful = found.certain & (found.features[:, IN_LIGHT] > _UNEXPLAINED)
-    read = {code.name for code in families}
-    rivals = [
-        family(name)
-        for name in FAMILY_NAMES
-        if name not in read and family(name).band == families[0].band
-    ]
-    if not doubtful.any() or not rivals:
+    if not doubtful.any():
         return found
+    read = {code.name for code in families}
+    others = [family(name) for name in FAMILY_NAMES if name not in read]
     away = found.frames[doubtful, None, :2, 2] - dots.frames[:, :2, 2]
     some = dots.select(np.unique(np.hypot(away[..., 0], away[..., 1]).argmin(axis=1)))
-    parts = [_read(gray, some, code, frozenset()) for code in rivals]
+    parts = [
+        _read(gray, some, code, frozenset()) for code in others if code.band == families[0].band
+    ]
     return _contested(Hypotheses.joined([found, *parts])).select(slice(len(found.words)))
 
 
