@@ -246,6 +246,14 @@ def markdown(report: dict[str, Any]) -> str:
     return '\n'.join(lines)
 
 
+def are_tests(seeds: Sequence[int]) -> bool:
+    """Return whether seeds are for tests, not for development; ValueError where they mix."""
+    tests = {seed >= FIRST_TEST_SEED for seed in seeds}
+    if len(tests) > 1:
+        raise ValueError(f'seeds are {seeds}, accepted are all below {FIRST_TEST_SEED} or none')
+    return tests == {True}
+
+
 def parser() -> argparse.ArgumentParser:
     """Return what can be chosen."""
     made = argparse.ArgumentParser(
@@ -271,10 +279,10 @@ def parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Measure and print."""
     options = parser().parse_args(arguments)
-    test = [seed >= FIRST_TEST_SEED for seed in options.seeds]
-    if len(set(test)) > 1:
-        told = f'seeds are {options.seeds}, accepted are all below {FIRST_TEST_SEED} or none'
-        print(told, file=sys.stderr)
+    try:
+        test = are_tests(options.seeds)
+    except ValueError as error:
+        print(error, file=sys.stderr)
         return 2
     size = asdict(SceneSettings(**QUICK) if options.quick else SceneSettings())
     report: dict[str, Any] = {
@@ -282,7 +290,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         'width': size['width'],
         'height': size['height'],
         'seeds': options.seeds,
-        'test': test[0],
+        'test': test,
         'machine': machine(),
     }
     before = json.loads(options.compare.read_text()) if options.compare else None

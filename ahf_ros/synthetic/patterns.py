@@ -149,6 +149,24 @@ def light_pattern(name: str, defocus: float, generator: np.random.Generator) -> 
     return _MAKERS[name](generator, defocus)
 
 
+def turned(pattern: Pattern, scale: float, turn: float) -> Pattern:
+    """Return a pattern, scaled and turned about the middle of the projector.
+
+    Parameters
+    ----------
+    pattern : Pattern
+        Its edges get softer with the scale, too.
+    scale : float
+        Size of the new pattern over that of the old one.
+    turn : float
+        Angle from +u towards +v, rad.
+    """
+    if scale == 1 and not turn:
+        return pattern
+    along, across = np.float32(math.cos(turn) / scale), np.float32(math.sin(turn) / scale)
+    return lambda u, v: pattern(u * along + v * across, v * along - u * across)
+
+
 def benchmark_lights() -> tuple[tuple[str, float], ...]:
     """Return the lights of the benchmarks as (name, ambient light) pairs."""
     patterned = ((name, ambient) for name in LIGHT_NAMES[1:] for ambient in (0.3, 0.12, 0.04))

@@ -22,7 +22,7 @@ from ahf_ros.synthetic.layout import (
     scattered_placements,
     size_ratios,
 )
-from ahf_ros.synthetic.patterns import LIGHT_NAMES, light_pattern
+from ahf_ros.synthetic.patterns import LIGHT_NAMES, light_pattern, turned
 from ahf_ros.synthetic.prints import Mark, print_mark
 from ahf_ros.synthetic.projector import rig_projector
 from ahf_ros.synthetic.radiance import paper_texture, wall_radiance
@@ -80,6 +80,8 @@ class SceneSettings:
         0.0, 'Radial lens distortion k1, dimensionless.', minimum=-0.3, maximum=0.3
     )
     light: str = parameter('normal', 'Projected pattern.', choices=LIGHT_NAMES)
+    light_scale: float = parameter(1.0, 'Scale of the pattern.', minimum=0.1, maximum=10.0)
+    light_turn: float = parameter(0.0, 'Turn of the pattern, deg.', minimum=-180.0, maximum=180.0)
     ambient: float = parameter(
         0.3,
         'Ambient light as a fraction of the projected light.',
@@ -217,7 +219,8 @@ def render(settings: SceneSettings) -> Rendering:
     marks += _distractors(settings, camera, placements, clutter)
 
     softness = math.hypot(settings.defocus, _PIXEL_DEVIATION / projector_pixel)
-    pattern = light_pattern(settings.light, softness, lamp)
+    size, turn = settings.light_scale, math.radians(settings.light_turn)
+    pattern = turned(light_pattern(settings.light, softness / size, lamp), size, turn)
     average = (settings.exposure / 255) ** settings.gamma
     highest = ((settings.exposure + 255) / 2 / 255) ** settings.gamma
     light = wall_radiance(camera, projector, pattern, settings.ambient, average, highest, lamp)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.synthetic.camera import tilted_camera
-from ahf_ros.synthetic.patterns import LIGHT_NAMES, benchmark_lights, light_pattern
+from ahf_ros.synthetic.patterns import LIGHT_NAMES, benchmark_lights, light_pattern, turned
 from ahf_ros.synthetic.projector import rig_projector
 
 
@@ -100,6 +100,17 @@ def test_the_benchmark_has_every_light() -> None:
     lights = benchmark_lights()
     assert {name for name, _ in lights} == set(LIGHT_NAMES)
     assert len(set(lights)) == len(lights) == 28
+
+
+def test_a_pattern_is_scaled_and_turned() -> None:
+    v, u = np.mgrid[-400:400, -640:640].astype(np.float32)
+    original = light_pattern('stripe', 0.5, np.random.default_rng(0))
+    assert turned(original, 1.0, 0.0) is original
+    larger = turned(original, 2.0, 0.0)(u, v)
+    assert 1 / frequency(larger) == pytest.approx(2 * 26, rel=0.03)
+    assert np.array_equal(larger, original(u / 2, v / 2))
+    upright = turned(original, 1.0, math.pi / 2)(u, v)
+    assert np.allclose(upright, original(v, -u), atol=1e-3)
 
 
 def test_an_unknown_light_is_refused() -> None:

@@ -1,0 +1,165 @@
+"""Where the light ends: small, oblique and blurred targets, without a search.
+
+Rows are views and light, columns are patterns. A cell has the targets with the right ID, of N,
+then wrong IDs and false positives where there are any, and the NEES of the right ones: 2 on
+average where covariances are right. The scenes are those of `benchmarks.identification` and, in
+the setting `other`, scenes that nothing in the package was fitted to: finer patterns in another
+direction, a wider lens, more noise, and another gamma. Seeds from 101 on are for tests.
+
+    python -m benchmarks.limits [--detector ring] [--family gsi] [--setting other]
+        [--rows 'radius 6, 0.12' ...] [--lights stripe ...] [--seeds 101] [--output FILE]
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.progress import track
+
+import ahf_ros.blas  # noqa: F401  before numpy
+from ahf_ros.codes.families import FAMILY_NAMES
+from ahf_ros.detectors import DETECTOR_NAMES
+from ahf_ros.synthetic.patterns import LIGHT_NAMES
+from ahf_ros.synthetic.scene import SceneSettings, render
+from benchmarks.filter import machine
+from benchmarks.identification import FIRST_TEST_SEED, Row, are_tests, with_detector
+
+LIGHTS = ('stripe', 'fine_stripe', 'lattice', 'dense_lattice')
+
+VIEWS: dict[str, dict[str, Any]] = {
+    'radius 20, 0.04': {'ambient': 0.04},
+    'radius 20, 0.02': {'ambient': 0.02},
+    'radius 10, 0.12': {'ambient': 0.12, 'dot_radius': 10.0},
+    'radius 6, 0.3': {'ambient': 0.3, 'dot_radius': 6.0},
+    'radius 6, 0.12': {'ambient': 0.12, 'dot_radius': 6.0},
+    '55 deg, 0.12': {'ambient': 0.12, 'tilt': 55.0, 'focal_length': 3.0},
+    '62 deg, 0.12': {'ambient': 0.12, 'tilt': 62.0, 'focal_length': 3.0},
+    'blur 2 px, 0.12': {'ambient': 0.12, 'blur': 2.0},
+}
+"""What differs from a scene of dots of 20 px."""
+
+SETTINGS: dict[str, dict[str, Any]] = {
+    'usual': {},
+    'other': {
+        'light_scale': 0.8,
+        'light_turn': 37.0,
+        'focal_length': 2.4,
+        'full_well': 6000.0,
+        'gamma': 1.8,
+    },
+}
+"""Settings of the renderer; nothing in the package was fitted to `other`."""
+
+DOT_SHARES = {'gsi': 0.5, 'dots': 0.7}
+"""Radius of the dot over that of a ring target of about the same size."""
+
+
+def scene(options: argparse.Namespace, row: str, light: str, seed: int) -> SceneSettings:
+    """Return the scene of a row, a light and a seed."""
+    changes = VIEWS[row] | SETTINGS[options.setting]
+    radius = changes.get('dot_radius', SceneSettings().dot_radius)
+    changes['dot_radius'] = radius * DOT_SHARES.get(options.family, 1.0)
+    return SceneSettings(
+        family=options.family, targets=options.targets, light=light, seed=seed, **changes
+    )
+
+
+def measure(options: argparse.Namespace) -> Iterator[Row]:
+    """Render and identify every scene with every seed; yield a row of each row and light."""
+    run = with_detector(options)
+    cells = [(row, light) for row in options.rows for light in options.lights]
+    for row, light in track(cells, 'scenes', console=Console(stderr=True)):
+        cell = Row(row, light)
+        for seed in options.seeds:
+            rendering = render(scene(options, row, light, seed))
+            truth = rendering.truth
+            cell.add(rendering.image, truth, run(rendering.image, options.family, len(truth)))
+        yield cell
+
+
+def cell_text(record: dict[str, Any]) -> str:
+    """Return a cell of the table."""
+    text = f'{record["right"]}'
+    if record['wrong'] or record['false_positives']:
+        text += f', {record["wrong"]} wrong, {record["false_positives"]} false'
+    return text if record['nees'] is None else f'{text} ({record["nees"]:.1f})'
+
+
+def markdown(report: dict[str, Any]) -> str:
+    """Return the report as a table."""
+    facts = report['machine']
+    kind = 'Test' if report['test'] else 'Development'
+    records = {(of['group'], of['name']): of for of in report['rows']}
+    rows, lights = (list(dict.fromkeys(keys)) for keys in zip(*records, strict=True))
+    lines = [
+        f'{report["method"]}, family {report["family"]}, setting `{report["setting"]}`. {kind} '
+        f'seeds: {", ".join(map(str, report["seeds"]))}. {facts["processor"]}, {facts["cores"]} '
+        f'cores, Python {facts["python"]}, numpy {facts["numpy"]}, OpenCV {facts["opencv"]}.',
+        '',
+        f'| right of N (NEES) | N | {" | ".join(lights)} | s |',
+        '|---' * (len(lights) + 3) + '|',
+    ]
+    for row in rows:
+        of_row = [records[row, light] for light in lights]
+        cells = ' | '.join(map(cell_text, of_row))
+        slowest = max(of['seconds'] for of in of_row)
+        lines.append(f'| {row} | {of_row[0]["expected"]} | {cells} | {slowest:.2f} |')
+    sums = [sum(of[name] for of in report['rows']) for name in ('right', 'expected')]
+    false = [sum(of[name] for of in report['rows']) for name in ('wrong', 'false_positives')]
+    lines += ['', '{} of {} right, {} wrong, {} false.'.format(*sums, *false)]
+    return '\n'.join(lines)
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return what can be chosen."""
+    made = argparse.ArgumentParser(
+        description=__doc__.split('\n\n')[0],
+        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+    )
+    made.add_argument('--detector', choices=DETECTOR_NAMES, default='ring')
+    made.add_argument('--family', choices=FAMILY_NAMES, default='metashape12')
+    made.add_argument('--ahf', action='store_true', help='search for filters, N being given')
+    made.add_argument('--setting', choices=tuple(SETTINGS), default='usual')
+    made.add_argument('--rows', nargs='+', choices=tuple(VIEWS), default=tuple(VIEWS))
+    made.add_argument('--lights', nargs='+', choices=LIGHT_NAMES, default=LIGHTS)
+    made.add_argument('--targets', type=int, default=SceneSettings().targets)
+    made.add_argument('--seeds', nargs='+', type=int, default=[FIRST_TEST_SEED])
+    made.add_argument(
+        '--output', type=Path, metavar='FILE', help='also write FILE.json and FILE.md'
+    )
+    return made
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Measure and print."""
+    options = parser().parse_args(arguments)
+    try:
+        test = are_tests(options.seeds)
+    except ValueError as error:
+        print(error, file=sys.stderr)
+        return 2
+    report: dict[str, Any] = {
+        'method': options.detector + (' with AHF' if options.ahf else ''),
+        'family': options.family,
+        'setting': options.setting,
+        'seeds': options.seeds,
+        'test': test,
+        'machine': machine(),
+    }
+    report['rows'] = [row.record() for row in measure(options)]
+    table = markdown(report)
+    if options.output:
+        Path(f'{options.output}.json').write_text(json.dumps(report, indent=1))
+        Path(f'{options.output}.md').write_text(table + '\n')
+    print(table)
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
