@@ -21,6 +21,7 @@ from benchmarks import occluders
 from benchmarks.disturbed import blurred, compressed, noisy
 from benchmarks.exposure import Exposure
 from benchmarks.lookalikes import LOOKALIKES
+from benchmarks.overlaps import overlapping
 from benchmarks.sheets import COLUMNS, ROWS, mark_sheet, random_numbers, target_sheet
 
 SHADOWS = (0.3, 0.08, 0.04, 0.02)
@@ -135,10 +136,10 @@ def disturbed(seed: int) -> Iterator[Scene]:
         yield Scene(condition, sheet.photograph(exposure), sheet.truth, name)
     for name in FAMILY_NAMES:
         numbers = random_numbers(name, CELLS, seed)[0]
-        sheet = target_sheet(name, numbers, seed, radius=float(generator.choice([8, 14])))
+        radius = float(generator.choice([8, 14]))
         for distance in (5.0, 6.0):
-            exposure = Exposure(occluder=occluders.other_target(name, distance))
-            yield Scene('another target', sheet.photograph(exposure), sheet.truth, name, True)
+            scene = overlapping(name, numbers, seed, distance, radius)
+            yield Scene('another target', *scene, name, True)
 
 
 def strange(seed: int) -> Iterator[Scene]:

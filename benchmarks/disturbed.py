@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import cv2
@@ -13,6 +13,7 @@ from ahf_ros.codes.ring import FAMILY_NAMES
 from ahf_ros.target import TrueTarget
 from benchmarks import occluders
 from benchmarks.exposure import Exposure
+from benchmarks.overlaps import overlapping
 from benchmarks.sheets import COLUMNS, Sheet, random_numbers, target_sheet
 
 RADIUS = 12.0
@@ -123,8 +124,8 @@ class Targets:
         for name, exposure in exposures().items():
             yield name, self._exposed(sheets, exposure)
         for distance in (6.5, 5.5) if self.name in FAMILY_NAMES else ():
-            other = Exposure(occluder=occluders.other_target(self.name, distance))
-            yield f'another target {distance} dot radii away', self._exposed(sheets, other)
+            row = f'another target {distance} dot radii away'
+            yield row, self._overlapping(distance)
         yield 'mirrored', self._mirrored(sheets)
         for distance in (3.2, 2.6):
             yield f'border of the image {distance} dot radii away', self._cut(distance)
@@ -135,6 +136,12 @@ class Targets:
     def _exposed(self, sheets: list[Sheet], exposure: Exposure) -> Iterator[Scene]:
         for sheet in sheets:
             yield sheet.photograph(exposure), sheet.truth
+
+    def _overlapping(self, distance: float) -> Iterator[Scene]:
+        """Yield sheets of half as many targets, each with another one on it."""
+        below = replace(self, count=self.count // 2)
+        for index, numbers in enumerate(below._numbers()):
+            yield overlapping(self.name, numbers, self.seed + index, distance)
 
     def _mirrored(self, sheets: list[Sheet]) -> Iterator[Scene]:
         for sheet in sheets:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from functools import partial
 
 import numpy as np
@@ -90,20 +91,40 @@ def _disc(
     return _share(radius - _from_band(cell, generator), cell), gray
 
 
-def other_target(name: str, distance: float) -> Occluder:
-    """Return the round paper of another target of a family, at a distance in dot radii."""
-    return partial(_other_target, name, distance)
+def other_targets(
+    name: str, numbers: Sequence[int], distance: float, directions: Sequence[float]
+) -> Occluder:
+    """Return the round papers of other targets, one after the other for each cell.
+
+    Parameters
+    ----------
+    name : str
+        Their family.
+    numbers : sequence of int
+        Their IDs.
+    distance : float
+        Of their centres, dot radii.
+    directions : sequence of float
+        To their centres, rad counter-clockwise.
+    """
+    return partial(_other_target, name, iter(zip(numbers, directions, strict=True)), distance)
 
 
 def _other_target(
-    name: str, distance: float, cell: Cell, generator: np.random.Generator
+    name: str,
+    others: Iterator[tuple[int, float]],
+    distance: float,
+    cell: Cell,
+    generator: np.random.Generator,
 ) -> tuple[np.ndarray, np.ndarray]:
     code = family(name)
-    direction, turn = generator.uniform(0, 2 * math.pi, 2)
+    number, direction = next(others)
+    turn = generator.uniform(0, 2 * math.pi)
     x = cell.x - np.float32(distance * math.cos(direction))
     y = cell.y - np.float32(distance * math.sin(direction))
-    word = int(generator.choice(code.words))
-    ink = ring_cover(code, word, turn, 0.0)(x, y, np.eye(2, dtype=np.float32) * cell.width)
+    ink = ring_cover(code, code.word(number), turn, 0.0)(
+        x, y, np.eye(2, dtype=np.float32) * cell.width
+    )
     gray = WHITE * (1 - (1 - INK) * ink) ** (1 / GAMMA)
     return _share(_LABEL - np.hypot(x, y), cell), gray
 

@@ -23,7 +23,7 @@ COLUMNS, ROWS = 9, 6
 """Cells of a whole sheet."""
 
 CELL = 5.0
-"""Half of the side of a cell, in dot radii."""
+"""Half of the usual side of a cell, in dot radii."""
 
 _SAMPLES = 3  # a pixel and axis
 _SQUARE = 2.4  # half of the side of a square marker, in radii of the dot of a ring target
@@ -72,6 +72,8 @@ class Sheet:
     seed : int
     bright : bool
         Whether ink and paper have changed places.
+    cell : float
+        Half of the side of a cell, dot radii.
     """
 
     name: str
@@ -80,11 +82,12 @@ class Sheet:
     marks: tuple[Mark, ...]
     seed: int
     bright: bool = False
+    cell: float = CELL
     _side: int = field(init=False)
 
     def __post_init__(self) -> None:
         """Round the cells to whole pixels."""
-        object.__setattr__(self, '_side', cell_pixels(self.radius))
+        object.__setattr__(self, '_side', cell_pixels(self.radius, self.cell))
 
     @property
     def truth(self) -> list[TrueTarget]:
@@ -137,9 +140,9 @@ class Sheet:
         return Cell(x, y, mark.turn, bits, inner, outer, width)
 
 
-def cell_pixels(radius: float) -> int:
+def cell_pixels(radius: float, cell: float = CELL) -> int:
     """Return the side of a cell for dots of a radius, px."""
-    return 2 * math.ceil(CELL * radius)
+    return 2 * math.ceil(cell * radius)
 
 
 def target_sheet(
@@ -151,6 +154,7 @@ def target_sheet(
     columns: int = COLUMNS,
     spread: float = 0.1,
     bright: bool = False,
+    cell: float = CELL,
 ) -> Sheet:
     """Return a sheet of targets.
 
@@ -170,6 +174,8 @@ def target_sheet(
         Largest deviation of a radius, as a share of it.
     bright : bool
         Whether ink and paper change places.
+    cell : float
+        Half of the side of a cell, dot radii.
     """
     ring = name in FAMILY_NAMES
 
@@ -180,7 +186,7 @@ def target_sheet(
         return square_cover(name, number, _SQUARE, turn)
 
     drawn = [(int(number), cover) for number in numbers]
-    return _drawn_sheet(name, drawn, seed, radius, columns, spread, bright)
+    return _drawn_sheet(name, drawn, seed, radius, columns, spread, bright, cell)
 
 
 def mark_sheet(
@@ -188,7 +194,7 @@ def mark_sheet(
 ) -> Sheet:
     """Return a sheet of marks that are no targets, each given by its ink at a turn, rad."""
     drawn = [(0, lambda _, turn, ink=ink: ink(turn)) for ink in covers]
-    return _drawn_sheet('', drawn, seed, radius, COLUMNS, 0.1, False)
+    return _drawn_sheet('', drawn, seed, radius, COLUMNS, 0.1, False, CELL)
 
 
 def random_numbers(
@@ -220,9 +226,10 @@ def _drawn_sheet(
     columns: int,
     spread: float,
     bright: bool,
+    cell: float,
 ) -> Sheet:
     generator = np.random.default_rng([seed, 0])
-    side = cell_pixels(radius)
+    side = cell_pixels(radius, cell)
     marks = []
     for index, (number, cover) in enumerate(drawn):
         row, column = divmod(index, columns)
@@ -236,7 +243,7 @@ def _drawn_sheet(
         ink = cover(number, turn)(*places, jacobian.astype(np.float32))
         ink = np.rint(np.clip(ink, 0, 1) * 255).astype(np.uint8)
         marks.append(Mark(number, x, y, plane, turn, ink))
-    return Sheet(name, radius, columns, tuple(marks), seed, bright)
+    return Sheet(name, radius, columns, tuple(marks), seed, bright, cell)
 
 
 def _random_plane(radius: float, generator: np.random.Generator) -> np.ndarray:

@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from ahf_ros.codes.ring import family
 from ahf_ros.detectors.ring.confidence import FEATURES
 from ahf_ros.detectors.ring.decoding import Readings
-from ahf_ros.detectors.ring.hypotheses import Hypotheses, resolve_dots, resolve_ids
+from ahf_ros.detectors.ring.hypotheses import (
+    Hypotheses,
+    resolve_dots,
+    resolve_ids,
+    resolve_overlaps,
+)
 from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import Fit
 
@@ -76,6 +82,22 @@ def test_of_two_claims_to_an_id_the_clearly_better_one_stays():
     unclear = resolve_ids(hypotheses(places, [30, 20, 16]), np.array([1, 2, 1]), certain)
     assert unclear.tolist() == [False, True, False]
     assert certain.all()
+
+
+@pytest.mark.parametrize(
+    ('apart', 'margins', 'on_top'),
+    [
+        (55, [90, 50], [True, False]),
+        (55, [90, 80], [False, False]),
+        (70, [90, 50], [True, True]),
+    ],
+)
+def test_of_two_targets_whose_bands_overlap_only_the_clearly_better_one_is_certain(
+    apart, margins, on_top
+):
+    found = hypotheses([(50, 50), (50 + apart, 50)], margins)
+    assert resolve_overlaps(found, np.ones(2, bool)).tolist() == on_top
+    assert resolve_overlaps(found, np.array([False, True])).tolist() == [False, True]
 
 
 def test_uncertain_claims_do_not_count():

@@ -15,7 +15,7 @@ from ahf_ros.codes.ring import FAMILY_NAMES, Family, family
 from ahf_ros.detectors.ring.confidence import IN_LIGHT
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.other_prints import SHARP
-from ahf_ros.detectors.ring.reading import read_bands
+from ahf_ros.detectors.ring.reading import PASSES, read_bands
 from ahf_ros.detectors.ring.surroundings import designs, likely_targets
 from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import Fit
@@ -132,23 +132,37 @@ def _against_other_words(
     Families of one print differ in the number of sectors. What a word leaves unexplained shows
     where the band may be one of theirs; `of_other_prints` tells other prints.
     """
-    doubtful = found.certain & (found.features[:, IN_LIGHT] > _UNEXPLAINED)
-    if not doubtful.any():
+    unexplained = np.where(found.certain, found.features[:, IN_LIGHT], 0.0)
+    doubtful = np.argsort(-unexplained, kind='stable')[: (unexplained > _UNEXPLAINED).sum()]
+    if not len(doubtful):
         return found
     read = {code.name for code in families}
     others = [family(name) for name in FAMILY_NAMES if name not in read]
-    away = found.frames[doubtful, None, :2, 2] - dots.frames[:, :2, 2]
-    some = dots.select(np.unique(np.hypot(away[..., 0], away[..., 1]).argmin(axis=1)))
-    parts = [
-        _read(gray, some, code, frozenset()) for code in others if code.band == families[0].band
-    ]
-    return _contested(Hypotheses.joined([found, *parts])).select(slice(len(found.words)))
+    rivals = [code for code in others if code.band == families[0].band]
+    parts = [found]
+    # Where the rivals contest none of the most doubtful words, the family is right.
+    for some in (doubtful[:_READ], doubtful[_READ:]):
+        away = found.frames[some, None, :2, 2] - dots.frames[:, :2, 2]
+        nearest = dots.select(np.hypot(away[..., 0], away[..., 1]).argmin(axis=1))
+        refined = replace(nearest, frames=found.frames[some])
+        parts += [_read(gray, refined, code, passes=PASSES[-1:]) for code in rivals]
+        contested = _contested(Hypotheses.joined(parts)).select(slice(len(found.words)))
+        if contested.certain[some].all():
+            break
+    return contested
 
 
-def _read(gray: np.ndarray, dots: Fit, code: Family, expected: frozenset[int]) -> Hypotheses:
+def _read(
+    gray: np.ndarray,
+    dots: Fit,
+    code: Family,
+    expected: frozenset[int] = frozenset(),
+    passes: Sequence[tuple[int, int]] = PASSES,
+) -> Hypotheses:
     parts = []
     for start in range(0, max(len(dots.frames), 1), PART):
-        read, _ = read_bands(gray, dots.select(slice(start, start + PART)), code, expected)
+        part = dots.select(slice(start, start + PART))
+        read, _ = read_bands(gray, part, code, expected, passes)
         parts.append(read)
     return Hypotheses.joined(parts)
 

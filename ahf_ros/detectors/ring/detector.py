@@ -16,7 +16,12 @@ from ahf_ros.codes.ring import family
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.ring.competition import PART, by_clear_dots, read_families
 from ahf_ros.detectors.ring.faint import with_faint
-from ahf_ros.detectors.ring.hypotheses import Hypotheses, resolve_dots, resolve_ids
+from ahf_ros.detectors.ring.hypotheses import (
+    Hypotheses,
+    resolve_dots,
+    resolve_ids,
+    resolve_overlaps,
+)
 from ahf_ros.detectors.ring.refinement import refine_centres
 from ahf_ros.detectors.ring.same_prints import decoded, settle_same_prints
 from ahf_ros.detectors.ring.target_circles import REACH
@@ -162,7 +167,8 @@ def report(hypotheses: Hypotheses, settings: DetectorSettings) -> list[Target]:
         [f'{name} {number}' for name, number in zip(names, ids, strict=True)], return_inverse=True
     )[1]
     kept, uncontested = resolve_dots(hypotheses, keys, hypotheses.certain, hypotheses.reach)
-    certain = resolve_ids(hypotheses, keys, hypotheses.certain & uncontested)
+    certain = resolve_overlaps(hypotheses, hypotheses.certain & uncontested)
+    certain = resolve_ids(hypotheses, keys, certain)
     ids = np.where(certain, ids, UNDECODED)
     if not settings.report_undecoded:
         kept = kept[certain[kept]]

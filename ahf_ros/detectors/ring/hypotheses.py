@@ -21,6 +21,8 @@ from ahf_ros.features.circle_fit import Fit
 
 _LIKELY = 0.5  # confidence from which a word tells where the edges of its band are
 _CLEARLY = 2.0  # times the evidence of another claim to the same ID or dot
+_OVERLAP = 0.92  # of the radii of two targets, at which the paper of one hides marks of the other
+_ON_TOP = 1.25  # times the evidence of a target that is partly below it
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,6 +167,33 @@ def resolve_dots(
     dropped = np.ones(len(ids), bool)
     dropped[kept] = False
     return np.array(kept, np.intp), uncontested & ~dropped
+
+
+def resolve_overlaps(hypotheses: Hypotheses, certain: np.ndarray) -> np.ndarray:
+    """Return which hypotheses are certain and below no other target, shape (k,).
+
+    Where two bands overlap the paper of one target lies on that of the other. White paper on white
+    paper may hide marks without a trace, so that only the one on top is certain. It is the one
+    that agrees better with its word.
+
+    Parameters
+    ----------
+    hypotheses : Hypotheses
+    certain : ndarray of bool, shape (k,)
+    """
+    on_top = certain.copy()
+    which = np.flatnonzero(certain)
+    some = hypotheses.select(which)
+    major, _, _ = frame.ellipse_axes(some.frames)
+    outer = major * np.array([code.band_outer for code in some.families])
+    centres = np.column_stack([some.frames[:, :2, 2], np.ones(len(which))])
+    for index, plane in enumerate(some.frames):
+        x, y, scale = np.linalg.solve(plane, centres.T)
+        distance = np.hypot(x, y) / np.abs(scale) * major[index]
+        near = distance < _OVERLAP * (outer + outer[index])
+        near[index] = False
+        on_top[which[index]] &= (some.margin[index] > _ON_TOP * some.margin[near]).all()
+    return on_top
 
 
 def resolve_ids(hypotheses: Hypotheses, ids: np.ndarray, certain: np.ndarray) -> np.ndarray:
