@@ -15,10 +15,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from types import FrameType
 
-INTERRUPTED, FAILED = 130, 1
+from ahf_ros.ending import ending_signals, ignore_ending
 
-ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-"""Signals that end a process; the last one unless nohup has it ignored."""
+INTERRUPTED, FAILED = 130, 1
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -61,24 +60,19 @@ def _ending_programs() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield  # signals come to the main thread
         return
-    before = {number: signal.getsignal(number) for number in ENDING}
-    ignored = before[signal.SIGHUP] == signal.SIG_IGN
-    heeded = ENDING[:-1] if ignored else ENDING
-    for number in heeded:
-        signal.signal(number, _end)
+    before = {number: signal.signal(number, _end) for number in ending_signals()}
     try:
         yield
     finally:
-        for number in heeded:
+        for number, handler in before.items():
             if signal.getsignal(number) is _end:
-                signal.signal(number, before[number])
+                signal.signal(number, handler)
 
 
 def _end(number: int, _: FrameType | None) -> None:
     from ahf_ros.detectors.external.program import end_programs
 
-    for each in ENDING:  # the second one of a pair interrupts nothing
-        signal.signal(each, signal.SIG_IGN)
+    ignore_ending()
     end_programs()
     if number == signal.SIGINT:
         raise KeyboardInterrupt

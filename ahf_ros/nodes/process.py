@@ -22,7 +22,8 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
 from rclpy.task import Future
 
-from ahf_ros.nodes.signals import ignore, signalled
+from ahf_ros.ending import ignore_ending
+from ahf_ros.nodes.signals import signalled
 from ahf_ros.text import reason_of
 
 ARENAS = 2
@@ -117,7 +118,7 @@ class ProcessNode(Node):
 
 
 def run(make_node: Callable[[], ProcessNode], arguments: list[str] | None = None) -> int:
-    """Run a node until it ends itself or receives one of `signals.ENDING`.
+    """Run a node until it ends itself or receives one of `ending_signals`.
 
     Parameters
     ----------
@@ -153,7 +154,7 @@ def run(make_node: Callable[[], ProcessNode], arguments: list[str] | None = None
         executor.shutdown()
         node.destroy_node()
         rclpy.shutdown()
-        ignore()
+        ignore_ending()
     return node.ended.result()
 
 

@@ -7,8 +7,7 @@ import select
 import signal
 from functools import cache
 
-ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-"""Signals that end a node; the last one unless nohup has it ignored."""
+from ahf_ros.ending import ending_signals
 
 
 @cache
@@ -21,8 +20,7 @@ def signalled() -> int:
     readable, written = os.pipe()
     os.set_blocking(written, False)
     signal.set_wakeup_fd(written)
-    ignored = signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
-    for number in ENDING[:-1] if ignored else ENDING:
+    for number in ending_signals():
         signal.signal(number, lambda *_: None)
     return readable
 
@@ -30,9 +28,3 @@ def signalled() -> int:
 def has_arrived() -> bool:
     """Return whether there was a signal."""
     return bool(select.select([signalled()], [], [], 0)[0])
-
-
-def ignore() -> None:
-    """Ignore signals until the process ends: Python and the middleware take a while to do so."""
-    for number in ENDING:
-        signal.signal(number, signal.SIG_IGN)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from importlib import import_module
 
-from ahf_ros.nodes.signals import has_arrived, ignore, signalled
+from ahf_ros.ending import ignore_ending
+from ahf_ros.nodes.signals import has_arrived, signalled
 
 NODES = {
     'demo': 'ahf_ros.nodes.demo',
@@ -27,7 +28,7 @@ def start(node: str, arguments: list[str] | None = None) -> int:
     signalled()
     module = import_module(NODES[node])
     if has_arrived():
-        ignore()
+        ignore_ending()
         return 0
     status: int = module.main(arguments)
     return status
