@@ -166,6 +166,8 @@ def summary(identification: Identification) -> str:
         words += f' of {estimated}{identification.expected}'
     if identification.mirrored:
         words += ', mirrored'
+    if identification.combination:
+        words += f', {identification.combination} of the stack'
     used = identification.filter
     if not used.applied:
         return f'{words}, no filter'

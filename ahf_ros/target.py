@@ -164,6 +164,9 @@ class Identification:
     mirrored : bool
         Whether the image seems to be mirrored: most IDs read are not among the expected ones, and
         most would be in a mirror.
+    combination : str
+        Combination of the stack that gave the targets, see `ahf_ros.imaging.stack`; empty for one
+        image.
 
     Examples
     --------
@@ -177,6 +180,7 @@ class Identification:
     filter: FilterState = field(default_factory=FilterState)
     estimated: bool = False
     mirrored: bool = False
+    combination: str = ''
 
     @property
     def count(self) -> int:

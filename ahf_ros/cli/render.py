@@ -28,7 +28,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'folder',
         type=Path,
         metavar='DIR',
-        help='Folder for LIGHT_AMBIENT_SEED.png and truth.csv; created if it does not exist.',
+        help='Folder for LIGHT_AMBIENT_SEED.png, or LIGHT_AMBIENT_SEED_PHASE.png with several '
+        'phases, and truth.csv; created if it does not exist.',
     )
     add_option(parser, COUNT)
     for item in flat_parameters(SceneSettings):
@@ -55,9 +56,10 @@ def run(options: argparse.Namespace) -> int:
     truth_path = options.folder / 'truth.csv'
     try:
         truth = dict(read_truth(truth_path)) if truth_path.exists() else {}
-        for scene in scenes:
-            rendering = render(scene)
-            name = f'{scene.light}_{scene.ambient:g}_{scene.seed}.png'
+        for scene, phase in scenes:
+            rendering = render(scene, phase)
+            name = f'{scene.light}_{scene.ambient:g}_{scene.seed}'
+            name += f'_{phase}.png' if scene.phases > 1 else '.png'
             write_image(options.folder / name, rendering.image)
             truth[name] = rendering.truth
             write_truth(truth_path, truth)
@@ -69,8 +71,8 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _scenes(options: argparse.Namespace) -> Iterator[SceneSettings]:
-    """Return the scenes one by one, having refused options that do not fit each other."""
+def _scenes(options: argparse.Namespace) -> Iterator[tuple[SceneSettings, int]]:
+    """Return scenes and phases one by one, having refused options that do not fit each other."""
     lights = options.light
     first = [
         settings_from(argparse.Namespace(**vars(options) | {'light': light}), SceneSettings)
@@ -80,7 +82,8 @@ def _scenes(options: argparse.Namespace) -> Iterator[SceneSettings]:
     for scene in first:
         replace(scene, seed=scene.seed + last)  # refuses a seed that is too large
     return (
-        replace(scene, seed=scene.seed + number)
+        (replace(scene, seed=scene.seed + number), phase)
         for scene in first
         for number in range(options.count)
+        for phase in range(scene.phases)
     )

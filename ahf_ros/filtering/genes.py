@@ -10,6 +10,8 @@ the cut-off. The extended search, which finds more with the same number of filte
   ln g. Because g^p = exp(p s), the exponent is a factor of both gains: the four numbers of
   `ahf_ros.filtering.transfer.Transfer` describe every filter of the space.
 
+Of a stack of images, the combination that is filtered is one more gene, the last one.
+
 References
 ----------
 .. [1] Shang & Liu, Remote Sens. 2023, 15, 3151.
@@ -110,6 +112,11 @@ class TuningSettings:
             raise ValueError(
                 f'{lower} is {value!r}, accepted is a number of at most {upper}, {maximum!r}'
             )
+
+
+def with_combination(genes: tuple[Gene, ...], count: int) -> tuple[Gene, ...]:
+    """Return the genes of an image, or those of a stack with a number of combinations."""
+    return genes if count == 1 else (*genes, Gene('combination', 0.0, count - 1.0, 1.0))
 
 
 def tuned(shape: tuple[int, int], values: Values) -> Transfer:

@@ -1,7 +1,8 @@
 """Adaptive homomorphic filtering: the identification chooses the filter of its image [1]_.
 
-The image as received is identified first. If it does not show the N targets that are expected, a
-genetic search looks for the filter through which the detector finds n with the smallest |N - n|.
+The image as received is identified first, or the combinations of a stack, one after the other. If
+none shows the N targets that are expected, a genetic search looks for the filter through which the
+detector finds n with the smallest |N - n|. The combination of a stack is one of its genes.
 It works with any detector: it knows nothing about a detector but how to call it.
 
 References
@@ -17,19 +18,19 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import nullcontext
 from dataclasses import asdict, dataclass, replace
-from functools import partial
 from numbers import Integral
 from typing import Any
 
 import numpy as np
 
+from ahf_ros.filtering.choice import Choice, choose
 from ahf_ros.filtering.fusion import fused
 from ahf_ros.filtering.genes import tuned
-from ahf_ros.filtering.genetic import SearchResult, Values, search
+from ahf_ros.filtering.genetic import SearchResult, Values
 from ahf_ros.filtering.mirroring import MirroredId, is_mirrored
 from ahf_ros.filtering.settings import AdaptiveSettings
-from ahf_ros.filtering.trials import DetectorFunction, Trials, confirmed
-from ahf_ros.imaging.image import check_image
+from ahf_ros.filtering.trials import DetectorFunction, Trials
+from ahf_ros.imaging.stack import ImageStack
 from ahf_ros.target import FilterState, Identification, Target, count_codes, sorted_targets
 from ahf_ros.target_check import checked_targets
 
@@ -48,25 +49,13 @@ class Memory:
     Attributes
     ----------
     filter : tuple of float or None
-        The filter to try first; None for none.
+        What to try first, see `ahf_ros.filtering.trials.Trials`; None for nothing.
     settled : tuple of 2 int or None
         n and N of the last image; None unless N was estimated.
     """
 
     filter: Values | None = None
     settled: tuple[int, int] | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class _Choice:
-    """The filter chosen for an image, None for the image as received, and how it was found."""
-
-    expected: int
-    filter: Values | None
-    remembered: Values | None  # for the next image
-    evaluations: int
-    tried: tuple[Values, ...] = ()
-    search: SearchResult | None = None
 
 
 class Identifier:
@@ -152,13 +141,16 @@ class Identifier:
         """Forget what worked for earlier images."""
         self.memory = Memory()
 
-    def identify(self, image: np.ndarray, expected_targets: int | None = None) -> Identification:
-        """Identify the targets of one image; call it from one thread at a time.
+    def identify(
+        self, image: np.ndarray | ImageStack, expected_targets: int | None = None
+    ) -> Identification:
+        """Identify the targets of one image or stack; call it from one thread at a time.
 
         Parameters
         ----------
-        image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
-            The image as received.
+        image : ndarray of uint8, uint16, float32 or float64, shape (height, width), or ImageStack
+            The image as received, or several of one unmoved scene. Without N, only the most
+            promising combination of a stack is looked at.
         expected_targets : int, optional
             N, the number of coded targets in this image; that of the identifier where None. Where
             it is 0, N is estimated; without an estimate, no filter is tried. An estimate is never
@@ -185,91 +177,70 @@ class Identifier:
             Whatever the detector, the refinement or the estimate raises.
         """
         started = self._clock()
-        check_image(image)
+        stack = image if isinstance(image, ImageStack) else ImageStack((image,))
         given = self._expected_targets if expected_targets is None else expected_targets
         _check_count('expected_targets', given)
         settings = self._settings
         expected = len(settings.listed) or given
         estimating = not expected and self._estimate is not None
         trials = Trials(
-            image, self._detector, self._draft, settings.listed, settings.filter, self._name
+            stack, self._detector, self._draft, settings.listed, settings.filter, self._name
         )
         threads = settings.threads or os.cpu_count() or 1
         with ThreadPoolExecutor(threads) if threads > 1 else nullcontext() as executor:
+            choice = None
             if estimating:
-                choice = self._steady(trials, executor) or self._choose(
-                    trials, self._estimated(trials, executor), executor
-                )
-            else:
-                choice = self._choose(trials, expected, executor)
+                choice = self._steady(trials, executor)
+            if choice is None:
+                wanted = self._estimated(trials, executor) if estimating else expected
+                remembered = self._remembered(trials)
+                choice = choose(trials, wanted, settings, remembered, executor, self._clock)
         targets = trials.targets[choice.filter]
         fusing = settings.fusion and choice.tried
         if fusing:
-            targets = fused(trials.of([choice.filter, None, *choice.tried]))
+            targets = fused(trials.of([choice.filter, *trials.plain, *choice.tried]))
         self.last_search = choice.search
         settled = (count_codes(targets), choice.expected) if estimating else None
         self.memory = Memory(choice.remembered, settled)
-        if self._refine and (choice.filter or fusing or image.dtype != np.uint8):
-            targets = checked_targets(self._refine(image, targets), f'refine of {self._name}')
+        number, used = trials.parts(choice.filter)
+        received = trials.image(choice.filter)
+        if self._refine and (used or fusing or received.dtype != np.uint8):
+            targets = checked_targets(self._refine(received, targets), f'refine of {self._name}')
         state = FilterState(
             evaluations=choice.evaluations,
             generations=choice.search.generations if choice.search else 0,
             duration=self._clock() - started,
         )
-        if choice.filter:
-            state = replace(state, applied=True, **asdict(tuned(image.shape, choice.filter)))
+        if used:
+            state = replace(state, applied=True, **asdict(tuned(stack.shape, used)))
         ordered = sorted_targets(targets)
         mirrored = self._mirrored is not None and is_mirrored(
             trials.targets[choice.filter] + trials.others[choice.filter],
             settings.listed,
             self._mirrored,
         )
-        return Identification(tuple(ordered), choice.expected, state, estimating, mirrored)
+        name = stack.names[number]
+        return Identification(tuple(ordered), choice.expected, state, estimating, mirrored, name)
 
-    def _steady(self, trials: Trials, executor: Executor | None) -> _Choice | None:
+    def _steady(self, trials: Trials, executor: Executor | None) -> Choice | None:
         """Return the filter and N of the image before if it still shows the same n."""
-        remembered, settled = self.memory.filter, self.memory.settled
+        remembered, settled = self._remembered(trials) or trials.plain[0], self.memory.settled
         if settled and 0 < settled[0] == trials.count(remembered, executor):
-            return _Choice(settled[1], remembered, remembered, 1)
+            return Choice(settled[1], remembered, remembered, 1)
         return None
 
     def _estimated(self, trials: Trials, executor: Executor | None) -> int:
         """Return the estimate of N, which is at least n through the filter that worked last."""
         assert self._estimate is not None
-        shown = trials.count(self.memory.filter, executor)
-        estimated = self._estimate(trials.image)
+        shown = trials.count(self._remembered(trials) or trials.plain[0], executor)
+        estimated = self._estimate(trials.image(trials.plain[0]))
         _check_count('estimate', estimated)
         return max(int(estimated), shown)
 
-    def _choose(self, trials: Trials, expected: int, executor: Executor | None) -> _Choice:
-        """Return the filter with the smallest |N - n|."""
-        settings, remembered = self._settings, self.memory.filter
-        discrepancy = partial(trials.discrepancy, expected)
-        searching = settings.ahf and expected > 0
-        if searching and remembered and discrepancy(remembered, executor) == 0:
-            return _Choice(expected, remembered, remembered, len(trials.targets))
-        unfiltered = discrepancy(None, executor)
-        if not searching or unfiltered == 0:
-            kept = None if searching else remembered
-            return _Choice(expected, None, kept, len(trials.targets))
-        searched = trials.reduced() if settings.coarse else trials
-        result = search(
-            partial(searched.discrepancy, expected),
-            settings.tuning.genes,
-            settings.genetic,
-            np.random.default_rng(settings.genetic.seed),
-            initial=[remembered] if remembered else [],
-            executor=executor,
-            clock=self._clock,
-        )
-        evaluations = 1 + result.evaluations
-        tried = result.tried
-        if searched is not trials:
-            tried = confirmed(expected, tried, searched, trials, executor)
-            evaluations += len(tried)
-        best = min(tried, key=discrepancy)
-        best_or_none = best if discrepancy(best) < unfiltered else None
-        return _Choice(expected, best_or_none, best_or_none, evaluations, tried, result)
+    def _remembered(self, trials: Trials) -> Values | None:
+        """Return what worked last, None if nothing did or it does not suit these images."""
+        remembered = self.memory.filter
+        return remembered if trials.suits(remembered, len(self._settings.tuning.genes)) else None
 
 
 def _interruptible(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
@@ -34,6 +34,8 @@ def to_json(
     shape: tuple[int, int],
     family: str,
     detector: str,
+    stack: Sequence[str] = (),
+    split: str = '',
 ) -> dict[str, Any]:
     """Return the JSON object of an identification.
 
@@ -49,12 +51,24 @@ def to_json(
         What was looked for: a family, or several as the settings list them.
     detector : str
         Name of the detector.
+    stack : sequence of str
+        Paths of the images, where images are identified together; `image` is the first.
+    split : str
+        Why a stack was split before the first of these images; empty if it was not.
     """
     height, width = shape
     used = asdict(identification.filter)
     elapsed = used.pop('duration')
+    several = {}
+    if stack:
+        several = {
+            'images': list(stack),
+            'combination': identification.combination,
+            'split': split,
+        }
     return {
         'image': image,
+        **several,
         'width': width,
         'height': height,
         'family': family,
@@ -96,7 +110,8 @@ def read_results(path: str | Path) -> dict[str, tuple[Target, ...]]:
     ----------
     path : str or Path
         A JSON object a line with 'image' and 'targets', of which 'id', 'x' and 'y' are required;
-        empty lines are ignored. '-' stands for standard input.
+        empty lines are ignored. With a list 'images', the targets are those of each of them. '-'
+        stands for standard input.
 
     Returns
     -------
@@ -120,10 +135,12 @@ def read_results(path: str | Path) -> dict[str, tuple[Target, ...]]:
         except (ValueError, RecursionError) as error:  # also too deep, or a number too long
             raise ValueError(f'{where} is not JSON: {reason_of(error)}') from error
         targets = tuple(targets_from_json(content, where))
-        image = checked_file_name(content.get('image'), f'{where}: image')
-        if image in results:
-            raise ValueError(f'{where}: {image} was on an earlier line, accepted is one an image')
-        results[image] = targets
+        for image in _image_names(content, where):
+            if image in results:
+                raise ValueError(
+                    f'{where}: {image} was on an earlier line, accepted is one an image'
+                )
+            results[image] = targets
     return results
 
 
@@ -132,6 +149,14 @@ def _standard_input() -> str:
         return sys.stdin.read()
     except (AttributeError, OSError, UnicodeDecodeError) as error:  # None where it is closed
         raise ValueError(f'- cannot be read: {reason_of(error)}') from error
+
+
+def _image_names(content: dict[str, Any], where: str) -> list[str]:
+    """Return the names of the image or of the images that a line is about."""
+    images = content.get('images', [content.get('image')])
+    if not isinstance(images, list) or not images:
+        raise ValueError(f'{where}: images is {shown(images)}, accepted is a list of file names')
+    return [checked_file_name(image, f'{where}: image') for image in images]
 
 
 def _targets(items: list[Any], name: str) -> Iterator[Target]:

@@ -36,7 +36,7 @@ class IlluminationNode(ProcessNode):
     def __init__(self) -> None:
         super().__init__('illumination')
         self._settings = ParameterSettings(self, IlluminationNodeSettings, self._restart)
-        self._scenes: list[SceneSettings] = []
+        self._scenes: list[tuple[SceneSettings, int]] = []
         self._rendered: list[SceneMessages] = []
         self._published = 0
         self._image = self.publisher(Image, 'image')
@@ -63,13 +63,15 @@ class IlluminationNode(ProcessNode):
         self._published = 0
         self._worker.offer(partial(self._render, self._scenes, self._rendered))
 
-    def _render(self, scenes: list[SceneSettings], rendered: list[SceneMessages]) -> None:
+    def _render(
+        self, scenes: list[tuple[SceneSettings, int]], rendered: list[SceneMessages]
+    ) -> None:
         """Render the scenes of the cycle, until other scenes or none are wanted."""
-        for scene in scenes:
+        for scene, phase in scenes:
             if self._rendered is not rendered:
                 return
             try:
-                rendered.append(scene_messages(render(scene)))
+                rendered.append(scene_messages(render(scene, phase)))
             except ValueError as error:
                 self.get_logger().error(f'nothing to publish: {error}')
                 return

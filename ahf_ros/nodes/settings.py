@@ -119,7 +119,8 @@ class IlluminationNodeSettings:
     rate: float = parameter(1.0, 'Images per second.', minimum=0.001, maximum=1000.0)
     frames: int = parameter(
         3,
-        'Number of different images, published in turn; each has the next seed.',
+        'Number of different scenes, published in turn with all their phases; each has the next '
+        'seed.',
         minimum=1,
         maximum=1000,
     )
@@ -133,10 +134,12 @@ class IlluminationNodeSettings:
         check_parameters(self)
         self.scenes()
 
-    def scenes(self) -> list[SceneSettings]:
-        """Return the scene of each image, in the order of publication."""
+    def scenes(self) -> list[tuple[SceneSettings, int]]:
+        """Return scene and phase of each image, in the order of publication."""
         return [
-            replace(self.scene, seed=self.scene.seed + number) for number in range(self.frames)
+            (replace(self.scene, seed=self.scene.seed + number), phase)
+            for number in range(self.frames)
+            for phase in range(self.scene.phases)
         ]
 
 

@@ -8,7 +8,10 @@ import string
 import cv2
 import numpy as np
 
+from ahf_ros.synthetic.camera import Camera
 from ahf_ros.synthetic.covers import Cover, stamp_cover
+from ahf_ros.synthetic.layout import Placements, scattered_placements
+from ahf_ros.synthetic.prints import Mark, mark_at
 
 _SIDE = 256  # px of a stamp, finer than any distractor in an image
 _FINE = 3  # fractional bits of drawing coordinates
@@ -81,3 +84,28 @@ def _leaf(stamp: np.ndarray, generator: np.random.Generator) -> None:
     stalk = np.array([[-0.9, generator.uniform(-0.2, 0.2)], [-0.4, 0.0]])
     cv2.polylines(stamp, [_fixed(stalk)], False, shade, 6, cv2.LINE_AA, _FINE)
     cv2.polylines(stamp, [_fixed(spine)], False, shade // 2, 3, cv2.LINE_AA, _FINE)
+
+
+def distractor_marks(
+    count: int, unit: float, camera: Camera, taken: Placements, generator: np.random.Generator
+) -> list[Mark]:
+    """Return distractors that overlap neither each other nor what is placed already.
+
+    Parameters
+    ----------
+    count : int
+        Number of distractors.
+    unit : float
+        Unit of their radii, px in the image.
+    camera : Camera
+    taken : Placements
+        Of the targets.
+    generator : numpy.random.Generator
+    """
+    drawn = [distractor_cover(generator) for _ in range(count)]
+    radii = np.array([radius for _, radius in drawn]) * unit
+    placements = scattered_placements(camera, radii, taken, generator)
+    return [
+        mark_at(camera, pixel, radius, 1.0, cover)
+        for pixel, radius, (cover, _) in zip(placements.centres, radii, drawn, strict=True)
+    ]

@@ -13,7 +13,7 @@ Pattern = Callable[[np.ndarray, np.ndarray], np.ndarray]
 _HALF_VIEW = (640.0, 400.0)  # half the size of a 1280 x 800 projector, px
 
 
-def uniform(_generator: np.random.Generator, _defocus: float) -> Pattern:
+def uniform(_generator: np.random.Generator, _defocus: float, _shift: float) -> Pattern:
     """Return full light everywhere."""
     return lambda u, _v: np.ones_like(u)
 
@@ -30,8 +30,8 @@ def stripes(period: float, direction: float = 0.0) -> Callable[..., Pattern]:
         10 degrees, and half of the patterns are mirrored.
     """
 
-    def make(generator: np.random.Generator, defocus: float) -> Pattern:
-        x, y, phase = _wave(generator, period, direction)
+    def make(generator: np.random.Generator, defocus: float, shift: float) -> Pattern:
+        x, y, phase = _wave(generator, period, direction, shift)
 
         def pattern(u: np.ndarray, v: np.ndarray) -> np.ndarray:
             along = _remainder(u * x + (v * y + phase), period)
@@ -45,8 +45,8 @@ def stripes(period: float, direction: float = 0.0) -> Callable[..., Pattern]:
 def fringe(period: float) -> Callable[..., Pattern]:
     """Return a factory of sinusoidal fringes with a period in projector px."""
 
-    def make(generator: np.random.Generator, defocus: float) -> Pattern:
-        x, y, phase = _wave(generator, period, 0.0)
+    def make(generator: np.random.Generator, defocus: float, shift: float) -> Pattern:
+        x, y, phase = _wave(generator, period, 0.0, shift)
         wave = np.float32(2 * math.pi / period)
         contrast = np.float32(0.5 * math.exp(-((float(wave) * defocus) ** 2) / 2))
 
@@ -59,15 +59,19 @@ def fringe(period: float) -> Callable[..., Pattern]:
 
 
 def lattice(period: float, diameter: float) -> Callable[..., Pattern]:
-    """Return a factory of square lattices of bright round spots; lengths in projector px."""
+    """Return a factory of square lattices of bright round spots; lengths in projector px.
 
-    def make(generator: np.random.Generator, defocus: float) -> Pattern:
-        x, y, phase = _wave(generator, period, 0.0)
-        shift = np.float32(generator.uniform(0, period))
+    A shift moves them twice as far along the second axis, so that four of a quarter light almost
+    every point.
+    """
+
+    def make(generator: np.random.Generator, defocus: float, shift: float) -> Pattern:
+        x, y, phase = _wave(generator, period, 0.0, shift)
+        second = np.float32(generator.uniform(0, period) + 2 * shift * period)
 
         def pattern(u: np.ndarray, v: np.ndarray) -> np.ndarray:
             across = _remainder(u * x + (v * y + phase), period)
-            along = _remainder(v * x - (u * y + shift), period)
+            along = _remainder(v * x - (u * y + second), period)
             distance = np.sqrt(across * across + along * along)
             return _soft_step(np.float32(diameter / 2) - distance, defocus)
 
@@ -76,7 +80,7 @@ def lattice(period: float, diameter: float) -> Callable[..., Pattern]:
     return make
 
 
-def spots(generator: np.random.Generator, defocus: float) -> Pattern:
+def spots(generator: np.random.Generator, defocus: float, _shift: float) -> Pattern:
     """Return three large bright spots with soft edges in the dark."""
     half_width, half_height = _HALF_VIEW
     u_centres = (np.array([-0.6, 0.0, 0.6]) + generator.uniform(-0.12, 0.12, 3)) * half_width
@@ -95,7 +99,7 @@ def spots(generator: np.random.Generator, defocus: float) -> Pattern:
     return pattern
 
 
-def shadow(generator: np.random.Generator, defocus: float) -> Pattern:
+def shadow(generator: np.random.Generator, defocus: float, _shift: float) -> Pattern:
     """Return full light with hard shadows of bars and convex polygons."""
     edges = [_bar(generator) for _ in range(3)] + [_polygon(generator) for _ in range(9)]
 
@@ -111,7 +115,7 @@ def shadow(generator: np.random.Generator, defocus: float) -> Pattern:
     return pattern
 
 
-_MAKERS: dict[str, Callable[[np.random.Generator, float], Pattern]] = {
+_MAKERS: dict[str, Callable[[np.random.Generator, float, float], Pattern]] = {
     'normal': uniform,
     'stripe': stripes(26),
     'wide_stripe': stripes(70),
@@ -127,7 +131,9 @@ LIGHT_NAMES: tuple[str, ...] = tuple(_MAKERS)
 """Names of the lights."""
 
 
-def light_pattern(name: str, defocus: float, generator: np.random.Generator) -> Pattern:
+def light_pattern(
+    name: str, defocus: float, generator: np.random.Generator, shift: float = 0.0
+) -> Pattern:
     """Return the pattern of a light with random phase, directions and positions.
 
     Parameters
@@ -138,6 +144,8 @@ def light_pattern(name: str, defocus: float, generator: np.random.Generator) -> 
         Standard deviation of the blur of the projector, projector px.
     generator : numpy.random.Generator
         Draws phase, directions and positions.
+    shift : float
+        Added to the phase, periods; a light without a period stays as it is.
 
     Raises
     ------
@@ -146,7 +154,7 @@ def light_pattern(name: str, defocus: float, generator: np.random.Generator) -> 
     """
     if name not in _MAKERS:
         raise ValueError(f'light is {name!r}, accepted is one of {", ".join(LIGHT_NAMES)}')
-    return _MAKERS[name](generator, defocus)
+    return _MAKERS[name](generator, defocus, shift)
 
 
 def turned(pattern: Pattern, scale: float, turn: float) -> Pattern:
@@ -174,12 +182,12 @@ def benchmark_lights() -> tuple[tuple[str, float], ...]:
 
 
 def _wave(
-    generator: np.random.Generator, period: float, direction: float
+    generator: np.random.Generator, period: float, direction: float, shift: float
 ) -> tuple[np.float32, np.float32, np.float32]:
-    """Return a unit normal (x, y) near a direction or its mirror image, and a phase."""
+    """Return a unit normal (x, y) near a direction or its mirror image, and a shifted phase."""
     angle = direction + generator.uniform(-math.radians(10), math.radians(10))
     angle *= generator.choice((-1, 1))
-    phase = generator.uniform(0, period)
+    phase = generator.uniform(0, period) + shift * period
     return np.float32(math.cos(angle)), np.float32(math.sin(angle)), np.float32(phase)
 
 

@@ -39,6 +39,13 @@ class Mark:
     cover: Cover
 
 
+def mark_at(camera: Camera, pixel: np.ndarray, radius: float, reach: float, cover: Cover) -> Mark:
+    """Return a mark at a pixel whose radius is `radius` px in the image."""
+    centre = camera.wall(pixel[None])[0]
+    enlargement = np.linalg.norm(camera.jacobian(centre), ord=2)
+    return Mark(centre, float(radius / enlargement), reach, cover)
+
+
 def print_mark(
     image: np.ndarray, light: np.ndarray, mark: Mark, camera: Camera, change: float, blur: float
 ) -> None:

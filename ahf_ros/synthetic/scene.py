@@ -11,19 +11,17 @@ import numpy as np
 from ahf_ros.codes.families import FAMILY_NAMES
 from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.synthetic.camera import Camera, Sensor, tilted_camera
-from ahf_ros.synthetic.covers import Cover
 from ahf_ros.synthetic.designs import designs, quiet_zone
-from ahf_ros.synthetic.distractors import distractor_cover
+from ahf_ros.synthetic.distractors import distractor_marks
 from ahf_ros.synthetic.layout import (
     Placements,
     finest_grid,
     grid_placements,
     quiet_radius,
-    scattered_placements,
     size_ratios,
 )
 from ahf_ros.synthetic.patterns import LIGHT_NAMES, light_pattern, turned
-from ahf_ros.synthetic.prints import Mark, print_mark
+from ahf_ros.synthetic.prints import Mark, mark_at, print_mark
 from ahf_ros.synthetic.projector import rig_projector
 from ahf_ros.synthetic.radiance import paper_texture, wall_radiance
 from ahf_ros.target import Target, TrueTarget, sorted_targets
@@ -87,6 +85,13 @@ class SceneSettings:
         'Ambient light as a fraction of the projected light.',
         minimum=0.0,
         maximum=10.0,
+    )
+    phases: int = parameter(
+        1,
+        'Number of images of the scene, between which the pattern shifts by equal parts of its '
+        'period.',
+        minimum=1,
+        maximum=1000,
     )
     defocus: float = parameter(
         0.5,
@@ -179,8 +184,8 @@ class Rendering:
         return tuple(map(TrueTarget.of, self.targets))
 
 
-def render(settings: SceneSettings) -> Rendering:
-    """Return the photograph of a scene; equal settings give equal images.
+def render(settings: SceneSettings, phase: int = 0) -> Rendering:
+    """Return the photograph of a scene; equal arguments give equal images.
 
     Light is smooth on the scale of a pixel, prints are not. So light is computed once per pixel;
     its product with the prints is supersampled, blurred by the lens and averaged over each pixel.
@@ -189,12 +194,14 @@ def render(settings: SceneSettings) -> Rendering:
     ----------
     settings : SceneSettings
         The scene.
+    phase : int
+        Number of the image, from 0 to `settings.phases` - 1. They differ in light and noise.
 
     Raises
     ------
     ValueError
-        If there is no room for the targets where the wall is seen at less than 75 degrees, or
-        for the distractors.
+        If there is no such phase, or no room for the targets where the wall is seen at less than
+        75 degrees, or for the distractors.
 
     Examples
     --------
@@ -202,9 +209,14 @@ def render(settings: SceneSettings) -> Rendering:
     >>> rendering.image.shape, len(rendering.targets)
     ((300, 400), 2)
     """
-    setup, wall, lamp, noise, clutter = (
-        np.random.default_rng(stream) for stream in np.random.SeedSequence(settings.seed).spawn(5)
-    )
+    if not 0 <= phase < settings.phases:
+        raise ValueError(
+            f'phase is {phase!r}, accepted is an integer from 0 to {settings.phases - 1}'
+        )
+    streams = np.random.SeedSequence(settings.seed).spawn(5)
+    if phase:
+        streams[3] = streams[3].spawn(phase)[-1]
+    setup, wall, lamp, noise, clutter = map(np.random.default_rng, streams)
     camera = tilted_camera(
         settings.width,
         settings.height,
@@ -216,11 +228,14 @@ def render(settings: SceneSettings) -> Rendering:
     projector_pixel = settings.dot_radius / _PROJECTOR_PIXELS
     projector = rig_projector(camera.pose, projector_pixel, setup)
     marks, targets, placements = _coded_targets(settings, camera, wall)
-    marks += _distractors(settings, camera, placements, clutter)
+    marks += distractor_marks(
+        settings.distractors, settings.dot_radius, camera, placements, clutter
+    )
 
     softness = math.hypot(settings.defocus, _PIXEL_DEVIATION / projector_pixel)
     size, turn = settings.light_scale, math.radians(settings.light_turn)
-    pattern = turned(light_pattern(settings.light, softness / size, lamp), size, turn)
+    shift = phase / settings.phases
+    pattern = turned(light_pattern(settings.light, softness / size, lamp, shift), size, turn)
     average = (settings.exposure / 255) ** settings.gamma
     highest = ((settings.exposure + 255) / 2 / 255) ** settings.gamma
     light = wall_radiance(camera, projector, pattern, settings.ambient, average, highest, lamp)
@@ -267,29 +282,9 @@ def _coded_targets(
     marks, targets = [], []
     for number, pixel, size, turn in zip(ids, placements.centres, semi_major, turns, strict=True):
         design = design_of(number, turn)
-        mark = _mark(camera, pixel, size, design.reach, design.cover)
+        mark = mark_at(camera, pixel, size, design.reach, design.cover)
         x, y = camera.project(mark.centre[None])[0].tolist()
         ellipse = camera.circle(mark.centre, design.radius * mark.radius)
         marks.append(mark)
         targets.append(Target(number, design.code, x, y, *ellipse, family=settings.family))
     return marks, targets, placements
-
-
-def _distractors(
-    settings: SceneSettings, camera: Camera, taken: Placements, generator: np.random.Generator
-) -> list[Mark]:
-    """Return distractors that do not overlap the targets."""
-    drawn = [distractor_cover(generator) for _ in range(settings.distractors)]
-    radii = np.array([radius for _, radius in drawn]) * settings.dot_radius
-    placements = scattered_placements(camera, radii, taken, generator)
-    return [
-        _mark(camera, pixel, radius, 1.0, cover)
-        for pixel, radius, (cover, _) in zip(placements.centres, radii, drawn, strict=True)
-    ]
-
-
-def _mark(camera: Camera, pixel: np.ndarray, radius: float, reach: float, cover: Cover) -> Mark:
-    """Return a mark at a pixel whose radius is `radius` px in the image."""
-    centre = camera.wall(pixel[None])[0]
-    enlargement = np.linalg.norm(camera.jacobian(centre), ord=2)
-    return Mark(centre, float(radius / enlargement), reach, cover)

@@ -17,6 +17,7 @@ from ahf_ros.interchange.truth_files import read_truth
 from ahf_ros.session import IdentificationSettings
 from ahf_ros.settings.nested import flat_parameters
 from ahf_ros.synthetic.scene import SceneSettings
+from support.command_line import ahf
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENE = ['--width', '640', '--height', '480', '--targets', '6', '--dot-radius', '10']
@@ -25,17 +26,6 @@ KEYS = (
     'id code x y semi_major semi_minor angle confidence covariance family',
     'applied gamma_high gamma_low cutoff attenuation evaluations generations',
 )
-
-
-def ahf(*arguments: object, stdin: str = '') -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, '-m', 'ahf_ros.cli', *map(str, arguments)],
-        input=stdin,
-        capture_output=True,
-        text=True,
-        env={**os.environ, 'PYTHONPATH': str(ROOT)},
-        timeout=300,
-    )
 
 
 def status(*arguments: object) -> int:

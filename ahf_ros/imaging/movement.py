@@ -1,0 +1,216 @@
+"""Whether the scene moved between two images, though the light on it changed.
+
+A print has the same steps of the logarithm in any light. So an edge of the first image is looked
+for in the second one, along its normal, with the same direction and about the same step. Edges of
+light that moved find no such partner in the same place, or find it displaced along their normal
+only. A scene that rests shows as a peak of coincidences at no displacement; its distance from zero
+is measured against its own uncertainty. Where nothing coincides at zero, but much does at another
+displacement, the scene moved by this.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from ahf_ros.imaging.coincidence import (
+    MINIMUM_EDGES,
+    PEAK,
+    WINDOW,
+    Displacement,
+    direction_weights,
+    measured,
+)
+from ahf_ros.imaging.image import as_gray
+from ahf_ros.imaging.logarithm import LOG_OFFSET
+
+REACH = 16
+"""Maximum displacement that is looked for, px."""
+
+MINIMUM_SHIFT = 0.05
+"""Smaller displacements of a scene do not count, px: uneven light moves edges by as much."""
+
+MINIMUM_PART_SHIFT = 0.5
+"""Smaller displacements of a part of the scene do not count, px."""
+
+_BLUR = 1.0  # px, of the logarithm; edges become as wide in sharp images as in soft ones
+_STEEP = 0.06  # of ln per px, an edge; paper is flatter
+_NOISY = 6.0  # standard deviations of the gradient in flat parts, an edge
+_FLAT, _FLAT_SIZE = 10, 0.459  # percentile of gradients that are noise, and its deviations
+_MAXIMUM_EDGES = 20_000  # evenly distributed ones are enough
+_SIMILAR = 1.5  # ratio of two steps that may be the same edge
+_FAR_EDGES = 4000  # are enough to look for a displacement of whole pixels
+_APART = 3.0  # px, between two peaks
+_TILES = 4  # along each side, that are looked at one by one
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Edges:
+    """Edges of an image, ready to be looked for in others.
+
+    Attributes
+    ----------
+    x, y : ndarray of float32, shape (n,)
+        Places, px.
+    normals : ndarray of float32, shape (n, 2)
+        Unit vectors from dark to bright.
+    steps : ndarray of float32, shape (n,)
+        Gradients of the logarithm, 1 / px.
+    places : ndarray of float32, shape (n,)
+        Exact places along the normals, px.
+    shape : tuple of int
+        Height and width of the image, px.
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    normals: np.ndarray
+    steps: np.ndarray
+    places: np.ndarray
+    shape: tuple[int, int]
+
+
+def find_edges(image: np.ndarray) -> Edges:
+    """Return the edges of an image.
+
+    Parameters
+    ----------
+    image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
+    """
+    gradients = _gradients(image)
+    size = cv2.magnitude(*gradients)
+    flat = float(np.percentile(size[::4, ::4], _FLAT)) / _FLAT_SIZE
+    minimum = max(_STEEP, _NOISY * flat)
+    inside = np.zeros(size.shape, bool)
+    margin = REACH + 2
+    inside[margin:-margin, margin:-margin] = True
+    crest = np.zeros(size.shape, bool)
+    for beside in ((3, 1), (1, 3)):
+        crest |= size >= cv2.dilate(size, np.ones(beside))
+    y, x = np.nonzero((size > minimum) & crest & inside)
+    every = -(-len(x) // _MAXIMUM_EDGES) or 1
+    y, x = y[::every], x[::every]
+    normals = np.stack([of[y, x] for of in gradients], 1) / size[y, x, None]
+    profiles = _profiles(gradients, x, y, normals, np.arange(-1.0, 2.0))
+    places, steps = _vertex(*profiles.T)
+    good = np.abs(places) < 1
+    x, y, normals, steps, places = (of[good] for of in (x, y, normals, steps, places))
+    return Edges(x.astype(np.float32), y.astype(np.float32), normals, steps, places, size.shape)
+
+
+def displacement(edges: Edges, image: np.ndarray) -> Displacement | None:
+    """Return by how much a scene moved, None where nothing shows that it did.
+
+    Parameters
+    ----------
+    edges : Edges
+        Of the first image.
+    image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
+        The other image, of the same size.
+    """
+    if len(edges.x) < MINIMUM_EDGES:
+        return None
+    gradients = _gradients(image)
+    found = _partners(edges, gradients, np.zeros(2))
+    whole = measured(edges.normals, found)
+    if whole is None:
+        return _far(edges, gradients)
+    if whole.exceeds(MINIMUM_SHIFT):
+        return whole
+    height, width = edges.shape
+    tile = (edges.y * _TILES // height) * _TILES + edges.x * _TILES // width
+    for number in range(_TILES**2):
+        part = measured(edges.normals[tile == number], found[tile == number])
+        if part and part.exceeds(MINIMUM_PART_SHIFT):
+            return part
+    return None
+
+
+def _gradients(image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    logarithm = np.log(as_gray(image).astype(np.float32) + np.float32(LOG_OFFSET))
+    smooth = cv2.GaussianBlur(logarithm, (0, 0), _BLUR)
+    return cv2.Scharr(smooth, cv2.CV_32F, 1, 0, scale=1 / 32), cv2.Scharr(
+        smooth, cv2.CV_32F, 0, 1, scale=1 / 32
+    )
+
+
+def _profiles(
+    gradients: tuple[np.ndarray, np.ndarray],
+    x: np.ndarray,
+    y: np.ndarray,
+    normals: np.ndarray,
+    offsets: np.ndarray,
+) -> np.ndarray:
+    """Return the gradient along each normal at offsets from the edge, shape (n, offsets)."""
+    columns = (x[:, None] + normals[:, :1] * offsets).astype(np.float32)
+    rows = (y[:, None] + normals[:, 1:] * offsets).astype(np.float32)
+    sampled = np.empty((2, *columns.shape), np.float32)
+    for top in range(0, len(x), 30_000):  # remap has a maximum of rows
+        part = slice(top, top + 30_000)
+        for axis in (0, 1):
+            sampled[axis, part] = cv2.remap(
+                gradients[axis], columns[part], rows[part], cv2.INTER_LINEAR
+            )
+    along: np.ndarray = sampled[0] * normals[:, :1] + sampled[1] * normals[:, 1:]
+    return along
+
+
+def _vertex(
+    before: np.ndarray, middle: np.ndarray, after: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return place and height of the vertex of a parabola through three values."""
+    bend = np.maximum(2 * middle - before - after, 1e-9)
+    place = (after - before) / (2 * bend)
+    return place, middle + bend * place**2 / 2
+
+
+def _partners(
+    edges: Edges, gradients: tuple[np.ndarray, np.ndarray], shift: np.ndarray
+) -> np.ndarray:
+    """Return where along its normal each edge is seen again, from a place shifted by whole pixels.
+
+    Shape (n, 2 WINDOW + 1), px; the maximum near each whole offset, else NaN.
+    """
+    offsets = np.arange(-WINDOW - 1.0, WINDOW + 2.0)
+    x, y = edges.x + np.float32(shift[0]), edges.y + np.float32(shift[1])
+    along = _profiles(gradients, x, y, edges.normals, offsets)
+    middle = along[:, 1:-1]
+    place, height = _vertex(along[:, :-2], middle, along[:, 2:])
+    good = (middle >= along[:, :-2]) & (middle > along[:, 2:])
+    good &= _alike(height, edges.steps[:, None])
+    found = offsets[1:-1] + place - edges.places[:, None]
+    return np.where(good, found, np.nan).astype(np.float32)
+
+
+def _alike(steps: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Return whether two steps may be those of one edge."""
+    return (steps > others / _SIMILAR) & (steps < others * _SIMILAR)
+
+
+def _far(edges: Edges, gradients: tuple[np.ndarray, np.ndarray]) -> Displacement | None:
+    """Return a displacement of more than a pixel, None unless just one stands out.
+
+    A pattern of light that moved is like itself at several displacements.
+    """
+    every = slice(None, None, -(-len(edges.x) // _FAR_EDGES))
+    x, y = (of[every].astype(int) for of in (edges.x, edges.y))
+    normals, steps = edges.normals[every], edges.steps[every]
+    weights = direction_weights(normals)
+    side = np.arange(-REACH, REACH + 1)
+    counts = np.zeros((len(side), len(side)))
+    for row, down in enumerate(side):
+        for column, right in enumerate(side):
+            at = y + down, x + right
+            along = gradients[0][at] * normals[:, 0] + gradients[1][at] * normals[:, 1]
+            counts[row, column] = weights @ _alike(along, steps)
+    row, column = divmod(int(counts.argmax()), len(side))
+    apart = np.hypot(side[:, None] - side[row], side - side[column]) >= _APART
+    if counts.max() < max(PEAK * counts[apart].max(), MINIMUM_EDGES):
+        return None
+    shift = np.array((side[column], side[row]))
+    rest = measured(edges.normals, _partners(edges, gradients, shift))
+    if rest is None:
+        return None
+    return Displacement(rest.x + float(shift[0]), rest.y + float(shift[1]), rest.deviation)

@@ -1,0 +1,106 @@
+"""Stacks of images on the command line."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ahf_ros.cli import main
+from ahf_ros.cli.stacks import stacked
+from ahf_ros.interchange.image_files import read_image, write_image
+from support.command_line import ahf
+
+PHASES = 4
+NAMES = [f'stripe_0.02_{seed}_{phase}.png' for seed in (1, 2) for phase in range(PHASES)]
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory) -> Path:
+    """Return a folder with four phases of two scenes, and their truth."""
+    folder = tmp_path_factory.mktemp('phases')
+    scene = '--width 480 --height 360 --targets 4 --dot-radius 12 --light stripe --ambient 0.02'
+    done = ahf('render', folder, *scene.split(), '--seed', 1, '--count', 2, '--phases', PHASES)
+    assert (done.returncode, done.stdout) == (0, '')
+    return folder
+
+
+def test_phases_are_one_scene_in_light_that_moves(folder):
+    assert sorted(path.name for path in folder.glob('*.png')) == sorted(NAMES)
+    first, second = (read_image(folder / name).astype(float) for name in NAMES[:2])
+    assert np.abs(first - second).mean() > 20
+    lines = (folder / 'truth.csv').read_text().splitlines()
+    places = {name: [line for line in lines if line.startswith(name)] for name in NAMES[:2]}
+    values = [[line.split(',', 1)[1] for line in of] for of in places.values()]
+    assert len(values[0]) == 4
+    assert values[0] == values[1]
+
+
+def test_every_stack_is_one_result_that_names_its_images(folder):
+    paths = [str(folder / name) for name in NAMES]
+    done = ahf('identify', *paths, '--stack', 4, '--expected', 4, '--json')
+    assert done.returncode == 0, done.stderr
+    results = [json.loads(line) for line in done.stdout.splitlines()]
+    assert [result['images'] for result in results] == [paths[:4], paths[4:]]
+    assert [result['image'] for result in results] == [paths[0], paths[4]]
+    assert [len(result['targets']) for result in results] == [4, 4]
+    assert {result['combination'] for result in results} == {'largest'}
+    assert [result['split'] for result in results] == ['', '']
+    judged = ahf('evaluate', folder / 'truth.csv', '-', '--json', stdin=done.stdout)
+    total = json.loads(judged.stdout.splitlines()[-1])
+    assert (total['right'], total['wrong'], total['expected']) == (32, 0, 32)
+
+
+def test_names_and_folders_say_what_belongs_together(folder):
+    paths = [str(folder / name) for name in reversed(NAMES)]
+    done = ahf('identify', *paths, '--stack-by', r'(.*)_\d', '--expected', 4, '--json')
+    results = [json.loads(line) for line in done.stdout.splitlines()]
+    assert [result['images'] for result in results] == [paths[:4], paths[4:]]
+    assert [len(result['targets']) for result in results] == [4, 4]
+
+
+def test_a_stack_of_several_sizes_is_split_and_what_is_unreadable_is_left_out(folder, tmp_path):
+    paths = [str(folder / name) for name in NAMES[:3]]
+    write_image(tmp_path / 'other.png', read_image(paths[0])[:-8])
+    (tmp_path / 'broken.png').write_bytes(b'nothing')
+    paths += [str(tmp_path / 'other.png'), str(tmp_path / 'broken.png')]
+    done = ahf('identify', *paths, '--stack', 5, '--json', '--overlay', tmp_path / 'seen')
+    assert done.returncode == 1
+    first, second = (json.loads(line) for line in done.stdout.splitlines())
+    assert (first['images'], second['images']) == (paths[:3], paths[3:4])
+    reason = 'image 4 of the stack is 480 x 352 px, accepted is the size of the first'
+    assert second['split'].startswith(reason)
+    assert reason in done.stderr
+    assert 'broken.png' in done.stderr
+    assert '4 of 5 images of a stack' in done.stderr
+    seen = sorted(path.name for path in (tmp_path / 'seen').iterdir())
+    assert seen == ['other_overlay.png', 'stripe_0.02_1_0_overlay.png']
+
+
+def test_single_images_are_what_they_were(folder):
+    done = ahf('identify', folder / NAMES[0], '--json')
+    assert not {'images', 'combination', 'split'} & set(json.loads(done.stdout))
+
+
+def test_groups_are_in_the_order_of_their_first_images():
+    images = ['b/x1.png', 'a/x1.png', 'b/x2.png', 'b/x3.png']
+    assert stacked(images, 'folder', 1) == [['b/x1.png', 'b/x2.png', 'b/x3.png'], ['a/x1.png']]
+    assert stacked(images, 'folder', 2)[0] == ['b/x1.png', 'b/x2.png']
+    assert stacked(images, '', 3) == [images[:3], images[3:]]
+    assert stacked(images, '', 1) == [[image] for image in images]
+    assert stacked(images, r'(x)\d', 1) == [[images[0], *images[2:]], ['a/x1.png']]
+
+
+@pytest.mark.parametrize(
+    ('by', 'message'),
+    [
+        ('(', "stack_by is '(', accepted is folder or a regular expression"),
+        ('abc', 'a regular expression with a group'),
+        ('(y).', "which does not match 'stripe"),
+    ],
+)
+def test_bad_groups_are_named(folder, capsys, by, message):
+    assert main(['identify', str(folder / NAMES[0]), '--stack-by', by]) == 2
+    assert message in capsys.readouterr().err

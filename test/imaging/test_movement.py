@@ -1,0 +1,68 @@
+"""Movement between images of one scene, in light that changes."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from ahf_ros.imaging.movement import displacement, find_edges
+from ahf_ros.synthetic.scene import SceneSettings, render
+
+SCENE = {'width': 640, 'height': 480, 'targets': 6, 'dot_radius': 16.0}
+
+
+def images(light: str, ambient: float, count: int = 3) -> list[np.ndarray]:
+    scene = SceneSettings(**SCENE, light=light, ambient=ambient, phases=4, seed=5)
+    return [render(scene, phase).image for phase in range(count)]
+
+
+def shifted(image: np.ndarray, x: float, y: float) -> np.ndarray:
+    moved = np.array([[1, 0, x], [0, 1, y]], float)
+    return cv2.warpAffine(
+        image, moved, image.shape[::-1], flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE
+    )
+
+
+LIGHTS = [('normal', 0.3), ('stripe', 0.02), ('lattice', 0.3), ('fringe', 0.3), ('shadow', 0.3)]
+
+
+@pytest.mark.parametrize(('light', 'ambient'), LIGHTS)
+def test_light_that_moves_is_no_movement_and_a_scene_that_moves_is(light, ambient):
+    first, *others = images(light, ambient)
+    edges = find_edges(first)
+    assert [displacement(edges, other) for other in others] == [None, None]
+    for x, y in ((0.6, 0.3), (5.0, -3.0)):
+        moved = displacement(edges, shifted(others[0], x, y))
+        assert moved is not None
+        assert np.hypot(moved.x - x, moved.y - y) < 0.15
+
+
+def test_a_tenth_of_a_pixel_is_seen_in_even_light():
+    first, second, _ = images('normal', 0.3)
+    moved = displacement(find_edges(first), shifted(second, 0.1, 0.0))
+    assert moved is not None
+    assert moved.exceeds(0.05)
+    assert moved.deviation < 0.01
+    assert str(moved).startswith('0.1')
+
+
+def test_an_object_that_moves_alone_is_noticed():
+    first, second, _ = images('normal', 0.3)
+    second[:, :320] = shifted(second, 0.9, 0.0)[:, :320]
+    moved = displacement(find_edges(first), second)
+    assert moved is not None
+    assert abs(moved.x - 0.9) < 0.2
+
+
+@pytest.mark.parametrize('size', [(16, 16), (40, 60)])
+def test_images_without_edges_do_not_move(size):
+    flat = np.full(size, 90, np.uint8)
+    flat[0, 0] = 91
+    assert displacement(find_edges(flat), flat) is None
+
+
+def test_other_pixel_types_are_accepted():
+    first, second, _ = images('normal', 0.3)
+    edges = find_edges(first.astype(np.uint16) * 16)
+    assert displacement(edges, second.astype(np.float32)) is None

@@ -1,0 +1,120 @@
+"""Which images of a sequence are identified together."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ahf_ros.sequence import (
+    SLIDING,
+    StackSettings,
+    Window,
+    identify_parts,
+    unmoved_parts,
+)
+from ahf_ros.session import create_identifier
+from ahf_ros.synthetic.scene import SceneSettings, render
+
+SCENE = SceneSettings(
+    width=480, height=360, targets=4, dot_radius=12, light='stripe', ambient=0.02, phases=4, seed=2
+)
+
+
+def gathered(window: Window[str], *added: tuple[str, str, int]) -> list[tuple[str, int, str]]:
+    return [
+        (''.join(stack.items), stack.fresh, stack.reason)
+        for item in added
+        for stack in window.add(*item)
+    ]
+
+
+def stream(names: str) -> list[tuple[str, str, int]]:
+    return [(name, 'mono8', number) for number, name in enumerate(names)]
+
+
+def test_a_tumbling_window_gives_each_image_to_one_stack():
+    window: Window[str] = Window(StackSettings(stack=3))
+    assert gathered(window, *stream('abcdefg')) == [('abc', 3, ''), ('def', 3, '')]
+    assert window.fresh == 1
+    assert [(stack.items, stack.reason) for stack in window.end('the bag ends')] == [
+        (('g',), '1 of 3 images: the bag ends')
+    ]
+    assert window.end('the bag ends') == []
+
+
+def test_a_sliding_window_answers_every_image_once_it_is_full():
+    window: Window[str] = Window(StackSettings(stack=3, stack_window=SLIDING))
+    assert gathered(window, *stream('abcde')) == [('abc', 3, ''), ('bcd', 1, ''), ('cde', 1, '')]
+    assert window.end('no more') == []
+
+
+@pytest.mark.parametrize('window', ['tumbling', SLIDING])
+@pytest.mark.parametrize(
+    ('third', 'reason'),
+    [
+        (('c', 'mono16', 2), '2 of 3 images: the next image is mono16, these are mono8'),
+        (('c', 'mono8', -2_000_000_000), '2 of 3 images: the stamp of the next image is 2'),
+    ],
+)
+def test_images_that_do_not_belong_together_begin_a_new_stack(window, third, reason):
+    gathering: Window[str] = Window(StackSettings(stack=3, stack_window=window))
+    _, kind, time = third
+    rest = [('d', kind, time), ('e', kind, time)]
+    (first, full) = gathered(gathering, *stream('ab'), third, *rest)
+    assert first[:2] == ('ab', 2)
+    assert first[2].startswith(reason)
+    assert full == ('cde', 3, '')
+
+
+def test_single_images_are_never_held_back():
+    window: Window[str] = Window(StackSettings())
+    added = [('a', 'mono8', 5), ('b', 'rgb8', 3)]
+    assert gathered(window, *added) == [('a', 1, ''), ('b', 1, '')]
+
+
+def test_a_stack_identifies_what_no_image_does():
+    images = [render(SCENE, phase).image for phase in range(4)]
+    truth = {target.id for target in render(SCENE).targets}
+    settings = StackSettings(stack=4)
+    identifier = create_identifier(expected_targets=4)
+    ((part, stack, found),) = identify_parts(identifier, images, settings)
+    assert (part.images, part.split, stack.shape) == (range(4), '', (360, 480))
+    assert {target.id for target in found.targets} == truth
+
+
+def test_a_stack_is_split_where_the_scene_moved():
+    scene = replace(SCENE, light='normal', phases=1)
+    still = render(scene).image
+    images = [still, still, np.roll(still, 4, axis=1), np.roll(still, 4, axis=1)]
+    first, second = unmoved_parts(images)
+    assert (first.images, second.images) == (range(2), range(2, 4))
+    assert second.split.startswith('the scene moved by 4.0')
+    assert second.split.endswith('before image 3 of the stack')
+    assert [part.images for part in unmoved_parts(images, look_for_movement=False)] == [range(4)]
+    identifier = create_identifier(expected_targets=4)
+    parts = list(identify_parts(identifier, images, StackSettings(stack=4)))
+    places = [found.targets[0].x for _, _, found in parts]
+    assert abs(places[1] - places[0] - 4) < 0.02
+    fresh = identify_parts(identifier, images, StackSettings(stack=4), fresh=1)
+    assert [part.images for part, _, _ in fresh] == [range(2, 4)]
+
+
+def test_images_of_another_type_are_a_part_of_their_own():
+    image = render(SCENE).image
+    parts = unmoved_parts([image, image.astype(np.uint16), image.astype(np.uint16)])
+    assert [part.images for part in parts] == [range(1), range(1, 3)]
+    assert 'pixels of type uint16' in parts[1].split
+
+
+@pytest.mark.parametrize(
+    ('values', 'message'),
+    [
+        ({'stack': 0}, 'stack is 0, accepted is an integer from 1 to 64'),
+        ({'stack_window': 'rolling'}, "stack_window is 'rolling'"),
+    ],
+)
+def test_bad_settings_are_named(values, message):
+    with pytest.raises(ValueError, match=message):
+        StackSettings(**values)
