@@ -92,7 +92,7 @@ def decode_occluded(
     clear = (readings.words > 0) & (readings.margin > _CLEAR_MARGIN) & (better < _CLEAR)
     clear &= prior(readings.words, family, expected) == 0
     others = np.flatnonzero(~clear)
-    best = plain.replaced(others, _competing(of.select(others), family, expected))
+    best = plain.replaced(others, _competing(of.select(others), plain.select(others), family, expected))
     (_, before), (_, after) = (canonical(of.words, family) for of in (readings, best))
     same = (readings.words > 0) & (before == after)
     explained, contradiction = explanation(
@@ -113,8 +113,10 @@ def decode_occluded(
     )
 
 
-def _competing(of: HiddenEvidence, family: Family, expected: frozenset[int]) -> _Words:
-    """Return the words that all hypotheses of what is hidden leave."""
+def _competing(
+    of: HiddenEvidence, plain: _Words, family: Family, expected: frozenset[int]
+) -> _Words:
+    """Return the words that all hypotheses of what is hidden leave, the plain ones among them."""
     per_sector = of.onto.shape[1] // family.bits
     angles = sectors_by_phase(per_sector, family)
     ground, mark = np.moveaxis(sector_evidence(of, angles), 1, 0)
@@ -122,18 +124,21 @@ def _competing(of: HiddenEvidence, family: Family, expected: frozenset[int]) -> 
     words, phases, _ = best_words(
         mark - ground, of.onto[:, last], of.off[:, last], family, expected
     )
+    read = plain.words > 0
+    words = np.column_stack([words, np.where(read, plain.words, words[:, 0])])
+    phases = np.column_stack([phases, np.where(read, plain.phases, phases[:, 0])])
     order = clearest(of)
     of = turned(of, order)
     bits = np.take_along_axis(bits_at(words, phases, per_sector, family), order[:, None], axis=2)
-    read = explained_words(of, bits)
-    scores = read + prior(words, family, expected)
+    evidence = explained_words(of, bits)
+    scores = evidence + prior(words, family, expected)
     best, rows = scores.argmax(axis=1), np.arange(len(words))
     turned_hidden, unexplained = best_explanations(of, bits[rows, best])
     hidden = np.empty_like(turned_hidden)
     np.put_along_axis(hidden, order, turned_hidden, axis=1)
     # What is expected wins a draw, but an ID that is read clearly is no other one.
     margin = np.minimum(
-        margins(words, scores, best, family), margins(words, read, best, family) + _DRAW
+        margins(words, scores, best, family), margins(words, evidence, best, family) + _DRAW
     )
     margin = np.minimum(margin, _MAXIMUM_MARGIN)
     return _Words(words[rows, best], phases[rows, best], margin, unexplained, hidden)

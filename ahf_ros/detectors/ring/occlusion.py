@@ -66,15 +66,18 @@ def hidden_evidence(evidence: PrintEvidence) -> HiddenEvidence:
     # What lies before the band may leave the ground beside it free.
     beside = np.maximum(evidence.free, 0)[:, None]
     anything = np.maximum(np.stack([inked, mark], axis=1), beside).sum(axis=2)
-    anything -= _FARTHER
-    either = np.maximum(mark, ground).sum(axis=1)
-    like_ground = np.stack([seen[:, 0], either], axis=1) - _FARTHER
-    before, after = _windows(seen)
-    onto = evidence.onto * _probability(before[:, 0]) * _probability(after[:, 1])
-    off = evidence.off * _probability(before[:, 1]) * _probability(after[:, 0])
+    like_ground = np.stack([seen[:, 0], np.maximum(mark, ground).sum(axis=1)], axis=1)
     price = _EDGES_OF_LIGHT * np.maximum(evidence.edges - _USUAL, 0)
     price += _UNEVEN_LIGHT * np.maximum(evidence.uneven - _USUAL, 0)
     price = np.minimum(price, _MAXIMUM_PRICE)
+    # An edge of light beside a mark may look like that of a mark whose other half is hidden.
+    uneven = price > EVEN
+    anything[uneven, 1] = np.maximum(seen[uneven, 1], beside[uneven].sum(axis=(1, 2)))
+    like_ground[uneven, 1] = seen[uneven].max(axis=1)
+    anything, like_ground = anything - _FARTHER, like_ground - _FARTHER
+    before, after = _windows(seen)
+    onto = evidence.onto * _probability(before[:, 0]) * _probability(after[:, 1])
+    off = evidence.off * _probability(before[:, 1]) * _probability(after[:, 0])
     return HiddenEvidence(seen, anything, like_ground, onto, off, price)
 
 
