@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -22,8 +23,10 @@ from ahf_ros.bag.source import Source
 from ahf_ros.detectors import create_detector
 from ahf_ros.detectors.contract import Unavailable
 from ahf_ros.drawing import draw
+from ahf_ros.imaging.image import check_image
 from ahf_ros.interchange.image_messages import decode_compressed, decode_image
 from ahf_ros.interchange.target_messages import coded_target_array
+from ahf_ros.sequence import Gathered, StackSettings, Window, identify_parts
 from ahf_ros.session import IdentificationSettings, create_identifier
 from ahf_ros.target import Identification
 from ahf_ros.text import printable, reason_of
@@ -55,8 +58,18 @@ class AnswerTopics:
         return types | {self.debug_image: COMPRESSED_IMAGE} if self.debug_image else types
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Held:
+    """A decoded image that belongs to a stack."""
+
+    header: Any
+    image: np.ndarray
+
+
 class Answering:
     """Identifies the images of each topic as a node of its own would.
+
+    A stack is answered with the header of its last image.
 
     Parameters
     ----------
@@ -65,6 +78,8 @@ class Answering:
     topics : mapping of str to AnswerTopics
         By the topic of the images.
     settings : IdentificationSettings
+    stacking : StackSettings
+        Which images are identified together.
     """
 
     def __init__(
@@ -72,51 +87,90 @@ class Answering:
         source: Source,
         topics: Mapping[str, AnswerTopics],
         settings: IdentificationSettings,
+        stacking: StackSettings,
     ) -> None:
         detector = create_detector(settings.detector, settings.detection)
         self._source = source
         self._topics = topics
         self._family = detector.family
         self._identifiers = {topic: create_identifier(settings, detector) for topic in topics}
+        self._stacking = stacking
+        self._windows: dict[str, Window[_Held]] = {topic: Window(stacking) for topic in topics}
         self._store = typestore()
         self._types = message_types(self._store)
 
     def answer(
-        self, connection: Connection, timestamp: int, data: bytes
+        self, connection: Connection, timestamp: int, data: bytes, last: bool
     ) -> tuple[Entry, list[Output]]:
-        """Return what becomes of an image, and the messages about it."""
+        """Return what becomes of an image, and the messages about it.
+
+        Parameters
+        ----------
+        connection : rosbags.interfaces.Connection
+        timestamp : int
+            Time of recording, ns.
+        data : bytes
+            The message.
+        last : bool
+            Whether no image follows; then all stacks end.
+        """
         topic = connection.topic
         answers: list[Output] = []
-        reason = ''
-        try:
-            answers = self._messages(connection, data)
-        except Unavailable:
-            raise  # it is not the fault of the image; another run may find the detector
-        except ValueError as error:
-            reason = printable(str(error), _REASON)
-        except Exception as error:
-            # The others go on, whatever an image does to a decoder or a detector.
-            reason = reason_of(error)
+        reasons: list[str] = []
+        notes: list[str] = []
+        gathered: list[tuple[str, Gathered[_Held]]] = []
+        with _refused(reasons):
+            gathered = [(topic, stack) for stack in self._add(connection, data)]
+        if last:
+            for name, window in self._windows.items():
+                gathered += [(name, stack) for stack in window.end('no image follows')]
+        for name, stack in gathered:
+            if stack.reason:
+                notes.append(f'a stack of {stack.reason}')
+            with _refused(reasons):
+                answers += self._messages(name, stack, notes)
         memory = self._identifiers[topic].memory
-        return Entry(topic, timestamp, memory, reason), answers
+        return Entry(topic, timestamp, memory, '; '.join(reasons), '; '.join(notes)), answers
 
-    def resume(self, entry: Entry) -> None:
+    def resume(self, entry: Entry, connection: Connection, data: bytes) -> None:
         """Go on as if an image had just been answered."""
         self._identifiers[entry.topic].memory = entry.memory
+        if self._stacking.stack > 1:
+            with _refused([]):
+                self._add(connection, data)
 
-    def _messages(self, connection: Connection, data: bytes) -> list[Output]:
+    def _add(self, connection: Connection, data: bytes) -> list[Gathered[_Held]]:
+        """Add an image to the window of its topic, and return the stacks that this completes."""
         received = self._source.deserialize(connection, data)
         image = DECODERS[connection.msgtype](received)
-        found = self._identifiers[connection.topic].identify(image)
-        # Without the duration, runs are byte-identical.
-        found = replace(found, filter=replace(found.filter, duration=0.0))
+        if self._stacking.stack > 1:
+            check_image(image)
+        height, width = image.shape
+        coding = getattr(received, 'encoding', '') or received.format
         header = self._header(received)
-        message = coded_target_array(found, self._family, image.shape, header, self._types)
-        topics = self._topics[connection.topic]
-        answers = [self._serialized(topics.targets, CODED_TARGETS, message)]
-        if topics.debug_image:
-            drawn = self._drawn(image, found, header)
-            answers.append(self._serialized(topics.debug_image, COMPRESSED_IMAGE, drawn))
+        time = header.stamp.sec * 10**9 + header.stamp.nanosec
+        window = self._windows[connection.topic]
+        return window.add(_Held(header, image), f'{width} x {height} px, {coding}', time)
+
+    def _messages(self, topic: str, gathered: Gathered[_Held], notes: list[str]) -> list[Output]:
+        """Return the messages about a stack, and note where it was split."""
+        answers: list[Output] = []
+        images = [held.image for held in gathered.items]
+        parts = identify_parts(
+            self._identifiers[topic], images, self._stacking, fresh=gathered.fresh
+        )
+        for part, stack, identified in parts:
+            if part.split:
+                notes.append(f'a stack is split: {part.split}')
+            # Without the duration, runs are byte-identical.
+            found = replace(identified, filter=replace(identified.filter, duration=0.0))
+            header = gathered.items[part.images[-1]].header
+            message = coded_target_array(found, self._family, stack.shape, header, self._types)
+            topics = self._topics[topic]
+            answers.append(self._serialized(topics.targets, CODED_TARGETS, message))
+            if topics.debug_image:
+                drawn = self._drawn(stack.combined(found.combination), found, header)
+                answers.append(self._serialized(topics.debug_image, COMPRESSED_IMAGE, drawn))
         return answers
 
     def _serialized(self, topic: str, kind: str, message: Any) -> Output:
@@ -135,3 +189,16 @@ class Answering:
         return self._store.types[COMPRESSED_IMAGE](
             header=header, format='bgr8; jpeg compressed bgr8', data=encoded.ravel()
         )
+
+
+@contextmanager
+def _refused(reasons: list[str]) -> Iterator[None]:
+    """Note why an image or a stack is refused, whatever it does to a detector."""
+    try:
+        yield
+    except Unavailable:
+        raise  # it is not the fault of the image; another run may find the detector
+    except ValueError as error:
+        reasons.append(printable(str(error), _REASON))
+    except Exception as error:
+        reasons.append(reason_of(error))

@@ -52,12 +52,15 @@ class Entry:
         State of the identifier after the image, for the next image of the topic.
     reason : str
         Why the image was refused; empty if it was not.
+    note : str
+        What became of its stack, if that is not what was asked for.
     """
 
     topic: str
     timestamp: int
     memory: Memory
     reason: str
+    note: str = ''
 
 
 Output = tuple[str, bytes]

@@ -12,7 +12,7 @@ import json
 import os
 import re
 import sqlite3
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -31,19 +31,22 @@ from ahf_ros.bag.assembly import (
 )
 from ahf_ros.bag.folder import MALFORMED
 from ahf_ros.bag.journal import PROGRESS, Entry, Journal, begin, custom_data, remove_parts
-from ahf_ros.bag.records import seconds
+from ahf_ros.bag.records import Message, seconds
 from ahf_ros.bag.source import Source
+from ahf_ros.sequence import StackSettings
 from ahf_ros.session import IdentificationSettings
+from ahf_ros.settings.parameter import parameters
 
 WRITING_ERRORS = (OSError, sqlite3.Error, WriterError)
 """Errors of writing a bag, such as a full disk or a folder without permission."""
 
 Report = Callable[[int, int, str], None]
 """Called after each image with the number of finished images, the number of all images or 0 if
-unknown, and the reason why this image was refused, empty if it was not."""
+unknown, and what there is to say about this image or its stack, empty if there is nothing."""
 
 _FORMAT = 2  # version of the journal and of the data stored in a bag
 _TOPIC_NAME = re.compile(r'/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*', re.ASCII)
+_OF_STACKS = tuple(item.name for item in parameters(StackSettings))
 _IRRELEVANT = ('source', 'target', 'threads')  # settings that do not change the bag
 
 
@@ -67,6 +70,8 @@ class BagTask:
         Whether to write annotated images, as JPEG.
     identification : IdentificationSettings
         Settings of the identification.
+    stacking : StackSettings
+        Which images are identified together.
     """
 
     source: Path
@@ -76,6 +81,7 @@ class BagTask:
     storage: str = 'mcap'
     debug_images: bool = False
     identification: IdentificationSettings = field(default_factory=IdentificationSettings)
+    stacking: StackSettings = field(default_factory=StackSettings)
 
 
 def answer_bag(task: BagTask, report: Report) -> Outcome:
@@ -164,7 +170,8 @@ def _answer_topics(task: BagTask, source: Source) -> dict[str, AnswerTopics]:
 def _origin(task: BagTask, source: Source, topics: dict[str, AnswerTopics]) -> dict[str, Any]:
     """Return everything that the results depend on."""
     origin = _flat(asdict(task))
-    origin = {name: value for name, value in origin.items() if name not in _IRRELEVANT}
+    irrelevant = _IRRELEVANT if task.stacking.stack > 1 else (*_IRRELEVANT, *_OF_STACKS)
+    origin = {name: value for name, value in origin.items() if name not in irrelevant}
     origin |= {'topics': list(topics), 'size of the bag': source.size(), 'format': _FORMAT}
     return origin
 
@@ -199,24 +206,36 @@ def _answer_images(
     report: Report,
 ) -> None:
     """Identify the images that are not in the journal yet."""
-    answering = Answering(source, topics, task.identification)
+    answering = Answering(source, topics, task.identification, task.stacking)
     total = sum(item.msgcount for item in source.connections if item.topic in topics)
     earlier = list(journal.entries)
-    for number, (connection, timestamp, data) in enumerate(source.messages(topics)):
+    for number, (message, last) in enumerate(_with_last(source.messages(topics))):
+        connection, timestamp, data = message
         if number < len(earlier):
             entry = earlier[number]
             check_entry(source, task.target, entry, connection.topic, timestamp)
-            answering.resume(entry)
+            answering.resume(entry, connection, data)
         else:
-            entry, answers = answering.answer(connection, timestamp, data)
+            entry, answers = answering.answer(connection, timestamp, data, last)
             journal.append(entry, answers)
-        report(number + 1, total, _refusal(entry))
+        report(number + 1, total, _remark(entry))
 
 
-def _refusal(entry: Entry) -> str:
-    if not entry.reason:
-        return ''
-    return f'{entry.topic} at {seconds(entry.timestamp)} s: {entry.reason}'
+def _with_last(messages: Iterable[Message]) -> Iterator[tuple[Message, bool]]:
+    """Yield messages, and whether each is the last one."""
+    before: Message | None = None
+    for message in messages:
+        if before is not None:
+            yield before, False
+        before = message
+    if before is not None:
+        yield before, True
+
+
+def _remark(entry: Entry) -> str:
+    """Return what there is to say about an image; empty if there is nothing."""
+    said = '; '.join(filter(None, (entry.reason, entry.note)))
+    return f'{entry.topic} at {seconds(entry.timestamp)} s: {said}' if said else ''
 
 
 def _tidy(target: Path) -> None:

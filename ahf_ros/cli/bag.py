@@ -15,6 +15,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from ahf_ros.cli.options import add_option, add_options, settings_from
 from ahf_ros.cli.workers import results
+from ahf_ros.sequence import StackSettings
 from ahf_ros.session import IdentificationSettings
 from ahf_ros.settings.parameter import Parameter
 
@@ -63,6 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--debug-images', action='store_true', help='Also write annotated images, as JPEG.'
     )
     add_option(parser, JOBS)
+    add_options(parser, StackSettings)
     add_options(parser, IdentificationSettings)
 
 
@@ -84,10 +86,10 @@ def run(options: argparse.Namespace) -> int:
     with _progress() as progress:
         bars = [progress.add_task(task.source.name, total=None) for task in tasks]
 
-        def report(number: int, done: int, total: int, refused: str) -> None:
+        def report(number: int, done: int, total: int, remark: str) -> None:
             progress.update(bars[number], completed=done, total=max(total, done))
-            if refused:
-                print(f'ahf bag: {tasks[number].source}: {refused}', file=sys.stderr)
+            if remark:
+                print(f'ahf bag: {tasks[number].source}: {remark}', file=sys.stderr)
 
         for task, outcome in _outcomes(tasks, options.jobs, report):
             _report(task, outcome)
@@ -120,6 +122,7 @@ def _tasks(options: argparse.Namespace) -> list[BagTask]:
             storage=options.storage,
             debug_images=options.debug_images,
             identification=settings,
+            stacking=settings_from(options, StackSettings),
         )
         for source, target in zip(options.bags, targets, strict=True)
     ]
