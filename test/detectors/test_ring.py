@@ -73,6 +73,15 @@ def test_sizes_and_views(scene, limit):
     assert errors_of(figures)[-1] < limit
 
 
+@pytest.mark.parametrize('light', ['stripe', 'fine_stripe', 'lattice'])
+def test_oblique_views_under_stripes_and_lattices(light):
+    view = SceneSettings(width=1000, height=600, targets=12, tilt=64.0, focal_length=3.0, seed=1)
+    rendering = rendered(replace(view, light=light, ambient=0.12))
+    figures = scored(rendering, identified(rendering.image))
+    assert (figures.wrong, figures.false_positives) == (0, 0)
+    assert figures.right >= 11
+
+
 def test_the_centre_is_the_physical_one_and_the_covariance_honest():
     scene = replace(SMALL, width=1600, height=1200, targets=40, tilt=45.0, dot_radius=14.0)
     rendering = rendered(scene)

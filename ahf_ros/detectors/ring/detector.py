@@ -22,6 +22,7 @@ from ahf_ros.detectors.ring.hypotheses import (
     resolve_ids,
     resolve_overlaps,
 )
+from ahf_ros.detectors.ring.oblique import oblique_dots, rounding
 from ahf_ros.detectors.ring.refinement import refine_centres
 from ahf_ros.detectors.ring.same_prints import decoded, settle_same_prints
 from ahf_ros.detectors.ring.target_circles import REACH
@@ -124,14 +125,25 @@ def read_image(
     whole = read_families(pyramid.gray, dots, families, expected)
     if whole_only:
         return whole
-    explained = whole.certain | (whole.share >= _WHOLE)
-    radii = np.where(whole.certain, whole.reach / frame.ellipse_axes(whole.frames)[1], 1.0)
-    outlines = frame.circle_outlines(whole.frames[explained], radii[explained] + _MARGIN)
+    outlines = _outlines(whole.select(whole.certain | (whole.share >= _WHOLE)))
     dots = _fitted(pyramid.gray, voted_dots(pyramid, *kind, explained=outlines))
     if not whole.certain.any():
         families = by_clear_dots(pyramid.gray, dots, families)
     voted = read_families(pyramid.gray, dots, families, expected)
-    return Hypotheses.joined([whole, voted])
+    found = Hypotheses.joined([whole, voted])
+    rounded = rounding(found)
+    if rounded is None:
+        return found
+    outlines = _outlines(found.select(found.certain))
+    dots = _fitted(pyramid.gray, oblique_dots(pyramid.gray, rounded, *kind, outlines))
+    return Hypotheses.joined([found, read_families(pyramid.gray, dots, families, expected)])
+
+
+def _outlines(explained: Hypotheses) -> np.ndarray:
+    """Return the outlines of certain targets and of dots, with a quiet margin, px."""
+    _, minor, _ = frame.ellipse_axes(explained.frames)
+    radii = np.where(explained.certain, explained.reach / minor, 1.0)
+    return frame.circle_outlines(explained.frames, radii + _MARGIN)
 
 
 def _fitted(gray: np.ndarray, dots: Dots) -> Fit:

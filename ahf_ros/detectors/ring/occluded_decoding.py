@@ -92,7 +92,9 @@ def decode_occluded(
     clear = (readings.words > 0) & (readings.margin > _CLEAR_MARGIN) & (better < _CLEAR)
     clear &= prior(readings.words, family, expected) == 0
     others = np.flatnonzero(~clear)
-    best = plain.replaced(others, _competing(of.select(others), plain.select(others), family, expected))
+    best = plain.replaced(
+        others, _competing(of.select(others), plain.select(others), family, expected)
+    )
     (_, before), (_, after) = (canonical(of.words, family) for of in (readings, best))
     same = (readings.words > 0) & (before == after)
     explained, contradiction = explanation(
