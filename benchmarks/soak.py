@@ -300,7 +300,7 @@ class Soak:
                 lambda: self._set(True, expected_targets=0, polarity='auto', threads=0),
                 self._reset,
                 self._subscribe_anew,
-                lambda: self._set(False, min_radius=70.0),
+                lambda: self._set(False, min_radius=70.0, max_radius=60.0),
             ]
         )
 

@@ -169,7 +169,9 @@ class DetectorSettings:
         minimum=0.0,
         maximum=1e4,
     )
-    max_radius: float = parameter(60.0, 'Maximum radius of a dot, px.', minimum=1.0, maximum=1e4)
+    max_radius: float = parameter(
+        1e4, 'Maximum radius of a dot, px; by default there is no limit.', minimum=1.0, maximum=1e4
+    )
     report_undecoded: bool = parameter(
         False, 'Whether to report targets whose code word is not certain, with the ID -1.'
     )

@@ -52,7 +52,11 @@ class Candidates:
 
 
 def find_candidates(
-    edges: Sequence[LogEdges], min_radius: float, max_radius: float, polarities: Sequence[int]
+    edges: Sequence[LogEdges],
+    min_radius: float,
+    max_radius: float,
+    polarities: Sequence[int],
+    explained: Sequence[np.ndarray] | np.ndarray = (),
 ) -> list[Candidates]:
     """Find the points where dots may be.
 
@@ -64,6 +68,8 @@ def find_candidates(
         Of the dots, px of the image.
     polarities : sequence of int
         1 to find dark dots, -1 to find bright ones.
+    explained : sequence of ndarray of float, each of shape (m, 2)
+        Outlines of objects that are known already, px of the image. Edges inside do not vote.
 
     Returns
     -------
@@ -72,10 +78,16 @@ def find_candidates(
     """
     candidates = []
     for level, of_level in enumerate(edges, start=1):
-        for low, high, cell in _FIRST_RANGES if level == 1 else _RANGES:
-            if high * 2**level < min_radius or low * 2**level > max_radius:
-                continue
-            curved = of_level.curved(_LONG * high)
+        ranges = [
+            (low, high, cell)
+            for low, high, cell in (_FIRST_RANGES if level == 1 else _RANGES)
+            if high * 2**level >= min_radius and low * 2**level <= max_radius
+        ]
+        if not ranges:
+            continue
+        rest = of_level.outside([(outline + 0.5) / 2**level - 0.5 for outline in explained])
+        for low, high, cell in ranges:
+            curved = rest.curved(_LONG * high)
             points = [_vote(curved, (low, high), cell, polarity) for polarity in polarities]
             polarity = np.repeat(polarities, [len(of_one) for of_one in points])
             candidates.append(Candidates(level, np.concatenate(points), (low, high), polarity))

@@ -14,7 +14,7 @@ import numpy as np
 
 from ahf_ros.features import frame
 from ahf_ros.features.candidates import find_candidates
-from ahf_ros.features.dots import Dots, distinct
+from ahf_ros.features.dots import NO_DOTS, Dots, distinct
 from ahf_ros.features.ellipses import fit_ellipses
 from ahf_ros.features.log_edges import LOG_SCALE
 from ahf_ros.features.outlines import whole_outlines
@@ -74,14 +74,9 @@ def voted_dots(
     Dots
         Without duplicates, those with the largest share first, in px of the image.
     """
-    edges = [
-        of_level.outside([(outline + 0.5) / 2**level - 0.5 for outline in explained])
-        for level, of_level in enumerate(pyramid.edges, start=1)
-    ]
-    candidates = find_candidates(edges, min_radius, max_radius, polarities)
+    candidates = find_candidates(pyramid.edges, min_radius, max_radius, polarities, explained)
     dots = [fit_ellipses(pyramid.logs, of_range) for of_range in candidates]
-    nothing = Dots(np.zeros((0, 3, 3)), np.zeros(0, int), np.zeros(0))
-    return distinct(Dots.joined([nothing, *dots]))
+    return distinct(Dots.joined([NO_DOTS, *dots]))
 
 
 def with_other_dots(

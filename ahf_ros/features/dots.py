@@ -33,6 +33,10 @@ class Dots(ArrayRecord):
     share: np.ndarray
 
 
+NO_DOTS = Dots(np.zeros((0, 3, 3)), np.zeros(0, int), np.zeros(0))
+"""The record of none."""
+
+
 def distinct(dots: Dots) -> Dots:
     """Return dots without duplicates, those with the largest share first."""
     size = frame.mean_radii(dots.frames)

@@ -5,6 +5,7 @@ In ln I an edge of a target is a step of the same height wherever the light fall
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from math import ceil, log2
 
@@ -17,6 +18,9 @@ from ahf_ros.imaging.logarithm import LOG_OFFSET
 LARGEST_RADIUS = 11.2
 """Largest radius of a dot that is voted for on one level, px; larger ones take a higher level."""
 
+_OCTAVE_LEVELS = 3  # of the halves in which the dots of an octave are voted for
+_ABOVE, _SLACK = 1.01, 1.03  # of the bounds of octaves, which overlap by less than votes do
+
 
 @dataclass(frozen=True, slots=True)
 class ImagePyramid:
@@ -26,6 +30,8 @@ class ImagePyramid:
     ----------
     gray : ndarray of float32, shape (height, width)
         The image, gray values from 0 to 255.
+    halves : tuple of ndarray of uint8 or float32
+        Its gray values on each level from the first half on.
     logs : tuple of ndarray of int16
         LOG_SCALE ln(I + LOG_OFFSET) of each level, the image as received first.
     edges : tuple of LogEdges
@@ -33,8 +39,28 @@ class ImagePyramid:
     """
 
     gray: np.ndarray
+    halves: tuple[np.ndarray, ...]
     logs: tuple[np.ndarray, ...]
     edges: tuple[LogEdges, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Octave:
+    """The radii of dots that are read in an image, or in a half of it.
+
+    Attributes
+    ----------
+    level : int
+        How often the image is halved.
+    pyramid : ImagePyramid
+        Of that half.
+    radii : tuple of 2 float
+        Smallest and largest radius of the dots, px of that half.
+    """
+
+    level: int
+    pyramid: ImagePyramid
+    radii: tuple[float, float]
 
 
 def image_pyramid(gray: np.ndarray, max_radius: float) -> ImagePyramid:
@@ -45,12 +71,52 @@ def image_pyramid(gray: np.ndarray, max_radius: float) -> ImagePyramid:
     gray : ndarray of uint8 or float32, shape (height, width)
         Gray values from 0 to 255.
     max_radius : float
-        Largest radius of a dot, px; it decides how often the image is halved.
+        Largest radius of a dot, px; it decides how often the image is halved. No dot is larger
+        than the image.
     """
-    levels = max(1, ceil(log2(max_radius / LARGEST_RADIUS)))
-    logs = tuple(log_image(level) for level in halved(gray, levels))
+    largest = min(max_radius, max(gray.shape) / 2)
+    levels = max(1, ceil(log2(largest / LARGEST_RADIUS)))
+    images = halved(gray, levels)
+    logs = tuple(log_image(level) for level in images)
     edges = tuple(find_edges(log) for log in logs[1:])
-    return ImagePyramid(gray.astype(np.float32, copy=False), logs, edges)
+    return ImagePyramid(_as_float(gray), tuple(images[1:]), logs, edges)
+
+
+def octaves(pyramid: ImagePyramid, min_radius: float, max_radius: float) -> Iterator[Octave]:
+    """Yield the octaves of the radii of dots, small dots first.
+
+    Dots of up to 90 px are read in the image as it is. Each octave of larger ones is read in an
+    image half the size of the one before, so that a dot never has more pixels than it needs.
+
+    Parameters
+    ----------
+    pyramid : ImagePyramid
+    min_radius, max_radius : float
+        Bounds of the radius, px of the image.
+    """
+    largest = LARGEST_RADIUS * 2**_OCTAVE_LEVELS
+    for level in range(max(1, len(pyramid.edges) - _OCTAVE_LEVELS + 1)):
+        smallest = largest / 2 * _ABOVE if level else 0.0
+        low, high = (
+            max(min_radius / 2**level, smallest),
+            min(max_radius / 2**level, largest * _SLACK),
+        )
+        if low <= high:
+            yield Octave(level, _half(pyramid, level), (low, high))
+
+
+def _half(pyramid: ImagePyramid, level: int) -> ImagePyramid:
+    """Return the pyramid of a level."""
+    if not level:
+        return pyramid
+    gray, *halves = pyramid.halves[level - 1 :]
+    return ImagePyramid(
+        _as_float(gray), tuple(halves), pyramid.logs[level:], pyramid.edges[level:]
+    )
+
+
+def _as_float(gray: np.ndarray) -> np.ndarray:
+    return gray.astype(np.float32, copy=False)
 
 
 def halved(image: np.ndarray, levels: int) -> list[np.ndarray]:

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 import cv2
 import numpy as np
 
-from ahf_ros.features.dots import Dots, best
+from ahf_ros.features.dots import NO_DOTS, Dots, best
 from ahf_ros.features.frame import affine_frames
 
 MAXIMUM_BLOBS = 20_000
@@ -85,7 +85,7 @@ def _blobs(height: np.ndarray, min_radius: float, max_radius: float, polarity: i
     least = _MINIMUM_STEP / _LN_RANGE * 255
     x, y, size = _connected(height, least, _LEVELS[polarity], 2 * max_radius + 3)
     if not len(size):
-        return Dots(np.zeros((0, 3, 3)), np.zeros(0, int), np.zeros(0))
+        return NO_DOTS
     start = np.cumsum(size) - size
     peak = np.maximum.reduceat(height[y, x], start)
     x, y = x.astype(np.float64), y.astype(np.float64)

@@ -198,7 +198,7 @@ def test_files_that_cannot_be_read_do_not_stop_the_others(folder, tmp_path):
         (['--family', 'ring'], "family is 'ring', accepted is one of metashape12, metashape14"),
         (['--detector', 'magic'], "detector is 'magic', accepted is one of"),
         (['--min-radius', 'nan'], "min_radius is 'nan', accepted is a number from 0"),
-        (['--min-radius', 70], 'min_radius is 70.0, accepted is a number of at most max_radius'),
+        (['--min-radius', 70, '--max-radius', 60], 'min_radius is 70.0, accepted is a number of'),
         (['--gamma-high-min', 5], 'gamma_high_min is 5.0, accepted is a number of at most'),
         (['--magic'], 'unrecognized arguments: --magic'),
     ],

@@ -34,6 +34,8 @@ def hypotheses(places: list[tuple[float, float]], margins: list[float]) -> Hypot
         confidence=np.ones(count),
         families=np.full(count, CODE, object),
         sharpness=np.full(count, 5.0),
+        polarity=np.ones(count, int),
+        starts=np.zeros(count),
     )
 
 

@@ -116,7 +116,10 @@ def test_settings_reach_the_detector():
         ({'family': 'ring12'}, r"family is 'ring12', accepted is one of metashape12, "),
         ({'polarity': 'black'}, r"polarity is 'black', accepted is one of auto, dark, bright"),
         ({'min_radius': -0.5}, r'min_radius is -0.5, accepted is a number from 0 to 10000'),
-        ({'min_radius': 61.0}, r'min_radius is 61.0, accepted .* at most max_radius, 60.0'),
+        (
+            {'min_radius': 61.0, 'max_radius': 60.0},
+            r'min_radius is 61.0, accepted .* at most max_radius, 60.0',
+        ),
         ({'report_undecoded': 1}, r'report_undecoded is 1, accepted is true or false'),
     ],
 )

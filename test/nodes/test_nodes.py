@@ -250,7 +250,7 @@ def test_parameters_are_checked_and_applied_together(
     lower = ('gamma_high_min', 0.5)
     assert not detector.set(lower)[0]
     assert detector.set(lower, ('gamma_low_max', 0.5)) == (True, '')
-    assert not detector.set(('polarity', 'bright'), ('min_radius', 1000.0))[0]
+    assert not detector.set(('polarity', 'bright'), ('min_radius', 9.0), ('max_radius', 8.0))[0]
     assert detector.get('polarity') == 'auto'
     # all back to the defaults, integers where numbers are meant
     assert detector.set(('gamma_high_min', 1), ('gamma_low_max', 1)) == (True, '')
@@ -380,7 +380,11 @@ def test_a_signal_ends_the_node_in_the_middle_of_a_search(
     [
         ('detector', {'population': 1}, ('population', '1', '2')),
         ('detector', {'family': 'qr'}, ("family is 'qr', accepted is one of metashape12",)),
-        ('detector', {'min_radius': 70}, ('min_radius is 70.0', 'max_radius, 60.0')),
+        (
+            'detector',
+            {'min_radius': 70, 'max_radius': 60},
+            ('min_radius is 70.0', 'max_radius, 60.0'),
+        ),
         ('illumination', {'light': 'moon'}, ("light is 'moon', accepted is one of normal",)),
         ('illumination', {'rate': 0}, ('rate', '0', '0.001')),
     ],

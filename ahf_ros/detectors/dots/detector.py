@@ -7,7 +7,7 @@ projective frame, in which the evidence for a dot at each place of the ring give
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import numpy as np
@@ -16,10 +16,12 @@ from ahf_ros.codes.dots import DotFamily, dot_family
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.dots.discs import small_discs, voted_discs, whole_discs
 from ahf_ros.detectors.dots.refinement import refined
+from ahf_ros.detectors.dots.resolving import best_of_each
 from ahf_ros.detectors.dots.rings import CERTAIN, Rings, read_discs, report
-from ahf_ros.features.pyramid import ImagePyramid, image_pyramid
+from ahf_ros.features.large_targets import targets_of_octaves
+from ahf_ros.features.pyramid import ImagePyramid, Octave, image_pyramid
 from ahf_ros.imaging.image import as_gray, check_image
-from ahf_ros.target import Target, sorted_targets
+from ahf_ros.target import DottedTarget, Target, sorted_targets
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,13 +55,20 @@ class DotsDetector:
         check_image(image)
         code = dot_family(self.settings.family_file)
         pyramid = image_pyramid(as_gray(image), self.settings.max_radius)
-        rings = find_rings(pyramid, self.settings, code)
-        return sorted_targets(report(rings, self.settings, code))
+        found = targets_of_octaves(pyramid, self.settings.radii, self._identify, self.refine)
+        return sorted_targets(best_of_each(found, code.border_radius))
 
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
         """Return targets with their places in an image; see `refined`."""
         check_image(image)
         return refined(as_gray(image), targets, dot_family(self.settings.family_file))
+
+    def _identify(self, octave: Octave) -> list[DottedTarget]:
+        """Return the targets of an octave, in its pixels."""
+        low, high = octave.radii
+        settings = replace(self.settings, min_radius=low, max_radius=high)
+        code = dot_family(settings.family_file)
+        return report(find_rings(octave.pyramid, settings, code), settings, code)
 
 
 def find_rings(pyramid: ImagePyramid, settings: DetectorSettings, code: DotFamily) -> Rings:

@@ -15,7 +15,7 @@ from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.dots.border_steps import border_steps
 from ahf_ros.detectors.dots.regions import STRAIGHT, open_regions
 from ahf_ros.features.dot_search import voted_dots, whole_dots
-from ahf_ros.features.dots import Dots, distinct
+from ahf_ros.features.dots import NO_DOTS, Dots, distinct
 from ahf_ros.features.frame import circle_outlines, ellipse_axes, enlarged
 from ahf_ros.features.log_edges import LOG_SCALE
 from ahf_ros.features.pyramid import ImagePyramid
@@ -76,7 +76,7 @@ def small_discs(
     # Edges of light end at a target, and look like no straight ones there.
     margin = 2 * STRAIGHT / np.maximum(ellipse_axes(known)[1], 1)
     outlines = (_outlines(known, code, margin) + 0.5) / 2 - 0.5
-    found = [Dots(np.zeros((0, 3, 3)), np.zeros(0, int), np.zeros(0))]
+    found = [NO_DOTS]
     for region in open_regions(pyramid.edges[0], outlines):
         found += _blobs(pyramid, region, settings)
     blobs = Dots.joined(found)

@@ -33,6 +33,7 @@ from ahf_ros.target import UNDECODED, Target, sorted_targets
 
 _SHORTEST = 5  # points of a contour, which an ellipse takes
 _MAXIMUM_MISFIT = 0.2  # between the area of a contour and that of its ellipse, relative
+_LARGEST = 60.0  # radius of a disc that blocks of the threshold are made for, px
 _RATIO = 1.35  # of the radii of the two circles over the printed one, at the most, or below it
 _MAXIMUM_DISTANCE = 0.4  # of their centres, radii of the disc
 _DIRECTIONS = 24  # of the development, for a place
@@ -70,12 +71,14 @@ class PublishedDotsDetector:
         """Identify the targets of one image; see `Detector`.
 
         The blocks of the threshold are as wide as a target whose disc has the geometric mean of
-        the smallest and the largest radius.
+        the smallest and the largest radius, of at most 60 px.
         """
         check_image(image)
         settings, code = self.settings, dot_family(self.settings.family_file)
         gray = stretched_to_8_bit(image)
-        side = 2 * code.border_radius * np.sqrt(np.prod(settings.radii))
+        smallest, largest = settings.radii
+        usual = np.sqrt(smallest * max(smallest, min(largest, _LARGEST)))
+        side = 2 * code.border_radius * usual
         height = gray.astype(np.float32) - local_otsu(gray, round(side))
         targets: list[Target] = []
         for polarity in settings.polarities:

@@ -37,7 +37,8 @@ from ahf_ros.features.dot_search import whole_dots, with_other_dots
 from ahf_ros.features.dots import Dots
 from ahf_ros.features.ellipse_targets import ellipse_fields, targets_from_frames
 from ahf_ros.features.homography import reference_frames
-from ahf_ros.features.pyramid import ImagePyramid, image_pyramid
+from ahf_ros.features.large_targets import targets_of_octaves
+from ahf_ros.features.pyramid import ImagePyramid, Octave, image_pyramid
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, DottedTarget, Target, sorted_targets
 
@@ -75,13 +76,25 @@ class GsiDetector:
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image; see `Detector`."""
         check_image(image)
-        settings, code = self.settings, point_family(self.settings.family_file)
-        pyramid = image_pyramid(as_gray(image), settings.max_radius)
-        hypotheses, dots = find_hypotheses(pyramid, settings, code)
+        pyramid = image_pyramid(as_gray(image), self.settings.max_radius)
+        found = targets_of_octaves(pyramid, self.settings.radii, self._identify, self.refine)
+        best: dict[int, Target] = {}
+        for target in sorted(found, key=lambda it: it.confidence):
+            best[target.id] = target
+        single = [target for target in found if target.id == UNDECODED]
+        best.pop(UNDECODED, None)
+        return sorted_targets([*best.values(), *single])
+
+    def _identify(self, octave: Octave) -> list[Target]:
+        """Return the targets of an octave, in its pixels."""
+        low, high = octave.radii
+        settings = replace(self.settings, min_radius=low, max_radius=high)
+        code = point_family(settings.family_file)
+        hypotheses, dots = find_hypotheses(octave.pyramid, settings, code)
         targets = report(hypotheses, code)
         if settings.report_undecoded:
-            targets += uncoded(pyramid.gray, dots, targets, settings)
-        return sorted_targets(targets)
+            targets += uncoded(octave.pyramid.gray, dots, targets, settings)
+        return targets
 
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
         """Return targets with their places in an image; see `Refiner`.

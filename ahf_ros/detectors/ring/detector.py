@@ -16,6 +16,7 @@ from ahf_ros.codes.ring import family
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.ring.competition import PART, by_clear_dots, read_families
 from ahf_ros.detectors.ring.faint import with_faint
+from ahf_ros.detectors.ring.full_size import at_full_size
 from ahf_ros.detectors.ring.hypotheses import (
     Hypotheses,
     resolve_dots,
@@ -29,9 +30,9 @@ from ahf_ros.detectors.ring.target_circles import REACH
 from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import Fit, fit_dots
 from ahf_ros.features.dot_search import voted_dots, whole_dots
-from ahf_ros.features.dots import Dots
+from ahf_ros.features.dots import NO_DOTS, Dots
 from ahf_ros.features.ellipse_targets import targets_from_frames
-from ahf_ros.features.pyramid import image_pyramid
+from ahf_ros.features.pyramid import Octave, image_pyramid, octaves
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, Target, sorted_targets
 
@@ -118,32 +119,58 @@ def read_image(
         Whether only dots with a whole outline are looked for.
     """
     families = [family(name) for name in settings.families]
-    kind = (*settings.radii, settings.polarities)
     pyramid = image_pyramid(gray, settings.max_radius)
-    dots = _fitted(pyramid.gray, whole_dots(pyramid, *kind))
-    families = by_clear_dots(pyramid.gray, dots, families)
-    whole = read_families(pyramid.gray, dots, families, expected)
-    if whole_only:
-        return whole
-    outlines = _outlines(whole.select(whole.certain | (whole.share >= _WHOLE)))
-    dots = _fitted(pyramid.gray, voted_dots(pyramid, *kind, explained=outlines))
-    if not whole.certain.any():
-        families = by_clear_dots(pyramid.gray, dots, families)
-    voted = read_families(pyramid.gray, dots, families, expected)
-    found = Hypotheses.joined([whole, voted])
-    rounded = rounding(found)
+    images = (gray, *pyramid.halves)
+    found: list[Hypotheses] = []
+    for octave in octaves(pyramid, *settings.radii):
+        for search in (_whole,) if whole_only else (_whole, _voted, _oblique):
+            dots = search(octave, settings.polarities, found)
+            if not len(dots.frames):
+                continue
+            fits = _fitted(octave.pyramid.gray, dots)
+            if not any(read.certain.any() for read in found):
+                families = by_clear_dots(octave.pyramid.gray, fits, families)
+            read = read_families(octave.pyramid.gray, fits, families, expected)
+            found.append(at_full_size(images[: octave.level], read))
+    if not found:
+        return Hypotheses.unread(_fitted(pyramid.gray, NO_DOTS), families[0])
+    return Hypotheses.joined(found)
+
+
+def _whole(octave: Octave, polarities: Sequence[int], _found: Sequence[Hypotheses]) -> Dots:
+    """Return the dots of an octave with a whole outline."""
+    return whole_dots(octave.pyramid, *octave.radii, polarities)
+
+
+def _voted(octave: Octave, polarities: Sequence[int], found: Sequence[Hypotheses]) -> Dots:
+    """Return the dots of an octave that edges vote for which nothing explains yet."""
+    outlines = [
+        outline
+        for read in found
+        for outline in _outlines(read.select(read.certain | (read.share >= _WHOLE)), octave.level)
+    ]
+    return voted_dots(octave.pyramid, *octave.radii, polarities, explained=outlines)
+
+
+def _oblique(octave: Octave, polarities: Sequence[int], found: Sequence[Hypotheses]) -> Dots:
+    """Return the dots of an octave that edges vote for where a view is seen straight ahead."""
+    if not found:
+        return NO_DOTS
+    certain = Hypotheses.joined([read.select(read.certain) for read in found])
+    rounded = rounding(certain)
     if rounded is None:
-        return found
-    outlines = _outlines(found.select(found.certain))
-    dots = _fitted(pyramid.gray, oblique_dots(pyramid.gray, rounded, *kind, outlines))
-    return Hypotheses.joined([found, read_families(pyramid.gray, dots, families, expected)])
+        return NO_DOTS
+    outlines = _outlines(certain, octave.level)
+    return oblique_dots(octave.pyramid.gray, rounded, *octave.radii, polarities, outlines)
 
 
-def _outlines(explained: Hypotheses) -> np.ndarray:
-    """Return the outlines of certain targets and of dots, with a quiet margin, px."""
+def _outlines(explained: Hypotheses, level: int) -> np.ndarray:
+    """Return the outlines of targets and dots, with a margin, px of a half of the image."""
     _, minor, _ = frame.ellipse_axes(explained.frames)
-    radii = np.where(explained.certain, explained.reach / minor, 1.0)
-    return frame.circle_outlines(explained.frames, radii + _MARGIN)
+    radii = np.where(explained.certain, explained.reach / minor, 1.0) + _MARGIN
+    shown = radii * minor > 2**level  # others have no edges in that half
+    outlines = frame.circle_outlines(explained.frames[shown], radii[shown])
+    return (outlines + 0.5) / 2**level - 0.5
 
 
 def _fitted(gray: np.ndarray, dots: Dots) -> Fit:

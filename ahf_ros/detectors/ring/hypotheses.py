@@ -49,6 +49,10 @@ class Hypotheses(ArrayRecord):
         Those of the words.
     sharpness : ndarray of float64, shape (k,)
         How well the edges agree with the word and the print, see `other_prints.sharpness`.
+    polarity : ndarray of int, shape (k,)
+        1 for a dark target on bright ground, -1 for a bright one on dark.
+    starts : ndarray of float64, shape (k,)
+        Where in the frame the sector of the lowest bit starts, rad counter-clockwise from +x.
     """
 
     frames: np.ndarray
@@ -60,6 +64,8 @@ class Hypotheses(ArrayRecord):
     confidence: np.ndarray
     families: np.ndarray
     sharpness: np.ndarray
+    polarity: np.ndarray
+    starts: np.ndarray
 
     @property
     def certain(self) -> np.ndarray:
@@ -88,6 +94,8 @@ class Hypotheses(ArrayRecord):
             features,
             nothing,
             np.full(count, family, object),
+            nothing,
+            dots.polarity,
             nothing,
         )
 
@@ -118,6 +126,8 @@ class Hypotheses(ArrayRecord):
             certainty,
             dots.families,
             sharpness(fit),
+            fit.polarity,
+            readings.start,
         )
         alone = dots.select(~likely)
         doubtful = replace(
