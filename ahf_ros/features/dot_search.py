@@ -75,7 +75,7 @@ def voted_dots(
         Without duplicates, those with the largest share first, in px of the image.
     """
     candidates = find_candidates(pyramid.edges, min_radius, max_radius, polarities, explained)
-    dots = [fit_ellipses(pyramid.logs, of_range) for of_range in candidates]
+    dots = [fit_ellipses(pyramid.logs, some) for some in candidates if len(some.points)]
     return distinct(Dots.joined([NO_DOTS, *dots]))
 
 
