@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from ahf_ros.evaluation import score
     from ahf_ros.filtering.identifier import Identifier
     from ahf_ros.filtering.settings import AdaptiveSettings
+    from ahf_ros.imaging.stack import ImageStack
     from ahf_ros.interchange.image_files import read_image, write_image
     from ahf_ros.session import IdentificationSettings, create_identifier, identify
     from ahf_ros.synthetic.scene import SceneSettings, render
@@ -39,6 +40,7 @@ __all__ = [
     'Identification',
     'IdentificationSettings',
     'Identifier',
+    'ImageStack',
     'SceneSettings',
     'Target',
     'TrueTarget',
@@ -63,6 +65,7 @@ _MODULES = {
     'Identification': 'target',
     'IdentificationSettings': 'session',
     'Identifier': 'filtering.identifier',
+    'ImageStack': 'imaging.stack',
     'SceneSettings': 'synthetic.scene',
     'Target': 'target',
     'TrueTarget': 'target',

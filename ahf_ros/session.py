@@ -24,6 +24,7 @@ from ahf_ros.detectors import (
 from ahf_ros.filtering.identifier import Identifier
 from ahf_ros.filtering.settings import AdaptiveSettings
 from ahf_ros.filtering.trials import DetectorFunction
+from ahf_ros.imaging.stack import ImageStack
 from ahf_ros.settings.nested import updated
 from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.target import Identification, Target
@@ -149,16 +150,16 @@ def create_identifier(
 
 
 def identify(
-    image: np.ndarray,
+    image: np.ndarray | ImageStack,
     detector: str | DetectorFunction | None = None,
     settings: IdentificationSettings | None = None,
     **values: Any,
 ) -> Identification:
-    """Identify the coded targets of one image.
+    """Identify the coded targets of one image, or of several images of an unmoved scene.
 
     Parameters
     ----------
-    image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
+    image : ndarray of uint8, uint16, float32 or float64, shape (height, width), or ImageStack
         Gray values, increasing with light.
     detector, settings, **values
         As for `create_identifier`.

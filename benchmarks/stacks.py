@@ -4,7 +4,7 @@ Rows are sizes and patterns, with ambient light of 0.02 of the projected one. Th
 first image alone, the stack, and the same scene in normal light. Seeds from 101 on are for tests.
 
     python -m benchmarks.stacks [--lights stripe ...] [--radii 6 20] [--seeds 101] [--phases 4]
-        [--json docs/figures/stacks.json]
+        [--output FILE]
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ import json
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import cv2
+import numpy as np
 from rich.console import Console
 from rich.progress import track
 
@@ -28,6 +28,7 @@ from ahf_ros.sequence import StackSettings, identify_parts
 from ahf_ros.session import create_identifier
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
 from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.target import Identification
 from benchmarks.filter import machine
 from benchmarks.identification import FIRST_TEST_SEED, Row, are_tests
 
@@ -44,29 +45,37 @@ def measure(options: argparse.Namespace) -> Iterator[dict[str, Any]]:
         chosen: Counter[str] = Counter()
         parts = 0
         for seed in options.seeds:
-            base = SceneSettings(dot_radius=radius, seed=seed, targets=options.targets)
+            base = SceneSettings(
+                width=options.width,
+                height=options.height,
+                dot_radius=radius,
+                targets=options.targets,
+                seed=seed,
+            )
             scene = replace(base, light=light, ambient=AMBIENT, phases=options.phases)
             shown = [render(scene, phase) for phase in range(options.phases)]
-            normal = render(base)
-            for column, of in zip(COLUMNS, (shown[:1], shown, [normal]), strict=True):
-                images = [rendering.image for rendering in of]
-                identifier = create_identifier(expected_targets=options.targets, ahf=False)
-                started = time.perf_counter()
-                settings = StackSettings(stack=len(images))
-                found = [it for _, _, it in identify_parts(identifier, images, settings)]
-                seconds = time.perf_counter() - started
-                rows[column].add(images[0], of[0].truth, (found[-1].targets, seconds))
+            for column, of in zip(COLUMNS, (shown[:1], shown, [render(base)]), strict=True):
+                found, seconds = identified([it.image for it in of], options.targets)
+                rows[column].add(of[0].image, of[0].truth, (found[-1].targets, seconds))
                 if len(of) > 1:
                     parts += len(found)
                     chosen[found[-1].combination] += 1
-        records = {column: row.record() for column, row in rows.items()}
         yield {
             'radius': radius,
             'light': light,
             'parts': parts,
             'combinations': dict(chosen),
-            **records,
+            **{column: row.record() for column, row in rows.items()},
         }
+
+
+def identified(images: list[np.ndarray], expected: int) -> tuple[list[Identification], float]:
+    """Return what was identified in each part of a stack, and the time that it took, s."""
+    identifier = create_identifier(expected_targets=expected, ahf=False)
+    started = time.perf_counter()
+    parts = identify_parts(identifier, images, StackSettings(stack=len(images)))
+    found = [identification for _, _, identification in parts]
+    return found, time.perf_counter() - started
 
 
 def markdown(report: dict[str, Any]) -> str:
@@ -74,7 +83,17 @@ def markdown(report: dict[str, Any]) -> str:
     facts = report['machine']
     kind = 'Test' if report['test'] else 'Development'
     seeds = ', '.join(map(str, report['seeds']))
-    head = ('radius', 'light', *COLUMNS, 'RMSE px', 'in normal light', 'NEES', 's', 'combination')
+    head = (
+        'radius',
+        'light',
+        *COLUMNS,
+        'parts',
+        'RMSE px',
+        'in normal light',
+        'NEES',
+        's',
+        'combination',
+    )
     lines = [
         f'{report["phases"]} phases, ambient light {AMBIENT:g}, {report["targets"]} targets an '
         f'image; right / wrong / false. {kind} seeds: {seeds}. {facts["processor"]}, Python '
@@ -99,38 +118,51 @@ def markdown(report: dict[str, Any]) -> str:
             )
         ]
         names = ', '.join(sorted(row['combinations']))
-        cells = (f'{row["radius"]:g}', row['light'], *counts, *numbers, names)
+        cells = (f'{row["radius"]:g}', row['light'], *counts, str(row['parts']), *numbers, names)
         lines.append(f'| {" | ".join(cells)} |')
     return '\n'.join(lines)
 
 
 def parser() -> argparse.ArgumentParser:
     """Return what can be chosen."""
-    made = argparse.ArgumentParser(description=__doc__.split('\n', 1)[0])
-    made.add_argument('--lights', nargs='+', default=list(LIGHTS), choices=LIGHT_NAMES)
+    made = argparse.ArgumentParser(
+        description=__doc__.split('\n\n')[0],
+        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+    )
+    made.add_argument('--lights', nargs='+', choices=LIGHT_NAMES, default=LIGHTS)
     made.add_argument('--radii', nargs='+', type=float, default=[6.0, 20.0])
-    made.add_argument('--seeds', nargs='+', type=int, default=[FIRST_TEST_SEED])
     made.add_argument('--phases', type=int, default=4)
-    made.add_argument('--targets', type=int, default=54)
-    made.add_argument('--json', type=Path, help='Write the figures to this file, too.')
+    made.add_argument('--targets', type=int, default=SceneSettings().targets)
+    made.add_argument('--width', type=int, default=SceneSettings().width)
+    made.add_argument('--height', type=int, default=SceneSettings().height)
+    made.add_argument('--seeds', nargs='+', type=int, default=[FIRST_TEST_SEED])
+    made.add_argument(
+        '--output', type=Path, metavar='FILE', help='also write FILE.json and FILE.md'
+    )
     return made
 
 
-def main() -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Measure and print."""
-    options = parser().parse_args()
-    cv2.setNumThreads(1)
-    report = {
-        'machine': machine(),
-        'test': are_tests(options.seeds),
+    options = parser().parse_args(arguments)
+    try:
+        test = are_tests(options.seeds)
+    except ValueError as error:
+        print(error, file=sys.stderr)
+        return 2
+    report: dict[str, Any] = {
         'seeds': options.seeds,
+        'test': test,
         'phases': options.phases,
         'targets': options.targets,
+        'machine': machine(),
         'rows': list(measure(options)),
     }
-    print(markdown(report))
-    if options.json:
-        options.json.write_text(json.dumps(report, indent=1) + '\n')
+    table = markdown(report)
+    if options.output:
+        Path(f'{options.output}.json').write_text(json.dumps(report, indent=1))
+        Path(f'{options.output}.md').write_text(table + '\n')
+    print(table)
     return 0
 
 

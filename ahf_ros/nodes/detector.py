@@ -29,12 +29,14 @@ from ahf_ros.nodes.cloud import TargetPoints
 from ahf_ros.nodes.diagnostics import CloudTally, Diagnostics, Tally
 from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.nodes.parameters import ParameterSettings
-from ahf_ros.nodes.pipeline import STOPPING, ImageMessage, Pipeline, Refused
+from ahf_ros.nodes.pipeline import STOPPING, ImageAnswer, ImageMessage, Pipeline, Refused
 from ahf_ros.nodes.process import ProcessNode, run
 from ahf_ros.nodes.service_detector import ServiceDetector
 from ahf_ros.nodes.settings import LOSSLESS, SERVICE, DetectorNodeSettings
+from ahf_ros.nodes.stacking import HeldImage, Stacks, answer_stack
 from ahf_ros.nodes.waiting import Take, WaitingMessages
 from ahf_ros.nodes.worker import Worker
+from ahf_ros.sequence import Gathered
 from ahf_ros.srv import Identify
 from ahf_ros.text import printable, reason_of
 
@@ -87,10 +89,11 @@ class DetectorNode(ProcessNode):
         # With use_sim_time, the node's clock stops when a replay stops.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(DIAGNOSTICS_PERIOD, self._publish_diagnostics, clock=steady)
-        self._last = Header()
         self._images: Subscription | None = None
         self._subscribed = ('', '')
         self._clouds: TargetPoints | None = None
+        self._stacks: Stacks | None = None
+        self._offered = 0  # images that the job answers that was offered last
         self._service: ServiceDetector | None = None
         self._settings = ParameterSettings(self, DetectorNodeSettings, self._renew)
         self._renew()
@@ -112,6 +115,7 @@ class DetectorNode(ProcessNode):
         """Put the current parameters into force."""
         settings = self._settings.current
         self._renew_clouds(settings)
+        self._renew_stacks(settings)
         self._pipeline = Pipeline(settings, self._stopping, self._service_detector(settings))
         if self._subscribed != (settings.image_transport, settings.queue):
             self._subscribed = (settings.image_transport, settings.queue)
@@ -137,6 +141,16 @@ class DetectorNode(ProcessNode):
                 self, settings, self._tally.clouds, self._target_points, self._target_labels
             )
 
+    def _renew_stacks(self, settings: DetectorNodeSettings) -> None:
+        """Start or stop gathering images to stacks."""
+        if self._stacks and self._stacks.suits(settings):
+            return
+        stacks, self._stacks = self._stacks, None
+        if stacks:
+            stacks.close('parameters changed')
+        if settings.stacking.stack > 1:
+            self._stacks = Stacks(self, settings, self._on_stack)
+
     def _service_detector(self, settings: DetectorNodeSettings) -> ServiceDetector | None:
         """Return the detector that calls a service, if the settings name it."""
         if settings.identification.detector != SERVICE:
@@ -150,28 +164,33 @@ class DetectorNode(ProcessNode):
 
     def _on_image(self, message: ImageMessage) -> None:
         self._tally.received += 1
-        self._compare_stamps(message.header)
+        if backwards := self._tally.compare_stamps(message.header):
+            self.get_logger().warning(backwards, throttle_duration_sec=LOG_PERIOD)
         pipeline, received = self._pipeline, time.monotonic()
         settings = pipeline.settings
-        if settings.queue == LOSSLESS:
-            limit = settings.queue_memory * 2**20
-            with suppress(Refused):
+        take: Take = lambda: message  # noqa: E731
+        with suppress(Refused):
+            if settings.queue == LOSSLESS:
+                limit = settings.queue_memory * 2**20
                 take = self._attempt(partial(self._waiting.put, message, limit))
-                self._worker.append(partial(self._process, take, pipeline, received))
-        elif self._worker.offer(partial(self._process, lambda: message, pipeline, received)):
-            self._tally.dropped += 1
+            if stacks := self._stacks:
+                stacks.add(HeldImage(take), message)
+            else:
+                self._submit(partial(self._process, take, pipeline, received), 1)
 
-    def _compare_stamps(self, header: Header) -> None:
-        """Report stamps that go backwards, as when a replay starts over."""
-        now, before = header.stamp, self._last.stamp
-        self._last = header
-        if (now.sec, now.nanosec) < (before.sec, before.nanosec):
-            self._tally.backwards += 1
-            self.get_logger().warning(
-                f'stamp is {now.sec}.{now.nanosec:09} s, that of the image before is '
-                f'{before.sec}.{before.nanosec:09} s',
-                throttle_duration_sec=LOG_PERIOD,
-            )
+    def _on_stack(self, stack: Gathered[HeldImage]) -> None:
+        publish = partial(self._publish, pipeline=self._pipeline, received=time.monotonic())
+        job = partial(answer_stack, stack, self._pipeline, self._attempt, publish)
+        self._submit(partial(job, self._tally, self.get_logger()), stack.fresh)
+
+    def _submit(self, job: Callable[[], None], images: int) -> None:
+        """Let the worker do a job that answers a number of images."""
+        if self._pipeline.settings.queue == LOSSLESS:
+            self._worker.append(job)
+            return
+        if self._worker.offer(job):
+            self._tally.dropped += self._offered
+        self._offered = images
 
     def _on_identify(
         self, request: Identify.Request, response: Identify.Response
@@ -202,9 +221,12 @@ class DetectorNode(ProcessNode):
             self._attempt(lambda: self._answer(take(), pipeline, received))
 
     def _answer(self, message: ImageMessage, pipeline: Pipeline, received: float) -> None:
-        answer = pipeline.answer(message)
+        self._publish(pipeline.answer(message), pipeline, received)
+
+    def _publish(self, answer: ImageAnswer, pipeline: Pipeline, received: float) -> None:
+        header = answer.message.header
         self._targets.publish(answer.message)
-        self._tally.answered += 1
+        self._tally.answered += answer.images
         self._tally.latency = time.monotonic() - received
         self._tally.last = answer.identification
         if clouds := self._clouds:
@@ -213,10 +235,10 @@ class DetectorNode(ProcessNode):
             self._annotations.publish(target_annotations(answer.message))
         if self._debug_image.get_subscription_count():
             drawn = draw(answer.image, answer.identification)
-            self._debug_image.publish(image_message(drawn, message.header))
+            self._debug_image.publish(image_message(drawn, header))
         if self._filtered_image.get_subscription_count():
             filtered = pipeline.filtered(answer)
-            self._filtered_image.publish(image_message(filtered, message.header))
+            self._filtered_image.publish(image_message(filtered, header))
 
     def _attempt(self, job: Callable[[], Result]) -> Result:
         """Return the result of a job on an image, or count and log its error.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from std_msgs.msg import Header
 
 from ahf_ros.target import Identification
 
@@ -59,12 +60,16 @@ class Tally:
         Why the last rejected image was rejected.
     mistaken : str
         Message about other types on the topic of the images; empty if there are none.
+    incomplete, split : int
+        Stacks that were answered with fewer images; that were split.
     latency : float
         Time from the arrival of the last image to its answer, s.
     last : Identification
         The last identification.
     clouds : CloudTally or None
         Counts of clouds; None while they are not subscribed to.
+    stamp : tuple of 2 int
+        Stamp of the last image, s and ns.
     """
 
     received: int = 0
@@ -72,11 +77,26 @@ class Tally:
     dropped: int = 0
     rejected: int = 0
     backwards: int = 0
+    incomplete: int = 0
+    split: int = 0
     reason: str = ''
     mistaken: str = ''
     latency: float = 0.0
     last: Identification = field(default_factory=lambda: Identification(()))
     clouds: CloudTally | None = None
+    stamp: tuple[int, int] = (0, 0)
+
+    def compare_stamps(self, header: Header) -> str:
+        """Count stamps that go backwards, as when a replay starts over; return what to report."""
+        (sec, nanosec), before = (header.stamp.sec, header.stamp.nanosec), self.stamp
+        self.stamp = sec, nanosec
+        if self.stamp >= before:
+            return ''
+        self.backwards += 1
+        return (
+            f'stamp is {sec}.{nanosec:09} s, that of the image before is '
+            f'{before[0]}.{before[1]:09} s'
+        )
 
 
 class Diagnostics:
@@ -94,12 +114,17 @@ class Diagnostics:
         answered = tally.answered - self._before.answered
         rejected = tally.rejected - self._before.rejected
         backwards = tally.backwards - self._before.backwards
+        incomplete = tally.incomplete - self._before.incomplete
+        split = tally.split - self._before.split
         self._before = tally
         level, message = DiagnosticStatus.OK, f'{answered} images identified'
         if rejected:
             level, message = DiagnosticStatus.WARN, f'{rejected} images rejected: {tally.reason}'
         elif backwards:
             level, message = DiagnosticStatus.WARN, f'{backwards} stamps went backwards'
+        elif incomplete or split:
+            level = DiagnosticStatus.WARN
+            message = f'{incomplete} stacks were not full, {split} were split'
         clouds = tally.clouds or CloudTally()
         rejected_clouds = clouds.rejected - self._rejected_clouds
         self._rejected_clouds = clouds.rejected
@@ -120,6 +145,8 @@ class Diagnostics:
             'rejected': tally.rejected,
             'last reason for rejection': tally.reason,
             'stamps that went backwards': tally.backwards,
+            'stacks that were not full': tally.incomplete,
+            'stacks that were split': tally.split,
             'identified (n)': tally.last.count,
             'expected (N)': tally.last.expected,
             'N estimated': tally.last.estimated,

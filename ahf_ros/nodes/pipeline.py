@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TypeAlias
 
 import numpy as np
 from sensor_msgs.msg import CompressedImage, Image
+from std_msgs.msg import Header
 
 from ahf_ros import msg
 from ahf_ros.detectors import Detector, create_detector
@@ -17,6 +19,7 @@ from ahf_ros.interchange.image_messages import decode_compressed, decode_image
 from ahf_ros.interchange.target_messages import coded_target_array
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.settings import LOSSLESS, DetectorNodeSettings
+from ahf_ros.sequence import identify_parts
 from ahf_ros.session import create_identifier
 from ahf_ros.target import Identification
 
@@ -43,11 +46,17 @@ class ImageAnswer:
         Its identification.
     message : CodedTargetArray
         The identification as it is sent.
+    images : int
+        Number of images of a stack that this is the first answer to.
+    split : str
+        Why a stack was split before these images; empty if it was not.
     """
 
     image: np.ndarray
     identification: Identification
     message: CodedTargetArray
+    images: int = 1
+    split: str = ''
 
 
 class Pipeline:
@@ -95,14 +104,50 @@ class Pipeline:
         Refused
             If the node stops first.
         """
-        image = (decode_compressed if hasattr(message, 'format') else decode_image)(message)
-        identification = self._identifier.identify(image, expected)
+        image = decoded(message)
+        return self._answer(image, self._identifier.identify(image, expected), message.header)
+
+    def answers(
+        self, images: Sequence[tuple[Header, np.ndarray]], fresh: int
+    ) -> Iterator[ImageAnswer]:
+        """Identify the targets of a stack, and yield an answer for each of its parts.
+
+        Parameters
+        ----------
+        images : sequence of tuple of Header and ndarray
+            The stack. The answer to a part has the header of its last image.
+        fresh : int
+            How many of the last images have not been answered; parts without them are left out.
+
+        Raises
+        ------
+        ValueError
+            If an image is not accepted.
+        Refused
+            If the node stops first.
+        """
+        headers = [header for header, _ in images]
+        parts = identify_parts(
+            self._identifier,
+            [image for _, image in images],
+            self.settings.stacking,
+            fresh=fresh,
+        )
+        for part, stack, found in parts:
+            shown = stack.combined(found.combination)
+            answer = self._answer(shown, found, headers[part.images[-1]])
+            new = part.images.stop - max(part.images.start, len(images) - fresh)
+            yield replace(answer, images=new, split=part.split)
+
+    def _answer(
+        self, image: np.ndarray, identification: Identification, header: Header
+    ) -> ImageAnswer:
         if self.settings.queue == LOSSLESS:
             # Without the duration, runs are byte-identical.
             used = replace(identification.filter, duration=0.0)
             identification = replace(identification, filter=used)
         family, shape = self._detector.family, image.shape
-        sent = coded_target_array(identification, family, shape, message.header, msg)
+        sent = coded_target_array(identification, family, shape, header, msg)
         return ImageAnswer(image, identification, sent)
 
     def filtered(self, answer: ImageAnswer) -> np.ndarray:
@@ -118,6 +163,17 @@ class Pipeline:
     def reset(self) -> None:
         """Forget what worked for earlier images."""
         self._identifier.reset()
+
+
+def decoded(message: ImageMessage) -> np.ndarray:
+    """Return the image of a message, in gray.
+
+    Raises
+    ------
+    ValueError
+        If the image is not accepted.
+    """
+    return (decode_compressed if hasattr(message, 'format') else decode_image)(message)
 
 
 def _check_running(stopping: threading.Event) -> None:

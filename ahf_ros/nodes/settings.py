@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from ahf_ros.detectors import DETECTOR
 from ahf_ros.localisation import NEIGHBOURHOOD
+from ahf_ros.sequence import StackSettings
 from ahf_ros.session import IdentificationSettings, create_identifier
 from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.synthetic.scene import SceneSettings
@@ -93,6 +94,13 @@ class DetectorNodeSettings:
         minimum=1,
         maximum=10**6,
     )
+    stack_timeout: float = parameter(
+        5.0,
+        'Time without a further image after which a stack is answered with what there is, s.',
+        minimum=0.01,
+        maximum=86400.0,
+    )
+    stacking: StackSettings = field(default_factory=StackSettings)
     identification: NodeIdentificationSettings = field(default_factory=NodeIdentificationSettings)
     cloud: CloudSettings = field(default_factory=CloudSettings)
 
