@@ -22,7 +22,7 @@ from ahf_ros.features.pyramid import ImagePyramid
 from ahf_ros.features.small_dots import small_dots
 
 _SCALES = np.geomspace(0.76, 1.32, 11)  # of the radius that a disc has, in that of its candidate
-_MINIMUM_SHARE = 0.5  # of the steps of ln at disc and border
+_MINIMUM_SHARE = 0.55  # of the steps of ln at disc and border; lattices of light reach 0.54
 _MARGIN = 0.3  # about the border of a known target, disc radii
 _SMALL = 12.0  # largest radius of discs that are looked for as blobs of the whole image, px
 _SMALLER = 0.8  # of the smallest radius, of a blob whose edge is blurred

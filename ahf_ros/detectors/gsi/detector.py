@@ -146,7 +146,7 @@ def find_hypotheses(
     """
     kind = (*settings.radii, settings.polarities)
     whole = whole_dots(pyramid, *kind)
-    first = read_targets(pyramid, whole, code, rivals=False)
+    first = read_targets(pyramid, whole, code, obvious=True)
     certain = first.select(resolve(first, code, OBVIOUS))
     which = _dots_of(certain.words, code)
     places, radii = code.places[which], code.radii[which]
@@ -156,10 +156,12 @@ def find_hypotheses(
         corners = frame.circle_outlines(frames, np.ones(len(frames))).reshape(-1, 2)
         explained.append(cv2.convexHull(corners.astype(np.float32))[:, 0])
     dots = with_other_dots(pyramid, whole.select(rest), *kind, explained=explained)
-    return Hypotheses.joined([certain, read_targets(pyramid, dots, code, rivals=True)]), dots
+    return Hypotheses.joined([certain, read_targets(pyramid, dots, code, obvious=False)]), dots
 
 
-def read_targets(pyramid: ImagePyramid, dots: Dots, code: PointFamily, rivals: bool) -> Hypotheses:
+def read_targets(
+    pyramid: ImagePyramid, dots: Dots, code: PointFamily, *, obvious: bool
+) -> Hypotheses:
     """Return the groups of dots that may be targets, with the code that each is read as.
 
     Parameters
@@ -167,7 +169,7 @@ def read_targets(pyramid: ImagePyramid, dots: Dots, code: PointFamily, rivals: b
     pyramid : ImagePyramid
     dots : Dots
     code : PointFamily
-    rivals : bool
+    obvious : bool
         As for `plausible`.
     """
     templates = find_templates(dots, code)
@@ -175,7 +177,7 @@ def read_targets(pyramid: ImagePyramid, dots: Dots, code: PointFamily, rivals: b
         return no_hypotheses()
     evidence = find_evidence(pyramid.logs[0], templates.homographies, templates.polarity, code)
     readings = read_codes(evidence, code)
-    which = plausible(templates, readings, code, rivals)
+    which = plausible(templates, readings, code, obvious=obvious)
     if not len(which):
         return no_hypotheses()
     some, words = templates.select(which), readings.words[which]

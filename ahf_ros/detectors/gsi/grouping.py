@@ -31,6 +31,7 @@ _PREDICTED = 0.9  # error of a dot that is predicted by three others, dot radii
 _PERSPECTIVE = 0.06  # the same, in its distance from them
 _RESIDUAL = 0.35  # of the dots of a template about a homography, root mean square, dot radii
 _PIXELS = 0.35  # the same, px, which counts where dots are small
+_WELL = 0.25  # share of what is accepted, of a template that fits well
 _MAXIMUM_GROUPS = 2000  # of one part, for a homography to be fitted
 _MAXIMUM_TEMPLATES = 2000  # of one polarity, those that fit best
 _STRAY = 3  # dots at the positions of a target that do not belong to it
@@ -251,4 +252,23 @@ def _distinct(templates: Templates) -> Templates:
     """Return the templates best first, of those with the same dots one."""
     order = np.argsort(templates.misfit, kind='stable')
     _, first = np.unique(templates.members[order], axis=0, return_index=True)
-    return templates.select(order[np.sort(first)[:_MAXIMUM_TEMPLATES]])
+    best = templates.select(order[np.sort(first)])
+    return best.select(np.flatnonzero(~_parts_of_others(best))[:_MAXIMUM_TEMPLATES])
+
+
+def _parts_of_others(templates: Templates) -> np.ndarray:
+    """Return where all dots of a template that lacks one belong to one that fits well.
+
+    Four dots of GSI's template are the corners of a square, which fits in four ways.
+    """
+    members = np.sort(templates.members, axis=1)
+    count = members.shape[1]
+    lacking = np.flatnonzero(members[:, 0] < 0)
+    whole = members[(members[:, 0] >= 0) & (templates.misfit < _WELL)]
+    parts = [np.delete(whole, index, axis=1) for index in range(count)]
+    rows = np.concatenate([members[lacking, 1:], *parts])
+    _, same = np.unique(rows, axis=0, return_inverse=True)
+    same = same.ravel()  # numpy 2.0 gives it two dimensions
+    part = np.zeros(len(members), bool)
+    part[lacking] = np.isin(same[: len(lacking)], same[len(lacking) :])
+    return part

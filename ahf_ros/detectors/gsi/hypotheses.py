@@ -20,6 +20,7 @@ OBVIOUS = 0.99
 """Confidence from which a target is not weighed against others in its place."""
 
 _PLAUSIBLE = 0.75  # support of a hypothesis that is followed up
+_CLEAR = 0.95  # the same, where only obvious targets are looked for; these have 1
 _MAXIMUM = 250  # hypotheses that are followed up, those with the most support
 _MISFIT = 0.1  # support that a misfit of 1 of the template costs in the order of these
 _EQUAL = 1.0  # distance of the reference points of equal hypotheses, dot radii
@@ -64,7 +65,7 @@ def no_hypotheses() -> Hypotheses:
 
 
 def plausible(
-    templates: Templates, readings: Readings, family: PointFamily, rivals: bool
+    templates: Templates, readings: Readings, family: PointFamily, *, obvious: bool
 ) -> np.ndarray:
     """Return the indices of the groups that are followed up, of equal ones one.
 
@@ -74,12 +75,13 @@ def plausible(
     readings : Readings
         Of the templates.
     family : PointFamily
-    rivals : bool
-        Whether several groups that cannot all be targets, as they lie too close, are followed up.
+    obvious : bool
+        Whether only groups that may be obvious targets are followed up. Otherwise so are several
+        groups that lie too close for all to be targets.
     """
     rank = readings.support - _MISFIT * templates.misfit
     order = np.argsort(-rank, kind='stable')
-    order = order[readings.support[order] >= _PLAUSIBLE]
+    order = order[readings.support[order] >= (_CLEAR if obvious else _PLAUSIBLE)]
     equal = family.template_radii[family.reference] * _EQUAL
     units = reference_frames(templates.homographies[order], float(equal))
     around = reference_frames(templates.homographies[order], family.reach * _APART)
@@ -89,7 +91,7 @@ def plausible(
         if free[position]:
             kept.append(position)
             free &= ~(_within(units, position) & (words == words[position]))
-            worse = support < support[position] - (_CLEARLY if rivals else 0.0)
+            worse = support < support[position] - (0.0 if obvious else _CLEARLY)
             free &= ~(_within(around, position) & worse)
             if len(kept) == _MAXIMUM:
                 break
@@ -129,9 +131,9 @@ def inside(points: np.ndarray, frames: np.ndarray) -> np.ndarray:
     frames : ndarray of float64, shape (k, 3, 3)
         Affine, of the circles.
     """
-    offset = points[:, None] - frames[:, :2, 2]
-    relative = np.linalg.inv(frames[:, :2, :2]) @ offset[..., None]
-    return np.asarray(((relative**2).sum(axis=(2, 3)) < 1).any(axis=1))
+    offset = points - frames[:, None, :2, 2]
+    relative = offset @ np.linalg.inv(frames[:, :2, :2]).swapaxes(1, 2)
+    return np.asarray(((relative**2).sum(axis=2) < 1).any(axis=0))
 
 
 def _within(units: np.ndarray, position: int) -> np.ndarray:

@@ -12,6 +12,7 @@ from ahf_ros.detectors.gsi.evidence import Evidence
 from ahf_ros.features.array_record import ArrayRecord
 
 _MOST_FOR, _MOST_AGAINST = 8.0, 6.0  # that one place may say on whether there is a target
+_GREATEST_MARGIN = 14.0  # of one code over the next, beyond which it says no more
 _CLEAREST = 20.0  # that it may say for a dot on which one
 
 
@@ -55,11 +56,10 @@ def read_codes(evidence: Evidence, family: PointFamily) -> Readings:
     template, positions = limited[:, :count], limited[:, count:]
     incidence = _incidence(family)
     scores = np.clip(evidence.ratio[:, count:], -_MOST_AGAINST, _CLEAREST) @ incidence.T
-    order = np.argpartition(scores, -min(2, scores.shape[1]), axis=1)[:, -2:]
-    best = scores.argmax(axis=1)
-    rows = np.arange(len(scores))
-    second = np.where(order == best[:, None], -np.inf, np.take_along_axis(scores, order, axis=1))
-    margin = scores[rows, best] - np.maximum(second.max(axis=1), scores[rows, best] - 14.0)
+    rows, best = np.arange(len(scores)), scores.argmax(axis=1)
+    highest = scores[rows, best]
+    scores[rows, best] = highest - _GREATEST_MARGIN
+    margin = highest - scores.max(axis=1)
     marked = incidence[best] > 0
     of_dots = np.concatenate([template, np.where(marked, positions, _MOST_FOR)], axis=1)
     against = np.where(marked, 0.0, -positions).sum(axis=1)
