@@ -237,6 +237,23 @@ def test_templates_are_not_mirrored_wherever_they_are() -> None:
     assert (np.linalg.det(templates.homographies) < 0).all()
 
 
+def test_small_dots_that_look_a_pixel_wider_still_make_a_template() -> None:
+    # Blobs of few pixels have axes of whole pixels: 3 px where the dot has 1.7 px.
+    family = point_family()
+    minor = np.cos(np.deg2rad(70.0))
+    pixels = 5.1 / family.dot_radius
+    homography = np.diag([pixels, -pixels * minor, 1.0])
+    homography[:2, 2] = 400.0, 300.0
+    which = np.arange(len(family.template))
+    frames = local_frames(homography[None], family.places[which], family.radii[which])[0]
+    wide = frames.copy()
+    wide[:, :2, :2] = np.diag([5.1, 3.0])
+    dots = Dots(wide, np.ones(len(which), int), np.ones(len(which)))
+    templates = find_templates(dots, family)
+    assert templates.members.tolist() == [which.tolist()]
+    assert templates.misfit[0] < 0.1
+
+
 def test_paper_in_a_dark_stripe_is_not_taken_for_a_dot() -> None:
     # As wide as a dot, a stripe has the outline of one on most of its circumference.
     shown = rendering(light='stripe', ambient=0.04, dot_radius=10.0, targets=3, width=1300)

@@ -23,6 +23,9 @@ WEIGHTS = Path(__file__).with_name('fitted_weights.json')
 FEATURES = 7
 """What the probability depends on, see `confidence_features`."""
 
+SUPPORT = 0
+"""Which of these is the support."""
+
 _GROWTH = (0.03, 0.4, 0.15)  # that is usual: of any dot, of the minor axis in px, of its 4th power
 _EXCESS = 0.02  # of growth, that counts as 1
 _SHARE = 0.8  # of dots whose edges are found, from which on no more are asked for

@@ -44,6 +44,7 @@ from ahf_ros.target import UNDECODED, DottedTarget, Target, sorted_targets
 
 _FAMILY = 'gsi'  # whichever data file describes it
 _MARGIN = 0.5  # about the dots of certain targets, dot radii
+_PROMISING = 0.85  # support of a hypothesis with another code than before, to be placed again
 _FARTHEST = 1.0  # that the reference point is moved by a refinement, px, or dot radii
 
 
@@ -182,7 +183,7 @@ def read_targets(
         return no_hypotheses()
     some, words = templates.select(which), readings.words[which]
     first = _placed(pyramid, some.homographies, some.polarity, words, code)
-    again = np.flatnonzero(first.words != words)
+    again = np.flatnonzero((first.words != words) & (first.support >= _PROMISING))
     if not len(again):
         return first
     second = _placed(

@@ -26,7 +26,7 @@ from ahf_ros.features.nearest_dots import NearestDots
 _LENGTH_ERROR = (0.35, 0.7)  # of a distance in units of an ellipse: share of it, and dot radii
 _LENGTH_ERROR_OF_MANY = (0.25, 0.5)  # the same, where there are many dots
 _ELLIPSE_ERROR = 0.25  # of the axes of a dot, from those that three dots imply, in ln
-_ELLIPSE_PIXELS = 0.8  # added to it, px over the semi-minor axis
+_ELLIPSE_PIXELS = 1.2  # added to it, px over the semi-minor axis: blobs consist of whole pixels
 _PREDICTED = 0.9  # error of a dot that is predicted by three others, dot radii
 _PERSPECTIVE = 0.06  # the same, in its distance from them
 _RESIDUAL = 0.35  # of the dots of a template about a homography, root mean square, dot radii

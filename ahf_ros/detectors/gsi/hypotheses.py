@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ahf_ros.codes.gsi import PointFamily
-from ahf_ros.detectors.gsi.confidence import FEATURES, probability
+from ahf_ros.detectors.gsi.confidence import FEATURES, SUPPORT, probability
 from ahf_ros.detectors.gsi.grouping import Templates
 from ahf_ros.detectors.gsi.reading import Readings
 from ahf_ros.features.array_record import ArrayRecord
@@ -50,6 +50,11 @@ class Hypotheses(ArrayRecord):
     polarity: np.ndarray
     words: np.ndarray
     features: np.ndarray
+
+    @property
+    def support(self) -> np.ndarray:
+        """Support of the code, as in `Readings`, shape (k,)."""
+        return self.features[:, SUPPORT]
 
     @property
     def confidence(self) -> np.ndarray:
