@@ -12,9 +12,7 @@ development.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterable, Iterator
-from itertools import pairwise
 
 import numpy as np
 from rich.progress import track
@@ -25,13 +23,7 @@ from ahf_ros.detectors.ring.confidence import HIDDEN, MARGIN, UNEXPLAINED, confi
 from ahf_ros.detectors.ring.detector import find_hypotheses
 from ahf_ros.imaging.image import as_gray
 from benchmarks.conditions import COMMON, Scene, scenes
-from benchmarks.weights import write_weights
-
-NEAR = 5.0
-"""Largest distance of a target from its truth, px."""
-
-CLASSES = (0.0, 0.5, 0.9, 0.95, 0.98, 0.99, 0.999, 1.0)
-"""Bounds of the classes of confidence in the table."""
+from benchmarks.reliability import NEAR, reliability_table, run
 
 RARE = 0.1
 """Weight of a reading under a condition that is not common, in the fit."""
@@ -137,32 +129,10 @@ def fitted(seeds: Iterable[int]) -> dict[str, np.ndarray]:
 
 
 def reliability(seeds: Iterable[int]) -> Iterator[str]:
-    """Yield the lines of the table of confidences and how often they are right."""
+    """Yield the lines of the table of the scenes of some seeds."""
     features, right, condition = gathered(seeds)
-    stated = confidence(features)
-    yield '| condition | confidence | readings | mean confidence | share right |'
-    yield '|---|---|---|---|---|'
-    for name in dict.fromkeys(condition):
-        for low, high in pairwise(CLASSES):
-            within = (condition == name) & (stated >= low) & (stated < high)
-            if within.any():
-                yield (
-                    f'| {name} | {low} to {high} | {within.sum()} | {stated[within].mean():.4f} '
-                    f'| {right[within].mean():.4f} |'
-                )
-
-
-def main() -> None:
-    """Write weights, or print their reliability as Markdown."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument('--fit', type=int, nargs='+', metavar='SEED', help='fit the weights anew')
-    parser.add_argument('--seeds', type=int, nargs='+', default=[101, 102])
-    options = parser.parse_args()
-    if options.fit:
-        write_weights('confidence', options.fit, fitted(options.fit))
-    else:
-        print('\n'.join(reliability(options.seeds)))
+    return reliability_table(condition, confidence(features), right)
 
 
 if __name__ == '__main__':
-    main()
+    run('confidence', __doc__, fitted, reliability)

@@ -12,10 +12,9 @@ are for tests, those below for development.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise, product
+from itertools import product
 
 import numpy as np
 from rich.console import Console
@@ -31,9 +30,9 @@ from ahf_ros.imaging.image import as_gray
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 from ahf_ros.target import Target
-from benchmarks.confidence import CLASSES, NEAR, logistic_regression
+from benchmarks.confidence import logistic_regression
+from benchmarks.reliability import NEAR, reliability_table, run
 from benchmarks.textures import lookalikes
-from benchmarks.weights import write_weights
 
 PER_RADIUS = 6.4
 """Width of a target in radii of its disc."""
@@ -124,33 +123,13 @@ def fitted(seeds: Sequence[int]) -> dict[str, np.ndarray]:
 
 
 def reliability(seeds: Sequence[int]) -> Iterator[str]:
-    """Yield the lines of the table of confidences and how often they are right."""
-    conditions = gathered(seeds)
-    conditions['all'] = Compared.joined(list(conditions.values()))
-    yield '| condition | confidence | readings | mean confidence | share right |'
-    yield '|---|---|---|---|---|'
-    for condition, some in conditions.items():
-        stated = target_probability(some.target_features) * word_probability(some.word_features)
-        for low, high in pairwise(CLASSES):
-            within = (stated >= low) & (stated < high)
-            if within.any():
-                yield (
-                    f'| {condition} | {low} to {high} | {within.sum()} '
-                    f'| {stated[within].mean():.4f} | {some.right[within].mean():.4f} |'
-                )
-
-
-def main() -> None:
-    """Write weights, or print their reliability as Markdown."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument('--fit', type=int, nargs='+', metavar='SEED', help='fit the weights anew')
-    parser.add_argument('--seeds', type=int, nargs='+', default=[101, 102])
-    options = parser.parse_args()
-    if options.fit:
-        write_weights('dots_confidence', options.fit, fitted(options.fit), WEIGHTS)
-    else:
-        print('\n'.join(reliability(options.seeds)))
+    """Yield the lines of the table of the scenes of some seeds."""
+    parts = gathered(seeds)
+    every = Compared.joined(list(parts.values()))
+    conditions = np.repeat(list(parts), [len(of.right) for of in parts.values()])
+    stated = target_probability(every.target_features) * word_probability(every.word_features)
+    return reliability_table(conditions, stated, every.right)
 
 
 if __name__ == '__main__':
-    main()
+    run('dots_confidence', __doc__, fitted, reliability, WEIGHTS)

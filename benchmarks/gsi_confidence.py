@@ -13,10 +13,9 @@ tests, those below for development.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from itertools import pairwise, product
+from itertools import product
 
 import numpy as np
 from rich.console import Console
@@ -31,9 +30,9 @@ from ahf_ros.features.pyramid import image_pyramid
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 from ahf_ros.target import DottedTarget
-from benchmarks.confidence import CLASSES, NEAR, rising_regression
+from benchmarks.confidence import rising_regression
 from benchmarks.gsi import texture
-from benchmarks.weights import write_weights
+from benchmarks.reliability import NEAR, reliability_table, run
 
 BASE = SceneSettings(
     family='gsi', width=1300, height=900, targets=6, dot_radius=5.0, focal_length=6.0
@@ -128,43 +127,18 @@ def gathered(seeds: Iterable[int]) -> tuple[list[str], np.ndarray, np.ndarray]:
     return conditions, features, right
 
 
-def fitted(features: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Return intercept and weights of the regression, shape (8,)."""
+def fitted(seeds: Iterable[int]) -> dict[str, np.ndarray]:
+    """Return intercept and weights of the regression on the scenes of some seeds, shape (8,)."""
+    _, features, right = gathered(seeds)
     intercept, slopes = rising_regression(SIGNS * features, right, np.ones(len(right)))
-    return np.round(np.append(intercept, SIGNS * slopes), 3) + 0.0
+    return {'weights': np.round(np.append(intercept, SIGNS * slopes), 3) + 0.0}
 
 
 def reliability(seeds: Iterable[int]) -> Iterator[str]:
-    """Yield the lines of the table of confidences, and how often they are right, by condition."""
-    names, features, right = gathered(seeds)
-    of_each = np.array(names)
-    stated = probability(features)
-    yield '| condition | confidence | hypotheses | mean confidence | share right |'
-    yield '|---|---|---|---|---|'
-    for condition in ('all', *dict.fromkeys(names)):
-        here = (of_each == condition) | (condition == 'all')
-        for low, high in pairwise(CLASSES):
-            within = here & (stated >= low) & ((stated < high) | (high == CLASSES[-1]))
-            if within.any():
-                yield (
-                    f'| {condition} | {low} to {high} | {within.sum()} '
-                    f'| {stated[within].mean():.4f} | {right[within].mean():.4f} |'
-                )
-
-
-def main() -> None:
-    """Write weights, or print their reliability as Markdown."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument('--fit', type=int, nargs='+', metavar='SEED', help='fit the weights anew')
-    parser.add_argument('--seeds', type=int, nargs='+', default=[101])
-    options = parser.parse_args()
-    if options.fit:
-        _, features, right = gathered(options.fit)
-        weights = {'weights': fitted(features, right)}
-        write_weights('gsi_confidence', options.fit, weights, WEIGHTS)
-    else:
-        print('\n'.join(reliability(options.seeds)))
+    """Yield the lines of the table of the scenes of some seeds."""
+    conditions, features, right = gathered(seeds)
+    return reliability_table(conditions, probability(features), right)
 
 
 if __name__ == '__main__':
-    main()
+    run('gsi_confidence', __doc__, fitted, reliability, WEIGHTS)

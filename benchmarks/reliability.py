@@ -1,0 +1,84 @@
+"""How far stated confidences can be trusted, and the command line of the benchmarks that ask.
+
+Each of `benchmarks.confidence`, `gsi_confidence` and `dots_confidence` renders scenes, compares
+what a detector reads with the truth, and then either prints the reliability of the weights in
+force or fits them anew.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from ahf_ros.detectors.ring.fitted_weights import PATH
+from benchmarks.identification import FIRST_TEST_SEED
+from benchmarks.weights import write_weights
+
+NEAR = 5.0
+"""Largest distance of a target from its truth, px."""
+
+CLASSES = (0.0, 0.5, 0.9, 0.95, 0.98, 0.99, 0.999, 1.0)
+"""Bounds of the classes of confidence in the table."""
+
+
+def reliability_table(
+    condition: Sequence[str] | np.ndarray, stated: np.ndarray, right: np.ndarray
+) -> Iterator[str]:
+    """Yield the lines of the table of confidences and how often they are right.
+
+    Parameters
+    ----------
+    condition : sequence of k str
+        Under which each reading was made; 'all' stands for all of them at the end.
+    stated : ndarray of float, shape (k,)
+        Their confidence.
+    right : ndarray of bool, shape (k,)
+    """
+    condition = np.asarray(condition)
+    yield '| condition | confidence | readings | mean confidence | share right |'
+    yield '|---|---|---|---|---|'
+    for name in (*dict.fromkeys(condition.tolist()), 'all'):
+        here = (condition == name) | (name == 'all')
+        for low, high in pairwise(CLASSES):
+            within = here & (stated >= low) & ((stated < high) | (high == CLASSES[-1]))
+            if within.any():
+                yield (
+                    f'| {name} | {low} to {high} | {within.sum()} | {stated[within].mean():.4f} '
+                    f'| {right[within].mean():.4f} |'
+                )
+
+
+def run(
+    purpose: str,
+    description: str,
+    fitted: Callable[[Sequence[int]], Mapping[str, np.ndarray]],
+    reliability: Callable[[Sequence[int]], Iterator[str]],
+    path: Path = PATH,
+) -> None:
+    """Write weights with --fit, or print their reliability as Markdown.
+
+    Parameters
+    ----------
+    purpose : str
+        Name of the benchmark, and of its set of weights.
+    description : str
+        Its first line is that of the help.
+    fitted : callable
+        Returns the weights that suit the scenes of some seeds.
+    reliability : callable
+        Yields the lines of the table of the scenes of some seeds.
+    path : Path
+        The file of weights.
+    """
+    parser = argparse.ArgumentParser(description=description.splitlines()[0])
+    parser.add_argument('--fit', type=int, nargs='+', metavar='SEED', help='fit the weights anew')
+    parser.add_argument('--seeds', type=int, nargs='+', default=[FIRST_TEST_SEED])
+    options = parser.parse_args()
+    if options.fit:
+        write_weights(purpose, options.fit, fitted(options.fit), path)
+    else:
+        print('\n'.join(reliability(options.seeds)))
