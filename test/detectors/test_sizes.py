@@ -40,7 +40,12 @@ def test_families_compete_for_large_dots():
 
 
 @pytest.mark.parametrize(
-    ('family', 'radii'), [('dots', [200.0, 100.0, 20.0, 8.0]), ('gsi', [100.0, 20.0, 5.0])]
+    ('family', 'radii'),
+    [
+        ('dots', [200.0, 100.0, 20.0, 8.0]),
+        ('gsi', [100.0, 20.0, 5.0]),
+        ('aruco_4x4_50', [150.0, 20.0, 6.0]),
+    ],
 )
 def test_large_dots_of_other_families(family, radii):
     check(collage(radii, family), family)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import ceil, log2
 
 import cv2
 import numpy as np
@@ -14,11 +15,15 @@ import numpy as np
 from ahf_ros.codes.square import dictionary
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.square.sides import centres, fit_sides
+from ahf_ros.features.pyramid import halved
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import Target, sorted_targets
 
 _DRAFT_DEVIATION = 0.3  # standard deviation of a centre from corners of contours, px
 _MINIMUM_SHARE = 0.3  # of the edges on each side, for a fit to be accepted
+_BORDER = 2  # cells of a marker that are its border
+_CELL = 2.5  # smallest cell of a marker that is looked for, px
+_LARGE = 120.0  # side of a marker whose contour gives its corners to about two pixels, px
 
 Corners = tuple[tuple[float, float], ...]
 
@@ -77,7 +82,10 @@ class SquareDetector:
         """Identify the markers of one image, with the corners of contours, to about a pixel."""
         check_image(image)
         gray = np.ascontiguousarray(as_gray(image).astype(np.uint8, copy=False))
-        detector = cv2.aruco.ArucoDetector(dictionary(self.family))
+        parameters = cv2.aruco.DetectorParameters()
+        smallest = 4 * _CELL * (dictionary(self.family).markerSize + _BORDER) / max(gray.shape)
+        parameters.minMarkerPerimeterRate = min(parameters.minMarkerPerimeterRate, smallest)
+        detector = cv2.aruco.ArucoDetector(dictionary(self.family), parameters)
         corners, numbers, _ = detector.detectMarkers(gray)
         if not corners:
             return []
@@ -113,8 +121,9 @@ class SquareDetector:
         if not markers:
             return list(targets)
         gray = as_gray(image).astype(np.float32, copy=False)
-        corners = np.array([it.corners for it in markers])
-        sides = fit_sides(gray, corners, dictionary(self.family).markerSize + 2)
+        cells = dictionary(self.family).markerSize + _BORDER
+        corners = _from_halves(gray, np.array([it.corners for it in markers]), cells)
+        sides = fit_sides(gray, corners, cells)
         numbers = np.array([it.id for it in markers])
         moved = _markers(numbers, sides.corners, sides.covariance, self.family)
         better: dict[Target, Target] = {
@@ -123,6 +132,23 @@ class SquareDetector:
             if share >= _MINIMUM_SHARE
         }
         return [better.get(it, it) for it in targets]
+
+
+def _from_halves(gray: np.ndarray, corners: np.ndarray, cells: int) -> np.ndarray:
+    """Return the corners, shape (k, 4, 2), of large markers as halves of the image show them.
+
+    The contour of a large marker gives its corners to a part of its side, not to two pixels.
+    """
+    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    levels = max(0, ceil(log2(sides.max() / _LARGE)))
+    corners = corners.astype(np.float64)
+    halves = halved(gray, levels)
+    for level in range(levels, 0, -1):
+        which = np.flatnonzero(sides > _LARGE * 2 ** (level - 1))
+        fit = fit_sides(halves[level], (corners[which] + 0.5) / 2**level - 0.5, cells)
+        good = fit.share >= _MINIMUM_SHARE
+        corners[which[good]] = (fit.corners[good] + 0.5) * 2**level - 0.5
+    return corners
 
 
 def _markers(
