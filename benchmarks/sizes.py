@@ -79,16 +79,17 @@ def markdown(report: dict[str, Any]) -> str:
     """Return the report as a table."""
     facts = report['machine']
     radii = sorted({float(radius) for row in report['rows'] for radius in row['errors']})
+    columns = [f'{radius:g}' for radius in radii]
     kind = 'Test' if report['test'] else 'Development'
     lines = [
         f'{kind} seed: {report["seed"]}. {facts["processor"]}, {facts["cores"]} cores, Python '
         f'{facts["python"]}, numpy {facts["numpy"]}, OpenCV {facts["opencv"]}.',
         '',
-        f'| family, px | light | MP | {" | ".join(f"{it:g}" for it in radii)} | wrong | false | s |',
-        '|---' * (len(radii) + 6) + '|',
+        f'| family, px | light | MP | {" | ".join(columns)} | wrong | false | s |',
+        '|---' * (len(columns) + 6) + '|',
     ]
     for row in report['rows']:
-        cells = [_cell(row['errors'], f'{radius:g}') for radius in radii]
+        cells = [_cell(row['errors'], radius) for radius in columns]
         ends = (row['wrong'], row['false_positives'], f'{row["seconds"]:.1f}')
         start = (row['family'], row['light'], f'{row["megapixels"]:.0f}')
         lines.append(f'| {" | ".join(map(str, (*start, *cells, *ends)))} |')
