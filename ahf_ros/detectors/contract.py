@@ -1,10 +1,11 @@
-"""What a detector is, and the settings that detectors share."""
+"""What a detector is, and what detectors share: settings, and the head of those of one family."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from dataclasses import dataclass, field
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -213,3 +214,40 @@ class DetectorSettings:
     def polarities(self) -> tuple[int, ...]:
         """1 where dots may be dark, -1 where they may be bright."""
         return {'auto': (1, -1), 'dark': (1,), 'bright': (-1,)}[self.polarity]
+
+
+@dataclass(frozen=True, slots=True)
+class FamilyDetector(ABC):
+    """A detector of one family of targets.
+
+    Attributes
+    ----------
+    settings : DetectorSettings
+
+    Raises
+    ------
+    ValueError
+        If the family, or the data file that describes it, is not accepted.
+    """
+
+    settings: DetectorSettings = field(default_factory=DetectorSettings)
+
+    def __post_init__(self) -> None:
+        """Refuse what is not accepted before the first image comes."""
+        _ = self.design
+
+    @property
+    def family(self) -> str:
+        """Family of the targets."""
+        return self.settings.family
+
+    @property
+    @abstractmethod
+    def design(self) -> Any:
+        """Printed design of the family.
+
+        Raises
+        ------
+        ValueError
+            If it is not accepted.
+        """

@@ -7,13 +7,13 @@ projective frame, in which the evidence for a dot at each place of the ring give
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
 from ahf_ros.codes.dots import DotFamily, dot_family
-from ahf_ros.detectors.contract import DetectorSettings
+from ahf_ros.detectors.contract import DetectorSettings, FamilyDetector
 from ahf_ros.detectors.dots.discs import small_discs, voted_discs, whole_discs
 from ahf_ros.detectors.dots.refinement import refined
 from ahf_ros.detectors.dots.resolving import best_of_each
@@ -25,7 +25,7 @@ from ahf_ros.target import DottedTarget, Target, sorted_targets
 
 
 @dataclass(frozen=True, slots=True)
-class DotsDetector:
+class DotsDetector(FamilyDetector):
     """Identify rings of dots.
 
     Attributes
@@ -39,21 +39,16 @@ class DotsDetector:
     """
 
     name: ClassVar[str] = 'dots'
-    settings: DetectorSettings = field(default_factory=DetectorSettings)
-
-    def __post_init__(self) -> None:
-        """Refuse a data file that is not accepted."""
-        dot_family(self.settings.family_file)
 
     @property
-    def family(self) -> str:
-        """Family of the codes."""
-        return self.settings.family
+    def design(self) -> DotFamily:
+        """Printed design of the family."""
+        return dot_family(self.settings.family_file)
 
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image; see `Detector`."""
         check_image(image)
-        code = dot_family(self.settings.family_file)
+        code = self.design
         pyramid = image_pyramid(as_gray(image), self.settings.max_radius)
         found = targets_of_octaves(pyramid, self.settings.radii, self._identify, self.refine)
         return sorted_targets(best_of_each(found, code.border_radius))
@@ -61,13 +56,13 @@ class DotsDetector:
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
         """Return targets with their places in an image; see `refined`."""
         check_image(image)
-        return refined(as_gray(image), targets, dot_family(self.settings.family_file))
+        return refined(as_gray(image), targets, self.design)
 
     def _identify(self, octave: Octave) -> list[DottedTarget]:
         """Return the targets of an octave, in its pixels."""
         low, high = octave.radii
         settings = replace(self.settings, min_radius=low, max_radius=high)
-        code = dot_family(settings.family_file)
+        code = self.design
         return report(find_rings(octave.pyramid, settings, code), settings, code)
 
 

@@ -14,14 +14,14 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import ClassVar
 
 import cv2
 import numpy as np
 
 from ahf_ros.codes.dots import DotFamily, dot_family
-from ahf_ros.detectors.contract import DetectorSettings
+from ahf_ros.detectors.contract import DetectorSettings, FamilyDetector
 from ahf_ros.detectors.dots.local_otsu import local_otsu
 from ahf_ros.detectors.dots.resolving import best_of_each
 from ahf_ros.detectors.dots.rings import FAMILY
@@ -42,7 +42,7 @@ _CONTOUR_ERROR = 0.5  # standard deviation of a point of a contour, px
 
 
 @dataclass(frozen=True, slots=True)
-class PublishedDotsDetector:
+class PublishedDotsDetector(FamilyDetector):
     """The detector `dots_published`; call it with an image.
 
     Attributes
@@ -56,16 +56,11 @@ class PublishedDotsDetector:
     """
 
     name: ClassVar[str] = 'dots_published'
-    settings: DetectorSettings = field(default_factory=DetectorSettings)
-
-    def __post_init__(self) -> None:
-        """Refuse a data file that is not accepted."""
-        dot_family(self.settings.family_file)
 
     @property
-    def family(self) -> str:
-        """Family of the codes."""
-        return self.settings.family
+    def design(self) -> DotFamily:
+        """Printed design of the family."""
+        return dot_family(self.settings.family_file)
 
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image; see `Detector`.
@@ -74,7 +69,7 @@ class PublishedDotsDetector:
         the smallest and the largest radius, of at most 60 px.
         """
         check_image(image)
-        settings, code = self.settings, dot_family(self.settings.family_file)
+        settings, code = self.settings, self.design
         gray = stretched_to_8_bit(image)
         smallest, largest = settings.radii
         usual = np.sqrt(smallest * max(smallest, min(largest, _LARGEST)))

@@ -10,7 +10,7 @@ target.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import cv2
@@ -18,7 +18,7 @@ import numpy as np
 
 from ahf_ros.codes.gsi import PointFamily
 from ahf_ros.codes.gsi_library import point_family
-from ahf_ros.detectors.contract import DetectorSettings
+from ahf_ros.detectors.contract import DetectorSettings, FamilyDetector
 from ahf_ros.detectors.gsi.confidence import confidence_features
 from ahf_ros.detectors.gsi.evidence import find_evidence
 from ahf_ros.detectors.gsi.grouping import find_templates
@@ -49,7 +49,7 @@ _FARTHEST = 1.0  # that the reference point is moved by a refinement, px, or dot
 
 
 @dataclass(frozen=True, slots=True)
-class GsiDetector:
+class GsiDetector(FamilyDetector):
     """Identify point-distributed targets: GSI's, or those that a data file describes.
 
     Attributes
@@ -63,16 +63,11 @@ class GsiDetector:
     """
 
     name: ClassVar[str] = 'gsi'
-    settings: DetectorSettings = field(default_factory=DetectorSettings)
-
-    def __post_init__(self) -> None:
-        """Refuse a data file that is not accepted."""
-        point_family(self.settings.family_file)
 
     @property
-    def family(self) -> str:
-        """Family of the codes."""
-        return self.settings.family
+    def design(self) -> PointFamily:
+        """Printed design of the family."""
+        return point_family(self.settings.family_file)
 
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image; see `Detector`."""
@@ -90,7 +85,7 @@ class GsiDetector:
         """Return the targets of an octave, in its pixels."""
         low, high = octave.radii
         settings = replace(self.settings, min_radius=low, max_radius=high)
-        code = point_family(settings.family_file)
+        code = self.design
         hypotheses, dots = find_hypotheses(octave.pyramid, settings, code)
         targets = report(hypotheses, code)
         if settings.report_undecoded:
@@ -104,7 +99,7 @@ class GsiDetector:
         should be, stay as they are.
         """
         check_image(image)
-        code = point_family(self.settings.family_file)
+        code = self.design
         dotted = [it for it in targets if isinstance(it, DottedTarget) and it.id != UNDECODED]
         if not dotted:
             return list(targets)

@@ -20,7 +20,7 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import ClassVar
 
 import cv2
@@ -28,7 +28,7 @@ import numpy as np
 
 from ahf_ros.codes.gsi import PointFamily
 from ahf_ros.codes.gsi_library import point_family
-from ahf_ros.detectors.contract import DetectorSettings
+from ahf_ros.detectors.contract import FamilyDetector
 from ahf_ros.detectors.gsi.published_decoding import LARGEST_BIAS, Decoded, check_family, decode
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, DottedTarget, Target, sorted_targets
@@ -43,7 +43,7 @@ _CONTOUR_ERROR = 0.2  # standard deviation of the centre of an ellipse, px
 
 
 @dataclass(frozen=True, slots=True)
-class PublishedGsiDetector:
+class PublishedGsiDetector(FamilyDetector):
     """The detector `gsi_published`; call it with an image.
 
     Attributes
@@ -58,16 +58,13 @@ class PublishedGsiDetector:
     """
 
     name: ClassVar[str] = 'gsi_published'
-    settings: DetectorSettings = field(default_factory=DetectorSettings)
-
-    def __post_init__(self) -> None:
-        """Refuse families that the method cannot identify."""
-        check_family(point_family(self.settings.family_file))
 
     @property
-    def family(self) -> str:
-        """Family of the codes."""
-        return self.settings.family
+    def design(self) -> PointFamily:
+        """Printed design of the family, of those that the method can identify."""
+        family = point_family(self.settings.family_file)
+        check_family(family)
+        return family
 
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image; see `Detector`.
@@ -76,7 +73,7 @@ class PublishedGsiDetector:
         not reported.
         """
         check_image(image)
-        settings, code = self.settings, point_family(self.settings.family_file)
+        settings, code = self.settings, self.design
         gray = as_gray(image)
         best: dict[int, Target] = {}
         single: list[Target] = []

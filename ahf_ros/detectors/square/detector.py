@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from ahf_ros.codes.square import dictionary
-from ahf_ros.detectors.contract import DetectorSettings
+from ahf_ros.detectors.contract import FamilyDetector
 from ahf_ros.detectors.square.sides import centres, fit_sides
 from ahf_ros.features.pyramid import halved
 from ahf_ros.imaging.image import as_gray, check_image
@@ -45,7 +45,7 @@ class SquareMarker(Target):
 
 
 @dataclass(frozen=True, slots=True)
-class SquareDetector:
+class SquareDetector(FamilyDetector):
     """Identify the markers of one family.
 
     Attributes
@@ -58,21 +58,15 @@ class SquareDetector:
         If it is not a family of square markers, or OpenCV does not have it.
     """
 
-    settings: DetectorSettings
-
-    def __post_init__(self) -> None:
-        """Refuse a family that is not there."""
-        dictionary(self.family)
+    @property
+    def design(self) -> cv2.aruco.Dictionary:
+        """Markers of the family."""
+        return dictionary(self.family)
 
     @property
     def name(self) -> str:
         """Name in the registry, aruco or apriltag."""
         return self.family.partition('_')[0]
-
-    @property
-    def family(self) -> str:
-        """Family of the markers."""
-        return self.settings.family
 
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the markers of one image; see `Detector`."""
@@ -83,9 +77,9 @@ class SquareDetector:
         check_image(image)
         gray = np.ascontiguousarray(as_gray(image).astype(np.uint8, copy=False))
         parameters = cv2.aruco.DetectorParameters()
-        smallest = 4 * _CELL * (dictionary(self.family).markerSize + _BORDER) / max(gray.shape)
+        smallest = 4 * _CELL * (self.design.markerSize + _BORDER) / max(gray.shape)
         parameters.minMarkerPerimeterRate = min(parameters.minMarkerPerimeterRate, smallest)
-        detector = cv2.aruco.ArucoDetector(dictionary(self.family), parameters)
+        detector = cv2.aruco.ArucoDetector(self.design, parameters)
         corners, numbers, _ = detector.detectMarkers(gray)
         if not corners:
             return []
@@ -121,7 +115,7 @@ class SquareDetector:
         if not markers:
             return list(targets)
         gray = as_gray(image).astype(np.float32, copy=False)
-        cells = dictionary(self.family).markerSize + _BORDER
+        cells = self.design.markerSize + _BORDER
         corners = _from_halves(gray, np.array([it.corners for it in markers]), cells)
         sides = fit_sides(gray, corners, cells)
         numbers = np.array([it.id for it in markers])
