@@ -14,6 +14,7 @@ from functools import reduce
 import cv2
 import numpy as np
 
+from ahf_ros.imaging.even_light import even_light
 from ahf_ros.imaging.image import brightest, check_image
 
 GAMMA = 2.2
@@ -76,7 +77,7 @@ class ImageStack:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the combinations, the most promising first; one where there is one image."""
-        return tuple(COMBINATIONS) if len(self.images) > 1 else (SINGLE,)
+        return COMBINATIONS if len(self.images) > 1 else (SINGLE,)
 
     def combined(self, name: str) -> np.ndarray:
         """Return a combination, of the size and the pixel type of the images.
@@ -97,14 +98,16 @@ class ImageStack:
             )
         if name == SINGLE:
             return self.images[0]
-        combine, first = COMBINATIONS[name], self.images[0]
+        first = self.images[0]
         scale = max(map(brightest, self.images)) if first.dtype != np.uint8 else 255.0
         result = np.empty_like(first, order='C')
+        if name == EVEN_LIGHT:
+            shares = (image.astype(np.float32) / np.float32(scale) for image in self.images)
+            _store(even_light(shares) * np.float32(scale), result)
+            return result
         for rows in _strips(first.shape[0]):
             strips = [image[rows].astype(np.float32) / np.float32(scale) for image in self.images]
-            values = combine(strips)
-            values *= np.float32(scale)
-            _store(values, result[rows])
+            _store(_POINTWISE[name](strips) * np.float32(scale), result[rows])
         return result
 
 
@@ -152,12 +155,18 @@ def _quotient(images: Sequence[np.ndarray]) -> np.ndarray:
 SINGLE = ''
 """Name of the combination of one image, which is the image."""
 
-COMBINATIONS: dict[str, Callable[[Sequence[np.ndarray]], np.ndarray]] = {
+EVEN_LIGHT = 'even_light'
+"""Name of the combination of `ahf_ros.imaging.even_light`."""
+
+_POINTWISE: dict[str, Callable[[Sequence[np.ndarray]], np.ndarray]] = {
     'largest': _largest,
     'mean_light': _mean_light,
     'mean_gray': _mean_gray,
     'quotient': _quotient,
 }
+
+COMBINATIONS: tuple[str, ...] = (EVEN_LIGHT, *_POINTWISE)
+"""Names of the combinations of several images, the most promising first."""
 
 
 def _strips(height: int) -> Iterator[slice]:

@@ -46,7 +46,7 @@ def test_every_stack_is_one_result_that_names_its_images(folder):
     assert [result['images'] for result in results] == [paths[:4], paths[4:]]
     assert [result['image'] for result in results] == [paths[0], paths[4]]
     assert [len(result['targets']) for result in results] == [4, 4]
-    assert {result['combination'] for result in results} == {'largest'}
+    assert {result['combination'] for result in results} == {'even_light'}
     assert [result['split'] for result in results] == ['', '']
     judged = ahf('evaluate', folder / 'truth.csv', '-', '--json', stdin=done.stdout)
     total = json.loads(judged.stdout.splitlines()[-1])

@@ -11,7 +11,7 @@ from ahf_ros.filtering.settings import AdaptiveSettings
 from ahf_ros.imaging.stack import COMBINATIONS, ImageStack
 from ahf_ros.target import Target
 
-NAMES = tuple(COMBINATIONS)
+NAMES = COMBINATIONS
 GENERATOR = np.random.default_rng(3)
 IMAGES = tuple(GENERATOR.integers(20, 200, (40, 40)).astype(np.uint8) for _ in range(3))
 STACK = ImageStack(IMAGES)

@@ -46,7 +46,7 @@ def test_the_quotient_shows_what_shines_in_one_of_the_lights():
 @pytest.mark.parametrize(
     ('kind', 'white'), [(np.uint16, 4095), (np.float32, 3.0), (np.float64, 7e5)]
 )
-@pytest.mark.parametrize('name', ['largest', 'mean_light', 'mean_gray'])
+@pytest.mark.parametrize('name', ['even_light', 'largest', 'mean_light', 'mean_gray'])
 def test_combinations_have_the_pixels_of_the_images(kind, white, name):
     images = tuple((lit(phase) / 255 * white).astype(kind) for phase in (0, 1))
     combined = ImageStack(images).combined(name)
@@ -102,5 +102,5 @@ def test_images_that_do_not_fit_are_named(images, message):
 
 
 def test_an_unknown_combination_is_refused():
-    with pytest.raises(ValueError, match="combination is 'sum', accepted is one of largest"):
+    with pytest.raises(ValueError, match="combination is 'sum', accepted is one of even_light"):
         both().combined('sum')
