@@ -60,10 +60,14 @@ def even_light(images: Iterable[np.ndarray]) -> np.ndarray:
         table, places[1], places[0], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
     )
     low, high = _ALIKE
-    alike = np.clip((ratios[0] - np.float32(low)) / np.float32(high - low), 0, 1)
-    result = cv2.exp(logarithm - alike * (excess - np.float32(full))) - np.float32(_FLOOR)
-    highest = float(np.percentile(result[::5, ::5], _BRIGHTEST))
-    return np.clip(result / np.float32(max(highest, 1.0)), 0, 1)
+    alike = (ratios[0] - np.float32(low)) / np.float32(high - low)
+    np.clip(alike, 0, 1, out=alike)
+    excess -= np.float32(full)
+    excess *= alike
+    result: np.ndarray = cv2.exp(cv2.subtract(logarithm, excess, logarithm), logarithm)
+    result -= np.float32(_FLOOR)
+    result /= np.float32(max(float(np.percentile(result[::5, ::5], _BRIGHTEST)), 1.0))
+    return np.clip(result, 0, 1, out=result)
 
 
 def _ranked(images: Iterable[np.ndarray]) -> tuple[np.ndarray, list[np.ndarray]]:
@@ -72,12 +76,16 @@ def _ranked(images: Iterable[np.ndarray]) -> tuple[np.ndarray, list[np.ndarray]]
     ranked: list[np.ndarray] = []
     for image in images:
         if largest is None:
-            largest = np.zeros_like(image)
-            ranked = [np.full_like(image, _FLOOR) for _ in range(_RANKS)]
-        largest = np.maximum(largest, image)
-        rest = cv2.GaussianBlur(image, (0, 0), _BLUR) + np.float32(_FLOOR)
-        for rank, brighter in enumerate(ranked):
-            ranked[rank], rest = np.maximum(brighter, rest), np.minimum(brighter, rest)
+            largest = np.zeros(image.shape, np.float32)
+            ranked = [np.full(image.shape, _FLOOR, np.float32) for _ in range(_RANKS)]
+            lower = np.empty(image.shape, np.float32)
+        cv2.max(largest, image, largest)
+        rest = cv2.GaussianBlur(image, (0, 0), _BLUR)
+        rest += np.float32(_FLOOR)
+        for brighter in ranked:
+            cv2.min(brighter, rest, lower)
+            cv2.max(brighter, rest, brighter)
+            rest, lower = lower, rest
     assert largest is not None
     return largest, ranked
 
