@@ -25,7 +25,7 @@ _STEPS = 8  # of the robust fit
 _DIRECTIONS = 12  # of normals, each of which counts as much: light has few, prints have many
 _STRIPED = 2.5  # ratio of edges in a direction to the median of all directions
 _ENOUGH = 300  # edges of other directions
-_UNEVEN = 0.05  # px, systematic error where no edge of the first image coincides
+_UNEVEN = 0.1  # px, systematic error where no edge of the first image coincides
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,8 +73,8 @@ def measured(normals: np.ndarray, found: np.ndarray) -> Displacement | None:
 def direction_weights(normals: np.ndarray) -> np.ndarray:
     """Return weights of edges, 1 on average, with which all directions count alike.
 
-    Directions with many times more edges than others are those of stripes of light, and are left
-    out where enough remain.
+    Directions with many times more edges than others are those of stripes of light. They and their
+    neighbours are left out where enough edges remain.
 
     Parameters
     ----------
@@ -87,6 +87,7 @@ def direction_weights(normals: np.ndarray) -> np.ndarray:
     least = len(normals) / (4 * _DIRECTIONS)
     weights: np.ndarray = 1 / np.maximum(counts, least)[classes]
     striped = counts > _STRIPED * np.median(counts)
+    striped |= np.roll(striped, 1) | np.roll(striped, -1)
     if counts[~striped].sum() >= _ENOUGH:
         weights[striped[classes]] = 0.0
     return weights / weights.mean()

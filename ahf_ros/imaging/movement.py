@@ -27,7 +27,7 @@ from ahf_ros.imaging.image import as_gray
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
 REACH = 16
-"""Maximum displacement that is looked for, px."""
+"""Maximum displacement that is looked for, px of an image and of smaller ones of it."""
 
 MINIMUM_SHIFT = 0.05
 """Smaller displacements of a scene do not count, px: uneven light moves edges by as much."""
@@ -42,6 +42,9 @@ _FLAT, _FLAT_SIZE = 10, 0.459  # percentile of gradients that are noise, and its
 _MAXIMUM_EDGES = 20_000  # evenly distributed ones are enough
 _SIMILAR = 1.5  # ratio of two steps that may be the same edge
 _FAR_EDGES = 4000  # are enough to look for a displacement of whole pixels
+_COARSE = 4  # times smaller image, in which larger displacements are looked for
+_SMALLEST = 100  # px, side of such an image
+_SHORT = 2.0  # px in it, a displacement that the whole image would show
 _APART = 3.0  # px, between two peaks
 _TILES = 4  # along each side, that are looked at one by one
 
@@ -62,6 +65,8 @@ class Edges:
         Exact places along the normals, px.
     shape : tuple of int
         Height and width of the image, px.
+    coarse : Edges or None
+        Those of the image at a quarter of its size; None where that is too small.
     """
 
     x: np.ndarray
@@ -70,6 +75,7 @@ class Edges:
     steps: np.ndarray
     places: np.ndarray
     shape: tuple[int, int]
+    coarse: Edges | None = None
 
 
 def find_edges(image: np.ndarray) -> Edges:
@@ -97,7 +103,9 @@ def find_edges(image: np.ndarray) -> Edges:
     places, steps = _vertex(*profiles.T)
     good = np.abs(places) < 1
     x, y, normals, steps, places = (of[good] for of in (x, y, normals, steps, places))
-    return Edges(x.astype(np.float32), y.astype(np.float32), normals, steps, places, size.shape)
+    coarse = find_edges(_reduced(image)) if min(size.shape) >= _COARSE * _SMALLEST else None
+    at = x.astype(np.float32), y.astype(np.float32)
+    return Edges(*at, normals, steps, places, size.shape, coarse)
 
 
 def displacement(edges: Edges, image: np.ndarray) -> Displacement | None:
@@ -116,7 +124,7 @@ def displacement(edges: Edges, image: np.ndarray) -> Displacement | None:
     found = _partners(edges, gradients, np.zeros(2))
     whole = measured(edges.normals, found)
     if whole is None:
-        return _far(edges, gradients)
+        return _far(edges, gradients) or _coarse(edges, image)
     if whole.exceeds(MINIMUM_SHIFT):
         return whole
     height, width = edges.shape
@@ -126,6 +134,20 @@ def displacement(edges: Edges, image: np.ndarray) -> Displacement | None:
         if part and part.exceeds(MINIMUM_PART_SHIFT):
             return part
     return None
+
+
+def _coarse(edges: Edges, image: np.ndarray) -> Displacement | None:
+    """Return a displacement that is found at a quarter of the size, None if it is short."""
+    found = displacement(edges.coarse, _reduced(image)) if edges.coarse else None
+    if found is None or not found.exceeds(_SHORT):
+        return None
+    return Displacement(_COARSE * found.x, _COARSE * found.y, _COARSE * found.deviation)
+
+
+def _reduced(image: np.ndarray) -> np.ndarray:
+    height, width = image.shape
+    size = width // _COARSE, height // _COARSE
+    return cv2.resize(as_gray(image), size, interpolation=cv2.INTER_AREA)
 
 
 def _gradients(image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -55,6 +55,21 @@ def test_an_object_that_moves_alone_is_noticed():
     assert abs(moved.x - 0.9) < 0.2
 
 
+def test_large_displacements_are_found_in_a_smaller_image():
+    first, second, _ = images('normal', 0.3)
+    moved = displacement(find_edges(first), shifted(second, 42.0, -25.0))
+    assert moved is not None
+    assert np.hypot(moved.x - 42, moved.y + 25) < 2
+
+
+def test_fine_stripes_that_move_by_half_their_period_are_no_movement():
+    scene = SceneSettings(
+        width=800, height=600, targets=16, dot_radius=6, light='fine_stripe', phases=4, seed=5
+    )
+    first, second = (render(scene, phase).image for phase in (0, 2))
+    assert displacement(find_edges(first), second) is None
+
+
 @pytest.mark.parametrize('size', [(16, 16), (40, 60)])
 def test_images_without_edges_do_not_move(size):
     flat = np.full(size, 90, np.uint8)
