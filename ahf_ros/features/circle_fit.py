@@ -15,9 +15,10 @@ import numpy as np
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.circles import Circles, dot_circles
+from ahf_ros.features.edge_covariance import common_errors, edge_covariance
 from ahf_ros.features.edge_weights import weigh_edges
 from ahf_ros.features.light_slope import LightSlope, common_slope, smooth_slopes
-from ahf_ros.features.profiles import BLURS, CORRELATION, USUAL_BLUR, Edges, measure_edges
+from ahf_ros.features.profiles import BLURS, USUAL_BLUR, Edges, measure_edges
 from ahf_ros.features.robust import geman_mcclure, geman_mcclure_gain, median, reweight, spread
 
 _NOISE = 1.0  # of gray values, of 255; the fit scales it to what it finds
@@ -36,8 +37,8 @@ _PRIOR_SCALE = 0.003  # standard deviation of the printed proportions of circles
 _PRIOR_PERSPECTIVE = 0.02  # of the projective part, in 1 a dot radius
 _PRIOR_SHIFT = 1.0  # of the shift of edges towards the dark side, px
 _WEAK_PRIOR = 1e-6  # of the other changes, so that they can always be solved for
-_NEIGHBOURS = 10  # of an edge whose errors may be like its own, to either side
 _SYSTEMATIC = 0.001  # standard deviation of what pixels and interpolation do to a centre, px
+_ROUNDED, _ROUNDED_FROM = 0.0055, 1.0  # the same, in the cube of blur beyond this one, px
 _NO_WEIGHT = 1e-9  # instead of a sum of no weights
 
 
@@ -147,7 +148,8 @@ def fit_circles(
         frames = frame.moved(frames, changes[:, : 7 if projective else 5])
     affine = frame.local_affine(frames)
     covariance = affine @ fit.covariance @ affine.transpose(0, 2, 1)
-    covariance += _SYSTEMATIC**2 * np.eye(2)
+    rounded = _ROUNDED * np.maximum(fit.blur**2 - _ROUNDED_FROM**2, 0) ** 1.5
+    covariance += (_SYSTEMATIC**2 + rounded**2)[:, None, None] * np.eye(2)
     return replace(fit, frames=frames, covariance=covariance)
 
 
@@ -187,7 +189,8 @@ def _solve(
     parts = influence * errors[:, None]
     parts -= light.influence(influence * (edges.sensitivity / edges.scale)[:, None])
     used = geman_mcclure(own.weights, relative)
-    covariance = _covariance(parts, used, edges.spacing, normal.shape[1])
+    common = common_errors(used * errors * edges.scale, circles.radii)
+    covariance = edge_covariance(parts, used, edges.spacing, normal.shape[1], common)
     # Where slopes differ that much from their neighbours, light is no slope within a profile.
     total = np.maximum(used.sum(axis=1), _NO_WEIGHT)
     uneven = (used * light.errors**2).sum(axis=1) / total
@@ -217,24 +220,6 @@ def _window(circles: Circles) -> np.ndarray:
     squares[circles.radii[:, None] != circles.radii] = np.inf
     window = np.exp(-0.5 * squares / _LIGHT_REACH**2)
     return window / window.sum(axis=0)
-
-
-def _covariance(
-    parts: np.ndarray, weights: np.ndarray, spacing: np.ndarray, unknowns: int
-) -> np.ndarray:
-    """Return the covariance of centres, dot radii^2, from what each edge's error does to them.
-
-    Neighbours closer than `CORRELATION` share pixels, so that their errors are alike. Their
-    products are not taken as they are: a fit leaves little of what they have in common.
-    """
-    distance = np.maximum(spacing / CORRELATION, 1 / _NEIGHBOURS)
-    alike = np.ones_like(distance)
-    for steps in range(1, _NEIGHBOURS):
-        alike += 2 * np.maximum(1 - steps * distance, 0)
-    squares = (weights**2 * alike).sum(axis=1)
-    count = weights.sum(axis=1) ** 2 / np.maximum(squares, _NO_WEIGHT)
-    free = count / np.maximum(count - unknowns, 1)
-    return free[:, None, None] * ((parts * alike[:, None]) @ parts.transpose(0, 2, 1))
 
 
 class _Model:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ahf_ros.features.edge_covariance import common_errors
 from ahf_ros.features.edge_weights import weigh_edges
 from ahf_ros.features.light_slope import common_slope, smooth_slopes
 from ahf_ros.features.profiles import (
@@ -37,6 +38,9 @@ _LIGHT_REACH = 1.5  # standard deviation of the window that smooths the light, p
 _LIGHT_PRIOR = 1.0  # weight of the prior, a slope of zero, in profiles
 _WEAK_PRIOR = 1e-3  # of the position of a side, in gray values^2 / px^2
 _DIFFERENCE = 1e-3  # step of numerical derivatives, px
+_FEWEST = 3.0  # independent edges of a side, two of which its line takes
+_NO_WEIGHT = 1e-9  # instead of a sum of no weights
+_THROUGH = 0.25  # of what cells behind the border do to a centre, px, by (blur / cell)^2
 _SYSTEMATIC = 0.003  # standard deviation of the effects of lens distortion and pixels, px
 
 
@@ -113,6 +117,9 @@ def fit_sides(gray: np.ndarray, corners: np.ndarray, cells: int) -> Sides:
         near = np.linalg.norm(met - starts, axis=2).max(axis=1) < 2 * _REACH
         corners = np.where(near[:, None, None], met, starts)
         share = np.where(near, lines.share.min(axis=1), 0.0)
+        cell = np.linalg.norm(ends - starts, axis=2).mean(axis=1) / cells
+        through = _THROUGH * (blur / np.maximum(cell, 1.0)) ** 2
+        covariance += (through**2)[:, None, None] * np.eye(2)
     return Sides(corners, share, covariance)
 
 
@@ -188,11 +195,16 @@ def _fit_lines(
         return _OUTLIER * usual.reshape(*errors.shape[:2], 1)
 
     (unknowns, inverse), _, robust = reweight(solve, weights, scale, _ROUNDS)
-    errors = np.abs(offsets - unknowns @ basis.T)
-    share = (seen & (errors < _PLACED)).mean(axis=2)
+    errors = offsets - unknowns @ basis.T
+    share = (seen & (np.abs(errors) < _PLACED)).mean(axis=2)
     influence = (robust[..., None] * basis) @ inverse
     together = np.maximum(CORRELATION / spacing, 1.0)
-    parts = influence * (errors * np.sqrt(together))[..., None]
+    squares = np.maximum((robust**2 * together).sum(axis=2), _NO_WEIGHT)
+    count = np.maximum(robust.sum(axis=2) ** 2 / squares, _FEWEST)
+    common = common_errors((robust * errors).reshape(flat), np.zeros(len(along)))
+    shared = np.maximum(common.reshape(*count.shape) / together.mean(axis=2), 1.0)
+    growth = together * (shared * count / (count - 2))[..., None]
+    parts = influence * (errors * np.sqrt(growth))[..., None]
     return _Lines(unknowns, np.swapaxes(parts, 2, 3) @ parts, share)
 
 
