@@ -65,6 +65,8 @@ class Edges:
         Exact places along the normals, px.
     shape : tuple of int
         Height and width of the image, px.
+    gradients : tuple of ndarray of float32, shape (height, width)
+        Of the logarithm of the image, along x and y, 1 / px.
     coarse : Edges or None
         Those of the image at a quarter of its size; None where that is too small.
     """
@@ -75,6 +77,7 @@ class Edges:
     steps: np.ndarray
     places: np.ndarray
     shape: tuple[int, int]
+    gradients: tuple[np.ndarray, np.ndarray]
     coarse: Edges | None = None
 
 
@@ -105,7 +108,7 @@ def find_edges(image: np.ndarray) -> Edges:
     x, y, normals, steps, places = (of[good] for of in (x, y, normals, steps, places))
     coarse = find_edges(_reduced(image)) if min(size.shape) >= _COARSE * _SMALLEST else None
     at = x.astype(np.float32), y.astype(np.float32)
-    return Edges(*at, normals, steps, places, size.shape, coarse)
+    return Edges(*at, normals, steps, places, size.shape, gradients, coarse)
 
 
 def displacement(edges: Edges, image: np.ndarray) -> Displacement | None:
@@ -211,25 +214,42 @@ def _alike(steps: np.ndarray, others: np.ndarray) -> np.ndarray:
     return (steps > others / _SIMILAR) & (steps < others * _SIMILAR)
 
 
-def _far(edges: Edges, gradients: tuple[np.ndarray, np.ndarray]) -> Displacement | None:
-    """Return a displacement of more than a pixel, None unless just one stands out.
+def _repeats(edges: Edges) -> bool:
+    """Return whether the first image is like itself at a displacement."""
+    counts, side = _counts(edges, edges.gradients, 2 * REACH)
+    apart = np.hypot(side[:, None], side) >= _APART
+    return bool(counts.max() < PEAK * counts[apart].max())
 
-    A pattern of light that moved is like itself at several displacements.
-    """
+
+def _counts(
+    edges: Edges, gradients: tuple[np.ndarray, np.ndarray], reach: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return how many edges are seen again at each displacement, (y, x), and the displacements."""
     every = slice(None, None, -(-len(edges.x) // _FAR_EDGES))
     x, y = (of[every].astype(int) for of in (edges.x, edges.y))
     normals, steps = edges.normals[every], edges.steps[every]
     weights = direction_weights(normals)
-    side = np.arange(-REACH, REACH + 1)
+    height, width = edges.shape
+    side = np.arange(-reach, reach + 1)
     counts = np.zeros((len(side), len(side)))
     for row, down in enumerate(side):
+        rows = np.clip(y + down, 0, height - 1)
         for column, right in enumerate(side):
-            at = y + down, x + right
+            at = rows, np.clip(x + right, 0, width - 1)
             along = gradients[0][at] * normals[:, 0] + gradients[1][at] * normals[:, 1]
             counts[row, column] = weights @ _alike(along, steps)
+    return counts, side
+
+
+def _far(edges: Edges, gradients: tuple[np.ndarray, np.ndarray]) -> Displacement | None:
+    """Return a displacement of more than a pixel, None unless just one stands out.
+
+    A pattern of light that moved is like itself at several displacements, and so is the image.
+    """
+    counts, side = _counts(edges, gradients, REACH)
     row, column = divmod(int(counts.argmax()), len(side))
     apart = np.hypot(side[:, None] - side[row], side - side[column]) >= _APART
-    if counts.max() < max(PEAK * counts[apart].max(), MINIMUM_EDGES):
+    if counts.max() < max(PEAK * counts[apart].max(), MINIMUM_EDGES) or _repeats(edges):
         return None
     shift = np.array((side[column], side[row]))
     rest = measured(edges.normals, _partners(edges, gradients, shift))

@@ -70,6 +70,21 @@ def test_fine_stripes_that_move_by_half_their_period_are_no_movement():
     assert displacement(find_edges(first), second) is None
 
 
+def test_a_lattice_that_moves_in_the_dark_is_no_movement():
+    scene = SceneSettings(
+        width=800,
+        height=600,
+        targets=12,
+        dot_radius=6,
+        light='lattice',
+        ambient=0.02,
+        phases=8,
+        seed=11,
+    )
+    first, second = (render(scene, phase).image for phase in (0, 1))
+    assert displacement(find_edges(first), second) is None
+
+
 @pytest.mark.parametrize('size', [(16, 16), (40, 60)])
 def test_images_without_edges_do_not_move(size):
     flat = np.full(size, 90, np.uint8)
