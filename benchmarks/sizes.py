@@ -12,7 +12,6 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -50,9 +49,7 @@ def measure(families: Sequence[str], lights: Sequence[str], seed: int) -> Iterat
         shown = collage(
             RADII[family], family, light=light, ambient=LIGHTS[light], tilt=tilt, seed=seed
         )
-        started = time.perf_counter()
         found = create_detector(family=family)(shown.image)
-        duration = time.perf_counter() - started
         figures = score(shown.truth, found)
         errors = {
             verdict.target.id: math.dist(
@@ -71,7 +68,6 @@ def measure(families: Sequence[str], lights: Sequence[str], seed: int) -> Iterat
             },
             'wrong': figures.wrong,
             'false_positives': figures.false_positives,
-            'seconds': duration,
         }
 
 
@@ -85,12 +81,12 @@ def markdown(report: dict[str, Any]) -> str:
         f'{kind} seed: {report["seed"]}. {facts["processor"]}, {facts["cores"]} cores, Python '
         f'{facts["python"]}, numpy {facts["numpy"]}, OpenCV {facts["opencv"]}.',
         '',
-        f'| family, px | light | MP | {" | ".join(columns)} | wrong | false | s |',
-        '|---' * (len(columns) + 6) + '|',
+        f'| family, px | light | MP | {" | ".join(columns)} | wrong | false |',
+        '|---' * (len(columns) + 5) + '|',
     ]
     for row in report['rows']:
         cells = [_cell(row['errors'], radius) for radius in columns]
-        ends = (row['wrong'], row['false_positives'], f'{row["seconds"]:.1f}')
+        ends = (row['wrong'], row['false_positives'])
         start = (row['family'], row['light'], f'{row["megapixels"]:.0f}')
         lines.append(f'| {" | ".join(map(str, (*start, *cells, *ends)))} |')
     return '\n'.join(lines)

@@ -120,7 +120,7 @@ def read_image(
     """
     families = [family(name) for name in settings.families]
     pyramid = image_pyramid(gray, settings.max_radius)
-    images = (gray, *pyramid.halves)
+    images = (pyramid.gray, *pyramid.halves)
     found: list[Hypotheses] = []
     for octave in octaves(pyramid, *settings.radii):
         for search in (_whole,) if whole_only else (_whole, _voted, _oblique):
