@@ -32,6 +32,10 @@ _BLUNTER = 0.8  # than usual, from which a certain word is contested by other fa
 _SHARPER = 0.2  # than the word of another family, to be the word of a dot
 _UNEXPLAINED = np.log1p(3.5)  # evidence for arcs of any length, that may be other words
 _LIKELY = 0.2  # probability of a target, for a dot to be read as other families, too
+_GLANCE = 3  # angles a sector at which many dots are looked at
+_PROBABLE = 0.5  # the same, of dots that tell how sharp targets are
+_UNLIKELY = 1e-8  # the same, below which one of many dots is not read
+_SHARP, _SOFT = 1.1, 1.6  # blur up to which a dot is sharp, and blur of those that are not, px
 
 
 def by_clear_dots(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> list[Family]:
@@ -104,12 +108,14 @@ def read_families(
         At least one of each dot.
     """
     first, *others = families
+    worth = _worth_reading(gray, dots, first)
+    unread, dots = Hypotheses.unread(dots.select(~worth), first), dots.select(worth)
     found = _against_other_words(gray, dots, _read(gray, dots, first, expected), families)
     if not others:
-        return found
+        return Hypotheses.joined([found, unread])
     dots = dots.select(~_settled(dots, found))
     likely = {code.band: likely_targets(gray, dots, code) for code in designs(others)}
-    parts = [found]
+    parts = [found, unread]
     for code in others:
         of_print = likely[code.band]
         best_first = np.argsort(-of_print, kind='stable')[: (of_print >= _LIKELY).sum()]
@@ -122,6 +128,25 @@ def read_families(
             if not read.certain.any():
                 break
     return _contested(Hypotheses.joined(parts))
+
+
+def _worth_reading(gray: np.ndarray, dots: Fit, code: Family) -> np.ndarray:
+    """Return which dots may be middles of targets of a print, shape (k,).
+
+    Most of the many dots of a lattice are not; to see that takes far less time than to read them.
+    """
+    if len(dots.frames) <= PART:
+        return np.ones(len(dots.frames), bool)
+    sharp = dots.blur <= _SHARP
+    probability = likely_targets(gray, dots.select(sharp), code, per_sector=_GLANCE)
+    worth = np.ones(len(sharp), bool)
+    worth[sharp] = probability >= _UNLIKELY
+    likely = probability >= _PROBABLE
+    if likely.sum() >= _MANY:
+        # Targets are sharp in this image, so that soft dots are spots of light, or out of focus.
+        soft = likely_targets(gray, dots.select(~sharp), code, _SOFT, per_sector=_GLANCE)
+        worth[~sharp] = soft >= _UNLIKELY
+    return worth
 
 
 def _against_other_words(

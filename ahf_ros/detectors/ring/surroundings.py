@@ -29,7 +29,7 @@ from ahf_ros.features.sampling import sample_circles
 MARKED = 7
 """Index of the feature that is the share of angles with a mark."""
 
-_SAMPLES = 5  # angles a sector
+_SAMPLES = 5  # angles a sector, unless fewer are enough
 _MARGIN = 0.45  # distance from the band at which its margin is read, dot radii
 _FAINTEST = 0.9  # gray value of dark over bright
 _MINIMUM_CONTRAST = 0.05
@@ -49,7 +49,13 @@ def designs(families: Sequence[Family]) -> list[Family]:
     return list(first.values())
 
 
-def likely_targets(gray: np.ndarray, dots: Hypotheses | Fit, code: Family) -> np.ndarray:
+def likely_targets(
+    gray: np.ndarray,
+    dots: Hypotheses | Fit,
+    code: Family,
+    blur: float = USUAL_BLUR,
+    per_sector: int = _SAMPLES,
+) -> np.ndarray:
     """Return the probabilities that dots are the middles of targets of a print, shape (k,).
 
     Parameters
@@ -60,10 +66,15 @@ def likely_targets(gray: np.ndarray, dots: Hypotheses | Fit, code: Family) -> np
         k dots.
     code : Family
         Has the radii of the band.
+    blur : float
+        Of their edges, px; readings keep away from it.
+    per_sector : int
+        Angles a sector.
     """
     parts = [np.zeros(0)]
     for start in range(0, len(dots.frames), _PART):
-        features = target_features(gray, dots.select(slice(start, start + _PART)), code)
+        part = dots.select(slice(start, start + _PART))
+        features = target_features(gray, part, code, blur, per_sector)
         # The regression has not seen every kind of dot; a word has at least two marked sectors.
         banded = features[:, MARKED] * code.bits >= _MINIMUM_MARKED
         parts.append(np.where(banded, target_probability(features), 0.0))
@@ -104,7 +115,13 @@ def terms(features: np.ndarray, means: np.ndarray, deviations: np.ndarray) -> np
     return factors[:, first] * factors[:, second]
 
 
-def target_features(gray: np.ndarray, dots: Hypotheses | Fit, code: Family) -> np.ndarray:
+def target_features(
+    gray: np.ndarray,
+    dots: Hypotheses | Fit,
+    code: Family,
+    blur: float = USUAL_BLUR,
+    per_sector: int = _SAMPLES,
+) -> np.ndarray:
     """Return what tells middles of targets from other dots, whatever their words are.
 
     Parameters
@@ -114,6 +131,10 @@ def target_features(gray: np.ndarray, dots: Hypotheses | Fit, code: Family) -> n
     dots : Hypotheses or Fit
         k dots.
     code : Family
+    blur : float
+        Of their edges, px; readings keep away from it.
+    per_sector : int
+        Angles a sector.
 
     Returns
     -------
@@ -123,9 +144,9 @@ def target_features(gray: np.ndarray, dots: Hypotheses | Fit, code: Family) -> n
         marks; share of the angles at which both edges of the band are those of a mark, and at
         which they contradict each other; evidence that whole sectors are marked or are not.
     """
-    angles = 2 * np.pi * np.arange(code.bits * _SAMPLES) / (code.bits * _SAMPLES)
+    angles = 2 * np.pi * np.arange(code.bits * per_sector) / (code.bits * per_sector)
     major, minor, _ = frame.ellipse_axes(dots.frames)
-    samples = sample_bands(gray, dots.frames, USUAL_BLUR, angles, code)
+    samples = sample_bands(gray, dots.frames, blur, angles, code)
     margin = np.full_like(samples.beside, code.band_outer + _MARGIN)
     radii = np.concatenate([1 - samples.beside, 1 + samples.beside, margin], axis=1)
     values = sample_circles(gray, dots.frames, angles, radii)
@@ -159,7 +180,7 @@ def target_features(gray: np.ndarray, dots: Hypotheses | Fit, code: Family) -> n
             free(samples.outer_ground, margin),
             mean(lower > _CLEAR),
             mean((lower < -_CLEAR) & (higher > _CLEAR)),
-            _of_sectors(band) / seen,
+            _of_sectors(band, per_sector) / seen,
         ],
         axis=1,
     )
@@ -176,14 +197,14 @@ def _mark_appearance(inside: np.ndarray, outside: np.ndarray, step: np.ndarray) 
     return MarkAppearance(polarity, contrast, np.median(bright, axis=1), blur)
 
 
-def _of_sectors(evidence: np.ndarray) -> np.ndarray:
+def _of_sectors(evidence: np.ndarray, per_sector: int) -> np.ndarray:
     """Return the sum over sectors of the size of their evidence, at the phase where it is largest.
 
     Parameters
     ----------
-    evidence : ndarray of float, shape (k, sectors * _SAMPLES)
+    evidence : ndarray of float, shape (k, sectors * per_sector)
     """
-    phases = [np.roll(evidence, phase, axis=1) for phase in range(_SAMPLES)]
-    shape = (_SAMPLES, len(evidence), evidence.shape[1] // _SAMPLES, _SAMPLES)
+    phases = [np.roll(evidence, phase, axis=1) for phase in range(per_sector)]
+    shape = (per_sector, len(evidence), -1, per_sector)
     sectors = np.stack(phases).reshape(shape)
     return np.abs(sectors.sum(axis=3)).sum(axis=2).max(axis=0)
