@@ -24,7 +24,7 @@ _RING = 1.25  # px, distance from a peak at which it has fallen
 _STEPS = 8  # of the robust fit
 _DIRECTIONS = 12  # of normals, each of which counts as much: light has few, prints have many
 _STRIPED = 2.5  # ratio of edges in a direction to the median of all directions
-_ENOUGH = 300  # edges of other directions
+_ENOUGH = 120  # edges of other directions
 _UNEVEN = 0.1  # px, systematic error where no edge of the first image coincides
 
 

@@ -32,7 +32,7 @@ REACH = 16
 MINIMUM_SHIFT = 0.05
 """Smaller displacements of a scene do not count, px: uneven light moves edges by as much."""
 
-MINIMUM_PART_SHIFT = 0.5
+MINIMUM_PART_SHIFT = 0.7
 """Smaller displacements of a part of the scene do not count, px."""
 
 _BLUR = 1.0  # px, of the logarithm; edges become as wide in sharp images as in soft ones
