@@ -23,7 +23,7 @@ from ahf_ros.features.circle_fit import Fit
 
 _MINIMUM_DEVIATION = 0.001  # of edges, below which it says no more, dot radii
 _MANY_EDGES = 3.0  # the same, from which it has many edges
-_CLEAR_SUPPORT = np.log1p(25.0)  # of a word, if nothing but light lies on it
+_CLEAR_SUPPORT = np.log1p(12.0)  # of a word, if nothing but light lies on it
 _ARCS = 2.6  # ln(1 + unexplained), from which arcs of any length are likelier
 _MOSTLY_HIDDEN = 0.5  # root of the hidden share, from which little is left to be arcs
 _SMALL = 0.35  # difference of both that tells small dots, of which blur makes arcs
