@@ -73,6 +73,14 @@ def test_sizes_and_views(scene, limit):
     assert errors_of(figures)[-1] < limit
 
 
+@pytest.mark.parametrize(('radius', 'blur'), [(12.0, 3.0), (20.0, 3.0), (40.0, 4.0)])
+def test_targets_out_of_focus(radius, blur):
+    scene = replace(SMALL, width=1400, height=1000, targets=5, dot_radius=radius, blur=blur)
+    rendering = rendered(scene)
+    figures = scored(rendering, identified(rendering.image))
+    assert (figures.right, figures.wrong, figures.false_positives) == (5, 0, 0)
+
+
 @pytest.mark.parametrize('light', ['stripe', 'fine_stripe', 'lattice'])
 def test_oblique_views_under_stripes_and_lattices(light):
     view = SceneSettings(width=1000, height=600, targets=12, tilt=64.0, focal_length=3.0, seed=1)

@@ -26,6 +26,7 @@ from ahf_ros.detectors.ring.hypotheses import (
 from ahf_ros.detectors.ring.oblique import oblique_dots, rounding
 from ahf_ros.detectors.ring.refinement import refine_centres
 from ahf_ros.detectors.ring.same_prints import decoded, settle_same_prints
+from ahf_ros.detectors.ring.soft import soft_dots
 from ahf_ros.detectors.ring.target_circles import REACH
 from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import Fit, fit_dots
@@ -123,6 +124,7 @@ def read_image(
     images = (pyramid.gray, *pyramid.halves)
     found: list[Hypotheses] = []
     for octave in octaves(pyramid, *settings.radii):
+        parts: list[tuple[Fit, Hypotheses]] = []
         for search in (_whole,) if whole_only else (_whole, _voted, _oblique):
             dots = search(octave, settings.polarities, found)
             if not len(dots.frames):
@@ -131,7 +133,17 @@ def read_image(
             if not any(read.certain.any() for read in found):
                 families = by_clear_dots(octave.pyramid.gray, fits, families)
             read = read_families(octave.pyramid.gray, fits, families, expected)
+            parts.append((fits, read))
             found.append(at_full_size(images[: octave.level], read))
+        # What is out of focus is sharper in the next half.
+        for level in range(octave.level + 1, 0 if whole_only else len(images)):
+            soft = soft_dots(parts)
+            if not len(soft.frames):
+                break
+            half = images[level].astype(np.float32, copy=False)
+            fits = _fitted(half, soft)
+            parts = [(fits, read_families(half, fits, families, expected))]
+            found.append(at_full_size(images[:level], parts[0][1]))
     if not found:
         return Hypotheses.unread(_fitted(pyramid.gray, NO_DOTS), families[0])
     return Hypotheses.joined(found)
