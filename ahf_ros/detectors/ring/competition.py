@@ -19,6 +19,7 @@ from ahf_ros.detectors.ring.reading import PASSES, read_bands
 from ahf_ros.detectors.ring.surroundings import designs, likely_targets
 from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import Fit
+from ahf_ros.features.profiles import USUAL_BLUR
 
 PART = 256
 """Dots read at a time, which bounds the memory."""
@@ -108,7 +109,7 @@ def read_families(
         At least one of each dot.
     """
     first, *others = families
-    worth = _worth_reading(gray, dots, first)
+    worth = _worth_reading(gray, dots, families)
     unread, dots = Hypotheses.unread(dots.select(~worth), first), dots.select(worth)
     found = _against_other_words(gray, dots, _read(gray, dots, first, expected), families)
     if not others:
@@ -130,23 +131,29 @@ def read_families(
     return _contested(Hypotheses.joined(parts))
 
 
-def _worth_reading(gray: np.ndarray, dots: Fit, code: Family) -> np.ndarray:
-    """Return which dots may be middles of targets of a print, shape (k,).
+def _worth_reading(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> np.ndarray:
+    """Return which dots may be middles of targets, shape (k,).
 
     Most of the many dots of a lattice are not; to see that takes far less time than to read them.
     """
     if len(dots.frames) <= PART:
         return np.ones(len(dots.frames), bool)
     sharp = dots.blur <= _SHARP
-    probability = likely_targets(gray, dots.select(sharp), code, per_sector=_GLANCE)
+    of_prints = designs(families)
+    probability = _glanced(gray, dots.select(sharp), of_prints, USUAL_BLUR)
     worth = np.ones(len(sharp), bool)
     worth[sharp] = probability >= _UNLIKELY
-    likely = probability >= _PROBABLE
-    if likely.sum() >= _MANY:
+    if (probability >= _PROBABLE).sum() >= _MANY:
         # Targets are sharp in this image, so that soft dots are spots of light, or out of focus.
-        soft = likely_targets(gray, dots.select(~sharp), code, _SOFT, per_sector=_GLANCE)
-        worth[~sharp] = soft >= _UNLIKELY
+        worth[~sharp] = _glanced(gray, dots.select(~sharp), of_prints, _SOFT) >= _UNLIKELY
     return worth
+
+
+def _glanced(gray: np.ndarray, dots: Fit, of_prints: Sequence[Family], blur: float) -> np.ndarray:
+    """Return about how probable it is that dots are middles of targets of any print."""
+    probabilities = [likely_targets(gray, dots, code, blur, _GLANCE) for code in of_prints]
+    highest: np.ndarray = np.max(probabilities, axis=0)
+    return highest
 
 
 def _against_other_words(
