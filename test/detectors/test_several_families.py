@@ -133,3 +133,14 @@ def test_bands_of_other_radii_are_not_read(shown, read):
 def test_targets_of_several_families_are_counted():
     image, truth = side_by_side(rendering('metashape12'), rendering('aicon14'))
     assert estimate_count(image, DetectorSettings(family='auto')) == len(truth)
+
+
+def test_both_prints_are_found_among_the_many_dots_of_a_lattice():
+    scene = SceneSettings(
+        width=900, height=700, targets=8, dot_radius=10, light='lattice', seed=21
+    )
+    shown = [replace(scene, family=name, ambient=0.12) for name in ('metashape12', 'aicon14')]
+    image = np.hstack([render(each).image for each in shown])
+    names = [target.family for target in found(image, 'metashape12,aicon14')]
+    assert names.count('metashape12') >= 7
+    assert names.count('aicon14') >= 7
