@@ -40,7 +40,7 @@ test-native: $(READY)
 # No vector units beyond those that numpy and OpenCV were compiled for: other last bits.
 test-portable: $(READY)
 	$(BIN)/python -m support.vector_units baseline $(BIN)/python -m pytest \
-		--ignore test/benchmarks --ignore test/nodes --ignore test/bag/test_bag_live.py
+		--ignore test/benchmarks --ignore test/nodes --ignore test/bag --ignore test/cli
 
 # The oldest versions of numpy and OpenCV that are to be had, no ROS, and no AVX-512.
 test-oldest: $(OLDEST)/ready

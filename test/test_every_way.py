@@ -14,7 +14,6 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 import pytest
 
@@ -27,15 +26,12 @@ from ahf_ros.interchange.image_files import write_image
 from ahf_ros.interchange.target_json import targets_from_json
 from support import bags
 from support.packages import MINE, my_detector, write_package
+from support.square_markers import needs_square_markers
 
 SCENE = {'width': 400, 'height': 300, 'targets': 4, 'dot_radius': 10.0}
 SCENES = {'gsi': SCENE | {'width': 560, 'height': 420, 'dot_radius': 5.0}}
 SQUARES = ('aruco_4x4_50', 'apriltag_36h11')
 BOTH = 'metashape12,aicon14'
-NO_MARKERS = pytest.mark.skipif(
-    not hasattr(getattr(cv2, 'aruco', None), 'ArucoDetector'),
-    reason=f'OpenCV {cv2.__version__} has no square markers',
-)
 COMMAND = f'{sys.executable} -m ahf_ros.cli identify --json'
 
 
@@ -70,7 +66,7 @@ CASES = (
 EVERY_CASE = pytest.mark.parametrize(
     'case',
     [
-        pytest.param(it, id=str(it), marks=NO_MARKERS if it.family in SQUARES else ())
+        pytest.param(it, id=str(it), marks=needs_square_markers if it.family in SQUARES else ())
         for it in CASES
     ],
 )

@@ -7,11 +7,9 @@ import numpy as np
 import pytest
 
 from ahf_ros.codes.square import SQUARE_NAMES, dictionary, marker
+from support.square_markers import needs_square_markers
 
-pytestmark = pytest.mark.skipif(
-    not hasattr(getattr(cv2, 'aruco', None), 'ArucoDetector'),
-    reason=f'OpenCV {cv2.__version__} has no square markers',
-)
+pytestmark = needs_square_markers
 
 
 @pytest.mark.parametrize('name', SQUARE_NAMES)

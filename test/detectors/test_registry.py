@@ -26,12 +26,7 @@ from ahf_ros.detectors import (
 from ahf_ros.detectors.external.guarded import guarded
 from ahf_ros.session import IdentificationSettings, identify
 from support.packages import EXAMPLE, write_package
-
-NEEDS_MARKERS = pytest.mark.skipif(
-    not hasattr(getattr(cv2, 'aruco', None), 'ArucoDetector'),
-    reason=f'OpenCV {cv2.__version__} has no square markers',
-)
-
+from support.square_markers import needs_square_markers
 
 SQUARES = {'aruco': 'aruco_4x4_50', 'apriltag': 'apriltag_36h11'}
 
@@ -39,7 +34,7 @@ SQUARES = {'aruco': 'aruco_4x4_50', 'apriltag': 'apriltag_36h11'}
 @pytest.mark.parametrize(
     'name',
     [
-        pytest.param(name, marks=NEEDS_MARKERS if name in SQUARES else ())
+        pytest.param(name, marks=needs_square_markers if name in SQUARES else ())
         for name in DETECTOR_NAMES
     ],
 )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import cv2
 import numpy as np
 import pytest
 
@@ -13,11 +12,9 @@ from ahf_ros.evaluation import score
 from ahf_ros.session import identify
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 from ahf_ros.target import Target
+from support.square_markers import needs_square_markers
 
-pytestmark = pytest.mark.skipif(
-    not hasattr(getattr(cv2, 'aruco', None), 'ArucoDetector'),
-    reason=f'OpenCV {cv2.__version__} has no square markers',
-)
+pytestmark = needs_square_markers
 SCENE = SceneSettings(
     width=1000, height=750, targets=6, family='aruco_4x4_50', dot_radius=16.0, seed=3
 )

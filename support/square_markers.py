@@ -1,0 +1,11 @@
+"""Square markers, which the oldest OpenCV does not have."""
+
+from __future__ import annotations
+
+import cv2
+import pytest
+
+needs_square_markers = pytest.mark.skipif(
+    not hasattr(getattr(cv2, 'aruco', None), 'ArucoDetector'),
+    reason=f'OpenCV {cv2.__version__} has no square markers',
+)
