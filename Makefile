@@ -37,15 +37,18 @@ lint: $(READY)
 test-native: $(READY)
 	$(BIN)/python -m pytest
 
+# Bags, nodes and the command line compute nothing of their own.
+SHARED = --ignore test/benchmarks --ignore test/bag --ignore test/cli
+
 # No vector units beyond those that numpy and OpenCV were compiled for: other last bits.
 test-portable: $(READY)
 	$(BIN)/python -m support.vector_units baseline $(BIN)/python -m pytest \
-		--ignore test/benchmarks --ignore test/nodes --ignore test/bag --ignore test/cli
+		$(SHARED) --ignore test/nodes --ignore test/test_every_way.py
 
 # The oldest versions of numpy and OpenCV that are to be had, no ROS, and no AVX-512.
 test-oldest: $(OLDEST)/ready
 	$(OLDEST)/bin/python -m support.vector_units avx2 $(OLDEST)/bin/python -m pytest \
-		--ignore test/benchmarks
+		$(SHARED)
 
 # The nodes on ROS 2 Kilted.
 test-kilted:
