@@ -36,7 +36,7 @@ MINIMUM_POINTS = 12
 """Minimum number of points that a position is fitted to; there are eleven unknowns."""
 
 _MAXIMUM_COORDINATE = float(np.finfo(np.float32).max)  # its square is finite in float64
-_MINIMUM_REACH = 5.0  # px; also the neighbourhood of targets of unknown size
+_MINIMUM_REACH = 5.0  # steps of the grid; also the neighbourhood of targets of unknown size
 _MAXIMUM_POINTS = 1024  # about; larger neighbourhoods are subsampled
 _MINIMUM_SHARE = 0.2  # of the pixels of a neighbourhood that must have points on its plane
 _MAXIMUM_OFFSET = 2.0  # from the mean of these points to the centre, standard deviations
@@ -46,6 +46,57 @@ _SPREADS = np.array([0.8191725134, 0.6710436067, 0.5497004779])  # Roberts' sequ
 _DEVIATION = 1.4826  # standard deviation of normal noise in units of its median magnitude
 _OUTLIER = 3.0  # standard deviations
 _PASSES = 3
+
+
+@dataclass(frozen=True, slots=True)
+class CloudGrid:
+    """Which pixel of the image each point of a cloud belongs to.
+
+    The point in row i and column j belongs to the pixel at x = `offset_x` + `step` j and
+    y = `offset_y` + `step` i.
+
+    Attributes
+    ----------
+    offset_x, offset_y : float
+        Pixel of the first point, px.
+    step : float
+        Distance in the image between neighbouring points, px.
+
+    Examples
+    --------
+    >>> CloudGrid(offset_x=32.0).fits((480, 608), (480, 640))
+    True
+    >>> CloudGrid().fits((480, 608), (480, 640))
+    False
+    """
+
+    offset_x: float = 0.0
+    offset_y: float = 0.0
+    step: float = 1.0
+
+    def fits(self, cloud: tuple[int, int], image: tuple[int, int]) -> bool:
+        """Return whether a cloud lies within an image; by default only one of the same size does.
+
+        Parameters
+        ----------
+        cloud, image : tuple of 2 int
+            Number of rows and columns of each.
+        """
+        if self == CloudGrid():
+            return cloud == image
+        last = [
+            first + self.step * (count - 1)
+            for first, count in zip((self.offset_y, self.offset_x), cloud, strict=True)
+        ]
+        return all(at <= size - 0.5 for at, size in zip(last, image, strict=True))
+
+    def of(self, x: float, y: float) -> tuple[float, float]:
+        """Return column and row of the cloud at a pixel of the image."""
+        return (x - self.offset_x) / self.step, (y - self.offset_y) / self.step
+
+
+FULL = CloudGrid()
+"""Grid of a cloud that has one point per pixel."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,7 +125,10 @@ class Positions:
 
 
 def positions(
-    cloud: np.ndarray, targets: Sequence[Target], neighbourhood: float = NEIGHBOURHOOD
+    cloud: np.ndarray,
+    targets: Sequence[Target],
+    neighbourhood: float = NEIGHBOURHOOD,
+    grid: CloudGrid = FULL,
 ) -> Positions:
     """Return the positions of targets.
 
@@ -92,28 +146,34 @@ def positions(
     neighbourhood : float
         Radius around a centre within which points count, in radii of its dot, an ellipse in the
         image.
+    grid : CloudGrid
+        Pixels of the image that the points belong to.
     """
     rows = np.full((len(targets), 5), np.nan)
     with np.errstate(all='ignore'):  # bad points end in values that are not finite
         for row, target in zip(rows, targets, strict=True):
-            offsets, points, pixels = _neighbours(cloud, target, neighbourhood)
+            offsets, points, pixels = _neighbours(cloud, target, neighbourhood, grid)
             if len(points) >= max(MINIMUM_POINTS, _MINIMUM_SHARE * pixels):
                 with suppress(np.linalg.LinAlgError):
                     row[:] = _position(offsets, points, _MINIMUM_SHARE * pixels)
     rows[~np.isfinite(rows).all(axis=1)] = np.nan
-    return Positions(rows[:, :3], rows[:, 3], rows[:, 4])
+    return Positions(rows[:, :3], rows[:, 3], rows[:, 4] / grid.step)
 
 
 def _neighbours(
-    cloud: np.ndarray, target: Target, neighbourhood: float
+    cloud: np.ndarray, target: Target, neighbourhood: float, grid: CloudGrid
 ) -> tuple[np.ndarray, np.ndarray, int]:
-    """Return offsets (n, 2) in px and points (n, 3) near a target, and the number of pixels."""
+    """Return offsets (n, 2) and points (n, 3) near a target, and the number of places in reach.
+
+    Offsets are in steps of the grid.
+    """
     shape = (target.x, target.y, target.semi_major, target.semi_minor, target.angle)
     if not all(map(math.isfinite, shape)):
         return np.empty((0, 2)), np.empty((0, 3)), 0
-    reach = [max(_MINIMUM_REACH, neighbourhood * axis) for axis in shape[2:4]]
+    reach = [max(_MINIMUM_REACH, neighbourhood * axis / grid.step) for axis in shape[2:4]]
+    x, y = grid.of(target.x, target.y)
     places = []
-    for centre, size in ((target.y, cloud.shape[0]), (target.x, cloud.shape[1])):
+    for centre, size in ((y, cloud.shape[0]), (x, cloud.shape[1])):
         first = math.ceil(min(size, max(0, centre - reach[0])))
         last = math.floor(min(size - 1, max(-1, centre + reach[0])))
         places.append((first, max(first, last + 1)))
@@ -121,7 +181,7 @@ def _neighbours(
     step = max(1, math.ceil(math.sqrt(count / _MAXIMUM_POINTS)))
     window = tuple(slice(first, end, step) for first, end in places)
     rows, columns = np.mgrid[window]
-    offsets = np.stack((columns - target.x, rows - target.y), axis=-1)
+    offsets = np.stack((columns - x, rows - y), axis=-1)
     turn = np.array(
         [
             [math.cos(target.angle), -math.sin(target.angle)],

@@ -14,47 +14,11 @@ import numpy as np
 
 from ahf_ros.filtering.identifier import Identifier
 from ahf_ros.imaging.movement import displacement, find_edges
-from ahf_ros.imaging.stack import MAXIMUM_IMAGES, ImageStack, unlike
-from ahf_ros.settings.parameter import check_parameters, parameter
+from ahf_ros.imaging.stack import ImageStack, unlike
+from ahf_ros.session_settings import SLIDING, StackSettings
 from ahf_ros.target import Identification
 
-TUMBLING, SLIDING = 'tumbling', 'sliding'
-"""Which images of a stream are a stack: every image one of one, or each with those before it."""
-
 Item = TypeVar('Item')
-
-
-@dataclass(frozen=True, slots=True)
-class StackSettings:
-    """Which images are identified together.
-
-    Examples
-    --------
-    >>> StackSettings(stack=4).stack_window
-    'tumbling'
-    """
-
-    stack: int = parameter(
-        1,
-        'Number of images of an unmoved scene, lit in turn by different patterns, that are '
-        'identified together; 1: every image on its own.',
-        minimum=1,
-        maximum=MAXIMUM_IMAGES,
-    )
-    stack_window: str = parameter(
-        TUMBLING,
-        'tumbling: each image belongs to one stack; sliding: each image is identified with those '
-        'before it.',
-        choices=(TUMBLING, SLIDING),
-    )
-    stack_movement: bool = parameter(
-        True,
-        'Whether to look for movement of the scene within a stack, and to split the stack there.',
-    )
-
-    def __post_init__(self) -> None:
-        """Refuse values that are not accepted."""
-        check_parameters(self)
 
 
 @dataclass(frozen=True, slots=True)

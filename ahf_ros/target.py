@@ -78,6 +78,32 @@ class DottedTarget(Target):
 
 
 @dataclass(frozen=True, slots=True)
+class UndecodedTarget(Target):
+    """A dot with the ID `UNDECODED`, and why it has no other.
+
+    Attributes
+    ----------
+    reason : str
+        'unread' if no code word is likely, 'uncertain' if one is but not certain, and 'contested'
+        if another target contradicts it: by its ID, by its place, or by lying on top of it.
+    likely_id : int
+        ID of the most likely code word, whose probability is `confidence`; `UNDECODED` if no code
+        word is likely.
+    likely_family : str
+        Family of the most likely code word; empty if no code word is likely.
+
+    Examples
+    --------
+    >>> UndecodedTarget(-1, 0, 10.5, 20.0, 8.0, 7.5, confidence=0.0).reason
+    'unread'
+    """
+
+    reason: str = 'unread'
+    likely_id: int = UNDECODED
+    likely_family: str = ''
+
+
+@dataclass(frozen=True, slots=True)
 class TrueTarget:
     """A target that an image shows.
 
@@ -148,6 +174,39 @@ class FilterState:
 
 
 @dataclass(frozen=True, slots=True)
+class SearchTrace:
+    """The filters that a search tried, in the order in which they counted, and how each did.
+
+    Attributes
+    ----------
+    reason : str
+        Why the search ended, see `ahf_ros.filtering.genetic.SearchResult`.
+    discrepancies : tuple of int
+        |N - n| through each filter.
+    gamma_high, gamma_low, cutoff, attenuation : tuple of float
+        The filters, as in `FilterState`.
+    generations : tuple of int
+        Number of filters tried by the end of each generation.
+    combinations : tuple of str
+        Combination of the stack that each filter was applied to; empty for one image.
+
+    Examples
+    --------
+    >>> SearchTrace('found', (2, 0), (2.0, 3.1), (0.5, 0.8), (90.0, 80.0), (1.5, 2.3), (2,)).reason
+    'found'
+    """
+
+    reason: str
+    discrepancies: tuple[int, ...]
+    gamma_high: tuple[float, ...]
+    gamma_low: tuple[float, ...]
+    cutoff: tuple[float, ...]
+    attenuation: tuple[float, ...]
+    generations: tuple[int, ...]
+    combinations: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Identification:
     """The targets that were identified in one image.
 
@@ -167,6 +226,10 @@ class Identification:
     combination : str
         Combination of the stack that gave the targets, see `ahf_ros.imaging.stack`; empty for one
         image.
+    expected_ids : tuple of int
+        The IDs that the image was expected to show, in ascending order; empty if they are unknown.
+    search : SearchTrace or None
+        The search for a filter; None if there was none.
 
     Examples
     --------
@@ -181,6 +244,8 @@ class Identification:
     estimated: bool = False
     mirrored: bool = False
     combination: str = ''
+    expected_ids: tuple[int, ...] = ()
+    search: SearchTrace | None = None
 
     @property
     def count(self) -> int:

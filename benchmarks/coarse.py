@@ -13,7 +13,7 @@ from itertools import product
 import ahf_ros.blas  # noqa: F401  before numpy
 from ahf_ros.detectors import DETECTOR_NAMES, create_detector
 from ahf_ros.evaluation import score
-from ahf_ros.filtering.genes import EXTENDED, PUBLISHED
+from ahf_ros.filtering.settings import EXTENDED, PUBLISHED
 from ahf_ros.session import identify
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
 from ahf_ros.synthetic.scene import SceneSettings, render

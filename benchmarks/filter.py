@@ -22,7 +22,8 @@ from typing import Any
 import cv2
 import numpy as np
 
-from ahf_ros.filtering.homomorphic import FilterSettings, HomomorphicFilter
+from ahf_ros.filtering.homomorphic import HomomorphicFilter
+from ahf_ros.filtering.settings import FilterSettings
 from ahf_ros.filtering.transfer import median_distance
 from ahf_ros.imaging.logarithm import logarithm, mapping
 from ahf_ros.synthetic.scene import SceneSettings, render

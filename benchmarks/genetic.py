@@ -17,8 +17,9 @@ import numpy as np
 
 from ahf_ros.filtering import genetic
 from ahf_ros.filtering.chromosome import Values, mutated
-from ahf_ros.filtering.genes import PUBLISHED, TuningSettings
-from ahf_ros.filtering.genetic import GeneticSettings, search
+from ahf_ros.filtering.genes import genes_of
+from ahf_ros.filtering.genetic import search
+from ahf_ros.filtering.settings import PUBLISHED, GeneticSettings, TuningSettings
 
 N = 54
 
@@ -78,7 +79,7 @@ def trial(objective: Callable, way: tuple[str, float, int], seed: int, most: int
     mutation_of = one_bit_mutated if kind == 'chromosome' else mutated
     with mock.patch.object(genetic, 'mutated', mutation_of):
         generator = np.random.default_rng(seed)
-        result = search(objective, TuningSettings(search=PUBLISHED).genes, settings, generator)
+        result = search(objective, genes_of(TuningSettings(search=PUBLISHED)), settings, generator)
     return result.evaluations, result.discrepancy
 
 

@@ -13,10 +13,8 @@ direction, a wider lens, more noise, and another gamma. Seeds from 101 on are fo
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from typing import Any
 
 from rich.console import Console
@@ -29,6 +27,7 @@ from ahf_ros.synthetic.patterns import LIGHT_NAMES
 from ahf_ros.synthetic.scene import SceneSettings, render
 from benchmarks.filter import machine
 from benchmarks.identification import FIRST_TEST_SEED, Row, are_tests, with_detector
+from benchmarks.output import add_output, publish
 
 LIGHTS = ('stripe', 'fine_stripe', 'lattice', 'dense_lattice')
 
@@ -130,9 +129,7 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument('--lights', nargs='+', choices=LIGHT_NAMES, default=LIGHTS)
     made.add_argument('--targets', type=int, default=SceneSettings().targets)
     made.add_argument('--seeds', nargs='+', type=int, default=[FIRST_TEST_SEED])
-    made.add_argument(
-        '--output', type=Path, metavar='FILE', help='also write FILE.json and FILE.md'
-    )
+    add_output(made)
     return made
 
 
@@ -153,11 +150,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         'machine': machine(),
     }
     report['rows'] = [row.record() for row in measure(options)]
-    table = markdown(report)
-    if options.output:
-        Path(f'{options.output}.json').write_text(json.dumps(report, indent=1))
-        Path(f'{options.output}.md').write_text(table + '\n')
-    print(table)
+    publish(report, markdown(report), options.output)
     return 0
 
 

@@ -35,10 +35,14 @@ from rich.progress import track
 
 from ahf_ros.detectors import Drafter, Refiner, create_detector
 from ahf_ros.evaluation import RIGHT, judge, score
-from ahf_ros.filtering.genes import EXTENDED, PUBLISHED, TuningSettings
-from ahf_ros.filtering.genetic import GeneticSettings
 from ahf_ros.filtering.identifier import Identifier
-from ahf_ros.filtering.settings import AdaptiveSettings
+from ahf_ros.filtering.settings import (
+    EXTENDED,
+    PUBLISHED,
+    AdaptiveSettings,
+    GeneticSettings,
+    TuningSettings,
+)
 from ahf_ros.filtering.trials import DetectorFunction
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render

@@ -12,10 +12,8 @@ mean. Photographs have no truth to that accuracy. Seeds from 101 on are for test
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -31,6 +29,7 @@ from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import Target
 from benchmarks.filter import machine
 from benchmarks.identification import FIRST_TEST_SEED, are_tests
+from benchmarks.output import add_output, publish
 from support import PHOTOS
 
 HOLE = 0.05
@@ -227,9 +226,7 @@ def main() -> None:
         formatter_class=argparse.ArgumentDefaultsHelpFormatter,
     )
     parser.add_argument('--seeds', nargs='+', type=int, default=[FIRST_TEST_SEED])
-    parser.add_argument(
-        '--output', type=Path, metavar='FILE', help='also write FILE.json and FILE.md'
-    )
+    add_output(parser)
     options = parser.parse_args()
     report: dict[str, Any] = {
         'seeds': options.seeds,
@@ -237,11 +234,7 @@ def main() -> None:
         'machine': machine(),
         'rows': [asdict(row) for row in measure(options.seeds)],
     }
-    table = markdown(report)
-    if options.output:
-        Path(f'{options.output}.json').write_text(json.dumps(report, indent=1))
-        Path(f'{options.output}.md').write_text(table + '\n')
-    print(table)
+    publish(report, markdown(report), options.output)
 
 
 if __name__ == '__main__':

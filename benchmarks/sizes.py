@@ -10,10 +10,8 @@ where the target is not identified. No limits of size are set. Seeds from 101 on
 from __future__ import annotations
 
 import argparse
-import json
 import math
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from typing import Any
 
 from rich.console import Console
@@ -24,6 +22,7 @@ from ahf_ros.detectors import create_detector
 from ahf_ros.evaluation import RIGHT, judge, score
 from benchmarks.filter import machine
 from benchmarks.identification import FIRST_TEST_SEED
+from benchmarks.output import add_output, publish
 from support.collage import collage
 
 RADII = {
@@ -109,9 +108,7 @@ def main() -> None:
     parser.add_argument('--families', nargs='+', choices=tuple(RADII), default=tuple(RADII))
     parser.add_argument('--lights', nargs='+', choices=tuple(LIGHTS), default=tuple(LIGHTS))
     parser.add_argument('--seed', type=int, default=FIRST_TEST_SEED)
-    parser.add_argument(
-        '--output', type=Path, metavar='FILE', help='also write FILE.json and FILE.md'
-    )
+    add_output(parser)
     options = parser.parse_args()
     report: dict[str, Any] = {
         'seed': options.seed,
@@ -119,11 +116,7 @@ def main() -> None:
         'machine': machine(),
         'rows': list(measure(options.families, options.lights, options.seed)),
     }
-    table = markdown(report)
-    if options.output:
-        Path(f'{options.output}.json').write_text(json.dumps(report, indent=1))
-        Path(f'{options.output}.md').write_text(table + '\n')
-    print(table)
+    publish(report, markdown(report), options.output)
 
 
 if __name__ == '__main__':

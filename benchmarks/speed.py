@@ -26,9 +26,10 @@ import numpy as np
 
 import ahf_ros.blas  # noqa: F401  before numpy
 from ahf_ros.detectors import Drafter, create_detector
-from ahf_ros.filtering.genes import PUBLISHED, TuningSettings
-from ahf_ros.filtering.genetic import GeneticSettings, search
-from ahf_ros.filtering.homomorphic import FilterSettings, HomomorphicFilter
+from ahf_ros.filtering.genes import genes_of
+from ahf_ros.filtering.genetic import search
+from ahf_ros.filtering.homomorphic import HomomorphicFilter
+from ahf_ros.filtering.settings import PUBLISHED, FilterSettings, GeneticSettings, TuningSettings
 from ahf_ros.session import create_identifier, identify
 from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import count_codes
@@ -54,7 +55,8 @@ def published(recipe: Recipe, image: np.ndarray, detector: Any, expected: int) -
         found.append(count_codes(detector(recipe(image, *gains))))
         return abs(expected - found[-1])
 
-    genes, generator = TuningSettings(search=PUBLISHED).genes, np.random.default_rng(settings.seed)
+    genes = genes_of(TuningSettings(search=PUBLISHED))
+    generator = np.random.default_rng(settings.seed)
     result = search(discrepancy, genes, settings, generator)
     for _ in range(settings.population * result.generations - result.evaluations):
         # the rest of the last generation, which that algorithm evaluates as well

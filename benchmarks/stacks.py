@@ -10,13 +10,11 @@ first image alone, the stack, and the same scene in normal light. Seeds from 101
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,13 +22,15 @@ from rich.console import Console
 from rich.progress import track
 
 import ahf_ros.blas  # noqa: F401  before numpy
-from ahf_ros.sequence import StackSettings, identify_parts
+from ahf_ros.sequence import identify_parts
 from ahf_ros.session import create_identifier
+from ahf_ros.session_settings import StackSettings
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
 from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import Identification
 from benchmarks.filter import machine
 from benchmarks.identification import FIRST_TEST_SEED, Row, are_tests
+from benchmarks.output import add_output, publish
 
 LIGHTS = ('stripe', 'fine_stripe', 'lattice', 'dense_lattice')
 COLUMNS = ('first image', 'stack', 'normal light')
@@ -136,9 +136,7 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument('--width', type=int, default=SceneSettings().width)
     made.add_argument('--height', type=int, default=SceneSettings().height)
     made.add_argument('--seeds', nargs='+', type=int, default=[FIRST_TEST_SEED])
-    made.add_argument(
-        '--output', type=Path, metavar='FILE', help='also write FILE.json and FILE.md'
-    )
+    add_output(made)
     return made
 
 
@@ -158,11 +156,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         'machine': machine(),
         'rows': list(measure(options)),
     }
-    table = markdown(report)
-    if options.output:
-        Path(f'{options.output}.json').write_text(json.dumps(report, indent=1))
-        Path(f'{options.output}.md').write_text(table + '\n')
-    print(table)
+    publish(report, markdown(report), options.output)
     return 0
 
 

@@ -22,9 +22,10 @@ from rich.progress import track
 import ahf_ros.blas  # noqa: F401  before numpy
 from ahf_ros.detectors import DETECTOR_NAMES, Drafter, create_detector
 from ahf_ros.filtering.chromosome import Gene, Values
-from ahf_ros.filtering.genes import EXTENDED, PUBLISHED, TuningSettings, tuned
-from ahf_ros.filtering.genetic import GeneticSettings, search
+from ahf_ros.filtering.genes import tuned
+from ahf_ros.filtering.genetic import search
 from ahf_ros.filtering.homomorphic import HomomorphicFilter
+from ahf_ros.filtering.settings import EXTENDED, PUBLISHED, GeneticSettings, TuningSettings
 from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import count_codes
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from ahf_ros.localisation import Positions, positions
+from ahf_ros.localisation import CloudGrid, Positions, positions
 from ahf_ros.target import Target
 
 KIND = np.dtype([('x', '<f4'), ('y', '<f4'), ('z', '<f4')])
@@ -146,6 +146,36 @@ def test_the_spacing_is_that_of_pixels_on_the_target() -> None:
     half = np.array([0.5, 0.0])
     step = on_plane(CENTRE + half, 1.0) - on_plane(CENTRE - half, 1.0)
     assert found(scan(1.0)).spacings[0] == pytest.approx(np.linalg.norm(step), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ('grid', 'part'),
+    [
+        (CloudGrid(offset_x=32), np.s_[:, 32:]),  # Ensenso with a disparity offset
+        (CloudGrid(offset_x=21, offset_y=11), np.s_[11:80, 21:100]),
+        (CloudGrid(offset_x=1, step=2), np.s_[::2, 1::2]),
+    ],
+)
+def test_a_cloud_may_be_a_part_of_the_image(grid: CloudGrid, part: tuple) -> None:
+    cloud = scan(0.4)
+    assert grid.fits(cloud[part].shape, cloud.shape)
+    found = positions(cloud[part], [target()], grid=grid)
+    assert found.points[0] == pytest.approx(on_plane(np.array(CENTRE), 0.4), abs=1e-3)
+    assert found.spacings == pytest.approx(positions(cloud, [target()]).spacings, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ('grid', 'shape'),
+    [
+        (CloudGrid(), (100, 119)),
+        (CloudGrid(), (101, 120)),
+        (CloudGrid(offset_x=32), (100, 89)),
+        (CloudGrid(offset_y=0.6), (100, 120)),
+        (CloudGrid(step=2), (51, 60)),
+    ],
+)
+def test_a_cloud_beyond_the_image_does_not_fit(grid: CloudGrid, shape: tuple[int, int]) -> None:
+    assert not grid.fits(shape, (100, 120))
 
 
 def test_a_cloud_that_is_the_same_everywhere_does_no_harm() -> None:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
+
+Words = TypeVar('Words', int, np.ndarray)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,9 +77,57 @@ def smallest_rotation(words: Any, bits: int) -> np.ndarray:
     >>> smallest_rotation([0b1000, 0b1010], 4)
     array([1, 5])
     """
-    rotated = np.asarray(words, dtype=np.int64)
-    smallest = rotated.copy()
-    for _ in range(bits - 1):
-        rotated = (rotated >> 1) | ((rotated & 1) << (bits - 1))
-        np.minimum(smallest, rotated, out=smallest)
+    words = np.asarray(words, dtype=np.int64)
+    smallest = words.copy()
+    for turn in range(1, bits):
+        np.minimum(smallest, rotated_words(words, turn, bits), out=smallest)
     return smallest
+
+
+def rotated_words(words: Words, turn: int, bits: int) -> Words:
+    """Return words whose sectors are rotated.
+
+    Parameters
+    ----------
+    words : int or ndarray of int64, any shape
+        Words of `bits` bits, 0 to 2^bits - 1.
+    turn : int
+        Number of sectors, 0 to `bits`, by which each bit moves to higher ones.
+    bits : int
+        Length of a word.
+
+    Returns
+    -------
+    int or ndarray of int64, shape of `words`
+
+    Examples
+    --------
+    >>> rotated_words(0b1001, 1, 4)
+    3
+    """
+    return (words << turn | words >> (bits - turn)) & ((1 << bits) - 1)
+
+
+def mirrored_words(words: np.ndarray, bits: int) -> np.ndarray:
+    """Return words as they read in a mirror, in some rotation.
+
+    Parameters
+    ----------
+    words : ndarray of int64, any shape
+        Words of `bits` bits, 0 to 2^bits - 1.
+    bits : int
+        Length of a word.
+
+    Returns
+    -------
+    ndarray of int64, shape of `words`
+
+    Examples
+    --------
+    >>> mirrored_words(np.array([0b1011]), 6)
+    array([52])
+    """
+    mirrored = np.zeros_like(words)
+    for bit in range(bits):
+        mirrored |= (words >> bit & 1) << (bits - 1 - bit)
+    return mirrored

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ahf_ros.codes.cyclic import CyclicFamily, smallest_rotation
+from ahf_ros.codes.cyclic import CyclicFamily, mirrored_words, smallest_rotation
 from ahf_ros.codes.data_file import Entry, read_data_file
 
 DOTS_DESIGN = Path(__file__).with_name('dots.json')
@@ -48,6 +48,16 @@ class DotFamily(CyclicFamily):
     def canonical(self, words: Any) -> np.ndarray:
         """Return the smallest of all words that are the same code, ndarray of int64."""
         return smallest_bracelet(words, self.bits)
+
+    def places(self, word: int, turn: float = 0.0) -> np.ndarray:
+        """Return the centres of the small dots of a word, shape (n, 2), in radii of the disc.
+
+        `turn` is the direction of the place of dot 0, rad.
+        """
+        which = np.flatnonzero(word >> np.arange(self.bits) & 1)
+        angles = turn + 2 * pi * which / self.bits
+        places: np.ndarray = self.dot_circle * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        return places
 
     def ids(self, words: np.ndarray) -> np.ndarray:
         """Return the IDs of words in any rotation or reflection, 0 where there is none."""
@@ -119,10 +129,7 @@ def smallest_bracelet(words: Any, bits: int) -> np.ndarray:
     ndarray of int64, shape of `words`
     """
     words = np.asarray(words, dtype=np.int64)
-    mirrored = np.zeros_like(words)
-    for bit in range(bits):
-        mirrored |= (words >> bit & 1) << (bits - 1 - bit)
     smallest: np.ndarray = np.minimum(
-        smallest_rotation(words, bits), smallest_rotation(mirrored, bits)
+        smallest_rotation(words, bits), smallest_rotation(mirrored_words(words, bits), bits)
     )
     return smallest

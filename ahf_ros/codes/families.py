@@ -1,20 +1,20 @@
-"""All families of coded targets, by the kind of their print, and lists of families."""
+"""All families of coded targets, by the kind of their print, and lists of families.
+
+Settings import this module, and with them the command line before it knows whether it computes
+anything. Therefore the codes, which take numpy and OpenCV, are imported where they are needed.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from itertools import combinations
 
-import numpy as np
-
-from ahf_ros.codes import ring, square
-from ahf_ros.codes.dots import dot_family
-from ahf_ros.codes.gsi_library import point_family
+from ahf_ros.codes.names import APRILTAG_NAMES, ARUCO_NAMES, RING_NAMES, SQUARE_NAMES
 
 KINDS: dict[str, tuple[str, ...]] = {
-    'ring': ring.FAMILY_NAMES,
-    'aruco': square.ARUCO_NAMES,
-    'apriltag': square.APRILTAG_NAMES,
+    'ring': RING_NAMES,
+    'aruco': ARUCO_NAMES,
+    'apriltag': APRILTAG_NAMES,
     'gsi': ('gsi',),
     'dots': ('dots',),
 }
@@ -92,11 +92,13 @@ def numbers_of(name: str, file: str = '') -> Sequence[int]:
     ValueError
         If there is no such family, or the data file is not accepted.
     """
+    from ahf_ros.codes import dots, gsi_library, ring, square
+
     if name == 'gsi':
-        return sorted(point_family(file).numbers.tolist())
+        return sorted(gsi_library.point_family(file).numbers.tolist())
     if name == 'dots':
-        return range(1, dot_family(file).words.size + 1)
-    if name in square.SQUARE_NAMES:
+        return range(1, dots.dot_family(file).words.size + 1)
+    if name in SQUARE_NAMES:
         return range(square.dictionary(name).bytesList.shape[0])
     return range(1, ring.family(name).words.size + 1)
 
@@ -153,7 +155,9 @@ def mirrored_number(name: str, code: int) -> int | None:
     >>> mirrored_number('metashape12', 71)
     12
     """
-    if name not in ring.FAMILY_NAMES:
+    from ahf_ros.codes import ring
+
+    if name not in RING_NAMES:
         return None
     family = ring.family(name)
     return family.number(ring.mirrored(code, family.bits))
@@ -185,13 +189,15 @@ def _check_list(names: Sequence[str], shown: str) -> None:
 
 def _same_print(first: str, second: str) -> bool:
     """Return whether targets of two families of one kind have the same print."""
-    if first in ring.FAMILY_NAMES:
+    from ahf_ros.codes import ring
+
+    if first in RING_NAMES:
         one, other = ring.family(first), ring.family(second)
         same = (one.bits, one.band_inner, one.band_outer) == (
             other.bits,
             other.band_inner,
             other.band_outer,
         )
-        return same and bool(np.intersect1d(one.words, other.words).size)
+        return same and not set(one.words.tolist()).isdisjoint(other.words.tolist())
     # The dictionaries of ArUco with one number of cells begin with the same markers.
-    return first in square.ARUCO_NAMES and first.rpartition('_')[0] == second.rpartition('_')[0]
+    return first in ARUCO_NAMES and first.rpartition('_')[0] == second.rpartition('_')[0]

@@ -108,6 +108,12 @@ class PointFamily:
         """Return the indices of the positions that have a dot, ndarray of int."""
         return np.flatnonzero(np.int64(word) >> self.position_numbers & 1)
 
+    def dots(self, word: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return the places of all dots of a value, relative to the centre, and their radii."""
+        count = len(self.template)
+        shown = np.r_[:count, count + self.decoding_dots(word)]
+        return self.places[shown], self.radii[shown]
+
     @property
     def listed(self) -> dict[int, int]:
         """The values of the codes that the library lists, by ID."""

@@ -10,23 +10,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from string import ascii_lowercase, digits
 
 import numpy as np
 
 from ahf_ros.codes.cyclic import CyclicFamily, smallest_rotation
+from ahf_ros.codes.names import RING_NAMES
 
 BAND_RADII = {'metashape': (2.25, 3.5), 'aicon': (2.0, 3.0)}
 """Inner and outer radius of the bands that vendors print, in radii of the dot."""
 
-_VENDORS_AND_BITS = {
-    'metashape12': ('metashape', 12),
-    'metashape14': ('metashape', 14),
-    'metashape16': ('metashape', 16),
-    'metashape20': ('metashape', 20),
-    'aicon12': ('aicon', 12),
-    'aicon14': ('aicon', 14),
-}
-FAMILY_NAMES: tuple[str, ...] = tuple(_VENDORS_AND_BITS)
+FAMILY_NAMES = RING_NAMES
 """The ring code families that `family` knows."""
 
 
@@ -55,7 +49,7 @@ class Family(CyclicFamily):
 
 def sector_count(name: str) -> int:
     """Return the number of sectors of a family, without its words."""
-    return _VENDORS_AND_BITS[name][1]
+    return int(name.lstrip(ascii_lowercase))
 
 
 @cache
@@ -84,9 +78,9 @@ def family(name: str) -> Family:
     >>> family('metashape12').number(0b100011100000)
     1
     """
-    if name not in _VENDORS_AND_BITS:
+    if name not in FAMILY_NAMES:
         raise ValueError(f'family is {name!r}, accepted is one of {", ".join(FAMILY_NAMES)}')
-    vendor, bits = _VENDORS_AND_BITS[name]
+    vendor, bits = name.rstrip(digits), sector_count(name)
     words = _even_canonical_words(bits)
     half = bits // 2
     if vendor == 'metashape':

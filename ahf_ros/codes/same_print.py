@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-from ahf_ros.codes.cyclic import smallest_rotation
+from ahf_ros.codes.cyclic import rotated_words, smallest_rotation
 from ahf_ros.codes.ring import FAMILY_NAMES, family, sector_count
 
 
@@ -64,7 +64,7 @@ def fewest_sectors(word: int, bits: int) -> tuple[int, int]:
             continue
         wide = (1 << width) - 1
         for turn in range(width):
-            turned = (word << turn | word >> (bits - turn)) & ((1 << bits) - 1)
+            turned = rotated_words(word, turn, bits)
             blocks = [turned >> bit * width & wide for bit in range(count)]
             if all(block in (0, wide) for block in blocks):
                 return count, sum((block > 0) << bit for bit, block in enumerate(blocks))

@@ -6,17 +6,7 @@ from typing import Any
 
 import cv2
 
-ARUCO_NAMES = (
-    *(f'aruco_{side}x{side}_{count}' for side in (4, 5, 6, 7) for count in (50, 100, 250, 1000)),
-    'aruco_original',
-)
-"""Families of ArUco: cells along a side, and number of markers."""
-
-APRILTAG_NAMES = ('apriltag_16h5', 'apriltag_25h9', 'apriltag_36h10', 'apriltag_36h11')
-"""Families of AprilTag."""
-
-SQUARE_NAMES = (*ARUCO_NAMES, *APRILTAG_NAMES)
-"""All families of square markers."""
+from ahf_ros.codes.names import SQUARE_NAMES
 
 
 def dictionary(name: str) -> Any:

@@ -1,8 +1,9 @@
 """Detectors, and the registry that makes one from a name or from a family of targets.
 
-A family of targets is one folder here and one line below. Other packages add detectors by entry
-points of the group `ahf_ros.detectors`: the name of a detector, and a callable that makes it from
-`DetectorSettings`.
+A family of targets is one folder here and one line below. What a line names is imported when it is
+used: who only chooses, such as the command line, does without all detectors. Other packages add
+detectors by entry points of the group `ahf_ros.detectors`: the name of a detector, and a callable
+that makes it from `DetectorSettings`.
 """
 
 from __future__ import annotations
@@ -10,25 +11,24 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
-from typing import Any
-
-import numpy as np
+from pkgutil import resolve_name
+from typing import TYPE_CHECKING, Any
 
 from ahf_ros.codes.families import FAMILY_NAMES, KINDS, check_numbers, families_in
-from ahf_ros.detectors.contract import Detector, DetectorSettings, Drafter, Expecting, Refiner
-from ahf_ros.detectors.dots.detector import DotsDetector
-from ahf_ros.detectors.dots.published import PublishedDotsDetector
-from ahf_ros.detectors.external.command import CommandDetector
-from ahf_ros.detectors.external.guarded import guarded
-from ahf_ros.detectors.gsi.detector import GsiDetector
-from ahf_ros.detectors.gsi.published import PublishedGsiDetector
-from ahf_ros.detectors.ring.counting import estimate_count
-from ahf_ros.detectors.ring.detector import RingDetector
-from ahf_ros.detectors.ring.traditional import TraditionalDetector
-from ahf_ros.detectors.square.detector import SquareDetector
+from ahf_ros.detectors.contract import (
+    Detector,
+    DetectorSettings,
+    Discerning,
+    Drafter,
+    Expecting,
+    Refiner,
+)
 from ahf_ros.settings.nested import updated
 from ahf_ros.settings.parameter import Parameter
 from ahf_ros.text import printable, reason_of
+
+if TYPE_CHECKING:
+    import numpy as np
 
 __all__ = [
     'AUTO',
@@ -38,6 +38,7 @@ __all__ = [
     'GROUP',
     'Detector',
     'DetectorSettings',
+    'Discerning',
     'Drafter',
     'Expecting',
     'Refiner',
@@ -56,29 +57,47 @@ AUTO = 'auto'
 
 @dataclass(frozen=True, slots=True)
 class _Entry:
-    """A detector, its families, and how their targets are counted without being decoded."""
+    """A detector, its families, and how their targets are counted without being decoded.
 
-    create: Callable[[DetectorSettings], Detector]
+    `detector` and `estimate` are module and name, below `ahf_ros`.
+    """
+
+    detector: str
     families: tuple[str, ...]
-    estimate: Callable[[np.ndarray, DetectorSettings], int] | None = None
+    estimate: str = ''
     several: bool = False  # families at a time
     own_ids: bool = False  # rather than those of the families
 
     def reads(self, families: tuple[str, ...]) -> bool:
         return set(families) <= set(self.families) and (self.several or len(families) == 1)
 
+    def create(self, settings: DetectorSettings) -> Detector:
+        made: Detector = resolve_name(f'ahf_ros.{self.detector}')(settings)
+        return made
+
+    def count(self, image: np.ndarray, settings: DetectorSettings) -> int:
+        counted: int = resolve_name(f'ahf_ros.{self.estimate}')(image, settings)
+        return counted
+
 
 # The detector of a family is the first one that lists it.
 _ENTRIES = {
-    'ring': _Entry(RingDetector, KINDS['ring'], estimate_count, several=True),
-    'traditional': _Entry(TraditionalDetector, KINDS['ring']),
-    'aruco': _Entry(SquareDetector, KINDS['aruco']),
-    'apriltag': _Entry(SquareDetector, KINDS['apriltag']),
-    'gsi': _Entry(GsiDetector, KINDS['gsi']),
-    'gsi_published': _Entry(PublishedGsiDetector, KINDS['gsi']),
-    'dots': _Entry(DotsDetector, KINDS['dots']),
-    'dots_published': _Entry(PublishedDotsDetector, KINDS['dots']),
-    'command': _Entry(CommandDetector, FAMILY_NAMES, several=True, own_ids=True),
+    'ring': _Entry(
+        'detectors.ring.detector:RingDetector',
+        KINDS['ring'],
+        'detectors.ring.counting:estimate_count',
+        several=True,
+    ),
+    'traditional': _Entry('detectors.ring.traditional:TraditionalDetector', KINDS['ring']),
+    'aruco': _Entry('detectors.square.detector:SquareDetector', KINDS['aruco']),
+    'apriltag': _Entry('detectors.square.detector:SquareDetector', KINDS['apriltag']),
+    'gsi': _Entry('detectors.gsi.detector:GsiDetector', KINDS['gsi']),
+    'gsi_published': _Entry('detectors.gsi.published:PublishedGsiDetector', KINDS['gsi']),
+    'dots': _Entry('detectors.dots.detector:DotsDetector', KINDS['dots']),
+    'dots_published': _Entry('detectors.dots.published:PublishedDotsDetector', KINDS['dots']),
+    'command': _Entry(
+        'detectors.external.command:CommandDetector', FAMILY_NAMES, several=True, own_ids=True
+    ),
 }
 
 _ADDED: dict[str, EntryPoint] = {
@@ -194,20 +213,22 @@ def estimator(settings: DetectorSettings) -> Callable[[np.ndarray], int]:
     ValueError
         If targets of this family cannot be counted.
     """
-    count = _ENTRIES[detector_name(AUTO, settings.family)].estimate
-    if count is None:
+    entry = _ENTRIES[detector_name(AUTO, settings.family)]
+    if not entry.estimate:
         counted = [
-            name for entry in _ENTRIES.values() if entry.estimate for name in entry.families
+            name for other in _ENTRIES.values() if other.estimate for name in other.families
         ]
         raise ValueError(
             f'estimate_expected is True and family is {settings.family!r}; accepted with this '
             f'family is False, and True with one of {", ".join(counted)}'
         )
-    return lambda image: count(image, settings)
+    return lambda image: entry.count(image, settings)
 
 
 def _added(point: EntryPoint, settings: DetectorSettings) -> Detector:
     """Return a detector of another package, which may raise anything."""
+    from ahf_ros.detectors.external.guarded import guarded
+
     try:
         return guarded(point.load()(settings), settings.detector_timeout)
     except (Exception, SystemExit) as error:

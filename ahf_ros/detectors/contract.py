@@ -5,13 +5,14 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol, runtime_checkable
-
-import numpy as np
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 from ahf_ros.codes.families import ACCEPTED, families_in
 from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.target import Target
+
+if TYPE_CHECKING:
+    import numpy as np
 
 _MINIMUM_RADIUS = 4.0  # of a dot, px, where the user sets none
 _MINIMUM_RADII = {'gsi': 2.0, 'dots': 2.5}  # of families whose dot is small beside the target
@@ -102,6 +103,19 @@ class Drafter(Protocol):
 
     def draft(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image, as a call does but with rough centres."""
+        ...
+
+
+@runtime_checkable
+class Discerning(Protocol):
+    """A detector that identifies in an image as received nearly all that any filter shows it.
+
+    AHF gives up early where filters show it no more.
+    """
+
+    @property
+    def patience(self) -> int:
+        """Filters in a row that show no more targets, after which a search ends."""
         ...
 
 

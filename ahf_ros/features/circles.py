@@ -34,8 +34,9 @@ class Circles:
     @property
     def spacing(self) -> np.ndarray:
         """Distances from each point to the next on its circle, dot radii."""
-        _, circle, count = np.unique(self.radii, return_inverse=True, return_counts=True)
-        return 2 * np.pi * self.radii / count[circle]
+        last = np.flatnonzero(np.diff(self.radii, append=np.inf))
+        count = np.diff(last, prepend=-1)
+        return 2 * np.pi * self.radii / np.repeat(count, count)
 
 
 def dot_circles(polarity: np.ndarray, rays: int) -> Circles:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ahf_ros.features import frame
 from ahf_ros.features.candidates import find_candidates
-from ahf_ros.features.dots import NO_DOTS, Dots, distinct
+from ahf_ros.features.dots import Dots, distinct
 from ahf_ros.features.ellipses import fit_ellipses
 from ahf_ros.features.log_edges import LOG_SCALE
 from ahf_ros.features.outlines import whole_outlines
@@ -75,8 +75,7 @@ def voted_dots(
         Without duplicates, those with the largest share first, in px of the image.
     """
     candidates = find_candidates(pyramid.edges, min_radius, max_radius, polarities, explained)
-    dots = [fit_ellipses(pyramid.logs, some) for some in candidates if len(some.points)]
-    return distinct(Dots.joined([NO_DOTS, *dots]))
+    return distinct(fit_ellipses(pyramid.logs, candidates))
 
 
 def with_other_dots(

@@ -9,8 +9,10 @@ import numpy as np
 
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
+from ahf_ros.features.neighbours import pairs_within
 
 _SAME = 0.3  # largest distance of the centres of the same dot in its radius; of radii in ln
+_PART = 100_000  # pairs looked at at a time, which bounds the memory
 _LOG = logging.getLogger(__name__)
 
 
@@ -39,21 +41,24 @@ NO_DOTS = Dots(np.zeros((0, 3, 3)), np.zeros(0, int), np.zeros(0))
 
 def distinct(dots: Dots) -> Dots:
     """Return dots without duplicates, those with the largest share first."""
-    size = frame.mean_radii(dots.frames)
-    order = np.argsort(dots.frames[:, 0, 2], kind='stable')  # neighbours are near in this order
-    x, y, size = dots.frames[order, 0, 2], dots.frames[order, 1, 2], size[order]
-    polarity = dots.polarity[order]
-    first, last = np.searchsorted(x, x - _SAME * size), np.searchsorted(x, x + _SAME * size)
-    kept: list[int] = []
-    free = np.ones(len(x), bool)
-    for index in np.argsort(-dots.share[order], kind='stable'):
+    order = np.lexsort((dots.frames[:, 0, 2], -dots.share))
+    dots = dots.select(order)
+    size, centres = frame.mean_radii(dots.frames), dots.frames[:, :2, 2]
+    pairs = [(np.zeros(0, np.intp), np.zeros(0, np.intp))]
+    for first, second in pairs_within(centres, _SAME * size, _PART):
+        away = centres[second] - centres[first]
+        same = np.hypot(away[:, 0], away[:, 1]) < _SAME * size[first]
+        same &= dots.polarity[second] == dots.polarity[first]
+        same &= np.abs(np.log(size[second] / size[first])) < _SAME
+        pairs.append((first[same], second[same]))
+    first, second = (np.concatenate(of) for of in zip(*pairs, strict=True))
+    free = np.ones(len(size), bool)
+    starts = np.searchsorted(first, np.arange(len(size) + 1))
+    for index in np.unique(first).tolist():
         if free[index]:
-            kept.append(int(order[index]))
-            near = slice(first[index], last[index] + 1)
-            same = np.hypot(x[near] - x[index], y[near] - y[index]) < _SAME * size[index]
-            same &= polarity[near] == polarity[index]
-            free[near] &= ~(same & (np.abs(np.log(size[near] / size[index])) < _SAME))
-    return dots.select(np.array(kept, np.intp))
+            others = second[starts[index] : starts[index + 1]]
+            free[others[others > index]] = False
+    return dots.select(free)
 
 
 def best(indices: np.ndarray, ranks: np.ndarray, limit: int, what: str) -> np.ndarray:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
 from ahf_ros.features import frame
 from ahf_ros.features.candidates import Candidates
-from ahf_ros.features.dots import Dots
+from ahf_ros.features.dots import NO_DOTS, Dots
 from ahf_ros.features.log_edges import LOG_SCALE
 from ahf_ros.features.robust import fit_linear
 from ahf_ros.features.sampling import sample_circles
@@ -35,9 +36,10 @@ _INLIER, _PIXEL_INLIER = 0.06, 0.4  # of the radius, or px
 _MINIMUM_INLIERS = 0.45
 _MINIMUM_ASPECT = 0.28
 _MINIMUM_MINOR = 1.0  # px
+_PART = 512  # dots fitted at a time, which stay in the cache
 
 
-def fit_ellipses(logs: Sequence[np.ndarray], candidates: Candidates) -> Dots:
+def fit_ellipses(logs: Sequence[np.ndarray], candidates: Sequence[Candidates]) -> Dots:
     """Fit ellipses to the dots about candidates.
 
     About each candidate the steps of ln I along rays are summed on circles and ellipses of all
@@ -47,25 +49,36 @@ def fit_ellipses(logs: Sequence[np.ndarray], candidates: Candidates) -> Dots:
     ----------
     logs : sequence of ndarray of int16
         The pyramid of logarithmic images.
-    candidates : Candidates
+    candidates : sequence of Candidates
 
     Returns
     -------
     Dots
         In px of the first level; only candidates that the edges support.
     """
-    level = candidates.level - (candidates.radii[1] < _COARSE)
-    shrink = 2.0 ** (candidates.level - level)
-    points = (candidates.points + 0.5) * shrink - 0.5
-    low, high = candidates.radii[0] * shrink, candidates.radii[1] * shrink
-    frames, scores = _best_ellipses(logs[level], points, candidates.polarity, low, high)
-    clear = scores > _MINIMUM_SCORE
-    dots = refine_ellipses(logs[level], frames[clear], candidates.polarity[clear])
-    dots = dots.select(frame.ellipse_axes(dots.frames)[0] < _OVERSIZE * high)
-    return Dots(frame.enlarged(dots.frames, level), dots.polarity, dots.share)
+    started: dict[int, list[tuple[Dots, np.ndarray]]] = {}
+    for some in candidates:
+        level = some.level - (some.radii[1] < _COARSE)
+        for start in range(0, len(some.points), _PART):
+            part = slice(start, start + _PART)
+            begun = _best_ellipses(logs[level], some, level, part)
+            started.setdefault(level, []).append(begun)
+    found = [NO_DOTS]
+    for level, parts in started.items():
+        dots = Dots.joined([of_part for of_part, _ in parts])
+        largest = np.concatenate([of_part for _, of_part in parts])
+        for start in range(0, len(dots.frames), _PART):
+            some_dots = dots.select(slice(start, start + _PART))
+            refined, kept = refine_ellipses(logs[level], some_dots.frames, some_dots.polarity)
+            major, _, _ = frame.ellipse_axes(refined.frames)
+            refined = refined.select(major < largest[start + kept])
+            found.append(replace(refined, frames=frame.enlarged(refined.frames, level)))
+    return Dots.joined(found)
 
 
-def refine_ellipses(log: np.ndarray, frames: np.ndarray, polarity: np.ndarray) -> Dots:
+def refine_ellipses(
+    log: np.ndarray, frames: np.ndarray, polarity: np.ndarray
+) -> tuple[Dots, np.ndarray]:
     """Refine ellipses on a logarithmic image, and drop those that its edges do not support.
 
     Parameters
@@ -77,32 +90,46 @@ def refine_ellipses(log: np.ndarray, frames: np.ndarray, polarity: np.ndarray) -
 
     Returns
     -------
-    Dots
+    dots : Dots
         In px of `log`.
+    kept : ndarray of int
+        Indices of the ellipses that these were.
     """
-    dots = Dots(frames, polarity, np.zeros(len(frames)))
+    dots, kept = Dots(frames, polarity, np.zeros(len(frames))), np.arange(len(frames))
     for window in _WINDOWS:
         dots = _refined(log, dots, window)
         major, minor, _ = frame.ellipse_axes(dots.frames)
         good = (minor > _MINIMUM_ASPECT * major) & (minor > _MINIMUM_MINOR)
-        dots = dots.select(good & (dots.share > _MINIMUM_INLIERS))
-    return dots
+        good &= dots.share > _MINIMUM_INLIERS
+        dots, kept = dots.select(good), kept[good]
+    return dots, kept
 
 
 def _best_ellipses(
-    log: np.ndarray, points: np.ndarray, polarity: np.ndarray, low: float, high: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return for each point the ellipse about it with the highest mean step, and that step."""
+    log: np.ndarray, candidates: Candidates, level: int, part: slice
+) -> tuple[Dots, np.ndarray]:
+    """Return the ellipses about some candidates with the highest mean steps.
+
+    Returns
+    -------
+    dots : Dots
+        Those that are clear, in px of the level of `log`.
+    largest : ndarray of float64, shape (k,)
+        Semi-major axis that they may have.
+    """
+    shrink = 2.0 ** (candidates.level - level)
+    x, y = ((candidates.points[part] + 0.5) * shrink - 0.5).T
+    polarity = candidates.polarity[part]
+    low, high = candidates.radii[0] * shrink, candidates.radii[1] * shrink
     templates, radii, majors, minors, directions = _templates(low, high)
-    one = np.ones(len(points))
-    frames = frame.affine_frames(points[:, 0], points[:, 1], one, one, 0 * one)
+    one = np.ones(len(x))
+    frames = frame.affine_frames(x, y, one, one, 0 * one)
     steps = _steps(log, frames, radii, polarity)
-    scores = steps.reshape(len(points), len(templates)) @ templates
-    best = scores.argmax(axis=1)
-    fitted = frame.affine_frames(
-        points[:, 0], points[:, 1], majors[best], minors[best], directions[best]
-    )
-    return fitted, scores[np.arange(len(points)), best]
+    scores = steps.reshape(len(x), len(templates)) @ templates
+    best, highest = scores.argmax(axis=1), scores.max(axis=1)
+    fitted = frame.affine_frames(x, y, majors[best], minors[best], directions[best])
+    dots = Dots(fitted, polarity, highest).select(highest > _MINIMUM_SCORE)
+    return dots, np.full(len(dots.frames), _OVERSIZE * high)
 
 
 @lru_cache(maxsize=16)  # a megabyte each; radii may be set to any number while a node runs

@@ -228,6 +228,11 @@ def enlarged(frames: np.ndarray, level: int) -> np.ndarray:
     return larger
 
 
+def reduced(points: np.ndarray, level: int) -> np.ndarray:
+    """Return points in the pixels of the image that is halved `level` times."""
+    return (points + 0.5) / 2**level - 0.5
+
+
 def ellipse_axes(frames: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the semi-axes of the dots and the direction of the major ones.
 

@@ -13,6 +13,7 @@ import numpy as np
 from ahf_ros.features.robust import cauchy, median
 
 _NO_WEIGHT = 1e-9  # instead of a sum of no weights
+_UNEVEN = 0.011  # usual error of slopes where light is no slope within a profile, 1/px
 _MINIMUM_USUAL = 0.002  # of the errors of slopes, 1/px
 _OUTLIER = 3.0  # times the usual error of a slope that halves its weight
 
@@ -43,6 +44,21 @@ class LightSlope:
         """Return what the errors do, given what the smoothed slopes do, shape (k, c, n) both."""
         of_profiles = (of_slopes / self.totals[:, None]) @ self.window.T
         return of_profiles * (self.weights * self.errors)[:, None]
+
+
+def unevenness(errors: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Return how much the slopes of k outlines differ from their neighbours, 0 to 1, shape (k,).
+
+    Where slopes differ from profile to profile, light is no slope within a profile, either.
+
+    Parameters
+    ----------
+    errors, weights : ndarray of float64, shape (k, n)
+        Of the slopes of single profiles, 1/px, and how much these count.
+    """
+    squares = (weights * errors**2).sum(axis=1) / np.maximum(weights.sum(axis=1), _NO_WEIGHT)
+    uneven: np.ndarray = np.minimum(squares / _UNEVEN**2, 1)
+    return uneven
 
 
 def common_slope(slopes: np.ndarray, polarity: np.ndarray, weights: np.ndarray) -> np.ndarray:

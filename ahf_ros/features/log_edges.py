@@ -48,10 +48,11 @@ class LogEdges:
 
     def outside(self, polygons: Sequence[np.ndarray]) -> LogEdges:
         """Return the edges that lie outside of polygons, each of shape (n, 2), px."""
-        mask = np.zeros(self.marked.shape, np.uint8)
-        for polygon in polygons:
-            cv2.fillPoly(mask, [np.rint(polygon).astype(np.int32)], 1)
-        return self.select(mask[self.y, self.x] == 0)
+        return self.unmasked(mask_of(polygons, self.marked.shape))
+
+    def unmasked(self, mask: np.ndarray) -> LogEdges:
+        """Return the edges where a mask of the size of the image is 0."""
+        return self.select(mask.ravel().take(self.y * np.intp(mask.shape[1]) + self.x) == 0)
 
     def curved(self, length: float) -> LogEdges:
         """Return the edges that do not run straight on for `length` px, to neither side."""
@@ -65,12 +66,24 @@ class LogEdges:
         """Return whether edges have the same gradient `way` px along themselves."""
         height, width = self.dx.shape
         unit_x, unit_y = self.unit_x[which], self.unit_y[which]
-        x = np.clip(np.rint(self.x[which] - way * unit_y).astype(np.int32), 0, width - 1)
-        y = np.clip(np.rint(self.y[which] + way * unit_x).astype(np.int32), 0, height - 1)
-        across, down = self.dx[y, x].astype(np.float32), self.dy[y, x].astype(np.float32)
+        x = np.rint(self.x[which] - np.float32(way) * unit_y)
+        y = np.rint(self.y[which] + np.float32(way) * unit_x)
+        at = np.clip(y, 0, height - 1).astype(np.intp) * width
+        at += np.clip(x, 0, width - 1).astype(np.intp)
+        across, down = (of.ravel().take(at).astype(np.float32) for of in (self.dx, self.dy))
         along = across * unit_x + down * unit_y
         strong = along > np.float32(_CONTINUED) * self.strength[which]
-        return (along > _STRAIGHT * np.hypot(across, down)) & strong
+        squares = across * across + down * down
+        return strong & (along * along > np.float32(_STRAIGHT**2) * squares)
+
+
+def mask_of(polygons: Sequence[np.ndarray] | np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """Return a mask of shape (height, width) that is not 0 in polygons, each of shape (n, 2)."""
+    mask = np.zeros(shape, np.uint8)
+    corners = np.rint(polygons) if isinstance(polygons, np.ndarray) else map(np.rint, polygons)
+    for polygon in corners:
+        cv2.fillPoly(mask, [polygon.astype(np.int32)], 1)
+    return mask
 
 
 def find_edges(log: np.ndarray) -> LogEdges:

@@ -8,31 +8,25 @@ unexplained, which tell later how much weight the edge deserves.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
-from math import erf, pi, sqrt
 
 import numpy as np
 
 from ahf_ros.features import frame
 from ahf_ros.features.circles import Circles
 from ahf_ros.features.sampling import sample_lines, within
+from ahf_ros.features.step_fit import ALONG, BLUR_STEP, HALF_WIDTHS, fit_steps
 
 USUAL_BLUR = 0.8
 """Standard deviation of a step, px: a sharp lens, the area of a pixel and the interpolation."""
 
-BLURS = (0.5, 2.0)
+BLURS = (0.5, 4.0)
 """Sharpest and softest step that is fitted, standard deviation in px."""
 
 CORRELATION = 1.9
 """Distance along an edge from where on the errors of profiles are independent, px."""
 
-_HALF_WIDTHS = np.array([0.0, 1.0, 1.3, 1.6, 2.0, 2.5, 3.0])  # of a profile, px
-_SAMPLES = 13  # of a profile
-_FARTHEST, _SPACING = 0.8, 0.1  # of the offsets that are tried, half widths of a profile
+_ENOUGH, _ENOUGH_BLURS = 3.0, 2.5  # half width of a profile, px, or deviations of the step
 _MAXIMUM_ASIDE = 0.8  # of the two lines of a profile, from its middle, px
-_BLUR_STEP = 0.1
-_CONTRAST = 0.25  # usual gray value of dark over bright
-_MINIMUM_STEP = 1.0  # gray values, that an offset is computed from
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,28 +141,26 @@ def measure_outlines(
         How far from an outline to look, in its units.
     """
     aside = np.minimum(outlines.spacing / 4, _MAXIMUM_ASIDE)
-    which = np.searchsorted(_HALF_WIDTHS, reach * outlines.scale, side='right') - 1
+    enough = np.maximum(_ENOUGH, _ENOUGH_BLURS * blur)[:, None]
+    which = np.searchsorted(HALF_WIDTHS, np.minimum(reach * outlines.scale, enough), 'right') - 1
     which[outlines.polarity == 0] = 0
-    ends = _HALF_WIDTHS[which, None] * outlines.normals
+    ends = HALF_WIDTHS[which, None] * outlines.normals
     for end in (outlines.points - ends, outlines.points + ends):
         which[~within(end, gray.shape)] = 0
-    blurs = np.rint(np.clip(blur, *BLURS) / _BLUR_STEP).astype(int)
-    groups = np.where(which > 0, which + len(_HALF_WIDTHS) * blurs[:, None], 0)
-    steps = np.zeros((7, *which.shape))
-    for group in np.unique(groups[groups > 0]):
-        blur_steps, index = divmod(int(group), len(_HALF_WIDTHS))
-        half = float(_HALF_WIDTHS[index])
-        selected = np.nonzero(groups == group)
-        polarity = outlines.polarity[selected]
-        across = polarity[:, None] * outlines.normals[selected]  # from dark to bright
-        values = _profiles(gray, outlines.points[selected], across, aside[selected], half)
-        fitted = _fit_steps(values, _step_filters(half, blur_steps * _BLUR_STEP))
-        fitted[[0, 3]] *= polarity
-        steps[:, selected[0], selected[1]] = fitted
+    blurs = np.rint(np.clip(blur, *BLURS) / BLUR_STEP).astype(int)
+    groups = (which + len(HALF_WIDTHS) * blurs[:, None]).ravel()
+    chosen = np.flatnonzero(which)
+    chosen = chosen[np.argsort(groups[chosen], kind='stable')]
+    fitted = fit_steps(_profiles(gray, outlines, aside, which, chosen), groups[chosen])
+    fitted[[0, 3]] *= outlines.polarity.ravel()[chosen]
+    steps = np.zeros((len(fitted), which.size))
+    steps[:, chosen] = fitted
     # On a curve, the blur and the chord between the two lines of a profile lie inside.
     inside = (blur[:, None] ** 2 + aside**2) / 2 * outlines.curvature
-    steps[0] += np.where(which > 0, inside, 0.0)
-    offset, dark, bright, slope, sensitivity, softness, residual = steps
+    steps[0] += np.where(which > 0, inside, 0.0).ravel()
+    offset, dark, bright, slope, sensitivity, softness, residual = (
+        of.reshape(which.shape) for of in steps
+    )
     return Edges(
         offset,
         dark,
@@ -184,85 +176,31 @@ def measure_outlines(
 
 
 def _profiles(
-    gray: np.ndarray, points: np.ndarray, across: np.ndarray, aside: np.ndarray, half: float
+    gray: np.ndarray,
+    outlines: OutlinePoints,
+    aside: np.ndarray,
+    which: np.ndarray,
+    chosen: np.ndarray,
 ) -> np.ndarray:
-    """Return profiles through n points, each the mean of two lines, shape (n, samples)."""
-    along = np.linspace(-half, half, _SAMPLES)
-    beside = aside[:, None] * across[:, ::-1] * [-1, 1]
-    first, second = (
-        sample_lines(gray, middles, across, along)
-        for middles in (points - beside, points + beside)
-    )
-    return (first + second) / 2
+    """Return profiles through some points, each the mean of two lines, shape (n, samples).
 
-
-def _fit_steps(values: np.ndarray, filters: _StepFilters) -> np.ndarray:
-    """Fit blurred steps to n profiles, shape (n, samples), from dark to bright.
-
-    The fit is linear about each of the offsets tried; the one with the smallest residual is taken.
-
-    Returns
-    -------
-    ndarray of float64, shape (7, n)
-        Offset, levels before and after, slope of the light, how a slope moves the offset, missing
-        blur, and residual.
+    Parameters
+    ----------
+    gray, outlines
+        As for `measure_outlines`.
+    aside : ndarray of float64, shape (k, m)
+        Distance of the two lines from the points, px.
+    which : ndarray of int, shape (k, m)
+        Indices of the half widths.
+    chosen : ndarray of int, shape (n,)
+        Indices of the points, of k m.
     """
-    count = len(filters.offsets)
-    first, second, contrast = (
-        (values @ filters.search).reshape(len(values), 3, count).swapaxes(0, 1)
-    )
-    explained = np.where(contrast > 0, first * first + second * second, -1.0)
-    best = explained.argmax(axis=1)
-    parameters = np.empty((len(values), filters.parts.shape[2]), np.float32)
-    for index in np.unique(best):
-        there = best == index
-        parameters[there] = values[there] @ filters.parts[index]
-    low, high, moved, light, blurred = parameters[:, :5].T.astype(np.float64)
-    residual = np.sqrt((parameters[:, 5:] ** 2).mean(axis=1))
-    contrast = np.maximum(high - low, _MINIMUM_STEP)
-    spacing = filters.offsets[1] - filters.offsets[0]
-    offset = filters.offsets[best] + np.clip(-moved / contrast, -spacing, spacing)
-    slope, softness = light / np.maximum(high, _MINIMUM_STEP), -blurred / contrast
-    return np.stack([offset, low, high, slope, filters.sensitivity[best], softness, residual])
-
-
-@dataclass(frozen=True, slots=True)
-class _StepFilters:
-    offsets: np.ndarray  # (p,), tried, px
-    search: np.ndarray  # (samples, 3 p), two that explain a step at each, and its contrast
-    parts: np.ndarray  # (p, samples, 5 + samples), low, high, moved, slope, blur, residuals
-    sensitivity: np.ndarray  # (p,), how a slope of the light of 1 / px moves a step, px^2
-
-
-@cache
-def _step_filters(half: float, blur: float) -> _StepFilters:
-    """Return the filters that fit steps of a blur to profiles of a half width.
-
-    A step has the levels inside and outside, and minus its contrast times its distance from the
-    offset as unknowns; the slope of the light is one more, and minus its contrast times its change
-    of blur another. A single profile hardly determines these two: each is fitted with those
-    before it, and without those behind.
-    """
-    along = np.linspace(-half, half, _SAMPLES)
-    offsets = np.arange(-_FARTHEST * half, _FARTHEST * half + 1e-9, _SPACING * half)
-    search, parts, sensitivity = [], [], []
-    for offset in offsets:
-        scaled = (along - offset) / blur
-        rise = 0.5 * (1 + np.array([erf(value / sqrt(2)) for value in scaled]))
-        density = np.exp(-0.5 * scaled**2) / (blur * sqrt(2 * pi))
-        light = (along - offset) * (_CONTRAST + (1 - _CONTRAST) * rise)
-        design = np.stack([1 - rise, rise, density, light, scaled * density], axis=1)
-        step = np.linalg.pinv(design[:, :3])
-        slope = np.linalg.pinv(design[:, :4])[3]
-        softness = np.linalg.pinv(design)[4]
-        basis = np.linalg.qr(design)[0]
-        rest = np.eye(_SAMPLES) - basis @ basis.T
-        search.append([*np.linalg.qr(design[:, :2])[0].T, step[1] - step[0]])
-        parts.append(np.column_stack([step.T, slope, softness, rest]))
-        sensitivity.append(-(light @ step[2]) / (1 - _CONTRAST))
-    return _StepFilters(
-        offsets,
-        np.array(search).transpose(2, 1, 0).reshape(_SAMPLES, -1).astype(np.float32),
-        np.array(parts, np.float32),
-        np.array(sensitivity),
-    )
+    points, normals = (of.reshape(-1, 2)[chosen] for of in (outlines.points, outlines.normals))
+    across = outlines.polarity.ravel()[chosen, None] * normals  # from dark to bright
+    beside = aside.ravel()[chosen, None] * across[:, ::-1] * [-1, 1]
+    middles = np.concatenate([points - beside, points + beside])
+    directions = HALF_WIDTHS[which.ravel()[chosen], None] * across
+    lines = sample_lines(gray, middles, np.concatenate([directions] * 2), ALONG)
+    profiles: np.ndarray = lines[: len(points)] + lines[len(points) :]
+    profiles /= 2
+    return profiles

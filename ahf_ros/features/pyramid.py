@@ -19,6 +19,7 @@ LARGEST_RADIUS = 11.2
 """Largest radius of a dot that is voted for on one level, px; larger ones take a higher level."""
 
 _OCTAVE_LEVELS = 3  # of the halves in which the dots of an octave are voted for
+_ROWS = 32  # of an image that are converted at a time, which stay in the cache
 _ABOVE, _SLACK = 1.01, 1.03  # of the bounds of octaves, which overlap by less than votes do
 
 
@@ -145,4 +146,10 @@ def log_image(gray: np.ndarray) -> np.ndarray:
     if gray.dtype == np.uint8:
         table = LOG_SCALE * np.log(np.arange(256) + LOG_OFFSET)
         return cv2.LUT(gray, table.astype(np.int16))
-    return (LOG_SCALE * cv2.log(gray + np.float32(LOG_OFFSET))).astype(np.int16)
+    log = np.empty(gray.shape, np.int16)
+    for start in range(0, len(gray), _ROWS):
+        values = gray[start : start + _ROWS] + np.float32(LOG_OFFSET)
+        cv2.log(values, values)
+        values *= np.float32(LOG_SCALE)
+        log[start : start + _ROWS] = values
+    return log

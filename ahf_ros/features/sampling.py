@@ -44,9 +44,8 @@ def sample_lines(
     middles : ndarray of float, shape (k, 2)
         px.
     directions : ndarray of float, shape (k, 2)
-        Unit vectors.
+        From the middle to the point at 1 along the line, px.
     along : ndarray of float, shape (n,)
-        Distances from the middle, px.
 
     Returns
     -------
@@ -88,17 +87,21 @@ def sample_circles(
     directions = np.stack([np.cos(angles), np.sin(angles)])
     radii = np.broadcast_to(radii, (len(frames), np.shape(radii)[-1])).astype(np.float32)
     values = np.empty((len(frames), len(angles), radii.shape[1]), image.dtype)
+    affine = bool((frames[:, 2] == (0, 0, 1)).all())
     step = max(1, _REMAP_ROWS // len(angles))
     for start in range(0, len(frames), step):
         part = slice(start, start + step)
         along = (frames[part, :, :2] @ directions).astype(np.float32)[..., None]
         centre = frames[part, :, 2].astype(np.float32)[..., None, None]
-        lengths = radii[part, None, :]
-        across, down, scale = (centre[:, row] + along[:, row] * lengths for row in range(3))
-        rows = across.size // radii.shape[1]
-        values[part] = _remapped(
-            image, (across / scale).reshape(rows, -1), (down / scale).reshape(rows, -1)
-        ).reshape(across.shape)
+        rows = [along[:, row] * radii[part, None] for row in range(2 if affine else 3)]
+        for row, points in enumerate(rows):
+            points += centre[:, row]
+        across, down, *scale = rows
+        for points in (across, down) if scale else ():
+            points /= scale[0]
+        shape = (across.shape[0] * across.shape[1], -1)
+        sampled = _remapped(image, across.reshape(shape), down.reshape(shape))
+        values[part] = sampled.reshape(across.shape)
     return values
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -9,7 +10,7 @@ from functools import partial
 
 import numpy as np
 
-from ahf_ros.filtering.genes import with_combination
+from ahf_ros.filtering.genes import first_filters, genes_of, with_combination
 from ahf_ros.filtering.genetic import SearchResult, Values, search
 from ahf_ros.filtering.settings import AdaptiveSettings
 from ahf_ros.filtering.trials import Trials, confirmed
@@ -59,6 +60,7 @@ def choose(
     expected : int
         N; 0 if it is unknown.
     settings : AdaptiveSettings
+        A patience of 0 is no limit.
     remembered : tuple of float or None
         What worked for the image before.
     executor : concurrent.futures.Executor or None
@@ -75,13 +77,19 @@ def choose(
     if not searching or discrepancy(plain) == 0:
         return Choice(expected, plain, kept if searching else remembered, len(trials.targets))
     searched = trials.reduced() if settings.coarse else trials
-    genes = with_combination(settings.tuning.genes, len(trials.plain))
+    genes = with_combination(genes_of(settings.tuning), len(trials.plain))
+    initial = [remembered] if remembered and len(remembered) == len(genes) else []
+    reference = math.inf
+    if settings.genetic.patience:
+        initial += first_filters(genes, plain)
+        reference = searched.discrepancy(expected, plain, executor)
     result = search(
         partial(searched.discrepancy, expected),
         genes,
         settings.genetic,
         np.random.default_rng(settings.genetic.seed),
-        initial=[remembered] if remembered and len(remembered) == len(genes) else [],
+        initial=initial,
+        reference=reference,
         executor=executor,
         clock=clock,
     )

@@ -17,8 +17,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Generator, Sequence
-from concurrent.futures import Executor, wait
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
 from contextlib import closing
 from dataclasses import dataclass
 
@@ -33,58 +33,12 @@ from ahf_ros.filtering.chromosome import (
     mutated,
     selected,
 )
-from ahf_ros.settings.parameter import check_parameters, parameter
+from ahf_ros.filtering.ordered import in_order
+from ahf_ros.filtering.settings import GeneticSettings
 
 DELTA = 1.0
 """delta of Eq. (10). With 1, a fitness of 1 is success. It does not affect the search, because
 tournaments only compare."""
-
-
-@dataclass(frozen=True, slots=True)
-class GeneticSettings:
-    """Parameters of Table 1 of the paper, and limits.
-
-    The paper has a population of 50. With 20, fifty filters are more than two generations, which
-    find slightly more than fifty random filters.
-    """
-
-    population: int = parameter(20, 'Chromosomes per generation.', minimum=2, maximum=10000)
-    generations: int = parameter(100, 'Maximum number of generations.', minimum=1, maximum=100000)
-    stall: int = parameter(
-        50,
-        'Generations without improvement after which a search ends.',
-        minimum=1,
-        maximum=100000,
-    )
-    tournament: int = parameter(
-        8,
-        'Chromosomes in a tournament; the fittest becomes a parent.',
-        minimum=1,
-        maximum=100,
-    )
-    crossover: float = parameter(
-        0.8,
-        'Probability that two parents exchange their bits after a random position.',
-        minimum=0.0,
-        maximum=1.0,
-    )
-    mutation: float = parameter(
-        0.1, 'Probability that a bit of a child flips.', minimum=0.0, maximum=1.0
-    )
-    max_evaluations: int = parameter(
-        50, 'Maximum number of filters tried in a search; 0: no limit.', minimum=0, maximum=1000000
-    )
-    max_duration: float = parameter(
-        0.0,
-        'Time after which a search ends, s; 0: no limit. With a limit, results vary with speed.',
-        minimum=0.0,
-        maximum=86400.0,
-    )
-    seed: int = parameter(0, 'Seed of the random numbers.', minimum=0, maximum=2**31 - 1)
-
-    def __post_init__(self) -> None:
-        """Check every parameter."""
-        check_parameters(self)
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,8 +75,13 @@ class SearchResult:
     tried : tuple of tuple of float
         All values evaluated, in the order in which they counted.
     reason : str
-        Why the search ended: 'found', 'generations', 'stall', 'evaluations', 'duration', or
-        'exhausted' if all values were tried.
+        Why the search ended: 'found', 'patience' if so many in a row were not better than before,
+        'generations', 'stall', 'evaluations', 'duration', or 'exhausted' if all values were
+        tried.
+    in_vain : int
+        Number of evaluations at the end that were not better than those before.
+    discrepancies : tuple of float
+        Those of `tried`.
     """
 
     values: Values
@@ -131,6 +90,8 @@ class SearchResult:
     history: tuple[Generation, ...]
     tried: tuple[Values, ...]
     reason: str
+    in_vain: int = 0
+    discrepancies: tuple[float, ...] = ()
 
     @property
     def generations(self) -> int:
@@ -145,6 +106,7 @@ def search(
     generator: np.random.Generator,
     *,
     initial: Sequence[Values] = (),
+    reference: float = math.inf,
     executor: Executor | None = None,
     clock: Callable[[], float] = time.monotonic,
 ) -> SearchResult:
@@ -158,11 +120,13 @@ def search(
     genes : sequence of Gene
         At least one.
     settings : GeneticSettings
-        Its seed is not used.
+        Its seed is not used, and a patience of 0 is no limit.
     generator : numpy.random.Generator
         Source of all random numbers.
     initial : sequence of tuple of float, optional
         Values of the first chromosomes, each rounded to a value of its gene.
+    reference : float, optional
+        Discrepancy without any values, which counts for the patience.
     executor : concurrent.futures.Executor, optional
         Threads that evaluate a generation; `discrepancy` must be thread-safe. Results count in
         the order of the chromosomes: without `max_duration`, the search does not depend on the
@@ -183,7 +147,7 @@ def search(
     """
     if not genes:
         raise ValueError('genes is empty, accepted is at least one gene')
-    objective = _Objective(discrepancy, settings, executor, clock)
+    objective = _Objective(discrepancy, settings, reference, executor, clock)
     population = first_population(genes, settings.population, generator, initial)
     history: list[Generation] = []
     stalled = 0
@@ -215,6 +179,7 @@ class _Objective:
         self,
         discrepancy: Callable[[Values], float],
         settings: GeneticSettings,
+        reference: float,
         executor: Executor | None,
         clock: Callable[[], float],
     ) -> None:
@@ -223,6 +188,8 @@ class _Objective:
         self.best_discrepancy = math.inf
         self._discrepancy = discrepancy
         self._settings = settings
+        self._reference = reference
+        self._in_vain = 0  # in a row
         self._executor = executor
         self._clock = clock
         self._started = clock()
@@ -233,14 +200,26 @@ class _Objective:
         maximum = self._settings.max_evaluations
         if maximum:
             fresh = fresh[: maximum - len(self.known)]
-        with closing(self._results(fresh)) as results:
+        patience, reason = self._settings.patience, ''
+        while fresh and not reason:
+            # No more are begun than count if all are in vain.
+            number = patience - self._in_vain if patience else len(fresh)
+            reason = self._evaluate_some(fresh[:number])
+            fresh = fresh[number:]
+        return reason
+
+    def _evaluate_some(self, fresh: Sequence[Values]) -> str:
+        settings = self._settings
+        with closing(in_order(self._discrepancy, fresh, self._executor)) as results:
             for values, result in zip(fresh, results, strict=True):
                 self._learn(values, result)
                 if result == 0:
                     return 'found'
-                if len(self.known) == maximum:
+                if 0 < settings.patience <= self._in_vain:
+                    return 'patience'
+                if len(self.known) == settings.max_evaluations:
                     return 'evaluations'
-                if 0 < self._settings.max_duration <= self._clock() - self._started:
+                if 0 < settings.max_duration <= self._clock() - self._started:
                     return 'duration'
         return ''
 
@@ -252,7 +231,8 @@ class _Objective:
     def result(self, history: tuple[Generation, ...], reason: str) -> SearchResult:
         """Return the result of the search."""
         best, tried = self.best_discrepancy, tuple(self.known)
-        return SearchResult(self.best, best, len(tried), history, tried, reason)
+        found, count = tuple(self.known.values()), len(tried)
+        return SearchResult(self.best, best, count, history, tried, reason, self._in_vain, found)
 
     def _learn(self, values: Values, result: float) -> None:
         if not result >= 0:
@@ -260,29 +240,7 @@ class _Objective:
                 f'discrepancy of {values} is {result!r}, accepted is a number of at least 0'
             )
         self.known[values] = result
+        better = result < min(self.best_discrepancy, self._reference)
+        self._in_vain = 0 if better else self._in_vain + 1
         if result < self.best_discrepancy:
             self.best, self.best_discrepancy = values, result
-
-    def _results(self, fresh: Sequence[Values]) -> Generator[float, None, None]:
-        """Yield the discrepancies in order; on closing, cancel what has not begun."""
-        if self._executor is None:
-            yield from map(self._discrepancy, fresh)
-            return
-        successes: list[int] = []
-
-        def evaluate(index: int, values: Values) -> float:
-            if successes and min(successes) < index:
-                return math.nan  # never read: the search ends before
-            result = self._discrepancy(values)
-            if result == 0:
-                successes.append(index)
-            return result
-
-        futures = [self._executor.submit(evaluate, *it) for it in enumerate(fresh)]
-        try:
-            for future in futures:
-                yield future.result()
-        finally:
-            for future in futures:
-                future.cancel()
-            wait(futures)

@@ -30,38 +30,16 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from ahf_ros.filtering.settings import FilterSettings
 from ahf_ros.filtering.transfer import Transfer, blur_taps, transfer
 from ahf_ros.imaging.image import check_image
 from ahf_ros.imaging.logarithm import logarithm, mapping, sample_lattice
-from ahf_ros.settings.parameter import check_parameters, parameter
 
 MARGIN = 12
 """Width of the periodic border around a logarithm, px; few filters reach further."""
 
 STRIP = 128
 """Rows that are processed at once, few enough to stay in the cache of a core."""
-
-
-@dataclass(frozen=True, slots=True)
-class FilterSettings:
-    """Input and output of the filter: the offset of the logarithm and the mapping to 8 bit."""
-
-    log_offset: float = parameter(
-        1 / 255,
-        'Added to the image before the logarithm, as a fraction of its range.',
-        minimum=1e-6,
-        maximum=1.0,
-    )
-    black_percentile: float = parameter(
-        0.1, 'Percentile of the filtered image that becomes black.', minimum=0.0, maximum=49.0
-    )
-    white_percentile: float = parameter(
-        99.5, 'Percentile of the filtered image that becomes white.', minimum=51.0, maximum=100.0
-    )
-
-    def __post_init__(self) -> None:
-        """Check every parameter."""
-        check_parameters(self)
 
 
 class HomomorphicFilter:

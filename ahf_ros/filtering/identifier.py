@@ -25,11 +25,12 @@ import numpy as np
 
 from ahf_ros.filtering.choice import Choice, choose
 from ahf_ros.filtering.fusion import fused
-from ahf_ros.filtering.genes import tuned
+from ahf_ros.filtering.genes import genes_of, tuned
 from ahf_ros.filtering.genetic import SearchResult, Values
 from ahf_ros.filtering.mirroring import MirroredId, is_mirrored
 from ahf_ros.filtering.settings import AdaptiveSettings
-from ahf_ros.filtering.trials import DetectorFunction, Trials
+from ahf_ros.filtering.trace import trace_of
+from ahf_ros.filtering.trials import DetectorFunction, Elsewhere, Trials
 from ahf_ros.imaging.stack import ImageStack
 from ahf_ros.target import FilterState, Identification, Target, count_codes, sorted_targets
 from ahf_ros.target_check import checked_targets
@@ -87,6 +88,9 @@ class Identifier:
         for.
     interrupt : callable, optional
         Called before each identification; what it raises ends `identify`.
+    patience : int
+        Patience of a search where that of the settings is 0; without fusion, which lives on many
+        filters. 0 for no limit.
     mirrored : callable, optional
         From a target to the ID that it has in a mirror, None if that is unknown.
     name : str
@@ -100,6 +104,8 @@ class Identifier:
         The search for the last image; None if there was none.
     memory : Memory
         What earlier images leave to the next one; set it to continue from another identifier.
+    elsewhere : callable or None
+        Tries filters in the place of the detector, see `ahf_ros.filtering.trials.Elsewhere`.
 
     Examples
     --------
@@ -119,17 +125,19 @@ class Identifier:
         draft: DetectorFunction | None = None,
         estimate: Estimate | None = None,
         interrupt: Callable[[], None] | None = None,
+        patience: int = 0,
         mirrored: MirroredId | None = None,
         name: str = 'detector',
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.last_search: SearchResult | None = None
         self.memory = Memory()
+        self.elsewhere: Elsewhere | None = None
         # Without a refinement, centres are those of the detector.
         draft = draft if draft and refine else detector
         self._detector = _interruptible(detector, interrupt)
         self._draft = _interruptible(draft, interrupt)
-        self._settings = settings or AdaptiveSettings()
+        self._settings = _with_patience(settings or AdaptiveSettings(), patience)
         self._expected_targets = expected_targets
         self._refine = refine
         self._estimate = estimate
@@ -161,7 +169,7 @@ class Identifier:
         Returns
         -------
         Identification
-            The result with the smallest |N - n|; of equally good ones that of the image as
+            The result with the smallest `|N - n|`; of equally good ones that of the image as
             received, then the first. With `fusion`, and after a search, what this filter and the
             others show together, see `ahf_ros.filtering.fusion`. The evaluations of its filter
             state are the identifications that led to it; threads may have begun others when the
@@ -183,9 +191,7 @@ class Identifier:
         settings = self._settings
         expected = len(settings.listed) or given
         estimating = not expected and self._estimate is not None
-        trials = Trials(
-            stack, self._detector, self._draft, settings.listed, settings.filter, self._name
-        )
+        trials = self.trials_of(stack)
         threads = settings.threads or os.cpu_count() or 1
         with ThreadPoolExecutor(threads) if threads > 1 else nullcontext() as executor:
             choice = None
@@ -220,7 +226,29 @@ class Identifier:
             self._mirrored,
         )
         name = stack.names[number]
-        return Identification(tuple(ordered), choice.expected, state, estimating, mirrored, name)
+        return Identification(
+            tuple(ordered),
+            choice.expected,
+            state,
+            estimating,
+            mirrored,
+            name,
+            tuple(sorted(settings.listed)),
+            trace_of(choice.search, trials, stack) if choice.search else None,
+        )
+
+    def trials_of(self, stack: ImageStack) -> Trials:
+        """Return what tries filters on a stack."""
+        settings = self._settings
+        return Trials(
+            stack,
+            self._detector,
+            self._draft,
+            settings.listed,
+            settings.filter,
+            self._name,
+            self.elsewhere,
+        )
 
     def _steady(self, trials: Trials, executor: Executor | None) -> Choice | None:
         """Return the filter and N of the image before if it still shows the same n."""
@@ -240,7 +268,8 @@ class Identifier:
     def _remembered(self, trials: Trials) -> Values | None:
         """Return what worked last, None if nothing did or it does not suit these images."""
         remembered = self.memory.filter
-        return remembered if trials.suits(remembered, len(self._settings.tuning.genes)) else None
+        genes = genes_of(self._settings.tuning)
+        return remembered if trials.suits(remembered, len(genes)) else None
 
 
 def _interruptible(
@@ -255,6 +284,13 @@ def _interruptible(
         return detector(image)
 
     return detect
+
+
+def _with_patience(settings: AdaptiveSettings, patience: int) -> AdaptiveSettings:
+    """Return settings with the patience of the detector if they have none of their own."""
+    if settings.genetic.patience or settings.fusion:
+        return settings
+    return replace(settings, genetic=replace(settings.genetic, patience=patience))
 
 
 def _check_count(name: str, count: Any) -> None:

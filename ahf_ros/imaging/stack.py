@@ -16,12 +16,10 @@ import numpy as np
 
 from ahf_ros.imaging.even_light import even_light
 from ahf_ros.imaging.image import brightest, check_image
+from ahf_ros.imaging.limits import MAXIMUM_IMAGES
 
 GAMMA = 2.2
 """Gray values are taken to be light to the power of 1 / GAMMA where light is averaged."""
-
-MAXIMUM_IMAGES = 64
-"""Maximum number of images of a stack."""
 
 _FLOOR = 2 / 255  # of the range; added to both sides of a quotient, about what noise adds
 _STRIP = 64  # rows combined at a time, which stay in the cache of a core

@@ -93,6 +93,31 @@ class Parameter:
         if not self.accepts(value):
             raise ValueError(f'{self.name} is {shown(value)}, accepted is {self.accepted}')
 
+    def value_of(self, text: str) -> Any:
+        """Return the value that a text stands for.
+
+        Raises
+        ------
+        ValueError
+            If there is none that is accepted; the message names the parameter, the text and what
+            is accepted.
+
+        Examples
+        --------
+        >>> Parameter('stack', 1, 'Number of images.', minimum=1).value_of('4')
+        4
+        """
+        try:
+            if isinstance(self.default, bool):
+                value = {'true': True, 'false': False}.get(text.lower(), text)
+            else:
+                value = type(self.default)(text)
+            self.check(value)
+        except ValueError as error:
+            message = f'{self.name} is {shown(text)}, accepted is {self.accepted}'
+            raise ValueError(message) from error
+        return value
+
 
 def parameter(
     default: Any,

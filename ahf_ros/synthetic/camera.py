@@ -167,10 +167,11 @@ class Sensor:
         """Return the 8-bit grey values of light, where 1 saturates; overwrites `light`.
 
         Photon noise is normally distributed with the variance of the Poisson distribution.
+        A lens that is sharper than a pixel leaves light that is slightly negative.
         """
         if self.full_well:
             deviation = np.sqrt(
-                light / np.float32(self.full_well)
+                np.maximum(light, 0) / np.float32(self.full_well)
                 + np.float32((self.read_noise / self.full_well) ** 2)
             )
             deviation *= generator.standard_normal(light.shape, dtype=np.float32)

@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from ahf_ros.codes.designs import HALF_SIDE, proportions
 from ahf_ros.codes.dots import DotFamily, dot_family
 from ahf_ros.codes.gsi import PointFamily
 from ahf_ros.codes.gsi_library import point_family
@@ -16,9 +17,8 @@ from ahf_ros.codes.square import SQUARE_NAMES, dictionary
 from ahf_ros.synthetic.covers import Cover, ring_cover, square_cover
 from ahf_ros.synthetic.dot_covers import dot_ring_cover, point_cover
 
-_HALF_SIDE = 2.4  # of a square marker, in radii of the dot of a ring target of the same size
-_QUIET_ZONE = 4.2  # of ring targets and square markers: 3.5 for the widest band, a fifth more
-_MARGIN = 1.0  # about the outermost dot or border of others, in radii of the dot
+CoverOf = Callable[[int, float], tuple[int, Cover]]
+"""From an ID and a counter-clockwise rotation in rad to the code word and the ink."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,50 +64,44 @@ def designs(
     design_of : callable
         From an ID and a counter-clockwise rotation in rad to the `Design`.
     """
+    ids, cover_of = _covers(name, pinhole, file)
+    common = proportions(name, file)
+
+    def design_of(number: int, turn: float) -> Design:
+        return Design(*cover_of(number, turn), common.reach, common.radius)
+
+    return ids, design_of
+
+
+def _covers(name: str, pinhole: float, file: str) -> tuple[np.ndarray, CoverOf]:
     if name in SQUARE_NAMES:
-        return np.arange(len(dictionary(name).bytesList)), partial(_square_design, name)
+        return np.arange(len(dictionary(name).bytesList)), partial(_square_cover, name)
     if name == 'gsi':
         points = point_family(file)
-        return points.numbers, partial(_point_design, points)
+        return points.numbers, partial(_point_cover, points)
     if name == 'dots':
         dots = dot_family(file)
-        return np.arange(1, dots.words.size + 1), partial(_dot_ring_design, dots, pinhole)
+        return np.arange(1, dots.words.size + 1), partial(_dot_ring_cover, dots, pinhole)
     table = family(name)
-    return np.arange(1, table.words.size + 1), partial(_ring_design, table, pinhole)
+    return np.arange(1, table.words.size + 1), partial(_ring_cover, table, pinhole)
 
 
-def _ring_design(table: Family, pinhole: float, number: int, turn: float) -> Design:
+def _ring_cover(table: Family, pinhole: float, number: int, turn: float) -> tuple[int, Cover]:
     word = table.word(number)
-    return Design(word, ring_cover(table, word, turn, pinhole), table.band_outer, 1.0)
+    return word, ring_cover(table, word, turn, pinhole)
 
 
-def _square_design(name: str, number: int, turn: float) -> Design:
-    cover = square_cover(name, number, _HALF_SIDE, turn)
-    return Design(number, cover, _HALF_SIDE * 2**0.5, _HALF_SIDE)
+def _square_cover(name: str, number: int, turn: float) -> tuple[int, Cover]:
+    return number, square_cover(name, number, HALF_SIDE, turn)
 
 
-def _point_design(table: PointFamily, number: int, turn: float) -> Design:
+def _point_cover(table: PointFamily, number: int, turn: float) -> tuple[int, Cover]:
     word = table.word(number)
-    radius = table.template_radii[table.reference] / table.dot_radius
-    cover = point_cover(table, word, turn)
-    return Design(word, cover, table.reach / table.dot_radius, float(radius))
+    return word, point_cover(table, word, turn)
 
 
-def _dot_ring_design(table: DotFamily, pinhole: float, number: int, turn: float) -> Design:
+def _dot_ring_cover(
+    table: DotFamily, pinhole: float, number: int, turn: float
+) -> tuple[int, Cover]:
     word = table.word(number)
-    return Design(word, dot_ring_cover(table, word, turn, pinhole), table.border_radius, 1.0)
-
-
-def quiet_zone(name: str, file: str = '') -> float:
-    """Return the radius of the area around a target that is left free, in radii of the dot.
-
-    Parameters
-    ----------
-    name, file : str
-        As for `designs`.
-    """
-    if name == 'gsi':
-        return point_family(file).reach / point_family(file).dot_radius + _MARGIN
-    if name == 'dots':
-        return dot_family(file).border_radius + _MARGIN
-    return _QUIET_ZONE
+    return word, dot_ring_cover(table, word, turn, pinhole)

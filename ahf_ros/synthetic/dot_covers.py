@@ -23,9 +23,8 @@ def point_cover(family: PointFamily, word: int, turn: float) -> Cover:
     turn : float
         Counter-clockwise rotation about the reference point, rad.
     """
-    shown = np.r_[: len(family.template), len(family.template) + family.decoding_dots(word)]
-    places = _turned(family.places[shown], turn) / family.dot_radius
-    radii = family.radii[shown] / family.dot_radius
+    places, radii = family.dots(word)
+    places, radii = _turned(places, turn) / family.dot_radius, radii / family.dot_radius
 
     def cover(x: np.ndarray, y: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
         inked = np.zeros_like(x)
@@ -50,9 +49,7 @@ def dot_ring_cover(family: DotFamily, word: int, turn: float, pinhole: float) ->
     pinhole : float
         Radius of the hole in the disc, in radii of the disc; 0 for none.
     """
-    which = np.flatnonzero(word >> np.arange(family.bits) & 1)
-    angles = turn + 2 * math.pi * which / family.bits
-    places = family.dot_circle * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    places = family.places(word, turn)
 
     def cover(x: np.ndarray, y: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
         distance = np.sqrt(x * x + y * y)

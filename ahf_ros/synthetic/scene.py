@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from ahf_ros.codes.designs import proportions
 from ahf_ros.codes.families import FAMILY_NAMES
 from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.synthetic.camera import Camera, Sensor, tilted_camera
-from ahf_ros.synthetic.designs import designs, quiet_zone
+from ahf_ros.synthetic.designs import designs
 from ahf_ros.synthetic.distractors import distractor_marks
 from ahf_ros.synthetic.layout import (
     Placements,
@@ -111,9 +112,9 @@ class SceneSettings:
     blur: float = parameter(
         0.7, 'Blur of the lens, standard deviation in px.', minimum=0.0, maximum=20.0
     )
-    exposure: float = parameter(220.0, 'Mean grey value of lit white.', minimum=1.0, maximum=255.0)
+    exposure: float = parameter(220.0, 'Mean gray value of lit white.', minimum=1.0, maximum=255.0)
     gamma: float = parameter(
-        2.2, 'Grey values are light to the power of 1 / gamma.', minimum=0.5, maximum=4.0
+        2.2, 'Gray values are light to the power of 1 / gamma.', minimum=0.5, maximum=4.0
     )
     full_well: float = parameter(
         10000.0, 'Photoelectrons at saturation; 0: no noise.', minimum=0.0
@@ -147,7 +148,7 @@ class SceneSettings:
                 f'{-strongest:.3f} with a focal_length of {self.focal_length:g}'
             )
         largest = self.dot_radius * (1 + self.radius_spread) * max(size_ratios(self.sizes))
-        zone = quiet_zone(self.family, self.family_file)
+        zone = proportions(self.family, self.family_file).quiet_zone
         reach = float(quiet_radius(largest, self.focal_length * self.width, zone))
         columns, rows = finest_grid(self.width, self.height, reach)
         if self.targets > columns * rows:
@@ -275,7 +276,7 @@ def _coded_targets(
     rounds = -(-count // len(every))
     shuffled = [generator.permutation(every) for _ in range(rounds)]
     ids = np.concatenate([np.empty(0, int), *shuffled])[:count].tolist()
-    zone = quiet_zone(settings.family, settings.family_file)
+    zone = proportions(settings.family, settings.family_file).quiet_zone
     reach = quiet_radius(semi_major, float(camera.intrinsics[0, 0]), zone)
     placements = grid_placements(camera, reach, generator)
 

@@ -19,6 +19,7 @@ from benchmarks.sensitivity import (
     table,
     written,
 )
+from support import ROOT
 
 CERTAIN = 'ahf_ros.detectors.ring.confidence._CERTAIN'
 SCALE = 'ahf_ros.features.profiles.USUAL_BLUR'  # circle_fit imports it
@@ -49,6 +50,7 @@ def test_a_change_reaches_whatever_uses_the_constant(folder: Path) -> None:
 def test_what_cannot_be_changed_is_no_outcome(folder: Path, name: str) -> None:
     done = subprocess.run(
         [sys.executable, '-m', 'benchmarks.changed_constant', str(folder), name, '1.0'],
+        cwd=ROOT,
         capture_output=True,
         text=True,
     )

@@ -12,7 +12,8 @@ from ahf_ros.codes.gsi import positions_of, value_of
 from ahf_ros.codes.gsi_library import point_family
 from ahf_ros.detectors import create_detector
 from ahf_ros.detectors.gsi.grouping import find_templates
-from ahf_ros.drawing import DECODED_COLOUR, DECODING_DOT_COLOUR, draw
+from ahf_ros.drawing.colours import DECODED_COLOUR, DECODING_DOT_COLOUR
+from ahf_ros.drawing.overlay import draw
 from ahf_ros.evaluation import score
 from ahf_ros.features.dots import Dots
 from ahf_ros.features.frame import affine_frames

@@ -36,6 +36,7 @@ def hypotheses(places: list[tuple[float, float]], margins: list[float]) -> Hypot
         sharpness=np.full(count, 5.0),
         polarity=np.ones(count, int),
         starts=np.zeros(count),
+        blur=np.full(count, 0.8),
     )
 
 

@@ -15,11 +15,16 @@ import pytest
 from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.detectors.ring.counting import estimate_count
 from ahf_ros.evaluation import FALSE, evaluate, judge, total
+from ahf_ros.interchange.export.formats import FORMATS, Export
+from ahf_ros.interchange.export.measured_images import read_measured_images
+from ahf_ros.interchange.export.survey import Control
 from ahf_ros.interchange.image_files import read_image
+from ahf_ros.interchange.point_lists import read_point_list
 from ahf_ros.interchange.target_json import read_results
 from ahf_ros.interchange.truth_files import read_truth
 from ahf_ros.target import Truth
 from support import ROOT
+from support.exported import READERS
 from support.photographs import PANEL, WALL, needs_photographs
 
 WALL_TRUTH = Path(__file__).parent / 'wall_truth.csv'
@@ -86,6 +91,23 @@ def test_recall_and_wrong_ids_on_the_panel(panel):
     assert figures.recall == figures.decoding
     assert figures.right >= 544  # measured: 546
     assert figures.rmse[2] < 0.025  # measured: 0.022 px; the truth is good to 0.02
+
+
+@pytest.mark.parametrize('name', FORMATS)
+def test_exports_of_the_panel_hold_what_was_measured(panel, name, tmp_path):
+    """Control coordinates go along; they are in mm, and a format that has none takes none."""
+    images = read_measured_images(panel)
+    control = Control(read_point_list(PANEL / 'points.csv'), 'EPSG:25832', 0.01)
+    Export(name, tmp_path).write(images, control)
+    found = READERS[name](tmp_path)
+    expected = {
+        (Path(image.path).name, str(target.id)): (target.x, target.y)
+        for image in images
+        for target in image.targets
+        if target.id >= 0
+    }
+    assert found.keys() == expected.keys() and len(found) >= 544
+    assert max(np.abs(np.subtract(found[key], expected[key])).max() for key in found) < 0.001
 
 
 def test_targets_on_the_panel_are_counted_among_dots_without_code():

@@ -12,9 +12,8 @@ import pytest
 from ahf_ros.codes.ring import family
 from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.detectors.ring.refinement import refine_centres
-from ahf_ros.filtering.genetic import GeneticSettings
 from ahf_ros.filtering.identifier import Identifier
-from ahf_ros.filtering.settings import AdaptiveSettings
+from ahf_ros.filtering.settings import AdaptiveSettings, GeneticSettings
 from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import UNDECODED, Target
 
@@ -138,3 +137,18 @@ def test_a_filter_leaves_no_trace_in_the_places(name):
     assert result.count == unrefined.count >= 4
     before, after = (distances(of.targets, SCENE) for of in (unrefined, result))
     assert np.sqrt((after**2).mean()) < 0.7 * np.sqrt((before**2).mean())
+
+
+def test_bright_dots_on_black_keep_their_size() -> None:
+    """Where black is 0, edges within a bright dot are as clear as its outline."""
+    scene = SceneSettings(
+        width=640, height=480, targets=12, dot_radius=8, polarity='bright', light='normal', seed=3
+    )
+    dark = np.rint((render(scene).image / 255) ** 3 * 120)
+    image = np.where(dark < 6, 0, dark).astype(np.uint8)
+    detector = create_detector('ring')
+    targets = detector(image)
+    assert len(targets) == 12
+    for target, refined in zip(targets, detector.refine(image, targets), strict=True):
+        assert refined.semi_major == pytest.approx(target.semi_major, rel=0.02)
+        assert np.hypot(refined.x - target.x, refined.y - target.y) < 0.02

@@ -17,6 +17,7 @@ from ahf_ros.detectors import (
     FAMILY_NAMES,
     Detector,
     DetectorSettings,
+    Discerning,
     Drafter,
     Refiner,
     create_detector,
@@ -24,7 +25,8 @@ from ahf_ros.detectors import (
     estimator,
 )
 from ahf_ros.detectors.external.guarded import guarded
-from ahf_ros.session import IdentificationSettings, identify
+from ahf_ros.session import identify
+from ahf_ros.session_settings import IdentificationSettings
 from support.packages import EXAMPLE, write_package
 from support.square_markers import needs_square_markers
 
@@ -93,6 +95,16 @@ def test_refinement_and_drafts_are_part_of_the_contract():
     assert not isinstance(ring, Drafter)
     assert isinstance(create_detector('traditional'), Drafter)
     assert not isinstance(create_detector('command', command='program'), Refiner)
+
+
+@pytest.mark.parametrize(
+    'name', ['ring', 'traditional', 'gsi', 'gsi_published', 'dots', 'command']
+)
+def test_only_detectors_that_hardly_need_a_filter_have_a_patience(name):
+    kind = name.partition('_')[0]
+    family = kind if kind in ('gsi', 'dots') else 'metashape12'
+    made = create_detector(name, family=family, command='program')
+    assert isinstance(made, Discerning) == (name in ('ring', 'gsi', 'dots'))
 
 
 def test_an_unknown_detector_is_refused_by_name():

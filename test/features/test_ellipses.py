@@ -53,7 +53,7 @@ def test_a_start_that_is_near_comes_onto_the_edge(ellipse, polarity):
     log = log_image(drawn([ellipse], *colours))
     x, y, major, minor, angle = ellipse
     start = frames_of((x + 0.1 * minor, y - 0.1 * minor, 1.1 * major, 1.08 * minor, angle))
-    dots = refine_ellipses(log, start, np.array([polarity]))
+    dots, _ = refine_ellipses(log, start, np.array([polarity]))
     assert dots.polarity.tolist() == [polarity]
     assert dots.share[0] > 0.9
     assert dots.frames[0, :2, 2] == pytest.approx((x, y), abs=0.2)
@@ -68,7 +68,7 @@ def test_a_start_that_is_near_comes_onto_the_edge(ellipse, polarity):
 def test_an_edge_of_light_across_the_dot_moves_it_little(angle):
     gray = half_in_shadow(drawn([(100.3, 90.6, 16.0, 14.0, 0.3)]), 104, 92, angle)
     start = frames_of((101.0, 90.0, 15.0, 15.0, 0.0))
-    dots = refine_ellipses(log_image(gray), start, np.array([1]))
+    dots, _ = refine_ellipses(log_image(gray), start, np.array([1]))
     assert dots.share[0] > 0.7
     assert dots.frames[0, :2, 2] == pytest.approx((100.3, 90.6), abs=0.4)
 
@@ -76,14 +76,14 @@ def test_an_edge_of_light_across_the_dot_moves_it_little(angle):
 def test_what_the_edges_do_not_bear_out_is_left_out():
     log = log_image(drawn([(60, 60, 12, 12, 0)]))
     start = frames_of((60, 60, 12, 12, 0), (160, 120, 12, 12, 0), (60, 60, 12, 12, 0))
-    dots = refine_ellipses(log, start, np.array([1, 1, -1]))
+    dots, _ = refine_ellipses(log, start, np.array([1, 1, -1]))
     assert len(dots.frames) == len(dots.polarity) == len(dots.share) == 1
     assert dots.frames[0, :2, 2] == pytest.approx((60, 60), abs=0.1)
 
 
 def test_nothing_in_nothing_out():
     log = log_image(drawn([(60, 60, 12, 12, 0)]))
-    dots = refine_ellipses(log, np.zeros((0, 3, 3)), np.zeros(0, int))
+    dots, _ = refine_ellipses(log, np.zeros((0, 3, 3)), np.zeros(0, int))
     assert (dots.frames.shape, dots.polarity.shape, dots.share.shape) == ((0, 3, 3), (0,), (0,))
 
 
@@ -95,7 +95,7 @@ def test_an_ellipse_is_found_about_a_candidate(ellipse, level):
     size = np.sqrt(major * minor) / scale
     points = (np.array([[x + 1.5, y - 1.5]]) + 0.5) / scale - 0.5
     candidate = Candidates(level, points, (0.7 * size, 1.4 * size), np.array([1]))
-    dots = fit_ellipses(image_pyramid(drawn([ellipse]), 60.0).logs, candidate)
+    dots = fit_ellipses(image_pyramid(drawn([ellipse]), 60.0).logs, [candidate])
     assert dots.polarity.tolist() == [1]
     assert dots.frames[0, :2, 2] == pytest.approx((x, y), abs=0.3 * scale)
     fitted = [axis[0] for axis in frame.ellipse_axes(dots.frames)]
@@ -104,7 +104,7 @@ def test_an_ellipse_is_found_about_a_candidate(ellipse, level):
 
 def test_a_candidate_on_even_ground_has_no_ellipse():
     candidate = Candidates(1, np.array([[80.0, 20.0]]), (5.8, 11.2), np.array([1]))
-    dots = fit_ellipses(image_pyramid(drawn([(60, 60, 12, 12, 0)]), 60.0).logs, candidate)
+    dots = fit_ellipses(image_pyramid(drawn([(60, 60, 12, 12, 0)]), 60.0).logs, [candidate])
     assert len(dots.frames) == len(dots.polarity) == len(dots.share) == 0
 
 

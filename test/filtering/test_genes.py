@@ -1,15 +1,17 @@
 import numpy as np
 import pytest
 
-from ahf_ros.filtering.genes import EXTENDED, PUBLISHED, TuningSettings, tuned
+from ahf_ros.filtering.chromosome import decoded, encoded
+from ahf_ros.filtering.genes import first_filters, genes_of, tuned, with_combination
 from ahf_ros.filtering.homomorphic import HomomorphicFilter
+from ahf_ros.filtering.settings import EXTENDED, PUBLISHED, TuningSettings
 from ahf_ros.filtering.transfer import median_distance, transfer
 
 SHAPE = (48, 64)
 
 
 def test_the_published_search_tunes_the_gains_of_the_paper():
-    high, low = TuningSettings(search=PUBLISHED).genes
+    high, low = genes_of(TuningSettings(search=PUBLISHED))
     assert (high.count, high.bits, high.value(0), high.value(30)) == (31, 5, 1.0, 4.0)
     assert (low.count, low.bits, low.value(0), low.value(100)) == (101, 7, 0.0, 1.0)
     assert tuned(SHAPE, (2.8, 0.82)) == transfer(SHAPE, 2.8, 0.82)
@@ -17,8 +19,8 @@ def test_the_published_search_tunes_the_gains_of_the_paper():
 
 def test_an_extended_search_also_tunes_cutoff_and_exponent():
     settings = TuningSettings(search=EXTENDED, cutoff_min=0.25, cutoff_max=2, exponent_min=0.3)
-    *gains, cutoff, exponent = settings.genes
-    assert tuple(gains) == TuningSettings(search=PUBLISHED).genes
+    *gains, cutoff, exponent = genes_of(settings)
+    assert tuple(gains) == genes_of(TuningSettings(search=PUBLISHED))
     assert [cutoff.value(index) for index in range(cutoff.count)] == [
         -2,
         -1.5,
@@ -71,3 +73,16 @@ def test_an_exponent_is_a_power_of_the_filtered_image():
 def test_a_setting_out_of_range_is_refused(values, words):
     with pytest.raises(ValueError, match=words):
         TuningSettings(**values)
+
+
+@pytest.mark.parametrize('plain', [None, (2.0,)])
+@pytest.mark.parametrize('search', [PUBLISHED, EXTENDED])
+def test_the_first_filters_are_chromosomes_far_apart(search, plain):
+    genes = with_combination(genes_of(TuningSettings(search=search)), 3 if plain else 1)
+    first = first_filters(genes, plain)
+    for values in first:
+        bits = np.array(encoded(values, genes))
+        assert np.allclose(decoded(bits, genes), values)
+        assert plain is None or values[-1:] == plain
+    light_kept = [values[1] / values[0] for values in first]
+    assert max(light_kept) > 4 * min(light_kept)

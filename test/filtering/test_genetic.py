@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import itertools
 import math
 import threading
 import time
@@ -8,7 +9,8 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from ahf_ros.filtering.genetic import DELTA, Gene, GeneticSettings, search
+from ahf_ros.filtering.genetic import DELTA, Gene, search
+from ahf_ros.filtering.settings import GeneticSettings
 
 GENES = [Gene('gamma_high', 1.0, 4.0, 0.1), Gene('gamma_low', 0.0, 1.0, 0.01)]
 FREE = {'max_evaluations': 0}
@@ -26,7 +28,9 @@ def unreachable(values):
 
 def run(objective, seed=0, **settings):
     keywords = {
-        key: settings.pop(key) for key in ('initial', 'executor', 'clock') if key in settings
+        key: settings.pop(key)
+        for key in ('initial', 'reference', 'executor', 'clock')
+        if key in settings
     }
     generator = np.random.default_rng(seed)
     return search(objective, GENES, GeneticSettings(**settings), generator, **keywords)
@@ -183,6 +187,27 @@ def test_an_improvement_starts_the_stall_again():
     assert result.reason == 'stall'
     best = [generation.best for generation in result.history]
     assert result.generations == best.index(max(best)) + 6
+
+
+@pytest.mark.parametrize('threads', [1, 4])
+def test_patience_ends_a_search_and_begins_nothing_that_does_not_count(threads):
+    objective = Recorder(lambda values: 7)
+    with ThreadPoolExecutor(threads) as executor:
+        result = run(objective, patience=3, reference=7, executor=executor)
+    assert (result.reason, result.evaluations, result.in_vain) == ('patience', 3, 3)
+    assert sorted(objective.asked) == sorted(result.tried)
+
+
+@pytest.mark.parametrize(('first', 'evaluations'), [(6, 3), (7, 2)])
+def test_what_is_better_than_no_values_starts_the_patience_again(first, evaluations):
+    calls = itertools.count()
+    result = run(lambda values: 7 if next(calls) else first, patience=2, reference=7)
+    assert (result.evaluations, result.discrepancy) == (evaluations, first)
+
+
+def test_patience_lasts_from_one_generation_to_the_next():
+    result = run(lambda values: 7, patience=25, population=20, reference=7)
+    assert (result.reason, result.evaluations, result.generations) == ('patience', 25, 2)
 
 
 def test_the_limit_on_time_is_obeyed():

@@ -6,7 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from ahf_ros.filtering.homomorphic import FilterSettings, HomomorphicFilter
+from ahf_ros.filtering.homomorphic import HomomorphicFilter
+from ahf_ros.filtering.settings import FilterSettings
 from ahf_ros.imaging.logarithm import logarithm
 from ahf_ros.settings.parameter import parameters
 from support.fourier import filtered_fft, filtered_logarithm_fft

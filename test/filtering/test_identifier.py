@@ -6,11 +6,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ahf_ros.filtering.genes import EXTENDED, PUBLISHED, TuningSettings
-from ahf_ros.filtering.genetic import GeneticSettings
-from ahf_ros.filtering.homomorphic import FilterSettings, HomomorphicFilter
+from ahf_ros.filtering.genes import FIRST
+from ahf_ros.filtering.homomorphic import HomomorphicFilter
 from ahf_ros.filtering.identifier import Identifier
-from ahf_ros.filtering.settings import AdaptiveSettings
+from ahf_ros.filtering.settings import (
+    EXTENDED,
+    PUBLISHED,
+    AdaptiveSettings,
+    FilterSettings,
+    GeneticSettings,
+    TuningSettings,
+)
 from ahf_ros.filtering.transfer import median_distance
 from ahf_ros.filtering.trials import CONFIRMED
 from ahf_ros.settings.parameter import parameters
@@ -65,6 +71,7 @@ def test_the_image_as_received_comes_first_and_may_be_enough():
     result = identify(BRIGHT, detector, COUNT)
     assert result.count == result.expected == COUNT
     assert (result.filter.applied, result.filter.evaluations, detector.calls) == (False, 1, 1)
+    assert result.search is None
     assert detector.images[0] is BRIGHT
 
 
@@ -78,6 +85,11 @@ def test_a_filter_is_found_where_the_light_defeats_the_detector():
     assert state.applied
     assert state.evaluations == detector.calls
     assert state.generations >= 1
+    trace = result.search
+    assert (trace.reason, trace.discrepancies[-1], min(trace.discrepancies)) == ('found', 0, 0)
+    assert len(trace.gamma_high) == len(trace.attenuation) == state.evaluations - 1
+    assert trace.generations[-1] == len(trace.discrepancies)
+    assert (trace.gamma_high[-1], trace.cutoff[-1]) == (state.gamma_high, state.cutoff)
     assert state.cutoff == median_distance(96, 96)
     assert state.attenuation == state.gamma_high - state.gamma_low
     filtered = HomomorphicFilter(DIM).filtered(state.gamma_high, state.gamma_low)
@@ -119,6 +131,35 @@ def test_the_image_as_received_wins_a_tie():
     assert not result.filter.applied
     assert (result.filter.gamma_high, result.filter.gamma_low) == (1.0, 1.0)
     assert result.filter.evaluations == 31
+
+
+@pytest.mark.parametrize('threads', [1, 3])
+def test_a_search_in_vain_ends_with_the_patience_of_the_detector(threads):
+    settings = AdaptiveSettings(threads=threads)
+    identifier = Identifier(lambda image: [target(1)], settings, patience=2)
+    assert identifier.identify(DIM, 5).filter.evaluations == 3
+    assert identifier.last_search.reason == 'patience'
+    assert identifier.last_search.tried == FIRST[:2]
+
+
+@pytest.mark.parametrize(
+    'settings',
+    [AdaptiveSettings(fusion=True), AdaptiveSettings(genetic=GeneticSettings(patience=100))],
+)
+def test_fusion_and_the_settings_come_before_the_patience_of_the_detector(settings):
+    identifier = Identifier(lambda image: [target(1)], settings, patience=2)
+    assert identifier.identify(DIM, 5).filter.evaluations == 51
+
+
+def test_a_filter_that_shows_more_keeps_a_search_going():
+    numbers = iter((3, 3, 4))
+    identifier = Identifier(
+        lambda image: [target(number) for number in range(next(numbers, 4))],
+        AdaptiveSettings(threads=1),
+        patience=2,
+    )
+    result = identifier.identify(DIM, 9)
+    assert (result.count, result.filter.evaluations) == (4, 5)
 
 
 def test_too_many_targets_are_as_bad_as_too_few():
@@ -415,6 +456,7 @@ def test_ids_that_are_listed_beat_a_number():
     found = identify(image, detector, 50, listed)
     assert [target.id for target in found.targets] == [1, 2, 3]
     assert (found.expected, found.filter.applied) == (3, True)
+    assert (found.expected_ids, without.expected_ids) == ((1, 2, 3), ())
     seen = identify(image, detector, 0, AdaptiveSettings(expected_ids='1-2'))
     assert [target.id for target in seen.targets] == [1, 2]
     assert (seen.expected, seen.filter.evaluations, seen.filter.applied) == (2, 1, False)

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ahf_ros.filtering.genetic import GeneticSettings
 from ahf_ros.filtering.identifier import Identifier, Memory
-from ahf_ros.filtering.settings import AdaptiveSettings
+from ahf_ros.filtering.settings import AdaptiveSettings, GeneticSettings
 from ahf_ros.imaging.stack import COMBINATIONS, ImageStack
 from ahf_ros.target import Target
 
@@ -64,6 +63,8 @@ def test_the_combination_is_a_gene_of_the_search():
     assert identifier.last_search is not None
     numbers = {int(values[-1]) for values in identifier.last_search.tried}
     assert numbers == set(range(len(NAMES)))
+    assert found.search is not None
+    assert set(found.search.combinations) == set(NAMES)
     assert {len(values) for values in identifier.last_search.tried} == {5}
     assert found.filter.evaluations == 12 + len(NAMES)
 

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from ahf_ros.cli import main
+from ahf_ros.codes.designs import proportions
 from ahf_ros.codes.dots import dot_family
 from ahf_ros.codes.gsi_library import GSI_LIBRARY, point_family
 from ahf_ros.interchange.truth_files import read_truth
 from ahf_ros.synthetic.camera import Camera, tilted_camera
-from ahf_ros.synthetic.designs import designs, quiet_zone
+from ahf_ros.synthetic.designs import designs
 from ahf_ros.synthetic.prints import Mark, print_mark
 from ahf_ros.synthetic.scene import SceneSettings, render
 
@@ -111,8 +112,9 @@ def test_steep_views_can_be_rendered() -> None:
 
 
 def test_targets_are_as_far_apart_as_they_are_wide() -> None:
-    assert quiet_zone('gsi') == pytest.approx(GSI.reach / 1.5 + 1)
-    assert quiet_zone('dots') == pytest.approx(4.2) == quiet_zone('metashape12')
+    assert proportions('gsi').quiet_zone == pytest.approx(GSI.reach / 1.5 + 1)
+    for name in ('dots', 'metashape12'):
+        assert proportions(name).quiet_zone == pytest.approx(4.2)
     with pytest.raises(ValueError, match=r'targets is 60, accepted is an integer from 0 to 4 '):
         SceneSettings(width=800, height=600, targets=60, family='gsi', dot_radius=7)
     with pytest.raises(ValueError, match="sizes is '1, x', accepted are numbers from"):

@@ -8,9 +8,10 @@ from __future__ import annotations
 import numpy as np
 
 from ahf_ros.codes.dots import DotFamily
-from ahf_ros.features.circle_fit import Fit, fit_circles
+from ahf_ros.features.circle_fit import Fit
 from ahf_ros.features.circles import Circles
 from ahf_ros.features.frame import mean_radii
+from ahf_ros.features.soft_edges import fit_circles_of_any_blur
 
 _RAYS = 40  # round each circle
 _REACH = 0.3  # how far from a circle its edge is looked for, radii of the disc: half the border
@@ -34,7 +35,7 @@ def fit_targets(
     """
     reach = np.maximum(_REACH, _SHORTEST_REACH / mean_radii(frames))[:, None]
     circles = target_circles(polarity, code)
-    return fit_circles(gray, frames, circles, reach=reach, projective=True, rounds=3)
+    return fit_circles_of_any_blur(gray, frames, circles, reach=reach, projective=True, rounds=3)
 
 
 def target_circles(polarity: np.ndarray, code: DotFamily) -> Circles:

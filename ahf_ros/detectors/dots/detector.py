@@ -39,6 +39,7 @@ class DotsDetector(FamilyDetector):
     """
 
     name: ClassVar[str] = 'dots'
+    patience: ClassVar[int] = 3
 
     @property
     def design(self) -> DotFamily:

@@ -31,7 +31,7 @@ from ahf_ros.detectors.gsi.hypotheses import (
     resolve,
 )
 from ahf_ros.detectors.gsi.reading import read_codes
-from ahf_ros.detectors.gsi.refinement import dot_frames, measure_dots, place_targets
+from ahf_ros.detectors.gsi.refinement import dot_frames, measure_dots, place_targets, resized
 from ahf_ros.features import frame
 from ahf_ros.features.dot_search import whole_dots, with_other_dots
 from ahf_ros.features.dots import Dots
@@ -63,6 +63,7 @@ class GsiDetector(FamilyDetector):
     """
 
     name: ClassVar[str] = 'gsi'
+    patience: ClassVar[int] = 3
 
     @property
     def design(self) -> PointFamily:
@@ -141,7 +142,7 @@ def find_hypotheses(
     code : PointFamily
     """
     kind = (*settings.radii, settings.polarities)
-    whole = whole_dots(pyramid, *kind)
+    whole = resized(pyramid.gray, whole_dots(pyramid, *kind))
     first = read_targets(pyramid, whole, code, obvious=True)
     certain = first.select(resolve(first, code, OBVIOUS))
     which = _dots_of(certain.words, code)
@@ -152,6 +153,7 @@ def find_hypotheses(
         corners = frame.circle_outlines(frames, np.ones(len(frames))).reshape(-1, 2)
         explained.append(cv2.convexHull(corners.astype(np.float32))[:, 0])
     dots = with_other_dots(pyramid, whole.select(rest), *kind, explained=explained)
+    dots = resized(pyramid.gray, dots)
     return Hypotheses.joined([certain, read_targets(pyramid, dots, code, obvious=False)]), dots
 
 

@@ -16,6 +16,7 @@ from ahf_ros.features.dot_evidence import circle_sides, dot_evidence, independen
 from ahf_ros.features.frame import ellipse_axes
 from ahf_ros.features.homography import local_frames
 from ahf_ros.features.robust import median
+from ahf_ros.imaging.black import black_lift, lifted
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
 _FAINTEST = 0.12  # step of ln of a dot
@@ -64,30 +65,55 @@ def find_evidence(
     """
     shape, count = (len(homographies), len(family.places)), len(family.template)
     frames = local_frames(homographies, family.places, family.radii)
-    sides, inside = circle_sides(log, frames.reshape(-1, 3, 3))
-    sides, inside = sides.reshape(*shape, *sides.shape[1:]), inside.reshape(shape)
-    steps = (sides[..., 1] - sides[..., 0]) * polarity[:, None, None]
-    expected = _expected_steps(sides, steps, count)
-    ratio = dot_evidence(steps / expected, frames, _NOISE / expected)
     single = frames.reshape(-1, 3, 3)
+    sides, inside = circle_sides(log, single)
     farther, _ = circle_sides(log, single, _FARTHER * ellipse_axes(single)[1])
-    levels = np.concatenate([sides, farther.reshape(sides.shape)], axis=2)
+    sides, farther = (of.reshape(*shape, *sides.shape[1:]) for of in (sides, farther))
+    inside = inside.reshape(shape)
+    lift = black_lift(*_ink_and_light(farther, polarity, count))
+    black = np.flatnonzero(lift > 0)
+    for of in (sides, farther):
+        of[black] = _lifted(of[black], lift[black, None, None, None])
+    steps = (sides[..., 1] - sides[..., 0]) * polarity[:, None, None]
+    expected = _expected_steps(sides, polarity, count)
+    ratio = dot_evidence(steps / expected, frames, _NOISE / expected)
+    levels = np.concatenate([sides, farther], axis=2)
     ratio[:, count:] += _level_evidence(levels, frames, count)
     return Evidence(np.where(inside, ratio, 0.0), inside)
 
 
-def _expected_steps(sides: np.ndarray, steps: np.ndarray, count: int) -> np.ndarray:
+def _expected_steps(sides: np.ndarray, polarity: np.ndarray, count: int) -> np.ndarray:
     """Return the steps of ln(I + 8) that dots have in the light that falls on each ray."""
-    brighter = np.maximum(np.exp(sides.max(axis=3)) - LOG_OFFSET, 0.0)
-    rays = (len(steps), count * steps.shape[2])
-    usual, light = steps[:, :count].reshape(rays), brighter[:, :count].reshape(rays)
+    brighter = _gray(sides.max(axis=3))
+    ink = _ink_and_light(sides, polarity, count)[0][:, None, None]
+    expected = np.log((brighter + LOG_OFFSET) / (ink * brighter + LOG_OFFSET))
+    return np.maximum(expected, _SMALLEST)
+
+
+def _ink_and_light(
+    sides: np.ndarray, polarity: np.ndarray, count: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the gray value of ink over that of paper, and that of paper in the light."""
+    template = sides[:, :count]
+    rays = (len(sides), count * sides.shape[2])
+    usual = ((template[..., 1] - template[..., 0]) * polarity[:, None, None]).reshape(rays)
+    light = _gray(template.max(axis=3)).reshape(rays)
     lit = light >= np.median(light, axis=1, keepdims=True)
     usual = np.maximum(median(usual, lit, 0.0), _FAINTEST)
     light = np.maximum(median(light, lit, 0.0), 1.0)
     ink = ((light + LOG_OFFSET) * np.exp(-usual) - LOG_OFFSET) / light
-    ink = np.clip(ink, 0.0, np.exp(-_FAINTEST))[:, None, None]
-    expected = np.log((brighter + LOG_OFFSET) / (ink * brighter + LOG_OFFSET))
-    return np.maximum(expected, _SMALLEST)
+    return np.clip(ink, 0.0, np.exp(-_FAINTEST)), light
+
+
+def _gray(logarithm: np.ndarray) -> np.ndarray:
+    gray: np.ndarray = np.maximum(np.exp(logarithm) - LOG_OFFSET, 0.0)
+    return gray
+
+
+def _lifted(logarithm: np.ndarray, lift: np.ndarray) -> np.ndarray:
+    """Return ln(I + 8) where black is lifted."""
+    moved: np.ndarray = np.log(lifted(_gray(logarithm), lift) + LOG_OFFSET)
+    return moved
 
 
 def _level_evidence(sides: np.ndarray, frames: np.ndarray, count: int) -> np.ndarray:

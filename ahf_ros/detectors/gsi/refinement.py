@@ -6,16 +6,19 @@ images of the centres of the dots; the homography tells the difference.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ahf_ros.features.array_record import ArrayRecord
-from ahf_ros.features.circle_fit import fit_circles
 from ahf_ros.features.circles import dot_circles
+from ahf_ros.features.dots import Dots
 from ahf_ros.features.frame import ellipse_axes, mean_radii, project
 from ahf_ros.features.homography import ellipse_centres, fit_homographies, local_frames
 from ahf_ros.features.robust import median
+from ahf_ros.features.sampling import sample_circles
+from ahf_ros.features.soft_edges import fit_circles_of_any_blur
+from ahf_ros.imaging.black import black_lift
 
 _RAYS = 32  # about a dot
 _REACHES = ((2.3, 0.45), (1.1, 0.95), (0.5, 1.9))
@@ -27,6 +30,8 @@ _OUTLIER = 4.0  # standard deviations from which a dot loses its weight
 _MINIMUM_ERROR = 0.01  # of a centre, standard deviation, that edges of light cannot undercut, px
 _USUAL = (0.08, 0.004)  # distance of a dot from the homography, px and dot radii
 _ROUNDS = 4
+_LEVEL_ANGLES = 2 * np.pi * np.arange(8) / 8
+_LEVEL_RADII = np.array([0.0, 1.8])  # where the levels of a dot and of its ground are read
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +102,7 @@ def measure_dots(gray: np.ndarray, frames: np.ndarray, polarity: np.ndarray) -> 
         which = np.flatnonzero((minor >= smallest) & (minor < above))
         above = smallest
         circles = dot_circles(polarity[which], _RAYS)
-        fit = fit_circles(gray, frames[which], circles, reach=reach, projective=False)
+        fit = fit_circles_of_any_blur(gray, frames[which], circles, reach=reach, projective=False)
         moved = np.hypot(*(fit.frames[:, :2, 2] - frames[which, :2, 2]).T)
         good = fit.share >= _MINIMUM_SHARE
         found[which], fitted[which[good]] = good, fit.frames[good]
@@ -105,6 +110,28 @@ def measure_dots(gray: np.ndarray, frames: np.ndarray, polarity: np.ndarray) -> 
         near[which] = good
         covariance[which[good]] = fit.covariance[good] + _MINIMUM_ERROR**2 * np.eye(2)
     return MeasuredDots(fitted, covariance, found, near)
+
+
+def resized(gray: np.ndarray, dots: Dots) -> Dots:
+    """Return dots with their size in gray values where dot or ground is darker than ink.
+
+    There the edges in the logarithm of the image, by which dots are found, lie elsewhere, by more
+    than templates allow for.
+
+    Parameters
+    ----------
+    gray : ndarray of float32, shape (height, width)
+        Gray values from 0 to 255.
+    dots : Dots
+    """
+    levels = np.median(sample_circles(gray, dots.frames, _LEVEL_ANGLES, _LEVEL_RADII), axis=1)
+    dark, bright = levels.min(axis=1), np.maximum(levels.max(axis=1), 1.0)
+    black = np.flatnonzero(black_lift(dark / bright, bright) > 0)
+    if not black.size:
+        return dots
+    frames = dots.frames.copy()
+    frames[black] = measure_dots(gray, frames[black], dots.polarity[black]).frames
+    return replace(dots, frames=frames)
 
 
 def place_targets(

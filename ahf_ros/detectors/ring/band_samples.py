@@ -9,10 +9,12 @@ import numpy as np
 from ahf_ros.codes.ring import Family
 from ahf_ros.features import frame
 from ahf_ros.features.sampling import sample_circles, within
+from ahf_ros.imaging.black import lifted
 
 _BESIDE = 2.6  # distance of a reading from an edge that is sharp, px
 _NEAREST, _FARTHEST = 0.13, 0.36  # bounds of that distance, dot radii
 _SOFT, _BESIDE_SOFT = 1.0, 3.0  # blur of an edge, px, from which that distance grows, and how fast
+_PERSPECTIVE = 1.5  # of circles, more than their perspective makes one side of them larger
 _BAND_DEPTHS = (0.3, 0.5, 0.7)  # shares of the width of the band, where its level is read
 _GAP_DEPTHS = (0.35, 0.65)  # shares of the width of the gap, where its level is read
 _DOT_RADII = (0.35, 0.7)  # where the level of the dot is read, dot radii
@@ -70,6 +72,7 @@ def sample_bands(
     blur: np.ndarray | float,
     angles: np.ndarray,
     family: Family,
+    lift: np.ndarray | None = None,
 ) -> BandSamples:
     """Read the gray values of targets about their dots.
 
@@ -83,27 +86,32 @@ def sample_bands(
     angles : ndarray of float64, shape (m,)
         In the frame, from +x towards +y, rad.
     family : Family
+    lift : ndarray of float64, shape (k,), optional
+        Gray values that black is lifted to.
     """
     inner, outer = family.band_inner, family.band_outer
-    beside = _BESIDE + _BESIDE_SOFT * np.maximum(blur - _SOFT, 0)
-    beside = np.clip(beside / frame.mean_radii(frames), _NEAREST, _FARTHEST)[:, None]
+    beside = beside_edges(frames, blur)
     fixed = np.concatenate(
         [
             inner + (outer - inner) * np.array(_BAND_DEPTHS),
-            1 + (inner - 1) * np.array(_GAP_DEPTHS),
+            gap_circles(family),
             np.array(_DOT_RADII),
             [inner, outer],
         ]
     )
-    edges = np.array([inner, inner, outer, outer]) + beside * np.array([-1, 1, -1, 1])
-    radii = np.concatenate([edges, np.broadcast_to(fixed, (len(frames), len(fixed)))], axis=1)
+    fixed = np.broadcast_to(fixed, (len(frames), len(fixed)))
+    radii = np.concatenate([edge_circles(beside, family), fixed], axis=1)
     values = sample_circles(gray, frames, angles, radii)
     values = np.moveaxis(np.maximum(values, 0), 2, 0)
+    if lift is not None:
+        values = lifted(values, lift[:, None].astype(np.float32))
     ends = np.cumsum([4, len(_BAND_DEPTHS), len(_GAP_DEPTHS), len(_DOT_RADII)])
-    beside_edges, band, gap, dot, on_edges = np.split(values, ends)
-    limits = frame.circle_points(angles, np.array([inner, outer]) + beside)
-    visible = within(frame.project(frames, limits), gray.shape)
-    inner_ground, inner_band, outer_band, outer_ground = beside_edges
+    across, band, gap, dot, on_edges = np.split(values, ends)
+    visible = np.ones((len(frames), len(angles), 2), bool)
+    border = np.flatnonzero(near_borders(frames, family, gray.shape))
+    limits = frame.circle_points(angles, np.array([inner, outer]) + beside[border])
+    visible[border] = within(frame.project(frames[border], limits), gray.shape)
+    inner_ground, inner_band, outer_band, outer_ground = across
     return BandSamples(
         inner_ground,
         inner_band,
@@ -116,3 +124,42 @@ def sample_bands(
         beside,
         np.moveaxis(visible, 2, 0),
     )
+
+
+def beside_edges(frames: np.ndarray, blur: np.ndarray | float) -> np.ndarray:
+    """Return the distance of readings beside edges from these, dot radii, shape (k, 1).
+
+    Parameters
+    ----------
+    frames, blur
+        As for `sample_bands`.
+    """
+    pixels = _BESIDE + _BESIDE_SOFT * np.maximum(blur - _SOFT, 0)
+    return np.clip(pixels / frame.mean_radii(frames), _NEAREST, _FARTHEST)[:, None]
+
+
+def edge_circles(beside: np.ndarray, family: Family) -> np.ndarray:
+    """Return the radii at which edges of bands are read, shape (k, 4): in gap, band, band, margin.
+
+    Parameters
+    ----------
+    beside : ndarray of float64, shape (k, 1)
+        Distance from the edges, dot radii.
+    family : Family
+    """
+    inner, outer = family.band_inner, family.band_outer
+    return np.array([inner, inner, outer, outer]) + beside * np.array([-1, 1, -1, 1])
+
+
+def gap_circles(family: Family) -> np.ndarray:
+    """Return the radii at which the gap between dot and band is read, shape (2,)."""
+    return 1 + (family.band_inner - 1) * np.array(_GAP_DEPTHS)
+
+
+def near_borders(frames: np.ndarray, family: Family, shape: tuple[int, ...]) -> np.ndarray:
+    """Return whether bands may reach beyond an image of shape (height, width), shape (k,)."""
+    major, _, _ = frame.ellipse_axes(frames)
+    reach = (_PERSPECTIVE * (family.band_outer + _FARTHEST) * major)[:, None]
+    centres = frames[:, :2, 2] / frames[:, 2:, 2]
+    inside = (centres > reach) & (centres < np.array(shape[1::-1]) - 1 - reach)
+    return np.asarray(~inside.all(axis=1))

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cache, lru_cache
 
 import numpy as np
 
+from ahf_ros.codes.cyclic import rotated_words
 from ahf_ros.codes.ring import Family, canonical
 
 _EXHAUSTIVE = 50_000  # rotations of words, up to which all of them compete
@@ -52,15 +54,58 @@ def best_words(
     scores : ndarray of float32, shape (k, COMPETITORS)
         Evidence for each, over a word without ones, with the prior.
     """
-    # A border between the bits a and b gives onto (1 - a) b + off a (1 - b).
-    single = sectors + off + np.roll(onto, 1, axis=2)
-    evidence = np.concatenate([single, -(onto + off)], axis=2).astype(np.float32)
     words = np.zeros((len(sectors), COMPETITORS), np.int64)
     phases = np.zeros(words.shape, np.intp)
     scores = np.zeros(words.shape, np.float32)
+    for index, competing, of_phases in _scored(sectors, onto, off, family, expected):
+        of_word = of_phases.max(axis=0)
+        # Where fewer words compete, the last ones are repeated.
+        best = np.argpartition(of_word, -min(COMPETITORS, len(of_word)))[-COMPETITORS:]
+        best = np.resize(best[np.argsort(-of_word[best], kind='stable')], COMPETITORS)
+        words[index], scores[index] = competing[best], of_word[best]
+        phases[index] = of_phases[:, best].argmax(axis=0)
+    return words, phases, scores
+
+
+def best_word(
+    sectors: np.ndarray, onto: np.ndarray, off: np.ndarray, family: Family
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return only the best word of each band, its phase and its margin, shape (k,) all.
+
+    Parameters are as for `best_words`, which takes longer.
+
+    Returns
+    -------
+    words, phases : ndarray of int
+        As there.
+    margins : ndarray of float64
+        Evidence over the best word of another ID; 0 where there is none.
+    """
+    words, phases = np.zeros((2, len(sectors)), np.int64)
+    margin, numbers = np.zeros(len(sectors)), _number_table(family)
+    for index, competing, of_phases in _scored(sectors, onto, off, family):
+        of_word = of_phases.max(axis=0)
+        best = of_word.argmax()
+        others = of_word[numbers[competing] != numbers[competing[best]]]
+        words[index], phases[index] = competing[best], of_phases[:, best].argmax()
+        margin[index] = of_word[best] - others.max() if others.size else 0.0
+    return words, phases, margin
+
+
+def _scored(
+    sectors: np.ndarray,
+    onto: np.ndarray,
+    off: np.ndarray,
+    family: Family,
+    expected: frozenset[int] = frozenset(),
+) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
+    """Yield bands that are read, the words that compete, and the evidence at each phase."""
+    # A border between the bits a and b gives onto (1 - a) b + off a (1 - b).
+    single = sectors + off + np.roll(onto, 1, axis=2)
+    evidence = np.concatenate([single, -(onto + off)], axis=2).astype(np.float32)
     everything = len(family.words) * family.bits <= _EXHAUSTIVE
     hopeful = np.maximum(sectors, 0).sum(axis=2).max(axis=1) > _MINIMUM_EVIDENCE
-    for index in np.flatnonzero(hopeful):
+    for index in np.flatnonzero(hopeful).tolist():
         competing, features = (
             _all_rotations(family)
             if everything
@@ -69,13 +114,7 @@ def best_words(
         of_phases = evidence[index] @ features
         if expected:
             of_phases += prior(competing, family, expected)
-        of_word = of_phases.max(axis=0)
-        # Where fewer words compete, the last ones are repeated.
-        best = np.argpartition(of_word, -min(COMPETITORS, len(of_word)))[-COMPETITORS:]
-        best = np.resize(best[np.argsort(-of_word[best], kind='stable')], COMPETITORS)
-        words[index], scores[index] = competing[best], of_word[best]
-        phases[index] = of_phases[:, best].argmax(axis=0)
-    return words, phases, scores
+        yield index, competing, of_phases
 
 
 def prior(words: np.ndarray, family: Family, expected: frozenset[int]) -> np.ndarray:
@@ -152,10 +191,9 @@ def _prior_table(family: Family, expected: frozenset[int]) -> np.ndarray:
 def _number_table(family: Family) -> np.ndarray:
     """Return the IDs of all words of n bits in any rotation, 0 for those that have none."""
     numbers = np.zeros(1 << family.bits, np.int32)
-    words = family.words
-    for _ in range(family.bits):
-        numbers[words] = np.arange(1, len(words) + 1)
-        words = words >> 1 | (words & 1) << (family.bits - 1)
+    for turn in range(family.bits):
+        turned = rotated_words(family.words, turn, family.bits)
+        numbers[turned] = np.arange(1, len(turned) + 1)
     return numbers
 
 

@@ -8,18 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from ahf_ros.codes.ring import FAMILY_NAMES, Family, family
 from ahf_ros.detectors.ring.confidence import IN_LIGHT
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
-from ahf_ros.detectors.ring.other_prints import SHARP
+from ahf_ros.detectors.ring.other_prints import SHARP, attainable_sharpness
 from ahf_ros.detectors.ring.reading import PASSES, read_bands
 from ahf_ros.detectors.ring.surroundings import designs, likely_targets
 from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import Fit
-from ahf_ros.features.profiles import USUAL_BLUR
 
 PART = 256
 """Dots read at a time, which bounds the memory."""
@@ -31,12 +31,9 @@ _MOST = 0.8  # of those read, whose words settle it
 _SHARPEST = 5.1  # sharpness of edges that are those of no other word
 _BLUNTER = 0.8  # than usual, from which a certain word is contested by other families
 _SHARPER = 0.2  # than the word of another family, to be the word of a dot
+_LEAST_SHARE = 0.01  # of edges in their places, instead of none
 _UNEXPLAINED = np.log1p(3.5)  # evidence for arcs of any length, that may be other words
 _LIKELY = 0.2  # probability of a target, for a dot to be read as other families, too
-_GLANCE = 3  # angles a sector at which many dots are looked at
-_PROBABLE = 0.5  # the same, of dots that tell how sharp targets are
-_UNLIKELY = 1e-8  # the same, below which one of many dots is not read
-_SHARP, _SOFT = 1.1, 1.6  # blur up to which a dot is sharp, and blur of those that are not, px
 
 
 def by_clear_dots(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> list[Family]:
@@ -109,14 +106,12 @@ def read_families(
         At least one of each dot.
     """
     first, *others = families
-    worth = _worth_reading(gray, dots, families)
-    unread, dots = Hypotheses.unread(dots.select(~worth), first), dots.select(worth)
     found = _against_other_words(gray, dots, _read(gray, dots, first, expected), families)
     if not others:
-        return Hypotheses.joined([found, unread])
+        return found
     dots = dots.select(~_settled(dots, found))
     likely = {code.band: likely_targets(gray, dots, code) for code in designs(others)}
-    parts = [found, unread]
+    parts = [found]
     for code in others:
         of_print = likely[code.band]
         best_first = np.argsort(-of_print, kind='stable')[: (of_print >= _LIKELY).sum()]
@@ -131,38 +126,14 @@ def read_families(
     return _contested(Hypotheses.joined(parts))
 
 
-def _worth_reading(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> np.ndarray:
-    """Return which dots may be middles of targets, shape (k,).
-
-    Most of the many dots of a lattice are not; to see that takes far less time than to read them.
-    """
-    if len(dots.frames) <= PART:
-        return np.ones(len(dots.frames), bool)
-    sharp = dots.blur <= _SHARP
-    of_prints = designs(families)
-    probability = _glanced(gray, dots.select(sharp), of_prints, USUAL_BLUR)
-    worth = np.ones(len(sharp), bool)
-    worth[sharp] = probability >= _UNLIKELY
-    if (probability >= _PROBABLE).sum() >= _MANY:
-        # Targets are sharp in this image, so that soft dots are spots of light, or out of focus.
-        worth[~sharp] = _glanced(gray, dots.select(~sharp), of_prints, _SOFT) >= _UNLIKELY
-    return worth
-
-
-def _glanced(gray: np.ndarray, dots: Fit, of_prints: Sequence[Family], blur: float) -> np.ndarray:
-    """Return about how probable it is that dots are middles of targets of any print."""
-    probabilities = [likely_targets(gray, dots, code, blur, _GLANCE) for code in of_prints]
-    highest: np.ndarray = np.max(probabilities, axis=0)
-    return highest
-
-
 def _against_other_words(
     gray: np.ndarray, dots: Fit, found: Hypotheses, families: Sequence[Family]
 ) -> Hypotheses:
     """Return hypotheses of which none is certain where a family that is not read agrees better.
 
     Families of one print differ in the number of sectors. What a word leaves unexplained shows
-    where the band may be one of theirs; `of_other_prints` tells other prints.
+    where the band may be one of theirs; `of_other_prints` tells other prints. Where nearly all
+    edges are in their places, no other word can agree clearly better.
     """
     unexplained = np.where(found.certain, found.features[:, IN_LIGHT], 0.0)
     doubtful = np.argsort(-unexplained, kind='stable')[: (unexplained > _UNEXPLAINED).sum()]
@@ -171,17 +142,38 @@ def _against_other_words(
     read = {code.name for code in families}
     others = [family(name) for name in FAMILY_NAMES if name not in read]
     rivals = [code for code in others if code.band == families[0].band]
+    better = attainable_sharpness(found.sharpness, np.maximum(found.share, _LEAST_SHARE))
+    contestable = better > found.sharpness + _SHARPER / 2
     parts = [found]
+    contested = found
     # Where the rivals contest none of the most doubtful words, the family is right.
     for some in (doubtful[:_READ], doubtful[_READ:]):
+        some = some[contestable[some]]
+        if not len(some):
+            break
         away = found.frames[some, None, :2, 2] - dots.frames[:, :2, 2]
         nearest = dots.select(np.hypot(away[..., 0], away[..., 1]).argmin(axis=1))
         refined = replace(nearest, frames=found.frames[some])
-        parts += [_read(gray, refined, code, passes=PASSES[-1:]) for code in rivals]
-        contested = _contested(Hypotheses.joined(parts)).select(slice(len(found.words)))
+        contested, by_rivals = _against_rivals(gray, refined, rivals, parts)
         if contested.certain[some].all():
             break
+        parts += by_rivals
     return contested
+
+
+def _against_rivals(
+    gray: np.ndarray, dots: Fit, rivals: Sequence[Family], parts: Sequence[Hypotheses]
+) -> tuple[Hypotheses, list[Hypotheses]]:
+    """Return the first part, contested by the others and by rivals, and what rivals read."""
+    # Whether a rival is of another print takes time to see, and matters only if it contests.
+    for other_prints in (False, True):
+        again = partial(_read, passes=PASSES[-1:], other_prints=other_prints, hidden=False)
+        read = [again(gray, dots, code) for code in rivals]
+        contested = _contested(Hypotheses.joined([*parts, *read]))
+        contested = contested.select(slice(len(parts[0].words)))
+        if np.array_equal(contested.certain, parts[0].certain):
+            break
+    return contested, read
 
 
 def _read(
@@ -190,11 +182,13 @@ def _read(
     code: Family,
     expected: frozenset[int] = frozenset(),
     passes: Sequence[tuple[int, int]] = PASSES,
+    other_prints: bool = True,
+    hidden: bool = True,
 ) -> Hypotheses:
     parts = []
     for start in range(0, max(len(dots.frames), 1), PART):
         part = dots.select(slice(start, start + PART))
-        read, _ = read_bands(gray, part, code, expected, passes)
+        read, _ = read_bands(gray, part, code, expected, passes, other_prints, hidden)
         parts.append(read)
     return Hypotheses.joined(parts)
 

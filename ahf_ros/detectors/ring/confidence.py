@@ -29,6 +29,7 @@ _MOSTLY_HIDDEN = 0.5  # root of the hidden share, from which little is left to b
 _SMALL = 0.35  # difference of both that tells small dots, of which blur makes arcs
 _CERTAIN = 0.9  # confidence from which words are reported
 _CERTAIN_IN_LIGHT, _CERTAIN_OF_ARCS = 0.7, 0.96  # the same, in light with many edges, and of arcs
+_BARELY, _CERTAIN_IF_BARELY = 6.0, 0.99  # support less contradiction, and the same below it
 _USUAL_PRICE = 4.0  # of covers, beyond the usual, that halves what is unexplained
 _FULL_SIZE = 12.0  # radius of a dot from which evidence grows no more, px
 
@@ -59,7 +60,8 @@ _FEATURES = (
 FEATURES = len(_FEATURES) + 1
 """Number of the features that `confidence` takes: those it weighs, and the price of covers."""
 
-MARGIN, UNEXPLAINED, IN_LIGHT, IN_SIZE, HIDDEN, SUPPORT = 0, 1, 2, 3, 4, 11
+MARGIN, UNEXPLAINED, IN_LIGHT, IN_SIZE, HIDDEN = range(5)
+CONTRADICTION, SUPPORT = 10, 11
 """Places of some of them."""
 
 _INTERCEPTS, *_WEIGHTS = fitted_weights('confidence', 'intercepts', 'even', 'edges')
@@ -115,8 +117,9 @@ def minimum_confidence(features: np.ndarray) -> np.ndarray:
     """Return the confidences from which words are reported, ndarray of float64, shape (k,).
 
     Where light has many edges, and a word is clear if these are all there is, hardly anything else
-    looks like that. Where a word needs something that hides a part of the band, and arcs of any
-    length explain what is left far better, it may as well be no target.
+    looks like that. A word that they support little more than they contradict it is mostly one
+    that light made: it has to be more certain. Where a word needs something that hides a part of
+    the band, and arcs of any length explain what is left far better, it may as well be no target.
 
     Parameters
     ----------
@@ -124,11 +127,15 @@ def minimum_confidence(features: np.ndarray) -> np.ndarray:
         As `confidence_features` gives them.
     """
     price, hidden = features[:, -1], features[:, HIDDEN]
-    in_light = (features[:, SUPPORT] > _CLEAR_SUPPORT) & (price > _MANY_EDGES)
+    many_edges = price > _MANY_EDGES
+    in_light = (features[:, SUPPORT] > _CLEAR_SUPPORT) & many_edges
+    support = np.sign(features[:, SUPPORT]) * np.expm1(np.abs(features[:, SUPPORT]))
+    barely = (support - np.expm1(features[:, CONTRADICTION]) < _BARELY) & many_edges
     like_arcs = even(features) & (features[:, UNEXPLAINED] > _ARCS)
     like_arcs &= (hidden > 0) & (hidden < _MOSTLY_HIDDEN)
     like_arcs &= features[:, IN_SIZE] - features[:, IN_LIGHT] < _SMALL
-    return np.select([in_light, like_arcs], [_CERTAIN_IN_LIGHT, _CERTAIN_OF_ARCS], _CERTAIN)
+    minimum = [_CERTAIN_IF_BARELY, _CERTAIN_IN_LIGHT, _CERTAIN_OF_ARCS]
+    return np.select([barely, in_light, like_arcs], minimum, _CERTAIN)
 
 
 def terms(features: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ import numpy as np
 from ahf_ros.codes.ring import Family
 from ahf_ros.detectors.ring.band_evidence import BandEvidence
 from ahf_ros.detectors.ring.band_samples import BandSamples
-from ahf_ros.detectors.ring.codewords import best_words, margins
+from ahf_ros.detectors.ring.codewords import best_word
 from ahf_ros.detectors.ring.evidence import MarkAppearance, log_ratio
 from ahf_ros.features.array_record import ArrayRecord
 
@@ -98,11 +98,9 @@ def decode(
     per_sector = evidence.marked.shape[1] // family.bits
     angles = sectors_by_phase(per_sector, family)
     last, marked = angles[..., -1], evidence.marked[:, angles].sum(axis=3)
-    words, phases, scores = best_words(
+    words, phases, margin = best_word(
         marked, evidence.onto[:, last], evidence.off[:, last], family
     )
-    margin = margins(words, scores, np.zeros(len(words), np.intp), family)
-    words, phases = words[:, 0], phases[:, 0]
     bits = bits_at(words, phases, per_sector, family)
     own = _of_sectors(np.where(bits, 1, -1) * evidence.marked, phases, family.bits)
     minimum = np.where(evidence.edges < _FEW_EDGES, 0, _MINIMUM_MARGIN)

@@ -8,15 +8,18 @@ together to a projective frame, whose origin is the image of the target's physic
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
-from ahf_ros.codes.ring import family
+from ahf_ros.codes.ring import Family, family
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.ring.competition import PART, by_clear_dots, read_families
+from ahf_ros.detectors.ring.explained import NOTHING, WHOLE, Explained
 from ahf_ros.detectors.ring.faint import with_faint
 from ahf_ros.detectors.ring.full_size import at_full_size
+from ahf_ros.detectors.ring.glance import may_be_targets
 from ahf_ros.detectors.ring.hypotheses import (
     Hypotheses,
     resolve_dots,
@@ -29,19 +32,18 @@ from ahf_ros.detectors.ring.same_prints import decoded, settle_same_prints
 from ahf_ros.detectors.ring.soft import soft_dots
 from ahf_ros.detectors.ring.target_circles import REACH
 from ahf_ros.features import frame
-from ahf_ros.features.circle_fit import Fit, fit_dots
+from ahf_ros.features.circle_fit import NO_FITS, Fit, fit_dots
 from ahf_ros.features.dot_search import voted_dots, whole_dots
 from ahf_ros.features.dots import NO_DOTS, Dots
 from ahf_ros.features.ellipse_targets import targets_from_frames
 from ahf_ros.features.pyramid import Octave, image_pyramid, octaves
 from ahf_ros.imaging.image import as_gray, check_image
-from ahf_ros.target import UNDECODED, Target, sorted_targets
+from ahf_ros.target import UNDECODED, Target, UndecodedTarget, sorted_targets
 
 _RAYS = 24  # about a dot
 _MINIMUM_SHARE = 0.5  # of the edge of a dot, for its band to be read
+_UNLIKELY = 0.02  # confidence of a word below which a dot counts as unread
 _FAINTEST = 0.8  # contrast of a dot, dark over bright, for its band to be read
-_WHOLE = 0.9  # share of the edge of a dot that is reported without a word
-_MARGIN = 0.4  # width of the quiet margin round a dot or a band, dot radii
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +64,11 @@ class RingDetector:
     def name(self) -> str:
         """Name in the registry."""
         return 'ring'
+
+    @property
+    def patience(self) -> int:
+        """Filters tried in vain after which a search ends; see `Discerning`."""
+        return 2
 
     @property
     def family(self) -> str:
@@ -123,90 +130,119 @@ def read_image(
     pyramid = image_pyramid(gray, settings.max_radius)
     images = (pyramid.gray, *pyramid.halves)
     found: list[Hypotheses] = []
+    explained = NOTHING
+
+    def explain(read: Hypotheses, level: int) -> Hypotheses:
+        nonlocal explained
+        whole = at_full_size(images[: level + 1], read)
+        explained = Explained.joined([explained, Explained.by(whole)])
+        return whole
+
     for octave in octaves(pyramid, *settings.radii):
+        gray = octave.pyramid.gray
         parts: list[tuple[Fit, Hypotheses]] = []
+        unlikely = NO_FITS
         for search in (_whole,) if whole_only else (_whole, _voted, _oblique):
-            dots = search(octave, settings.polarities, found)
+            dots = search(octave, settings.polarities, explained)
             if not len(dots.frames):
                 continue
-            fits = _fitted(octave.pyramid.gray, dots)
-            if not any(read.certain.any() for read in found):
-                families = by_clear_dots(octave.pyramid.gray, fits, families)
-            read = read_families(octave.pyramid.gray, fits, families, expected)
+            fits, others = _fitted(gray, dots, families, settings)
+            explain(Hypotheses.unread(others, families[0]), octave.level)
+            if not explained.certain.any():
+                families = by_clear_dots(gray, fits, families)
+            read = read_families(gray, fits, families, expected)
             parts.append((fits, read))
-            found.append(at_full_size(images[: octave.level], read))
+            unlikely = Fit.joined([unlikely, others])
+            found.append(explain(read, octave.level))
         # What is out of focus is sharper in the next half.
         for level in range(octave.level + 1, 0 if whole_only else len(images)):
-            soft = soft_dots(parts)
-            if not len(soft.frames):
+            again = partial(_fitted_again, gray, settings=settings)
+            blurred = soft_dots(parts, unlikely, again)
+            if not len(blurred.frames):
                 break
-            half = images[level].astype(np.float32, copy=False)
-            fits = _fitted(half, soft)
-            parts = [(fits, read_families(half, fits, families, expected))]
-            found.append(at_full_size(images[:level], parts[0][1]))
+            gray = images[level].astype(np.float32, copy=False)
+            few = len(blurred.frames) <= PART  # which are read however little they show
+            fits, unlikely = _fitted(gray, blurred, families, settings, every=few)
+            parts = [(fits, read_families(gray, fits, families, expected))]
+            found.append(explain(parts[0][1], level))
     if not found:
-        return Hypotheses.unread(_fitted(pyramid.gray, NO_DOTS), families[0])
+        return Hypotheses.unread(NO_FITS, families[0])
     return Hypotheses.joined(found)
 
 
-def _whole(octave: Octave, polarities: Sequence[int], _found: Sequence[Hypotheses]) -> Dots:
+def _whole(octave: Octave, polarities: Sequence[int], _explained: Explained) -> Dots:
     """Return the dots of an octave with a whole outline."""
     return whole_dots(octave.pyramid, *octave.radii, polarities)
 
 
-def _voted(octave: Octave, polarities: Sequence[int], found: Sequence[Hypotheses]) -> Dots:
+def _voted(octave: Octave, polarities: Sequence[int], explained: Explained) -> Dots:
     """Return the dots of an octave that edges vote for which nothing explains yet."""
-    outlines = [
-        outline
-        for read in found
-        for outline in _outlines(read.select(read.certain | (read.share >= _WHOLE)), octave.level)
-    ]
+    outlines = explained.outlines_in(octave.level)
     return voted_dots(octave.pyramid, *octave.radii, polarities, explained=outlines)
 
 
-def _oblique(octave: Octave, polarities: Sequence[int], found: Sequence[Hypotheses]) -> Dots:
+def _oblique(octave: Octave, polarities: Sequence[int], explained: Explained) -> Dots:
     """Return the dots of an octave that edges vote for where a view is seen straight ahead."""
-    if not found:
-        return NO_DOTS
-    certain = Hypotheses.joined([read.select(read.certain) for read in found])
-    rounded = rounding(certain)
+    certain = explained.select(explained.certain)
+    rounded = rounding(certain.frames)
     if rounded is None:
         return NO_DOTS
-    outlines = _outlines(certain, octave.level)
+    outlines = explained.select(explained.clear).outlines_in(octave.level)
     return oblique_dots(octave.pyramid.gray, rounded, *octave.radii, polarities, outlines)
 
 
-def _outlines(explained: Hypotheses, level: int) -> np.ndarray:
-    """Return the outlines of targets and dots, with a margin, px of a half of the image."""
-    _, minor, _ = frame.ellipse_axes(explained.frames)
-    radii = np.where(explained.certain, explained.reach / minor, 1.0) + _MARGIN
-    shown = radii * minor > 2**level  # others have no edges in that half
-    outlines = frame.circle_outlines(explained.frames[shown], radii[shown])
-    return (outlines + 0.5) / 2**level - 0.5
+def _fitted(
+    gray: np.ndarray,
+    dots: Dots,
+    families: Sequence[Family],
+    settings: DetectorSettings,
+    every: bool = False,
+) -> tuple[Fit, Fit]:
+    """Return the fits of the dots whose bands are worth reading, or of every one, and of others.
 
-
-def _fitted(gray: np.ndarray, dots: Dots) -> Fit:
-    """Return the fits of the dots whose bands are worth reading."""
-    parts = []
+    Those are measured once, which is enough to see that they are no targets.
+    """
+    worth, others = [], []
     for start in range(0, max(len(dots.frames), 1), PART):
         part = dots.select(slice(start, start + PART))
-        fit = fit_dots(
-            gray,
-            part.frames,
-            part.polarity,
-            rays=_RAYS,
-            reach=REACH,
-            min_share=_MINIMUM_SHARE,
-            max_contrast=_FAINTEST,
-        )
-        parts.append(fit)
-    return Fit.joined(parts)
+        once = _fit_once(gray, part.frames, part.polarity, settings)
+        likely = np.ones(len(once.frames), bool)
+        if not every and not settings.report_undecoded:
+            likely = may_be_targets(gray, once.frames, families, many=len(dots.frames) > PART)
+        others.append(once.select(~likely))
+        worth.append(_fitted_again(gray, once.select(likely), settings))
+    return Fit.joined(worth), Fit.joined(others)
+
+
+def _fitted_again(gray: np.ndarray, once: Fit, settings: DetectorSettings) -> Fit:
+    """Return better fits of dots whose edges are where those of a dot are."""
+    fit = _fit_once(gray, once.frames, once.polarity, settings, once.blur)
+    return fit.select((fit.share >= _MINIMUM_SHARE) & (fit.contrast <= _FAINTEST))
+
+
+def _fit_once(
+    gray: np.ndarray,
+    frames: np.ndarray,
+    polarity: np.ndarray,
+    settings: DetectorSettings,
+    blur: np.ndarray | None = None,
+) -> Fit:
+    return fit_dots(
+        gray,
+        frames,
+        polarity,
+        rays=_RAYS,
+        reach=REACH,
+        rounds=1,
+        blur=blur,
+        covariances=settings.report_undecoded,
+    )
 
 
 def report(hypotheses: Hypotheses, settings: DetectorSettings) -> list[Target]:
     """Return the targets to report: one for each dot, and one for each ID at the most."""
     major, _, _ = frame.ellipse_axes(hypotheses.frames)
-    whole = settings.report_undecoded & (hypotheses.share >= _WHOLE)
+    whole = settings.report_undecoded & (hypotheses.share >= WHOLE)
     minimum, maximum = settings.radii
     of_size = (major >= minimum) & (major <= maximum)
     hypotheses = settle_same_prints(hypotheses.select(of_size), settings.families)
@@ -220,9 +256,32 @@ def report(hypotheses: Hypotheses, settings: DetectorSettings) -> list[Target]:
     kept, uncontested = resolve_dots(hypotheses, keys, hypotheses.certain, hypotheses.reach)
     certain = resolve_overlaps(hypotheses, hypotheses.certain & uncontested)
     certain = resolve_ids(hypotheses, keys, certain)
-    ids = np.where(certain, ids, UNDECODED)
     if not settings.report_undecoded:
         kept = kept[certain[kept]]
+    likely, ids = ids[kept], np.where(certain, ids, UNDECODED)
     some = hypotheses.select(kept)
     columns = (some.frames, some.covariance, ids[kept], codes[kept], some.confidence)
-    return sorted_targets(targets_from_frames(*columns, names[kept]))
+    targets = targets_from_frames(*columns, names[kept])
+    rows = zip(targets, some.certain.tolist(), names[kept].tolist(), likely.tolist(), strict=True)
+    return sorted_targets(_explained(*row) for row in rows)
+
+
+def _explained(target: Target, certain: bool, likely_family: str, likely_id: int) -> Target:
+    """Return a target, with the reason if it is not decoded.
+
+    Parameters
+    ----------
+    target : Target
+    certain : bool
+        Whether its word alone was certain.
+    likely_family, likely_id
+        Of its most likely word.
+    """
+    if target.id != UNDECODED:
+        return target
+    if not certain and target.confidence < _UNLIKELY:
+        return UndecodedTarget(**asdict(target), reason='unread')
+    reason = 'contested' if certain else 'uncertain'
+    return UndecodedTarget(
+        **asdict(target), reason=reason, likely_id=likely_id, likely_family=likely_family
+    )

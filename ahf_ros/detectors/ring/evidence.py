@@ -8,11 +8,12 @@ bounds the evidence of one reading.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ahf_ros.features.array_record import ArrayRecord
+from ahf_ros.imaging.black import black_lift, lifted
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
 NOISE = 1.2
@@ -36,6 +37,9 @@ LEVEL_BIN = 0.05
 LEVELS = np.arange(np.log(LOG_OFFSET), np.log(255 + LOG_OFFSET) + LEVEL_BIN, LEVEL_BIN)
 """The levels of ln I that densities are of."""
 
+_DISTANCES = LEVEL_BIN * (np.arange(len(LEVELS))[:, None] - np.arange(len(LEVELS)))
+_KERNEL = np.exp(-0.5 * (_DISTANCES / _LEVEL_SPREAD) ** 2) / (_LEVEL_SPREAD * np.sqrt(2 * np.pi))
+
 
 @dataclass(frozen=True, slots=True)
 class MarkAppearance(ArrayRecord):
@@ -57,6 +61,17 @@ class MarkAppearance(ArrayRecord):
     contrast: np.ndarray
     bright: np.ndarray
     blur: np.ndarray
+
+    @property
+    def lift(self) -> np.ndarray:
+        """Gray values that black is lifted to, see `ahf_ros.imaging.black`."""
+        return black_lift(self.contrast, self.bright)
+
+    def lifted(self) -> MarkAppearance:
+        """Return how marks look when black is lifted."""
+        bright = lifted(self.bright, self.lift)
+        dark = lifted(self.contrast * self.bright, self.lift)
+        return replace(self, contrast=dark / bright, bright=bright)
 
     def step(self, values: np.ndarray) -> np.ndarray:
         """Return the step of ln onto a mark where the bright side has gray values (k, ...)."""
@@ -193,10 +208,7 @@ def _density(bins: np.ndarray) -> np.ndarray:
     size = len(LEVELS)
     keys = (bins + size * np.arange(len(bins))[:, None]).ravel()
     counts = np.bincount(keys, minlength=size * len(bins)).reshape(len(bins), size)
-    distance = np.arange(size)[:, None] - np.arange(size)
-    kernel = np.exp(-0.5 * (distance * LEVEL_BIN / _LEVEL_SPREAD) ** 2)
-    kernel /= _LEVEL_SPREAD * np.sqrt(2 * np.pi)
-    return counts / max(bins.shape[1], 1) @ kernel
+    return counts / max(bins.shape[1], 1) @ _KERNEL
 
 
 def border_evidence(
@@ -207,7 +219,7 @@ def border_evidence(
     bright = np.moveaxis(np.maximum(before, after), 0, 2)
     mark = np.moveaxis(marks.step(bright), 2, 0)
     # The step of a mark without contrast tells nothing.
-    mark = np.sign(mark) * np.maximum(np.abs(mark), _MINIMUM_STEP)
+    mark = np.copysign(np.maximum(np.abs(mark), _MINIMUM_STEP), mark)
     rise = log_ratio(after, before) / mark
     floor = _FLOOR + _BORDER_FLOOR * light.edges[:, None]
     onto, none, off = (

@@ -1,8 +1,9 @@
-"""Frames at full size of targets that were read in a half of the image.
+"""Frames of certain targets, measured anew where their edges tell more than in the first reading.
 
 A large dot is read where it has few pixels. Its edges are as sharp in the image as those of small
 ones, so that its centre is measured there: from half to half, each of which doubles the error of
-the frame to a small part of a pixel.
+the frame to a small part of a pixel. Soft edges are measured again on profiles that are long
+enough for them: a sharper step is fitted to a part of an edge, at the wrong place.
 """
 
 from __future__ import annotations
@@ -18,9 +19,11 @@ from ahf_ros.detectors.ring.reading import PASSES
 from ahf_ros.detectors.ring.target_circles import REACH, target_circles
 from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import fit_circles
+from ahf_ros.features.profiles import USUAL_BLUR
+from ahf_ros.features.soft_edges import ROUNDS, SOFT
 
 _MINIMUM_SHARE = 0.5  # of the expected edges, for a fit to count
-_FARTHEST = 2.0  # that a centre is moved, px
+_FARTHEST, _FARTHEST_SOFT = 2.0, 0.4  # that a centre is moved in a larger image or the same, px
 
 
 def at_full_size(images: Sequence[np.ndarray], read: Hypotheses) -> Hypotheses:
@@ -29,28 +32,72 @@ def at_full_size(images: Sequence[np.ndarray], read: Hypotheses) -> Hypotheses:
     Parameters
     ----------
     images : sequence of ndarray of uint8 or float32
-        The image and its halves, without the last one, in which the targets were read.
+        The image and its halves, down to the one in which the targets were read.
     read : Hypotheses
-        In px of that last half.
+        In px of that one.
     """
-    for image in reversed(images):
-        read = replace(read, frames=frame.enlarged(read.frames, 1), covariance=4 * read.covariance)
-        certain = np.flatnonzero(read.certain)
-        if not certain.size:
-            continue
-        gray = image.astype(np.float32, copy=False)
-        for code in dict.fromkeys(read.families[certain]):
-            which = certain[read.families[certain] == code]
-            read = read.replaced(which, _fitted(gray, read.select(which), code))
+    read = with_soft_edges(images[-1], read, read.certain)
+    for image in reversed(images[:-1]):
+        read = replace(
+            read,
+            frames=frame.enlarged(read.frames, 1),
+            covariance=4 * read.covariance,
+            blur=_enlarged(read.blur),
+        )
+        read = _measured(image, read, read.certain, _FARTHEST)
     return read
 
 
-def _fitted(gray: np.ndarray, read: Hypotheses, code: Family) -> Hypotheses:
+def with_soft_edges(image: np.ndarray, read: Hypotheses, right: np.ndarray) -> Hypotheses:
+    """Return hypotheses, those of right words with soft edges with frames from all of these.
+
+    Parameters
+    ----------
+    image : ndarray of uint8 or float32
+        In which they were read.
+    read : Hypotheses
+    right : ndarray of bool, shape (k,)
+        Whether their words are right.
+    """
+    return _measured(image, read, right & (read.blur > SOFT), _FARTHEST_SOFT)
+
+
+def _enlarged(blur: np.ndarray) -> np.ndarray:
+    """Return the blur of edges in the image whose half shows them with another blur."""
+    added = USUAL_BLUR**2  # by pixels and interpolation, in either
+    return np.sqrt(4 * np.maximum(blur**2 - added, 0) + added)
+
+
+def _measured(
+    image: np.ndarray, read: Hypotheses, which: np.ndarray, farthest: float
+) -> Hypotheses:
+    """Return hypotheses, some with frames from the edges of an image, if it shows them."""
+    selected = np.flatnonzero(which)
+    if not selected.size:
+        return read
+    gray = image.astype(np.float32, copy=False)
+    soft = read.blur > SOFT
+    for code in dict.fromkeys(read.families[selected]):
+        of_code = selected[read.families[selected] == code]
+        for of_kind, rounds in ((~soft, PASSES[-1][1]), (soft, ROUNDS)):
+            some = of_code[of_kind[of_code]]
+            if some.size:
+                fitted = _fitted(gray, read.select(some), code, rounds, farthest)
+                read = read.replaced(some, fitted)
+    return read
+
+
+def _fitted(
+    gray: np.ndarray, read: Hypotheses, code: Family, rounds: int, farthest: float
+) -> Hypotheses:
     """Return hypotheses of one family with frames from the edges of an image, if it shows them."""
-    per_sector, rounds = PASSES[-1]
-    circles = target_circles(read.words, read.starts, read.polarity, per_sector, code)
-    fit = fit_circles(gray, read.frames, circles, reach=REACH, projective=True, rounds=rounds)
+    circles = target_circles(read.words, read.starts, read.polarity, PASSES[-1][0], code)
+    fit = fit_circles(
+        gray, read.frames, circles, reach=REACH, projective=True, rounds=rounds, blur=read.blur
+    )
     moved = np.hypot(*(fit.frames[:, :2, 2] - read.frames[:, :2, 2]).T)
-    good = (fit.share >= _MINIMUM_SHARE) & (moved <= _FARTHEST)
-    better = replace(read, frames=fit.frames, covariance=fit.covariance, share=fit.share)
+    good = (fit.share >= _MINIMUM_SHARE) & (moved <= farthest)
+    better = replace(
+        read, frames=fit.frames, covariance=fit.covariance, share=fit.share, blur=fit.blur
+    )
     return read.replaced(good, better.select(good))

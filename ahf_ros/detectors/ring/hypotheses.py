@@ -53,6 +53,8 @@ class Hypotheses(ArrayRecord):
         1 for a dark target on bright ground, -1 for a bright one on dark.
     starts : ndarray of float64, shape (k,)
         Where in the frame the sector of the lowest bit starts, rad counter-clockwise from +x.
+    blur : ndarray of float64, shape (k,)
+        Of the edges, standard deviation in px of the image that they were measured in.
     """
 
     frames: np.ndarray
@@ -66,6 +68,7 @@ class Hypotheses(ArrayRecord):
     sharpness: np.ndarray
     polarity: np.ndarray
     starts: np.ndarray
+    blur: np.ndarray
 
     @property
     def certain(self) -> np.ndarray:
@@ -97,6 +100,7 @@ class Hypotheses(ArrayRecord):
             nothing,
             dots.polarity,
             nothing,
+            dots.blur,
         )
 
     @staticmethod
@@ -128,6 +132,7 @@ class Hypotheses(ArrayRecord):
             sharpness(fit),
             fit.polarity,
             readings.start,
+            fit.blur,
         )
         alone = dots.select(~likely)
         doubtful = replace(

@@ -13,7 +13,6 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.features import frame
 from ahf_ros.features.dot_search import voted_dots
 from ahf_ros.features.dots import Dots
@@ -23,13 +22,13 @@ _OBLIQUE = 1.5  # ratio of the axes of ellipses that gradients do not tell well
 _FEWEST = 4  # certain targets that tell how obliquely a scene is seen
 
 
-def rounding(hypotheses: Hypotheses) -> np.ndarray | None:
+def rounding(certain: np.ndarray) -> np.ndarray | None:
     """Return the map that makes the targets of an oblique view as round as it can.
 
     Parameters
     ----------
-    hypotheses : Hypotheses
-        Of a whole image.
+    certain : ndarray of float64, shape (k, 3, 3)
+        Frames of the certain targets of a whole image.
 
     Returns
     -------
@@ -37,7 +36,6 @@ def rounding(hypotheses: Hypotheses) -> np.ndarray | None:
         It leaves areas as they are. None where hardly any target is certain, or the usual one is
         round enough.
     """
-    certain = hypotheses.frames[hypotheses.certain]
     if len(certain) < _FEWEST:
         return None
     shapes = frame.local_affine(certain)

@@ -7,7 +7,7 @@ one without it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,12 +23,11 @@ from ahf_ros.detectors.ring.decoding import (
     sectors_by_phase,
 )
 from ahf_ros.detectors.ring.evidence import MarkAppearance
+from ahf_ros.detectors.ring.explanations import best_explanations, explained_words
 from ahf_ros.detectors.ring.occlusion import (
     EVEN,
     HiddenEvidence,
-    best_explanations,
     clearest,
-    explained_words,
     hidden_evidence,
     nothing_better,
     sector_evidence,
@@ -39,9 +38,11 @@ from ahf_ros.features.array_record import ArrayRecord
 
 _MAXIMUM_MARGIN = 13.0  # what looks like the ground over two sectors makes any word another one
 _CLEAR_MARGIN = 30.0  # where nothing is hidden, of words that no hypothesis can defeat
+_SETTLED_MARGIN, _SETTLED = 40.0, 10.0  # the same, and of words that one only can defeat
+_ONE_HIDDEN = 10.0  # evidence over that one: something like the ground lies over a sector
 _DRAW = 5.0  # lead of a word that is not expected, which is as good as none
 _MOST_HIDDEN = 0.85  # share of a band that light hides, of which some marks are made up
-_CLEAR = 2.0  # evidence for any states over the word's own, of such words
+_CLEAR = 2.0  # evidence for any states over the word's own, of words that are clear
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,10 +90,13 @@ def decode_occluded(
         better,
         np.zeros(bits.shape, bool),
     )
-    clear = (readings.words > 0) & (readings.margin > _CLEAR_MARGIN) & (better < _CLEAR)
-    clear &= prior(readings.words, family, expected) == 0
-    others = np.flatnonzero(~clear)
-    best = plain.replaced(
+    likely = (readings.words > 0) & (prior(readings.words, family, expected) == 0)
+    clear = likely & (readings.margin > _CLEAR_MARGIN) & (better < _CLEAR)
+    settled = likely & (readings.margin > _SETTLED_MARGIN) & (better < _SETTLED) & ~clear
+    some = np.flatnonzero(settled)
+    best = plain.replaced(some, _explained(of.select(some), plain.select(some), bits[some]))
+    others = np.flatnonzero(~clear & ~(settled & ~best.hidden.any(axis=1)))
+    best = best.replaced(
         others, _competing(of.select(others), plain.select(others), family, expected)
     )
     (_, before), (_, after) = (canonical(of.words, family) for of in (readings, best))
@@ -115,6 +119,25 @@ def decode_occluded(
     )
 
 
+def _explained(of: HiddenEvidence, plain: _Words, bits: np.ndarray) -> _Words:
+    """Return words that only something like the ground can defeat, and what explains them best."""
+    margin = np.minimum(_ONE_HIDDEN + of.price, _MAXIMUM_MARGIN)
+    order = clearest(of)
+    hidden, unexplained = _best_explanations(of, bits, order)
+    return replace(plain, margin=margin, unexplained=unexplained, hidden=hidden)
+
+
+def _best_explanations(
+    of: HiddenEvidence, bits: np.ndarray, order: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return `best_explanations` with the angles in their own order, not in that of the search."""
+    turned_bits = np.take_along_axis(bits, order, axis=1)
+    turned_hidden, unexplained = best_explanations(turned(of, order), turned_bits)
+    hidden = np.empty_like(turned_hidden)
+    np.put_along_axis(hidden, order, turned_hidden, axis=1)
+    return hidden, unexplained
+
+
 def _competing(
     of: HiddenEvidence, plain: _Words, family: Family, expected: frozenset[int]
 ) -> _Words:
@@ -130,14 +153,12 @@ def _competing(
     words = np.column_stack([words, np.where(read, plain.words, words[:, 0])])
     phases = np.column_stack([phases, np.where(read, plain.phases, phases[:, 0])])
     order = clearest(of)
-    of = turned(of, order)
-    bits = np.take_along_axis(bits_at(words, phases, per_sector, family), order[:, None], axis=2)
-    evidence = explained_words(of, bits)
+    bits = bits_at(words, phases, per_sector, family)
+    turned_bits = np.take_along_axis(bits, order[:, None], axis=2)
+    evidence = explained_words(turned(of, order), turned_bits)
     scores = evidence + prior(words, family, expected)
     best, rows = scores.argmax(axis=1), np.arange(len(words))
-    turned_hidden, unexplained = best_explanations(of, bits[rows, best])
-    hidden = np.empty_like(turned_hidden)
-    np.put_along_axis(hidden, order, turned_hidden, axis=1)
+    hidden, unexplained = _best_explanations(of, bits[rows, best], order)
     # What is expected wins a draw, but an ID that is read clearly is no other one.
     margin = np.minimum(
         margins(words, scores, best, family), margins(words, evidence, best, family) + _DRAW

@@ -32,6 +32,19 @@ def sharpness(fit: Fit) -> np.ndarray:
     return np.asarray(-fit.share * deviation - (1 - fit.share) * np.log(_ANYWHERE))
 
 
+def attainable_sharpness(sharp: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Return the sharpness that words would have with all edges in their places, shape (k,).
+
+    Parameters
+    ----------
+    sharp : ndarray of float64, shape (k,)
+        As `sharpness` gives it.
+    share : ndarray of float64, shape (k,)
+        Share of the edges that are in their places; not 0.
+    """
+    return np.asarray((sharp + (1 - share) * np.log(_ANYWHERE)) / share)
+
+
 def of_other_prints(
     gray: np.ndarray,
     dots: np.ndarray,
@@ -68,6 +81,8 @@ def of_other_prints(
             per_sector,
             family.with_band(inner, outer),
         )
-        other = fit_circles(gray, dots[doubtful], circles, reach=REACH, projective=True, rounds=2)
+        other = fit_circles(
+            gray, dots[doubtful], circles, reach=REACH, projective=True, covariances=False
+        )
         foreign[doubtful] |= sharpness(other) > own[doubtful] + _CLEARLY
     return foreign

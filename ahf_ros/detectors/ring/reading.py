@@ -38,6 +38,8 @@ def read_bands(
     family: Family,
     expected: frozenset[int] = frozenset(),
     passes: Sequence[tuple[int, int]] = PASSES,
+    other_prints: bool = True,
+    hidden: bool = True,
 ) -> tuple[Hypotheses, np.ndarray]:
     """Read the bands about dots, and refine dot and band together.
 
@@ -52,6 +54,10 @@ def read_bands(
         IDs that are likely to be there; all are alike where it is empty.
     passes : sequence of (int, int)
         As `PASSES` has them; one is enough where frames are right to a tenth of a pixel.
+    other_prints : bool
+        Whether words are refused where bands of other prints agree better.
+    hidden : bool
+        Whether words count that are plausible only where something hides a part of the band.
 
     Returns
     -------
@@ -62,25 +68,40 @@ def read_bands(
     """
     if not len(dots.frames):
         return Hypotheses.unread(dots, family), np.zeros(0, np.intp)
-    marks = mark_appearance(gray, dots)
     which, frames = unshifted(dots)
-    marks, read, alone = marks.select(which), np.arange(len(which)), frames
+    marks = mark_appearance(gray, dots).select(which)
+    marks, lift, read, alone = marks.lifted(), marks.lift, np.arange(len(which)), frames
     for per_sector, rounds in passes:
         angles = sector_angles(family, per_sector)
-        samples = sample_bands(gray, frames, marks.blur, angles, family)
+        samples = sample_bands(gray, frames, marks.blur, angles, family, lift)
         evidence = band_evidence(samples, marks, frames, family)
         readings = decode(samples, evidence, marks, family)
-        if (per_sector, rounds) == PASSES[-1]:
+        last = (per_sector, rounds) == PASSES[-1]
+        good = readings.plausible | (hidden and last)
+        if last and good.any():
             readings = decode_occluded(
                 samples, evidence, readings, marks, frames, family, expected
             )
-        good = readings.plausible
+            good &= readings.plausible
+        if not good.any():
+            return Hypotheses.unread(dots.select(which), family), which
         read, readings, marks = read[good], readings.select(good), marks.select(good)
+        lift = lift[good]
         words, starts = readings.words, readings.start
         circles = target_circles(words, starts, marks.polarity, per_sector, family)
-        fit = fit_circles(gray, frames[good], circles, reach=REACH, projective=True, rounds=rounds)
+        fit = fit_circles(
+            gray,
+            frames[good],
+            circles,
+            reach=REACH,
+            projective=True,
+            rounds=rounds,
+            covariances=last,
+        )
         frames = fit.frames
-    foreign = of_other_prints(gray, alone[read], fit, words, starts, per_sector, family)
+    foreign = np.zeros(len(read), bool)
+    if other_prints:
+        foreign = of_other_prints(gray, alone[read], fit, words, starts, per_sector, family)
     unread = Hypotheses.unread(dots.select(which), family)
     return unread.replaced(
         read, Hypotheses.read(readings, fit, unread.select(read), foreign)

@@ -13,6 +13,7 @@ import numpy as np
 
 from ahf_ros.codes import ring
 from ahf_ros.codes.ring import Family, canonical
+from ahf_ros.detectors.ring.full_size import with_soft_edges
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.reading import PASSES, read_bands
 from ahf_ros.detectors.ring.target_circles import REACH
@@ -135,7 +136,7 @@ def _agreeing(
         which = of_family[of_read]
         agreed = (read.words > 0) & (canonical(read.words, code)[0] == codes[which])
         agreed &= read.share >= _MINIMUM_SHARE
-        parts.append(read.select(agreed))
+        parts.append(with_soft_edges(gray, read, agreed).select(agreed))
         of_parts.append(which[agreed])
     return Hypotheses.joined(parts), np.concatenate(of_parts)
 
@@ -151,6 +152,10 @@ def _fit_either_polarity(gray: np.ndarray, frames: np.ndarray, polarities: Seque
         fit_dots(gray, frames, np.full(count, polarity), rays=_FIRST_RAYS, reach=REACH, rounds=1)
         for polarity in polarities
     ]
-    # Flat parts show edges of the wrong polarity, too, but these are faint.
-    best = np.argmax([fit.share * (1 - fit.contrast) for fit in fits], axis=0)
+    # Flat parts show edges of the wrong polarity, too, but these are faint. Those within a bright
+    # dot on black are not, but of another size.
+    sizes = [frame.ellipse_axes(fit.frames)[0] / frame.ellipse_axes(frames)[0] for fit in fits]
+    alike = [np.minimum(size, 1 / np.maximum(size, 1e-9)) for size in sizes]
+    seen = [fit.share * (1 - fit.contrast) for fit in fits]
+    best = np.argmax(np.multiply(seen, alike), axis=0)
     return Fit.joined(fits).select(best * count + np.arange(count))

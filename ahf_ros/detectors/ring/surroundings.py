@@ -33,10 +33,10 @@ _SAMPLES = 5  # angles a sector, unless fewer are enough
 _MARGIN = 0.45  # distance from the band at which its margin is read, dot radii
 _FAINTEST = 0.9  # gray value of dark over bright
 _MINIMUM_CONTRAST = 0.05
-_CLEAR = 1.0  # evidence, in units of ln, that is more than noise
 _WHOLE_STEP = 0.5  # of the usual step of the dot's edge
-_MAXIMUM = 4.0  # scaled feature; more says no more
+_CLEAR = 1.0  # evidence, in units of ln, that is more than noise
 _MINIMUM_MARKED = 1.0  # sectors of a band with a mark at both edges
+_MAXIMUM = 4.0  # scaled feature; more says no more
 _PART = 256  # dots looked at together, which bounds the memory
 _MEANS, _DEVIATIONS, _WEIGHTS = fitted_weights('counting', 'means', 'deviations', 'weights')
 
@@ -153,7 +153,7 @@ def target_features(
     inside, outside, margin = np.moveaxis(np.maximum(values, 0), 2, 0)
 
     step = log_ratio(outside, inside)
-    marks = _mark_appearance(inside, outside, step)
+    marks = seen_marks(inside, outside, step)
     bright = np.where((marks.polarity > 0)[:, None], samples.ground, inside)
     light = light_levels(np.moveaxis(bright, 0, 2), samples.gap, marks)
     visible = samples.visible.all(axis=0)
@@ -186,15 +186,30 @@ def target_features(
     )
 
 
-def _mark_appearance(inside: np.ndarray, outside: np.ndarray, step: np.ndarray) -> MarkAppearance:
-    """Return how marks look, from the gray values on both sides of the edge of dots."""
-    polarity = np.where(np.median(step, axis=1) > 0, 1, -1)
+def seen_marks(inside: np.ndarray, outside: np.ndarray, step: np.ndarray) -> MarkAppearance:
+    """Return how marks look, from what lies on both sides of the edge of dots.
+
+    Parameters
+    ----------
+    inside, outside : ndarray of float, shape (k, m)
+        Gray values.
+    step : ndarray of float, shape (k, m)
+        From the inside to the outside, of ln.
+    """
+    polarity = np.where(_median(step) > 0, 1, -1)
     is_dark = (polarity > 0)[:, None]
     dark, bright = np.where(is_dark, inside, outside), np.where(is_dark, outside, inside)
-    contrast = np.median(dark / np.maximum(bright, 1), axis=1)
+    contrast = _median(dark / np.maximum(bright, 1))
     blur = np.full(len(polarity), USUAL_BLUR)
     contrast = np.minimum(contrast, _FAINTEST)
-    return MarkAppearance(polarity, contrast, np.median(bright, axis=1), blur)
+    return MarkAppearance(polarity, contrast, _median(bright), blur)
+
+
+def _median(values: np.ndarray) -> np.ndarray:
+    """Return the upper median of each row, which takes less time than the mean of both."""
+    middle = values.shape[1] // 2
+    medians: np.ndarray = np.partition(values, middle, axis=1)[:, middle]
+    return medians
 
 
 def _of_sectors(evidence: np.ndarray, per_sector: int) -> np.ndarray:

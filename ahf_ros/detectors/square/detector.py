@@ -15,6 +15,7 @@ import numpy as np
 from ahf_ros.codes.square import dictionary
 from ahf_ros.detectors.contract import FamilyDetector
 from ahf_ros.detectors.square.sides import centres, fit_sides
+from ahf_ros.features.frame import reduced
 from ahf_ros.features.pyramid import halved
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import Target, sorted_targets
@@ -139,7 +140,7 @@ def _from_halves(gray: np.ndarray, corners: np.ndarray, cells: int) -> np.ndarra
     halves = halved(gray, levels)
     for level in range(levels, 0, -1):
         which = np.flatnonzero(sides > _LARGE * 2 ** (level - 1))
-        fit = fit_sides(halves[level], (corners[which] + 0.5) / 2**level - 0.5, cells)
+        fit = fit_sides(halves[level], reduced(corners[which], level), cells)
         good = fit.share >= _MINIMUM_SHARE
         corners[which[good]] = (fit.corners[good] + 0.5) * 2**level - 0.5
     return corners

@@ -13,7 +13,7 @@ import numpy as np
 
 from ahf_ros.features.edge_covariance import common_errors
 from ahf_ros.features.edge_weights import weigh_edges
-from ahf_ros.features.light_slope import common_slope, smooth_slopes
+from ahf_ros.features.light_slope import common_slope, smooth_slopes, unevenness
 from ahf_ros.features.profiles import (
     BLURS,
     CORRELATION,
@@ -26,9 +26,10 @@ from ahf_ros.features.robust import median, reweight, spread
 
 _PROFILES = 32  # per side
 _ENDS = 0.06  # of a side, left out at its ends, where blur rounds the corner
-_REACH = 3.0  # maximum distance of an edge from its expected position, px
+_REACH = 3.0  # half the distance within which a corner may lie from where it was, px
 _REACH_IN_CELLS = 0.45  # the same in cells of the marker; other edges are a cell away
-_MEASUREMENTS = 3
+_MEASUREMENTS = 5
+_OF_COMMON, _BY_LIGHT = 1.2, 2.0  # of the variance, as rendered scenes have it
 _ROUNDS = 6  # iterations of robust least squares
 _OUTLIER = 3.0  # distance from the line that quarters the weight, in usual distances
 _MINIMUM_DISTANCE = 0.02  # minimum of the usual distance, px
@@ -106,9 +107,10 @@ def fit_sides(gray: np.ndarray, corners: np.ndarray, cells: int) -> Sides:
         own = weigh_edges(edges)
         step = np.maximum(edges.bright - edges.dark, _MINIMUM_STEP)
         of_side = (len(corners), 4, _PROFILES)
+        slopes, uneven = _slopes(edges, own.weights)
         lines = _fit_lines(
             along,
-            (edges.offset - edges.sensitivity * _slopes(edges, own.weights)).reshape(of_side),
+            (edges.offset - edges.sensitivity * slopes).reshape(of_side),
             (own.weights * step**2).reshape(of_side),
             own.seen.reshape(of_side),
             edges.spacing.reshape(of_side),
@@ -119,17 +121,27 @@ def fit_sides(gray: np.ndarray, corners: np.ndarray, cells: int) -> Sides:
         share = np.where(near, lines.share.min(axis=1), 0.0)
         cell = np.linalg.norm(ends - starts, axis=2).mean(axis=1) / cells
         through = _THROUGH * (blur / np.maximum(cell, 1.0)) ** 2
+        covariance *= (1 + _BY_LIGHT * uneven)[:, None, None]
         covariance += (through**2)[:, None, None] * np.eye(2)
     return Sides(corners, share, covariance)
 
 
-def _slopes(edges: Edges, weights: np.ndarray) -> np.ndarray:
-    """Return the slope of the light across the edges, smoothed along each side, shape (k, m)."""
+def _slopes(edges: Edges, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the slope of the light across edges, smoothed along each side, and its unevenness.
+
+    Returns
+    -------
+    slopes : ndarray of float64, shape (k, m)
+        As a share of the light, 1/px.
+    uneven : ndarray of float64, shape (k,)
+    """
     slopes = edges.slope - common_slope(edges.slope, np.ones_like(edges.slope), weights)
     index = np.arange(_PROFILES)
     window = np.exp(-0.5 * ((index[:, None] - index) / _LIGHT_REACH) ** 2)
     of_sides = (slopes.reshape(-1, _PROFILES), weights.reshape(-1, _PROFILES))
-    return smooth_slopes(*of_sides, window, _LIGHT_PRIOR, rounds=1).slope.reshape(slopes.shape)
+    light = smooth_slopes(*of_sides, window, _LIGHT_PRIOR, rounds=1)
+    errors = light.errors.reshape(slopes.shape)
+    return light.slope.reshape(slopes.shape), unevenness(errors, weights)
 
 
 def _normals(starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
@@ -148,7 +160,7 @@ def _outlines(
     points = starts[:, :, None] + along[:, None] * (ends - starts)[:, :, None]
     lengths = np.linalg.norm(ends - starts, axis=2)
     depth = np.minimum(np.roll(lengths, 1, axis=1), np.roll(lengths, -1, axis=1))
-    reach = np.minimum(_REACH_IN_CELLS * depth / cells, _REACH)
+    reach = _REACH_IN_CELLS * depth / cells
 
     def repeated(of_sides: np.ndarray) -> np.ndarray:
         return np.repeat(of_sides, _PROFILES, axis=1)
@@ -202,8 +214,8 @@ def _fit_lines(
     squares = np.maximum((robust**2 * together).sum(axis=2), _NO_WEIGHT)
     count = np.maximum(robust.sum(axis=2) ** 2 / squares, _FEWEST)
     common = common_errors((robust * errors).reshape(flat), np.zeros(len(along)))
-    shared = np.maximum(common.reshape(*count.shape) / together.mean(axis=2), 1.0)
-    growth = together * (shared * count / (count - 2))[..., None]
+    shared = common.reshape(*count.shape)
+    growth = together * (_OF_COMMON * shared**2 * count / (count - 2))[..., None]
     parts = influence * (errors * np.sqrt(growth))[..., None]
     return _Lines(unknowns, np.swapaxes(parts, 2, 3) @ parts, share)
 

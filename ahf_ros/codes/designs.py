@@ -1,0 +1,253 @@
+"""Printed designs of the families: the outlines of the ink, and the free area about it.
+
+Lengths are in radii of the dot, with x to the right and y upwards as printed. The origin is the
+centre of the target. The corner or edge where the reading of a word begins lies on the x axis.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ahf_ros.codes.dots import DotFamily, dot_family
+from ahf_ros.codes.families import FAMILY_NAMES
+from ahf_ros.codes.gsi import PointFamily
+from ahf_ros.codes.gsi_library import point_family
+from ahf_ros.codes.ring import Family, family, sectors
+from ahf_ros.codes.square import SQUARE_NAMES, marker
+
+HALF_SIDE = 2.4
+"""Half the side of a square marker, in radii of the dot of a ring target of the same size."""
+
+_QUIET_ZONE = 4.2  # of ring targets and square markers: 3.5 for the widest band, a fifth more
+_MARGIN = 1.0  # about the outermost dot or border of others, in radii of the dot
+
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Arc:
+    """An arc of a circle, counter-clockwise where `extent` is positive; angles in rad."""
+
+    x: float
+    y: float
+    radius: float
+    start: float
+    extent: float
+
+
+Contour = tuple[Point | Arc, ...]
+"""A closed outline: corners and arcs in their order, joined by straight lines."""
+
+
+@dataclass(frozen=True, slots=True)
+class Proportions:
+    """What the targets of a family have in common; lengths are in radii of the dot.
+
+    Attributes
+    ----------
+    reach : float
+        Radius of the circle that holds all ink.
+    radius : float
+        Radius of the circle whose image is reported as the ellipse of the target.
+    quiet_zone : float
+        Radius of the area around a target that is left free.
+    radii : dict of str to float
+        The lengths of the design by their names.
+    """
+
+    reach: float
+    radius: float
+    quiet_zone: float
+    radii: dict[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class PrintedDesign:
+    """The print of one target.
+
+    Attributes
+    ----------
+    code : int
+        Code word.
+    contours : tuple of Contour
+        A point is inked if it is inside an odd number of them.
+    """
+
+    code: int
+    contours: tuple[Contour, ...]
+
+
+def proportions(name: str, file: str = '') -> Proportions:
+    """Return what the targets of a family have in common.
+
+    Parameters
+    ----------
+    name : str
+        One of `ahf_ros.codes.families.FAMILY_NAMES`.
+    file : str
+        Data file that describes the family, of `gsi` and `dots`; the usual one where empty.
+
+    Raises
+    ------
+    ValueError
+        If there is no such family, or the data file is not accepted.
+
+    Examples
+    --------
+    >>> proportions('metashape12').radii
+    {'dot': 1.0, 'band_inner': 2.25, 'band_outer': 3.5}
+    """
+    if name in SQUARE_NAMES:
+        radii = {'half_side': HALF_SIDE}
+        return Proportions(HALF_SIDE * 2**0.5, HALF_SIDE, _QUIET_ZONE, radii)
+    if name == 'gsi':
+        points = point_family(file)
+        reach = points.reach / points.dot_radius
+        radius = float(points.template_radii[points.reference] / points.dot_radius)
+        return Proportions(reach, radius, reach + _MARGIN, {'dot': 1.0})
+    if name == 'dots':
+        dots = dot_family(file)
+        radii = {
+            'dot': 1.0,
+            'dot_circle': dots.dot_circle,
+            'small_dot': dots.dot_radius,
+            'ground': dots.ground_radius,
+            'border': dots.border_radius,
+        }
+        return Proportions(dots.border_radius, 1.0, dots.border_radius + _MARGIN, radii)
+    inner, outer = family(name).band
+    radii = {'dot': 1.0, 'band_inner': inner, 'band_outer': outer}
+    return Proportions(outer, 1.0, _QUIET_ZONE, radii)
+
+
+def relative_reach(name: str) -> float:
+    """Return the radius of a target, in semi-axes of the ellipse that is reported.
+
+    Parameters
+    ----------
+    name : str
+        A family. Of one that the package does not know, the radius is that of the ellipse.
+
+    Examples
+    --------
+    >>> relative_reach('metashape12'), relative_reach('mine')
+    (3.5, 1.0)
+    """
+    if name not in FAMILY_NAMES:
+        return 1.0
+    design = proportions(name)
+    return design.reach / design.radius
+
+
+def printed_design(name: str, number: int, pinhole: float, file: str = '') -> PrintedDesign:
+    """Return the print of a target.
+
+    Parameters
+    ----------
+    name, file : str
+        As for `proportions`.
+    number : int
+        ID of the target.
+    pinhole : float
+        Radius of the hole in the centre of the dot, in radii of the dot; 0 for none. Square
+        markers and point-distributed targets have none.
+
+    Raises
+    ------
+    ValueError
+        If the family has no such ID; and as for `proportions`.
+
+    Examples
+    --------
+    >>> len(printed_design('metashape12', 1, 0.05).contours)  # dot, hole, two arcs of the band
+    4
+    """
+    if name in SQUARE_NAMES:
+        return PrintedDesign(number, _square_contours(name, number))
+    if name == 'gsi':
+        points = point_family(file)
+        word = points.word(number)
+        return PrintedDesign(word, _point_contours(points, word))
+    centre = [circle(1.0)] + [circle(pinhole)] * (pinhole > 0)
+    if name == 'dots':
+        dots = dot_family(file)
+        word = dots.word(number)
+        return PrintedDesign(word, (*centre, *_dot_ring_contours(dots, word)))
+    table = family(name)
+    word = table.word(number)
+    return PrintedDesign(word, (*centre, *_band_contours(table, word)))
+
+
+def circle(radius: float, x: float = 0.0, y: float = 0.0) -> Contour:
+    """Return the outline of a circle."""
+    return (Arc(x, y, radius, 0.0, 2 * math.pi),)
+
+
+def _band_contours(table: Family, word: int) -> list[Contour]:
+    """Return the outlines of the arcs of a band; sectors side by side are one arc."""
+    inked = sectors(word, table.bits)
+    sector = 2 * math.pi / table.bits
+    contours: list[Contour] = []
+    for first in np.flatnonzero(inked & ~np.roll(inked, 1)).tolist():
+        count = int(np.argmin(np.roll(inked, -first)))
+        start, extent = first * sector, count * sector
+        outer = Arc(0.0, 0.0, table.band_outer, start, extent)
+        contours.append((outer, Arc(0.0, 0.0, table.band_inner, start + extent, -extent)))
+    return contours
+
+
+def _dot_ring_contours(table: DotFamily, word: int) -> list[Contour]:
+    dots = [circle(table.dot_radius, x, y) for x, y in table.places(word).tolist()]
+    return [*dots, circle(table.ground_radius), circle(table.border_radius)]
+
+
+def _point_contours(table: PointFamily, word: int) -> tuple[Contour, ...]:
+    places, radii = table.dots(word)
+    dots = np.column_stack([radii, places]) / table.dot_radius
+    return tuple(circle(*dot) for dot in dots.tolist())
+
+
+def _square_contours(name: str, number: int) -> tuple[Contour, ...]:
+    cells = marker(name, number, 1) == 0
+    side = len(cells)
+    scale = 2 * HALF_SIDE / side
+    return tuple(
+        tuple(((x - side / 2) * scale, (side / 2 - y) * scale) for x, y in corners)
+        for corners in _outlines(cells)
+    )
+
+
+def _outlines(cells: np.ndarray) -> list[list[tuple[int, int]]]:
+    """Return the corners (column, row) of the polygons that bound the true cells of a picture."""
+    padded = np.pad(cells, 1)
+    after: dict[tuple[int, int], list[tuple[int, int]]] = {}
+    for row, column in np.argwhere(cells).tolist():
+        corners = [(column, row), (column, row + 1), (column + 1, row + 1), (column + 1, row)]
+        beside = [(row + 1, column), (row + 2, column + 1), (row + 1, column + 2)]
+        beside.append((row, column + 1))
+        for index, neighbour in enumerate(beside):
+            if not padded[neighbour]:
+                after.setdefault(corners[index], []).append(corners[(index + 1) % 4])
+    polygons = []
+    while after:
+        start = corner = next(iter(after))
+        polygon = []
+        while True:
+            polygon.append(corner)
+            following = after[corner].pop()
+            if not after[corner]:
+                del after[corner]
+            corner = following
+            if corner == start:
+                break
+        polygons.append(_without_straight(polygon))
+    return polygons
+
+
+def _without_straight(polygon: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Return a polygon with sides along the axes without the corners at which it goes straight."""
+    around = zip([polygon[-1], *polygon], polygon, [*polygon[1:], polygon[0]], strict=False)
+    return [at for before, at, next_ in around if before[0] != next_[0] and before[1] != next_[1]]

@@ -1,0 +1,166 @@
+"""Targets that are hard to confuse: words far apart, which no cover turns into each other.
+
+Something in one colour over a part of a band or of a ring of dots, as dark as ink or as bright as
+the ground, can turn one word into another. No detector can tell such a target from the other one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ahf_ros.codes.cyclic import CyclicFamily, mirrored_words, rotated_words
+from ahf_ros.codes.dots import dot_family
+from ahf_ros.codes.gsi_library import point_family
+from ahf_ros.codes.independent import independent_set
+from ahf_ros.codes.ring import FAMILY_NAMES, family
+from ahf_ros.codes.square import SQUARE_NAMES, dictionary
+
+MAXIMUM_WORDS = 2048
+"""Number of words among which a set is looked for; of more, as many are drawn at random."""
+
+_BYTE = np.array([bin(byte).count('1') for byte in range(256)], np.uint8)
+
+
+def select_ids(name: str, ids: Sequence[int], count: int, file: str = '') -> list[int]:
+    """Return IDs of targets that are hard to confuse.
+
+    No two of their words turn into each other by a cover in one colour, and the smallest Hamming
+    distance between any two, over all rotations, is as large as a search finds it.
+
+    Parameters
+    ----------
+    name : str
+        One of `ahf_ros.codes.families.FAMILY_NAMES`.
+    ids : sequence of int
+        Different IDs of the family, of which some are selected.
+    count : int
+        Number of IDs to select, at least 1.
+    file : str
+        Data file that describes the family, of `gsi` and `dots`; the usual one where empty.
+
+    Returns
+    -------
+    list of int
+        `count` IDs, ascending; the same ones in every run.
+
+    Raises
+    ------
+    ValueError
+        If no set of so many is found.
+
+    Examples
+    --------
+    >>> ids = select_ids('metashape14', range(1, 562), 20)
+    >>> len(ids), smallest_distance('metashape14', ids)
+    (20, 4)
+    """
+    generator = np.random.default_rng(0)
+    pool = np.array(sorted(ids))
+    if pool.size > MAXIMUM_WORDS:
+        pool = np.sort(generator.choice(pool, MAXIMUM_WORDS, replace=False))
+    distances = _distances(_orbits(name, pool, file))
+    confused = _confused(name, pool, file)
+    levels = np.unique(distances[np.triu_indices(pool.size, 1)])[::-1].tolist() or [0]
+    largest = 0
+    for level in levels:
+        conflicts = confused | (distances < level)
+        np.fill_diagonal(conflicts, False)
+        found = independent_set(conflicts, count, generator, level == levels[-1])
+        if found.size == count:
+            return [int(number) for number in pool[found]]
+        largest = max(largest, found.size)
+    raise ValueError(
+        f'best is {count}, accepted is an integer from 1 to {largest}: no larger set of IDs of '
+        f'{name} was found in which no target turns into another one by a cover'
+    )
+
+
+def smallest_distance(name: str, ids: Sequence[int], file: str = '') -> int:
+    """Return the smallest Hamming distance between the words of any two IDs, over all rotations.
+
+    Parameters
+    ----------
+    name, ids, file
+        As for `select_ids`; at least two IDs.
+    """
+    distances = _distances(_orbits(name, np.asarray(ids), file))
+    return int(distances[np.triu_indices(len(ids), 1)].min())
+
+
+def confused_pairs(name: str, ids: Sequence[int], file: str = '') -> list[tuple[int, int]]:
+    """Return the pairs of IDs that a cover in one colour can turn into each other.
+
+    Parameters
+    ----------
+    name, ids, file
+        As for `select_ids`.
+
+    Examples
+    --------
+    >>> len(confused_pairs('metashape12', range(1, 162)))
+    1652
+    """
+    pool = np.asarray(ids)
+    pairs = np.argwhere(np.triu(_confused(name, pool, file)))
+    return [(int(pool[first]), int(pool[second])) for first, second in pairs]
+
+
+def _cyclic(name: str, file: str) -> CyclicFamily | None:
+    if name in FAMILY_NAMES:
+        return family(name)
+    return dot_family(file) if name == 'dots' else None
+
+
+def _orbits(name: str, ids: np.ndarray, file: str) -> np.ndarray:
+    """Return all words that are the code of each ID, ndarray of uint64, shape (n, k)."""
+    code = _cyclic(name, file)
+    if code is not None:
+        words = code.words[ids - 1]
+        turned = [rotated_words(words, turn, code.bits) for turn in range(code.bits)]
+        if name == 'dots':
+            turned += [mirrored_words(words, code.bits) for words in turned]
+        return np.stack(turned, axis=1).astype(np.uint64)
+    if name in SQUARE_NAMES:
+        rotations = dictionary(name).bytesList[ids].transpose(0, 2, 1).astype(np.uint64)
+        places = np.uint64(8) * np.arange(rotations.shape[2], dtype=np.uint64)
+        orbits: np.ndarray = (rotations << places).sum(axis=2, dtype=np.uint64)
+        return orbits
+    points = point_family(file)
+    return np.array([[points.word(number)] for number in ids.tolist()], np.uint64)
+
+
+def _distances(orbits: np.ndarray) -> np.ndarray:
+    """Return the Hamming distance between any two codes, ndarray of uint8, shape (n, n)."""
+    first = orbits[:, 0]
+    distances = np.full((len(first), len(first)), 64, np.uint8)
+    for words in orbits.T:
+        for row, word in enumerate(first):
+            different = (words ^ word).view(np.uint8).reshape(-1, 8)
+            counted = _BYTE[different].sum(axis=1, dtype=np.uint8)
+            np.minimum(distances[row], counted, out=distances[row])
+    return distances
+
+
+def _confused(name: str, ids: np.ndarray, file: str) -> np.ndarray:
+    """Return which pairs a cover turns into each other, ndarray of bool, shape (n, n)."""
+    confused = np.zeros((ids.size, ids.size), bool)
+    code = _cyclic(name, file)
+    if code is None:
+        return confused
+    words = code.words[ids - 1]
+    every = code.canonical(np.arange(1 << code.bits))
+    order = np.argsort(words)
+    place = order[np.minimum(np.searchsorted(words, every, sorter=order), ids.size - 1)]
+    index = np.where(words[place] == every, place, -1)
+    rows = np.arange(ids.size)
+    for length in range(1, code.bits):
+        for turn in range(code.bits):
+            arc = int(rotated_words((1 << length) - 1, turn, code.bits))
+            for covered in (words & ~arc, words | arc):
+                others = index[covered]
+                confused[rows[others >= 0], others[others >= 0]] = True
+    np.fill_diagonal(confused, False)
+    both: np.ndarray = confused | confused.T
+    return both

@@ -1,0 +1,66 @@
+"""What is explained of an image while its dots are looked for: certain targets, and whole dots."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ahf_ros.detectors.ring.hypotheses import Hypotheses
+from ahf_ros.features import frame
+from ahf_ros.features.array_record import ArrayRecord
+
+WHOLE = 0.9
+"""Share of the edge of a dot that is explained, or reported, without a word."""
+
+_LARGE = 12.0  # dot with its margin, px
+_MARGIN = 0.4  # width of the quiet margin round a dot or a band, dot radii
+
+
+@dataclass(frozen=True, slots=True)
+class Explained(ArrayRecord):
+    """k certain targets and whole dots, whose edges need no other explanation.
+
+    Attributes
+    ----------
+    frames : ndarray of float64, shape (k, 3, 3)
+        In px of the image.
+    outlines : ndarray of float64, shape (k, m, 2)
+        Polygons around them and their margins, px of the image.
+    sizes : ndarray of float64, shape (k,)
+        Smaller radii of these, px.
+    certain : ndarray of bool, shape (k,)
+        Whether they are targets.
+    """
+
+    frames: np.ndarray
+    outlines: np.ndarray
+    sizes: np.ndarray
+    certain: np.ndarray
+
+    @staticmethod
+    def by(read: Hypotheses) -> Explained:
+        """Return what hypotheses explain, those of a whole image."""
+        certain = read.certain
+        explained = certain | (read.share >= WHOLE)
+        read, certain = read.select(explained), certain[explained]
+        _, minor, _ = frame.ellipse_axes(read.frames)
+        radii = np.where(certain, read.reach / minor, 1.0) + _MARGIN
+        outlines = frame.circle_outlines(read.frames, radii)
+        return Explained(read.frames, outlines, radii * minor, certain)
+
+    @property
+    def clear(self) -> np.ndarray:
+        """Whether they are targets, or so large that their edges are clear, shape (k,)."""
+        return self.certain | (self.sizes > _LARGE)
+
+    def outlines_in(self, level: int) -> np.ndarray:
+        """Return the outlines with edges in the image that is halved `level` times, its px."""
+        return frame.reduced(self.outlines[self.sizes > 2**level], level)
+
+
+_NO_FRAMES, _NO_SIZES = np.zeros((0, 3, 3)), np.zeros(0)
+NOTHING = Explained(
+    _NO_FRAMES, frame.circle_outlines(_NO_FRAMES, _NO_SIZES), _NO_SIZES, np.zeros(0, bool)
+)
+"""The record of an image of which nothing is known."""

@@ -1,0 +1,53 @@
+"""Black that is darker than ink, as a camera or an editor makes it.
+
+Ink reflects a few hundredths of the light that paper does. Where an image shows it darker, because
+contrast was raised, black was clipped or the image was never photographed, the logarithm
+exaggerates the dark end of every blurred edge, and marks look wider or narrower than they are.
+Lifting black to what prints have undoes that.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+_PRINTED = 0.25
+"""Gray value of ink over that of paper to which black is lifted."""
+
+
+def black_lift(contrast: np.ndarray, bright: np.ndarray) -> np.ndarray:
+    """Return the gray values that black is lifted to.
+
+    Parameters
+    ----------
+    contrast : ndarray of float64, shape (...)
+        Gray value of ink over that of paper. From 0.2 on, black stays as it is.
+    bright : ndarray of float64, shape (...)
+        Gray value of paper.
+
+    Returns
+    -------
+    ndarray of float64, shape (...)
+
+    Examples
+    --------
+    >>> black_lift(np.array([0.0, 0.3]), np.array([200.0, 200.0])).round()
+    array([54.,  0.])
+    """
+    wanted = _PRINTED * (1 - contrast)
+    missing = np.maximum(wanted - contrast, 0) * bright
+    lift: np.ndarray = missing / (1 - wanted + missing / 255)
+    return lift
+
+
+def lifted(values: np.ndarray, lift: np.ndarray) -> np.ndarray:
+    """Return gray values in a range that begins at `lift` instead of at 0.
+
+    Parameters
+    ----------
+    values : ndarray of float, shape (...)
+        Gray values from 0 to 255.
+    lift : ndarray of float
+        See `black_lift`; its shape is broadcast to that of `values`.
+    """
+    moved: np.ndarray = lift + (1 - lift / 255) * values
+    return moved

@@ -1,0 +1,90 @@
+"""Outlines of printed targets, against the ink of rendered ones."""
+
+from __future__ import annotations
+
+import math
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ahf_ros.codes.designs import Arc, Contour, _outlines, printed_design, proportions
+from ahf_ros.codes.families import numbers_of
+from ahf_ros.synthetic.designs import designs
+from support.square_markers import needs_square_markers
+
+ROUND = ('metashape12', 'metashape20', 'aicon14', 'gsi', 'dots')
+SQUARE = ('aruco_4x4_50', 'aruco_original', 'apriltag_25h9')
+SHARP = np.eye(2, dtype=np.float32) * np.float32(0.01)
+
+
+def polygon(contour: Contour) -> np.ndarray:
+    corners: list[tuple[float, float]] = []
+    for part in contour:
+        if isinstance(part, Arc):
+            for angle in part.start + part.extent * np.linspace(0, 1, 181):
+                x, y = math.cos(angle), math.sin(angle)
+                corners.append((part.x + part.radius * x, part.y + part.radius * y))
+        else:
+            corners.append(part)
+    return np.array(corners)
+
+
+def inside(contours: tuple[Contour, ...], points: np.ndarray) -> np.ndarray:
+    """Return which points are in an odd number of contours, by the crossings of a ray."""
+    crossings = np.zeros(len(points), int)
+    x, y = points.T[:, :, None]
+    for contour in contours:
+        first = polygon(contour)
+        second = np.roll(first, -1, axis=0)
+        across = (first[:, 1] > y) != (second[:, 1] > y)
+        rise = np.where(first[:, 1] == second[:, 1], 1, second[:, 1] - first[:, 1])
+        at = first[:, 0] + (y - first[:, 1]) * (second[:, 0] - first[:, 0]) / rise
+        crossings += (across & (at > x)).sum(axis=1)
+    return crossings % 2 == 1
+
+
+@pytest.mark.parametrize(
+    'name', [*ROUND, *(pytest.param(name, marks=needs_square_markers) for name in SQUARE)]
+)
+def test_outlines_hold_the_ink_of_rendered_targets(name: str) -> None:
+    pinhole = 0.2
+    _, design_of = designs(name, pinhole)
+    every = numbers_of(name)
+    generator = np.random.default_rng(5)
+    for number in (every[0], every[len(every) // 2], every[-1]):
+        rendered, printed = design_of(number, 0.0), printed_design(name, number, pinhole)
+        assert printed.code == rendered.code
+        points = generator.uniform(-1.1, 1.1, (1500, 2)) * rendered.reach
+        points[:100] /= 5 * rendered.reach  # in the dot, about its hole
+        x, y = points.astype(np.float32).T
+        ink = rendered.cover(x[None], y[None], SHARP)[0]
+        clear = np.abs(ink - 0.5) > 0.49
+        assert clear.mean() > 0.8
+        assert (inside(printed.contours, points) == (ink > 0.5))[clear].all()
+        assert 0.05 < (ink > 0.5).mean() < 0.7
+        outside = np.hypot(*points.T) > 1.02 * proportions(name).reach
+        assert not ink[outside].any()
+
+
+@given(st.lists(st.lists(st.booleans(), min_size=4, max_size=4), min_size=1, max_size=5))
+def test_outlines_of_cells_enclose_exactly_the_cells(rows: list[list[bool]]) -> None:
+    cells = np.array(rows)
+    polygons = [np.array(corners, float) for corners in _outlines(cells)]
+    area = 0.0
+    for corners in polygons:
+        following = np.roll(corners, -1, axis=0)
+        assert ((corners != following).sum(axis=1) == 1).all()
+        area -= (corners[:, 0] * following[:, 1] - corners[:, 1] * following[:, 0]).sum() / 2
+    assert area == cells.sum()
+    middles = np.argwhere(np.ones_like(cells))[:, ::-1] + 0.5
+    contours = tuple(tuple(map(tuple, corners.tolist())) for corners in polygons)
+    assert inside(contours, middles).tolist() == cells.ravel().tolist()
+
+
+def test_a_target_that_is_not_there_is_named() -> None:
+    message = 'number is 162, accepted is an ID of metashape12 from 1 to 161'
+    with pytest.raises(ValueError, match=re.escape(message)):
+        printed_design('metashape12', 162, 0.0)
