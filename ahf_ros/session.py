@@ -1,93 +1,30 @@
-"""One identification: its settings, declared once, and the builder that every way in uses."""
+"""The builder of one identification, which every way in uses."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from ahf_ros.codes.families import mirrored_number
 from ahf_ros.detectors import (
-    DETECTOR,
     Detector,
     DetectorSettings,
+    Discerning,
     Drafter,
     Expecting,
     Refiner,
     check_expected_ids,
     create_detector,
-    detector_name,
     estimator,
 )
 from ahf_ros.filtering.identifier import Identifier
-from ahf_ros.filtering.settings import AdaptiveSettings
 from ahf_ros.filtering.trials import DetectorFunction
 from ahf_ros.imaging.stack import ImageStack
+from ahf_ros.session_settings import IdentificationSettings
 from ahf_ros.settings.nested import updated
-from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.target import Identification, Target
-
-MAXIMUM_TARGETS = 100_000
-"""Maximum of N."""
-
-
-@dataclass(frozen=True, slots=True)
-class IdentificationSettings:
-    """Settings of one identification: which targets, how many, by which detector and search.
-
-    Attributes
-    ----------
-    detector : str
-        One of `ahf_ros.detectors.DETECTOR_NAMES`, or 'auto' for the detector of the family.
-    expected_targets : int
-        N, the number of coded targets in every image; 0 where unknown.
-    estimate_expected : bool
-        Whether to estimate N where it is unknown.
-    detection : DetectorSettings
-        What the targets look like.
-    adaptive : AdaptiveSettings
-        How a filter is searched for.
-
-    Raises
-    ------
-    ValueError
-        If a value is not accepted or does not fit the others.
-
-    Examples
-    --------
-    >>> from ahf_ros import DetectorSettings, IdentificationSettings
-    >>> IdentificationSettings(detection=DetectorSettings(family='aicon14')).detector
-    'auto'
-    """
-
-    detector: str = parameter(DETECTOR.default, DETECTOR.description, choices=DETECTOR.choices)
-    expected_targets: int = parameter(
-        0,
-        'N, the number of coded targets in every image; 0: unknown, and no filter is searched for '
-        'unless N is estimated.',
-        minimum=0,
-        maximum=MAXIMUM_TARGETS,
-    )
-    estimate_expected: bool = parameter(
-        False,
-        'Whether to estimate N where it is unknown, and to search for a filter that shows N '
-        'targets.',
-    )
-    detection: DetectorSettings = field(default_factory=DetectorSettings)
-    adaptive: AdaptiveSettings = field(default_factory=AdaptiveSettings)
-
-    def __post_init__(self) -> None:
-        """Refuse values that are not accepted."""
-        check_parameters(self)
-        self.check_detector()
-        if self.estimate_expected:
-            estimator(self.detection)
-
-    def check_detector(self) -> None:
-        """Refuse a detector that does not identify the family."""
-        detector_name(self.detector, self.detection.family)
 
 
 def create_identifier(
@@ -105,7 +42,7 @@ def create_identifier(
         The defaults where None.
     detector : str or callable, optional
         Name of a detector, or a detector of your own: any function from an 8-bit image to a list
-        of `Target`. If it is also a `Refiner` or a `Drafter`, that is used.
+        of `Target`. If it is also a `Refiner`, a `Drafter` or `Discerning`, that is used.
     interrupt : callable, optional
         As for `Identifier`.
     **values
@@ -144,6 +81,7 @@ def create_identifier(
         draft=used.draft if isinstance(used, Drafter) else None,
         estimate=estimate,
         interrupt=interrupt,
+        patience=used.patience if isinstance(used, Discerning) else 0,
         mirrored=_mirrored_id,
         name=f'detector {used.name!r}' if isinstance(used, Detector) else 'detector',
     )

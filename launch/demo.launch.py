@@ -3,41 +3,46 @@
 ros2 launch ahf_ros demo.launch.py light:=lattice
 """
 
-from ament_index_python.packages import get_package_share_directory
 from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument, SetEnvironmentVariable
-from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
+from launch.actions import DeclareLaunchArgument, SetEnvironmentVariable, Shutdown
+from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
-CONFIG = PathJoinSubstitution([get_package_share_directory('ahf_ros'), 'config'])
-PROFILES = PathJoinSubstitution([CONFIG, 'fastdds_shm.xml'])
+from ahf_ros.nodes.launching import config
+from ahf_ros.synthetic.patterns import LIGHT_NAMES
+
+PARAMETERS = {
+    'illumination': [
+        config('illumination.yaml'),
+        {'light': LaunchConfiguration('light'), 'rate': 0.2},
+    ],
+    'detector': [config('detector.yaml'), {'expected_targets': 54, 'max_duration': 20.0}],
+    'scoreboard': [],
+}
 
 
 def generate_launch_description():
+    # Room for whole images in the memory that processes share; Jazzy, and Kilted.
+    variables = ('FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE')
+    profiles = config('fastdds_shm.xml')
     return LaunchDescription(
         [
-            DeclareLaunchArgument('light', default_value='stripe', description='Projected light.'),
-            # Room for whole images in the memory that processes share; Jazzy, and Kilted.
-            SetEnvironmentVariable('FASTRTPS_DEFAULT_PROFILES_FILE', PROFILES),
-            SetEnvironmentVariable('FASTDDS_DEFAULT_PROFILES_FILE', PROFILES),
-            Node(
-                package='ahf_ros',
-                executable='illumination',
-                parameters=[
-                    PathJoinSubstitution([CONFIG, 'illumination.yaml']),
-                    {'light': LaunchConfiguration('light'), 'rate': 0.2},
-                ],
-                output='screen',
+            DeclareLaunchArgument(
+                'light',
+                default_value='stripe',
+                choices=list(LIGHT_NAMES),
+                description='Light that is projected onto the targets.',
             ),
-            Node(
-                package='ahf_ros',
-                executable='detector',
-                parameters=[
-                    PathJoinSubstitution([CONFIG, 'detector.yaml']),
-                    {'expected_targets': 54, 'max_duration': 20.0},
-                ],
-                output='screen',
+            *(SetEnvironmentVariable(name, profiles) for name in variables),
+            *(
+                Node(
+                    package='ahf_ros',
+                    executable=name,
+                    parameters=parameters,
+                    output='screen',
+                    on_exit=Shutdown(reason=f'the {name} has ended'),
+                )
+                for name, parameters in PARAMETERS.items()
             ),
-            Node(package='ahf_ros', executable='scoreboard', output='screen'),
         ]
     )

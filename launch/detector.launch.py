@@ -3,39 +3,31 @@
 ros2 launch ahf_ros detector.launch.py namespace:=left image:=/left/image_raw
 """
 
-from ament_index_python.packages import get_package_share_directory
 from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument
-from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
-from launch_ros.actions import Node
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
 
-CONFIG = PathJoinSubstitution([get_package_share_directory('ahf_ros'), 'config'])
+from ahf_ros.nodes.launching import USUAL, arguments, detector
+
+PARAMETERS = (*USUAL, 'cloud')
 
 
 def generate_launch_description():
     return LaunchDescription(
         [
-            DeclareLaunchArgument('namespace', default_value='', description='Of the node.'),
-            DeclareLaunchArgument('image', default_value='image', description='Topic of images.'),
             DeclareLaunchArgument(
-                'points', default_value='points', description='Topic of clouds, with cloud.'
+                'image',
+                default_value='image',
+                description='Topic of the images; with image_transport compressed, /compressed '
+                'is appended.',
             ),
             DeclareLaunchArgument(
-                'parameters',
-                default_value=PathJoinSubstitution([CONFIG, 'detector.yaml']),
-                description='File with the parameters.',
+                'points', default_value='points', description='Topic of the clouds, with cloud.'
             ),
-            Node(
-                package='ahf_ros',
-                executable='detector',
-                namespace=LaunchConfiguration('namespace'),
-                parameters=[LaunchConfiguration('parameters')],
-                remappings=[
-                    ('image', LaunchConfiguration('image')),
-                    ('image/compressed', [LaunchConfiguration('image'), '/compressed']),
-                    ('points', LaunchConfiguration('points')),
-                ],
-                output='screen',
-            ),
+            *arguments(PARAMETERS),
+            OpaqueFunction(function=nodes),
         ]
     )
+
+
+def nodes(context):
+    return [detector(context.launch_configurations, PARAMETERS)]

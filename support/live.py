@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
+from pathlib import Path
 from typing import IO, Any
 from unittest import mock
 
@@ -47,10 +48,10 @@ def ros_environment() -> dict[str, str]:
 class NodeProcess:
     """A node of this package that runs in a process of its own."""
 
-    def __init__(self, node: str, *arguments: str) -> None:
+    def __init__(self, node: str, *arguments: str, folder: Path | None = None) -> None:
         command = [sys.executable, '-m', 'ahf_ros.nodes', node, '--ros-args', *arguments]
         self.awaited = False
-        self.output = ''
+        self.output = self.log = ''
         # Not pipes, which hold up a process of which nobody reads the log.
         self._written = [tempfile.TemporaryFile('w+') for _ in range(2)]  # noqa: SIM115
         self.process = subprocess.Popen(
@@ -58,18 +59,23 @@ class NodeProcess:
             env={**os.environ, **ros_environment()},
             stdout=self._written[0],
             stderr=self._written[1],
+            cwd=folder,
         )
 
     def wait(self) -> tuple[int, str]:
-        """Return exit status and error output of the process when it has ended."""
+        """Return exit status and error output of the process when it has ended.
+
+        What it logs for information is not an error and is left to `log`.
+        """
         self.awaited = True
         try:
             self.process.wait(PATIENCE)
         except subprocess.TimeoutExpired:
             self.process.kill()
             raise
-        self.output, errors = (self._read(it) for it in self._written)
-        return self.process.returncode, errors
+        self.output, self.log = (self._read(it) for it in self._written)
+        lines = self.log.splitlines(keepends=True)
+        return self.process.returncode, ''.join(it for it in lines if not it.startswith('[INFO] '))
 
     def kill(self) -> None:
         """End the process without notice."""
@@ -95,9 +101,9 @@ class Graph:
         self.node = node
         self._processes: list[NodeProcess] = []
 
-    def start(self, node: str, *arguments: str) -> NodeProcess:
-        """Start a node of this package; it ends with the graph."""
-        self._processes.append(NodeProcess(node, *arguments))
+    def start(self, node: str, *arguments: str, folder: Path | None = None) -> NodeProcess:
+        """Start a node of this package, or of another checkout; it ends with the graph."""
+        self._processes.append(NodeProcess(node, *arguments, folder=folder))
         return self._processes[-1]
 
     def close(self) -> None:
@@ -132,13 +138,25 @@ class Graph:
         return publisher
 
     def call(self, kind: type, service: str, request: Any) -> Any:
-        """Return the response of a service."""
+        """Return the response of a service.
+
+        A response that is sent before the service has discovered the client gets lost, so that
+        the request is repeated if nothing comes.
+        """
         client = self.node.create_client(kind, service)
         try:
             self.until(client.service_is_ready)
-            future = client.call_async(request)
-            self.until(future.done)
-            return future.result()
+            calls = [client.call_async(request)]
+            repetition = time.monotonic() + PATIENCE / 4
+
+            def answered() -> Any:
+                nonlocal repetition
+                if time.monotonic() > repetition:
+                    repetition += PATIENCE / 4
+                    calls.append(client.call_async(request))
+                return next((it for it in calls if it.done()), None)
+
+            return self.until(answered).result()
         finally:
             self.node.destroy_client(client)
 

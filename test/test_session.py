@@ -9,7 +9,8 @@ import pytest
 
 from ahf_ros.detectors import DetectorSettings
 from ahf_ros.filtering.settings import AdaptiveSettings
-from ahf_ros.session import IdentificationSettings, create_identifier, identify
+from ahf_ros.session import create_identifier, identify
+from ahf_ros.session_settings import IdentificationSettings
 from ahf_ros.settings.nested import flat_parameters, flat_values, updated
 from ahf_ros.target import Target
 

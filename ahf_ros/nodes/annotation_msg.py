@@ -14,7 +14,7 @@ from geometry_msgs.msg import Point
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import ImageMarker
 
-from ahf_ros.drawing import DECODED_COLOUR, UNDECODED_COLOUR
+from ahf_ros.drawing.colours import DECODED_COLOUR, DOUBTFUL_COLOUR
 from ahf_ros.msg import CodedTarget, CodedTargetArray
 from ahf_ros.target import UNDECODED
 
@@ -78,7 +78,7 @@ def target_annotations(answer: CodedTargetArray) -> ImageMarker:
 
 def target_colour(target: CodedTarget) -> dict[str, float]:
     """Return the red, green, blue and opacity of a target, 0 to 1."""
-    return _rgba(UNDECODED_COLOUR if target.id == UNDECODED else DECODED_COLOUR)
+    return _rgba(DOUBTFUL_COLOUR if target.id == UNDECODED else DECODED_COLOUR)
 
 
 def target_name(target: CodedTarget) -> str:

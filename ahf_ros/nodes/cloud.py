@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import threading
+
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
-from rclpy.publisher import Publisher
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
+from visualization_msgs.msg import MarkerArray
 
+from ahf_ros.interchange.image_messages import nanoseconds
 from ahf_ros.interchange.point_clouds import organised_points
-from ahf_ros.localisation import positions
+from ahf_ros.localisation import FULL, CloudGrid, positions
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.diagnostics import CloudTally
-from ahf_ros.nodes.matching import Matcher
+from ahf_ros.nodes.inputs import Input
+from ahf_ros.nodes.matching import Matcher, Waiting
 from ahf_ros.nodes.point_msg import target_labels, target_points
 from ahf_ros.nodes.process import ProcessNode
 from ahf_ros.nodes.settings import LOSSLESS, DetectorNodeSettings
+from ahf_ros.nodes.topics import ANSWERS_KEPT, POINTS, TARGET_LABELS, TARGET_POINTS
 
 ANSWERS = 100
 """Maximum number of answers waiting for the cloud of their image."""
@@ -36,13 +41,11 @@ class TargetPoints:
     Parameters
     ----------
     node : ProcessNode
-        Subscribes to `points`.
+        Subscribes to `points`, and publishes `~/target_points` and `~/target_labels`.
     settings : DetectorNodeSettings
         Settings of the node.
     tally : CloudTally
         Counts to continue.
-    points, labels : rclpy.publisher.Publisher
-        Publishers of sensor_msgs/PointCloud2 and of visualization_msgs/MarkerArray.
     """
 
     def __init__(
@@ -50,33 +53,42 @@ class TargetPoints:
         node: ProcessNode,
         settings: DetectorNodeSettings,
         tally: CloudTally,
-        points: Publisher,
-        labels: Publisher,
     ) -> None:
         self._node = node
         self._settings = _relevant(settings)
         self._radius = settings.cloud.cloud_radius
+        self._grid = settings.cloud.grid
         self._tally = tally
-        self._points = points
-        self._labels = labels
         tolerance = round(settings.cloud.cloud_tolerance * 1e9)
         limits = (settings.queue_memory * 2**20, ANSWERS)
         self._matcher = Matcher(tolerance, limits, tally.unmatched)
-        subscribe = node.subscribe_to_all if settings.queue == LOSSLESS else node.subscribe
+        self._publishing = threading.Lock()
+        self._closed = False
+        lossless = settings.queue == LOSSLESS
         group = MutuallyExclusiveCallbackGroup()
-        self._clouds = subscribe(PointCloud2, 'points', self._on_cloud, group)
+        self._clouds = node.subscribe(PointCloud2, POINTS, self._on_cloud, group, lossless)
+        self._points = node.publisher(PointCloud2, TARGET_POINTS, ANSWERS_KEPT)
+        self._labels = node.publisher(MarkerArray, TARGET_LABELS)
 
     def suits(self, settings: DetectorNodeSettings) -> bool:
         """Return whether other settings of the node would make no difference."""
         return _relevant(settings) == self._settings
 
     def close(self) -> None:
-        """End the subscription."""
-        self._node.destroy_subscription(self._clouds)
+        """End the subscription and the publishers."""
+        self._node.unsubscribe(self._clouds)
+        with self._publishing:
+            self._closed = True
+        self._node.destroy_publisher(self._points)
+        self._node.destroy_publisher(self._labels)
+
+    def waiting(self) -> tuple[Input, Waiting]:
+        """Return where clouds come from, and what waits for its match."""
+        return self._clouds, self._matcher.waiting()
 
     def locate(self, answer: CodedTargetArray) -> None:
         """Publish the positions of the targets of an answer, now or when its cloud arrives."""
-        cloud = self._matcher.put(ANSWER, _nanoseconds(answer.header), answer)
+        cloud = self._matcher.put(ANSWER, nanoseconds(answer.header), answer)
         if cloud is not None:
             self._publish(answer, cloud)
 
@@ -87,22 +99,23 @@ class TargetPoints:
         except ValueError as error:
             self._refuse(str(error))
             return
-        answer = self._matcher.put(CLOUD, _nanoseconds(cloud.header), cloud, len(cloud.data))
+        answer = self._matcher.put(CLOUD, nanoseconds(cloud.header), cloud, len(cloud.data))
         if answer is not None:
             self._publish(answer, cloud)
 
     def _publish(self, answer: CodedTargetArray, cloud: PointCloud2) -> None:
-        if (cloud.width, cloud.height) != (answer.width, answer.height):
-            self._refuse(
-                f'cloud has {cloud.width} x {cloud.height} points, '
-                f'accepted is {answer.width} x {answer.height}, the size of the image'
-            )
+        image = answer.height, answer.width
+        if not self._grid.fits((cloud.height, cloud.width), image):
+            self._refuse(unfit(cloud, answer, self._grid))
             return
-        found = positions(organised_points(cloud), answer.targets, self._radius)
+        found = positions(organised_points(cloud), answer.targets, self._radius, self._grid)
         header = Header(stamp=answer.header.stamp, frame_id=cloud.header.frame_id)
-        self._points.publish(target_points(answer.targets, found, header))
-        if self._labels.get_subscription_count():
-            self._labels.publish(target_labels(answer.targets, found, header))
+        with self._publishing:
+            if self._closed:
+                return
+            self._points.publish(target_points(answer.targets, found, header))
+            if self._labels.get_subscription_count():
+                self._labels.publish(target_labels(answer.targets, found, header))
         self._tally.used += 1
         self._tally.positions = f'{found.known.sum()} of {len(answer.targets)}'
 
@@ -113,9 +126,19 @@ class TargetPoints:
         logger.warning(f'cloud refused: {reason}', throttle_duration_sec=LOG_PERIOD)
 
 
+def unfit(cloud: PointCloud2, answer: CodedTargetArray, grid: CloudGrid) -> str:
+    """Return why a cloud does not fit its image, and what to set."""
+    size, image = f'{cloud.width} x {cloud.height}', f'{answer.width} x {answer.height}'
+    if grid == FULL:
+        return (
+            f'cloud has {size} points, accepted is {image}, the size of the image; for another '
+            'one, set cloud_offset_x, cloud_offset_y and cloud_step'
+        )
+    return (
+        f'cloud has {size} points, accepted are those that an image of {image} has room for from '
+        f'x = {grid.offset_x:g}, y = {grid.offset_y:g} in steps of {grid.step:g} px'
+    )
+
+
 def _relevant(settings: DetectorNodeSettings) -> tuple[object, ...]:
     return settings.cloud, settings.queue, settings.queue_memory
-
-
-def _nanoseconds(header: Header) -> int:
-    return int(header.stamp.sec * 10**9 + header.stamp.nanosec)

@@ -11,15 +11,14 @@ from typing import Any
 import numpy as np
 from sensor_msgs.msg import Image
 
-from ahf_ros.drawing import (
+from ahf_ros.drawing.colours import (
     DECODED_COLOUR,
     MISSED_COLOUR,
     TEXT_COLOUR,
     WRONG_COLOUR,
-    Tile,
-    overlay,
-    side_by_side,
 )
+from ahf_ros.drawing.overlay import overlay
+from ahf_ros.drawing.tiles import Tile, side_by_side
 from ahf_ros.evaluation import FALSE, RIGHT, WRONG, judge
 from ahf_ros.interchange.image_files import write_image
 from ahf_ros.interchange.image_messages import decode_image

@@ -75,7 +75,8 @@ class Processes:
         """Start a node in a namespace."""
         given = [word for name, value in parameters.items() for word in ('-p', f'{name}:={value}')]
         names = ('-r', f'__ns:={space}', '-r', f'image:={NAMESPACE}/image')
-        command = (sys.executable, '-m', 'ahf_ros.nodes', node, '--ros-args', *names, *given)
+        ros = ('--ros-args', '--log-level', 'warn', *names, *given)
+        command = (sys.executable, '-m', 'ahf_ros.nodes', node, *ros)
         self._started.append(subprocess.Popen(command))
 
     def any_ended(self) -> bool:

@@ -6,7 +6,6 @@ import threading
 import time
 import traceback
 from collections.abc import Callable
-from concurrent.futures import CancelledError
 from contextlib import suppress
 from functools import partial
 from typing import TypeVar
@@ -14,30 +13,32 @@ from typing import TypeVar
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.clock import Clock, ClockType
-from rclpy.qos import QoSProfile
-from rclpy.subscription import Subscription
-from sensor_msgs.msg import CompressedImage, Image, PointCloud2
 from std_msgs.msg import Header
-from std_srvs.srv import Trigger
-from visualization_msgs.msg import ImageMarker, MarkerArray
 
 from ahf_ros.detectors.external.program import end_programs
-from ahf_ros.drawing import draw
-from ahf_ros.msg import CodedTargetArray
-from ahf_ros.nodes.annotation_msg import target_annotations
-from ahf_ros.nodes.cloud import TargetPoints
-from ahf_ros.nodes.diagnostics import CloudTally, Diagnostics, Tally
-from ahf_ros.nodes.image_msg import image_message
+from ahf_ros.nodes.ahead import ImageJob
+from ahf_ros.nodes.answers import Answers
+from ahf_ros.nodes.diagnostics import Diagnostics, Tally
+from ahf_ros.nodes.inputs import Input
+from ahf_ros.nodes.managed import ACTIVE, ManagedNode
 from ahf_ros.nodes.parameters import ParameterSettings
-from ahf_ros.nodes.pipeline import STOPPING, ImageAnswer, ImageMessage, Pipeline, Refused
-from ahf_ros.nodes.process import ProcessNode, run
+from ahf_ros.nodes.pipeline import ImageMessage, Pipeline, Refused
+from ahf_ros.nodes.process import run
+from ahf_ros.nodes.requests import Requests
 from ahf_ros.nodes.service_detector import ServiceDetector
 from ahf_ros.nodes.settings import LOSSLESS, SERVICE, DetectorNodeSettings
-from ahf_ros.nodes.stacking import HeldImage, Stacks, answer_stack
+from ahf_ros.nodes.stacking import HeldImage, Stacks, answer_stack, image_kind
+from ahf_ros.nodes.topics import (
+    IMAGE_TYPES,
+    POINTS,
+    camera_info_topic,
+    declare_topics,
+    image_topic,
+)
 from ahf_ros.nodes.waiting import Take, WaitingMessages
+from ahf_ros.nodes.watch import Watch
 from ahf_ros.nodes.worker import Worker
 from ahf_ros.sequence import Gathered
-from ahf_ros.srv import Identify
 from ahf_ros.text import printable, reason_of
 
 Result = TypeVar('Result')
@@ -45,26 +46,14 @@ Result = TypeVar('Result')
 DIAGNOSTICS_PERIOD = 1.0
 """Period of /diagnostics, s."""
 
-TOPICS = {'raw': (Image, 'image'), 'compressed': (CompressedImage, 'image/compressed')}
-"""Type and topic of the images, by image transport."""
-
-ANSWERS_KEPT = 1000
-"""Depth of the publishers of answers, so that lost messages can be resent.
-
-With a small depth, the next answer replaces one that a subscriber has not received yet.
-"""
-
-REQUESTS_KEPT = 1000
-"""Requests to a service that may wait. The middleware drops more without an answer."""
-
 _REASON = 2000  # characters of why an image is refused
 
 LOG_PERIOD = 5.0
 """Minimum time between two log lines of the same kind about images, s."""
 
 
-class DetectorNode(ProcessNode):
-    """Identifies the targets of the latest image, one image at a time.
+class DetectorNode(ManagedNode):
+    """Identifies the targets of the latest image, and of the next one in another thread.
 
     Parameters and services are answered meanwhile. Every valid image gets an answer, unless a
     newer one arrives before its turn. Invalid images are counted and logged.
@@ -72,6 +61,7 @@ class DetectorNode(ProcessNode):
 
     def __init__(self) -> None:
         super().__init__('detector')
+        self.listen(False)
         self._stopping = threading.Event()
         self._worker = Worker()
         self._waiting = WaitingMessages()
@@ -79,31 +69,52 @@ class DetectorNode(ProcessNode):
         name = self.get_fully_qualified_name().lstrip('/')
         self._diagnostics = Diagnostics(f'{name}: identification', self._tally)
 
-        self._targets = self.publisher(CodedTargetArray, 'coded_targets', ANSWERS_KEPT)
-        self._debug_image = self.publisher(Image, '~/debug_image')
-        self._filtered_image = self.publisher(Image, '~/filtered_image')
-        self._annotations = self.publisher(ImageMarker, '~/annotations')
-        self._target_points = self.publisher(PointCloud2, '~/target_points', ANSWERS_KEPT)
-        self._target_labels = self.publisher(MarkerArray, '~/target_labels')
-        self._diagnostic_array = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        self._watch = Watch(self, self._tally)
+        declare_topics(self)
+        self._answers = Answers(self, self._tally)
+        self._diagnostic_array = self.publisher(DiagnosticArray, '/diagnostics', 10)
         # With use_sim_time, the node's clock stops when a replay stops.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(DIAGNOSTICS_PERIOD, self._publish_diagnostics, clock=steady)
-        self._images: Subscription | None = None
+        self._images: Input | None = None
         self._subscribed = ('', '')
-        self._clouds: TargetPoints | None = None
         self._stacks: Stacks | None = None
         self._offered = 0  # images that the job answers that was offered last
         self._service: ServiceDetector | None = None
         self._settings = ParameterSettings(self, DetectorNodeSettings, self._renew)
+        self._configured = False
+        Requests(self, self._worker, lambda: self._pipeline, self._attempt)
+        self.begin(self._settings.on('managed'), self._settings.on('autostart'))
+
+    def configure(self) -> None:
+        """Check the settings and make the detector."""
+        self._configured = True
         self._renew()
-        requests = MutuallyExclusiveCallbackGroup()
-        kept = QoSProfile(depth=REQUESTS_KEPT)
-        for kind, name, callback in (
-            (Identify, '~/identify', self._on_identify),
-            (Trigger, '~/reset', self._on_reset),
-        ):
-            self.create_service(kind, name, callback, qos_profile=kept, callback_group=requests)
+
+    def activate(self) -> None:
+        """Subscribe to images, and answer those that wait."""
+        self.listen(True)
+        self._worker.resume()
+
+    def deactivate(self) -> None:
+        """Stop to receive and to answer images; those that wait are kept."""
+        self.listen(False)
+        self._worker.pause()
+
+    def cleanup(self) -> None:
+        """Give up detector, subscriptions and the images that wait."""
+        self._configured = False
+        self._worker.discard()
+        self._waiting, self._offered = WaitingMessages(), 0
+        if stacks := self._stacks:
+            stacks.discard()
+        if self._images:
+            self.unsubscribe(self._images)
+        self._answers.close()
+        self._images = self._stacks = self._service = None
+        self._subscribed = ('', '')
+        if given_up := self._tally.give_up():
+            self.get_logger().warning(f'{given_up} images that waited are given up')
 
     def close(self) -> None:
         """Interrupt the current identification."""
@@ -111,35 +122,37 @@ class DetectorNode(ProcessNode):
         end_programs()
         self._worker.stop()
 
-    def _renew(self) -> None:
-        """Put the current parameters into force."""
+    def introduction(self) -> str:
+        """Return the settings that matter most, and the topics."""
+        if not self._configured:
+            return f'the node is {self.state} and waits for the service ~/change_state'
         settings = self._settings.current
-        self._renew_clouds(settings)
+        names = {'answers': 'coded_targets', 'images': image_topic(self, settings.image_transport)}
+        if settings.cloud.cloud:
+            names['clouds'] = POINTS
+        if settings.answers.undistort:
+            names['calibration'] = camera_info_topic(self)
+        topics = [f'{what} on {self.resolve_topic_name(it)}' for what, it in names.items()]
+        return f'{settings.described()}, {", ".join(topics)}'
+
+    def _renew(self) -> None:
+        """Put the current parameters into force, unless the node is not configured."""
+        if not self._configured:
+            return
+        settings = self._settings.current
+        self._answers.renew(settings)
         self._renew_stacks(settings)
         self._pipeline = Pipeline(settings, self._stopping, self._service_detector(settings))
         if self._subscribed != (settings.image_transport, settings.queue):
             self._subscribed = (settings.image_transport, settings.queue)
             if self._images:
-                self.destroy_subscription(self._images)
-            kind, topic = TOPICS[settings.image_transport]
-            lossless = settings.queue == LOSSLESS
-            subscribe = self.subscribe_to_all if lossless else self.subscribe
+                self.unsubscribe(self._images)
+            transport = settings.image_transport
+            kind, topic = IMAGE_TYPES[transport], image_topic(self, transport)
+            lossless = self._tally.lossless = settings.queue == LOSSLESS
             # The callback may wait for room in the queue and must not block the others.
             group = MutuallyExclusiveCallbackGroup()
-            self._images = subscribe(kind, topic, self._on_image, group)
-
-    def _renew_clouds(self, settings: DetectorNodeSettings) -> None:
-        """Start or stop matching clouds with images."""
-        if self._clouds and self._clouds.suits(settings):
-            return
-        clouds, self._clouds = self._clouds, None
-        if clouds:
-            clouds.close()
-        if settings.cloud.cloud:
-            self._tally.clouds = self._tally.clouds or CloudTally()
-            self._clouds = TargetPoints(
-                self, settings, self._tally.clouds, self._target_points, self._target_labels
-            )
+            self._images = self.subscribe(kind, topic, self._on_image, group, lossless)
 
     def _renew_stacks(self, settings: DetectorNodeSettings) -> None:
         """Start or stop gathering images to stacks."""
@@ -166,6 +179,8 @@ class DetectorNode(ProcessNode):
         self._tally.received += 1
         if backwards := self._tally.compare_stamps(message.header):
             self.get_logger().warning(backwards, throttle_duration_sec=LOG_PERIOD)
+        if changed := self._tally.compare_kinds(image_kind(message)):
+            self.get_logger().warning(changed, throttle_duration_sec=LOG_PERIOD)
         pipeline, received = self._pipeline, time.monotonic()
         settings = pipeline.settings
         take: Take = lambda: message  # noqa: E731
@@ -176,69 +191,39 @@ class DetectorNode(ProcessNode):
             if stacks := self._stacks:
                 stacks.add(HeldImage(take), message)
             else:
-                self._submit(partial(self._process, take, pipeline, received), 1)
+                image = ImageJob(take, pipeline)
+                job = partial(self._process, image, pipeline, received)
+                self._submit(job, 1, image.prepare if pipeline.ahead else None)
 
     def _on_stack(self, stack: Gathered[HeldImage]) -> None:
-        publish = partial(self._publish, pipeline=self._pipeline, received=time.monotonic())
+        publish = partial(
+            self._answers.publish, pipeline=self._pipeline, received=time.monotonic()
+        )
         job = partial(answer_stack, stack, self._pipeline, self._attempt, publish)
         self._submit(partial(job, self._tally, self.get_logger()), stack.fresh)
 
-    def _submit(self, job: Callable[[], None], images: int) -> None:
+    def _submit(
+        self,
+        job: Callable[[], None],
+        images: int,
+        prepare: Callable[[], None] | None = None,
+    ) -> None:
         """Let the worker do a job that answers a number of images."""
         if self._pipeline.settings.queue == LOSSLESS:
-            self._worker.append(job)
+            self._worker.append(job, prepare)
             return
-        if self._worker.offer(job):
+        if self._worker.offer(job, prepare):
             self._tally.dropped += self._offered
         self._offered = images
 
-    def _on_identify(
-        self, request: Identify.Request, response: Identify.Response
-    ) -> Identify.Response:
-        pipeline = self._pipeline
-        expected = request.expected or None
-        job = partial(self._attempt, partial(pipeline.answer, request.image, expected))
-        try:
-            response.coded_targets = self._worker.call(job).message
-            response.success = True
-        except Refused as error:
-            response.message = str(error)
-        except CancelledError:
-            response.message = STOPPING
-        return response
-
-    def _on_reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        try:
-            self._worker.call(self._pipeline.reset)
-            response.success = True
-        except CancelledError:
-            response.message = STOPPING
-        return response
-
-    def _process(self, take: Take, pipeline: Pipeline, received: float) -> None:
+    def _process(self, image: ImageJob, pipeline: Pipeline, received: float) -> None:
         """Identify the targets of an image and publish the results."""
+        # In a lossless stream no image waits like this.
+        if self._worker.waiting and image.outdated():
+            self._tally.dropped += 1
+            return
         with suppress(Refused):
-            self._attempt(lambda: self._answer(take(), pipeline, received))
-
-    def _answer(self, message: ImageMessage, pipeline: Pipeline, received: float) -> None:
-        self._publish(pipeline.answer(message), pipeline, received)
-
-    def _publish(self, answer: ImageAnswer, pipeline: Pipeline, received: float) -> None:
-        header = answer.message.header
-        self._targets.publish(answer.message)
-        self._tally.answered += answer.images
-        self._tally.latency = time.monotonic() - received
-        self._tally.last = answer.identification
-        if clouds := self._clouds:
-            clouds.locate(answer.message)
-        if self._annotations.get_subscription_count():
-            self._annotations.publish(target_annotations(answer.message))
-        if self._debug_image.get_subscription_count():
-            drawn = draw(answer.image, answer.identification)
-            self._debug_image.publish(image_message(drawn, header))
-        if self._filtered_image.get_subscription_count():
-            filtered = pipeline.filtered(answer)
-            self._filtered_image.publish(image_message(filtered, header))
+            self._attempt(lambda: self._answers.publish(image.answer(), pipeline, received))
 
     def _attempt(self, job: Callable[[], Result]) -> Result:
         """Return the result of a job on an image, or count and log its error.
@@ -264,21 +249,12 @@ class DetectorNode(ProcessNode):
         self.get_logger().warning(f'image refused: {reason}', throttle_duration_sec=LOG_PERIOD)
         raise Refused(reason)
 
-    def _compare_types(self) -> None:
-        """Report publishers of another type on the topic of the images."""
-        kind, name = TOPICS[self._subscribed[0]]
-        topic = self.resolve_topic_name(name)
-        accepted = f'sensor_msgs/msg/{kind.__name__}'
-        found = {it.topic_type for it in self.get_publishers_info_by_topic(topic)} - {accepted}
-        self._tally.mistaken = ''
-        if found:
-            self._tally.mistaken = (
-                f'{topic} is of type {", ".join(sorted(found))}, accepted is {accepted}'
-            )
-            self.get_logger().warning(self._tally.mistaken, throttle_duration_sec=LOG_PERIOD)
-
     def _publish_diagnostics(self) -> None:
-        self._compare_types()
+        state = self.state
+        self._tally.inactive = '' if state == ACTIVE else state
+        if self._images and state == ACTIVE:
+            timeout = self._settings.current.image_timeout
+            self._watch.look(self._images, timeout, self._answers.waiting())
         status = self._diagnostics.status(DIAGNOSTICS_PERIOD)
         header = Header(stamp=self.get_clock().now().to_msg())
         self._diagnostic_array.publish(DiagnosticArray(header=header, status=[status]))

@@ -46,6 +46,15 @@ class IlluminationNode(ProcessNode):
         self._worker = Worker()
         self._restart()
 
+    def introduction(self) -> str:
+        """Return what is rendered, and where it is published."""
+        settings, scene = self._settings.current, self._settings.current.scene
+        return (
+            f'{scene.targets} targets of {scene.family} under {scene.light}, '
+            f'{scene.width} x {scene.height} px, {settings.rate:g} Hz, '
+            f'images on {self.resolve_topic_name("image")}'
+        )
+
     def close(self) -> None:
         """Stop rendering after the current image."""
         self._rendered = []

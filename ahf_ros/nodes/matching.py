@@ -3,14 +3,34 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections import deque
 from typing import Any, NamedTuple
 
 
-class _Waiting(NamedTuple):
+class _Message(NamedTuple):
     stamp: int
     item: Any
     size: int
+    arrived: float
+
+
+class Waiting(NamedTuple):
+    """What waits for its match.
+
+    Attributes
+    ----------
+    counts : tuple of 2 int
+        Messages of each topic.
+    seconds : tuple of 2 float
+        How long the oldest message of each topic has waited, s; 0 where there is none.
+    nearest : int
+        Smallest difference of two stamps since the last match, ns; 0 if none were compared.
+    """
+
+    counts: tuple[int, int]
+    seconds: tuple[float, float]
+    nearest: int
 
 
 class Matcher:
@@ -33,7 +53,8 @@ class Matcher:
         self._unmatched = unmatched
         self._tolerance = tolerance
         self._limits = limits
-        self._waiting: tuple[deque[_Waiting], deque[_Waiting]] = (deque(), deque())
+        self._waiting: tuple[deque[_Message], deque[_Message]] = (deque(), deque())
+        self._nearest = 0
         self._lock = threading.Lock()
 
     def put(self, side: int, stamp: int, item: Any, size: int = 1) -> Any:
@@ -58,11 +79,22 @@ class Matcher:
                     self._discard(other)
                 while self._waiting[side]:
                     self._discard(side)
+                self._nearest = 0
                 return self._waiting[other].popleft().item
-            self._waiting[side].append(_Waiting(stamp, item, size))
+            if stamps:
+                self._nearest = min(self._nearest or min(stamps), min(stamps))
+            self._waiting[side].append(_Message(stamp, item, size, time.monotonic()))
             while len(self._waiting[side]) > 1 and self._taken(side) > self._limits[side]:
                 self._discard(side)
         return None
+
+    def waiting(self) -> Waiting:
+        """Return what waits, and for how long."""
+        now = time.monotonic()
+        with self._lock:
+            first, second = self._waiting
+            seconds = [now - it[0].arrived if it else 0.0 for it in self._waiting]
+            return Waiting((len(first), len(second)), (seconds[0], seconds[1]), self._nearest)
 
     def _taken(self, side: int) -> int:
         return sum(waiting.size for waiting in self._waiting[side])

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
 from typing import Generic, TypeVar
 
 from rcl_interfaces.msg import (
@@ -11,11 +12,15 @@ from rcl_interfaces.msg import (
     ParameterDescriptor,
     SetParametersResult,
 )
+from rcl_interfaces.srv import SetParameters
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
+from rclpy.parameter_service import ParameterService
 
+from ahf_ros.nodes.overrides import unknown_parameters
 from ahf_ros.settings.nested import assemble, flat_parameters
 from ahf_ros.settings.parameter import Parameter
+from ahf_ros.text import printable
 
 Settings = TypeVar('Settings')
 
@@ -34,8 +39,8 @@ class ParameterSettings(Generic[Settings]):
 
     Raises
     ------
-    ValueError
-        If an initial value is not accepted or does not fit the others.
+    ParameterException
+        If an initial value is of a type or in a form that ROS does not accept.
     """
 
     def __init__(
@@ -47,22 +52,41 @@ class ParameterSettings(Generic[Settings]):
             item.name: node.declare_parameter(item.name, item.default, descriptor(item)).value
             for item in flat_parameters(settings)
         }
-        self._current = assemble(settings, self._values)
+        self._current: Settings | ValueError = self._initial()
         node.add_on_set_parameters_callback(self._check)
         node.add_post_set_parameters_callback(self._apply)
 
     @property
     def current(self) -> Settings:
-        """The settings in force."""
+        """The settings in force; raises a ValueError while the initial values do not fit."""
+        if isinstance(self._current, ValueError):
+            raise self._current
         return self._current
+
+    def on(self, name: str) -> bool:
+        """Return whether a parameter is true, also while others are not accepted."""
+        return self._values[name] is True
+
+    def _initial(self) -> Settings | ValueError:
+        try:
+            for item in flat_parameters(self._type):
+                _check_quotes(item, self._values[item.name])
+            return assemble(self._type, self._values)
+        except ValueError as error:
+            return error
 
     def _changes(self, parameters: Iterable[RosParameter]) -> dict[str, object]:
         """Return the new values of our parameters, without those that rclpy declares."""
         return {item.name: item.value for item in parameters if item.name in self._values}
 
     def _check(self, parameters: Iterable[RosParameter]) -> SetParametersResult:
+        changes = self._changes(parameters)
+        if not changes:
+            return SetParametersResult(successful=True)
         try:
-            assemble(self._type, self._values | self._changes(parameters))
+            for item in flat_parameters(self._type):
+                _check_quotes(item, changes.get(item.name, item.default))
+            assemble(self._type, self._values | changes)
         except ValueError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
@@ -75,6 +99,63 @@ class ParameterSettings(Generic[Settings]):
         self._current = assemble(self._type, self._values)
         if self._changed is not None:
             self._changed()
+
+
+class AnyOrderParameterService(ParameterService):
+    """Parameter services whose `set_parameters` does not depend on the order of the request.
+
+    Each parameter is set on its own, as ROS has it, and so does `ros2 param load`. One that does
+    not fit the values of the others is tried again after them: a minimum and a maximum that both
+    move past the other one are accepted, whichever comes first.
+    """
+
+    def _set_parameters_callback(
+        self, request: SetParameters.Request, response: SetParameters.Response
+    ) -> SetParameters.Response:
+        given = [RosParameter.from_parameter_msg(item) for item in request.parameters]
+        response.results = set_in_any_order(self._set_one, given)
+        return response
+
+    def _set_one(self, parameter: RosParameter) -> SetParametersResult:
+        node = self._get_node()
+        if not node.has_parameter(parameter.name):
+            (reason,) = unknown_parameters([parameter.name], node.get_parameters_by_prefix(''))
+            return SetParametersResult(successful=False, reason=reason)
+        return node.set_parameters_atomically([parameter])
+
+
+def set_in_any_order(
+    set_one: Callable[[RosParameter], SetParametersResult], given: Sequence[RosParameter]
+) -> list[SetParametersResult]:
+    """Set parameters one by one, and those that are refused again, as long as that helps.
+
+    Parameters
+    ----------
+    set_one : callable
+        Sets a parameter and returns the result.
+    given : sequence of rclpy.parameter.Parameter
+        What to set. One that is given twice is not tried again, as the last value counts.
+    """
+    results = [set_one(item) for item in given]
+    times = Counter(item.name for item in given)
+    refused = [place for place, item in enumerate(given) if times[item.name] == 1]
+    while True:
+        before = [place for place in refused if not results[place].successful]
+        for place in before:
+            results[place] = set_one(given[place])
+        refused = [place for place in before if not results[place].successful]
+        if len(refused) in (0, len(before)):
+            return results
+
+
+def _check_quotes(item: Parameter, value: object) -> None:
+    """Refuse a number or a list for a text, and say how YAML and the shell take it for a text."""
+    if isinstance(item.default, str) and not isinstance(value, str):
+        text = printable(str(value))
+        quoted = f"""; as a text it is {item.name}:="'{text}'" on the command line"""
+        raise ValueError(
+            f'{item.name} is {text}, accepted is {item.accepted}{"" if item.choices else quoted}'
+        )
 
 
 def descriptor(item: Parameter) -> ParameterDescriptor:

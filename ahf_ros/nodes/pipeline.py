@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import threading
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
+from itertools import count
 from typing import TypeAlias
 
 import numpy as np
@@ -15,6 +17,8 @@ from std_msgs.msg import Header
 from ahf_ros import msg
 from ahf_ros.detectors import Detector, create_detector
 from ahf_ros.filtering.homomorphic import HomomorphicFilter
+from ahf_ros.filtering.identifier import Memory
+from ahf_ros.imaging.stack import ImageStack
 from ahf_ros.interchange.image_messages import decode_compressed, decode_image
 from ahf_ros.interchange.target_messages import coded_target_array
 from ahf_ros.msg import CodedTargetArray
@@ -34,14 +38,14 @@ class Refused(Exception):
     """An image that cannot be answered; the text says why."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ImageAnswer:
-    """An image and its identification.
+    """An image or a stack, and its identification.
 
     Attributes
     ----------
-    image : ndarray of uint8, shape (height, width)
-        The image as received, in gray.
+    stack : ImageStack
+        The images as received, in gray.
     identification : Identification
         Its identification.
     message : CodedTargetArray
@@ -52,11 +56,36 @@ class ImageAnswer:
         Why a stack was split before these images; empty if it was not.
     """
 
-    image: np.ndarray
+    stack: ImageStack
     identification: Identification
     message: CodedTargetArray
     images: int = 1
     split: str = ''
+
+    @cached_property
+    def image(self) -> np.ndarray:
+        """The image or combination of images in which the targets were identified."""
+        return self.stack.combined(self.identification.combination)
+
+
+@dataclass(frozen=True)
+class Speculation:
+    """An identification that is right if the images before leave nothing new.
+
+    Attributes
+    ----------
+    before, after : Memory
+        What the images before have left, and what this one leaves.
+    stack : ImageStack
+        The image.
+    identification : Identification
+        Its identification.
+    """
+
+    before: Memory
+    after: Memory
+    stack: ImageStack
+    identification: Identification
 
 
 class Pipeline:
@@ -70,6 +99,11 @@ class Pipeline:
         Interrupts an identification, also a search, at its next step.
     detector : Detector, optional
         Replaces the detector that the settings name.
+
+    Attributes
+    ----------
+    ahead : bool
+        Whether there is a second thread for the next image.
     """
 
     def __init__(
@@ -83,11 +117,18 @@ class Pipeline:
         self._detector = detector or create_detector(
             identification.detector, identification.detection
         )
+        self._stopping = stopping
+        self.ahead = (identification.adaptive.threads or os.cpu_count() or 1) > 1
         # No method of this object: with a cycle of references, it would stay in memory for long.
         interrupt = partial(_check_running, stopping)
         self._identifier = create_identifier(identification, self._detector, interrupt=interrupt)
 
-    def answer(self, message: ImageMessage, expected: int | None = None) -> ImageAnswer:
+    def answer(
+        self,
+        message: ImageMessage,
+        expected: int | None = None,
+        speculation: Speculation | None = None,
+    ) -> ImageAnswer:
         """Identify the targets of an image.
 
         Parameters
@@ -96,6 +137,8 @@ class Pipeline:
             The image.
         expected : int, optional
             N; that of the settings where None.
+        speculation : Speculation, optional
+            Of the same image, with the N of the settings; used if it is right.
 
         Raises
         ------
@@ -104,8 +147,45 @@ class Pipeline:
         Refused
             If the node stops first.
         """
-        image = decoded(message)
-        return self._answer(image, self._identifier.identify(image, expected), message.header)
+        identifier, header = self._identifier, message.header
+        if speculation and self.holds(speculation):
+            identifier.memory = speculation.after
+            return self._answer(speculation.stack, speculation.identification, header)
+        stack = ImageStack((decoded(message),))
+        return self._answer(stack, identifier.identify(stack, expected), header)
+
+    def holds(self, speculation: Speculation | None) -> bool:
+        """Return whether there is a speculation that is right so far."""
+        return speculation is not None and speculation.before == self._identifier.memory
+
+    def speculation(self, message: ImageMessage) -> Speculation | None:
+        """Identify the targets of an image before its turn, if one identification suffices.
+
+        It may be called while another image is being answered. Under steady light, that image
+        leaves what is there already, and the speculation is right.
+
+        Parameters
+        ----------
+        message : Image or CompressedImage
+            The image.
+
+        Returns
+        -------
+        Speculation or None
+            None if filters would have to be searched for, or if the image is not accepted.
+        """
+        interrupt = partial(_once, count(), self._stopping)
+        identifier = create_identifier(
+            self.settings.identification, self._detector, interrupt=interrupt
+        )
+        identifier.memory = before = self._identifier.memory
+        try:
+            stack = ImageStack((decoded(message),))
+            identification = identifier.identify(stack)
+        except Exception:
+            # In its turn, the image is identified again, and what is wrong is reported.
+            return None
+        return Speculation(before, identifier.memory, stack, identification)
 
     def answers(
         self, images: Sequence[tuple[Header, np.ndarray]], fresh: int
@@ -134,21 +214,20 @@ class Pipeline:
             fresh=fresh,
         )
         for part, stack, found in parts:
-            shown = stack.combined(found.combination)
-            answer = self._answer(shown, found, headers[part.images[-1]])
+            answer = self._answer(stack, found, headers[part.images[-1]])
             new = part.images.stop - max(part.images.start, len(images) - fresh)
             yield replace(answer, images=new, split=part.split)
 
     def _answer(
-        self, image: np.ndarray, identification: Identification, header: Header
+        self, stack: ImageStack, identification: Identification, header: Header
     ) -> ImageAnswer:
         if self.settings.queue == LOSSLESS:
             # Without the duration, runs are byte-identical.
             used = replace(identification.filter, duration=0.0)
             identification = replace(identification, filter=used)
-        family, shape = self._detector.family, image.shape
+        family, shape = self._detector.family, stack.shape
         sent = coded_target_array(identification, family, shape, header, msg)
-        return ImageAnswer(image, identification, sent)
+        return ImageAnswer(stack, identification, sent)
 
     def filtered(self, answer: ImageAnswer) -> np.ndarray:
         """Return the filtered image in which the targets of an answer were identified."""
@@ -174,6 +253,13 @@ def decoded(message: ImageMessage) -> np.ndarray:
         If the image is not accepted.
     """
     return (decode_compressed if hasattr(message, 'format') else decode_image)(message)
+
+
+def _once(calls: Iterator[int], stopping: threading.Event) -> None:
+    """Raise `Refused` at every call but the first one, and when the node stops."""
+    _check_running(stopping)
+    if next(calls):
+        raise Refused('more than one identification')
 
 
 def _check_running(stopping: threading.Event) -> None:

@@ -2,34 +2,44 @@
 
 from __future__ import annotations
 
-import ctypes
 import os
+import re
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from typing import Any
 
 import rclpy
 from rclpy.callback_groups import CallbackGroup
-from rclpy.exceptions import ParameterException
+from rclpy.clock import Clock, ClockType
+from rclpy.exceptions import InvalidHandle, ParameterException
 from rclpy.executors import MultiThreadedExecutor
+from rclpy.logging import LoggingSeverity, get_logger_effective_level, set_logger_level
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.qos import HistoryPolicy, QoSProfile
-from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.signals import SignalHandlerOptions
-from rclpy.subscription import Subscription
 from rclpy.task import Future
+from rclpy.utilities import remove_ros_args
 
 from ahf_ros.ending import ignore_ending
+from ahf_ros.nodes.inputs import Input
+from ahf_ros.nodes.memory import reuse_memory
+from ahf_ros.nodes.overrides import (
+    check_arguments,
+    foreign_parameters,
+    unknown_arguments,
+    unknown_parameters,
+)
+from ahf_ros.nodes.parameters import AnyOrderParameterService
+from ahf_ros.nodes.qos import PUBLISHER, declare_qos, qos_profile
 from ahf_ros.nodes.signals import signalled
 from ahf_ros.text import reason_of
 
-ARENAS = 2
-"""Number of memory arenas that the threads of a node share; glibc would give each its own."""
+FOLLOW_PERIOD = 1.0
+"""Time between two looks at what publishers offer, s."""
 
-_M_ARENA_MAX = -8  # of glibc's malloc.h
+_PLACE = re.compile(r',? at /\S+:\d+')  # in the sources of rcl, as its errors name it
 
 
 class Ending(Future):
@@ -52,6 +62,16 @@ class Ending(Future):
 class JoiningExecutor(MultiThreadedExecutor):
     """An executor whose shutdown waits for callbacks, which rclpy's does not up to Kilted."""
 
+    def spin_until(self, ended: Future) -> None:
+        """Run callbacks until a future is done.
+
+        rclpy takes it well if another thread ends a subscription that is waited for, but not the
+        events of one.
+        """
+        while not ended.done():
+            with suppress(InvalidHandle):
+                self.spin_until_future_complete(ended)
+
     def shutdown(self, timeout_sec: float | None = None) -> bool:
         """Wait until the callbacks that have begun have ended, then shut down."""
         self._executor.shutdown(wait=True)
@@ -68,18 +88,38 @@ class ProcessNode(Node):
     """
 
     def __init__(self, name: str) -> None:
-        super().__init__(name)
+        super().__init__(name, start_parameter_services=False)
+        self._parameter_service = AnyOrderParameterService(self)
         self.ended = Ending()
+        self._inputs: list[Input] = []
+        self._listening = True
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(FOLLOW_PERIOD, self._follow, clock=steady)
+
+    def introduction(self) -> str:
+        """Return what the node will do, for the log at its start; empty if that is not needed."""
+        return ''
+
+    def ineffective(self, arguments: Sequence[str]) -> Iterator[str]:
+        """Yield a message for each argument and parameter that has no effect on the node.
+
+        Parameters
+        ----------
+        arguments : sequence of str
+            Command line arguments, without the name of the program.
+        """
+        known = self.get_parameters_by_prefix('')
+        yield from unknown_parameters(self._parameter_overrides, known)
+        yield from foreign_parameters(arguments, self.get_fully_qualified_name())
+        yield from unknown_arguments(remove_ros_args(arguments), known)
 
     def close(self) -> None:
         """End the threads of the node, while topics and the log still work."""
 
     def publisher(self, kind: type, topic: str, depth: int = 1) -> Publisher:
         """Return a publisher, reliable and of this depth unless `qos_overrides` differ."""
-        options = QoSOverridingOptions.with_default_policies()
-        return self.create_publisher(
-            kind, topic, QoSProfile(depth=depth), qos_overriding_options=options
-        )
+        profile = qos_profile(declare_qos(self, PUBLISHER, topic, depth))
+        return self.create_publisher(kind, topic, profile)
 
     def subscribe(
         self,
@@ -87,34 +127,34 @@ class ProcessNode(Node):
         topic: str,
         callback: Callable[[Any], None],
         group: CallbackGroup | None = None,
-    ) -> Subscription:
-        """Subscribe to a topic, reliable and of depth 1 unless `qos_overrides` differ."""
-        options = QoSOverridingOptions.with_default_policies()
-        return self.create_subscription(
-            kind,
-            topic,
-            callback,
-            QoSProfile(depth=1),
-            callback_group=group,
-            qos_overriding_options=options,
-        )
+        lossless: bool = False,
+    ) -> Input:
+        """Subscribe to a topic, as its publishers offer it unless `qos_overrides` differ.
 
-    def subscribe_to_all(
-        self, kind: type, topic: str, callback: Callable[[Any], None], group: CallbackGroup
-    ) -> Subscription:
-        """Subscribe to every message of a topic; the callback must take each at once.
-
-        In `qos_overrides` it is called `subscription_lossless`.
+        Only the latest message is kept; where lossless, every one, and the callback must take each
+        at once. In `qos_overrides`, that is called `subscription_lossless`.
         """
-        options = QoSOverridingOptions.with_default_policies(entity_id='lossless')
-        return self.create_subscription(
-            kind,
-            topic,
-            callback,
-            QoSProfile(history=HistoryPolicy.KEEP_ALL),
-            callback_group=group,
-            qos_overriding_options=options,
-        )
+        made = Input(self, kind, topic, callback, group, lossless, self._listening)
+        self._inputs.append(made)
+        return made
+
+    def listen(self, wanted: bool) -> None:
+        """Begin or stop to receive messages on all topics that the node subscribes to."""
+        self._listening = wanted
+        for it in tuple(self._inputs):
+            if wanted:
+                it.open()
+            else:
+                it.close()
+
+    def unsubscribe(self, old: Input) -> None:
+        """End a subscription."""
+        self._inputs.remove(old)
+        old.close()
+
+    def _follow(self) -> None:
+        for it in tuple(self._inputs):
+            it.follow()
 
 
 def run(make_node: Callable[[], ProcessNode], arguments: list[str] | None = None) -> int:
@@ -133,22 +173,31 @@ def run(make_node: Callable[[], ProcessNode], arguments: list[str] | None = None
         Exit status: that of the node, 0 after a signal, 1 if the node cannot start with these
         arguments, with the reason on stderr.
     """
-    _share_memory()
+    reuse_memory()
     arrived = signalled()
+    given = sys.argv[1:] if arguments is None else arguments
     try:
+        check_arguments(given)
+        set_logger_level('rcl', LoggingSeverity.FATAL)  # its errors are raised as well
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+        if get_logger_effective_level('rcl') == LoggingSeverity.FATAL:
+            set_logger_level('rcl', LoggingSeverity.UNSET)
         node = make_node()
     except (ValueError, ParameterException, RuntimeError) as error:
-        print(error if isinstance(error, ValueError) else reason_of(error), file=sys.stderr)
+        print(_reason(error), file=sys.stderr)
         rclpy.try_shutdown()
         return 1
+    for text in node.ineffective(given):
+        node.get_logger().warning(text)
+    if text := node.introduction():
+        node.get_logger().info(text)
     threading.Thread(target=_end_at_signal, args=(node.ended, arrived), daemon=True).start()
     # One thread for a service that takes as long as an identification, one for an image that waits
     # for room in the queue, one for everything short.
     executor = JoiningExecutor(num_threads=3)
     executor.add_node(node)
     try:
-        executor.spin_until_future_complete(node.ended)
+        executor.spin_until(node.ended)
     finally:
         node.close()
         executor.shutdown()
@@ -158,13 +207,11 @@ def run(make_node: Callable[[], ProcessNode], arguments: list[str] | None = None
     return node.ended.result()
 
 
-def _share_memory() -> None:
-    """Let threads share arenas, because memory that a thread frees stays in its arena.
-
-    Each search starts threads. With an arena each, the process grew for hours.
-    """
-    with suppress(AttributeError):  # where malloc is not that of glibc
-        ctypes.CDLL(None).mallopt(_M_ARENA_MAX, ARENAS)
+def _reason(error: Exception) -> str:
+    """Return why a node does not start, in one line without the places in the sources of ROS."""
+    if isinstance(error, ValueError):
+        return str(error)
+    return _PLACE.sub('', reason_of(error))
 
 
 def _end_at_signal(ended: Future, arrived: int) -> None:

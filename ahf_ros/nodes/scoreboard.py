@@ -47,6 +47,11 @@ class Scoreboard(ProcessNode):
         self.subscribe(CodedTargetArray, 'ground_truth', self._truths.put)
         self.subscribe(CodedTargetArray, 'coded_targets', self._on_targets)
 
+    def introduction(self) -> str:
+        """Return which topics are compared."""
+        topics = [self.resolve_topic_name(it) for it in ('coded_targets', 'ground_truth')]
+        return f'compares {topics[0]} with {topics[1]}'
+
     def _on_targets(self, message: CodedTargetArray) -> None:
         images = self._settings.current.images
         truth = self._truths.get(message.header)

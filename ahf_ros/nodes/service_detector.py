@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import queue
 import threading
 import time
+from collections.abc import Callable
+from contextlib import suppress
 
 import numpy as np
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -22,6 +25,7 @@ from ahf_ros.text import printable
 
 _POLL = 0.2  # interval between checks that the service still exists, s
 _GONE = 3.0  # time that discovery may take, s
+_REPEATED = 1 / 3  # of the time limit, after which a service that is new is asked again
 
 
 class ServiceDetector:
@@ -53,6 +57,7 @@ class ServiceDetector:
         self._client: Client = node.create_client(
             Identify, service, callback_group=ReentrantCallbackGroup()
         )
+        self._known = False  # whether the service has answered since it was there
 
     @property
     def name(self) -> str:
@@ -77,12 +82,8 @@ class ServiceDetector:
         """
         # A request that is sent before the service is discovered gets lost.
         if not self._client.wait_for_service(min(_GONE, self.timeout)):
-            raise ValueError(f'{self._named} is not there')
-        future = self._client.call_async(Identify.Request(image=image_message(image, Header())))
-        try:
-            response = self._awaited(future)
-        finally:
-            self._client.remove_pending_request(future)
+            raise self._absent()
+        response = self._asked(Identify.Request(image=image_message(image, Header())))
         if not response.success:
             raise ValueError(f'{self._named} refuses the image: {printable(response.message)}')
         return checked_targets(identification_from(response.coded_targets).targets, self._named)
@@ -91,23 +92,52 @@ class ServiceDetector:
     def _named(self) -> str:
         return f'service {self.service!r}'
 
-    def _awaited(self, future: Future) -> Identify.Response:
-        answered = threading.Event()
-        future.add_done_callback(lambda _: answered.set())
+    def _absent(self) -> ValueError:
+        self._known = False
+        return ValueError(f'{self._named} is not there')
+
+    def _asked(self, request: Identify.Request) -> Identify.Response:
+        """Return the first response.
+
+        A response gets lost if the service has not discovered this node yet, so that a service
+        that has not answered before is asked twice.
+        """
+        answers: queue.SimpleQueue[Future] = queue.SimpleQueue()
+        asked: list[Future] = []
+
+        def ask() -> None:
+            asked.append(self._client.call_async(request))
+            asked[-1].add_done_callback(answers.put)
+
+        try:
+            ask()
+            return self._awaited(answers, ask)
+        finally:
+            for future in asked:
+                self._client.remove_pending_request(future)
+
+    def _awaited(
+        self, answers: queue.SimpleQueue[Future], ask: Callable[[], None]
+    ) -> Identify.Response:
+        start = seen = time.monotonic()
         patience = self.timeout
-        limit = time.monotonic() + patience
-        seen = time.monotonic()
-        while not answered.wait(_POLL):
+        repeated = self._known
+        while True:
+            with suppress(queue.Empty):
+                response: Identify.Response = answers.get(timeout=_POLL).result()
+                self._known = True
+                return response
             if self._stopping.is_set():
                 raise Refused(STOPPING)
             now = time.monotonic()
             if self._client.service_is_ready():
                 seen = now
             elif now - seen > min(_GONE, patience):
-                raise ValueError(f'{self._named} is not there')
-            if now > limit:
+                raise self._absent()
+            if now - start > patience:
                 raise ValueError(
                     f'{self._named} took longer than detector_timeout, {patience:g} s'
                 )
-        response: Identify.Response = future.result()
-        return response
+            if not repeated and now - start > _REPEATED * patience:
+                repeated = True
+                ask()

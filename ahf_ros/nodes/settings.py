@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field, replace
+from importlib.util import find_spec
 
-from ahf_ros.detectors import DETECTOR
-from ahf_ros.localisation import NEIGHBOURHOOD
-from ahf_ros.sequence import StackSettings
-from ahf_ros.session import IdentificationSettings, create_identifier
+from ahf_ros.detectors import DETECTOR, detector_name
+from ahf_ros.localisation import FULL, NEIGHBOURHOOD, CloudGrid
+from ahf_ros.session import create_identifier
+from ahf_ros.session_settings import IdentificationSettings, StackSettings
 from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.synthetic.scene import SceneSettings
 
@@ -17,6 +18,12 @@ LATEST, LOSSLESS = 'latest', 'lossless'
 
 SERVICE = 'service'
 """Name of the detector that calls a service of another node."""
+
+MAXIMUM_TOLERANCE = 10.0
+"""Maximum difference between the stamps of an image and its cloud, s."""
+
+NUMBER_UNKNOWN = 'unknown (expected_targets is 0)'
+"""What stands for N in the log where no filter is searched for."""
 
 _SERVICE_NAME = re.compile(r'[~/]?/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*', re.ASCII)
 
@@ -30,10 +37,11 @@ class CloudSettings:
         'Whether to subscribe to point clouds on points and to publish the positions of targets.',
     )
     cloud_tolerance: float = parameter(
-        0.0,
-        'Maximum difference between the stamps of an image and its cloud, s; 0: equal stamps.',
+        1e-6,
+        'Maximum difference between the stamps of an image and its cloud, s. The default is for '
+        'clouds that went through PCL, which keeps whole microseconds; 0: equal stamps.',
         minimum=0.0,
-        maximum=10.0,
+        maximum=MAXIMUM_TOLERANCE,
     )
     cloud_radius: float = parameter(
         NEIGHBOURHOOD,
@@ -41,10 +49,57 @@ class CloudSettings:
         minimum=0.5,
         maximum=10.0,
     )
+    cloud_offset_x: float = parameter(
+        FULL.offset_x,
+        'Column of the image that the first column of the cloud belongs to, px.',
+        minimum=0.0,
+        maximum=100000.0,
+    )
+    cloud_offset_y: float = parameter(
+        FULL.offset_y,
+        'Row of the image that the first row of the cloud belongs to, px.',
+        minimum=0.0,
+        maximum=100000.0,
+    )
+    cloud_step: float = parameter(
+        FULL.step,
+        'Distance in the image between neighbouring points of the cloud, px.',
+        minimum=0.1,
+        maximum=100.0,
+    )
 
     def __post_init__(self) -> None:
         """Refuse values that are not accepted."""
         check_parameters(self)
+
+    @property
+    def grid(self) -> CloudGrid:
+        """Pixels of the image that the points of the cloud belong to."""
+        return CloudGrid(self.cloud_offset_x, self.cloud_offset_y, self.cloud_step)
+
+
+@dataclass(frozen=True, slots=True)
+class AnswerSettings:
+    """Other forms in which answers are published, too."""
+
+    detections: bool = parameter(
+        False,
+        'Whether to publish the targets on ~/detections, too, as vision_msgs/Detection2DArray.',
+    )
+    undistort: bool = parameter(
+        False,
+        'Whether to subscribe to camera_info and to publish the targets on ~/undistorted_targets, '
+        'too, in the rectified image.',
+    )
+
+    def __post_init__(self) -> None:
+        """Refuse values that are not accepted."""
+        check_parameters(self)
+        if self.detections and find_spec('vision_msgs') is None:
+            raise ValueError(
+                'detections is True and the package vision_msgs is not there, accepted without '
+                'it is False; ros-DISTRIBUTION-vision-msgs installs it'
+            )
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,9 +131,20 @@ class DetectorNodeSettings:
         'Whether the node may start programs, as the detector command does.',
         read_only=True,
     )
+    managed: bool = parameter(
+        False,
+        'Whether the node has a lifecycle: others configure and activate it.',
+        read_only=True,
+    )
+    autostart: bool = parameter(
+        False,
+        'Whether a managed node configures and activates itself at its start.',
+        read_only=True,
+    )
     image_transport: str = parameter(
         'raw',
-        'raw: sensor_msgs/Image on image; compressed: CompressedImage on image/compressed.',
+        'raw: sensor_msgs/Image on image; compressed: CompressedImage on image/compressed, which '
+        'follows a remapped image.',
         choices=('raw', 'compressed'),
     )
     queue: str = parameter(
@@ -100,9 +166,33 @@ class DetectorNodeSettings:
         minimum=0.01,
         maximum=86400.0,
     )
+    image_timeout: float = parameter(
+        10.0,
+        'Time without an image, or of an image without its cloud, after which the diagnostics '
+        'warn and say why, s; 0: never.',
+        minimum=0.0,
+        maximum=86400.0,
+    )
     stacking: StackSettings = field(default_factory=StackSettings)
     identification: NodeIdentificationSettings = field(default_factory=NodeIdentificationSettings)
+    answers: AnswerSettings = field(default_factory=AnswerSettings)
     cloud: CloudSettings = field(default_factory=CloudSettings)
+
+    def described(self) -> str:
+        """Return what matters most to somebody who starts the node, in words."""
+        of = self.identification
+        detector = self.service
+        if of.detector != SERVICE:
+            detector = detector_name(of.detector, of.detection.family)
+        number = str(of.expected_targets)
+        if not of.expected_targets:
+            number = 'estimated' if of.estimate_expected else NUMBER_UNKNOWN
+        search = of.adaptive.ahf and number != NUMBER_UNKNOWN
+        return (
+            f'detector {detector}, family {of.detection.family}, N {number}, '
+            f'search for a filter {"on" if search else "off"}, queue {self.queue}, '
+            f'stack {self.stacking.stack}'
+        )
 
     def __post_init__(self) -> None:
         """Refuse values that are not accepted."""

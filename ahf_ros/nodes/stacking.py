@@ -14,6 +14,7 @@ from rclpy.impl.rcutils_logger import RcutilsLogger
 from std_msgs.msg import Header
 
 from ahf_ros.imaging.image import check_image
+from ahf_ros.interchange.image_messages import nanoseconds
 from ahf_ros.nodes.diagnostics import Tally
 from ahf_ros.nodes.pipeline import ImageAnswer, ImageMessage, Pipeline, Refused, decoded
 from ahf_ros.nodes.process import ProcessNode
@@ -93,17 +94,19 @@ class Stacks:
 
     def add(self, image: HeldImage, message: ImageMessage) -> None:
         """Add an image, and process the stacks that this completes or ends."""
-        stamp = message.header.stamp
         with self._lock:
             self._arrived = time.monotonic()
-            nanoseconds = stamp.sec * 10**9 + stamp.nanosec
-            for stack in self._window.add(image, _kind(message), nanoseconds):
+            for stack in self._window.add(image, image_kind(message), nanoseconds(message.header)):
                 self._process(stack)
 
     def close(self, why: str) -> None:
         """Process what there is, and end."""
         self._node.destroy_timer(self._timer)
         self._end(why)
+
+    def discard(self) -> None:
+        """End without processing what there is."""
+        self._node.destroy_timer(self._timer)
 
     def _end_if_overdue(self) -> None:
         with self._lock:
@@ -121,7 +124,7 @@ def _relevant(settings: DetectorNodeSettings) -> tuple[object, ...]:
     return settings.stacking, settings.stack_timeout, settings.queue
 
 
-def _kind(message: ImageMessage) -> str:
+def image_kind(message: ImageMessage) -> str:
     """Return what the images of a stack have in common."""
     if hasattr(message, 'format'):
         return message.format

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Sequence
 from importlib import import_module
 
 from ahf_ros.ending import ignore_ending
@@ -26,12 +28,23 @@ def start(node: str, arguments: list[str] | None = None) -> int:
         Command line arguments; those of the process where None.
     """
     signalled()
+    if node != 'demo' and _help_wanted(sys.argv[1:] if arguments is None else arguments):
+        from ahf_ros.nodes.help import help_text
+
+        print(help_text(node), end='')
+        return 0
     module = import_module(NODES[node])
     if has_arrived():
         ignore_ending()
         return 0
     status: int = module.main(arguments)
     return status
+
+
+def _help_wanted(arguments: Sequence[str]) -> bool:
+    """Return whether `--help` is among the arguments, before those that ROS reads."""
+    end = arguments.index('--ros-args') if '--ros-args' in arguments else len(arguments)
+    return not {'-h', '--help'}.isdisjoint(arguments[:end])
 
 
 def demo() -> int:

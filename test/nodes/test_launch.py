@@ -1,190 +1,151 @@
-"""The launch files, read by launch where it is installed, and by a stand-in everywhere.
-
-launch is on no package index. The stand-in tells which processes a launch file starts, with which
-arguments, and these are then started. What it cannot tell is whether launch accepts the file.
-"""
+"""The launch files, read by launch where it is installed, and by a stand-in everywhere."""
 
 from __future__ import annotations
 
 import runpy
 import sys
-from dataclasses import dataclass
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
-import cv2
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
-NODES = {'detector': ['detector'], 'demo': ['illumination', 'detector', 'scoreboard']}
+pytest.importorskip('ament_index_python', reason='ROS 2 is not installed')
+
+from ahf_ros.nodes.settings import DetectorNodeSettings
+from ahf_ros.settings.nested import flat_parameters
+from ahf_ros.synthetic.patterns import LIGHT_NAMES
+from support import ROOT
+from support.launch_files import USERS, launched
+
+NODES = {
+    'detector': ['detector'],
+    'rig': ['detector'],
+    'demo': ['illumination', 'detector', 'scoreboard'],
+}
+REQUIRED = {'detector': {}, 'rig': {'driver': 'zivid'}, 'demo': {}}
+DETECTOR_FILE = str(ROOT / 'config' / 'detector.yaml')
 
 
 @pytest.mark.parametrize('name', NODES)
-def test_launch_reads_a_file(name: str) -> None:
-    pytest.importorskip('launch.actions', reason='launch is not installed')
+def test_launch_reads_a_file(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    launch = pytest.importorskip('launch', reason='launch is not installed')
     pytest.importorskip('launch_ros', reason='launch_ros is not installed')
-    described = entities(name)
-    packages = [getattr(entity, 'node_package', None) for entity in described]
-    assert packages.count('ahf_ros') == len(NODES[name])
-
-
-def entities(name: str) -> list[Any]:
-    """Return what a launch file describes."""
+    monkeypatch.delitem(sys.modules, USERS, raising=False)
     file = str(ROOT / 'launch' / f'{name}.launch.py')
-    return runpy.run_path(file)['generate_launch_description']().entities
-
-
-class Entity:
-    """Something of launch: what it was made with."""
-
-    def __init__(self, *given: Any, **named: Any) -> None:
-        self.given = given
-        self.named = named
-
-
-class LaunchDescription(Entity):
-    @property
-    def entities(self) -> list[Entity]:
-        return self.given[0]
-
-
-STAND_IN: dict[str, dict[str, Any]] = {
-    'launch': {'LaunchDescription': LaunchDescription},
-    'launch.actions': {},
-    'launch.substitutions': {},
-    'launch_ros': {},
-    'launch_ros.actions': {},
-}
-for module, name in (
-    ('launch.actions', 'DeclareLaunchArgument'),
-    ('launch.actions', 'SetEnvironmentVariable'),
-    ('launch.substitutions', 'LaunchConfiguration'),
-    ('launch.substitutions', 'PathJoinSubstitution'),
-    ('launch_ros.actions', 'Node'),
-):
-    STAND_IN[module][name] = type(name, (Entity,), {})
-
-
-@pytest.fixture
-def stand_in(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Put the stand-in in the place of launch, and the sources in that of the share folder."""
-    packages = pytest.importorskip('ament_index_python.packages', reason='ROS 2 is not installed')
-    monkeypatch.setattr(packages, 'get_package_share_directory', lambda _: str(ROOT))
-    for name, content in STAND_IN.items():
-        module = ModuleType(name)
-        vars(module).update(content)
-        monkeypatch.setitem(sys.modules, name, module)
-
-
-@dataclass(frozen=True)
-class Started:
-    """A process that launch starts."""
-
-    node: str
-    arguments: list[str]
-
-
-def started(name: str, **configuration: str) -> tuple[list[Started], dict[str, str]]:
-    """Return the processes of a launch file, given its arguments, and their environment."""
-    nodes, environment = [], {}
-    for entity in entities(name):
-        kind = type(entity).__name__
-        if kind == 'DeclareLaunchArgument':
-            default = text(entity.named['default_value'], configuration)
-            configuration.setdefault(entity.given[0], default)
-            assert entity.named['description']
-        elif kind == 'SetEnvironmentVariable':
-            variable, value = entity.given
-            environment[variable] = text(value, configuration)
+    description = runpy.run_path(file)['generate_launch_description']()
+    context = launch.LaunchContext()
+    context.launch_configurations.update(REQUIRED[name])
+    nodes: list[str] = []
+    waiting = list(description.entities)
+    while waiting:
+        entity = waiting.pop(0)
+        if hasattr(entity, 'node_package'):
+            nodes.append(entity.node_executable)
         else:
-            nodes.append(process(entity.named, configuration))
-    return nodes, environment
+            waiting[:0] = entity.visit(context) or []
+    assert nodes == NODES[name]
 
 
-def process(node: dict[str, Any], configuration: dict[str, str]) -> Started:
-    """Return what launch_ros makes of a node: arguments for its command line."""
-    assert node['package'] == 'ahf_ros'
-    assert node['output'] == 'screen'
-    assert (ROOT / 'scripts' / node['executable']).is_file()
-    arguments = []
-    namespace = text(node.get('namespace', ''), configuration)
-    if namespace:
-        arguments += ['-r', f'__ns:=/{namespace}']
-    for item in node.get('parameters', []):
-        if isinstance(item, dict):
-            for name, value in item.items():
-                arguments += ['-p', f'{name}:={text(value, configuration)}']
-        else:
-            arguments += ['--params-file', text(item, configuration)]
-    for source, target in node.get('remappings', []):
-        arguments += ['-r', f'{source}:={text(target, configuration)}']
-    return Started(node['executable'], arguments)
+def test_every_launch_file_is_tested() -> None:
+    files = {file.name.removesuffix('.launch.py') for file in (ROOT / 'launch').iterdir()}
+    assert files == set(NODES)
 
 
-def text(value: Any, configuration: dict[str, str]) -> str:
-    """Return what a substitution stands for; those of a list are joined."""
-    kind = type(value).__name__
-    if kind == 'LaunchConfiguration':
-        return configuration[value.given[0]]
-    if kind == 'PathJoinSubstitution':
-        return str(Path(*(text(part, configuration) for part in value.given[0])))
-    if isinstance(value, list):
-        return ''.join(text(part, configuration) for part in value)
-    return str(value)
+@pytest.mark.parametrize('name', NODES)
+def test_nodes_have_arguments_with_texts_and_end_their_launch(name: str) -> None:
+    result = launched(name, **REQUIRED[name])
+    assert [it.node for it in result.nodes] == NODES[name]  # on_exit is asserted there
+    for argument, declared in result.declared.items():
+        description = declared.named['description']
+        assert description.endswith('.'), argument
+        assert len(description) > 20, argument
 
 
-@pytest.mark.usefixtures('stand_in')
-def test_the_detector_of_a_launch_file_works_in_its_namespace(graph: Any) -> None:
-    from sensor_msgs.msg import Image, PointCloud2
-    from std_msgs.msg import Header
-
-    from ahf_ros.msg import CodedTargetArray
-    from ahf_ros.nodes.image_msg import image_message
-    from ahf_ros.synthetic.scene import SceneSettings, render
-
-    given = {'namespace': 'left', 'image': '/left/image_raw', 'points': 'cloud'}
-    (detector,), _ = started('detector', **given)
-    assert detector.node == 'detector'
-    graph.start('detector', *detector.arguments, '-p', 'cloud:=true')
-    answers = graph.listen(CodedTargetArray, '/left/coded_targets')
-    scene = render(SceneSettings(width=640, height=480, targets=4, dot_radius=10.0))
-    graph.publisher(PointCloud2, '/left/cloud')
-    graph.publisher(Image, '/left/image_raw').publish(image_message(scene.image, Header()))
-    graph.until(lambda: answers)
-    assert [it.id for it in answers[0].targets] == [it.id for it in scene.targets]
+@pytest.mark.parametrize('name', ['detector', 'rig'])
+def test_usual_parameters_are_arguments(name: str) -> None:
+    declared = launched(name, **REQUIRED[name]).declared
+    parameters = {item.name: item for item in flat_parameters(DetectorNodeSettings)}
+    usual = [parameters[it] for it in declared if it in parameters]
+    assert len(usual) >= 10
+    assert {'expected_targets', 'detector', 'family', 'queue'} <= set(declared)
+    for item in usual:
+        named = declared[item.name].named
+        assert item.description in named['description']
+        assert tuple(named['choices'] or ('',)) == ('', *item.choices)
 
 
-@pytest.mark.usefixtures('stand_in')
-def test_the_detector_of_a_launch_file_reads_compressed_images(graph: Any) -> None:
-    from sensor_msgs.msg import CompressedImage
-
-    from ahf_ros.msg import CodedTargetArray
-    from ahf_ros.synthetic.scene import SceneSettings, render
-
-    (detector,), _ = started('detector', namespace='right', image='/right/image_raw')
-    graph.start('detector', *detector.arguments, '-p', 'image_transport:=compressed')
-    answers = graph.listen(CodedTargetArray, '/right/coded_targets')
-    scene = render(SceneSettings(width=640, height=480, targets=4, dot_radius=10.0))
-    content = cv2.imencode('.png', scene.image)[1].tobytes()
-    sent = CompressedImage(format='mono8; png compressed', data=content)
-    graph.publisher(CompressedImage, '/right/image_raw/compressed').publish(sent)
-    graph.until(lambda: answers)
-    assert [it.id for it in answers[0].targets] == [it.id for it in scene.targets]
+def test_what_is_not_given_is_left_to_the_file_of_parameters() -> None:
+    (detector,) = launched('detector').nodes
+    assert '-p' not in detector.arguments
+    assert detector.arguments[:2] == ['--params-file', DETECTOR_FILE]
 
 
-@pytest.mark.usefixtures('stand_in')
+def test_arguments_of_a_file_that_includes_this_one_are_left_alone() -> None:
+    (detector,) = launched('detector', threads='4', seed='7').nodes
+    assert '-p' not in detector.arguments
+
+
+def test_what_is_given_has_the_type_of_the_parameter() -> None:
+    given = {'expected_ids': '5', 'expected_targets': '4', 'ahf': 'False', 'max_duration': '2'}
+    (detector,) = launched('detector', namespace='left', image='raw', **given).nodes
+    assert detector.arguments == [
+        *('-r', '__ns:=/left', '--params-file', DETECTOR_FILE),
+        *('-p', 'expected_targets:=4', '-p', "expected_ids:='5'"),
+        *('-p', 'ahf:=false', '-p', 'max_duration:=2.0'),
+        *('-r', 'image:=raw', '-r', 'points:=points'),
+    ]
+
+
+@pytest.mark.parametrize(
+    ('name', 'given', 'words'),
+    [
+        ('detector', {'expected_targets': 'many'}, "expected_targets is 'many', accepted is an"),
+        ('detector', {'max_duration': '-1'}, "max_duration is '-1', accepted is a number"),
+        ('detector', {'ahf': 'perhaps'}, "ahf is 'perhaps', accepted is true or false"),
+        ('detector', {'queue': 'long'}, "queue is 'long', accepted is one of"),
+        ('rig', {'driver': 'zivd'}, "driver is 'zivd', accepted is one of"),
+        ('demo', {'light': 'foo'}, "light is 'foo', accepted is one of"),
+    ],
+)
+def test_bad_arguments_start_nothing(name: str, given: dict[str, str], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        launched(name, **given)
+
+
+def test_the_lights_of_the_demo_are_choices() -> None:
+    assert tuple(launched('demo').declared['light'].named['choices']) == LIGHT_NAMES
+
+
+def test_a_rig_without_a_driver_starts_nothing() -> None:
+    with pytest.raises(KeyError):
+        launched('rig')
+
+
+@pytest.mark.parametrize(
+    ('given', 'words'),
+    [
+        ({}, 'qos_overrides./phoxi/phoxi_camera/texture.subscription.reliability'),
+        (
+            {'image': 'texture', 'namespace': 'left', 'queue': 'lossless'},
+            'qos_overrides./left/texture.subscription_lossless.reliability',
+        ),
+    ],
+)
+def test_best_effort_is_for_the_topics_that_are_read(given: dict[str, str], words: str) -> None:
+    (detector,) = launched('rig', driver='phoxi', **given).nodes
+    assert f"{words}:='best_effort'" in detector.arguments
+
+
 def test_the_nodes_of_the_demo_work_together(graph: Any) -> None:
-    nodes, environment = started('demo', light='lattice')
-    assert [it.node for it in nodes] == NODES['demo']
-    assert all(Path(file).is_file() for file in environment.values())
+    result = launched('demo', light='lattice')
+    assert all(Path(file).is_file() for file in result.environment.values())
     small = {
         'illumination': ('width:=640', 'height:=480', 'targets:=6', 'dot_radius:=10', 'rate:=2'),
         'detector': ('expected_targets:=6',),
         'scoreboard': ('images:=2',),
     }
     processes = {}
-    for item in nodes:
+    for item in result.nodes:
         changes = [word for change in small[item.node] for word in ('-p', change)]
         own = ('-r', '__ns:=/demo')
         processes[item.node] = graph.start(item.node, *item.arguments, *own, *changes)

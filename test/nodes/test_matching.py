@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from ahf_ros.nodes.matching import Matcher
+from ahf_ros.nodes.settings import CloudSettings
 
 CLOUD, ANSWER = 0, 1
 
@@ -28,6 +29,13 @@ def test_the_nearest_within_the_tolerance_matches() -> None:
     assert matcher.put(ANSWER, 24, 'too late') is None
     assert matcher.put(ANSWER, 13, 'answer') == 14
     assert unmatched == [1, 1]  # what came before
+
+
+def test_stamps_that_went_through_pcl_match_by_default() -> None:
+    matcher = Matcher(round(CloudSettings().cloud_tolerance * 1e9), (10, 10), [0, 0])
+    stamp = 1_700_000_000_123_456_999
+    matcher.put(ANSWER, stamp, 'answer')
+    assert matcher.put(CLOUD, stamp // 1000 * 1000, 'cloud') == 'answer'
 
 
 def test_what_came_before_a_match_is_given_up() -> None:

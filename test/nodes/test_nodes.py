@@ -36,7 +36,12 @@ from support.detector import DetectorProcess
 CONFIG = Path(__file__).parents[2] / 'config' / 'detector.yaml'
 SCENE = {'width': 1000, 'height': 700, 'targets': 6}
 LARGEST_ERROR = 0.1  # px
-ENDLESS = ('max_evaluations', 0), ('population', 10000), ('generations', 100000)
+ENDLESS = (
+    ('max_evaluations', 0),
+    ('population', 10000),
+    ('generations', 100000),
+    ('patience', 1000000),
+)
 
 
 def overrides(**given: Any) -> list[str]:
@@ -273,6 +278,31 @@ def test_one_refused_parameter_of_a_list_leaves_the_others(
     assert (detector.get('seed'), detector.get('population')) == (7, before)
 
 
+def test_minimum_and_maximum_of_a_list_may_come_in_either_order(
+    graph: Any, detector: DetectorProcess
+) -> None:
+    names = 'min_radius', 'max_radius'
+    before = [detector.get(name) for name in names]
+    reasons: list[str] = []
+
+    def load(*pairs: tuple[str, Any]) -> list[bool]:
+        given = [Parameter(name, value=value).to_parameter_msg() for name, value in pairs]
+        request = SetParameters.Request(parameters=given)
+        found = graph.call(SetParameters, '/own/detector/set_parameters', request).results
+        reasons.extend(result.reason for result in found)
+        return [result.successful for result in found]
+
+    assert load(('min_radius', 10.0), ('max_radius', 20.0)) == [True, True]
+    up = load(('min_radius', 30.0), ('population', 1), ('max_radius', 40.0))
+    assert up == [True, False, True]
+    assert [detector.get(name) for name in names] == [30.0, 40.0]
+    assert load(('max_radius', 20.0), ('min_radius', 10.0)) == [True, True]
+    assert [detector.get(name) for name in names] == [10.0, 20.0]
+    assert load(('min_radius', 40.0), ('max_radius', 30.0), ('seeds', 1)) == [False, True, False]
+    assert reasons[-1] == 'no parameter is named seeds; the nearest is seed'
+    assert load(*zip(names, before, strict=True)) == [True, True]
+
+
 def test_images_for_those_who_look(
     graph: Any, detector: DetectorProcess, rendering: Rendering
 ) -> None:
@@ -317,7 +347,9 @@ def test_parameters_are_answered_and_the_latest_image_waits_during_a_search(
     assert first is not None
     assert (first.expected, last.expected) == (50, 6)
     assert first.filter.evaluations > last.filter.evaluations == 1
-    assert (answer(images[1]), answer(images[2])) == (None, None)
+    # One of them may have been identified during the search, and waited for its turn.
+    between = [it for it in map(answer, images[1:3]) if it]
+    assert [it.filter.evaluations for it in between] in ([], [1])
     assert graph.call(Trigger, '/own/detector/reset', Trigger.Request()).success
 
 
@@ -362,14 +394,15 @@ def test_compressed_images(graph: Any, detector: DetectorProcess, rendering: Ren
 def test_a_signal_ends_the_node_in_the_middle_of_a_search(
     graph: Any, message: Image, number: signal.Signals
 ) -> None:
+    space = f'/ending{number}'
     process = graph.start(
         'detector',
-        *('-r', '__ns:=/ending', '-r', '/diagnostics:=/ending/diagnostics'),
+        *('-r', f'__ns:={space}', '-r', f'/diagnostics:={space}/diagnostics'),
         *overrides(expected_targets=50, **dict(ENDLESS)),
     )
-    diagnostics = graph.listen(DiagnosticArray, '/ending/diagnostics')
-    answers = graph.listen(CodedTargetArray, '/ending/coded_targets')
-    graph.publisher(Image, '/ending/image').publish(message)
+    diagnostics = graph.listen(DiagnosticArray, f'{space}/diagnostics')
+    answers = graph.listen(CodedTargetArray, f'{space}/coded_targets')
+    graph.publisher(Image, f'{space}/image').publish(message)
     graph.until(lambda: diagnostics and values(diagnostics[-1])['received'] == '1')
     assert process.end(number) == (0, '')
     assert answers == []
@@ -394,7 +427,8 @@ def test_a_refused_parameter_stops_a_node_at_the_start(
 ) -> None:
     status, errors = graph.start(node, *overrides(**given)).wait()
     assert status == 1
-    assert 'Traceback' not in errors
+    assert len(errors.splitlines()) == 1
+    assert 'qos_overrides' not in errors
     assert all(word in errors for word in words), errors
 
 
@@ -407,12 +441,15 @@ def test_a_service_is_a_detector_and_its_end_is_named(
     assert "service is '', accepted is the name of a ROS service" in errors
     other = graph.start('detector', '-r', '__ns:=/other')
     graph.until(lambda: ('detector', '/other') in graph.node.get_node_names_and_namespaces())
-    chosen = overrides(detector='service', service='/other/detector/identify')
+    # So long that a busy machine answers in it, so short that a lost answer is asked for again.
+    chosen = overrides(
+        detector='service', service='/other/detector/identify', detector_timeout=24.0
+    )
     detector = DetectorProcess(graph, '/asking', *chosen)
     found = detector.answer(message)
     assert [it.id for it in found.targets] == [it.id for it in rendering.targets]
     assert found.family == 'metashape12'
-    other.kill()
+    other.end()
     response = detector.identify(image_message(rendering.image, header()))
     assert not response.success
     assert response.message == "service '/other/detector/identify' is not there"

@@ -39,10 +39,15 @@ def rendering() -> Rendering:
 @pytest.fixture(scope='module')
 def camera() -> Camera:
     """Return the camera of the rendering."""
-    setup = np.random.default_rng(np.random.SeedSequence(SCENE.seed).spawn(5)[0])
-    width, focal_length = SCENE.width, SCENE.focal_length * SCENE.width
-    tilt = math.radians(SCENE.tilt)
-    return tilted_camera(width, SCENE.height, focal_length, tilt, SCENE.distortion, setup)
+    return synthetic_camera(SCENE)
+
+
+def synthetic_camera(scene: SceneSettings) -> Camera:
+    """Return the camera that a scene is rendered with."""
+    setup = np.random.default_rng(np.random.SeedSequence(scene.seed).spawn(5)[0])
+    width, focal_length = scene.width, scene.focal_length * scene.width
+    tilt = math.radians(scene.tilt)
+    return tilted_camera(width, scene.height, focal_length, tilt, scene.distortion, setup)
 
 
 def in_space(camera: Camera, pixels: np.ndarray) -> np.ndarray:
@@ -218,7 +223,8 @@ def test_bad_clouds_are_named_and_the_node_goes_on(
     rig.cloud.publish(cloud_message(scanned[:, :-1], image.header))
     rig.graph.until(lambda: rig.told('clouds rejected') == before + len(bad) + 1)
     assert values(rig.diagnostics[-1])['last reason for rejection of a cloud'] == (
-        'cloud has 639 x 480 points, accepted is 640 x 480, the size of the image'
+        'cloud has 639 x 480 points, accepted is 640 x 480, the size of the image; for another '
+        'one, set cloud_offset_x, cloud_offset_y and cloud_step'
     )
     image = image_message(rendering.image, header())
     rig.detector.answer(image)

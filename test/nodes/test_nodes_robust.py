@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+import os
+from collections.abc import Iterator
 from typing import Any
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -25,6 +28,7 @@ from ahf_ros.nodes.process import Ending
 from ahf_ros.nodes.settings import DetectorNodeSettings
 from ahf_ros.settings.nested import flat_parameters
 from ahf_ros.synthetic.scene import SceneSettings, render
+from support import live
 
 SCENE = {'width': 320, 'height': 240, 'targets': 3, 'dot_radius': 9.0}
 ENDLESS = {
@@ -32,12 +36,23 @@ ENDLESS = {
     'max_evaluations': 0,
     'population': 10000,
     'generations': 100000,
+    'patience': 1000000,
 }
 
 
 def overrides(**given: Any) -> list[str]:
     """Return command line arguments that set parameters."""
     return [word for name, value in given.items() for word in ('-p', f'{name}:={value}')]
+
+
+@pytest.fixture(scope='module')
+def graph() -> Iterator[live.Graph]:
+    """Return a graph without shared memory, by which Fast DDS lets the killed take others along.
+
+    It may write to a port that another process has removed: eProsima/Fast-DDS, pull request 4737.
+    """
+    with mock.patch.dict(os.environ, FASTDDS_BUILTIN_TRANSPORTS='UDPv4'), live.opened() as graph:
+        yield graph
 
 
 @pytest.fixture(scope='module')
@@ -93,7 +108,10 @@ def test_a_camera_that_is_killed_and_comes_again(graph: Any, queue: str) -> None
         camera.kill()
         bench.answers.clear()
     assert bench.told('rejected') == '0'
-    assert bench.process.end() == (0, '')
+    status, errors = bench.process.end()
+    assert status == 0
+    # Until its lease is over, the killed camera counts as a second publisher.
+    assert [it for it in errors.splitlines() if '2 publishers on' not in it] == []
 
 
 def test_a_detector_that_is_killed_in_the_middle_of_a_search_and_comes_again(graph: Any) -> None:
@@ -111,7 +129,7 @@ def test_a_detector_that_is_killed_in_the_middle_of_a_search_and_comes_again(gra
 
 
 def test_stamps_that_go_backwards_are_told_and_answered(graph: Any, pixels: np.ndarray) -> None:
-    bench = Bench(graph, 'backwards', queue='lossless')
+    bench = Bench(graph, 'backwards', queue='lossless', image_timeout=0)
     image = graph.publisher(Image, '/backwards/image')
     stamps = [Time(sec=5), Time(sec=7, nanosec=1), Time(sec=7), Time(sec=7), Time(sec=8)]
     for stamp in stamps:

@@ -1,0 +1,124 @@
+"""Everything that a node publishes about an image that it has identified."""
+
+from __future__ import annotations
+
+import time
+from importlib import import_module
+from types import ModuleType
+
+from rclpy.publisher import Publisher
+from sensor_msgs.msg import Image
+from visualization_msgs.msg import ImageMarker
+
+from ahf_ros.drawing.overlay import draw
+from ahf_ros.msg import CodedTargetArray
+from ahf_ros.nodes.annotation_msg import target_annotations
+from ahf_ros.nodes.cloud import TargetPoints
+from ahf_ros.nodes.detection_msg import target_detections
+from ahf_ros.nodes.diagnostics import CloudTally, Tally
+from ahf_ros.nodes.image_msg import image_message
+from ahf_ros.nodes.inputs import Input
+from ahf_ros.nodes.matching import Waiting
+from ahf_ros.nodes.pipeline import ImageAnswer, Pipeline
+from ahf_ros.nodes.process import ProcessNode
+from ahf_ros.nodes.settings import DetectorNodeSettings
+from ahf_ros.nodes.topics import ANSWERS_KEPT, DETECTIONS
+from ahf_ros.nodes.undistortion import UndistortedTargets
+
+
+class Answers:
+    """Publishes an identification in every form that is asked for.
+
+    Parameters
+    ----------
+    node : ProcessNode
+        Has the publishers.
+    tally : Tally
+        Counts to continue.
+    """
+
+    def __init__(self, node: ProcessNode, tally: Tally) -> None:
+        self._node = node
+        self._tally = tally
+        self._targets = node.publisher(CodedTargetArray, 'coded_targets', ANSWERS_KEPT)
+        self._debug_image = node.publisher(Image, '~/debug_image')
+        self._filtered_image = node.publisher(Image, '~/filtered_image')
+        self._annotations = node.publisher(ImageMarker, '~/annotations')
+        self._clouds: TargetPoints | None = None
+        self._detections: tuple[ModuleType, Publisher] | None = None
+        self._detecting = False
+        self._undistorted: UndistortedTargets | None = None
+
+    def renew(self, settings: DetectorNodeSettings) -> None:
+        """Put settings into force: start or stop what they ask for."""
+        self._renew_clouds(settings)
+        self._renew_detections(settings.answers.detections)
+        self._renew_undistorted(settings.answers.undistort)
+
+    def waiting(self) -> tuple[Input, Waiting] | None:
+        """Return where clouds come from and what waits for its match, None without clouds."""
+        clouds = self._clouds
+        return clouds.waiting() if clouds else None
+
+    def close(self) -> None:
+        """Stop everything that settings ask for, and forget what waits for its cloud."""
+        clouds, self._clouds = self._clouds, None
+        if clouds:
+            clouds.close()
+        self._renew_undistorted(False)
+
+    def _renew_clouds(self, settings: DetectorNodeSettings) -> None:
+        if self._clouds and self._clouds.suits(settings):
+            return
+        clouds, self._clouds = self._clouds, None
+        if clouds:
+            clouds.close()
+        if settings.cloud.cloud:
+            self._tally.clouds = self._tally.clouds or CloudTally()
+            self._clouds = TargetPoints(self._node, settings, self._tally.clouds)
+
+    def _renew_detections(self, wanted: bool) -> None:
+        # A publisher stays once it is there: the answer that is being published may need it.
+        if wanted and not self._detections:
+            kinds = import_module('vision_msgs.msg')
+            publisher = self._node.publisher(kinds.Detection2DArray, DETECTIONS, ANSWERS_KEPT)
+            self._detections = kinds, publisher
+        self._detecting = wanted
+
+    def _renew_undistorted(self, wanted: bool) -> None:
+        if wanted and not self._undistorted:
+            self._undistorted = UndistortedTargets(self._node, self._tally)
+        if self._undistorted:
+            self._undistorted.listen(wanted)
+
+    def publish(self, answer: ImageAnswer, pipeline: Pipeline, received: float) -> None:
+        """Publish an answer.
+
+        Parameters
+        ----------
+        answer : ImageAnswer
+        pipeline : Pipeline
+            Made the answer.
+        received : float
+            When its image arrived, s of the monotonic clock.
+        """
+        header = answer.message.header
+        self._targets.publish(answer.message)
+        self._tally.answered += answer.images
+        self._tally.latency = time.monotonic() - received
+        self._tally.last = answer.identification
+        if clouds := self._clouds:
+            clouds.locate(answer.message)
+        if self._detections and self._detecting:
+            kinds, publisher = self._detections
+            publisher.publish(target_detections(answer.message, kinds))
+        if self._undistorted:
+            self._undistorted.publish(answer.message, answer.identification)
+        if self._annotations.get_subscription_count():
+            self._annotations.publish(target_annotations(answer.message))
+        if self._debug_image.get_subscription_count():
+            drawn = draw(answer.image, answer.identification)
+            self._debug_image.publish(image_message(drawn, header))
+        if self._filtered_image.get_subscription_count():
+            filtered = pipeline.filtered(answer)
+            self._filtered_image.publish(image_message(filtered, header))

@@ -1,0 +1,152 @@
+"""Centres of targets without the distortion of the lens, from the calibration of the camera."""
+
+from __future__ import annotations
+
+import bisect
+import threading
+from dataclasses import replace
+from typing import NamedTuple
+
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from sensor_msgs.msg import CameraInfo
+
+from ahf_ros import msg
+from ahf_ros.interchange.camera_info import Calibration, calibration
+from ahf_ros.interchange.image_messages import nanoseconds
+from ahf_ros.interchange.target_messages import coded_target_array
+from ahf_ros.interchange.undistorted_targets import undistorted_targets
+from ahf_ros.msg import CodedTargetArray
+from ahf_ros.nodes.diagnostics import Tally
+from ahf_ros.nodes.inputs import Input
+from ahf_ros.nodes.process import ProcessNode
+from ahf_ros.nodes.topics import ANSWERS_KEPT, UNDISTORTED, camera_info_topic
+from ahf_ros.target import Identification
+
+CHANGES = 1000
+"""Maximum number of different calibrations that are remembered."""
+
+LOG_PERIOD = 5.0
+"""Minimum time between two log lines about calibrations that cannot be used, s."""
+
+
+class _Change(NamedTuple):
+    stamp: int
+    content: tuple[object, ...]
+    calibration: Calibration | str
+
+
+class Calibrations:
+    """The calibrations of a camera in the order of their stamps; thread-safe.
+
+    Drivers send one with every image, nearly always the same. So only changes are kept, and an
+    image that waited for long still finds the calibration of its time.
+    """
+
+    def __init__(self) -> None:
+        self._changes: list[_Change] = []
+        self._lock = threading.Lock()
+
+    def put(self, message: CameraInfo) -> None:
+        """Remember the calibration of a message, or why it is not accepted."""
+        stamp, content = nanoseconds(message.header), _content(message)
+        with self._lock:
+            place = bisect.bisect([change.stamp for change in self._changes], stamp)
+            if place and self._changes[place - 1].content == content:
+                return
+            try:
+                found: Calibration | str = calibration(message)
+            except ValueError as error:
+                found = str(error)
+            self._changes.insert(place, _Change(stamp, content, found))
+            del self._changes[:-CHANGES]
+
+    def at(self, stamp: int) -> Calibration | None:
+        """Return the calibration at a time: the last one before, or else the first one after.
+
+        Parameters
+        ----------
+        stamp : int
+            Stamp of an image, ns.
+
+        Returns
+        -------
+        Calibration or None
+            None if there is none.
+
+        Raises
+        ------
+        ValueError
+            If it was not accepted.
+        """
+        with self._lock:
+            if not self._changes:
+                return None
+            place = bisect.bisect([change.stamp for change in self._changes], stamp)
+            found = self._changes[max(0, place - 1)].calibration
+        if isinstance(found, str):
+            raise ValueError(found)
+        return found
+
+
+class UndistortedTargets:
+    """Publishes answers once more, with centres as a camera without distortion would see them.
+
+    Parameters
+    ----------
+    node : ProcessNode
+        Subscribes to camera_info.
+    tally : Tally
+        Gets the reason why an answer has no undistorted centres.
+    """
+
+    def __init__(self, node: ProcessNode, tally: Tally) -> None:
+        self._node = node
+        self._tally = tally
+        self._publisher = node.publisher(CodedTargetArray, UNDISTORTED, ANSWERS_KEPT)
+        self._calibrations = Calibrations()
+        self._topic = camera_info_topic(node)
+        self._subscription: Input | None = None
+
+    def listen(self, wanted: bool) -> None:
+        """Subscribe to calibrations, or end the subscription."""
+        if wanted and not self._subscription:
+            group = MutuallyExclusiveCallbackGroup()
+            put = self._calibrations.put
+            self._subscription = self._node.subscribe(CameraInfo, self._topic, put, group)
+        elif self._subscription and not wanted:
+            self._node.unsubscribe(self._subscription)
+            self._subscription = None
+            self._tally.uncalibrated = ''
+
+    def publish(self, answer: CodedTargetArray, identification: Identification) -> None:
+        """Publish the undistorted targets of an answer, or report why that is impossible."""
+        if not self._subscription:
+            return
+        header, size = answer.header, (answer.height, answer.width)
+        try:
+            camera = self._calibrations.at(nanoseconds(header))
+            if camera is None:
+                topic = self._node.resolve_topic_name(self._topic)
+                raise ValueError(f'no camera_info has come on {topic}')
+            camera.check(header.frame_id, answer.width, answer.height)
+        except ValueError as error:
+            self._tally.uncalibrated = f'targets are not undistorted: {error}'
+            logger = self._node.get_logger()
+            logger.warning(self._tally.uncalibrated, throttle_duration_sec=LOG_PERIOD)
+            return
+        self._tally.uncalibrated = ''
+        targets = undistorted_targets(camera, identification.targets)
+        moved = replace(identification, targets=targets)
+        self._publisher.publish(coded_target_array(moved, answer.family, size, header, msg))
+
+
+def _content(message: CameraInfo) -> tuple[object, ...]:
+    """Return everything in a message but its stamp."""
+    roi = message.roi
+    return (
+        message.header.frame_id,
+        *(message.width, message.height, message.binning_x, message.binning_y),
+        *(roi.x_offset, roi.y_offset, roi.width, roi.height),
+        message.distortion_model,
+        *(it.tobytes() for it in (message.d, message.k, message.r, message.p)),
+    )

@@ -1,0 +1,110 @@
+"""Settings of an identification, declared once for every way in, and of the images that it is of.
+
+The command line needs them before it knows whether it computes anything, so nothing is imported
+here that does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from ahf_ros.detectors import DETECTOR, DetectorSettings, detector_name, estimator
+from ahf_ros.filtering.settings import AdaptiveSettings
+from ahf_ros.imaging.limits import MAXIMUM_IMAGES
+from ahf_ros.settings.parameter import check_parameters, parameter
+
+MAXIMUM_TARGETS = 100_000
+"""Maximum of N."""
+
+TUMBLING, SLIDING = 'tumbling', 'sliding'
+"""Which images of a stream are a stack: every image one of one, or each with those before it."""
+
+
+@dataclass(frozen=True, slots=True)
+class IdentificationSettings:
+    """Settings of one identification: which targets, how many, by which detector and search.
+
+    Attributes
+    ----------
+    detector : str
+        One of `ahf_ros.detectors.DETECTOR_NAMES`, or 'auto' for the detector of the family.
+    expected_targets : int
+        N, the number of coded targets in every image; 0 where unknown.
+    estimate_expected : bool
+        Whether to estimate N where it is unknown.
+    detection : DetectorSettings
+        What the targets look like.
+    adaptive : AdaptiveSettings
+        How a filter is searched for.
+
+    Raises
+    ------
+    ValueError
+        If a value is not accepted or does not fit the others.
+
+    Examples
+    --------
+    >>> from ahf_ros import DetectorSettings, IdentificationSettings
+    >>> IdentificationSettings(detection=DetectorSettings(family='aicon14')).detector
+    'auto'
+    """
+
+    detector: str = parameter(DETECTOR.default, DETECTOR.description, choices=DETECTOR.choices)
+    expected_targets: int = parameter(
+        0,
+        'N, the number of coded targets in every image; 0: unknown, and no filter is searched for '
+        'unless N is estimated.',
+        minimum=0,
+        maximum=MAXIMUM_TARGETS,
+    )
+    estimate_expected: bool = parameter(
+        False,
+        'Whether to estimate N where it is unknown, and to search for a filter that shows N '
+        'targets.',
+    )
+    detection: DetectorSettings = field(default_factory=DetectorSettings)
+    adaptive: AdaptiveSettings = field(default_factory=AdaptiveSettings)
+
+    def __post_init__(self) -> None:
+        """Refuse values that are not accepted."""
+        check_parameters(self)
+        self.check_detector()
+        if self.estimate_expected:
+            estimator(self.detection)
+
+    def check_detector(self) -> None:
+        """Refuse a detector that does not identify the family."""
+        detector_name(self.detector, self.detection.family)
+
+
+@dataclass(frozen=True, slots=True)
+class StackSettings:
+    """Which images are identified together.
+
+    Examples
+    --------
+    >>> StackSettings(stack=4).stack_window
+    'tumbling'
+    """
+
+    stack: int = parameter(
+        1,
+        'Number of images of an unmoved scene, lit in turn by different patterns, that are '
+        'identified together; 1: every image on its own.',
+        minimum=1,
+        maximum=MAXIMUM_IMAGES,
+    )
+    stack_window: str = parameter(
+        TUMBLING,
+        'tumbling: each image belongs to one stack; sliding: each image is identified with those '
+        'before it.',
+        choices=(TUMBLING, SLIDING),
+    )
+    stack_movement: bool = parameter(
+        True,
+        'Whether to look for movement of the scene within a stack, and to split the stack there.',
+    )
+
+    def __post_init__(self) -> None:
+        """Refuse values that are not accepted."""
+        check_parameters(self)

@@ -1,0 +1,252 @@
+"""How long a stream of images waits for its answers, and how fast it may be without a loss.
+
+Images under stripes that stay as they are come from another process, at two sizes, with the
+defaults of Fast DDS and with `config/fastdds_shm.xml`. Except for the last figure, the node keeps
+the latest image.
+
+- Latency: from the stamp of an image, given when it is sent, to its answer, with one image sent at
+  a time; beside it the time of the identification itself.
+- Rate: the highest of a series of falling rates at which every image of a stream is answered.
+- Lossless: how many images a second a lossless queue answers, all of them sent at once.
+
+With `--before`, every figure is also that of another checkout of this repository. Latencies are
+measured in turn, image by image, so that their ratio holds on a machine with other work, too.
+
+    python -m benchmarks.latency [--images 40] [--before FOLDER] [--output docs/figures/latency]
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from statistics import median, quantiles
+from typing import Any
+
+import rclpy
+from sensor_msgs.msg import Image
+from std_msgs.msg import Header
+
+from ahf_ros.msg import CodedTargetArray
+from ahf_ros.nodes.image_msg import image_message
+from ahf_ros.nodes.settings import LATEST, LOSSLESS
+from ahf_ros.synthetic.scene import SceneSettings, render
+from benchmarks.filter import machine
+from benchmarks.node import TRANSPORTS
+from benchmarks.output import add_output, publish
+from support import live
+
+SIZES = {'2.5 MP': (1936, 1296, 20), '10.6 MP': (3984, 2656, 54)}
+"""Width, height and targets of the images."""
+
+STEP = 0.93
+"""Ratio of two rates of the series."""
+
+SLOWEST = 0.4
+"""Last rate of the series, as a fraction of the first one."""
+
+PAUSE = 0.5
+"""Time without an answer after which the rest of a stream is lost, in times of an answer."""
+
+Figures = dict[str, float]
+
+
+class Stream:
+    """A node, images to it, and when each was sent and answered.
+
+    Parameters
+    ----------
+    graph : live.Graph
+    message : Image
+        Sent again and again.
+    namespace : str
+        Of the node.
+    folder : Path or None
+        Checkout whose node it is.
+    queue : str
+        Of the node.
+    """
+
+    def __init__(
+        self,
+        graph: live.Graph,
+        message: Image,
+        namespace: str,
+        folder: Path | None,
+        queue: str = LATEST,
+    ) -> None:
+        self._graph = graph
+        self._message = message
+        places = '-r', f'__ns:={namespace}', '-r', f'/diagnostics:={namespace}/diagnostics'
+        given = '-p', f'queue:={queue}'
+        graph.start('detector', *places, *given, folder=folder)
+        self._publisher = graph.node.create_publisher(Image, f'{namespace}/image', 100)
+        self.sent: dict[int, float] = {}
+        self.answered: dict[int, tuple[float, float]] = {}
+        graph.node.create_subscription(
+            CodedTargetArray, f'{namespace}/coded_targets', self._on_answer, 1000
+        )
+        graph.until(self._publisher.get_subscription_count)
+
+    def _on_answer(self, answer: CodedTargetArray) -> None:
+        number = answer.header.stamp.sec
+        self.answered[number] = time.monotonic() - self.sent[number], answer.filter.duration
+
+    def send(self) -> int:
+        """Send the image and return its number."""
+        number = len(self.sent) + 1
+        self._message.header.stamp.sec = number
+        self.sent[number] = time.monotonic()
+        self._publisher.publish(self._message)
+        return number
+
+    def wait(self, until: Callable[[], bool], limit: float) -> bool:
+        """Return whether a condition comes true before a time of the monotonic clock."""
+        while not until():
+            left = limit - time.monotonic()
+            if left <= 0:
+                return False
+            rclpy.spin_once(self._graph.node, timeout_sec=left)
+        return True
+
+    def answer(self) -> tuple[float, float]:
+        """Send an image; return the time to its answer and that of its identification, s."""
+        number = self.send()
+        limit = time.monotonic() + live.PATIENCE
+        assert self.wait(lambda: number in self.answered, limit), 'no answer'
+        return self.answered[number]
+
+    def all_answered(self, images: int, rate: float, patience: float) -> bool:
+        """Return whether every image of a stream is answered."""
+        started, first = time.monotonic(), len(self.sent) + 1
+        for number in range(images):
+            self.wait(lambda: False, started + number / rate)
+            self.send()
+        wanted = range(first, first + images)
+
+        def complete() -> bool:
+            return all(number in self.answered for number in wanted)
+
+        while not complete():
+            count = len(self.answered)
+            until = time.monotonic() + patience
+            if not self.wait(lambda count=count: len(self.answered) > count, until):
+                return False
+        return True
+
+
+def all_at_once(stream: Stream, images: int) -> float:
+    """Return how many images a second a lossless queue answers, Hz."""
+    stream.answer()
+    started = time.monotonic()
+    for _ in range(images):
+        stream.send()
+    limit = started + images * live.PATIENCE
+    assert stream.wait(lambda: len(stream.answered) == len(stream.sent), limit), 'images are lost'
+    return images / (time.monotonic() - started)
+
+
+def latencies(streams: dict[str, Stream], images: int) -> dict[str, Figures]:
+    """Return the latency of each node, an image of one after an image of the other."""
+    times: dict[str, list[tuple[float, float]]] = {name: [] for name in streams}
+    for _ in range(images + 2):
+        for name, stream in streams.items():
+            times[name].append(stream.answer())
+    figures = {}
+    for name, rows in times.items():
+        totals, own = zip(*rows[2:], strict=True)
+        figures[name] = {
+            'p50 (ms)': 1e3 * median(totals),
+            'p99 (ms)': 1e3 * quantiles(totals, n=100, method='inclusive')[98],
+            'identification (ms)': 1e3 * median(own),
+        }
+    return figures
+
+
+def rate_without_loss(stream: Stream, images: int, latency: Figures) -> float:
+    """Return the highest rate of a series at which all images are answered, Hz; 0: none is."""
+    rate = first = 1.1e3 / latency['identification (ms)']
+    patience = max(1.0, (1 + PAUSE) * 2e-3 * latency['p99 (ms)'])
+    while rate > SLOWEST * first:
+        if stream.all_answered(images, rate, patience):
+            return rate
+        rate *= STEP
+    return 0.0
+
+
+def measured(options: argparse.Namespace) -> dict[str, Figures]:
+    """Return the figures with the transport that the environment says, by size and checkout."""
+    rows = {}
+    folders = {'before': options.before, 'now': None} if options.before else {'now': None}
+    for size in options.sizes:
+        width, height, targets = SIZES[size]
+        scene = SceneSettings(
+            width=width, height=height, targets=targets, light=options.light, ambient=0.3
+        )
+        message = image_message(render(scene).image, Header())
+        with live.opened() as graph:
+            latest, lossless = (
+                {
+                    name: Stream(graph, message, f'/{name}_{queue}', folder, queue)
+                    for name, folder in folders.items()
+                }
+                for queue in (LATEST, LOSSLESS)
+            )
+            figures = latencies(latest, options.images)
+            for name, row in figures.items():
+                rate = rate_without_loss(latest[name], options.images, row)
+                row['rate without loss (Hz)'] = rate
+                row['lossless (Hz)'] = all_at_once(lossless[name], options.images)
+                rows[f'{size}, {name}'] = row
+    return rows
+
+
+def markdown(report: dict[str, Any]) -> str:
+    """Return the figures as a table, a row a transport, size and checkout."""
+    rows = {
+        f'{name}, {row}': of for name, it in report['transports'].items() for row, of in it.items()
+    }
+    names = list(next(iter(rows.values())))
+    lines = [f'| {report["light"]} | {" | ".join(names)} |', '|---' * (len(names) + 1) + '|']
+    lines += [
+        f'| {name} | {" | ".join(f"{of[it]:.4g}" for it in names)} |' for name, of in rows.items()
+    ]
+    return '\n'.join(lines)
+
+
+def main() -> int:
+    """Measure with every transport, each in a process of its own, and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument('--images', type=int, default=40, help='of each stream')
+    parser.add_argument('--light', default='stripe', help='on the targets')
+    parser.add_argument('--sizes', nargs='+', choices=SIZES, default=list(SIZES))
+    parser.add_argument('--transports', nargs='+', choices=TRANSPORTS, default=list(TRANSPORTS))
+    parser.add_argument(
+        '--before', type=Path, metavar='FOLDER', help='another checkout, measured in turn'
+    )
+    parser.add_argument('--alone', action='store_true', help=argparse.SUPPRESS)
+    add_output(parser)
+    options = parser.parse_args()
+    if options.alone:
+        print(json.dumps(measured(options)))
+        return 0
+    report: dict[str, Any] = {'machine': machine(), 'light': options.light, 'transports': {}}
+    for name in options.transports:
+        done = subprocess.run(
+            [sys.executable, '-m', 'benchmarks.latency', *sys.argv[1:], '--alone'],
+            env={**os.environ, **TRANSPORTS[name]},
+            stdout=subprocess.PIPE,
+            check=True,
+        )
+        report['transports'][name] = json.loads(done.stdout)
+    publish(report, markdown(report), options.output)
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
