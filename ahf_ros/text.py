@@ -40,3 +40,14 @@ def reason_of(error: BaseException) -> str:
     except Exception:  # an exception of others may have no text
         text = ''
     return printable(f'{type(error).__name__}: {text}')
+
+
+def counted(number: int, noun: str) -> str:
+    """Return a number of things in words.
+
+    Examples
+    --------
+    >>> counted(1, 'page'), counted(2, 'page')
+    ('1 page', '2 pages')
+    """
+    return f'{number} {noun}' + 's' * (number != 1)

@@ -5,18 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ahf_ros.drawing import (
+from ahf_ros.drawing.colours import (
     DECODED_COLOUR,
+    DOUBTFUL_COLOUR,
     MISSED_COLOUR,
     UNDECODED_COLOUR,
     WRONG_COLOUR,
-    Tile,
-    draw,
-    overlay,
-    side_by_side,
-    summary,
 )
-from ahf_ros.target import UNDECODED, FilterState, Identification, Target
+from ahf_ros.drawing.labels import Label, place_labels
+from ahf_ros.drawing.overlay import draw, overlay, summary
+from ahf_ros.drawing.tiles import Tile, side_by_side
+from ahf_ros.target import UNDECODED, FilterState, Identification, Target, UndecodedTarget
 
 GRAY = np.full((240, 320), 120, np.uint8)
 
@@ -44,7 +43,7 @@ def test_colours_say_what_a_target_is():
     for colour, x in ((UNDECODED_COLOUR, 60), (WRONG_COLOUR, 160), (DECODED_COLOUR, 250)):
         columns = np.flatnonzero(shown(drawn, colour).any(axis=0))
         assert abs(columns.mean() - x) < 20
-        assert shown(drawn, colour)[140, x]
+        assert shown(drawn, colour)[140, x] == (colour != UNDECODED_COLOUR)
 
 
 def test_a_missed_target_is_crossed_out():
@@ -53,6 +52,35 @@ def test_a_missed_target_is_crossed_out():
     assert crossed[140, 160]
     assert all(crossed[140 + down, 160 + across] for down in (-30, 30) for across in (-30, 30))
     assert not crossed[140, 180:].any()
+
+
+def test_doubtful_targets_are_dashed_and_have_a_question_mark() -> None:
+    uncertain = UndecodedTarget(
+        UNDECODED, 0, 160.0, 140.0, 20.0, 12.0, 0.3, 0.4, reason='uncertain', likely_id=7
+    )
+    for target in (Target(7, 0, 160.0, 140.0, 20.0, 12.0, 0.3, 0.9), uncertain):
+        drawn = overlay(GRAY, [target])
+        assert not shown(drawn, DECODED_COLOUR).any()
+        assert shown(drawn, DOUBTFUL_COLOUR)[100:125, 175:205].any()  # its label
+        ring = shown(drawn, DOUBTFUL_COLOUR)[126:155]
+        whole = shown(overlay(GRAY, [Target(7, 0, 160.0, 140.0, 20.0, 12.0, 0.3)]), DECODED_COLOUR)
+        assert 0.4 * whole[126:155].sum() < ring.sum() < 0.85 * whole[126:155].sum()
+
+
+def test_labels_hide_no_target_and_no_other_label() -> None:
+    places = [(x, y) for y in range(60, 240, 60) for x in range(60, 320, 60)]
+    labels = [Label('12', x, y, 22.0, DECODED_COLOUR) for x, y in places]
+    placed = place_labels(labels, [(18.0, 11.0)] * len(labels), (240, 320), 2.0)
+    boxes = [(left, bottom - 11, left + 18, bottom) for left, bottom in placed]
+    for index, (left, top, right, bottom) in enumerate(boxes):
+        assert 0 <= left < right <= 320
+        assert 0 <= top < bottom <= 240
+        for label in labels:
+            across = label.x - min(max(label.x, left), right)
+            down = label.y - min(max(label.y, top), bottom)
+            assert np.hypot(across, down) > 20
+        for other in boxes[:index]:
+            assert other[0] > right or other[2] < left or other[1] > bottom or other[3] < top
 
 
 def test_pictures_side_by_side_have_their_text_above_them():
@@ -103,6 +131,10 @@ def test_the_summary_says_how_many_and_through_what():
     through = FilterState(applied=True, gamma_high=1.2, gamma_low=0.25)
     told = summary(Identification((target(7),), 54, through))
     assert told == '1 identified of 54, gamma_high 1.2, gamma_low 0.25'
+    missed = Identification((target(7),), 3, expected_ids=(6, 7, 8))
+    assert summary(missed) == '1 identified of 3, missed 6 8, no filter'
+    many = summary(Identification((), 20, expected_ids=tuple(range(1, 21))))
+    assert many.endswith('missed 1 2 3 4 5 6 7 8 9 10 11 12 and 8 others, no filter')
     mirrored = Identification((target(7),), 54, mirrored=True)
     assert summary(mirrored) == '1 identified of 54, mirrored, no filter'
     estimated = Identification((target(7),), 54, estimated=True)

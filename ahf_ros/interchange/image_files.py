@@ -15,16 +15,19 @@ SUFFIXES = ('.bmp', '.jpeg', '.jpg', '.png', '.tif', '.tiff')
 """Endings of the image files that are tested; others are tried."""
 
 
-def read_image(path: str | Path) -> np.ndarray:
+def read_image(path: str | Path, *, turned: bool = False) -> np.ndarray:
     """Return the image in a file as gray values.
 
     Colour is converted to gray and transparency is ignored. The orientation that a camera notes
-    in the file is not applied: the pixels are those of the sensor. `orientation_note` tells of it.
+    in the file is not applied unless that is asked for: the pixels are those of the sensor.
+    `read_noted_image` tells of it.
 
     Parameters
     ----------
     path : str or Path
         A PNG, JPEG, TIFF or BMP file, or another that OpenCV reads.
+    turned : bool
+        Whether to turn the image upright, as its orientation says.
 
     Returns
     -------
@@ -44,15 +47,62 @@ def read_image(path: str | Path) -> np.ndarray:
     >>> image.shape, image.dtype, int(image[-1, -1])
     ((20, 20), dtype('uint16'), 399)
     """
-    return decode_bytes(read_bytes(path), str(path))
+    return read_noted_image(path, turned=turned)[0]
 
 
-def orientation_note(path: str | Path) -> str:
-    """Return a line for people if an image file notes an orientation, an empty text if not."""
-    orientation = read_header(read_bytes(path)).orientation
+def read_noted_image(path: str | Path, *, turned: bool = False) -> tuple[np.ndarray, str]:
+    """Return the image in a file as `read_image` does, and what there is to say about it.
+
+    Parameters
+    ----------
+    path, turned
+        As for `read_image`.
+
+    Returns
+    -------
+    image : ndarray
+    note : str
+        A line for people if the file notes an orientation; empty if not.
+
+    Raises
+    ------
+    ValueError
+        As `read_image` does.
+    """
+    image, orientation = _decoded(read_bytes(path), str(path))
     if orientation == UPRIGHT:
-        return ''
-    return f'{path}: orientation {orientation} is not applied; coordinates are those of the pixels'
+        return image, ''
+    if turned:
+        image = as_oriented(image, orientation)
+        done, of = 'is applied', 'the upright image'
+    else:
+        done, of = 'is not applied', 'the pixels'
+    return image, f'{path}: orientation {orientation} {done}; coordinates are those of {of}'
+
+
+def as_oriented(image: np.ndarray, orientation: int) -> np.ndarray:
+    """Return an image turned upright.
+
+    Parameters
+    ----------
+    image : ndarray, shape (height, width)
+        As it is stored.
+    orientation : int
+        As in Exif (CIPA DC-008, table 4), 1 to 8; others are `UPRIGHT`.
+
+    Examples
+    --------
+    >>> as_oriented(np.array([[1, 2], [3, 4]]), 6)
+    array([[3, 1],
+           [4, 2]])
+    """
+    if orientation in (5, 6, 7, 8):
+        image = image.T
+    if orientation in (3, 4, 7, 8):
+        image = image[::-1]
+    if orientation in (2, 3, 6, 7):
+        image = image[:, ::-1]
+    return np.ascontiguousarray(image)
 
 
 def decode_bytes(encoded: bytes, name: str) -> np.ndarray:
@@ -70,7 +120,11 @@ def decode_bytes(encoded: bytes, name: str) -> np.ndarray:
     ValueError
         If `encoded` is empty, not an image or too large, which its header tells.
     """
-    content = bytes(encoded)
+    return _decoded(bytes(encoded), name)[0]
+
+
+def _decoded(content: bytes, name: str) -> tuple[np.ndarray, int]:
+    """Return the gray values of an encoded image as they are stored, and its orientation."""
     if not content:
         raise ValueError(f'{name} is empty, accepted is an image')
     header = read_header(content)
@@ -84,7 +138,7 @@ def decode_bytes(encoded: bytes, name: str) -> np.ndarray:
         raise ValueError(
             f'{name} is not an image, or is damaged; accepted is one of {", ".join(SUFFIXES)}'
         )
-    return image
+    return image, header.orientation
 
 
 def write_image(path: str | Path, image: np.ndarray) -> None:

@@ -171,3 +171,8 @@ def decode_compressed(message: Any) -> np.ndarray:
         If `data` is not an image.
     """
     return decode_bytes(message.data, f'data of format {message.format!r}')
+
+
+def nanoseconds(header: Any) -> int:
+    """Return the stamp of a header, ns."""
+    return int(header.stamp.sec * 10**9 + header.stamp.nanosec)

@@ -4,15 +4,22 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
 from ahf_ros.interchange.fields import checked_file_name
-from ahf_ros.interchange.files import read_text
-from ahf_ros.target import Identification, Target
-from ahf_ros.target_check import checked_targets
+from ahf_ros.interchange.files import RESULTS_FILE, read_text
+from ahf_ros.target import DottedTarget, Identification, Target, UndecodedTarget
+from ahf_ros.target_check import (
+    MAXIMUM_ID,
+    MAXIMUM_LENGTH_PX,
+    checked_integer,
+    checked_number,
+    checked_targets,
+    checked_text,
+)
 from ahf_ros.text import reason_of, shown
 
 _FIELDS = fields(Target)
@@ -27,6 +34,11 @@ _ABSENT = {
 }
 """What the optional fields of a target are where they are not given."""
 
+REASONS = ('unread', 'uncertain', 'contested')
+"""Why a target is not decoded, see `ahf_ros.target.UndecodedTarget`."""
+
+_MOST_DOTS = 1000  # of one target
+
 
 def to_json(
     identification: Identification,
@@ -36,6 +48,8 @@ def to_json(
     detector: str,
     stack: Sequence[str] = (),
     split: str = '',
+    upright: bool = False,
+    mapping: Mapping[str, float] | None = None,
 ) -> dict[str, Any]:
     """Return the JSON object of an identification.
 
@@ -55,9 +69,13 @@ def to_json(
         Paths of the images, where images are identified together; `image` is the first.
     split : str
         Why a stack was split before the first of these images; empty if it was not.
+    upright : bool
+        Whether images were turned as their orientation says.
+    mapping : mapping of str to float, optional
+        The other settings of the filter, see `ahf_ros.filtering.homomorphic.FilterSettings`.
     """
     height, width = shape
-    used = asdict(identification.filter)
+    used = asdict(identification.filter) | dict(mapping or {})
     elapsed = used.pop('duration')
     several = {}
     if stack:
@@ -71,13 +89,16 @@ def to_json(
         **several,
         'width': width,
         'height': height,
+        'upright': upright,
         'family': family,
         'detector': detector,
         'expected': identification.expected,
         'estimated': identification.estimated,
+        'expected_ids': list(identification.expected_ids),
         'mirrored': identification.mirrored,
         'targets': [asdict(target) for target in identification.targets],
         'filter': used,
+        'search': asdict(identification.search) if identification.search else None,
         'elapsed_s': elapsed,
     }
 
@@ -89,7 +110,7 @@ def targets_from_json(content: Any, name: str) -> list[Target]:
     ----------
     content : dict
         Has the list 'targets'. Each of them has 'id', 'x' and 'y' and may have the other fields
-        of `Target`.
+        of `Target`, and those of `DottedTarget` or of `UndecodedTarget`.
     name : str
         What errors call the object.
 
@@ -100,7 +121,11 @@ def targets_from_json(content: Any, name: str) -> list[Target]:
     """
     if not isinstance(content, dict) or not isinstance(content.get('targets'), list):
         raise ValueError(f'{name} is not an object with a list of targets')
-    return checked_targets(list(_targets(content['targets'], name)), name)
+    targets = checked_targets(list(_targets(content['targets'], name)), name)
+    return [
+        _of_its_kind(target, item, f'{name}: target {number}')
+        for number, (target, item) in enumerate(zip(targets, content['targets'], strict=True))
+    ]
 
 
 def read_results(path: str | Path) -> dict[str, tuple[Target, ...]]:
@@ -125,15 +150,7 @@ def read_results(path: str | Path) -> dict[str, tuple[Target, ...]]:
         the same name; the message names both.
     """
     results: dict[str, tuple[Target, ...]] = {}
-    text = _standard_input() if path == '-' else read_text(path)
-    for number, line in enumerate(text.splitlines(), start=1):
-        if not line.strip():
-            continue
-        where = f'{path}, line {number}'
-        try:
-            content = json.loads(line)
-        except (ValueError, RecursionError) as error:  # also too deep, or a number too long
-            raise ValueError(f'{where} is not JSON: {reason_of(error)}') from error
+    for where, content in json_lines(path):
         targets = tuple(targets_from_json(content, where))
         for image in _image_names(content, where):
             if image in results:
@@ -142,6 +159,34 @@ def read_results(path: str | Path) -> dict[str, tuple[Target, ...]]:
                 )
             results[image] = targets
     return results
+
+
+def json_lines(path: str | Path) -> Iterator[tuple[str, Any]]:
+    """Yield what errors call each line of a file that is not empty, and the value of its JSON.
+
+    A folder stands for the `RESULTS_FILE` in it.
+
+    Raises
+    ------
+    ValueError
+        If the file, or standard input for '-', cannot be read, or a line is not JSON.
+    """
+    if path != '-' and Path(path).is_dir():
+        path = Path(path) / RESULTS_FILE
+    text = _standard_input() if path == '-' else read_text(path)
+    for number, line in enumerate(text.splitlines(), start=1):
+        if not line.strip():
+            continue
+        where = f'{path}, line {number}'
+        yield where, parsed_json(line, where)
+
+
+def parsed_json(text: str, where: str) -> Any:
+    """Return the value of a JSON text, or raise a ValueError that calls it `where`."""
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError) as error:  # also too deep, or a number too long
+        raise ValueError(f'{where} is not JSON: {reason_of(error)}') from error
 
 
 def _standard_input() -> str:
@@ -166,3 +211,34 @@ def _targets(items: list[Any], name: str) -> Iterator[Target]:
             raise ValueError(f'{name}: target is {shown(item)}, accepted is an object')
         values = {field.name: item.get(field.name, _ABSENT.get(field.name)) for field in _FIELDS}
         yield Target(**values)
+
+
+def _of_its_kind(target: Target, item: dict[str, Any], name: str) -> Target:
+    """Return a target with the fields of dotted or undecoded ones, if an object has them."""
+    known = {field.name: getattr(target, field.name) for field in _FIELDS}
+    if item.get('dots'):
+        return DottedTarget(**known, **_dots(item, name))
+    if 'reason' not in item:
+        return target
+    if item['reason'] not in REASONS:
+        raise ValueError(
+            f'{name}: reason is {shown(item["reason"])}, accepted is one of {", ".join(REASONS)}'
+        )
+    likely = checked_integer(item.get('likely_id', -1), f'{name}: likely_id', -1, MAXIMUM_ID)
+    family = checked_text(item.get('likely_family', ''), f'{name}: likely_family')
+    return UndecodedTarget(**known, reason=item['reason'], likely_id=likely, likely_family=family)
+
+
+def _dots(item: dict[str, Any], name: str) -> dict[str, Any]:
+    rows = item['dots']
+    if not isinstance(rows, list) or len(rows) > _MOST_DOTS:
+        raise ValueError(f'{name}: dots is {shown(rows)}, accepted are at most {_MOST_DOTS} rows')
+    dots = []
+    for row in rows:
+        if not isinstance(row, list) or len(row) != 5:
+            raise ValueError(f'{name}: dots has {shown(row)}, accepted are rows of 5 numbers')
+        limit = MAXIMUM_LENGTH_PX
+        dots.append(tuple(checked_number(it, f'{name}: dots', -limit, limit) for it in row))
+    count = checked_integer(item.get('template_dots', 0), f'{name}: template_dots', 0, len(dots))
+    polarity = checked_integer(item.get('polarity', 1), f'{name}: polarity', -1, 1)
+    return {'dots': tuple(dots), 'template_dots': count, 'polarity': polarity}

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.cli import main
-from ahf_ros.interchange.image_files import decode_bytes, orientation_note, read_image
+from ahf_ros.interchange.image_files import decode_bytes, read_image, read_noted_image
 from ahf_ros.interchange.image_headers import read_header
 
 IMAGE = np.arange(24 * 36, dtype=np.uint16).reshape(24, 36)
@@ -105,11 +105,11 @@ def test_pixels_of_other_formats_are_those_that_are_stored(orientation, suffix):
 def test_the_orientation_is_reported(tmp_path: Path, capfd: pytest.CaptureFixture[str]):
     path = tmp_path / 'turned.tif'
     path.write_bytes(tiff(IMAGE, 6))
-    assert orientation_note(path).startswith(f'{path}: orientation 6 is not applied')
+    assert read_noted_image(path)[1].startswith(f'{path}: orientation 6 is not applied')
     assert main(['identify', str(path), '--detector', 'traditional']) == 0
     assert 'orientation 6 is not applied' in capfd.readouterr().err
     path.write_bytes(tiff(IMAGE, 1))
-    assert orientation_note(path) == ''
+    assert read_noted_image(path)[1] == ''
 
 
 @pytest.mark.parametrize('suffix', ['.png', '.jpg', '.bmp', '.tif'])

@@ -4,11 +4,21 @@ from __future__ import annotations
 
 import io
 import json
+import math
 
 import pytest
 
 from ahf_ros.interchange.target_json import read_results, targets_from_json, to_json
-from ahf_ros.target import FilterState, Identification, Target
+from ahf_ros.target import (
+    DottedTarget,
+    FilterState,
+    Identification,
+    SearchTrace,
+    Target,
+    UndecodedTarget,
+)
+
+NONE = (0.0, 0.0, 0.0, 0.0)
 
 
 def test_what_becomes_json_is_read_again():
@@ -20,6 +30,41 @@ def test_what_becomes_json_is_read_again():
     assert (printed['width'], printed['height']) == (20, 30)
     assert (printed['family'], printed['mirrored']) == ('ring12', False)
     assert (printed['elapsed_s'], printed['filter']['evaluations']) == (0.25, 9)
+    assert (printed['expected_ids'], printed['search'], printed['upright']) == ([], None, False)
+
+
+def test_searches_and_the_reasons_of_undecoded_targets_become_json():
+    dots = ((1.0, 2.0, 3.0, 2.5, 0.1), (9.0, 2.0, 3.0, 2.5, 0.1))
+    targets = (
+        UndecodedTarget(-1, 0, 5.0, 6.0, 2.0, 1.0, 0.0, 0.4, NONE, '', 'uncertain', 17, 'aicon14'),
+        DottedTarget(7, 19, 1.25, 2.5, 20.0, 18.0, dots=dots, template_dots=1, polarity=-1),
+    )
+    trace = SearchTrace('found', (2, 0), (2.0, 3.0), (0.5, 0.8), (90.0, 80.0), (1.5, 2.2), (2,))
+    found = Identification(targets, 2, expected_ids=(7, 17), search=trace)
+    record = to_json(found, 'a.png', (30, 20), 'gsi', 'gsi', mapping={'log_offset': 0.01})
+    printed = json.loads(json.dumps(record))
+    assert targets_from_json(printed, 'record') == list(targets)
+    assert printed['search']['discrepancies'] == [2, 0]
+    assert printed['search']['reason'] == 'found'
+    assert printed['expected_ids'] == [7, 17]
+    assert printed['filter']['log_offset'] == 0.01
+
+
+@pytest.mark.parametrize(
+    ('change', 'message'),
+    [
+        ({'reason': 'lost'}, "reason is 'lost', accepted is one of unread, uncertain, contested"),
+        ({'reason': 'unread', 'likely_id': -2}, 'target 0: likely_id is -2'),
+        ({'dots': 3}, 'dots is 3'),
+        ({'dots': [[1, 2, 3]]}, 'dots has .1, 2, 3., accepted are rows of 5 numbers'),
+        ({'dots': [[1, 2, 3, 4, math.inf]]}, 'dots is inf'),
+        ({'dots': [[1, 2, 3, 4, 5]], 'template_dots': 2}, 'template_dots is 2'),
+    ],
+)
+def test_a_damaged_kind_of_target_is_named(change, message):
+    item = {'id': 1, 'x': 2.0, 'y': 3.0, **change}
+    with pytest.raises(ValueError, match=message):
+        targets_from_json({'targets': [item]}, 'record')
 
 
 def test_results_need_only_ids_and_places(tmp_path):

@@ -1,0 +1,1 @@
+"""Overlays of what was identified, and pictures side by side."""

@@ -1,0 +1,1 @@
+"""Identified targets as other photogrammetric software reads them."""

@@ -1,0 +1,138 @@
+"""Surveys as a database of COLMAP: cameras, images, keypoints and their matches."""
+
+from __future__ import annotations
+
+import os
+import sqlite3
+import tempfile
+from collections.abc import Iterator
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+
+from ahf_ros.interchange.export.survey import Photograph, Survey
+from ahf_ros.interchange.export.tables import table
+from ahf_ros.interchange.files import file_errors
+
+DATABASE = 'targets.db'
+
+# The schema of the documentation, up to 3.11; later versions add their tables when they open it.
+SCHEMA = """
+PRAGMA user_version = 3800;
+CREATE TABLE cameras (camera_id INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL,
+    model INTEGER NOT NULL, width INTEGER NOT NULL, height INTEGER NOT NULL, params BLOB,
+    prior_focal_length INTEGER NOT NULL);
+CREATE TABLE images (image_id INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL,
+    name TEXT NOT NULL UNIQUE, camera_id INTEGER NOT NULL,
+    CONSTRAINT image_id_check CHECK(image_id >= 0 and image_id < 2147483647),
+    FOREIGN KEY(camera_id) REFERENCES cameras(camera_id));
+CREATE UNIQUE INDEX index_name ON images(name);
+CREATE TABLE keypoints (image_id INTEGER PRIMARY KEY NOT NULL, rows INTEGER NOT NULL,
+    cols INTEGER NOT NULL, data BLOB,
+    FOREIGN KEY(image_id) REFERENCES images(image_id) ON DELETE CASCADE);
+CREATE TABLE descriptors (image_id INTEGER PRIMARY KEY NOT NULL, rows INTEGER NOT NULL,
+    cols INTEGER NOT NULL, data BLOB,
+    FOREIGN KEY(image_id) REFERENCES images(image_id) ON DELETE CASCADE);
+CREATE TABLE matches (pair_id INTEGER PRIMARY KEY NOT NULL, rows INTEGER NOT NULL,
+    cols INTEGER NOT NULL, data BLOB);
+CREATE TABLE two_view_geometries (pair_id INTEGER PRIMARY KEY NOT NULL, rows INTEGER NOT NULL,
+    cols INTEGER NOT NULL, data BLOB, config INTEGER NOT NULL, F BLOB, E BLOB, H BLOB,
+    qvec BLOB, tvec BLOB);
+"""
+SIMPLE_RADIAL = 2
+UNCALIBRATED = 3
+"""Kind of geometry of two views whose matches are right and whose cameras are not known."""
+
+IMAGES = 2147483647
+"""Factor that makes one number of the two of a pair of images."""
+
+FOCAL_LENGTH = 1.2
+"""Focal length that COLMAP assumes without EXIF, as a share of the longer side."""
+
+
+def colmap_files(survey: Survey) -> dict[str, bytes]:
+    """Return a database, and a table with the label of each keypoint.
+
+    Images are named from the folder that they have in common. Those of one size get one camera,
+    whose parameters are for COLMAP to adjust. Points with the same label are matched between all
+    images, as two-view geometries, so that no descriptors are needed.
+
+    Raises
+    ------
+    ValueError
+        If the database cannot be made, such as on a full disk.
+    """
+    names = image_names(survey.photographs)
+    labels = [
+        (name, number, mark.label)
+        for name, photograph in zip(names, survey.photographs, strict=True)
+        for number, mark in enumerate(photograph.marks)
+    ]
+    return {
+        'keypoints.csv': table([('image', 'keypoint', 'label'), *labels]),
+        DATABASE: _database(survey, names),
+    }
+
+
+def image_names(photographs: tuple[Photograph, ...]) -> list[str]:
+    """Return the paths of photographs from the folder that they have in common."""
+    paths = [os.path.abspath(it.path) for it in photographs]  # noqa: PTH100  need not be there
+    common = os.path.commonpath([os.path.dirname(path) for path in paths])  # noqa: PTH120
+    return [Path(path).relative_to(common).as_posix() for path in paths]
+
+
+def _database(survey: Survey, names: list[str]) -> bytes:
+    # sqlite3 can only serialise a database in memory from Python 3.11 on.
+    with file_errors(DATABASE, 'written'), tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / DATABASE
+        try:
+            connection = sqlite3.connect(path)
+            try:
+                with connection:
+                    connection.executescript(SCHEMA)
+                    _fill(connection, survey, names)
+            finally:
+                connection.close()
+        except sqlite3.Error as error:
+            raise ValueError(f'{DATABASE} cannot be written: {error}') from error
+        return path.read_bytes()
+
+
+def _fill(connection: sqlite3.Connection, survey: Survey, names: list[str]) -> None:
+    cameras: dict[tuple[int, int], int] = {}
+    for number, photograph in enumerate(survey.photographs, start=1):
+        size = photograph.width, photograph.height
+        if size not in cameras:
+            cameras[size] = len(cameras) + 1
+            parameters = [FOCAL_LENGTH * max(size), size[0] / 2, size[1] / 2, 0.0]
+            camera = (cameras[size], SIMPLE_RADIAL, *size, _blob(parameters, '<f8'), 0)
+            connection.execute('INSERT INTO cameras VALUES (?, ?, ?, ?, ?, ?)', camera)
+        image = (number, names[number - 1], cameras[size])
+        connection.execute('INSERT INTO images VALUES (?, ?, ?)', image)
+        places = [(mark.x, mark.y) for mark in photograph.marks]
+        keypoints = (number, len(places), 2, _blob(places, '<f4'))
+        connection.execute('INSERT INTO keypoints VALUES (?, ?, ?, ?)', keypoints)
+    for first, second, shared in _pairs(survey.photographs):
+        row = (first * IMAGES + second, len(shared), 2, _blob(shared, '<u4'))
+        connection.execute('INSERT INTO matches VALUES (?, ?, ?, ?)', row)
+        connection.execute(
+            'INSERT INTO two_view_geometries (pair_id, rows, cols, data, config) '
+            'VALUES (?, ?, ?, ?, ?)',
+            (*row, UNCALIBRATED),
+        )
+
+
+def _pairs(
+    photographs: tuple[Photograph, ...],
+) -> Iterator[tuple[int, int, list[tuple[int, int]]]]:
+    """Yield the numbers of two images and of the keypoints of the points that both show."""
+    rows = [{mark.label: row for row, mark in enumerate(it.marks)} for it in photographs]
+    for (first, here), (second, there) in combinations(enumerate(rows, start=1), 2):
+        shared = [(row, there[label]) for label, row in here.items() if label in there]
+        if shared:
+            yield first, second, shared
+
+
+def _blob(values: object, dtype: str) -> bytes:
+    return np.asarray(values, dtype).tobytes()

@@ -1,0 +1,251 @@
+"""A survey: photographs, the labelled marks in them, and control points."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import PurePath
+
+import numpy as np
+
+from ahf_ros.interchange.export.measured_images import MeasuredImage
+from ahf_ros.target import UNDECODED, Target
+from ahf_ros.text import shown
+
+LISTED = 10
+"""Number of labels that a message lists."""
+
+UNKNOWN_VARIANCE = 1.0
+"""Variance of a coordinate of a mark whose covariance is not known, px^2."""
+
+
+@dataclass(frozen=True, slots=True)
+class Control:
+    """Control points as they were given.
+
+    Attributes
+    ----------
+    points : mapping of str to ndarray of float64, shape (3,)
+        Coordinates by the label that the list has.
+    crs : str
+        Coordinate reference system, such as 'EPSG:25832'; empty for a local system in metres.
+    sigma : float
+        Standard deviation of a coordinate, in the unit of the coordinates; 0 where unknown.
+    """
+
+    points: Mapping[str, np.ndarray] = field(default_factory=dict)
+    crs: str = ''
+    sigma: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """A target in a photograph.
+
+    Attributes
+    ----------
+    label : str
+        Name of the point, the same in all photographs.
+    x, y : float
+        Place, px, from the origin of the format.
+    covariance : tuple of 3 float
+        Variance of x, covariance, variance of y, px^2.
+    target : Target
+        What was identified, from our origin.
+    """
+
+    label: str
+    x: float
+    y: float
+    covariance: tuple[float, float, float]
+    target: Target
+
+    @property
+    def sigma(self) -> float:
+        """Standard deviation of a coordinate, px."""
+        return math.sqrt((self.covariance[0] + self.covariance[2]) / 2)
+
+
+@dataclass(frozen=True, slots=True)
+class Photograph:
+    """A photograph with its marks.
+
+    Attributes
+    ----------
+    path : str
+        Path, as the user wrote it.
+    width, height : int
+        Size, px.
+    marks : tuple of Mark
+        In the order of their targets' family and ID.
+    """
+
+    path: str
+    width: int
+    height: int
+    marks: tuple[Mark, ...]
+
+    @property
+    def name(self) -> str:
+        """Name of the file, without folders."""
+        return PurePath(self.path).name
+
+
+@dataclass(frozen=True, slots=True)
+class Survey:
+    """What is handed over.
+
+    Attributes
+    ----------
+    photographs : tuple of Photograph
+    labels : tuple of str
+        Labels of all points that photographs show, in the order of their family and ID.
+    control : mapping of str to ndarray of float64, shape (3,)
+        Coordinates of those of the points that are control points, by our label.
+    crs : str
+        See `Control`.
+    sigma : float
+        See `Control`.
+    """
+
+    photographs: tuple[Photograph, ...]
+    labels: tuple[str, ...]
+    control: Mapping[str, np.ndarray]
+    crs: str = ''
+    sigma: float = 0.0
+
+
+def make_survey(
+    images: Sequence[MeasuredImage], control: Control | None = None, origin: float = 0.0
+) -> Survey:
+    """Return a survey of what was identified.
+
+    A point is labelled with its ID; where the images show several families, with the family and
+    the ID, such as 'aicon14_7'. Undecoded targets are left out.
+
+    Parameters
+    ----------
+    images : sequence of MeasuredImage
+    control : Control, optional
+        The points may be labelled with an ID, also with leading zeros, or with our label.
+    origin : float
+        What is added to our coordinates, px; 0.5 where (0, 0) is the corner of the first pixel.
+
+    Raises
+    ------
+    ValueError
+        If an image is there twice, has a name that does not print, or shows a target twice, if no
+        image shows a target, or if the labels of the control points are ambiguous or none of them
+        is that of a point.
+
+    Examples
+    --------
+    >>> target = Target(id=7, code=19, x=10.5, y=20.0, semi_major=8.0, semi_minor=7.5)
+    >>> survey = make_survey([MeasuredImage('a.jpg', 60, 40, (target,))], origin=0.5)
+    >>> survey.labels, survey.photographs[0].marks[0].x
+    (('7',), 11.0)
+    """
+    _check_paths(images)
+    keys = sorted({it.key for image in images for it in image.targets if it.id != UNDECODED})
+    if not keys:
+        raise ValueError('no image shows an identified target, accepted is at least one')
+    several = len({family for family, _ in keys}) > 1
+    labels = {key: f'{key[0]}_{key[1]}'.lstrip('_') if several else str(key[1]) for key in keys}
+    photographs = tuple(_photograph(image, labels, origin) for image in images)
+    known = tuple(labels.values())
+    if control is None:
+        return Survey(photographs, known, {})
+    points = _control_points(control.points, labels)
+    return Survey(photographs, known, points, control.crs, control.sigma)
+
+
+def notes_on(control: Control, survey: Survey) -> list[str]:
+    """Return what a user should know about control points and the points of a survey."""
+    notes = []
+    used = {id(point) for point in survey.control.values()}
+    unseen = [label for label, point in control.points.items() if id(point) not in used]
+    without = [label for label in survey.labels if label not in survey.control]
+    if unseen:
+        notes.append(f'control points that no image shows: {listed(unseen)}')
+    if without:
+        notes.append(f'targets that are no control points: {listed(without)}')
+    return notes
+
+
+def listed(labels: Sequence[str]) -> str:
+    """Return the first labels of a list, and the number of the others."""
+    more = f' and {len(labels) - LISTED} more' if len(labels) > LISTED else ''
+    return ', '.join(labels[:LISTED]) + more
+
+
+def check_names(paths: Iterable[str], name: str) -> None:
+    """Raise a ValueError if two images have the same name, for a format that has only names."""
+    seen: dict[str, str] = {}
+    for path in paths:
+        file = PurePath(path).name
+        if file in seen:
+            raise ValueError(
+                f'{name} knows images by their names, {path!r} and {seen[file]!r} have the same, '
+                'accepted are different names'
+            )
+        seen[file] = path
+
+
+def _check_paths(images: Sequence[MeasuredImage]) -> None:
+    seen = set()
+    for image in images:
+        if not image.path.isprintable():
+            raise ValueError(f'image is {shown(image.path)}, accepted is a name that prints')
+        path = os.path.abspath(image.path)  # noqa: PTH100  the file need not be there
+        if path in seen:
+            raise ValueError(f'{image.path!r} is there twice, accepted is one result an image')
+        seen.add(path)
+
+
+def _photograph(
+    image: MeasuredImage, labels: Mapping[tuple[str, int], str], origin: float
+) -> Photograph:
+    marks: dict[tuple[str, int], Mark] = {}
+    for target in image.targets:
+        if target.id == UNDECODED:
+            continue
+        if target.key in marks:
+            raise ValueError(
+                f'{image.path} shows target {labels[target.key]} twice, accepted is once'
+            )
+        xx, xy, _, yy = target.covariance
+        known = (xx, xy, yy) if xx > 0 and yy > 0 else (UNKNOWN_VARIANCE, 0.0, UNKNOWN_VARIANCE)
+        label, x, y = labels[target.key], target.x + origin, target.y + origin
+        marks[target.key] = Mark(label, x, y, known, target)
+    ordered = tuple(marks[key] for key in sorted(marks))
+    return Photograph(image.path, image.width, image.height, ordered)
+
+
+def _control_points(
+    points: Mapping[str, np.ndarray], labels: Mapping[tuple[str, int], str]
+) -> dict[str, np.ndarray]:
+    """Return the coordinates by our labels, from those by the labels of the list."""
+    by_id = defaultdict(list)
+    for (_, number), label in labels.items():
+        by_id[number].append(label)
+    ours = set(labels.values())
+    found: dict[str, np.ndarray] = {}
+    for given, point in points.items():
+        matching = [given] if given in ours else by_id[int(given)] if given.isdecimal() else []
+        if len(matching) > 1:
+            raise ValueError(
+                f'control point {given!r} may be {" or ".join(matching)}, accepted is one of them'
+            )
+        for label in matching:
+            if label in found:
+                raise ValueError(f'control point {label} is there twice, accepted is one')
+            found[label] = point
+    if not found:
+        raise ValueError(
+            f'no control point is a target of the images: the list has {listed(list(points))}, '
+            f'the images show {listed(list(labels.values()))}'
+        )
+    return {label: found[label] for label in labels.values() if label in found}

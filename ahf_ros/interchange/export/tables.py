@@ -1,0 +1,102 @@
+"""Surveys as tables: CSV, the ground control of ODM and OpenSfM, and RealityCapture."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable, Sequence
+
+from ahf_ros.interchange.export.survey import Photograph, Survey
+
+COLUMNS = (
+    'image',
+    'label',
+    'id',
+    'family',
+    'x',
+    'y',
+    'variance_x',
+    'covariance_xy',
+    'variance_y',
+    'semi_major',
+    'semi_minor',
+    'angle',
+    'confidence',
+)
+
+
+def csv_files(survey: Survey) -> dict[str, bytes]:
+    """Return one table with a row for each mark, and the control coordinates where there are any.
+
+    Returns
+    -------
+    dict of str to bytes
+        Content by the name of the file.
+    """
+    with_control = ('control_x', 'control_y', 'control_z') if survey.control else ()
+    rows = []
+    for photograph in survey.photographs:
+        for mark in photograph.marks:
+            of = mark.target
+            found = [of.id, of.family, *_place(mark.x, mark.y), *mark.covariance]
+            shape = [of.semi_major, of.semi_minor, of.angle, of.confidence]
+            point = list(survey.control.get(mark.label, [''] * 3)) if with_control else []
+            rows.append([photograph.path, mark.label, *found, *shape, *point])
+    return {'targets.csv': table([(*COLUMNS, *with_control), *rows])}
+
+
+def odm_files(survey: Survey) -> dict[str, bytes]:
+    """Return the ground control points of OpenDroneMap and OpenSfM.
+
+    Each row is x, y, z, then x and y in the image, its name, and a label that is ignored.
+
+    Raises
+    ------
+    ValueError
+        If there are no control points, if their coordinate reference system is none that the
+        readers know, or if an image has a name with blanks, at which they split.
+    """
+    if not survey.control:
+        raise ValueError('odm has only control points, accepted are results with control points')
+    if not survey.crs.upper().startswith(('EPSG:', 'WGS84', '+PROJ')):
+        raise ValueError(
+            f'odm has no local coordinates, control_crs is {survey.crs!r}, accepted is EPSG:CODE, '
+            'WGS84, WGS84 UTM ZONE or +proj=...'
+        )
+    lines = [survey.crs]
+    for photograph in survey.photographs:
+        if len(photograph.name.split()) != 1:
+            raise ValueError(
+                f'odm splits at blanks, accepted is an image without: {photograph.path!r}'
+            )
+        for mark in photograph.marks:
+            if mark.label in survey.control:
+                point = [repr(float(value)) for value in survey.control[mark.label]]
+                cells = [*point, *_place(mark.x, mark.y), photograph.name, mark.label]
+                lines.append(' '.join(cells))
+    return {'gcp_list.txt': ''.join(f'{line}\n' for line in lines).encode()}
+
+
+def realitycapture_files(survey: Survey) -> dict[str, bytes]:
+    """Return the measurements in images and the ground control of RealityCapture."""
+    rows = [row for photograph in survey.photographs for row in _measurements(photograph)]
+    files = {'control_points.csv': table([('#image', 'point', 'x', 'y'), *rows])}
+    if survey.control:
+        ground = [(label, *map(float, point)) for label, point in survey.control.items()]
+        files['ground_control.csv'] = table([('#point', 'x', 'y', 'z'), *ground])
+    return files
+
+
+def table(rows: Iterable[Sequence[object]]) -> bytes:
+    """Return rows as CSV in UTF-8."""
+    file = io.StringIO()
+    csv.writer(file, lineterminator='\n').writerows(rows)
+    return file.getvalue().encode()
+
+
+def _measurements(photograph: Photograph) -> list[Sequence[object]]:
+    return [(photograph.name, it.label, *_place(it.x, it.y)) for it in photograph.marks]
+
+
+def _place(x: float, y: float) -> tuple[str, str]:
+    return f'{x:.5f}', f'{y:.5f}'

@@ -1,0 +1,1 @@
+"""Sheets of targets to print, true to scale."""

@@ -1,0 +1,152 @@
+"""Lengths with units, sizes of pages, and sheets of labels."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from ahf_ros.text import shown
+
+_UNITS = {'mm': 1.0, 'cm': 10.0, 'm': 1000.0, 'in': 25.4, 'pt': 25.4 / 72}
+_NUMBER = r'\s*(\d+\.?\d*|\.\d+)\s*'
+
+LONGEST_PAGE = 5000.0
+"""Side of a page, mm; a PDF may have 14,400 points, which is 5080 mm."""
+
+PAGES = {
+    'A0': (841.0, 1189.0),
+    'A1': (594.0, 841.0),
+    'A2': (420.0, 594.0),
+    'A3': (297.0, 420.0),
+    'A4': (210.0, 297.0),
+    'A5': (148.0, 210.0),
+    'A6': (105.0, 148.0),
+    'letter': (215.9, 279.4),
+    'legal': (215.9, 355.6),
+    'tabloid': (279.4, 431.8),
+}
+"""Width and height of pages, mm."""
+
+
+@dataclass(frozen=True, slots=True)
+class Page:
+    """A page.
+
+    Attributes
+    ----------
+    name : str
+        Its name, or its size as text.
+    width, height : float
+        In mm.
+    """
+
+    name: str
+    width: float
+    height: float
+
+    def turned(self) -> Page:
+        """Return the page with width and height exchanged."""
+        return Page(f'{self.name} landscape', self.height, self.width)
+
+
+@dataclass(frozen=True, slots=True)
+class LabelSheet:
+    """A sheet of round labels in a grid; lengths are in mm.
+
+    Attributes
+    ----------
+    page : Page
+    columns, rows : int
+    diameter : float
+        Of a label.
+    left, top : float
+        From the edges of the page to the first label.
+    pitch_x, pitch_y : float
+        From the centre of one label to that of the next one.
+    """
+
+    page: Page
+    columns: int
+    rows: int
+    diameter: float
+    left: float
+    top: float
+    pitch_x: float
+    pitch_y: float
+
+
+_LETTER = Page('letter', *PAGES['letter'])
+
+
+def _inches(columns: int, rows: int, *lengths: float) -> LabelSheet:
+    return LabelSheet(_LETTER, columns, rows, *(25.4 * length for length in lengths))
+
+
+LABEL_SHEETS = {
+    'avery6450': _inches(7, 9, 1.0, 0.375, 0.5, 1.125, 1.125),
+    'avery5293': _inches(4, 6, 1.625, 0.4157, 0.549, 2.0145, 1.6554),
+    'avery8293': _inches(4, 5, 1.5, 0.5, 0.75, 2.0, 2.0),
+}
+"""Sheets of round labels with a diameter of 1, 1 5/8 and 1 1/2 inch."""
+
+
+def length_in(field: str, text: str) -> float:
+    """Return a length in mm.
+
+    Parameters
+    ----------
+    field : str
+        What errors call the length.
+    text : str
+        A number above 0 with one of the units mm, cm, m, in, pt; mm where there is none.
+
+    Raises
+    ------
+    ValueError
+        If it is not such a length, or longer than any page.
+
+    Examples
+    --------
+    >>> length_in('dot_radius', '0.5 in')
+    12.7
+    """
+    found = re.fullmatch(f'{_NUMBER}({"|".join(_UNITS)})?\\s*', text)
+    length = float(found[1]) * _UNITS[found[2] or 'mm'] if found else 0.0
+    if not 0 < length <= LONGEST_PAGE:
+        raise ValueError(
+            f'{field} is {shown(text)}, accepted is a length such as 4mm, 0.4cm or 0.25in, of at '
+            f'most {LONGEST_PAGE:g} mm'
+        )
+    return length
+
+
+def page_in(text: str) -> Page:
+    """Return the page that a text names.
+
+    Parameters
+    ----------
+    text : str
+        One of `PAGES` in upper or lower case, or width x height with a unit, such as 210x297mm.
+
+    Raises
+    ------
+    ValueError
+        If there is no such page.
+
+    Examples
+    --------
+    >>> page_in('a4').height, page_in('8.5x11in').name
+    (297.0, '8.5x11in')
+    """
+    for name, size in PAGES.items():
+        if text.lower() == name.lower():
+            return Page(name, *size)
+    found = re.fullmatch(f'{_NUMBER}x{_NUMBER}({"|".join(_UNITS)})?\\s*', text.lower())
+    if not found:
+        raise ValueError(
+            f'page is {shown(text)}, accepted is one of {", ".join(PAGES)}, or a size such as '
+            '210x297mm'
+        )
+    unit = found[3] or 'mm'
+    width, height = (length_in('page', f'{side}{unit}') for side in found.group(1, 2))
+    return Page(text, width, height)

@@ -1,0 +1,163 @@
+"""What is printed, and on what."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ahf_ros.codes.designs import HALF_SIDE, Proportions, proportions
+from ahf_ros.codes.families import FAMILY_NAMES, check_numbers, numbers_of
+from ahf_ros.codes.selection import select_ids
+from ahf_ros.codes.square import SQUARE_NAMES
+from ahf_ros.printing.paper import LABEL_SHEETS, LabelSheet, Page, length_in, page_in
+from ahf_ros.settings.parameter import check_parameters, numbers_in, parameter
+
+_NO_LABELS = 'none'
+_DEFAULT_PAGE = 'A4'
+_DEFAULT_RADIUS = '4mm'
+
+
+@dataclass(frozen=True, slots=True)
+class SheetSettings:
+    """Targets to print, and the pages that they are printed on.
+
+    Examples
+    --------
+    >>> SheetSettings(ids='1-3, 7', dot_radius='0.25in').numbers
+    [1, 2, 3, 7]
+    """
+
+    family: str = parameter('metashape12', 'Family of the targets.', choices=FAMILY_NAMES)
+    family_file: str = parameter(
+        '', 'Data file that describes the family gsi or dots; empty: the usual design.'
+    )
+    ids: str = parameter('', 'IDs and ranges of IDs, such as 1-54, 60; empty: all of the family.')
+    best: int = parameter(
+        0,
+        'Number of IDs to select from these, so that they are as hard to confuse as possible; 0: '
+        'all of them.',
+        minimum=0,
+    )
+    polarity: str = parameter(
+        'dark', 'Dark targets on white, or bright ones on black.', choices=('dark', 'bright')
+    )
+    dot_radius: str = parameter(
+        '',
+        'Radius of the dot, with a unit; it scales the whole target. Empty: 4 mm.',
+        form='a length such as 4mm, 0.4cm or 0.25in',
+    )
+    side: str = parameter(
+        '',
+        'Side of a square marker, with a unit, instead of dot_radius.',
+        form='a length such as 40mm',
+    )
+    pinhole: float = parameter(
+        0.05,
+        'Radius of the hole in the dot, in dot radii; 0: none. gsi and square markers have none.',
+        minimum=0.0,
+        maximum=0.5,
+    )
+    page: str = parameter(
+        '',
+        'Page: A0 to A6, letter, legal, tabloid, or a size such as 210x297mm. Empty: A4, or that '
+        'of the labels.',
+    )
+    landscape: bool = parameter(False, 'Whether the page is turned.')
+    labels: str = parameter(
+        _NO_LABELS, 'Sheet of labels, one target on each.', choices=(_NO_LABELS, *LABEL_SHEETS)
+    )
+    per_page: int = parameter(
+        0, 'Maximum number of targets on a page; 0: as many as there is room for.', minimum=0
+    )
+
+    def __post_init__(self) -> None:
+        """Check each parameter, and that they fit each other.
+
+        Raises
+        ------
+        ValueError
+            If not; the message names the field, its value and what is accepted.
+        """
+        check_parameters(self)
+        check_numbers('ids', numbers_in('ids', self.ids), (self.family,), self.family_file)
+        square = self.family in SQUARE_NAMES
+        if square and self.polarity != 'dark':
+            raise ValueError(
+                f'polarity is {self.polarity!r} and family is {self.family!r}; accepted with '
+                'square markers is dark, which is what detectors read'
+            )
+        if self.side and (self.dot_radius or not square):
+            raise ValueError(
+                f'side is {self.side!r}, accepted is a length for a family of square markers and '
+                'without dot_radius'
+            )
+        if self.labels != _NO_LABELS and (self.page or self.landscape):
+            raise ValueError(
+                f'labels is {self.labels!r}, accepted with page and landscape is {_NO_LABELS}: '
+                'labels have their own page'
+            )
+        _ = self.radius, self.paper
+
+    @property
+    def numbers(self) -> list[int]:
+        """IDs of the targets, ascending.
+
+        Raises
+        ------
+        ValueError
+            If so many as `best` are not found.
+        """
+        given = numbers_in('ids', self.ids)
+        every = sorted(given) if given else list(numbers_of(self.family, self.family_file))
+        if not self.best:
+            return every
+        if self.best > len(every):
+            raise ValueError(
+                f'best is {self.best}, accepted is an integer from 1 to {len(every)}, the number '
+                'of IDs to select from'
+            )
+        return select_ids(self.family, every, self.best, self.family_file)
+
+    @property
+    def radius(self) -> float:
+        """Radius of the dot, mm."""
+        if self.side:
+            return length_in('side', self.side) / (2 * HALF_SIDE)
+        return length_in('dot_radius', self.dot_radius or _DEFAULT_RADIUS)
+
+    @property
+    def size(self) -> str:
+        """The size of a target as text."""
+        return f'{self.size_name} {self.size_factor * self.radius:.4g} mm'
+
+    @property
+    def size_name(self) -> str:
+        """What is given as the size of a target: the radius of the dot, or the side."""
+        return 'side' if self.family in SQUARE_NAMES else 'r'
+
+    @property
+    def size_factor(self) -> float:
+        """The size of a target in radii of the dot."""
+        return 2 * HALF_SIDE if self.family in SQUARE_NAMES else 1.0
+
+    @property
+    def has_pinhole(self) -> bool:
+        """Whether the dot has a hole."""
+        return self.pinhole > 0 and self.family != 'gsi' and self.family not in SQUARE_NAMES
+
+    @property
+    def proportions(self) -> Proportions:
+        """What all targets have in common, in radii of the dot."""
+        return proportions(self.family, self.family_file)
+
+    @property
+    def sheet(self) -> LabelSheet | None:
+        """The sheet of labels, None where there is none."""
+        return LABEL_SHEETS.get(self.labels)
+
+    @property
+    def paper(self) -> Page:
+        """The page."""
+        if self.sheet:
+            return self.sheet.page
+        page = page_in(self.page or _DEFAULT_PAGE)
+        return page.turned() if self.landscape else page

@@ -1,0 +1,1 @@
+"""Reports: results as one page that people look at."""

@@ -1,0 +1,266 @@
+"""The page: one HTML file with everything in it, written picture by picture."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import cv2
+
+from ahf_ros.codes.designs import relative_reach
+from ahf_ros.interchange.files import whole_file
+from ahf_ros.report.images import shown_image
+from ahf_ros.report.pictures import Picture, fitted, thumbnail
+from ahf_ros.report.results import ImageResult
+from ahf_ros.report.rows import families_of, row
+from ahf_ros.report.settings import ReportSettings
+from ahf_ros.target import Truth
+from ahf_ros.text import reason_of
+
+PAGE = Path(__file__).parent / 'page'
+"""Folder of the template, and of the styles and scripts that it holds."""
+
+SCRIPTS = ('data', 'table', 'viewer', 'plots', 'details', 'overview', 'main')
+"""Scripts of the page, in their order."""
+
+_LARGEST_PICTURE = 4_000_000  # bytes
+_SMALLEST_PICTURE = 2_000
+_FILTERED_WEIGHT = 0.6  # of the bytes of an original
+_MARKUP = 600  # bytes around the pictures of an image
+_THUMBNAIL = 4_000  # bytes of its text
+
+Item = TypeVar('Item')
+Value = TypeVar('Value')
+
+
+@dataclass(frozen=True, slots=True)
+class Pictures:
+    """The pictures of one image of the page.
+
+    Attributes
+    ----------
+    index : int
+        Row of the image.
+    pictures : dict of str to Picture
+        By what they are: 'thumbnail', 'original', 'filtered'.
+    problem : str
+        Why there are none; empty if there are.
+    """
+
+    index: int
+    pictures: dict[str, Picture]
+    problem: str = ''
+
+
+@dataclass(frozen=True, slots=True)
+class Page:
+    """Everything on a page but its pictures.
+
+    Attributes
+    ----------
+    title : str
+    rows : tuple of str
+        JSON of each image, see `ahf_ros.report.rows.row`.
+    about : str
+        JSON of what concerns all images.
+    limits : tuple of int
+        Bytes for the pictures of each image.
+    """
+
+    title: str
+    rows: tuple[str, ...]
+    about: str
+    limits: tuple[int, ...]
+
+
+def make_page(
+    results: Sequence[ImageResult],
+    settings: ReportSettings,
+    title: str,
+    truth: Truth | None = None,
+) -> Page:
+    """Return the page of results, without its pictures.
+
+    Parameters
+    ----------
+    results : sequence of ImageResult
+    settings : ReportSettings
+    title : str
+        Where the settings have none.
+    truth : mapping of str to sequence of TrueTarget, optional
+        What images show, by their names without folders.
+    """
+    families = families_of(results)
+    rows = [
+        row(
+            result,
+            families,
+            settings.doubtful_below,
+            truth.get(Path(result.image).name) if truth is not None else None,
+        )
+        for result in results
+    ]
+    about = {
+        'families': families,
+        'reach': [round(relative_reach(name), 4) for name in families],
+        'doubtfulBelow': settings.doubtful_below,
+        'maxSize': settings.max_size,
+    }
+    texts = tuple(_json(it) for it in rows)
+    taken = sum(map(len, texts)) + sum(len(text) for text in _parts().values())
+    weights = [1 + _FILTERED_WEIGHT * result.filter.applied for result in results]
+    limits = _limits(round(1e6 * settings.max_size) - taken, weights)
+    return Page(settings.title or title, texts, _json(about), limits)
+
+
+def page_pictures(
+    results: Sequence[ImageResult], page: Page, threads: int, folders: Sequence[Path] = ()
+) -> Iterator[Pictures]:
+    """Yield the pictures of each image in turn; a few are made at a time.
+
+    Parameters
+    ----------
+    results : sequence of ImageResult
+    page : Page
+        Of these results.
+    threads : int
+        0 for one per core.
+    folders : sequence of Path
+        Where images may be, see `ahf_ros.report.images.find_image`.
+    """
+
+    def make(index: int) -> Pictures:
+        return _pictures(index, results[index], page.limits[index], folders)
+
+    yield from _in_order(make, range(len(results)), threads or os.cpu_count() or 1)
+
+
+def write_page(path: Path, page: Page, pictures: Iterable[Pictures]) -> list[str]:
+    """Write a page to a file that is never there in part.
+
+    Parameters
+    ----------
+    path : Path
+    page : Page
+    pictures : iterable of Pictures
+        Of all its images, in their order.
+
+    Returns
+    -------
+    list of str
+        What is wrong with images.
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be written, or jinja2 is not installed.
+    """
+    template = _template()
+    problems: dict[int, str] = {}
+
+    def passing() -> Iterator[Pictures]:
+        for item in pictures:
+            if item.problem:
+                problems[item.index] = item.problem
+            yield item
+
+    with whole_file(path) as file:
+        for text in template.generate(
+            **_parts(), page=page, pictures=passing(), problems=_Late(problems)
+        ):
+            file.write(text.encode('utf-8', 'backslashreplace'))
+    return [problems[index] for index in sorted(problems)]
+
+
+class _Late:
+    """What is known only when all pictures are written."""
+
+    def __init__(self, problems: Mapping[int, str]) -> None:
+        self._problems = problems
+
+    def __html__(self) -> str:
+        return _json(self._problems)
+
+
+def _template() -> Any:
+    try:
+        from jinja2 import Environment, FileSystemLoader, StrictUndefined
+    except ImportError as error:
+        raise ValueError(
+            "the page needs jinja2, which is not installed: pip install 'ahf_ros[report]'"
+        ) from error
+    environment = Environment(
+        loader=FileSystemLoader(PAGE),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template('page.html')
+
+
+def _parts() -> dict[str, str]:
+    """Return the styles and the scripts of the page."""
+    scripts = [(PAGE / f'{name}.js').read_text(encoding='utf-8') for name in SCRIPTS]
+    style = (PAGE / 'style.css').read_text(encoding='utf-8')
+    return {'style': style, 'script': '\n'.join(scripts)}
+
+
+def _limits(available: int, weights: Sequence[float]) -> tuple[int, ...]:
+    """Return the bytes for the pictures of each image, in proportion to the weights."""
+    if not weights:
+        return ()
+    texts = available - len(weights) * (_MARKUP + _THUMBNAIL)
+    share = texts * 3 / 4 / sum(weights)  # base64 makes four bytes of three
+    share = min(max(share, _SMALLEST_PICTURE), _LARGEST_PICTURE)
+    return tuple(int(share * weight) for weight in weights)
+
+
+def _pictures(index: int, result: ImageResult, limit: int, folders: Sequence[Path]) -> Pictures:
+    try:
+        shown = shown_image(result, folders)
+    except ValueError as error:
+        return Pictures(index, {}, str(error))
+    except (MemoryError, cv2.error) as error:  # the other images may be smaller
+        return Pictures(index, {}, f'{result.image}: {reason_of(error)}')
+    pictures = {'thumbnail': thumbnail(shown.original)}
+    if shown.filtered is None:
+        pictures['original'] = fitted(shown.original, limit)
+    else:
+        part = int(limit / (1 + _FILTERED_WEIGHT))
+        pictures['original'] = fitted(shown.original, part)
+        pictures['filtered'] = fitted(shown.filtered, limit - part)
+    return Pictures(index, pictures)
+
+
+def _in_order(
+    function: Callable[[Item], Value], items: Iterable[Item], threads: int
+) -> Iterator[Value]:
+    """Yield the values of a function in the order of the items, a few of them ahead."""
+    if threads == 1:
+        yield from map(function, items)
+        return
+    waiting: deque[Future[Value]] = deque()
+    with ThreadPoolExecutor(threads) as executor:
+        try:
+            for item in items:
+                waiting.append(executor.submit(function, item))
+                if len(waiting) > threads:
+                    yield waiting.popleft().result()
+            while waiting:
+                yield waiting.popleft().result()
+        finally:
+            for future in waiting:
+                future.cancel()
+
+
+def _json(value: Any) -> str:
+    """Return JSON that a script element can hold, whatever texts are in it."""
+    text = json.dumps(value, separators=(',', ':'), allow_nan=False)
+    return text.replace('<', '\\u003c')

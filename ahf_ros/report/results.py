@@ -1,0 +1,193 @@
+"""The result of one image, from what `ahf identify --json` prints for it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ahf_ros.interchange.target_json import targets_from_json
+from ahf_ros.target import UNDECODED, FilterState, SearchTrace, Target
+from ahf_ros.target_check import MAXIMUM_ID, checked_integer, checked_number
+from ahf_ros.text import shown
+
+_MAPPING = ('log_offset', 'black_percentile', 'white_percentile')
+_LARGEST_SIDE = 65536  # px
+_MOST_FILTERS = 100_000  # of a search
+
+
+@dataclass(frozen=True, slots=True)
+class ImageResult:
+    """What was identified in one image, or in one stack of images.
+
+    Attributes
+    ----------
+    image : str
+        Path of the image as the record has it; the first one of a stack.
+    source : Path
+        File that the record is in.
+    width, height : int
+        Size of the image, px; 0 if the record does not say.
+    upright : bool
+        Whether the image was turned as its orientation says.
+    family, detector : str
+    expected : int
+        N; 0 if unknown.
+    expected_ids : tuple of int
+        Empty if unknown.
+    estimated, mirrored : bool
+    targets : tuple of Target
+    filter : FilterState
+    mapping : dict of str to float
+        The settings of the filter that the record has beside its gains.
+    search : SearchTrace or None
+    images : tuple of str
+        Paths of all images of a stack; empty for one image.
+    combination : str
+        Combination of the stack; empty for one image.
+    """
+
+    image: str
+    source: Path
+    targets: tuple[Target, ...]
+    width: int = 0
+    height: int = 0
+    upright: bool = False
+    family: str = ''
+    detector: str = ''
+    expected: int = 0
+    expected_ids: tuple[int, ...] = ()
+    estimated: bool = False
+    mirrored: bool = False
+    filter: FilterState = field(default_factory=FilterState)
+    mapping: dict[str, float] = field(default_factory=dict)
+    search: SearchTrace | None = None
+    images: tuple[str, ...] = ()
+    combination: str = ''
+
+    @property
+    def identified(self) -> frozenset[int]:
+        """The IDs that were identified."""
+        return frozenset(target.id for target in self.targets if target.id != UNDECODED)
+
+
+def result_from_json(content: Any, source: Path, where: str) -> ImageResult:
+    """Return the result that a JSON object is.
+
+    Parameters
+    ----------
+    content : dict
+        As `ahf_ros.interchange.target_json.to_json` makes it; only 'image' and 'targets' are
+        required.
+    source : Path
+        The file that it is in.
+    where : str
+        What errors call the object.
+
+    Raises
+    ------
+    ValueError
+        If the object is not like that; the message names the field.
+
+    Examples
+    --------
+    >>> result_from_json({'image': 'a.png', 'targets': []}, Path('a.jsonl'), 'line 1').image
+    'a.png'
+    """
+    targets = tuple(targets_from_json(content, where))
+    record = _Record(content, where)
+    used = record.object('filter')
+    extra = {key: used.number(key) for key in used.content if key in _MAPPING}
+    search = record.object('search')
+    return ImageResult(
+        image=record.text('image', required=True),
+        source=source,
+        targets=targets,
+        width=record.integer('width', _LARGEST_SIDE),
+        height=record.integer('height', _LARGEST_SIDE),
+        upright=record.flag('upright'),
+        family=record.text('family'),
+        detector=record.text('detector'),
+        expected=record.integer('expected'),
+        expected_ids=tuple(int(it) for it in record.numbers('expected_ids')),
+        estimated=record.flag('estimated'),
+        mirrored=record.flag('mirrored'),
+        filter=FilterState(
+            applied=used.flag('applied'),
+            gamma_high=used.number('gamma_high'),
+            gamma_low=used.number('gamma_low'),
+            cutoff=used.number('cutoff'),
+            attenuation=used.number('attenuation'),
+            evaluations=used.integer('evaluations'),
+            generations=used.integer('generations'),
+            duration=record.number('elapsed_s'),
+        ),
+        mapping=extra,
+        search=_search(search) if search.content else None,
+        images=record.texts('images'),
+        combination=record.text('combination'),
+    )
+
+
+def _search(record: _Record) -> SearchTrace:
+    discrepancies = record.numbers('discrepancies')
+    columns = {
+        name: record.numbers(name) for name in ('gamma_high', 'gamma_low', 'cutoff', 'attenuation')
+    }
+    for name, column in columns.items():
+        if len(column) != len(discrepancies):
+            raise ValueError(
+                f'{record.where}: {name} has {len(column)} numbers, accepted are as many as '
+                f'discrepancies, {len(discrepancies)}'
+            )
+    return SearchTrace(
+        reason=record.text('reason'),
+        discrepancies=tuple(int(it) for it in discrepancies),
+        **columns,
+        generations=tuple(int(it) for it in record.numbers('generations')),
+        combinations=record.texts('combinations'),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Record:
+    """An object of JSON, whose fields are checked where they are read; absent ones are empty."""
+
+    content: dict[str, Any]
+    where: str
+
+    def object(self, name: str) -> _Record:
+        value = self.content.get(name) or {}
+        if not isinstance(value, dict):
+            raise ValueError(f'{self.where}: {name} is {shown(value)}, accepted is an object')
+        return _Record(value, f'{self.where}: {name}')
+
+    def text(self, name: str, required: bool = False) -> str:
+        value = self.content.get(name, '')
+        if not isinstance(value, str) or (required and not value):
+            raise ValueError(f'{self.where}: {name} is {shown(value)}, accepted is a text')
+        return value
+
+    def texts(self, name: str) -> tuple[str, ...]:
+        values = self.content.get(name) or []
+        if not isinstance(values, list) or not all(isinstance(it, str) for it in values):
+            raise ValueError(f'{self.where}: {name} is {shown(values)}, accepted is a list')
+        return tuple(values)
+
+    def flag(self, name: str) -> bool:
+        return self.content.get(name, False) is True
+
+    def integer(self, name: str, maximum: int = MAXIMUM_ID) -> int:
+        return checked_integer(self.content.get(name, 0), f'{self.where}: {name}', 0, maximum)
+
+    def number(self, name: str) -> float:
+        name, value = f'{self.where}: {name}', self.content.get(name, 0)
+        return checked_number(value, name, -math.inf, math.inf)
+
+    def numbers(self, name: str) -> tuple[float, ...]:
+        values = self.content.get(name) or []
+        if not isinstance(values, list) or len(values) > _MOST_FILTERS:
+            raise ValueError(f'{self.where}: {name} is {shown(values)}, accepted is a list')
+        called = f'{self.where}: {name}'
+        return tuple(checked_number(it, called, -math.inf, math.inf) for it in values)

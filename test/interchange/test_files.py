@@ -1,0 +1,42 @@
+"""Files that are whole or not there."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from ahf_ros.interchange.files import write_whole
+from support.disk import room_for
+
+
+def test_a_file_is_replaced_and_its_folder_made(tmp_path: Path) -> None:
+    file = tmp_path / 'new' / 'sheet.pdf'
+    write_whole(file, b'first')
+    write_whole(file, b'second')
+    assert file.read_bytes() == b'second'
+    assert [it.name for it in file.parent.iterdir()] == ['sheet.pdf']
+
+
+def test_a_link_stays_one(tmp_path: Path) -> None:
+    (tmp_path / 'link').symlink_to(tmp_path / 'file')
+    write_whole(tmp_path / 'link', b'content')
+    assert (tmp_path / 'link').is_symlink() and (tmp_path / 'file').read_bytes() == b'content'
+
+
+def test_what_does_not_fit_leaves_the_old_file(tmp_path: Path) -> None:
+    file = tmp_path / 'sheet.pdf'
+    write_whole(file, b'old')
+    message = f'{re.escape(str(file))} cannot be written: File too large'
+    with room_for(1000), pytest.raises(ValueError, match=message):
+        write_whole(file, b'x' * 5000)
+    assert file.read_bytes() == b'old'
+    assert [it.name for it in tmp_path.iterdir()] == ['sheet.pdf']
+
+
+def test_a_device_is_written_to_and_stays_one() -> None:
+    write_whole('/dev/null', b'content')
+    with pytest.raises(ValueError, match='/dev/full cannot be written: No space left on device'):
+        write_whole('/dev/full', b'content')
+    assert Path('/dev/null').is_char_device() and Path('/dev/full').is_char_device()
