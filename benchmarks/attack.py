@@ -25,7 +25,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from ahf_ros.bag.definitions import CODED_TARGETS, message_types, typestore
-from ahf_ros.drawing import draw
+from ahf_ros.drawing.overlay import draw
 from ahf_ros.interchange.image_files import decode_bytes
 from ahf_ros.interchange.target_json import to_json
 from ahf_ros.interchange.target_messages import coded_target_array

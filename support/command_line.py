@@ -10,12 +10,14 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 
 
-def ahf(*arguments: object, stdin: str = '') -> subprocess.CompletedProcess[str]:
+def ahf(
+    *arguments: object, stdin: str = '', timeout: float = 300
+) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, '-m', 'ahf_ros.cli', *map(str, arguments)],
         input=stdin,
         capture_output=True,
         text=True,
         env={**os.environ, 'PYTHONPATH': str(ROOT)},
-        timeout=300,
+        timeout=timeout,
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import PurePosixPath
 from typing import Any
 
 from rcl_interfaces.srv import GetParameters, SetParametersAtomically
@@ -19,13 +20,21 @@ from support.live import Graph
 class DetectorProcess:
     """The node `detector` in a namespace of its own, and what it answers."""
 
-    def __init__(self, graph: Graph, namespace: str, *arguments: str) -> None:
+    def __init__(
+        self,
+        graph: Graph,
+        namespace: str,
+        *arguments: str,
+        images: str = 'image',
+        subscribed: bool = True,
+    ) -> None:
         self.graph = graph
         self.namespace = namespace
         places = '-r', f'__ns:={namespace}', '-r', f'/diagnostics:={namespace}/diagnostics'
         self.process = graph.start('detector', *places, *arguments)
         self.targets = graph.listen(CodedTargetArray, f'{self.namespace}/coded_targets')
-        self.image = graph.publisher(Image, f'{self.namespace}/image')
+        if subscribed:
+            self.image = graph.publisher(Image, str(PurePosixPath(namespace, images)))
 
     def answer(self, message: Image) -> CodedTargetArray:
         """Return the answer to an image."""

@@ -22,12 +22,13 @@ from ahf_ros.bag.journal import Entry, Output
 from ahf_ros.bag.source import Source
 from ahf_ros.detectors import create_detector
 from ahf_ros.detectors.contract import Unavailable
-from ahf_ros.drawing import draw
+from ahf_ros.drawing.overlay import draw
 from ahf_ros.imaging.image import check_image
-from ahf_ros.interchange.image_messages import decode_compressed, decode_image
+from ahf_ros.interchange.image_messages import decode_compressed, decode_image, nanoseconds
 from ahf_ros.interchange.target_messages import coded_target_array
-from ahf_ros.sequence import Gathered, StackSettings, Window, identify_parts
-from ahf_ros.session import IdentificationSettings, create_identifier
+from ahf_ros.sequence import Gathered, Window, identify_parts
+from ahf_ros.session import create_identifier
+from ahf_ros.session_settings import IdentificationSettings, StackSettings
 from ahf_ros.target import Identification
 from ahf_ros.text import printable, reason_of
 
@@ -148,9 +149,9 @@ class Answering:
         height, width = image.shape
         coding = getattr(received, 'encoding', '') or received.format
         header = self._header(received)
-        time = header.stamp.sec * 10**9 + header.stamp.nanosec
         window = self._windows[connection.topic]
-        return window.add(_Held(header, image), f'{width} x {height} px, {coding}', time)
+        kind = f'{width} x {height} px, {coding}'
+        return window.add(_Held(header, image), kind, nanoseconds(header))
 
     def _messages(self, topic: str, gathered: Gathered[_Held], notes: list[str]) -> list[Output]:
         """Return the messages about a stack, and note where it was split."""

@@ -7,13 +7,11 @@ replaces the journal. A run that was killed continues where it stopped.
 
 from __future__ import annotations
 
-import fcntl
 import json
-import os
 import re
 import sqlite3
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -33,8 +31,8 @@ from ahf_ros.bag.folder import MALFORMED
 from ahf_ros.bag.journal import PROGRESS, Entry, Journal, begin, custom_data, remove_parts
 from ahf_ros.bag.records import Message, seconds
 from ahf_ros.bag.source import Source
-from ahf_ros.sequence import StackSettings
-from ahf_ros.session import IdentificationSettings
+from ahf_ros.interchange.files import locked
+from ahf_ros.session_settings import IdentificationSettings, StackSettings
 from ahf_ros.settings.parameter import parameters
 
 WRITING_ERRORS = (OSError, sqlite3.Error, WriterError)
@@ -47,7 +45,7 @@ unknown, and what there is to say about this image or its stack, empty if there 
 _FORMAT = 2  # version of the journal and of the data stored in a bag
 _TOPIC_NAME = re.compile(r'/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*', re.ASCII)
 _OF_STACKS = tuple(item.name for item in parameters(StackSettings))
-_IRRELEVANT = ('source', 'target', 'threads')  # settings that do not change the bag
+_IRRELEVANT = ('source', 'target', 'threads', 'patience')  # settings that do not change the bag
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +70,8 @@ class BagTask:
         Settings of the identification.
     stacking : StackSettings
         Which images are identified together.
+    patience : float
+        Time to wait for another process that writes the bag, s.
     """
 
     source: Path
@@ -82,6 +82,7 @@ class BagTask:
     debug_images: bool = False
     identification: IdentificationSettings = field(default_factory=IdentificationSettings)
     stacking: StackSettings = field(default_factory=StackSettings)
+    patience: float = 0.0
 
 
 def answer_bag(task: BagTask, report: Report) -> Outcome:
@@ -111,7 +112,7 @@ def answer_bag(task: BagTask, report: Report) -> Outcome:
         if not task.target.exists():
             types = {name: kind for to in topics.values() for name, kind in to.types.items()}
             begin(task.target, types, json.dumps(origin))
-        with locked(task.target):
+        with locked(task.target, task.patience):
             _check_target(task.target, origin)
             outcome = finished(task.target) or _made(task, source, topics, report)
             _tidy(task.target)
@@ -125,19 +126,6 @@ def _made(
     journal = Journal(task.target)
     _answer_images(task, source, topics, journal, report)
     return assemble(source, task.target, topics, journal, task.storage)
-
-
-@contextmanager
-def locked(target: Path) -> Iterator[None]:
-    """Lock a bag against other processes, until this process ends at the latest."""
-    descriptor = os.open(target, os.O_RDONLY)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        yield
-    except BlockingIOError as error:
-        raise ValueError(f'{target} is being written by another process') from error
-    finally:
-        os.close(descriptor)
 
 
 def _answer_topics(task: BagTask, source: Source) -> dict[str, AnswerTopics]:

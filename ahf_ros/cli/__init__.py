@@ -33,6 +33,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     int
         The exit status.
     """
+    # What OpenCV warns of, such as tags of TIFF files that it does not know, is not for users.
+    os.environ.setdefault('OPENCV_LOG_LEVEL', 'ERROR')
     try:
         # Imported here, so that Ctrl-C during the imports ends in order, too.
         from ahf_ros.cli import commands

@@ -5,24 +5,28 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import redirect_stdout
-from functools import partial
+from contextlib import closing, redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from ahf_ros.cli.options import add_option, add_options, settings_from
-from ahf_ros.cli.workers import results
-from ahf_ros.sequence import StackSettings
-from ahf_ros.session import IdentificationSettings
+from ahf_ros.batch.engine import GivenUp, finished_tasks
+from ahf_ros.cli.engine_options import add_scheduler_argument
+from ahf_ros.cli.engines import create_engine, shared_settings
+from ahf_ros.cli.options import (
+    add_option,
+    add_options,
+    add_search_options,
+    add_target_options,
+    settings_from,
+)
+from ahf_ros.session_settings import IdentificationSettings, StackSettings
 from ahf_ros.settings.parameter import Parameter
 
 if TYPE_CHECKING:
     from ahf_ros.bag.run import BagTask, Outcome
-
-DESCRIPTION = 'Identify the coded targets in the images of ROS 1 and ROS 2 bags.'
 
 JOBS = Parameter('jobs', 1, 'Number of bags processed at the same time.', minimum=1)
 OUTPUT_TOPIC = Parameter(
@@ -33,6 +37,8 @@ OUTPUT_TOPIC = Parameter(
 STORAGE = Parameter(
     'storage', 'mcap', 'Storage format of the output bag.', choices=('mcap', 'sqlite3')
 )
+
+_PATIENCE = 10.0  # s; a worker process outlives a worker of a cluster that is killed, by GRACE
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -64,8 +70,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--debug-images', action='store_true', help='Also write annotated images, as JPEG.'
     )
     add_option(parser, JOBS)
-    add_options(parser, StackSettings)
-    add_options(parser, IdentificationSettings)
+    add_scheduler_argument(parser)
+    add_target_options(parser)
+    add_options(parser.add_argument_group('stacks'), StackSettings)
+    add_search_options(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -91,7 +99,7 @@ def run(options: argparse.Namespace) -> int:
             if remark:
                 print(f'ahf bag: {tasks[number].source}: {remark}', file=sys.stderr)
 
-        for task, outcome in _outcomes(tasks, options.jobs, report):
+        for task, outcome in _outcomes(tasks, options.jobs, options.scheduler, report):
             _report(task, outcome)
             failed |= isinstance(outcome, ValueError) or bool(outcome.refused or outcome.lost)
     return int(failed)
@@ -105,7 +113,9 @@ def _tasks(options: argparse.Namespace) -> list[BagTask]:
             f'{error.name} is not installed, bags need it: pip install rosbags'
         ) from error
 
+    jobs = min(options.jobs, len(options.bags))
     settings = settings_from(options, IdentificationSettings)
+    settings = shared_settings(settings, jobs, options.scheduler)
     targets = [options.target]
     if len(options.bags) > 1:
         targets = [options.target / bag.stem for bag in options.bags]
@@ -115,28 +125,37 @@ def _tasks(options: argparse.Namespace) -> list[BagTask]:
             )
     return [
         BagTask(
-            source=source,
-            target=target,
+            source=source.absolute() if options.scheduler else source,
+            target=target.absolute() if options.scheduler else target,
             topics=tuple(options.topic),
             output_topic=options.output_topic,
             storage=options.storage,
             debug_images=options.debug_images,
             identification=settings,
             stacking=settings_from(options, StackSettings),
+            patience=_PATIENCE if options.scheduler else 0.0,
         )
         for source, target in zip(options.bags, targets, strict=True)
     ]
 
 
 def _outcomes(
-    tasks: Sequence[BagTask], jobs: int, report: Any
+    tasks: Sequence[BagTask], jobs: int, scheduler: str, report: Any
 ) -> Iterator[tuple[BagTask, Outcome | ValueError]]:
     """Yield the outcome of each bag, or the error that ended it, as soon as it is known."""
-    if min(jobs, len(tasks)) == 1:
-        for number, task in enumerate(tasks):
-            yield task, _attempt(task, partial(report, number))
-        return
-    yield from results(_attempt, tasks, min(jobs, len(tasks)), report)
+    engine = create_engine('bag', _attempt, min(jobs, len(tasks)), scheduler, _told_by, report)
+    with closing(engine):
+        for item in finished_tasks(engine, tasks):
+            outcome = item.result
+            if isinstance(outcome, GivenUp):
+                outcome = ValueError(f'{item.task.source}: {outcome.reason}')
+            yield item.task, outcome
+
+
+def _told_by(outcome: Outcome | ValueError, machine: str) -> Outcome | ValueError:
+    if isinstance(outcome, ValueError):
+        return ValueError(f'{outcome} (on {machine})')
+    return outcome
 
 
 def _attempt(task: BagTask, report: Any) -> Outcome | ValueError:

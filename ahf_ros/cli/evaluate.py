@@ -14,8 +14,6 @@ from ahf_ros.interchange.truth_files import read_truth
 from ahf_ros.settings.parameter import Parameter
 from ahf_ros.text import printable
 
-DESCRIPTION = 'Compare the output of `ahf identify --json` with the truth.'
-
 TOLERANCE_PARAMETER = Parameter(
     'tolerance', TOLERANCE, 'Maximum distance between a target and the truth, px.', minimum=1e-3
 )

@@ -15,8 +15,6 @@ from ahf_ros.codes.gsi_library import library_text, point_family, with_codes
 from ahf_ros.interchange.files import file_errors
 from ahf_ros.interchange.point_lists import read_point_list
 
-DESCRIPTION = 'Learn template, positions and numbers of point-distributed targets from a survey.'
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Give a parser the arguments of the command."""

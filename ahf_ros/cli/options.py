@@ -6,9 +6,11 @@ import argparse
 from collections.abc import Callable
 from typing import Any, TypeVar
 
+from ahf_ros.detectors.contract import DetectorSettings
+from ahf_ros.filtering.settings import AdaptiveSettings
+from ahf_ros.session_settings import IdentificationSettings
 from ahf_ros.settings.nested import assemble, flat_parameters
-from ahf_ros.settings.parameter import Parameter
-from ahf_ros.text import shown
+from ahf_ros.settings.parameter import Parameter, parameters
 
 Settings = TypeVar('Settings')
 
@@ -16,12 +18,30 @@ _METAVARS = {int: 'N', float: 'X', str: 'TEXT'}
 _SHORT = {'expected_targets': '--expected'}
 
 
-def add_options(parser: argparse.ArgumentParser, settings: type) -> None:
+Group = argparse._ArgumentGroup | argparse.ArgumentParser
+"""What takes options: a parser, or a group of its options."""
+
+
+def add_target_options(parser: argparse.ArgumentParser) -> None:
+    """Give a parser the options that say which targets are identified, and by which detector."""
+    group = parser.add_argument_group('targets')
+    for item in parameters(IdentificationSettings):
+        add_option(group, item)
+    add_options(group, DetectorSettings)
+
+
+def add_search_options(parser: argparse.ArgumentParser) -> None:
+    """Give a parser the options of the search for a filter."""
+    group = parser.add_argument_group('search', 'How AHF searches for a filter if N is given.')
+    add_options(group, AdaptiveSettings)
+
+
+def add_options(parser: Group, settings: type) -> None:
     """Give a parser one option for each parameter of a settings dataclass.
 
     Parameters
     ----------
-    parser : argparse.ArgumentParser
+    parser : argparse.ArgumentParser, or a group of it
         Gets `--max-radius` for the parameter `max_radius`; `--ahf` and `--no-ahf` for one that is
         true or false.
     settings : type
@@ -31,12 +51,12 @@ def add_options(parser: argparse.ArgumentParser, settings: type) -> None:
         add_option(parser, item)
 
 
-def add_option(parser: argparse.ArgumentParser, item: Parameter, **changes: Any) -> None:
+def add_option(parser: Group, item: Parameter, **changes: Any) -> None:
     """Give a parser the option of one parameter.
 
     Parameters
     ----------
-    parser : argparse.ArgumentParser
+    parser : argparse.ArgumentParser, or a group of it
     item : Parameter
     **changes
         Arguments of `add_argument` to replace.
@@ -69,11 +89,8 @@ def _converter(item: Parameter) -> Callable[[str], Any]:
 
     def convert(text: str) -> Any:
         try:
-            value = type(item.default)(text)
-            item.check(value)
+            return item.value_of(text)
         except ValueError as error:
-            message = f'{item.name} is {shown(text)}, accepted is {item.accepted}'
-            raise argparse.ArgumentTypeError(message) from error
-        return value
+            raise argparse.ArgumentTypeError(str(error)) from error
 
     return convert

@@ -15,8 +15,6 @@ from ahf_ros.settings.nested import flat_parameters
 from ahf_ros.settings.parameter import Parameter
 from ahf_ros.synthetic.scene import SceneSettings, render
 
-DESCRIPTION = 'Render images of targets under projected light, with their truth.'
-
 COUNT = Parameter(
     'count', 1, 'Number of images for each light, with consecutive seeds.', minimum=1
 )

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import argparse
 import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from ahf_ros.cli.options import add_option
-from ahf_ros.sequence import StackSettings
+from ahf_ros.cli.options import Group, add_option
+from ahf_ros.session_settings import StackSettings
 from ahf_ros.settings.parameter import parameters
 from ahf_ros.text import shown
 
@@ -16,7 +15,7 @@ FOLDER = 'folder'
 """Images of one folder are one stack."""
 
 
-def add_stack_arguments(parser: argparse.ArgumentParser) -> None:
+def add_stack_arguments(parser: Group) -> None:
     """Give a parser the options that say which images belong together."""
     for item in parameters(StackSettings):
         if item.name in ('stack', 'stack_movement'):

@@ -39,9 +39,10 @@ def test_answers_of_the_node_are_those_of_the_bag(
         'use_sim_time': str(simulated).lower(),
     }
     given = [text for name, value in parameters.items() for text in ('-p', f'{name}:={value}')]
-    node = graph.start('detector', '-r', '__ns:=/replay', *given)
-    answers = graph.listen(CodedTargetArray, '/replay/coded_targets')
-    publisher = graph.publisher(Image, '/replay/image')
+    space = f'/replay_{"simulated" if simulated else "real"}'
+    node = graph.start('detector', '-r', f'__ns:={space}', *given)
+    answers = graph.listen(CodedTargetArray, f'{space}/coded_targets')
+    publisher = graph.publisher(Image, f'{space}/image')
     images = [(time, data) for topic, time, data in bags.read(source) if topic == '/image']
     clock = graph.publisher(Clock, '/clock') if simulated else None
     for time, data in images:  # faster than they are answered

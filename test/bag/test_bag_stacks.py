@@ -12,8 +12,7 @@ pytest.importorskip('rosbags', reason='rosbags is not installed')
 from ahf_ros.bag.definitions import IMAGE, typestore
 from ahf_ros.bag.run import BagTask, answer_bag
 from ahf_ros.cli import main
-from ahf_ros.sequence import SLIDING, StackSettings
-from ahf_ros.session import IdentificationSettings
+from ahf_ros.session_settings import SLIDING, IdentificationSettings, StackSettings
 from ahf_ros.synthetic.scene import SceneSettings, render
 from support import bags
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import struct
 import subprocess
 import sys
 from pathlib import Path
@@ -14,7 +15,7 @@ import pytest
 from ahf_ros.cli import main
 from ahf_ros.interchange.image_files import read_image, write_image
 from ahf_ros.interchange.truth_files import read_truth
-from ahf_ros.session import IdentificationSettings
+from ahf_ros.session_settings import IdentificationSettings
 from ahf_ros.settings.nested import flat_parameters
 from ahf_ros.synthetic.scene import SceneSettings
 from support.command_line import ahf
@@ -22,9 +23,11 @@ from support.command_line import ahf
 ROOT = Path(__file__).resolve().parents[2]
 SCENE = ['--width', '640', '--height', '480', '--targets', '6', '--dot-radius', '10']
 KEYS = (
-    'image width height family detector expected estimated mirrored targets filter elapsed_s',
+    'image width height upright family detector expected estimated expected_ids mirrored targets '
+    'filter search elapsed_s',
     'id code x y semi_major semi_minor angle confidence covariance family',
-    'applied gamma_high gamma_low cutoff attenuation evaluations generations',
+    'applied gamma_high gamma_low cutoff attenuation evaluations generations log_offset '
+    'black_percentile white_percentile',
 )
 
 
@@ -110,9 +113,27 @@ def test_an_unknown_number_is_estimated_where_that_is_asked_for(folder, capsys):
 def test_without_json_standard_output_stays_empty(folder):
     done = ahf('identify', folder / 'normal_0.3_4.png', '--detector', 'traditional')
     assert (done.returncode, done.stdout) == (0, '')
-    head, *lines = done.stderr.splitlines()
+    head, *lines, hint = done.stderr.splitlines()
     assert '6 identified, no filter' in head
     assert len(lines) == 6
+    assert 'with --expected N, AHF searches' in hint
+
+
+def tiff_with_unknown_tag(image: np.ndarray) -> bytes:
+    """Return a TIFF file of gray values, as scanners write them."""
+    height, width = image.shape
+    tags = {256: width, 257: height, 258: 8, 259: 1, 262: 1, 273: 8, 277: 1, 278: height}
+    tags |= {279: image.size, 51000: 5}
+    entries = b''.join(struct.pack('<HHII', tag, 4, 1, value) for tag, value in tags.items())
+    start, count = struct.pack('<I', 8 + image.size), struct.pack('<H', len(tags))
+    return b'II*\0' + start + image.tobytes() + count + entries + bytes(4)
+
+
+def test_warnings_of_image_libraries_are_not_for_users(folder, tmp_path):
+    image = read_image(folder / 'normal_0.3_4.png')
+    (tmp_path / 'scan.tif').write_bytes(tiff_with_unknown_tag(image))
+    done = ahf('identify', tmp_path / 'scan.tif', '--quiet', '--detector', 'traditional')
+    assert (done.returncode, done.stdout, done.stderr) == (0, '', '')
 
 
 def test_evaluation_of_results_in_a_file_and_in_a_pipe(folder, results, tmp_path):
@@ -172,19 +193,28 @@ def test_stripes_need_the_filter_and_a_search_repeats_itself(tmp_path, capsys):
     assert {**first, 'elapsed_s': 0} == {**second, 'elapsed_s': 0}
 
 
+def test_a_search_that_ended_early_says_so(folder, capsys):
+    image = folder / 'normal_0.3_4.png'
+    command = ('identify', image, '--expected', 7, '--max-radius', 40, '--json')
+    assert status(*command) == 0
+    found, said = capsys.readouterr()
+    assert json.loads(found)['filter']['evaluations'] == 3
+    assert f'{image}: the search ended early, 2 filters in a row show no more targets' in said
+
+
 def test_files_that_cannot_be_read_do_not_stop_the_others(folder, tmp_path):
     (tmp_path / 'text.png').write_text('not an image')
     write_image(tmp_path / 'flat.png', np.full((50, 50), 9, np.uint8))
-    images = ('missing.png', tmp_path, tmp_path / 'text.png', tmp_path / 'flat.png')
+    empty = tmp_path / 'empty'
+    empty.mkdir()
+    images = (empty, 'missing.png', tmp_path / 'text.png', tmp_path / 'flat.png')
     good = folder / 'normal_0.3_4.png'
     done = ahf('identify', *images, good, '--detector', 'traditional', '--json')
     assert done.returncode == 1
     assert len(done.stdout.splitlines()) == 1
     told = [line for line in done.stderr.splitlines() if line.startswith('ahf identify: ')]
     assert len(told) == 4
-    for line, name in zip(
-        told, ('missing.png', str(tmp_path), 'text.png', 'flat.png'), strict=True
-    ):
+    for line, name in zip(told, (str(empty), 'missing.png', 'text.png', 'flat.png'), strict=True):
         assert name in line
     assert 'constant' in told[3]
 

@@ -57,6 +57,53 @@ def running(mark: Path) -> list[int]:
     return found
 
 
+KILLER = """
+import os, signal
+from ahf_ros import Target
+class MyDetector:
+    name = family = 'mine'
+    def __init__(self, settings):
+        pass
+    def __call__(self, image):
+        if image.shape[0] == 31:
+            os.kill(os.getpid(), signal.SIGKILL)
+        print('noise')
+        return [Target(7, 0, *image[0, :2] + 5.0, 3.0, 2.0)]
+"""
+
+
+def test_an_image_that_kills_its_process_costs_only_itself(tmp_path: Path) -> None:
+    packages.write_package(tmp_path, 'killing', KILLER)
+    paths = [tmp_path / name for name in ('a.png', 'killer.png', 'b.png', 'missing.png', 'c.png')]
+    for path, height in zip(paths, (30, 31, 33, 0, 35), strict=True):
+        if height:
+            write_image(path, np.tile(np.arange(height, height + 40, dtype=np.uint8), (height, 1)))
+
+    def result(jobs: int, *images: Path) -> tuple[int | None, list[object], str]:
+        process = start(
+            'identify', '--json', *images, '--jobs', jobs, '--detector', 'mine',
+            '--export', f'csv={tmp_path / str(jobs)}', '--overlay', tmp_path / f'seen{jobs}',
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+            env={**os.environ, 'PYTHONPATH': f'{ROOT}{os.pathsep}{tmp_path}'},
+        )  # fmt: skip
+        output, errors = process.communicate(timeout=LIMIT)
+        lines = [{**json.loads(line), 'elapsed_s': 0} for line in output.splitlines()]
+        return process.returncode, lines, errors.decode()
+
+    status, lines, errors = result(2, *paths)
+    assert status == 1
+    assert [line['image'] for line in lines] == [str(paths[number]) for number in (0, 2, 4)]
+    assert f'ahf identify: {paths[1]}: given up, 2 processes that worked on it died' in errors
+    assert 'missing.png cannot be read' in errors and 'noise' in errors
+    assert result(1, *paths[::2])[:2] == (0, lines), errors
+    for one, two in (('1', '2'), ('seen1', 'seen2')):
+        files = [
+            {file.name: file.read_bytes() for file in (tmp_path / folder).iterdir()}
+            for folder in (one, two)
+        ]
+        assert files[0] and files[0] == files[1]
+
+
 def is_free(target: Path) -> bool:
     """Return whether no process writes a bag."""
     try:
@@ -83,12 +130,14 @@ def slow_command(tmp_path: Path) -> tuple[str, Path]:
 def test_a_signal_ends_the_command_and_its_files(
     tmp_path: Path, number: signal.Signals, status: int
 ) -> None:
-    write_image(tmp_path / 'image.png', np.tile(np.arange(40, dtype=np.uint8), (30, 1)))
+    images = ['a.png', 'b.png'][: 2 if number == signal.SIGINT else 1]  # two workers, or none
+    for name in images:
+        write_image(tmp_path / name, np.tile(np.arange(40, dtype=np.uint8), (30, 1)))
     command, mark = slow_command(tmp_path)
     (tmp_path / 'scratch').mkdir()
     process = start(
-        'identify', tmp_path / 'image.png', '--detector', 'command', '--command', command,
-        '--expected', 3, '--detector-timeout', 600,
+        'identify', *(tmp_path / name for name in images), '--jobs', 2, '--expected', 3,
+        '--detector', 'command', '--command', command, '--detector-timeout', 600,
         stderr=subprocess.PIPE, env={**os.environ, 'TMPDIR': str(tmp_path / 'scratch')},
     )  # fmt: skip
     wait_for(mark.exists)

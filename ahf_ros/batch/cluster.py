@@ -1,0 +1,236 @@
+"""The engine of many machines: workers of a scheduler of dask.distributed [1]_.
+
+The engine keeps what it has submitted until it has the result. So it survives workers that die,
+and the scheduler itself: whatever is lost with it is submitted again once it is back.
+
+References
+----------
+.. [1] Rocklin, Dask: Parallel Computation with Blocked algorithms and Task Scheduling, Proceedings
+   of the 14th Python in Science Conference, 2015.
+"""
+
+from __future__ import annotations
+
+import math
+import pickle
+import queue
+import time
+import uuid
+from collections import deque
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+
+from ahf_ros.batch.connection import AWAY, connect, refused_workers
+from ahf_ros.batch.engine import TRIES, GivenUp, Job, Report, no_report
+from ahf_ros.batch.remote import guarded_perform
+from ahf_ros.release import release
+from ahf_ros.text import reason_of
+
+PATIENCE = 300.0
+"""Time that a scheduler may be away, s."""
+
+_AGAIN = 0.5  # s between two attempts to reach a scheduler
+_LOOK = 2.0  # s between two looks at the workers
+_WAIT = 0.1  # s after which waiting is interrupted
+_AT_A_TIME = 2  # tasks for each thread of a worker: one that it works on and one that waits
+
+
+@dataclass(frozen=True, slots=True)
+class _Begun:
+    """A task that the scheduler has."""
+
+    number: int
+    task: Any
+    tries: int
+    workers: frozenset[str]  # that may process it; all if empty
+
+
+class Cluster:
+    """The engine that processes tasks on the workers of a scheduler.
+
+    Parameters
+    ----------
+    job : callable
+        A function of a module.
+    address : str
+        Of the scheduler, such as tcp://host:8786.
+    report : callable, optional
+        Called with the number of the task before what the job reports.
+    say : callable, optional
+        Called with lines for people: workers that are refused, a scheduler that is away.
+    located : callable, optional
+        From a result and the name of the machine that it comes from to a result that tells of it.
+
+    Raises
+    ------
+    ValueError
+        If distributed is not installed, or there is no scheduler or one of another version.
+    """
+
+    def __init__(
+        self,
+        job: Job,
+        address: str,
+        report: Report = no_report,
+        say: Callable[[str], None] = no_report,
+        located: Callable[[Any, str], Any] = lambda result, _: result,
+    ) -> None:
+        self._job = job
+        self._address = address
+        self._report = report
+        self._say = say
+        self._located = located
+        self._name = uuid.uuid4().hex
+        self._reports: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._begun: dict[str, _Begun] = {}
+        self._waiting: list[_Begun] = []
+        self._results: deque[tuple[int, Any]] = deque()
+        self._refused: dict[str, str] = {}
+        self._submissions = 0
+        self._deserted = False
+        self._perform = guarded_perform()
+        self._connect()
+
+    @property
+    def capacity(self) -> int:
+        """Number of tasks that it holds at a time; it changes with the workers."""
+        good = (count for name, count in self._threads.items() if name not in self._refused)
+        return max(_AT_A_TIME * sum(good), 1)
+
+    def submit(self, number: int, task: Any) -> None:
+        """Hand a task to the scheduler."""
+        self._begin(_Begun(number, task, 1, frozenset()))
+
+    def wait(self, timeout: float | None = None) -> tuple[int, Any] | None:
+        """Return the next result, see `ahf_ros.batch.engine.Engine`."""
+        limit = math.inf if timeout is None else time.monotonic() + timeout
+        while time.monotonic() <= limit:
+            self._deliver_reports()
+            for future, result in self._completed.next_batch(block=False):
+                self._take(future, result)
+            if self._results:
+                return self._results.popleft()
+            self._keep_up()
+            condition = self._completed.thread_condition
+            with condition:
+                if not self._completed.has_ready():
+                    condition.wait(min(_WAIT, max(limit - time.monotonic(), 0)))
+        return None
+
+    def close(self) -> None:
+        """Let go of what still runs."""
+        with suppress(*AWAY):
+            self._client.close(timeout=_LOOK)
+
+    def _connect(self) -> None:
+        from distributed import as_completed
+
+        self._client = connect(self._address)
+        self._completed = as_completed(
+            loop=self._client.loop, with_results=True, raise_errors=False
+        )
+        self._client.subscribe_topic(self._name, lambda event: self._reports.put(event[1]))
+        self._threads = dict(self._client.nthreads())
+        for worker, reason in refused_workers(self._client).items():
+            self._refuse(worker, reason)
+        self._look()
+
+    def _look(self) -> None:
+        """Look at the workers, and tell if there are none."""
+        self._looked = time.monotonic()
+        with suppress(*AWAY):
+            self._threads = dict(self._client.nthreads())
+        deserted = not self._good()
+        if deserted and not self._deserted:
+            self._say(f'{self._address} has no workers, waiting for them')
+        self._deserted = deserted
+
+    def _good(self) -> frozenset[str]:
+        return frozenset(self._threads) - frozenset(self._refused)
+
+    def _refuse(self, worker: str, reason: str) -> None:
+        if worker not in self._refused:
+            self._refused[worker] = reason
+            self._say(f'worker {worker} is refused: it {reason}')
+
+    def _begin(self, begun: _Begun) -> None:
+        """Submit a task, or keep it while there is no scheduler or no worker that may have it."""
+        workers = self._good() if self._refused else frozenset()
+        if self._client.status != 'running' or (self._refused and not workers):
+            self._waiting.append(begun)
+            return
+        self._submissions += 1
+        key = f'identify-{self._name}-{begun.number}-{self._submissions}'
+        content = pickle.dumps((self._job, begun.number, begun.task))
+        self._begun[key] = _Begun(begun.number, begun.task, begun.tries, workers)
+        self._completed.add(
+            self._client.submit(
+                self._perform,
+                content,
+                self._name,
+                release(),
+                key=key,
+                pure=False,
+                workers=sorted(workers) or None,
+            )
+        )
+
+    def _take(self, future: Any, result: Any) -> None:
+        """Take what became of a task; begin it again if it is not known."""
+        begun = self._begun.pop(future.key, None)
+        if begun is None:
+            return
+        if future.status == 'finished':
+            machine, outcome = result
+            if machine is None:
+                self._refuse(*outcome)
+                self._begin(begun)
+            elif isinstance(outcome, Exception):
+                raise outcome
+            else:
+                found = self._located(pickle.loads(outcome), machine)
+                self._results.append((begun.number, found))
+        elif future.status == 'error':
+            error = result[1]
+            if begun.tries < TRIES and type(error).__name__ != 'KilledWorker':
+                self._begin(_Begun(begun.number, begun.task, begun.tries + 1, frozenset()))
+            else:
+                self._results.append((begun.number, GivenUp(f'given up: {reason_of(error)}')))
+        else:  # cancelled, because the scheduler is away
+            self._waiting.append(begun)
+
+    def _keep_up(self) -> None:
+        """Connect again if need be, look at the workers, and submit what waits."""
+        if self._client.status != 'running':
+            self._return()
+        elif time.monotonic() - self._looked > _LOOK:
+            self._look()
+            for key, begun in list(self._begun.items()):
+                if begun.workers and not begun.workers & self._good():
+                    self._waiting.append(self._begun.pop(key))
+        waiting, self._waiting = self._waiting, []
+        for begun in waiting:
+            self._begin(begun)
+
+    def _return(self) -> None:
+        """Wait for the scheduler, and keep what it had for submission."""
+        self._say(f'{self._address} is away, waiting for it')
+        self.close()
+        self._waiting += self._begun.values()
+        self._begun.clear()
+        limit = time.monotonic() + PATIENCE
+        while True:
+            try:
+                self._connect()
+                break
+            except ValueError:
+                if time.monotonic() > limit:
+                    raise
+                time.sleep(_AGAIN)
+        self._say(f'{self._address} is back')
+
+    def _deliver_reports(self) -> None:
+        while not self._reports.empty():
+            self._report(*self._reports.get())

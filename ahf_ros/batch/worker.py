@@ -1,0 +1,106 @@
+"""A worker process: reads tasks from a pipe, and writes what becomes of them to another one.
+
+`ahf_ros.batch.processes` starts it. It ends when the pipes are closed, which they are as soon as
+the process that started it is gone.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+import time
+import traceback
+from contextlib import suppress
+from enum import IntEnum
+from functools import partial
+from multiprocessing.connection import Connection
+from typing import Any
+
+import ahf_ros.blas  # noqa: F401  before numpy
+from ahf_ros.batch.engine import Job
+from ahf_ros.text import reason_of
+
+GRACE = 3.0
+"""Time that a worker has to end in order once the process that started it is gone, s."""
+
+GONE = (EOFError, OSError)
+"""What the pipe of a process that has ended raises."""
+
+
+class Kind(IntEnum):
+    """What a worker sends."""
+
+    REPORT = 0
+    DONE = 1
+    RAISED = 2
+
+
+def main(tasks: int, answers: int, alive: int) -> None:
+    """Process tasks until there are no more.
+
+    Parameters
+    ----------
+    tasks, answers : int
+        File descriptors of the pipes.
+    alive : int
+        File descriptor of a pipe that is closed when the parent ends.
+    """
+    _heed_signals(alive)
+    received, sent = Connection(tasks, writable=False), Connection(answers, readable=False)
+    with suppress(*GONE):
+        sys.path[:] = received.recv()
+        job, threads = received.recv()
+        _prepare(threads)
+        while True:
+            sent.send(_result_of(job, received.recv(), sent))
+
+
+def _result_of(job: Job, task: Any, sent: Connection) -> tuple[Kind, Any]:
+    try:
+        return Kind.DONE, job(task, partial(_report, sent))
+    except ValueError as error:
+        return Kind.RAISED, ValueError(str(error))
+    except Exception as error:
+        traceback.print_exc()  # which the exception of another process does not have
+        return Kind.RAISED, RuntimeError(reason_of(error))
+
+
+def _report(sent: Connection, *report: Any) -> None:
+    sent.send((Kind.REPORT, report))
+
+
+def _heed_signals(alive: int) -> None:
+    for number in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)  # the parent gets it, too, and ends
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
+    signal.signal(signal.SIGTERM, _end)
+    threading.Thread(target=_watch, args=(alive,), daemon=True).start()
+
+
+def _watch(alive: int) -> None:
+    """End this process once nobody holds the other end of a pipe."""
+    os.read(alive, 1)
+    os.kill(os.getpid(), signal.SIGTERM)
+    time.sleep(GRACE)
+    os._exit(1)
+
+
+def _end(number: int, _: Any) -> None:
+    signal.signal(number, signal.SIG_IGN)  # a second one would disturb the end
+    # No import: the signal may have interrupted that of the same module, and then nothing runs.
+    programs = sys.modules.get('ahf_ros.detectors.external.program')
+    if end_programs := getattr(programs, 'end_programs', None):
+        end_programs()
+    raise SystemExit(128 + number)
+
+
+def _prepare(threads: int) -> None:
+    """Let what detectors of others print go to standard error, and limit threads."""
+    if sys.stdout and sys.stderr:  # otherwise other files may have their numbers
+        os.dup2(2, 1)
+    sys.stdout = sys.stderr
+    import cv2
+
+    cv2.setNumThreads(threads)

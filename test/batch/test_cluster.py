@@ -1,0 +1,143 @@
+"""A real scheduler and real workers on this machine, which die and come back."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import sys
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip('distributed', reason='distributed is not installed')
+
+pytest.importorskip('rosbags', reason='rosbags is not installed')
+
+from ahf_ros.bag.definitions import typestore
+from ahf_ros.batch import connection
+from ahf_ros.batch.cluster import Cluster
+from ahf_ros.batch.engine import GivenUp, finished_tasks
+from ahf_ros.batch.remote import guarded_perform
+from ahf_ros.cli import main
+from ahf_ros.interchange.image_files import write_image
+from support import bags
+from support.cluster import LIMIT, LocalCluster, free_port
+from support.jobs import do_as_told
+
+FOREIGN = {'batch/remote.py': 'perform = None', 'release.py': 'def release():\n    return "0.1"'}
+"""A package of another release."""
+
+
+def test_nothing_is_lost_and_nothing_twice(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, text in FOREIGN.items():
+        path = tmp_path / 'foreign' / 'ahf_ros' / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+        (path.parent / '__init__.py').touch()
+    monkeypatch.setattr(connection, '_CONNECT', LIMIT)
+    said: list[str] = []
+    reports: list[tuple[int, str]] = []
+    tasks = [('pid', 0), ('die once', str(tmp_path / 'mark')), ('die', 0)]
+    tasks += [('square', number) for number in range(60)]
+    with LocalCluster(tmp_path) as local:
+        scheduler = local.scheduler()
+        first, _ = local.worker('first'), local.worker('second')
+        local.worker('foreign', PYTHONPATH=str(tmp_path / 'foreign'))
+        local.wait_for_workers(3)
+        engine = Cluster(
+            do_as_told, local.address, lambda *it: reports.append(it), said.append,
+            lambda result, machine: (result, machine),
+        )  # fmt: skip
+        with closing(engine):
+            results = {}
+            for item in finished_tasks(engine, tasks):
+                assert item.number not in results
+                results[item.number] = item.result[0]
+                assert 'tcp://127.0.0.1' in item.result[1]
+                if len(results) == 20:
+                    first.kill()
+                if len(results) == 40:
+                    scheduler.kill()
+                    scheduler.wait()
+                    scheduler = local.scheduler()
+                    local.worker('third')
+        assert sorted(results) == list(range(len(tasks)))
+        assert results[0] != os.getpid() and isinstance(results[1], int)
+        assert isinstance(results[2], GivenUp) and 'by SIGKILL' in results[2].reason
+        assert [results[number + 3] for number in range(60)] == [it**2 for it in range(60)]
+        told = {(number, f'{what} {value}') for number, (what, value) in enumerate(tasks)}
+        assert set(reports) <= told and len(reports) > 30
+        assert f'{local.address} is away, waiting for it' in said
+        assert f'{local.address} is back' in said
+        assert any('has ahf_ros 0.1, accepted is' in text for text in said)
+
+        images = [tmp_path / name for name in ('a.png', 'missing.png', 'b.png')]
+        for path in images[::2]:
+            write_image(path, np.tile(np.arange(40, dtype=np.uint8), (30, 1)))
+        monkeypatch.chdir(tmp_path)
+        command = ['identify', *(path.name for path in images), '--json']
+        found = []
+        for where in (['--jobs', '1'], ['--scheduler', local.address]):
+            assert main([*command, '--detector', 'traditional', *where]) == 1
+            printed = capsys.readouterr()
+            lines = map(json.loads, printed.out.splitlines())
+            found.append([{**line, 'elapsed_s': 0} for line in lines])
+        assert found[0] == found[1] and len(found[0]) == 2
+        assert 'missing.png cannot be read: No such file or directory (on ' in printed.err
+
+        pictures = [np.tile(np.arange(40, dtype=np.uint8) + it, (30, 1)) for it in range(2)]
+        pictures[1][:] = 7  # is refused
+        sources = [
+            bags.write_ros2(tmp_path / name, bags.recorded(typestore(), pictures))
+            for name in ('monday', 'tuesday')
+        ]
+        command = ['bag', *(path.name for path in sources), 'out', '--detector', 'traditional']
+        assert main([*command, '--scheduler', local.address]) == 1
+        told = capsys.readouterr().err
+        for source in sources:
+            assert f'out/{source.name}: 2 images answered, 1 of them not accepted' in told
+            assert f'ahf bag: {source}: /' in told and 'constant' in told
+            assert len(bags.answers(tmp_path / 'out' / source.name)) == 1
+    command = ['identify', 'a.png']
+    monkeypatch.setattr(connection, '_CONNECT', 0.3)
+    address = f'tcp://127.0.0.1:{free_port()}'
+    assert main([*command, '--scheduler', address]) == 2
+    assert f"scheduler is '{address}', accepted is the address" in capsys.readouterr().err
+    shutil.rmtree(tmp_path / 'foreign')
+
+
+class OtherVersions:
+    """A client of a cluster of other versions."""
+
+    def __init__(self, scheduler: str, python: str) -> None:
+        self.found = {
+            'client': {'packages': {'distributed': '2026.1'}},
+            'scheduler': {'packages': {'distributed': scheduler}},
+            'workers': {'tcp://a': {'host': {'python': python}}},
+        }
+
+    def get_versions(self) -> dict[str, object]:
+        return self.found
+
+    def nthreads(self) -> dict[str, int]:
+        return {'tcp://a': 1}
+
+
+def test_other_versions_are_named() -> None:
+    client = OtherVersions('2023.4', '3.1.4.final.0')
+    with pytest.raises(ValueError, match=r'has dask\.distributed 2023\.4, accepted is 2026\.1'):
+        connection.check_version(client, 'tcp://b')
+    refused = connection.refused_workers(client)
+    assert refused['tcp://a'].startswith('has Python 3.1, accepted is 3.')
+
+
+def test_a_worker_without_the_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, 'ahf_ros.batch.remote', None)
+    machine, (address, reason) = guarded_perform()(b'', '', '0.1')
+    assert (machine, address) == (None, '')
+    assert reason.startswith('has no ahf_ros: ')

@@ -1,0 +1,127 @@
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from ahf_ros.cli import main
+from ahf_ros.cli.inputs import image_paths
+from ahf_ros.interchange.image_files import as_oriented, read_image
+from ahf_ros.interchange.target_json import read_results
+from ahf_ros.synthetic.scene import SceneSettings, render
+
+ROTATED = 6
+"""Orientation in Exif of an image whose camera was turned by 90 degrees."""
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp('inputs')
+    for name in ('b.png', 'a.JPG', 'notes.txt', 'day/c.tif', 'day/[d].png'):
+        path = folder / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(b'')
+    return folder
+
+
+def names(*arguments: object) -> tuple[list[str], list[str]]:
+    paths, problems = image_paths([str(argument) for argument in arguments])
+    return [Path(path).name for path in paths], problems
+
+
+def test_folders_patterns_and_lists_name_images(folder: Path) -> None:
+    assert names(folder) == (['a.JPG', 'b.png'], [])
+    assert names(f'{folder}/*/*.tif', f'{folder}/b.png') == (['c.tif', 'b.png'], [])
+    assert names(f'{folder}/**/*.png') == (['b.png', '[d].png'], [])
+    assert names(folder / 'day' / '[d].png') == (['[d].png'], [])
+    list_of_images = folder / 'list'
+    list_of_images.write_text(f'{folder}/b.png\n\n  {folder}/day\n')
+    assert names(f'@{list_of_images}') == (['b.png', '[d].png', 'c.tif'], [])
+
+
+def test_what_names_no_image_is_told_and_the_rest_goes_on(folder: Path) -> None:
+    empty = folder / 'empty'
+    empty.mkdir()
+    found, problems = names(empty, f'{folder}/*.bmp', f'@{folder}/none', folder / 'b.png')
+    assert found == ['b.png']
+    for problem, named in zip(problems, ('empty', '*.bmp', 'none'), strict=True):
+        assert named in problem
+    assert main(['identify', str(empty)]) == 1
+
+
+def oriented_jpeg(image: np.ndarray, orientation: int) -> bytes:
+    """Return a JPEG file whose Exif header tells an orientation."""
+    entry = bytes([1, 0x12, 0, 3, 0, 0, 0, 1, 0, orientation, 0, 0])
+    exif = b'Exif\0\0MM\0*\0\0\0\x08\0\x01' + entry + bytes(4)
+    content = cv2.imencode('.jpg', image, [cv2.IMWRITE_JPEG_QUALITY, 100])[1].tobytes()
+    header = b'\xff\xe1' + (len(exif) + 2).to_bytes(2, 'big') + exif
+    return content[:2] + header + content[2:]
+
+
+@pytest.mark.parametrize('orientation', range(1, 9))
+def test_images_are_turned_as_opencv_turns_them(tmp_path: Path, orientation: int) -> None:
+    path = tmp_path / 'turned.jpg'
+    stored = np.random.default_rng(0).integers(0, 255, (40, 64), np.uint8)
+    path.write_bytes(oriented_jpeg(stored, orientation))
+    upright = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_GRAYSCALE)
+    assert np.array_equal(read_image(path, turned=True), upright)
+    assert np.array_equal(as_oriented(read_image(path), orientation), upright)
+
+
+def test_coordinates_are_those_of_stored_pixels_unless_upright_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    scene = render(SceneSettings(width=600, height=400, targets=4, dot_radius=10, seed=1))
+    path = tmp_path / 'photo.jpg'
+    path.write_bytes(oriented_jpeg(scene.image, ROTATED))
+
+    def result(*options: str) -> tuple[dict[int, tuple[float, float]], str]:
+        assert main(['identify', '--json', *options, str(path)]) == 0
+        output = capsys.readouterr()
+        (tmp_path / 'results.jsonl').write_text(output.out)
+        (found,) = read_results(tmp_path / 'results.jsonl').values()
+        return {target.id: (target.x, target.y) for target in found}, output.err
+
+    stored, told = result()
+    assert 'orientation 6 is not applied' in told
+    assert 'N is not given' in told
+    turned, told = result('--upright')
+    assert 'orientation 6 is applied' in told
+    for target in scene.targets:
+        assert stored[target.id] == pytest.approx((target.x, target.y), abs=0.05)
+        x, y = turned[target.id]
+        assert (y, 399 - x) == pytest.approx((target.x, target.y), abs=0.05)
+    assert result('--quiet') == (stored, '')
+
+
+def test_options_are_known_without_what_computes() -> None:
+    code = (
+        'import sys; from ahf_ros.cli import commands; commands._parser([]); '
+        'listed = "ahf_ros.detectors" in sys.modules; '
+        'commands._parser(["identify"]).format_help(); '
+        'print(listed, [name for name in ("numpy", "cv2", "rich") if name in sys.modules])'
+    )
+    output = subprocess.run([sys.executable, '-c', code], capture_output=True, check=True)
+    assert output.stdout.split() == [b'False', b'[]']
+
+
+@pytest.mark.parametrize(
+    ('line', 'completed'), [('ahf ident', 'identify'), ('ahf identify --over', '--overlay')]
+)
+def test_commands_and_options_are_completed(tmp_path: Path, line: str, completed: str) -> None:
+    pytest.importorskip('argcomplete')
+    answer = tmp_path / 'answer'
+    asked = {
+        '_ARGCOMPLETE': '1',
+        '_ARGCOMPLETE_STDOUT_FILENAME': str(answer),
+        'COMP_LINE': line,
+        'COMP_POINT': str(len(line)),
+    }
+    command = [sys.executable, '-m', 'ahf_ros.cli']
+    subprocess.run(command, env=os.environ | asked, check=True, timeout=120)
+    assert answer.read_text().split() == [completed]
