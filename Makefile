@@ -1,8 +1,9 @@
 # make demo    ROS 2 nodes identify one striped image in three ways: a line each, a picture in demo/
 #              DEMO='--light lattice --ambient 0.12' and so on; ahf_demo --help lists all options
-# make test    every check: ruff, mypy, the import rules, the tests; then the tests that need no
-#              ROS once more with the oldest versions, and once more on other vector units
-# Both set up .venv first; nothing is installed outside it. DISTRIBUTION=kilted takes the wheels of
+# make test    every check: ruff, mypy, the import rules, the site, the tests; then the tests that
+#              need no ROS with the oldest versions and without the processor's vector units
+# make site    the documentation as a site, build/site/index.html
+# All set up .venv first; nothing is installed outside it. DISTRIBUTION=kilted takes the wheels of
 # ROS 2 Kilted instead of Jazzy, into .venv-kilted. make --jobs=2 test uses two cores.
 
 PYTHON ?= python3
@@ -12,6 +13,10 @@ BIN := $(VENV)/bin
 READY := $(VENV)/ready
 export AHF_ROS_DISTRIBUTION := $(DISTRIBUTION)
 
+# The site is built and reports are opened in a browser once, on Jazzy.
+COMMA := ,
+EXTRAS := test$(if $(filter jazzy,$(DISTRIBUTION)),$(COMMA)docs$(COMMA)test-browser)
+
 # The first Python that is there is the oldest that numpy and OpenCV of test/oldest.txt are for.
 OLDEST_PYTHON ?= $(firstword $(foreach name,python3.10 python3.11,$(shell $(name) -c '' 2>/dev/null && echo $(name))) $(PYTHON))
 OLDEST := .venv-oldest
@@ -20,13 +25,15 @@ OLDEST := .venv-oldest
 unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: demo test lint test-native test-portable test-oldest test-kilted clean
+.PHONY: demo test lint site test-native test-live test-computing test-oldest test-portable \
+	test-kilted browser clean
 .DELETE_ON_ERROR:
 
 demo: $(READY)
 	$(BIN)/ahf_demo $(DEMO)
 
-test: test-native test-portable test-oldest lint
+# The longest first, so that two cores end at the same time.
+test: test-live test-oldest test-computing test-portable lint site
 
 lint: $(READY)
 	$(BIN)/ruff check .
@@ -34,26 +41,44 @@ lint: $(READY)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-test-native: $(READY)
-	$(BIN)/python -m pytest
+site: $(READY)
+	$(BIN)/python scripts/build_site.py build/site
 
-# Bags, nodes and the command line compute nothing of their own.
-SHARED = --ignore test/benchmarks --ignore test/bag --ignore test/cli
+test-native: test-computing test-live
 
-# No vector units beyond those that numpy and OpenCV were compiled for: other last bits.
-test-portable: $(READY)
-	$(BIN)/python -m support.vector_units baseline $(BIN)/python -m pytest \
-		$(SHARED) --ignore test/nodes --ignore test/test_every_way.py
+# What runs nodes and other processes, and the rest.
+LIVE = test/bag test/batch test/cli test/nodes test/test_every_way.py
 
-# The oldest versions of numpy and OpenCV that are to be had, no ROS, and no AVX-512.
+test-live: $(READY)
+	$(BIN)/python -m pytest $(LIVE)
+
+test-computing: $(READY) | $(if $(CI),browser)
+	$(BIN)/python -m pytest $(LIVE:%=--ignore %)
+
+# Reports are tested in Chromium. CI installs it where it can; elsewhere the test skips without it.
+browser:
+	@command -v chromedriver >/dev/null || support/install_browser.sh
+
+# Bags, batches, nodes and the command line compute nothing of their own.
+SHARED = --ignore test/benchmarks --ignore test/bag --ignore test/batch --ignore test/cli
+
+# The oldest versions of numpy and OpenCV that are to be had, and no ROS. No vector units beyond
+# those that both were compiled for: other last bits than those of the tests above.
 test-oldest: $(OLDEST)/ready
-	$(OLDEST)/bin/python -m support.vector_units avx2 $(OLDEST)/bin/python -m pytest \
+	$(OLDEST)/bin/python -m support.vector_units baseline $(OLDEST)/bin/python -m pytest \
 		$(SHARED)
 
-# The nodes on ROS 2 Kilted.
+# What the oldest OpenCV does not have, without those vector units.
+test-portable: $(READY)
+	$(BIN)/python -m support.vector_units baseline $(BIN)/python -m pytest \
+		test/detectors/test_square.py test/detectors/test_sides.py
+
+# What talks to ROS 2, on Kilted; what lasts long does so on Jazzy only.
+LASTING = test_benchmark_soak|test_demo|test_every_way|test_nodes_robust|test_package
 test-kilted:
 	$(MAKE) DISTRIBUTION=kilted .venv-kilted/ready
-	.venv-kilted/bin/python -m pytest $$(grep -lrE 'rclpy|graph: ' test --include='test_*.py')
+	.venv-kilted/bin/python -m pytest \
+		$$(grep -lrE 'rclpy|graph: ' test --include='test_*.py' | grep -vE '$(LASTING)')
 
 clean:
 	rm -rf .venv* build
@@ -64,7 +89,7 @@ $(READY): pyproject.toml setup.py distributions.ini package.xml CMakeLists.txt \
 	@$(PYTHON) scripts/prerequisites.py
 	@echo 'Setting up $(VENV): ROS 2 from PyPI, and the messages compiled; takes 1 to 3 minutes.'
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[$(EXTRAS)]'
 	touch $@
 
 $(OLDEST)/ready: test/oldest.txt

@@ -15,15 +15,24 @@ if TYPE_CHECKING:
         DetectorSettings,
         create_detector,
     )
-    from ahf_ros.drawing import draw
+    from ahf_ros.drawing.overlay import draw
     from ahf_ros.evaluation import score
     from ahf_ros.filtering.identifier import Identifier
     from ahf_ros.filtering.settings import AdaptiveSettings
     from ahf_ros.imaging.stack import ImageStack
     from ahf_ros.interchange.image_files import read_image, write_image
-    from ahf_ros.session import IdentificationSettings, create_identifier, identify
+    from ahf_ros.session import create_identifier, identify
+    from ahf_ros.session_settings import IdentificationSettings
     from ahf_ros.synthetic.scene import SceneSettings, render
-    from ahf_ros.target import UNDECODED, FilterState, Identification, Target, TrueTarget
+    from ahf_ros.target import (
+        UNDECODED,
+        FilterState,
+        Identification,
+        SearchTrace,
+        Target,
+        TrueTarget,
+        UndecodedTarget,
+    )
 
 # The generated messages (ahf_ros.msg, ahf_ros.srv) may live in another directory of sys.path:
 # an installed copy when Python runs from a checkout, or the build tree.
@@ -42,8 +51,10 @@ __all__ = [
     'Identifier',
     'ImageStack',
     'SceneSettings',
+    'SearchTrace',
     'Target',
     'TrueTarget',
+    'UndecodedTarget',
     'create_detector',
     'create_identifier',
     'draw',
@@ -63,15 +74,17 @@ _MODULES = {
     'DetectorSettings': 'detectors',
     'FilterState': 'target',
     'Identification': 'target',
-    'IdentificationSettings': 'session',
+    'IdentificationSettings': 'session_settings',
     'Identifier': 'filtering.identifier',
     'ImageStack': 'imaging.stack',
     'SceneSettings': 'synthetic.scene',
+    'SearchTrace': 'target',
     'Target': 'target',
     'TrueTarget': 'target',
+    'UndecodedTarget': 'target',
     'create_detector': 'detectors',
     'create_identifier': 'session',
-    'draw': 'drawing',
+    'draw': 'drawing.overlay',
     'identify': 'session',
     'read_image': 'interchange.image_files',
     'render': 'synthetic.scene',

@@ -25,7 +25,13 @@ def entry(item: Parameter) -> str:
     """Return the lines of one parameter."""
     comment = f'{item.description} Accepted is {item.accepted}.'
     lines = textwrap.wrap(comment, WIDTH, initial_indent='    # ', subsequent_indent='    # ')
-    return '\n'.join([*lines, f'    {item.name}: {json.dumps(item.default)}', ''])
+    return '\n'.join([*lines, f'    {item.name}: {value(item.default)}', ''])
+
+
+def value(default: object) -> str:
+    """Return a value in YAML 1.1, where a number with an exponent needs a decimal point."""
+    text = json.dumps(default)
+    return text.replace('e-', '.0e-') if isinstance(default, float) and '.' not in text else text
 
 
 def configuration(node: str) -> str:

@@ -11,6 +11,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from ahf_ros.nodes.drivers import DRIVERS
+from ahf_ros.nodes.interfaces import NODES
 from ahf_ros.nodes.settings import DetectorNodeSettings
 from ahf_ros.settings.nested import flat_parameters
 from ahf_ros.settings.parameter import Parameter
@@ -19,6 +21,15 @@ from benchmarks.disturbances import TABLES, Count, markdown
 
 ROOT = Path(__file__).resolve().parent.parent
 AMBIENT = ('0.3', '0.12', '0.04')
+RADII = {
+    'radius 6, 0.3': '6 px, 0.3',
+    'radius 6, 0.12': '6 px, 0.12',
+    'radius 10, 0.12': '10 px, 0.12',
+    'radius 20, 0.04': '20 px, 0.04',
+    'radius 20, 0.02': '20 px, 0.02',
+}
+ANGLES = {'55 deg, 0.12': '55°, 0.12', '62 deg, 0.12': '62°, 0.12'}
+BLURS = {'blur 2 px, 0.12': '2 px, 0.12'}
 AHF_LIGHTS = ('normal 0.3', 'stripe 0.3', 'stripe 0.12', 'lattice 0.3', 'lattice 0.12')
 
 
@@ -33,6 +44,44 @@ def parameter(item: Parameter) -> tuple[str, ...]:
     """Return the cells of one parameter."""
     default = json.dumps(round(item.default, 6) if type(item.default) is float else item.default)
     return f'`{item.name}`', default, item.accepted, item.description
+
+
+def interfaces() -> str:
+    """Return the topics and services of the nodes."""
+    rows = [('node', '', 'name', 'type')]
+    for node, about in NODES.items():
+        for number, it in enumerate(about.interfaces):
+            text = f'`{it.kind}`, {it.text}'
+            rows.append((f'`{node}`' if number == 0 else '', it.use, f'`{it.name}`', text))
+    return table(rows)
+
+
+def drivers() -> str:
+    """Return what the drivers of scanners publish."""
+    rows = [('driver', 'image', 'cloud', 'bytes per point, missing points', 'stamps', 'QoS')]
+    for name, driver in DRIVERS.items():
+        cells = (
+            f'`{name}`: {driver.package}',
+            f'`{driver.image}`, {driver.encoding}',
+            f'`{driver.points}`{", before the image" if driver.cloud_first else ""}',
+            f'{driver.point_step}, {driver.missing}',
+            driver.stamps,
+            'reliable' if driver.reliable else 'best effort',
+        )
+        rows.append(cells)
+    return table(rows)
+
+
+def driver_settings() -> str:
+    """Return what is to be set for each driver, in the node and in the driver."""
+    rows = [('driver', 'the launch file sets', 'to do in the driver')]
+    for name, driver in DRIVERS.items():
+        settings = {'cloud': 'true', **driver.settings}
+        if not driver.reliable:
+            settings['reliability'] = 'best_effort'
+        cells = ', '.join(f'`{key}:={value}`' for key, value in settings.items())
+        rows.append((f'`{name}`', cells, driver.setup))
+    return table(rows)
 
 
 def lights() -> str:
@@ -71,6 +120,20 @@ def others() -> str:
     return table(rows)
 
 
+def limits(head: str, rows: dict[str, str]) -> str:
+    """Return what `ring` identifies under patterns, in some rows of `benchmarks.limits`.
+
+    Rows are given by the names of `benchmarks.limits`, and what the table calls them.
+    """
+    figures = read('limits')
+    lights = tuple(dict.fromkeys(light for _, light in figures))
+    body = [
+        (text, *(right_and_wrong(figures[row, light]) for light in lights))
+        for row, text in rows.items()
+    ]
+    return table([(head, *(f'`{light}`' for light in lights)), *body])
+
+
 def disturbed(name: str, file: str = 'disturbances') -> str:
     """Return one of the tables of `benchmarks.disturbances`."""
     report = json.loads((ROOT / 'docs' / 'figures' / f'{file}.json').read_text())
@@ -91,9 +154,15 @@ def cell(of: dict[str, Any] | None) -> str:
     """Return right IDs, wrong ones if there are any, and the RMSE."""
     if of is None:
         return ''
-    wrong = f', {of["wrong"]} wrong' if of['wrong'] else ''
     error = '' if of['rmse_xy'] is None else f' ({of["rmse_xy"]:.3f})'
-    return f'{of["right"]}{wrong}{error}'
+    return f'{right_and_wrong(of)}{error}'
+
+
+def right_and_wrong(of: dict[str, Any]) -> str:
+    """Return the number of right IDs, and of wrong ones and false positives if there are any."""
+    wrong = f', {of["wrong"]} wrong' if of['wrong'] else ''
+    false = f', {of["false_positives"]} false' if of['false_positives'] else ''
+    return f'{of["right"]}{wrong}{false}'
 
 
 def table(rows: list[tuple[str, ...]]) -> str:
@@ -104,8 +173,15 @@ def table(rows: list[tuple[str, ...]]) -> str:
 
 PAGES: dict[str, dict[str, Callable[[], str]]] = {
     'README.md': {'summary': summary},
+    'docs/photograph.md': {
+        'radii': partial(limits, 'radius of the dot, ambient light', RADII),
+        'angles': partial(limits, 'angle, ambient light', ANGLES),
+        'blurs': partial(limits, 'blur, ambient light', BLURS),
+    },
     'docs/parameters.md': {'parameters': parameters},
-    'docs/figures.md': {'lights': lights, 'others': others},
+    'docs/ros.md': {'interfaces': interfaces},
+    'docs/rig.md': {'drivers': drivers, 'settings of drivers': driver_settings},
+    'docs/figures.md': {'summary': summary, 'lights': lights, 'others': others},
     'docs/figures/disturbances.md': {
         **{name: partial(disturbed, name) for name in TABLES},
         'other families': partial(disturbed, 'disturbances', 'disturbances_families'),

@@ -1,9 +1,9 @@
-"""What all tests share: a header, the log of the package, and the graph of real nodes."""
+"""What all tests share: a header, and the graph of real nodes."""
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -14,15 +14,14 @@ def pytest_report_header() -> str:
     return f'vector units: {vector_units.described()}'
 
 
-@pytest.fixture
-def caplog(
-    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
-) -> pytest.LogCaptureFixture:
-    """Capture the log of the package also where launch has made loggers that do not propagate."""
-    for name, logger in logging.root.manager.loggerDict.items():
-        if name.startswith('ahf_ros') and isinstance(logger, logging.Logger):
-            monkeypatch.setattr(logger, 'propagate', True)
-    return caplog
+@pytest.hookimpl(tryfirst=True)
+def pytest_pycollect_makemodule(module_path: Path, parent: pytest.Collector) -> pytest.Module:
+    """Leave modules to pytest.
+
+    The plugin of launch_testing imports each of them to see whether it describes a launch. One
+    that skips at its import then ends the collection, and no test runs.
+    """
+    return pytest.Module.from_parent(parent, path=module_path)
 
 
 @pytest.fixture(scope='module')

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-PAGES = [ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', *sorted((ROOT / 'docs').rglob('*.md'))]
+TOP = ('README.md', 'CONTRIBUTING.md', 'QUALITY_DECLARATION.md')
+PAGES = [*(ROOT / name for name in TOP), *sorted((ROOT / 'docs').rglob('*.md'))]
 ROOTS = (ROOT, ROOT / 'ahf_ros')
 WITH_EXAMPLES = [page for page in PAGES if '>>> ' in page.read_text()]
 SCRIPT = runpy.run_path(str(ROOT / 'scripts' / 'write_docs.py'))
@@ -63,5 +64,41 @@ def test_paths_in_the_text_exist(page: Path):
     assert not lost
 
 
+def test_every_page_is_in_the_index():
+    listed = re.findall(r'^   (\w+)$', (ROOT / 'docs' / 'index.rst').read_text(), re.M)
+    pages = [page.stem for page in (ROOT / 'docs').iterdir() if page.suffix in ('.md', '.rst')]
+    assert sorted([*listed, 'index']) == sorted(pages)
+
+
+def test_every_picture_is_shown_and_can_be_made_again():
+    shown = ''.join(page.read_text() for page in PAGES)
+    pictures = {path.name: path for path in (ROOT / 'docs' / 'pictures').iterdir()}
+    assert [name for name in pictures if f'](pictures/{name})' not in shown] == []
+    pytest.importorskip('matplotlib')
+    script = runpy.run_path(str(ROOT / 'scripts' / 'write_pictures.py'))
+    printed = {f'{name}.svg': content for name, content in script['printed']().items()}
+    drawn = {f'{name}.jpg' for name in script['PICTURES'] if name != 'targets'}
+    assert set(printed) | drawn <= set(pictures)
+    assert all(pictures[name].read_bytes() == content for name, content in printed.items())
+    assert len(script['reading']().axes) == 4
+
+
+def test_pages_of_the_site_that_load_from_other_hosts_are_found(tmp_path: Path):
+    loads = {
+        'font.css': '@import "https://example.org/font";',
+        'picture.css': 'body { background: url(//example.org/a.png) }',
+        'script.html': '<script async src="https://example.org/a.js"></script>',
+        'style.html': '<link rel="stylesheet" href="//example.org/a.css">',
+    }
+    others = {
+        'link.html': '<a href="https://example.org">there</a> <img src="../a.png">',
+        'own.css': "@import 'own.css'; body { background: url('a.png') }",
+    }
+    for name, text in (loads | others).items():
+        (tmp_path / name).write_text(text)
+    script = runpy.run_path(str(ROOT / 'scripts' / 'build_site.py'))
+    assert {path.name for path in script['loading'](tmp_path)} == set(loads)
+
+
 def test_the_readme_is_short():
-    assert len((ROOT / 'README.md').read_text().splitlines()) <= 150
+    assert len((ROOT / 'README.md').read_text().splitlines()) <= 130

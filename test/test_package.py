@@ -7,6 +7,7 @@ import importlib.util
 import re
 import subprocess
 import sys
+import xml.etree.ElementTree as ElementTree
 from collections import Counter
 from fnmatch import fnmatch
 from importlib import metadata
@@ -29,6 +30,31 @@ TO_BE_USED = {'ahf_ros.codes.invariant'}
 
 NOT_DISTRIBUTED = ('.ci/*', '.gitignore')
 ADDED_BY_SETUPTOOLS = ('MANIFEST.in', 'README.md', 'pyproject.toml', 'setup.py')
+
+ROSDEP = {
+    'argcomplete': 'python3-argcomplete',
+    'backports': 'python3-rosbags-pip',
+    'compression': 'python3-rosbags-pip',
+    'cv2': 'python3-opencv',
+    'hypothesis': 'python3-hypothesis',
+    'jinja2': 'python3-jinja2',
+    'lz4': 'python3-rosbags-pip',
+    'matplotlib': 'python3-matplotlib',
+    'numpy': 'python3-numpy',
+    'pytest': 'python3-pytest',
+    'reportlab': 'python3-reportlab',
+    'rich': 'python3-rich',
+    'rosbags': 'python3-rosbags-pip',
+    'ruamel': 'python3-ruamel.yaml',
+    'yaml': 'python3-yaml',
+}
+"""Keys of rosdep of what is not a ROS package; rosbags brings lz4 and backports.zstd."""
+
+NOT_IN_ROSDEP = {'Metashape', 'distributed', 'fsspec', 'pypdfium2', 'selenium', 'watchdog'}
+"""What tests skip without, extras, and what is only in the console of other software."""
+
+TO_RUN, TO_TEST = ('depend', 'exec_depend'), ('depend', 'exec_depend', 'test_depend')
+OWN = {'ahf_ros', 'benchmarks', 'paper_plots', 'support'}
 
 needs_rosbags = pytest.mark.skipif(
     not importlib.util.find_spec('rosbags'), reason='rosbags is not installed'
@@ -70,7 +96,8 @@ def test_everything_but_the_nodes_works_without_ros() -> None:
 
 
 def test_what_needs_no_ros_among_the_nodes_does_without() -> None:
-    command = [sys.executable, '-c', WITHOUT_ROS, 'ahf_ros.nodes.settings']
+    names = ('ahf_ros.nodes.settings', 'ahf_ros.nodes.drivers', 'ahf_ros.nodes.help')
+    command = [sys.executable, '-c', WITHOUT_ROS, *names]
     subprocess.run(command, cwd=ROOT, check=True)
 
 
@@ -81,7 +108,7 @@ def test_a_file_is_one_idea() -> None:
 
 def test_every_module_is_used() -> None:
     entries = (ROOT / 'pyproject.toml').read_text()
-    users = [*MODULES.values(), *(ROOT / 'scripts').iterdir()]
+    users = [*MODULES.values(), *(ROOT / 'scripts').iterdir(), *(ROOT / 'launch').iterdir()]
     used = Counter(name for file in users if file.is_file() for name in imported(file))
     # Registries name what they import when it is asked for.
     words = {
@@ -107,6 +134,59 @@ def test_tests_of_bags_skip_without_rosbags() -> None:
         if any((node.module or '').startswith(('ahf_ros.bag', 'rosbags')) for node in top):
             skips = "pytest.importorskip('rosbags'" in file.read_text()
             assert skips, f'{file} needs rosbags, accepted is pytest.importorskip before'
+
+
+@pytest.mark.parametrize(
+    ('folders', 'kinds'),
+    [(('ahf_ros', 'launch'), TO_RUN), (('test', 'support', 'benchmarks'), TO_TEST)],
+)
+def test_package_xml_names_what_is_imported(
+    folders: tuple[str, ...], kinds: tuple[str, ...]
+) -> None:
+    root = ElementTree.parse(ROOT / 'package.xml').getroot()
+    declared = {item.text for kind in kinds for item in root.iter(kind)}
+    files = [file for folder in folders for file in (ROOT / folder).rglob('*.py')]
+    names = {name.split('.')[0] for file in files for name in imported(file)}
+    names -= OWN | NOT_IN_ROSDEP | sys.stdlib_module_names
+    foreign = {it for it in names if not it.startswith('test_')}
+    assert len(foreign) > 5
+    assert {ROSDEP.get(it, it) for it in foreign} - declared == set()
+
+
+def test_ros2_run_finds_every_program() -> None:
+    text = (ROOT / 'CMakeLists.txt').read_text()
+    (programs,) = re.findall(r'install\(PROGRAMS([^)]*)DESTINATION lib/\$\{PROJECT_NAME\}', text)
+    scripts = {file.name for file in (ROOT / 'scripts').iterdir() if file.is_file()}
+    assert set(programs.split()) == {f'scripts/{it}' for it in scripts if '.' not in it}
+
+
+class ImportingPlugin:
+    """A plugin that imports test modules while they are collected, as that of launch_testing."""
+
+    def pytest_pycollect_makemodule(self) -> None:
+        pytest.skip('a package is not installed', allow_module_level=True)
+
+
+def test_a_module_that_skips_does_not_end_the_collection(request: pytest.FixtureRequest) -> None:
+    here = Path(__file__)
+    manager = request.config.pluginmanager
+    plugin = ImportingPlugin()
+    manager.register(plugin)
+    try:
+        hooks = request.session.gethookproxy(here)
+        made = hooks.pytest_pycollect_makemodule(module_path=here, parent=request.session)
+    except pytest.skip.Exception:
+        made = None
+    finally:
+        manager.unregister(plugin)
+    assert type(made) is pytest.Module
+
+
+def test_tests_do_not_need_loggers_that_propagate() -> None:
+    """launch, and so its plugin of pytest, makes all later loggers keep from the root logger."""
+    files = (ROOT / 'test').rglob('*.py')
+    users = [file for file in files if re.search(r'\bcaplog[,:.)]', file.read_text())]
+    assert users == [], 'caplog sees nothing where launch is installed'
 
 
 def test_no_two_test_files_have_the_same_name() -> None:
