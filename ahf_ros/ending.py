@@ -1,11 +1,31 @@
-"""Signals that end a process; imports neither ROS nor numpy, so that they are heeded at once."""
+"""The end of this process by a signal; imports neither ROS nor numpy, so it is heeded at once.
+
+A signal handler that raises an exception does so wherever the program is. During an import the
+exception may be lost or become another one, because C code discards or replaces what it does not
+expect. So `end` waits for the end of an import, and loops that go on call `check`.
+"""
 
 from __future__ import annotations
 
 import signal
+import time
+from collections.abc import Callable
+from types import FrameType
+
+POLL = 0.02
+"""Time between two looks at what is waited for, s."""
+
+GRACE = 3.0
+"""Time to end in order, s."""
 
 _WITH_NOHUP = (signal.SIGINT, signal.SIGTERM)
 _ENDING = (*_WITH_NOHUP, signal.SIGHUP)
+_IMPORT = '<frozen importlib'  # file of the code that imports
+
+# Signal handlers set and read these, so they have no lock.
+_number: int | None = None
+_limit = 0.0
+_actions: list[Callable[[], None]] = []
 
 
 def ending_signals() -> tuple[signal.Signals, ...]:
@@ -18,3 +38,68 @@ def ignore_ending() -> None:
     """Ignore these signals from now on: a second one interrupts nothing."""
     for number in _ENDING:
         signal.signal(number, signal.SIG_IGN)
+
+
+def end(number: int, frame: FrameType | None) -> None:
+    """Handle a signal by the end of this process, in order.
+
+    Raises
+    ------
+    KeyboardInterrupt, SystemExit
+        As `check` does; after the current import, if that takes no longer than `GRACE`.
+    """
+    global _limit
+    ignore_ending()
+    begin(number)
+    _limit = time.monotonic() + GRACE
+    _raise_after_import(number, frame)
+
+
+def _raise_after_import(_: int, frame: FrameType | None) -> None:
+    while frame and time.monotonic() < _limit:
+        if frame.f_code.co_filename.startswith(_IMPORT):
+            signal.signal(signal.SIGALRM, _raise_after_import)
+            signal.setitimer(signal.ITIMER_REAL, POLL)
+            return
+        frame = frame.f_back
+    check()
+
+
+def at_begin(action: Callable[[], None]) -> None:
+    """Let `begin` call a function, which a signal handler can run."""
+    _actions.append(action)
+
+
+def begin(number: int = signal.SIGTERM) -> None:
+    """Say that this process ends, and why: nobody waits for programs and detectors any more.
+
+    Parameters
+    ----------
+    number : int
+        The signal, or the one that stands for the reason.
+    """
+    global _number
+    _number = number
+    for action in _actions:
+        action()
+
+
+def has_begun() -> bool:
+    """Return whether this process ends."""
+    return _number is not None
+
+
+def check() -> None:
+    """Go on, unless this process ends.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        If it ends by SIGINT.
+    SystemExit
+        If it ends by another signal; its code is 128 and the number of the signal.
+    """
+    if _number == signal.SIGINT:
+        raise KeyboardInterrupt
+    if _number is not None:
+        raise SystemExit(128 + _number)

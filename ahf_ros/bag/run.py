@@ -18,6 +18,7 @@ from typing import Any
 
 from rosbags.rosbag2 import WriterError
 
+from ahf_ros import ending
 from ahf_ros.bag.answering import Answering, AnswerTopics
 from ahf_ros.bag.assembly import (
     TASK_KEY,
@@ -205,6 +206,7 @@ def _answer_images(
             answering.resume(entry, connection, data)
         else:
             entry, answers = answering.answer(connection, timestamp, data, last)
+            ending.check()  # the answer may be that of a program that was ended
             journal.append(entry, answers)
         report(number + 1, total, _remark(entry))
 

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
 
+from ahf_ros import ending
+
 TRIES = 2
 """How often a task is tried whose process dies."""
 
@@ -113,7 +115,9 @@ def finished_tasks(
             running.update([following])
             engine.submit(*following)
             following = next(waiting, None)
+        ending.check()  # before it waits
         found = engine.wait()
+        ending.check()  # the result may be that of a program that was ended
         if found is not None:
             yield Finished(found[0], running.pop(found[0]), found[1])
 

@@ -18,10 +18,11 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any
 
+from ahf_ros import ending
 from ahf_ros.batch.engine import TRIES, GivenUp, Job, Report, no_report
 from ahf_ros.batch.worker import GONE, Kind
 
-_ENDING = 5.0  # s that a worker has to end in order; one that is stuck is killed
+_ENDING = 10 * ending.GRACE  # s until a worker is killed that cannot end by itself
 _PACKAGE = str(Path(__file__).parents[2])
 _BEGIN = (
     'import sys; sys.path.insert(0, sys.argv[1]); '
@@ -111,17 +112,13 @@ class Processes:
     def close(self) -> None:
         """End all workers."""
         for worker in self._workers:
-            if worker.busy:
-                worker.process.terminate()
-            else:
-                worker.tasks.close()  # so it ends
+            worker.close()  # so it ends
         limit = time.monotonic() + _ENDING
         for worker in self._workers:
             with suppress(subprocess.TimeoutExpired):
                 worker.process.wait(max(limit - time.monotonic(), 0))
             worker.process.kill()
             worker.process.wait()
-            worker.close()
         self._workers.clear()
 
     def _hand_over(self, number: int, task: Any, tries: int) -> None:

@@ -6,6 +6,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 
+from ahf_ros import ending
 from ahf_ros.batch.arrivals import Alarm, Arrivals
 from ahf_ros.batch.engine import Engine
 from ahf_ros.batch.plan import make_plan, out_of_date
@@ -67,6 +68,7 @@ def watch(
             alarm.wait(min(interval, _BUSY) if arrivals.settling else interval)
             continue
         found = engine.wait(_BUSY)
+        ending.check()
         if found is not None:
             task = running.pop(found[0])
             outcome = outcome_of(task, found[1])

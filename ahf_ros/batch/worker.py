@@ -1,7 +1,7 @@
 """A worker process: reads tasks from a pipe, and writes what becomes of them to another one.
 
-`ahf_ros.batch.processes` starts it. It ends when the pipes are closed, which they are as soon as
-the process that started it is gone.
+`ahf_ros.batch.processes` starts it. It ends when the pipes are closed, at the latest when the
+process that started it is gone.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ import os
 import signal
 import sys
 import threading
-import time
 import traceback
 from contextlib import suppress
 from enum import IntEnum
@@ -19,11 +18,9 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 import ahf_ros.blas  # noqa: F401  before numpy
+from ahf_ros import ending
 from ahf_ros.batch.engine import Job
 from ahf_ros.text import reason_of
-
-GRACE = 3.0
-"""Time that a worker has to end in order once the process that started it is gone, s."""
 
 GONE = (EOFError, OSError)
 """What the pipe of a process that has ended raises."""
@@ -54,7 +51,9 @@ def main(tasks: int, answers: int, alive: int) -> None:
         job, threads = received.recv()
         _prepare(threads)
         while True:
-            sent.send(_result_of(job, received.recv(), sent))
+            result = _result_of(job, received.recv(), sent)
+            ending.check()  # the result may be that of a program that was ended
+            sent.send(result)
 
 
 def _result_of(job: Job, task: Any, sent: Connection) -> tuple[Kind, Any]:
@@ -68,7 +67,8 @@ def _result_of(job: Job, task: Any, sent: Connection) -> tuple[Kind, Any]:
 
 
 def _report(sent: Connection, *report: Any) -> None:
-    sent.send((Kind.REPORT, report))
+    with suppress(*GONE):  # this process is about to end
+        sent.send((Kind.REPORT, report))
 
 
 def _heed_signals(alive: int) -> None:
@@ -82,18 +82,16 @@ def _heed_signals(alive: int) -> None:
 def _watch(alive: int) -> None:
     """End this process once nobody holds the other end of a pipe."""
     os.read(alive, 1)
-    os.kill(os.getpid(), signal.SIGTERM)
-    time.sleep(GRACE)
-    os._exit(1)
+    _end()
 
 
-def _end(number: int, _: Any) -> None:
-    signal.signal(number, signal.SIG_IGN)  # a second one would disturb the end
-    # No import: the signal may have interrupted that of the same module, and then nothing runs.
-    programs = sys.modules.get('ahf_ros.detectors.external.program')
-    if end_programs := getattr(programs, 'end_programs', None):
-        end_programs()
-    raise SystemExit(128 + number)
+def _end(*_: Any) -> None:
+    """Let the current task come to its end, within a limit of time.
+
+    It is not interrupted by an exception, which might be lost, or leave temporary files behind.
+    """
+    ending.begin()
+    signal.setitimer(signal.ITIMER_REAL, ending.GRACE)  # then SIGALRM kills this process
 
 
 def _prepare(threads: int) -> None:

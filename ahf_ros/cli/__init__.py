@@ -13,9 +13,8 @@ import sys
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from types import FrameType
 
-from ahf_ros.ending import ending_signals, ignore_ending
+from ahf_ros import ending
 
 INTERRUPTED, FAILED = 130, 1
 
@@ -36,11 +35,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # What OpenCV warns of, such as tags of TIFF files that it does not know, is not for users.
     os.environ.setdefault('OPENCV_LOG_LEVEL', 'ERROR')
     try:
-        # Imported here, so that Ctrl-C during the imports ends in order, too.
-        from ahf_ros.cli import commands
+        with _heeded_signals():
+            # Imported here, so that a signal during the imports ends in order, too.
+            from ahf_ros.cli import commands
 
-        _replace_closed()
-        with _ending_programs():
+            _replace_closed()
             status = commands.run(arguments)
             sys.stdout.flush()
         return status
@@ -57,28 +56,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 @contextmanager
-def _ending_programs() -> Iterator[None]:
-    """End the programs that detectors run as soon as a signal ends this process."""
+def _heeded_signals() -> Iterator[None]:
+    """End in order after a signal, with the programs that detectors run."""
     if threading.current_thread() is not threading.main_thread():
         yield  # signals come to the main thread
         return
-    before = {number: signal.signal(number, _end) for number in ending_signals()}
+    before = {number: signal.signal(number, ending.end) for number in ending.ending_signals()}
     try:
         yield
     finally:
         for number, handler in before.items():
-            if signal.getsignal(number) is _end:
+            if signal.getsignal(number) is ending.end:
                 signal.signal(number, handler)
-
-
-def _end(number: int, _: FrameType | None) -> None:
-    from ahf_ros.detectors.external.program import end_programs
-
-    ignore_ending()
-    end_programs()
-    if number == signal.SIGINT:
-        raise KeyboardInterrupt
-    raise SystemExit(128 + number)
 
 
 def _replace_closed() -> None:

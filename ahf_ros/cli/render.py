@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+from ahf_ros import ending
 from ahf_ros.cli.options import add_option, settings_from
 from ahf_ros.interchange.image_files import write_image
 from ahf_ros.interchange.truth_files import read_truth, write_truth
@@ -55,6 +56,7 @@ def run(options: argparse.Namespace) -> int:
     try:
         truth = dict(read_truth(truth_path)) if truth_path.exists() else {}
         for scene, phase in scenes:
+            ending.check()
             rendering = render(scene, phase)
             name = f'{scene.light}_{scene.ambient:g}_{scene.seed}'
             name += f'_{phase}.png' if scene.phases > 1 else '.png'

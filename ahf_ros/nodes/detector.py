@@ -15,7 +15,7 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.clock import Clock, ClockType
 from std_msgs.msg import Header
 
-from ahf_ros.detectors.external.program import end_programs
+from ahf_ros import ending
 from ahf_ros.nodes.ahead import ImageJob
 from ahf_ros.nodes.answers import Answers
 from ahf_ros.nodes.diagnostics import Diagnostics, Tally
@@ -119,7 +119,7 @@ class DetectorNode(ManagedNode):
     def close(self) -> None:
         """Interrupt the current identification."""
         self._stopping.set()
-        end_programs()
+        ending.begin()
         self._worker.stop()
 
     def introduction(self) -> str:

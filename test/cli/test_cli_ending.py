@@ -173,6 +173,36 @@ def test_a_signal_does_not_wait_for_a_detector_of_another_package(
     assert b'Traceback' not in errors
 
 
+INTERRUPTING = """
+import os, signal, time
+class Field:
+    def __set_name__(self, owner, name):
+        for _ in range(2):
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.1)
+class MyDetector:
+    name = family = 'mine'
+    field = Field()
+    def __init__(self, settings):
+        pass
+    def __call__(self, image):
+        return []
+"""
+
+
+def test_a_signal_that_an_import_would_lose_ends_the_command(tmp_path: Path) -> None:
+    packages.write_package(tmp_path, 'interrupting', INTERRUPTING)
+    write_image(tmp_path / 'image.png', np.tile(np.arange(40, dtype=np.uint8), (30, 1)))
+    process = start(
+        'identify', '--json', tmp_path / 'image.png', '--detector', 'mine',
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        env={**os.environ, 'PYTHONPATH': f'{ROOT}{os.pathsep}{tmp_path}'},
+    )  # fmt: skip
+    output, errors = process.communicate(timeout=LIMIT)
+    assert process.returncode == 130, errors
+    assert (output, errors) == (b'', b'')
+
+
 def test_what_a_detector_prints_is_not_in_the_json(tmp_path: Path) -> None:
     body = packages.EXAMPLE.read_text().replace('radii = np', "print('noise')\n        radii = np")
     packages.write_package(tmp_path, 'printing', body)

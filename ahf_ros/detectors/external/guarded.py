@@ -11,8 +11,8 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
+from ahf_ros import ending
 from ahf_ros.detectors.contract import Detector, Drafter, Expecting, Refiner
-from ahf_ros.detectors.external import ending
 from ahf_ros.target import Target
 from ahf_ros.target_check import checked_targets, checked_text
 from ahf_ros.text import reason_of

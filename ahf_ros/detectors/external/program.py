@@ -11,8 +11,8 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import IO, Any
 
+from ahf_ros import ending
 from ahf_ros.detectors.contract import Unavailable
-from ahf_ros.detectors.external import ending
 from ahf_ros.text import LONGEST, printable
 
 LARGEST_OUTPUT = 64 * 2**20
@@ -42,7 +42,7 @@ def output_of(words: list[str], folder: Path, timeout: float, name: str) -> str:
         If the program cannot be started.
     ValueError
         If it takes longer, writes more than `LARGEST_OUTPUT`, ends with another status than 0, or
-        is ended by `end_programs`.
+        this process ends.
     """
     output, errors = folder / 'output', folder / 'errors'
     with output.open('wb') as out, errors.open('wb') as err:
@@ -66,17 +66,8 @@ def output_of(words: list[str], folder: Path, timeout: float, name: str) -> str:
     return output.read_text(encoding='utf-8', errors='replace')
 
 
-def end_programs() -> None:
-    """End all programs that run, and those that would still be started; this process ends."""
-    ending.begin()
-    with _lock:
-        running = list(_running)
-    for process in running:
-        _kill(process)
-
-
 def _started(words: list[str], out: IO[bytes], err: IO[bytes]) -> subprocess.Popen[Any]:
-    """Start a program that `end_programs` ends, whenever it is called."""
+    """Start a program that ends with this process, whenever that begins to end."""
     with _lock:
         process = subprocess.Popen(
             words, stdin=subprocess.DEVNULL, stdout=out, stderr=err, start_new_session=True
@@ -124,8 +115,18 @@ def _end(process: subprocess.Popen[Any]) -> None:
     process.wait()
 
 
+def _kill_running() -> None:
+    with _lock:
+        running = list(_running)
+    for process in running:
+        _kill(process)
+
+
 def _kill(process: subprocess.Popen[Any]) -> None:
     try:
         os.killpg(process.pid, signal.SIGKILL)
     except ProcessLookupError:
         return
+
+
+ending.at_begin(_kill_running)
