@@ -130,7 +130,10 @@ def outcome(folder: Path, constant: str = '', value: float = 0.0) -> Outcome:
         )
     except subprocess.TimeoutExpired:
         return Outcome()
-    return Outcome(**json.loads(done.stdout)) if done.returncode == 0 else Outcome()
+    if done.returncode != 0:
+        print(done.stderr, end='', file=sys.stderr)  # why it does not work
+        return Outcome()
+    return Outcome(**json.loads(done.stdout))
 
 
 def changed(name: str, value: float, factor: float) -> float:

@@ -43,7 +43,8 @@ def test_a_change_reaches_whatever_uses_the_constant(folder: Path) -> None:
     assert outcome(folder, CERTAIN, 1.1) == Outcome(0, 0, 0, None)
     assert outcome(folder, SCALE, 2.0).rmse != outcome(folder).rmse
     assert PAIR in dict(constants())
-    assert outcome(folder, PAIR, 1e9) == Outcome(0, 0, 0, None)
+    # More than any step, but a threshold that cv2.Canny takes on one core as well, in 16 bits.
+    assert outcome(folder, PAIR, 30.0) == Outcome(0, 0, 0, None)
 
 
 @pytest.mark.parametrize('name', [f'{CERTAIN}_NOT', 'ahf_ros.cli.bag.PERIOD'])
