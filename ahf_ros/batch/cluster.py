@@ -128,6 +128,7 @@ class Cluster:
         from distributed import as_completed
 
         self._client = connect(self._address)
+        self._connection = self._client.scheduler_comm
         self._completed = as_completed(
             loop=self._client.loop, with_results=True, raise_errors=False
         )
@@ -136,6 +137,15 @@ class Cluster:
         for worker, reason in refused_workers(self._client).items():
             self._refuse(worker, reason)
         self._look()
+
+    def _connected(self) -> bool:
+        """Return whether the scheduler is still connected as it was.
+
+        A client whose connection breaks may connect again by itself before that is seen here. Its
+        tasks and the subscription to reports are lost nevertheless.
+        """
+        running: bool = self._client.status == 'running'
+        return running and self._client.scheduler_comm is self._connection
 
     def _look(self) -> None:
         """Look at the workers, and tell if there are none."""
@@ -158,7 +168,7 @@ class Cluster:
     def _begin(self, begun: _Begun) -> None:
         """Submit a task, or keep it while there is no scheduler or no worker that may have it."""
         workers = self._good() if self._refused else frozenset()
-        if self._client.status != 'running' or (self._refused and not workers):
+        if not self._connected() or (self._refused and not workers):
             self._waiting.append(begun)
             return
         self._submissions += 1
@@ -203,7 +213,7 @@ class Cluster:
 
     def _keep_up(self) -> None:
         """Connect again if need be, look at the workers, and submit what waits."""
-        if self._client.status != 'running':
+        if not self._connected():
             self._return()
         elif time.monotonic() - self._looked > _LOOK:
             self._look()
@@ -225,7 +235,7 @@ class Cluster:
             try:
                 self._connect()
                 break
-            except ValueError:
+            except (ValueError, *AWAY):  # not there yet, or away again meanwhile
                 if time.monotonic() > limit:
                     raise
                 time.sleep(_AGAIN)

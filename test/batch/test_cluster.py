@@ -6,6 +6,7 @@ import json
 import os
 import shutil
 import sys
+import time
 from contextlib import closing
 from pathlib import Path
 
@@ -61,19 +62,25 @@ def test_nothing_is_lost_and_nothing_twice(
                 assert 'tcp://127.0.0.1' in item.result[1]
                 if len(results) == 20:
                     first.kill()
-                if len(results) == 40:
+                if len(results) in (40, 50):
+                    client, connected = engine._client, engine._client.scheduler_comm
                     scheduler.kill()
                     scheduler.wait()
                     scheduler = local.scheduler()
-                    local.worker('third')
+                    local.worker(f'after {len(results)}')
+                    # The second time, the client is faster to connect again than the engine.
+                    limit = time.monotonic() + LIMIT
+                    while len(results) == 50 and client.scheduler_comm in (None, connected):
+                        assert time.monotonic() < limit
+                        time.sleep(0.01)
         assert sorted(results) == list(range(len(tasks)))
         assert results[0] != os.getpid() and isinstance(results[1], int)
         assert isinstance(results[2], GivenUp) and 'by SIGKILL' in results[2].reason
         assert [results[number + 3] for number in range(60)] == [it**2 for it in range(60)]
         told = {(number, f'{what} {value}') for number, (what, value) in enumerate(tasks)}
         assert set(reports) <= told and len(reports) > 30
-        assert f'{local.address} is away, waiting for it' in said
-        assert f'{local.address} is back' in said
+        assert said.count(f'{local.address} is away, waiting for it') >= 2
+        assert said.count(f'{local.address} is back') >= 2
         assert any('has ahf_ros 0.1, accepted is' in text for text in said)
 
         images = [tmp_path / name for name in ('a.png', 'missing.png', 'b.png')]

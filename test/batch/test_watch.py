@@ -78,8 +78,9 @@ def test_images_are_identified_as_they_arrive_and_none_twice(tmp_path: Path) -> 
 
     def results() -> list[str]:
         file = output / RESULTS_FILE
-        lines = file.read_text().splitlines() if file.exists() else []
-        return [Path(json.loads(line)['image']).name for line in lines]
+        lines = file.read_text().splitlines(keepends=True) if file.exists() else []
+        whole = [line for line in lines if line.endswith('\n')]  # the last is being written
+        return [Path(json.loads(line)['image']).name for line in whole]
 
     def wait_for(*names: str) -> None:
         limit = time.monotonic() + LIMIT
