@@ -334,12 +334,17 @@ class Soak:
         self.visits += 1
 
     def _leave(self) -> None:
-        visitor, self._visitor = self._visitor, None
-        if visitor is None:
+        if (visitor := self._visitor) is None:
             return
+        limit = time.monotonic() + live.PATIENCE
+        while len(visitor.seen) != 3:  # the node may not know of it yet
+            if time.monotonic() > limit:
+                raise AssertionError(f'a visitor saw only {dict(visitor.seen)}')
+            self._send(self._valid[0])
+            self._quiet()
+            visitor.spin()
         visitor.leave()
-        if len(visitor.seen) != 3:
-            raise AssertionError(f'a visitor saw only {dict(visitor.seen)}')
+        self._visitor = None
 
     def _identify(self) -> None:
         request = Identify.Request(image=self._valid[0].message)
