@@ -12,7 +12,7 @@ import numpy as np
 from ahf_ros.codes.gsi import PointFamily
 from ahf_ros.codes.gsi_learning import Learnt, learn_family
 from ahf_ros.codes.gsi_library import library_text, point_family, with_codes
-from ahf_ros.interchange.files import file_errors
+from ahf_ros.interchange.files import write_whole
 from ahf_ros.interchange.point_lists import read_point_list
 
 
@@ -70,8 +70,7 @@ def run(options: argparse.Namespace) -> int:
                 position_radii=family.position_radii * (radius / family.dot_radius),
             )
         family = with_codes(family, learnt.codes)
-        with file_errors(options.output, 'written'):
-            Path(options.output).write_text(library_text(family), encoding='utf-8')
+        write_whole(options.output, library_text(family).encode())
         point_family(options.output)
     except ValueError as error:
         print(f'ahf learn-family: {error}', file=sys.stderr)

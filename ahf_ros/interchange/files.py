@@ -134,6 +134,7 @@ def whole_file(path: str | Path) -> Iterator[BinaryIO]:
             return
         final.parent.mkdir(parents=True, exist_ok=True)
         part = final.with_name(f'.{final.name[:200]}.{os.getpid()}.part')
+        part.unlink(missing_ok=True)  # of a killed process of that number, as in containers
         try:
             with part.open('xb') as file:
                 yield file

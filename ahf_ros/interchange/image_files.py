@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from ahf_ros.imaging.image import check_size
-from ahf_ros.interchange.files import file_errors, read_bytes
+from ahf_ros.interchange.files import read_bytes, write_whole
 from ahf_ros.interchange.image_headers import UPRIGHT, read_header, upright
 
 SUFFIXES = ('.bmp', '.jpeg', '.jpg', '.png', '.tif', '.tiff')
@@ -168,6 +168,4 @@ def write_image(path: str | Path, image: np.ndarray) -> None:
     if path.suffix.lower() not in SUFFIXES:
         raise ValueError(f'{path} has an unknown format, accepted is one of {", ".join(SUFFIXES)}')
     _, encoded = cv2.imencode(path.suffix, image)
-    with file_errors(path, 'written'):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(encoded.tobytes())
+    write_whole(path, encoded.tobytes())

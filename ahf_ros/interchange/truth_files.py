@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import csv
+import io
 from pathlib import Path
 from typing import Any
 
 from ahf_ros.interchange.fields import checked_file_name, parsed_integer, parsed_number
-from ahf_ros.interchange.files import file_errors, read_text
+from ahf_ros.interchange.files import read_text, write_whole
 from ahf_ros.target import UNDECODED, TrueTarget, Truth
 from ahf_ros.target_check import MAXIMUM_ID, MAXIMUM_LENGTH_PX
 
@@ -57,7 +58,7 @@ def write_truth(path: str | Path, truth: Truth) -> None:
     Parameters
     ----------
     path : str or Path
-        The file; an existing one is replaced.
+        The file; an existing one is replaced, a missing folder is created.
     truth : mapping of str to sequence of TrueTarget
         The targets of each image; coordinates are written to 0.0001 px.
 
@@ -71,11 +72,9 @@ def write_truth(path: str | Path, truth: Truth) -> None:
         for item in targets:
             place = [f'{item.x:.4f}', f'{item.y:.4f}']
             rows.append([name, str(item.id), *place, str(int(item.confirmed))])
-    with (
-        file_errors(path, 'written'),
-        Path(path).open('w', encoding='utf-8', newline='') as file,
-    ):
-        csv.writer(file, lineterminator='\n').writerows(rows)
+    table = io.StringIO()
+    csv.writer(table, lineterminator='\n').writerows(rows)
+    write_whole(path, table.getvalue().encode())
 
 
 def _target(row: dict[str, Any], where: str) -> TrueTarget:

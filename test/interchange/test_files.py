@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from ahf_ros.interchange.files import write_whole
+from ahf_ros.interchange.image_files import write_image
+from ahf_ros.interchange.truth_files import write_truth
+from ahf_ros.target import TrueTarget
 from support.disk import room_for
 
 
@@ -33,6 +38,30 @@ def test_what_does_not_fit_leaves_the_old_file(tmp_path: Path) -> None:
         write_whole(file, b'x' * 5000)
     assert file.read_bytes() == b'old'
     assert [it.name for it in tmp_path.iterdir()] == ['sheet.pdf']
+
+
+@pytest.mark.parametrize('name', ['truth.csv', 'image.png'])
+def test_truth_and_images_are_replaced_as_a_whole(tmp_path: Path, name: str) -> None:
+    file = tmp_path / name
+
+    def write(count: int) -> None:
+        if file.suffix == '.csv':
+            write_truth(file, {'a.png': [TrueTarget(it, 1.0, 2.0) for it in range(count)]})
+        else:
+            write_image(file, np.random.default_rng(0).integers(0, 255, (count, 90), np.uint8))
+
+    write(4)
+    before = file.read_bytes()
+    with room_for(1000), pytest.raises(ValueError, match='cannot be written: File too large'):
+        write(100)
+    assert file.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [file]
+
+
+def test_what_a_killed_process_of_the_same_number_left_is_replaced(tmp_path: Path) -> None:
+    (tmp_path / f'.page.html.{os.getpid()}.part').write_bytes(b'half')
+    write_whole(tmp_path / 'page.html', b'whole')
+    assert [it.read_bytes() for it in tmp_path.iterdir()] == [b'whole']
 
 
 def test_a_device_is_written_to_and_stays_one() -> None:
