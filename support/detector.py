@@ -48,6 +48,10 @@ class DetectorProcess:
         request = Identify.Request(image=message, expected=expected)
         return self.graph.call(Identify, f'{self.namespace}/detector/identify', request)
 
+    def until_served(self, message: Image) -> None:
+        """Wait until the node has found the service that is its detector."""
+        self.graph.until(lambda: self.identify(message).success)
+
     def reset(self) -> None:
         """Let the node forget what was learnt from earlier images."""
         response = self.graph.call(Trigger, f'{self.namespace}/detector/reset', Trigger.Request())
@@ -64,17 +68,22 @@ class DetectorProcess:
         return response.result.successful, response.result.reason
 
     @contextmanager
-    def resubscription(self) -> Iterator[None]:
-        """Wait until another subscription to images has taken the place of the one before.
+    def resubscription(self, *topics: str) -> Iterator[None]:
+        """Wait until other subscriptions have taken the place of those before.
 
-        That goes when the node gets round to it, and what it receives till then gets lost.
+        They go when the node gets round to it, and what they receive till then gets lost.
         """
-        before = self._subscriptions()
+        before = [self._subscriptions(it) for it in topics]
         yield
-        self.graph.until(lambda: len(now := self._subscriptions()) == 1 and not now & before)
 
-    def _subscriptions(self) -> set[tuple[int, ...]]:
-        known = self.graph.node.get_subscriptions_info_by_topic(f'{self.namespace}/image')
+        def replaced() -> bool:
+            pairs = zip(map(self._subscriptions, topics), before, strict=True)
+            return all(len(now) == 1 and not now & old for now, old in pairs)
+
+        self.graph.until(replaced)
+
+    def _subscriptions(self, topic: str) -> set[tuple[int, ...]]:
+        known = self.graph.node.get_subscriptions_info_by_topic(f'{self.namespace}/{topic}')
         return {tuple(it.endpoint_gid) for it in known}
 
     def get(self, name: str) -> Any:

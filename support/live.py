@@ -18,8 +18,11 @@ from unittest import mock
 
 import ahf_ros.blas  # noqa: F401  before numpy, as in processes that are ours
 
-PATIENCE = 60.0
+PATIENCE = 180.0
 """Time after which something that does not happen is a failure, s; machines may be slow."""
+
+AGAIN = 1.0
+"""Time after which what may have got lost is sent again, s."""
 
 DOMAINS = range(1, 101)
 
@@ -100,6 +103,7 @@ class Graph:
     def __init__(self, node: Any) -> None:
         self.node = node
         self._processes: list[NodeProcess] = []
+        self._clients: dict[tuple[type, str], Any] = {}
 
     def start(self, node: str, *arguments: str, folder: Path | None = None) -> NodeProcess:
         """Start a node of this package, or of another checkout; it ends with the graph."""
@@ -128,8 +132,43 @@ class Graph:
         """Return a list that messages come into, once there is somebody to send them."""
         received: list = []
         self.node.create_subscription(kind, topic, received.append, depth)
-        self.until(lambda: self.node.count_publishers(topic))
+        for publisher in self.until(lambda: self._publishers(topic)):
+            self.introduce(publisher)
         return received
+
+    def newer(self, received: list) -> Any:
+        """Return the last of the messages that a list gets, once one was stamped after now."""
+        now = self.node.get_clock().now().to_msg()
+
+        def is_newer() -> bool:
+            stamp = received[-1].header.stamp
+            return (stamp.sec, stamp.nanosec) > (now.sec, now.nanosec)
+
+        self.until(lambda: received and is_newer())
+        return received[-1]
+
+    def _publishers(self, topic: str) -> set[str]:
+        """Return the nodes that publish on a topic, none unless all of them are known by name."""
+        found = self.node.get_publishers_info_by_topic(topic)
+        nodes = {(it.node_namespace, it.node_name) for it in found}
+        known = {(space, name) for name, space in self.node.get_node_names_and_namespaces()}
+        if not nodes <= known:
+            return set()
+        return {f'{namespace.rstrip("/")}/{name}' for namespace, name in nodes}
+
+    def introduce(self, node: str) -> None:
+        """Return when a node knows all subscriptions and clients that are here already.
+
+        What it sends to one that it does not know gets lost. It answers a new client, and has
+        then heard of what was here before, as announcements come in order.
+        """
+        from rcl_interfaces.srv import GetParameters
+
+        client = self.node.create_client(GetParameters, f'{node}/get_parameters')
+        try:
+            self._response(client, GetParameters.Request(), AGAIN)
+        finally:
+            self.node.destroy_client(client)
 
     def publisher(self, kind: type, topic: str) -> Any:
         """Return a publisher, once there is somebody to receive its messages."""
@@ -138,27 +177,27 @@ class Graph:
         return publisher
 
     def call(self, kind: type, service: str, request: Any) -> Any:
-        """Return the response of a service.
+        """Return the response of a service of a node."""
+        client = self._clients.get((kind, service))
+        if client is None:
+            client = self._clients[kind, service] = self.node.create_client(kind, service)
+            self.introduce(service.rpartition('/')[0])
+        return self._response(client, request, PATIENCE / 4)
 
-        A response that is sent before the service has discovered the client gets lost, so that
-        the request is repeated if nothing comes.
-        """
-        client = self.node.create_client(kind, service)
-        try:
-            self.until(client.service_is_ready)
-            calls = [client.call_async(request)]
-            repetition = time.monotonic() + PATIENCE / 4
+    def _response(self, client: Any, request: Any, patience: float) -> Any:
+        """Return the response to a request, which is sent again after some time without one."""
+        self.until(client.service_is_ready)
+        calls = [client.call_async(request)]
+        repetition = time.monotonic() + patience
 
-            def answered() -> Any:
-                nonlocal repetition
-                if time.monotonic() > repetition:
-                    repetition += PATIENCE / 4
-                    calls.append(client.call_async(request))
-                return next((it for it in calls if it.done()), None)
+        def answered() -> Any:
+            nonlocal repetition
+            if time.monotonic() > repetition:
+                repetition += patience
+                calls.append(client.call_async(request))
+            return next((it for it in calls if it.done()), None)
 
-            return self.until(answered).result()
-        finally:
-            self.node.destroy_client(client)
+        return self.until(answered).result()
 
 
 @contextmanager

@@ -149,6 +149,9 @@ def test_a_bag(case: Case, tmp_path: Path) -> None:
 @pytest.fixture(scope='module')
 def nodes(graph: Any) -> Callable[[Case], Any]:
     """Return, by a case, a node with its detector and another one that asks it for targets."""
+    from std_msgs.msg import Header
+
+    from ahf_ros.nodes.image_msg import image_message
     from support.detector import DetectorProcess
 
     @cache
@@ -157,7 +160,9 @@ def nodes(graph: Any) -> Callable[[Case], Any]:
         other = 'detector:=service', f'service:=/{detector}/detector/identify'
         words, others = ([word for it in given for word in ('-p', it)] for given in (own, other))
         first = DetectorProcess(graph, f'/{detector}', *words)
-        return first, DetectorProcess(graph, f'/asks_{detector}', *others)
+        second = DetectorProcess(graph, f'/asks_{detector}', *others)
+        second.until_served(image_message(image(Case()), Header()))
+        return first, second
 
     return lambda case: with_detector(case.detector, case.command)
 

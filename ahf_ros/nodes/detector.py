@@ -250,13 +250,14 @@ class DetectorNode(ManagedNode):
         raise Refused(reason)
 
     def _publish_diagnostics(self) -> None:
+        # Before the counts, so that these are no older than the stamp.
+        header = Header(stamp=self.get_clock().now().to_msg())
         state = self.state
         self._tally.inactive = '' if state == ACTIVE else state
         if self._images and state == ACTIVE:
             timeout = self._settings.current.image_timeout
             self._watch.look(self._images, timeout, self._answers.waiting())
         status = self._diagnostics.status(DIAGNOSTICS_PERIOD)
-        header = Header(stamp=self.get_clock().now().to_msg())
         self._diagnostic_array.publish(DiagnosticArray(header=header, status=[status]))
 
 

@@ -36,6 +36,7 @@ def test_answers_of_the_node_are_those_of_the_bag(
         **SEARCH,
         'expected_targets': 4,
         'queue': 'lossless',
+        'image_timeout': 0,
         'use_sim_time': str(simulated).lower(),
     }
     given = [text for name, value in parameters.items() for text in ('-p', f'{name}:={value}')]

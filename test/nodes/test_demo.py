@@ -31,7 +31,7 @@ def demo(*options: str) -> subprocess.CompletedProcess[str]:
         env={**os.environ, **ros_environment()},
         capture_output=True,
         text=True,
-        timeout=240,
+        timeout=4 * PATIENCE,
     )
 
 

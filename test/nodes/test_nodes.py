@@ -36,6 +36,8 @@ from support.detector import DetectorProcess
 CONFIG = Path(__file__).parents[2] / 'config' / 'detector.yaml'
 SCENE = {'width': 1000, 'height': 700, 'targets': 6}
 LARGEST_ERROR = 0.1  # px
+PATIENT = {'image_timeout': 0}
+"""Nothing is said of images that a busy machine has not sent yet."""
 ENDLESS = (
     ('max_evaluations', 0),
     ('population', 10000),
@@ -94,7 +96,7 @@ def assert_true(answer: CodedTargetArray, truth: CodedTargetArray) -> None:
 
 def test_two_processes_identify_what_is_there(graph: Any) -> None:
     illumination = graph.start('illumination', *overrides(**SCENE, rate=4, frames=2, tilt=10))
-    detector = graph.start('detector', *overrides(expected_targets=6))
+    detector = graph.start('detector', *overrides(expected_targets=6, **PATIENT))
     truths = graph.listen(CodedTargetArray, '/ground_truth')
     answers = graph.listen(CodedTargetArray, '/coded_targets')
     cameras = graph.listen(CameraInfo, '/camera_info')
@@ -103,9 +105,11 @@ def test_two_processes_identify_what_is_there(graph: Any) -> None:
         true = {stamp(it.header): it for it in truths}
         return [(it, true[stamp(it.header)]) for it in answers if stamp(it.header) in true]
 
-    graph.until(lambda: len(known()) >= 4 and cameras)
+    def both() -> bool:
+        return len({truth.targets[0].id for _, truth in known()}) == 2  # two different images
+
+    graph.until(lambda: len(known()) >= 4 and both() and cameras)
     pairs = known()
-    assert len({truth.targets[0].id for _, truth in pairs}) == 2  # two different images
     for answer, truth in pairs:
         assert_true(answer, truth)
         assert answer.header == truth.header
@@ -123,7 +127,7 @@ def test_two_processes_identify_what_is_there(graph: Any) -> None:
 def test_the_scoreboard_compares_with_the_truth(graph: Any) -> None:
     others = ('-r', '__ns:=/match')
     camera = graph.start('illumination', *others, *overrides(**SCENE, rate=4))
-    detector = graph.start('detector', *others, *overrides(expected_targets=6))
+    detector = graph.start('detector', *others, *overrides(expected_targets=6, **PATIENT))
     board = graph.start('scoreboard', *others, *overrides(images=2))
     assert board.wait() == (0, '')
     lines = board.output.splitlines()
@@ -175,8 +179,7 @@ def test_what_is_refused_is_counted_and_the_node_goes_on(
         told = values(diagnostics[-1])
         return int(told['rejected']), told['last reason for rejection']
 
-    graph.until(lambda: diagnostics)
-    before = rejected()[0]
+    before = int(values(graph.newer(diagnostics))['rejected'])
     flat = image_message(np.zeros((100, 100), np.uint8), header())
     short = image_message(np.zeros((100, 100), np.uint8), header())
     short.height = 200
@@ -322,41 +325,48 @@ def test_images_for_those_who_look(
 def test_parameters_are_answered_and_the_latest_image_waits_during_a_search(
     graph: Any, detector: DetectorProcess, rendering: Rendering
 ) -> None:
-    images = [image_message(rendering.image, header()) for _ in range(4)]
-
-    def answer(image: Image) -> CodedTargetArray | None:
-        return next((it for it in detector.targets if it.header == image.header), None)
+    diagnostics = graph.listen(DiagnosticArray, '/own/diagnostics')
 
     def received() -> int:
-        return int(values(diagnostics[-1])['received'])
+        return int(values(graph.newer(diagnostics))['received'])
 
-    search = *ENDLESS, ('max_duration', 5.0), ('expected_targets', 50)
-    assert detector.set(*search) == (True, '')
-    diagnostics = graph.listen(DiagnosticArray, '/own/diagnostics')
-    graph.until(lambda: diagnostics)
-    before = received()
-    detector.image.publish(images[0])
-    graph.until(lambda: received() > before)
-    for image in images[1:3]:
-        detector.image.publish(image)
-    assert detector.set(('expected_targets', 6)) == (True, '')
-    assert answer(images[0]) is None
-    detector.image.publish(images[3])
-    last = graph.until(lambda: answer(images[3]))
-    first = answer(images[0])
+    def answers_in_time(duration: float) -> list[CodedTargetArray | None]:
+        """Return the answers to four images, none if the search ended before the last one came."""
+        images = [image_message(rendering.image, header()) for _ in range(4)]
+
+        def answer(image: Image) -> CodedTargetArray | None:
+            return next((it for it in detector.targets if it.header == image.header), None)
+
+        search = *ENDLESS, ('max_duration', duration), ('expected_targets', 50)
+        assert detector.set(*search) == (True, '')
+        before = received()
+        detector.image.publish(images[0])
+        graph.until(lambda: received() > before)
+        for image in images[1:3]:
+            detector.image.publish(image)
+        assert detector.set(('expected_targets', 6)) == (True, '')
+        in_time = answer(images[0]) is None
+        detector.image.publish(images[3])
+        graph.until(lambda: answer(images[3]))
+        answers = [answer(image) for image in images]
+        searched = [it for it in answers if it and it.filter.evaluations > 1]
+        return answers if in_time and searched == answers[:1] else []
+
+    # A machine may be so busy that a short search has ended before the parameters are set.
+    first, *between, last = next(filter(None, map(answers_in_time, (5.0, 20.0, 60.0))), [None] * 4)
     assert first is not None
+    assert last is not None
     assert (first.expected, last.expected) == (50, 6)
     assert first.filter.evaluations > last.filter.evaluations == 1
     # One of them may have been identified during the search, and waited for its turn.
-    between = [it for it in map(answer, images[1:3]) if it]
-    assert [it.filter.evaluations for it in between] in ([], [1])
+    assert [it.filter.evaluations for it in between if it] in ([], [1])
     assert graph.call(Trigger, '/own/detector/reset', Trigger.Request()).success
 
 
 def test_no_image_is_lost_in_a_lossless_queue(
     graph: Any, detector: DetectorProcess, rendering: Rendering
 ) -> None:
-    with detector.resubscription():
+    with detector.resubscription('image'):
         assert detector.set(('queue', 'lossless'), ('queue_memory', 1)) == (True, '')
     publisher = graph.node.create_publisher(Image, '/own/image', 30)
     graph.until(publisher.get_subscription_count)
@@ -371,12 +381,13 @@ def test_no_image_is_lost_in_a_lossless_queue(
     graph.until(lambda: len(answers()) == 30)
     assert [it.header for it in answers()] == [image.header for image in images]
     assert {it.filter.duration for it in answers()} == {0.0}
-    with detector.resubscription():
+    with detector.resubscription('image'):
         assert detector.set(('queue', 'latest')) == (True, '')
 
 
 def test_compressed_images(graph: Any, detector: DetectorProcess, rendering: Rendering) -> None:
     assert detector.set(('image_transport', 'compressed')) == (True, '')
+    graph.until(lambda: not detector.image.get_subscription_count())
     publisher = graph.publisher(CompressedImage, '/own/image/compressed')
     _, data = cv2.imencode('.png', rendering.image)
     sent = CompressedImage(header=header(), format='mono8; png compressed')
@@ -398,7 +409,7 @@ def test_a_signal_ends_the_node_in_the_middle_of_a_search(
     process = graph.start(
         'detector',
         *('-r', f'__ns:={space}', '-r', f'/diagnostics:={space}/diagnostics'),
-        *overrides(expected_targets=50, **dict(ENDLESS)),
+        *overrides(expected_targets=50, **PATIENT, **dict(ENDLESS)),
     )
     diagnostics = graph.listen(DiagnosticArray, f'{space}/diagnostics')
     answers = graph.listen(CodedTargetArray, f'{space}/coded_targets')
@@ -443,9 +454,10 @@ def test_a_service_is_a_detector_and_its_end_is_named(
     graph.until(lambda: ('detector', '/other') in graph.node.get_node_names_and_namespaces())
     # So long that a busy machine answers in it, so short that a lost answer is asked for again.
     chosen = overrides(
-        detector='service', service='/other/detector/identify', detector_timeout=24.0
+        detector='service', service='/other/detector/identify', detector_timeout=60.0
     )
     detector = DetectorProcess(graph, '/asking', *chosen)
+    detector.until_served(message)
     found = detector.answer(message)
     assert [it.id for it in found.targets] == [it.id for it in rendering.targets]
     assert found.family == 'metashape12'

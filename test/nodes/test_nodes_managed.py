@@ -91,7 +91,9 @@ def test_a_managed_node_goes_through_its_states(graph: Any) -> None:
     assert change(graph, node, Transition.TRANSITION_ACTIVATE)
     until_answered()
 
+    graph.until(images.get_subscription_count)
     assert change(graph, node, Transition.TRANSITION_DEACTIVATE)
+    graph.until(lambda: not images.get_subscription_count())
     assert change(graph, node, Transition.TRANSITION_CLEANUP)
     assert state(graph, node) == State.PRIMARY_STATE_UNCONFIGURED
     assert detector.set(('expected_targets', 0)) == (True, '')

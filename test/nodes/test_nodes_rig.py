@@ -114,6 +114,7 @@ class Rig:
 
     def send_cloud(self, message: PointCloud2) -> None:
         """Publish a cloud, and return when the node has got it."""
+        self.graph.newer(self.diagnostics)
         before = self.told('clouds received')
         self.cloud.publish(message)
         self.graph.until(lambda: self.told('clouds received') > before)
@@ -169,6 +170,7 @@ def test_what_has_no_partner_is_counted(
     rig: Rig, rendering: Rendering, scanned: np.ndarray
 ) -> None:
     names = ('clouds without an image', 'images without a cloud')
+    rig.graph.newer(rig.diagnostics)
     before = [rig.told(name) for name in names]
     lonely, of = header(), header()
     rig.send_cloud(cloud_message(scanned, lonely))
@@ -183,20 +185,22 @@ def test_what_has_no_partner_is_counted(
 def test_stamps_may_differ_by_the_tolerance(
     rig: Rig, rendering: Rendering, scanned: np.ndarray
 ) -> None:
-    assert rig.detector.set(('cloud_tolerance', 0.01)) == (True, '')
-    rig.graph.until(lambda: rig.cloud.get_subscription_count() == 1)
+    with rig.detector.resubscription('points'):
+        assert rig.detector.set(('cloud_tolerance', 0.01)) == (True, '')
     image = image_message(rendering.image, header())
     cloud = cloud_message(scanned, image.header)
     cloud.header.stamp.nanosec += 9_000_000
     rig.detector.answer(image)
     rig.cloud.publish(cloud)
     assert rig.found(image.header).width == SCENE.targets
-    assert rig.detector.set(('cloud_tolerance', 0)) == (True, '')
+    with rig.detector.resubscription('points'):
+        assert rig.detector.set(('cloud_tolerance', 0)) == (True, '')
 
 
 def test_bad_clouds_are_named_and_the_node_goes_on(
     rig: Rig, rendering: Rendering, camera: Camera, scanned: np.ndarray
 ) -> None:
+    rig.graph.newer(rig.diagnostics)
     before = rig.told('clouds rejected')
     flat = cloud_message(scanned, header())
     flat.height, flat.width = 1, flat.height * flat.width
@@ -235,16 +239,10 @@ def test_bad_clouds_are_named_and_the_node_goes_on(
 def test_no_cloud_is_lost_in_a_lossless_queue(
     rig: Rig, rendering: Rendering, scanned: np.ndarray
 ) -> None:
-    assert rig.detector.set(('queue', 'lossless')) == (True, '')
-    # The subscriptions that there were go when the node gets round to it.
-    first = image_message(rendering.image, header())
-    rig.detector.answer(first)
-    rig.cloud.publish(cloud_message(scanned, first.header))
-    rig.found(first.header)
-    clouds = rig.graph.node.create_publisher(PointCloud2, '/own/points', 10)
-    images = rig.graph.node.create_publisher(Image, '/own/image', 10)
-    for publisher in (clouds, images):
-        rig.graph.until(lambda publisher=publisher: publisher.get_subscription_count() == 1)
+    with rig.detector.resubscription('image', 'points'):
+        assert rig.detector.set(('queue', 'lossless')) == (True, '')
+    clouds = rig.graph.publisher(PointCloud2, '/own/points')
+    images = rig.graph.publisher(Image, '/own/image')
     before = len(rig.points)
     headers = [header() for _ in range(8)]
     for of in headers:
@@ -252,8 +250,8 @@ def test_no_cloud_is_lost_in_a_lossless_queue(
         images.publish(image_message(rendering.image, of))
     rig.graph.until(lambda: len(rig.points) == before + len(headers))
     assert [it.header.stamp for it in rig.points[before:]] == [of.stamp for of in headers]
-    assert rig.detector.set(('queue', 'latest')) == (True, '')
-    rig.graph.until(lambda: clouds.get_subscription_count() == 1)
+    with rig.detector.resubscription('image', 'points'):
+        assert rig.detector.set(('queue', 'latest')) == (True, '')
 
 
 def test_labels_in_space_for_those_who_look(

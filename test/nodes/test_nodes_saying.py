@@ -129,9 +129,7 @@ class Quiet:
 
     def values(self) -> dict[str, str]:
         """Return the entries of the diagnostics that come next."""
-        self.diagnostics.clear()
-        self.graph.until(lambda: self.diagnostics)
-        return values(self.diagnostics[-1])
+        return values(self.graph.newer(self.diagnostics))
 
     def set(self, *given: tuple[str, Any]) -> None:
         parameters = [Parameter(name, value=value).to_parameter_msg() for name, value in given]

@@ -74,7 +74,7 @@ def test_what_does_not_belong_together_is_answered_and_said(
         values = diagnostics[-1].status[0].values
         return int({it.key: it.value for it in values}[name])
 
-    detector.graph.until(lambda: diagnostics)
+    detector.graph.newer(diagnostics)
     before = said('stacks that were not full')
     small = [pixels[:-20] for pixels in phases]
     stream = [message(pixels, 30 + number) for number, pixels in enumerate(phases[:2])]
