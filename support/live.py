@@ -52,7 +52,10 @@ class NodeProcess:
     """A node of this package that runs in a process of its own."""
 
     def __init__(self, node: str, *arguments: str, folder: Path | None = None) -> None:
-        command = [sys.executable, '-m', 'ahf_ros.nodes', node, '--ros-args', *arguments]
+        # A response to a client that the node does not know yet; the request is sent again.
+        unwarned = '-W', 'ignore:failed to send response'
+        command = [sys.executable, *unwarned, '-m', 'ahf_ros.nodes', node]
+        command += ['--ros-args', *arguments]
         self.awaited = False
         self.output = self.log = ''
         # Not pipes, which hold up a process of which nobody reads the log.
