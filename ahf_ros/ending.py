@@ -16,7 +16,7 @@ POLL = 0.02
 """Time between two looks at what is waited for, s."""
 
 GRACE = 3.0
-"""Time to end in order, s."""
+"""Time to end in order, s; of processors, where others may be busy."""
 
 _WITH_NOHUP = (signal.SIGINT, signal.SIGTERM)
 _ENDING = (*_WITH_NOHUP, signal.SIGHUP)

@@ -18,11 +18,9 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any
 
-from ahf_ros import ending
 from ahf_ros.batch.engine import TRIES, GivenUp, Job, Report, no_report
-from ahf_ros.batch.worker import GONE, Kind
+from ahf_ros.batch.worker import GONE, STUCK, Kind
 
-_ENDING = 10 * ending.GRACE  # s until a worker is killed that cannot end by itself
 _PACKAGE = str(Path(__file__).parents[2])
 _BEGIN = (
     'import sys; sys.path.insert(0, sys.argv[1]); '
@@ -113,7 +111,7 @@ class Processes:
         """End all workers."""
         for worker in self._workers:
             worker.close()  # so it ends
-        limit = time.monotonic() + _ENDING
+        limit = time.monotonic() + STUCK
         for worker in self._workers:
             with suppress(subprocess.TimeoutExpired):
                 worker.process.wait(max(limit - time.monotonic(), 0))

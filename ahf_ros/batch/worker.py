@@ -10,6 +10,7 @@ import os
 import signal
 import sys
 import threading
+import time
 import traceback
 from contextlib import suppress
 from enum import IntEnum
@@ -21,6 +22,9 @@ import ahf_ros.blas  # noqa: F401  before numpy
 from ahf_ros import ending
 from ahf_ros.batch.engine import Job
 from ahf_ros.text import reason_of
+
+STUCK = 10 * ending.GRACE
+"""Time after which a worker is taken to be stuck at its end, s."""
 
 GONE = (EOFError, OSError)
 """What the pipe of a process that has ended raises."""
@@ -83,15 +87,17 @@ def _watch(alive: int) -> None:
     """End this process once nobody holds the other end of a pipe."""
     os.read(alive, 1)
     _end()
+    time.sleep(STUCK)
+    os._exit(1)
 
 
 def _end(*_: Any) -> None:
-    """Let the current task come to its end, within a limit of time.
+    """Let the current task come to its end, within a limit of processor time.
 
     It is not interrupted by an exception, which might be lost, or leave temporary files behind.
     """
     ending.begin()
-    signal.setitimer(signal.ITIMER_REAL, ending.GRACE)  # then SIGALRM kills this process
+    signal.setitimer(signal.ITIMER_PROF, ending.GRACE)  # then SIGPROF kills this process
 
 
 def _prepare(threads: int) -> None:

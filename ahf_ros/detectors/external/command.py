@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from ahf_ros.detectors.contract import DetectorSettings
-from ahf_ros.detectors.external.program import output_of
+from ahf_ros.detectors.external.program import check_running, output_of
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.interchange.target_json import targets_from_json
 from ahf_ros.target import Target, sorted_targets
@@ -62,10 +62,11 @@ class CommandDetector:
         Unavailable
             If the command cannot be started.
         ValueError
-            If the image is not accepted; if the command takes longer than its time limit, ends
-            with another status than 0, or prints what is not accepted.
+            If the image is not accepted; if this process ends; if the command takes longer than
+            its time limit, ends with another status than 0, or prints what is not accepted.
         """
         check_image(image)
+        check_running(self._named)
         with tempfile.TemporaryDirectory(prefix='ahf_') as folder:
             path = Path(folder, 'image.png')
             cv2.imwrite(str(path), as_gray(image).astype(np.uint8, copy=False))

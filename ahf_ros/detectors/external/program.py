@@ -22,6 +22,18 @@ _running: set[subprocess.Popen[Any]] = set()
 _lock = threading.RLock()  # a signal handler may interrupt its own thread
 
 
+def check_running(name: str) -> None:
+    """Refuse to run a program while this process ends.
+
+    Raises
+    ------
+    ValueError
+        With the name that errors call it.
+    """
+    if ending.has_begun():
+        raise ValueError(f'{name} was ended with this process')
+
+
 def output_of(words: list[str], folder: Path, timeout: float, name: str) -> str:
     """Run a program and return what it writes to standard output.
 
@@ -84,8 +96,7 @@ def _awaited(
     """Return the status of a program, or raise a ValueError as soon as it breaks a limit."""
     limit = time.monotonic() + timeout
     while True:
-        if ending.has_begun():
-            raise ValueError(f'{name} was ended with this process')
+        check_running(name)
         remaining = limit - time.monotonic()
         status = None
         try:
