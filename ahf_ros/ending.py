@@ -2,14 +2,16 @@
 
 A signal handler that raises an exception does so wherever the program is. During an import the
 exception may be lost or become another one, because C code discards or replaces what it does not
-expect. So `end` waits for the end of an import, and loops that go on call `check`.
+expect. So `interrupt` waits for the end of an import, and loops that go on call `check`.
 """
 
 from __future__ import annotations
 
 import signal
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from types import FrameType
 
 POLL = 0.02
@@ -24,6 +26,7 @@ _IMPORT = '<frozen importlib'  # file of the code that imports
 
 # Signal handlers set and read these, so they have no lock.
 _number: int | None = None
+_raised = False
 _limit = 0.0
 _actions: list[Callable[[], None]] = []
 
@@ -40,19 +43,50 @@ def ignore_ending() -> None:
         signal.signal(number, signal.SIG_IGN)
 
 
-def end(number: int, frame: FrameType | None) -> None:
-    """Handle a signal by the end of this process, in order.
+@contextmanager
+def handled() -> Iterator[None]:
+    """Let the first of these signals end this process in order; others have no effect then.
 
-    Raises
-    ------
-    KeyboardInterrupt, SystemExit
-        As `check` does; after the current import, if that takes no longer than `GRACE`.
+    The signal raises what `check` does, see `interrupt`. Other threads than the main one get none.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {number: signal.signal(number, _end) for number in ending_signals()}
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        if has_begun():
+            ignore_ending()
+        else:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+
+def _end(number: int, frame: FrameType | None) -> None:
+    # Not SIG_IGN: two signals at once would be reported as a race.
+    for other in _ENDING:
+        signal.signal(other, _pass)
+    begin(number)
+    interrupt(frame)
+
+
+def _pass(_: int, __: FrameType | None) -> None:
+    """Handle a signal that has no effect."""
+
+
+def interrupt(frame: FrameType | None) -> None:
+    """Raise what `check` does in the main thread, after an import if that is not too long.
+
+    Parameters
+    ----------
+    frame : frame, optional
+        Where a signal interrupts the main thread; the handler of the signal calls this.
     """
     global _limit
-    ignore_ending()
-    begin(number)
     _limit = time.monotonic() + GRACE
-    _raise_after_import(number, frame)
+    _raise_after_import(0, frame)
 
 
 def _raise_after_import(_: int, frame: FrameType | None) -> None:
@@ -62,7 +96,8 @@ def _raise_after_import(_: int, frame: FrameType | None) -> None:
             signal.setitimer(signal.ITIMER_REAL, POLL)
             return
         frame = frame.f_back
-    check()
+    if not _raised:  # by a loop that has called `check` meanwhile
+        check()
 
 
 def at_begin(action: Callable[[], None]) -> None:
@@ -99,7 +134,11 @@ def check() -> None:
     SystemExit
         If it ends by another signal; its code is 128 and the number of the signal.
     """
+    global _raised
+    if _number is None:
+        return
+    if threading.current_thread() is threading.main_thread():
+        _raised = True
     if _number == signal.SIGINT:
         raise KeyboardInterrupt
-    if _number is not None:
-        raise SystemExit(128 + _number)
+    raise SystemExit(128 + _number)

@@ -16,6 +16,7 @@ from contextlib import suppress
 from enum import IntEnum
 from functools import partial
 from multiprocessing.connection import Connection
+from types import FrameType
 from typing import Any
 
 import ahf_ros.blas  # noqa: F401  before numpy
@@ -80,6 +81,7 @@ def _heed_signals(alive: int) -> None:
         signal.signal(number, signal.SIG_IGN)  # the parent gets it, too, and ends
     signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
     signal.signal(signal.SIGTERM, _end)
+    signal.signal(signal.SIGPROF, _interrupt)
     threading.Thread(target=_watch, args=(alive,), daemon=True).start()
 
 
@@ -92,12 +94,17 @@ def _watch(alive: int) -> None:
 
 
 def _end(*_: Any) -> None:
-    """Let the current task come to its end, within a limit of processor time.
+    """Let the current task come to its end; interrupt it after some time of processors, then kill.
 
-    It is not interrupted by an exception, which might be lost, or leave temporary files behind.
+    An exception is the second choice, because it might be lost, or leave temporary files behind.
     """
     ending.begin()
-    signal.setitimer(signal.ITIMER_PROF, ending.GRACE)  # then SIGPROF kills this process
+    signal.setitimer(signal.ITIMER_PROF, ending.GRACE, ending.GRACE)
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    signal.signal(number, signal.SIG_DFL)  # the next one kills this process
+    ending.interrupt(frame)
 
 
 def _prepare(threads: int) -> None:

@@ -8,11 +8,8 @@ argument is not accepted.
 from __future__ import annotations
 
 import os
-import signal
 import sys
-import threading
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 
 from ahf_ros import ending
 
@@ -35,7 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # What OpenCV warns of, such as tags of TIFF files that it does not know, is not for users.
     os.environ.setdefault('OPENCV_LOG_LEVEL', 'ERROR')
     try:
-        with _heeded_signals():
+        with ending.handled():
             # Imported here, so that a signal during the imports ends in order, too.
             from ahf_ros.cli import commands
 
@@ -53,21 +50,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _discard_output()
         print(f'ahf: error: {error.strerror or error}', file=sys.stderr)
         return FAILED
-
-
-@contextmanager
-def _heeded_signals() -> Iterator[None]:
-    """End in order after a signal, with the programs that detectors run."""
-    if threading.current_thread() is not threading.main_thread():
-        yield  # signals come to the main thread
-        return
-    before = {number: signal.signal(number, ending.end) for number in ending.ending_signals()}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            if signal.getsignal(number) is ending.end:
-                signal.signal(number, handler)
 
 
 def _replace_closed() -> None:
