@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 from rosbags.interfaces import Connection
 
+from ahf_ros import ending
 from ahf_ros.bag.definitions import (
     CODED_TARGETS,
     COMPRESSED_IMAGE,
@@ -94,7 +95,10 @@ class Answering:
         self._source = source
         self._topics = topics
         self._family = detector.family
-        self._identifiers = {topic: create_identifier(settings, detector) for topic in topics}
+        self._identifiers = {
+            topic: create_identifier(settings, detector, interrupt=ending.check)
+            for topic in topics
+        }
         self._stacking = stacking
         self._windows: dict[str, Window[_Held]] = {topic: Window(stacking) for topic in topics}
         self._store = typestore()

@@ -13,6 +13,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from ahf_ros import ending
 from ahf_ros.batch.engine import Report, no_report
 from ahf_ros.batch.fingerprints import file_fingerprint
 from ahf_ros.batch.task import ImageOutcome, ImageTask, Level, Message
@@ -154,7 +155,7 @@ def _identified(
     if not paths:
         return
     try:
-        identifier = create_identifier(task.settings, detector)
+        identifier = create_identifier(task.settings, detector, interrupt=ending.check)
         identifier.elsewhere = spread(task, images) if spread else None
         for part, stack, found in identify_parts(identifier, list(images.values()), task.stacking):
             of = paths[part.images.start : part.images.stop]
