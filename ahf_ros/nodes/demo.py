@@ -165,8 +165,9 @@ def main(arguments: list[str] | None = None) -> int:
     print(f'{SCENE["targets"]} targets under {options.light}, being rendered ...', flush=True)
     with Processes() as processes:
         for space, (_, parameters) in DETECTORS.items():
-            expected = {'expected_targets': SCENE['targets']}
-            processes.start('detector', f'{NAMESPACE}/{space}', **expected, **parameters)
+            # The camera waits until all are connected, so that no image for long is no fault.
+            common = {'expected_targets': SCENE['targets'], 'image_timeout': 0.0}
+            processes.start('detector', f'{NAMESPACE}/{space}', **common, **parameters)
         frames = {'frames': options.images, 'rate': WAITING_RATE}
         processes.start('illumination', NAMESPACE, **frames, **SCENE, **scene)
         return run(partial(Demo, processes, options), ['--ros-args', '-r', f'__ns:={NAMESPACE}'])

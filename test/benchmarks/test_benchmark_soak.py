@@ -19,6 +19,7 @@ def test_every_image_is_answered_and_nothing_is_left_behind(graph: Any) -> None:
     assert figures['unexpected IDs'] == 0
     assert figures['rejected'] == figures['messages that are not images'] == 13 + 1
     assert (figures['parameters set'], figures['participants that joined and left']) == (10, 1)
-    assert figures['threads at the end'] <= figures['threads when warm'] + 1
+    # Threads of pools start when they are first needed: 3 of the executor, 3 of the worker.
+    assert figures['threads at the end'] <= run.looks[0].threads + 6
     assert figures['open files at the end'] == figures['open files when warm']
     assert run.node.end()[0] == 0

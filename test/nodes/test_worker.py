@@ -7,8 +7,7 @@ from concurrent.futures import CancelledError
 import pytest
 
 from ahf_ros.nodes.worker import Worker
-
-PATIENCE = 60.0
+from support.live import PATIENCE
 
 
 class Gate:
