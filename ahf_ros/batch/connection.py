@@ -40,6 +40,7 @@ def connect(address: str) -> Any:
     for name in list(logging.root.manager.loggerDict):
         if name.partition('.')[0] == 'distributed':
             logging.getLogger(name).setLevel(logging.CRITICAL)
+    logging.getLogger('tornado.application').addFilter(_is_news)
     try:
         client = distributed.Client(address, timeout=_CONNECT, set_as_default=False)
     except Exception as error:  # a scheduler of another version may answer anything
@@ -86,6 +87,11 @@ def check_version(client: Any, address: str) -> None:
         raise ValueError(
             f'scheduler {address} has dask.distributed {theirs}, accepted is {mine} as here'
         )
+
+
+def _is_news(record: logging.LogRecord) -> bool:
+    """Return whether a record is about anything but a connection that is lost or closed."""
+    return not (record.exc_info and isinstance(record.exc_info[1], AWAY))
 
 
 def _python(version: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 import shutil
 import sys
@@ -141,6 +142,12 @@ def test_other_versions_are_named() -> None:
         connection.check_version(client, 'tcp://b')
     refused = connection.refused_workers(client)
     assert refused['tcp://a'].startswith('has Python 3.1, accepted is 3.')
+
+
+def test_a_lost_connection_is_no_news_to_log() -> None:
+    for error, news in ((ConnectionResetError('gone'), False), (ValueError('wrong'), True)):
+        record = logging.makeLogRecord({'exc_info': (type(error), error, None)})
+        assert connection._is_news(record) == news
 
 
 def test_a_worker_without_the_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
