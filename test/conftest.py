@@ -1,13 +1,24 @@
-"""What all tests share: a header, and the graph of real nodes."""
+"""What all tests share: a header, the drawn examples, and the graph of real nodes."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
 from support import live, vector_units
+
+with suppress(ModuleNotFoundError):
+    from hypothesis import HealthCheck, settings
+
+    # Neither the speed of a machine nor chance decides: `benchmarks.attack` draws other examples.
+    slow = [HealthCheck.too_slow]
+    settings.register_profile(
+        'same', deadline=None, derandomize=True, database=None, suppress_health_check=slow
+    )
+    settings.load_profile('same')
 
 
 def pytest_report_header() -> str:

@@ -100,7 +100,7 @@ def test_what_is_right_stays_as_it_is():
     assert checked_target(GOOD, 'x') is GOOD
 
 
-@settings(max_examples=300, deadline=None, derandomize=True)
+@settings(max_examples=300)
 @given(attack.RESULTS)
 def test_whatever_passes_fits_everywhere(found):
     attack.check_result(found)

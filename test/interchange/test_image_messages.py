@@ -207,13 +207,13 @@ def test_compressed_images_keep_their_depth():
         decode_compressed(SimpleNamespace(format='jpeg', data=np.zeros(3, np.uint8)))
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=400)
 @given(fuzz.images())
 def test_any_message_is_an_image_or_refused(fields):
     fuzz.check(fields)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(fuzz.compressed_images())
 def test_any_compressed_message_is_an_image_or_refused(fields):
     fuzz.check_compressed(fields)

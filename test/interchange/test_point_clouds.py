@@ -115,7 +115,7 @@ def sizes(most: int = 2**32 - 1) -> Any:
     return st.integers(0, 40) | st.integers(0, most)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(
     height=sizes(),
     width=sizes(),
