@@ -43,7 +43,7 @@ def identify(results: Path, *arguments: object) -> Path:
         capture_output=True,
         text=True,
         env={**os.environ, 'PYTHONPATH': str(ROOT)},
-        timeout=600,
+        timeout=3600,
     )
     assert done.returncode == 0, done.stderr
     results.write_text(done.stdout)

@@ -190,14 +190,15 @@ class MyDetector:
 )
 def test_a_detector_of_another_package_may_fail_and_hang(tmp_path, monkeypatch, gray, words):
     registry = added(tmp_path, monkeypatch, f'package_that_fails_{gray}', FAILING)
-    detector = registry['create_detector']('mine', DetectorSettings(detector_timeout=0.2))
+    patient = registry['create_detector']('mine', DetectorSettings(detector_timeout=600.0))
+    impatient = registry['create_detector']('mine', DetectorSettings(detector_timeout=0.2))
     image = np.full((20, 20), gray, np.uint8)
     image[0] = 0
     with pytest.raises(ValueError) as raised:
-        identify(image, detector, expected_targets=0)
+        identify(image, impatient if gray == 1 else patient, expected_targets=0)
     assert str(raised.value) == words
     with pytest.raises(ValueError, match="detector 'mine' failed: RuntimeError: no GPU"):
-        detector.refine(image, [])
+        patient.refine(image, [])
 
 
 HOSTILE = """
@@ -291,9 +292,12 @@ def test_no_image_that_a_detector_failed_on_stays_in_memory():
 def test_a_search_ends_when_a_detector_hangs_in_it(tmp_path, monkeypatch):
     body = FAILING.replace('image.max() == 1', 'image.max() > 100')
     registry = added(tmp_path, monkeypatch, 'package_that_hangs', body)
-    detector = registry['create_detector']('mine', DetectorSettings(detector_timeout=0.2))
+    patient, impatient = (
+        registry['create_detector']('mine', DetectorSettings(detector_timeout=limit))
+        for limit in (600.0, 0.2)
+    )
     image = np.full((20, 20), 60, np.uint8)
     image[0] = 0
-    assert identify(image, detector, expected_targets=0).targets == ()
+    assert identify(image, patient, expected_targets=0).targets == ()
     with pytest.raises(ValueError, match='took longer than detector_timeout'):
-        identify(image, detector, expected_targets=5)
+        identify(image, impatient, expected_targets=5)
