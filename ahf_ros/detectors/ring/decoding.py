@@ -102,7 +102,7 @@ def decode(
         marked, evidence.onto[:, last], evidence.off[:, last], family
     )
     bits = bits_at(words, phases, per_sector, family)
-    own = _of_sectors(np.where(bits, 1, -1) * evidence.marked, phases, family.bits)
+    own = sums_of_sectors(np.where(bits, 1, -1) * evidence.marked, phases, family.bits)
     minimum = np.where(evidence.edges < _FEW_EDGES, 0, _MINIMUM_MARGIN)
     explained, contradiction = explanation(
         samples, evidence, marks, words, phases, np.zeros(bits.shape, bool), family
@@ -148,7 +148,7 @@ def explanation(
     """
     bits = bits_at(words, phases, hidden.shape[1] // family.bits, family)
     against = np.where(bits | hidden, 0, np.maximum(evidence.steps, 0).sum(axis=0))
-    contradiction = _of_sectors(against, phases, family.bits).max(axis=1)
+    contradiction = sums_of_sectors(against, phases, family.bits).max(axis=1)
     return _explained(samples, marks, bits, ~hidden), contradiction
 
 
@@ -183,7 +183,7 @@ def bits_at(words: np.ndarray, phases: np.ndarray, per_sector: int, family: Fami
     return (words[..., None] >> sector & 1).astype(bool)
 
 
-def _of_sectors(values: np.ndarray, phases: np.ndarray, bits: int) -> np.ndarray:
+def sums_of_sectors(values: np.ndarray, phases: np.ndarray, bits: int) -> np.ndarray:
     """Return the sums of values (k, angles) over sectors, at phases (k,), shape (k, bits)."""
     count = values.shape[1]
     sector = (np.arange(count) - phases[:, None]) % count // (count // bits)

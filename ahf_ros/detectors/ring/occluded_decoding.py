@@ -24,6 +24,7 @@ from ahf_ros.detectors.ring.decoding import (
 )
 from ahf_ros.detectors.ring.evidence import MarkAppearance
 from ahf_ros.detectors.ring.explanations import best_explanations, explained_words
+from ahf_ros.detectors.ring.impossible import are_impossible
 from ahf_ros.detectors.ring.occlusion import (
     EVEN,
     HiddenEvidence,
@@ -104,7 +105,11 @@ def decode_occluded(
     explained, contradiction = explanation(
         samples, evidence, marks, best.words, best.phases, best.hidden, family
     )
-    seen = (best.hidden.mean(axis=1) < _MOST_HIDDEN) | (of.price <= EVEN)
+    even = of.price <= EVEN
+    seen = (best.hidden.mean(axis=1) < _MOST_HIDDEN) | even
+    possible = even | ~are_impossible(
+        samples, best.words, best.phases, best.hidden, marks, frames, family
+    )
     return Readings(
         best.words,
         2 * np.pi * best.phases / count,
@@ -115,7 +120,7 @@ def decode_occluded(
         best.unexplained,
         best.hidden,
         of.price,
-        (best.words > 0) & seen & (explained.min(axis=1) > MINIMUM_EXPLAINED),
+        (best.words > 0) & seen & possible & (explained.min(axis=1) > MINIMUM_EXPLAINED),
     )
 
 
