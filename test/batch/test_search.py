@@ -61,6 +61,7 @@ def test_a_search_ends_with_its_process(
         passed.append(call)
 
     monkeypatch.setattr(ending, 'check', check)
+    monkeypatch.setattr(ending, '_raised', False)  # as it is afterwards
     with pytest.raises(ends):
         identify_images(ImageTask((str(tmp_path / 'image.png'),), settings))
     assert len(passed) <= 2
