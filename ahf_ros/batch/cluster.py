@@ -89,6 +89,7 @@ class Cluster:
         self._results: deque[tuple[int, Any]] = deque()
         self._refused: dict[str, str] = {}
         self._submissions = 0
+        self._late: set[str] = set()
         self._deserted = False
         self._perform = guarded_perform()
         self._connect()
@@ -217,12 +218,25 @@ class Cluster:
             self._return()
         elif time.monotonic() - self._looked > _LOOK:
             self._look()
+            self._fetch_again()
             for key, begun in list(self._begun.items()):
                 if begun.workers and not begun.workers & self._good():
                     self._waiting.append(self._begun.pop(key))
         waiting, self._waiting = self._waiting, []
         for begun in waiting:
             self._begin(begun)
+
+    def _fetch_again(self) -> None:
+        """Ask again for results that got lost on their way, which the client does not."""
+        late = {
+            future.key: future
+            for future in list(self._completed.futures)
+            if future.key in self._begun and future.done()
+        }
+        again = self._late & late.keys()
+        for key in again:
+            self._completed.add(late[key])
+        self._late = late.keys() - again
 
     def _return(self) -> None:
         """Wait for the scheduler, and keep what it had for submission."""

@@ -10,6 +10,7 @@ import sys
 import time
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -31,6 +32,17 @@ from support.jobs import do_as_told
 
 FOREIGN = {'batch/remote.py': 'perform = None', 'release.py': 'def release():\n    return "0.1"'}
 """A package of another release."""
+
+
+def lose_one(client: Any) -> None:
+    """Let a connection break while a result comes over it, though not that to the scheduler."""
+    gather = client._gather
+
+    async def broken(*_: object, **__: object) -> None:
+        client._gather = gather
+        raise ConnectionResetError('gone')
+
+    client._gather = broken
 
 
 def test_nothing_is_lost_and_nothing_twice(
@@ -74,6 +86,8 @@ def test_nothing_is_lost_and_nothing_twice(
                     while len(results) == 50 and client.scheduler_comm in (None, connected):
                         assert time.monotonic() < limit
                         time.sleep(0.01)
+                if len(results) == 55:
+                    lose_one(engine._client)
         assert sorted(results) == list(range(len(tasks)))
         assert results[0] != os.getpid() and isinstance(results[1], int)
         assert isinstance(results[2], GivenUp) and 'by SIGKILL' in results[2].reason
