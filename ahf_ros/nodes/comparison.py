@@ -69,13 +69,14 @@ class Comparison(ProcessNode):
         self._cases: dict[tuple[Target, ...], Case] = {}
         self.answered = 0
         self._complete: set[tuple[Target, ...]] = set()
-        self.subscribe(CodedTargetArray, 'ground_truth', self._truths.put)
+        self.subscribe(CodedTargetArray, 'ground_truth', self._truths.put, lossless=True)
         self.subscribe(Image, 'image', partial(self._take, self._keep_image, ''))
         for space in titles:
             filtered, targets = f'{space}/detector/filtered_image', f'{space}/coded_targets'
             keep_answer = partial(self._take, self._keep_answer, space)
             self.subscribe(Image, filtered, partial(self._take, self._keep_image, space))
-            self.subscribe(CodedTargetArray, targets, keep_answer)
+            # With the latest answer only, the first one to a scene may not be seen.
+            self.subscribe(CodedTargetArray, targets, keep_answer, lossless=True)
 
     def connected(self) -> bool:
         """Return whether somebody publishes on every topic that the node listens to."""

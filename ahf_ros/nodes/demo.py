@@ -15,8 +15,9 @@ from pathlib import Path
 from typing import Any
 
 from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
-from rcl_interfaces.srv import SetParameters
+from rcl_interfaces.srv import GetParameters, SetParameters
 from rclpy.parameter import Parameter
+from rclpy.task import Future
 
 from ahf_ros.nodes.comparison import Comparison
 from ahf_ros.nodes.process import run
@@ -76,7 +77,9 @@ class Processes:
         given = [word for name, value in parameters.items() for word in ('-p', f'{name}:={value}')]
         names = ('-r', f'__ns:={space}', '-r', f'image:={NAMESPACE}/image')
         ros = ('--ros-args', '--log-level', 'warn', *names, *given)
-        command = (sys.executable, '-m', 'ahf_ros.nodes', node, *ros)
+        # rclpy warns of responses that get lost; their requests are repeated.
+        unwarned = '-W', 'ignore:failed to send response'
+        command = (sys.executable, *unwarned, '-m', 'ahf_ros.nodes', node, *ros)
         self._started.append(subprocess.Popen(command))
 
     def any_ended(self) -> bool:
@@ -101,13 +104,18 @@ class Demo(Comparison):
         super().__init__(titles, options.images, options.output, origin)
         self._processes = processes
         self._camera = self.create_client(SetParameters, 'illumination/set_parameters')
+        nodes = 'illumination', *(f'{space}/detector' for space in titles)
+        self._strangers = {
+            node: self.create_client(GetParameters, f'{node}/get_parameters') for node in nodes
+        }
         self._waiting = True
         self._seen = 0
         self._changed = time.monotonic()
         self.create_timer(0.2, self._watch)
 
     def _watch(self) -> None:
-        if self._waiting and self._camera.service_is_ready() and self.connected():
+        ready = self._waiting and self._camera.service_is_ready() and self.connected()
+        if ready and self._known():
             self._waiting = False
             rate = Parameter('rate', value=RATE).to_parameter_msg()
             self._camera.call_async(SetParameters.Request(parameters=[rate]))
@@ -121,6 +129,21 @@ class Demo(Comparison):
         if reason and not self.ended.done():
             print(reason, file=sys.stderr)
             self.ended.set_result(1)
+
+    def _known(self) -> bool:
+        """Return whether all nodes know this one, and ask those that may not.
+
+        What a node sends to a subscription that it does not know yet gets lost. Once it has
+        answered a client, it knows the subscriptions that are older.
+        """
+        for node, client in tuple(self._strangers.items()):
+            if client.service_is_ready():
+                asked = client.call_async(GetParameters.Request())
+                asked.add_done_callback(partial(self._meet, node))
+        return not self._strangers
+
+    def _meet(self, node: str, _: Future) -> None:
+        self._strangers.pop(node, None)
 
 
 def shared_memory_profile() -> Path:
