@@ -24,11 +24,12 @@ _OPTIONS = (
 
 @contextmanager
 def opened(loading: str = 'normal') -> Iterator[Any]:
-    """Yield a Chromium that selenium drives, or skip where it is not installed.
+    """Yield a Chromium that selenium drives, or skip where it is not installed or does not start.
 
     `loading` is the strategy of selenium: 'none' does not wait until a page is complete.
     """
     webdriver = pytest.importorskip('selenium.webdriver', reason='selenium is not installed')
+    exceptions = pytest.importorskip('selenium.common.exceptions')
     program = next((path for path in map(shutil.which, _PROGRAMS) if path), None)
     driver = shutil.which('chromedriver')
     if not (program and driver):
@@ -40,7 +41,10 @@ def opened(loading: str = 'normal') -> Iterator[Any]:
     for option in _OPTIONS:
         options.add_argument(option)
     service = webdriver.ChromeService(executable_path=driver)
-    browser = webdriver.Chrome(options=options, service=service)
+    try:
+        browser = webdriver.Chrome(options=options, service=service)
+    except exceptions.WebDriverException as error:  # such as a snap in a container
+        pytest.skip(f'Chromium does not start: {error.msg}')
     try:
         yield browser
     finally:
