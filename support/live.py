@@ -162,8 +162,9 @@ class Graph:
     def introduce(self, node: str) -> None:
         """Return when a node knows all subscriptions and clients that are here already.
 
-        What it sends to one that it does not know gets lost. It answers a new client, and has
-        then heard of what was here before, as announcements come in order.
+        What it sends to one that it does not know gets lost: it waits for 0.1 s with a response,
+        then drops it (ros2/rmw_fastrtps#467). Once it has answered a new client, it has heard of
+        what was here before, as announcements come in order.
         """
         from rcl_interfaces.srv import GetParameters
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 from typing import Any
@@ -90,32 +89,16 @@ def test_garbage_of_a_program_is_named_and_the_node_lives(graph: Any, tmp_path: 
     assert 'Traceback' not in errors
 
 
-def until_matched(graph: Any, client: Any, request: Identify.Request) -> None:
-    """Repeat a request until it is answered.
-
-    A service that does not know its client yet waits for 0.1 s with its first response, then
-    drops it (ros2/rmw_fastrtps#467). A busy machine takes longer.
-    """
-    sent: list[tuple[float, Any]] = []
-
-    def answered() -> bool:
-        if not sent or time.monotonic() > sent[-1][0] + 1:
-            sent.append((time.monotonic(), client.call_async(request)))
-        return any(it.done() for _, it in sent)
-
-    graph.until(answered)
-
-
 @pytest.mark.parametrize('count', [12, 60])
 def test_all_of_many_requests_at_once_are_answered(graph: Any, count: int) -> None:
     graph.start('detector', '-r', f'__ns:=/many{count}', *overrides(detector='traditional'))
-    # Clients keep ten requests, unless told otherwise. Some are repeated before.
-    kept = QoSProfile(depth=count + 1000)
-    name = f'/many{count}/detector/identify'
-    client = graph.node.create_client(Identify, name, qos_profile=kept)
+    # Clients keep ten requests, unless told otherwise.
+    kept = QoSProfile(depth=max(count, 10))
+    node = f'/many{count}/detector'
+    client = graph.node.create_client(Identify, f'{node}/identify', qos_profile=kept)
     graph.until(client.service_is_ready)
+    graph.introduce(node)
     request = Identify.Request(image=image_message(IMAGE, Header()))
-    until_matched(graph, client, request)
     futures = [client.call_async(request) for _ in range(count)]
     for number in range(1, count + 1):  # each in its time, however long all of them take
         graph.until(lambda at_least=number: sum(it.done() for it in futures) >= at_least)
