@@ -48,6 +48,18 @@ def ros_environment() -> dict[str, str]:
     raise RuntimeError('all domains are taken by other tests')
 
 
+def errors_of(log: str) -> str:
+    """Return the errors among what nodes write to standard error.
+
+    Information is none, nor is a port of shared memory that a process of whatever domain takes at
+    the same moment: Fast DDS says so and takes the next one.
+    """
+    lines = log.splitlines(keepends=True)
+    return ''.join(
+        it for it in lines if not it.startswith('[INFO] ') and 'Failed init_port' not in it
+    )
+
+
 class NodeProcess:
     """A node of this package that runs in a process of its own."""
 
@@ -80,8 +92,7 @@ class NodeProcess:
             self.process.kill()
             raise
         self.output, self.log = (self._read(it) for it in self._written)
-        lines = self.log.splitlines(keepends=True)
-        return self.process.returncode, ''.join(it for it in lines if not it.startswith('[INFO] '))
+        return self.process.returncode, errors_of(self.log)
 
     def kill(self) -> None:
         """End the process without notice."""

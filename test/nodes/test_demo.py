@@ -16,7 +16,7 @@ import pytest
 from ahf_ros.drawing.colours import DECODED_COLOUR, MISSED_COLOUR, WRONG_COLOUR
 from ahf_ros.interchange.image_files import read_image
 from ahf_ros.target import FilterState, Identification, Target
-from support.live import PATIENCE, ros_environment
+from support.live import PATIENCE, errors_of, ros_environment
 
 pytest.importorskip('rclpy', reason='ROS 2 is not installed')
 
@@ -37,7 +37,7 @@ def demo(*options: str) -> subprocess.CompletedProcess[str]:
 
 def test_the_demo_shows_one_image_in_three_ways(tmp_path: Path) -> None:
     done = demo('--output', str(tmp_path))
-    assert (done.returncode, done.stderr) == (0, '')
+    assert (done.returncode, errors_of(done.stderr)) == (0, '')
     found = re.findall(
         r'^  (\w.*?)  +(\d+) of 12 right.* (\d+) missed.*; (.*), ', done.stdout, re.M
     )

@@ -47,7 +47,7 @@ def run(*command: str, **environment: str) -> tuple[int, str]:
         text=True,
         timeout=live.PATIENCE,
     )
-    return done.returncode, done.stderr
+    return done.returncode, live.errors_of(done.stderr)
 
 
 @pytest.mark.parametrize(
