@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from ahf_ros.batch.engine import GivenUp, finished_tasks
+from ahf_ros.batch.worker import STUCK
 from ahf_ros.cli.engine_options import add_scheduler_argument
 from ahf_ros.cli.engines import create_engine, shared_settings
 from ahf_ros.cli.options import (
@@ -38,7 +39,7 @@ STORAGE = Parameter(
     'storage', 'mcap', 'Storage format of the output bag.', choices=('mcap', 'sqlite3')
 )
 
-_PATIENCE = 10.0  # s; a worker process outlives a worker of a cluster that is killed, by GRACE
+_PATIENCE = 2 * STUCK  # s; a process outlives its killed worker of a cluster, at most by STUCK
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
