@@ -60,6 +60,8 @@ class Fit(ArrayRecord):
         Of the image of the centre, px^2; NaN where it was not asked for.
     blur : ndarray of float64, shape (k,)
         Of the edges, standard deviation in px.
+    edge_shift : ndarray of float64, shape (k,)
+        By how much what is dark has grown on all edges, px; 0 where one circle does not tell.
     """
 
     frames: np.ndarray
@@ -70,6 +72,7 @@ class Fit(ArrayRecord):
     deviation: np.ndarray
     covariance: np.ndarray
     blur: np.ndarray
+    edge_shift: np.ndarray
 
     @property
     def size(self) -> np.ndarray:
@@ -79,9 +82,17 @@ class Fit(ArrayRecord):
 
 _NONE = np.zeros(0)
 NO_FITS = Fit(
-    np.zeros((0, 3, 3)), _NONE.astype(int), _NONE, _NONE, _NONE, _NONE, np.zeros((0, 2, 2)), _NONE
+    frames=np.zeros((0, 3, 3)),
+    polarity=_NONE.astype(int),
+    contrast=_NONE,
+    bright=_NONE,
+    share=_NONE,
+    deviation=_NONE,
+    covariance=np.zeros((0, 2, 2)),
+    blur=_NONE,
+    edge_shift=_NONE,
 )
-"""The record of none."""
+"""An empty record."""
 
 
 def fit_dots(
@@ -166,7 +177,8 @@ def fit_circles(
         edges = measure_edges(gray, frames, circles, blur, reach)
         blur = np.clip(blur + median(edges.softness, edges.visible, 0.0), *BLURS)
         solution = _solve(edges, circles, window, projective)
-        np.clip(solution.changes, -_MAXIMUM_CHANGE, _MAXIMUM_CHANGE, out=solution.changes)
+        of_frame = solution.changes[:, :7]
+        np.clip(of_frame, -_MAXIMUM_CHANGE, _MAXIMUM_CHANGE, out=of_frame)
         if remaining:
             frames = frame.moved(frames, solution.changes[:, : 7 if projective else 5])
     return _fit(solution, frames, circles, blur, covariances)
@@ -229,7 +241,18 @@ def _fit(
     moved = frame.moved(frames, of.changes[:, : 7 if of.model.projective else 5])
     affine = frame.local_affine(moved)
     covariance = affine @ covariance @ affine.transpose(0, 2, 1) + _SYSTEMATIC**2 * np.eye(2)
-    return Fit(moved, polarity, own.contrast, bright, share, scatter, covariance, blur)
+    shift = -of.changes[:, -1] if of.model.projective else np.zeros(len(frames))
+    return Fit(
+        frames=moved,
+        polarity=polarity,
+        contrast=own.contrast,
+        bright=bright,
+        share=share,
+        deviation=scatter,
+        covariance=covariance,
+        blur=blur,
+        edge_shift=shift,
+    )
 
 
 def _covariance(of: _Solution, frames: np.ndarray, circles: Circles) -> np.ndarray:

@@ -13,7 +13,7 @@ from ahf_ros.codes.ring import family
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.ring.detector import find_hypotheses
 from ahf_ros.detectors.ring.hypotheses import resolve_dots
-from ahf_ros.detectors.ring.surroundings import designs, likely_targets
+#from ahf_ros.detectors.ring.surroundings import designs, likely_targets
 from ahf_ros.features import frame
 from ahf_ros.imaging.image import as_gray, check_image
 

@@ -15,8 +15,8 @@ from ahf_ros.codes import ring
 from ahf_ros.codes.ring import Family, canonical
 from ahf_ros.detectors.ring.full_size import with_soft_edges
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
-from ahf_ros.detectors.ring.reading import PASSES, read_bands
-from ahf_ros.detectors.ring.target_circles import REACH
+from ahf_ros.detectors.ring.circles import REACH
+from ahf_ros.detectors.ring.reading import read_bands
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.circle_fit import Fit, fit_dots
@@ -106,7 +106,7 @@ def _locate(
     )
     hypotheses, which = _agreeing(gray, dots, decoded, targets, family, expected)
     # Of two hypotheses on one target, the one with the larger margin comes first.
-    order = np.argsort(-hypotheses.margin, kind='stable')
+    order = np.argsort(-hypotheses.seen, kind='stable')
     by_band, best = np.unique(which[order], return_index=True)
     rest = np.setdiff1d(np.arange(len(targets)), by_band)
     alone = fit_dots(gray, start[rest], dots.polarity[rest], rays=_RAYS, reach=REACH)
@@ -132,8 +132,8 @@ def _agreeing(
         of_family = decoded[names[decoded] == name]
         code = family if name == family.name else ring.family(name)
         some = dots.select(of_family)
-        read, of_read = read_bands(gray, some, code, expected, PASSES[-1:])
-        which = of_family[of_read]
+        read = read_bands(gray, some, code, expected)
+        which = of_family
         agreed = (read.words > 0) & (canonical(read.words, code)[0] == codes[which])
         agreed &= read.share >= _MINIMUM_SHARE
         parts.append(with_soft_edges(gray, read, agreed).select(agreed))
