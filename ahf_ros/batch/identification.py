@@ -29,7 +29,7 @@ from ahf_ros.interchange.urls import is_url
 from ahf_ros.sequence import identify_parts
 from ahf_ros.session import create_identifier
 from ahf_ros.session_settings import IdentificationSettings
-from ahf_ros.target import Identification
+from ahf_ros.target import Identification, edge_shift_remark
 from ahf_ros.text import reason_of
 
 Spread = Callable[[ImageTask, Mapping[str, np.ndarray]], Elsewhere]
@@ -195,6 +195,8 @@ def _messages(of: _Found) -> Iterator[Message]:
             f'{path}: the image seems to be mirrored: most IDs are not among the expected ones, '
             'and most would be in a mirror'
         )
+    if remark := edge_shift_remark(found.edge_shift):
+        yield Message(f'{path}: {remark}')
     for target in found.targets:
         yield Message(
             f'{target.id:>8} {target.family:<11} {target.x:10.3f} {target.y:10.3f} px'

@@ -32,7 +32,14 @@ from ahf_ros.filtering.settings import AdaptiveSettings
 from ahf_ros.filtering.trace import trace_of
 from ahf_ros.filtering.trials import DetectorFunction, Elsewhere, Trials
 from ahf_ros.imaging.stack import ImageStack
-from ahf_ros.target import FilterState, Identification, Target, count_codes, sorted_targets
+from ahf_ros.target import (
+    FilterState,
+    Identification,
+    Target,
+    count_codes,
+    median_edge_shift,
+    sorted_targets,
+)
 from ahf_ros.target_check import checked_targets
 
 Refinement = Callable[[np.ndarray, Sequence[Target]], Sequence[Target]]
@@ -235,6 +242,7 @@ class Identifier:
             name,
             tuple(sorted(settings.listed)),
             trace_of(choice.search, trials, stack) if choice.search else None,
+            median_edge_shift(ordered),
         )
 
     def trials_of(self, stack: ImageStack) -> Trials:

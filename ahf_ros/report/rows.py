@@ -17,6 +17,7 @@ from ahf_ros.target import (
     TrueTarget,
     UndecodedTarget,
     count_codes,
+    edge_shift_remark,
 )
 
 MOST_UNREAD = 300
@@ -64,6 +65,7 @@ def row(
         'expected': expected,
         'estimated': result.estimated,
         'mirrored': result.mirrored,
+        'edges': edge_shift_remark(result.edge_shift),
         'identified': identified,
         'missed': len(missed) if known is not None else max(0, expected - identified),
         'missedIds': missed,
