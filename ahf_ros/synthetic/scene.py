@@ -12,6 +12,7 @@ from ahf_ros.codes.designs import proportions
 from ahf_ros.codes.families import FAMILY_NAMES
 from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.synthetic.camera import Camera, Sensor, tilted_camera
+from ahf_ros.synthetic.covers import card_cover
 from ahf_ros.synthetic.designs import designs
 from ahf_ros.synthetic.distractors import distractor_marks
 from ahf_ros.synthetic.layout import (
@@ -29,6 +30,7 @@ from ahf_ros.target import Target, TrueTarget, sorted_targets
 
 _PROJECTOR_PIXELS = 6.4  # per radius of a dot: 1280 across an image of 200 radii, as by default
 _PIXEL_DEVIATION = 12**-0.5  # standard deviation of a position inside a pixel, px
+_LARGEST_SHIFT = 0.35  # of edges, in dot radii: nearly half a sector of the finest ring codes
 _STRIP = 128  # rows exposed at a time, to bound the memory
 
 
@@ -68,6 +70,20 @@ class SceneSettings:
     )
     pinhole: float = parameter(
         0.05, 'Radius of the hole in the dot, in dot radii.', minimum=0.0, maximum=0.5
+    )
+    edge_shift: float = parameter(
+        0.0,
+        'Length by which dark areas of the targets are larger on every edge than the design, px: '
+        'the gain of the ink where positive.',
+        minimum=-20.0,
+        maximum=20.0,
+    )
+    wall: float = parameter(
+        1.0,
+        'Reflectance of the wall as a fraction of that of the targets\' ground; below 1, every '
+        'target is on a square card.',
+        minimum=0.05,
+        maximum=1.0,
     )
     tilt: float = parameter(
         0.0, 'Angle between the optical axis and the wall normal, deg.', minimum=0.0, maximum=80.0
@@ -113,6 +129,12 @@ class SceneSettings:
         0.7, 'Blur of the lens, standard deviation in px.', minimum=0.0, maximum=20.0
     )
     exposure: float = parameter(220.0, 'Mean gray value of lit white.', minimum=1.0, maximum=255.0)
+    overexposure: float = parameter(
+        1.0,
+        'Light on the sensor in multiples of what `exposure` asks for; gray values end at 255.',
+        minimum=1.0,
+        maximum=1000.0,
+    )
     gamma: float = parameter(
         2.2, 'Gray values are light to the power of 1 / gamma.', minimum=0.5, maximum=4.0
     )
@@ -147,9 +169,16 @@ class SceneSettings:
                 f'distortion is {self.distortion!r}, accepted is a number of at least '
                 f'{-strongest:.3f} with a focal_length of {self.focal_length:g}'
             )
-        largest = self.dot_radius * (1 + self.radius_spread) * max(size_ratios(self.sizes))
-        zone = proportions(self.family, self.family_file).quiet_zone
-        reach = float(quiet_radius(largest, self.focal_length * self.width, zone))
+        ratios = size_ratios(self.sizes)
+        smallest = self.dot_radius * (1 - self.radius_spread) * min(ratios)
+        if abs(self.edge_shift) > _LARGEST_SHIFT * smallest:
+            most = _LARGEST_SHIFT * smallest
+            raise ValueError(
+                f'edge_shift is {self.edge_shift!r}, accepted is a number from {-most:.3g} to '
+                f'{most:.3g} with dots of {smallest:.3g} px'
+            )
+        largest = self.dot_radius * (1 + self.radius_spread) * max(ratios)
+        reach = float(quiet_radius(largest, self.focal_length * self.width, _free_radius(self)))
         columns, rows = finest_grid(self.width, self.height, reach)
         if self.targets > columns * rows:
             raise ValueError(
@@ -228,8 +257,8 @@ def render(settings: SceneSettings, phase: int = 0) -> Rendering:
     )
     projector_pixel = settings.dot_radius / _PROJECTOR_PIXELS
     projector = rig_projector(camera.pose, projector_pixel, setup)
-    marks, targets, placements = _coded_targets(settings, camera, wall)
-    marks += distractor_marks(
+    cards, marks, targets, placements = _coded_targets(settings, camera, wall)
+    distractors = distractor_marks(
         settings.distractors, settings.dot_radius, camera, placements, clutter
     )
 
@@ -237,17 +266,20 @@ def render(settings: SceneSettings, phase: int = 0) -> Rendering:
     size, turn = settings.light_scale, math.radians(settings.light_turn)
     shift = phase / settings.phases
     pattern = turned(light_pattern(settings.light, softness / size, lamp, shift), size, turn)
-    average = (settings.exposure / 255) ** settings.gamma
-    highest = ((settings.exposure + 255) / 2 / 255) ** settings.gamma
+    average = settings.overexposure * (settings.exposure / 255) ** settings.gamma
+    highest = settings.overexposure * ((settings.exposure + 255) / 2 / 255) ** settings.gamma
     light = wall_radiance(camera, projector, pattern, settings.ambient, average, highest, lamp)
     if settings.texture:
         light *= paper_texture(light.shape, settings.texture, settings.dot_radius, wall)
     ground, inked = (1.0, settings.black) if settings.polarity == 'dark' else (settings.black, 1.0)
-    image: np.ndarray = light * np.float32(ground)
+    plain = ground * settings.wall
+    image: np.ndarray = light * np.float32(plain)
     if settings.blur:
         image = cv2.GaussianBlur(image, (0, 0), settings.blur, borderType=cv2.BORDER_REPLICATE)
-    for mark in marks:
-        print_mark(image, light, mark, camera, inked - ground, settings.blur)
+    prints = (cards, ground - plain), (marks, inked - ground), (distractors, inked - plain)
+    for printed, change in prints:
+        for mark in printed:
+            print_mark(image, light, mark, camera, change, settings.blur)
     del light
 
     sensor = Sensor(settings.full_well, settings.read_noise, settings.gamma)
@@ -258,10 +290,16 @@ def render(settings: SceneSettings, phase: int = 0) -> Rendering:
     return Rendering(grey, tuple(sorted_targets(targets)), camera.intrinsics, settings)
 
 
+def _free_radius(settings: SceneSettings) -> float:
+    """Return the radius of what is left free about a target, in radii of its dot."""
+    zone = proportions(settings.family, settings.family_file).quiet_zone
+    return zone if settings.wall == 1 else zone * math.sqrt(2)  # of the corners of a card
+
+
 def _coded_targets(
     settings: SceneSettings, camera: Camera, generator: np.random.Generator
-) -> tuple[list[Mark], list[Target], Placements]:
-    """Return targets with random positions, sizes, codes and directions.
+) -> tuple[list[Mark], list[Mark], list[Target], Placements]:
+    """Return targets with random positions, sizes, codes and directions, and the cards below.
 
     Prints are larger where the wall is farther away, so that every dot is about `dot_radius` in
     the image. Codes repeat only if there are more targets than codes.
@@ -276,16 +314,20 @@ def _coded_targets(
     rounds = -(-count // len(every))
     shuffled = [generator.permutation(every) for _ in range(rounds)]
     ids = np.concatenate([np.empty(0, int), *shuffled])[:count].tolist()
-    zone = proportions(settings.family, settings.family_file).quiet_zone
-    reach = quiet_radius(semi_major, float(camera.intrinsics[0, 0]), zone)
+    free = _free_radius(settings)
+    reach = quiet_radius(semi_major, float(camera.intrinsics[0, 0]), free)
     placements = grid_placements(camera, reach, generator)
+    gain = settings.edge_shift if settings.polarity == 'dark' else -settings.edge_shift
 
-    marks, targets = [], []
+    cards, marks, targets = [], [], []
     for number, pixel, size, turn in zip(ids, placements.centres, semi_major, turns, strict=True):
-        design = design_of(number, turn)
+        design = design_of(number, turn, gain / size)
         mark = mark_at(camera, pixel, size, design.reach, design.cover)
         x, y = camera.project(mark.centre[None])[0].tolist()
         ellipse = camera.circle(mark.centre, design.radius * mark.radius)
         marks.append(mark)
+        if settings.wall < 1:
+            card = card_cover(free / math.sqrt(2), turn)
+            cards.append(Mark(mark.centre, mark.radius, free, card))
         targets.append(Target(number, design.code, x, y, *ellipse, family=settings.family))
-    return marks, targets, placements
+    return cards, marks, targets, placements
