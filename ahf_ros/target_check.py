@@ -73,8 +73,9 @@ def checked_target(target: Any, name: str) -> Target:
     target : Target
         Its fields may be of any type. Accepted are an `id` from -1 to 2^31 - 1, a `code` from 0 to
         2^32 - 1, finite coordinates and semi-axes, an `angle` within a turn, a `confidence` from
-        0 to 1, a covariance that is symmetric and positive semidefinite, and a `family` that is a
-        printable text, and an `edge_shift` that is a finite number or None; numpy scalars and arrays are converted.
+        0 to 1, a covariance that is symmetric and positive semidefinite, a `family` that is a
+        printable text, and an `edge_shift` that is None or a number of px; numpy scalars and
+        arrays are converted.
     name : str
         What errors call it.
 

@@ -7,8 +7,8 @@ larger or smaller on every edge, in half of the image as well; and `exposure`, p
 exposed several times too long. The scenes are those of `benchmarks.identification` and, in two
 other settings, scenes that nothing in the package was fitted to. `other` has finer patterns in
 another direction, a wider lens, more noise, and another gamma; `strange` has coarser patterns, a
-long lens with distortion, a noisy camera with a flat gamma, gray ink on coarse paper, and targets on
-white cards before a darker wall. Seeds from 101 on are for tests.
+long lens with distortion, a noisy camera with a flat gamma, gray ink on coarse paper, and targets
+on white cards before a darker wall. Seeds from 101 on are for tests.
 
     python -m benchmarks.limits [--detector ring] [--family gsi] [--setting other]
         [--group 'edge shift'] [--rows 'radius 6, 0.12' ...] [--lights stripe ...] [--seeds 101]

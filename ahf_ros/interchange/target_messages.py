@@ -10,7 +10,6 @@ import numpy as np
 
 from ahf_ros.target import FilterState, Identification, Target
 
-
 _TARGET_FIELDS = [it.name for it in fields(Target) if it.name != 'edge_shift']
 
 

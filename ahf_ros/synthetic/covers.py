@@ -43,7 +43,7 @@ def ring_cover(
         Length by which the ink is larger on every edge, in radii of the dot; less than half of a
         sector.
     """
-    inner, outer = np.float32([family.band_inner - growth, family.band_outer + growth])
+    inner, outer = np.float32(family.band_inner - growth), np.float32(family.band_outer + growth)
 
     def cover(x: np.ndarray, y: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
         distance = np.sqrt(x * x + y * y)
@@ -87,14 +87,15 @@ def square_cover(
     return stamp_cover(ink, half_side * len(ink) / side, turn)
 
 
-def card_cover(half_side: float, turn: float) -> Cover:
-    """Return a square, turned counter-clockwise by an angle in rad."""
+def card_cover(half_width: float, turn: float) -> Cover:
+    """Return a regular octagon, turned counter-clockwise by an angle in rad."""
     cosine, sine = np.float32(math.cos(turn)), np.float32(math.sin(turn))
 
     def cover(x: np.ndarray, y: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
         width = np.float32(np.sqrt(abs(np.linalg.det(jacobian))))
         across, up = np.abs(x * cosine + y * sine), np.abs(y * cosine - x * sine)
-        return inside_share(np.float32(half_side) - np.maximum(across, up), width)
+        outermost = np.maximum(np.maximum(across, up), (across + up) * np.float32(math.sqrt(0.5)))
+        return inside_share(np.float32(half_width) - outermost, width)
 
     return cover
 

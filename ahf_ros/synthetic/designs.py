@@ -100,9 +100,7 @@ def _square_cover(name: str, number: int, turn: float, growth: float) -> tuple[i
     return number, square_cover(name, number, HALF_SIDE, turn, growth)
 
 
-def _point_cover(
-    table: PointFamily, number: int, turn: float, growth: float
-) -> tuple[int, Cover]:
+def _point_cover(table: PointFamily, number: int, turn: float, growth: float) -> tuple[int, Cover]:
     word = table.word(number)
     return word, point_cover(table, word, turn, growth)
 

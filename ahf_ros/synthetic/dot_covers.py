@@ -56,7 +56,8 @@ def dot_ring_cover(
         Length by which the ink is larger on every edge, in radii of the disc.
     """
     places = family.places(word, turn)
-    inner, outer = np.float32([family.ground_radius - growth, family.border_radius + growth])
+    inner = np.float32(family.ground_radius - growth)
+    outer = np.float32(family.border_radius + growth)
 
     def cover(x: np.ndarray, y: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
         distance = np.sqrt(x * x + y * y)

@@ -31,6 +31,7 @@ from ahf_ros.target import Target, TrueTarget, sorted_targets
 _PROJECTOR_PIXELS = 6.4  # per radius of a dot: 1280 across an image of 200 radii, as by default
 _PIXEL_DEVIATION = 12**-0.5  # standard deviation of a position inside a pixel, px
 _LARGEST_SHIFT = 0.35  # of edges, in dot radii: nearly half a sector of the finest ring codes
+_CARD_WIDTH = math.cos(math.pi / 8)  # of an octagon, in distances of its corners
 _STRIP = 128  # rows exposed at a time, to bound the memory
 
 
@@ -80,8 +81,8 @@ class SceneSettings:
     )
     wall: float = parameter(
         1.0,
-        'Reflectance of the wall as a fraction of that of the targets\' ground; below 1, every '
-        'target is on a square card.',
+        "Reflectance of the wall as a fraction of that of the targets' ground; below 1, every "
+        'target is on an eight-sided card.',
         minimum=0.05,
         maximum=1.0,
     )
@@ -293,7 +294,7 @@ def render(settings: SceneSettings, phase: int = 0) -> Rendering:
 def _free_radius(settings: SceneSettings) -> float:
     """Return the radius of what is left free about a target, in radii of its dot."""
     zone = proportions(settings.family, settings.family_file).quiet_zone
-    return zone if settings.wall == 1 else zone * math.sqrt(2)  # of the corners of a card
+    return zone if settings.wall == 1 else zone / _CARD_WIDTH
 
 
 def _coded_targets(
@@ -327,7 +328,7 @@ def _coded_targets(
         ellipse = camera.circle(mark.centre, design.radius * mark.radius)
         marks.append(mark)
         if settings.wall < 1:
-            card = card_cover(free / math.sqrt(2), turn)
+            card = card_cover(free * _CARD_WIDTH, turn)
             cards.append(Mark(mark.centre, mark.radius, free, card))
         targets.append(Target(number, design.code, x, y, *ellipse, family=settings.family))
     return cards, marks, targets, placements
