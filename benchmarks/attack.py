@@ -26,10 +26,11 @@ from hypothesis import strategies as st
 
 from ahf_ros.bag.definitions import CODED_TARGETS, message_types, typestore
 from ahf_ros.drawing.overlay import draw
+from ahf_ros.edge_shift import median_edge_shift
 from ahf_ros.interchange.image_files import decode_bytes
 from ahf_ros.interchange.target_json import to_json
 from ahf_ros.interchange.target_messages import coded_target_array
-from ahf_ros.target import Identification, Target, median_edge_shift
+from ahf_ros.target import Identification, Target
 from ahf_ros.target_check import checked_targets
 from benchmarks import fuzz
 from benchmarks.attack_bags import GRAY, hostile_bags, mutated

@@ -19,6 +19,7 @@ from ahf_ros.batch.fingerprints import file_fingerprint
 from ahf_ros.batch.task import ImageOutcome, ImageTask, Level, Message
 from ahf_ros.detectors import Detector, DetectorSettings, create_detector
 from ahf_ros.drawing.overlay import draw, summary
+from ahf_ros.edge_shift import edge_shift_remark
 from ahf_ros.filtering.trials import Elsewhere
 from ahf_ros.imaging.image import check_image
 from ahf_ros.imaging.stack import ImageStack
@@ -29,7 +30,7 @@ from ahf_ros.interchange.urls import is_url
 from ahf_ros.sequence import identify_parts
 from ahf_ros.session import create_identifier
 from ahf_ros.session_settings import IdentificationSettings
-from ahf_ros.target import Identification, edge_shift_remark
+from ahf_ros.target import Identification
 from ahf_ros.text import reason_of
 
 Spread = Callable[[ImageTask, Mapping[str, np.ndarray]], Elsewhere]

@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from ahf_ros.edge_shift import median_edge_shift
 from ahf_ros.filtering.choice import Choice, choose
 from ahf_ros.filtering.fusion import fused
 from ahf_ros.filtering.genes import genes_of, tuned
@@ -32,14 +33,7 @@ from ahf_ros.filtering.settings import AdaptiveSettings
 from ahf_ros.filtering.trace import trace_of
 from ahf_ros.filtering.trials import DetectorFunction, Elsewhere, Trials
 from ahf_ros.imaging.stack import ImageStack
-from ahf_ros.target import (
-    FilterState,
-    Identification,
-    Target,
-    count_codes,
-    median_edge_shift,
-    sorted_targets,
-)
+from ahf_ros.target import FilterState, Identification, Target, count_codes, sorted_targets
 from ahf_ros.target_check import checked_targets
 
 Refinement = Callable[[np.ndarray, Sequence[Target]], Sequence[Target]]

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field, replace
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from std_msgs.msg import Header
 
-from ahf_ros.target import Identification, edge_shift_remark
+from ahf_ros.edge_shift import edge_shift_remark
+from ahf_ros.target import Identification
 from ahf_ros.text import printable
 
 LOSS_REMEDY = 'more depth of the publisher, or config/fastdds_shm.xml on both sides, may help'

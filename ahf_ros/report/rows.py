@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
+from ahf_ros.edge_shift import edge_shift_remark
 from ahf_ros.evaluation import FALSE, RIGHT, WRONG, judge
 from ahf_ros.report.results import ImageResult
 from ahf_ros.target import (
@@ -17,7 +18,6 @@ from ahf_ros.target import (
     TrueTarget,
     UndecodedTarget,
     count_codes,
-    edge_shift_remark,
 )
 
 MOST_UNREAD = 300
