@@ -1,4 +1,12 @@
-"""The probability that a reading is right."""
+"""The probability that a reading is right.
+
+There has to be a target, no pattern of light and no other mark, and its word has to be right,
+whatever covers a part of it. Each has a log odds, which would be the probability if all readings
+were independent and all scenes alike. A logistic regression on rendered scenes, on targets that
+are covered, glossy, over-exposed or of other families and on clutter, says how far they can be
+trusted. None of its weights is negative: what speaks for a reading speaks for it everywhere. Its
+probability is multiplied by that of the margin over the next ID. `benchmarks.confidence` fits it and shows how far it can be trusted.
+"""
 
 from __future__ import annotations
 
@@ -6,22 +14,48 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ahf_ros.detectors.ring.fitted_weights import fitted_weights
+
 if TYPE_CHECKING:
     from ahf_ros.detectors.ring.hypotheses import Hypotheses
 
 CERTAIN = 0.9
 """Confidence from which words are reported."""
 
+_INTERCEPT, _WEIGHTS = fitted_weights('confidence', 'intercept', 'weights')
 
-def confidence(read: Hypotheses) -> np.ndarray:
-    """Return the probabilities that readings are right, shape (k,)."""
-    features = np.stack(
-        [
-            np.log1p(np.maximum(read.margin, 0)),
-            np.log1p(np.maximum(read.seen, 0)),
-            read.share,
-            np.log(read.deviation + 0.001),
-        ]
-    )
-    evidence = np.array([1.3, 2.0, 22.0, -1.0]) @ features - 33.0
-    return 1 / (1 + np.exp(-np.clip(evidence, -30, 30)))
+
+def features(read: Hypotheses) -> np.ndarray:
+    """Return what tells right readings from others, float64, shape (k, 5).
+
+    Logarithms of the log odds of words against the next ID, against bare paper, against anything
+    and against arcs of any length; and the share of the expected edges that are in their place.
+
+    Parameters
+    ----------
+    read : Hypotheses
+        Of k words.
+    """
+    against = np.stack([read.margin, read.marked, read.seen, read.coded], axis=1)
+    return np.column_stack([np.sign(against) * np.log1p(np.abs(against)), read.share])
+
+
+def confidence(values: np.ndarray) -> np.ndarray:
+    """Return the probabilities that readings are right, shape (k,).
+
+    Parameters
+    ----------
+    values : ndarray of float, shape (k, 5)
+        As `features` gives them.
+    """
+    return target_probability(values) * _logistic(np.expm1(values[:, 0]))
+
+
+def target_probability(values: np.ndarray) -> np.ndarray:
+    """Return the probabilities that readings are of targets, shape (k,), values (k, 5)."""
+    return _logistic(_INTERCEPT + values @ _WEIGHTS)
+
+
+def _logistic(odds: np.ndarray) -> np.ndarray:
+    """Return the probabilities of log odds."""
+    return np.asarray(1 / (1 + np.exp(-np.clip(odds, -30, 30))))

@@ -169,7 +169,7 @@ def report(hypotheses: Hypotheses, settings: DetectorSettings) -> list[Target]:
     likely, ids = ids[kept], np.where(certain, ids, UNDECODED)
     some = hypotheses.select(kept)
     columns = (some.frames, some.covariance, ids[kept], codes[kept], some.confidence)
-    targets = targets_from_frames(*columns, names[kept])
+    targets = targets_from_frames(*columns, names[kept], some.shift)
     rows = zip(targets, some.certain.tolist(), names[kept].tolist(), likely.tolist(), strict=True)
     return sorted_targets(_explained(*row) for row in rows)
 

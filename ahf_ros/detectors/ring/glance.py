@@ -44,9 +44,7 @@ def may_be_targets(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> n
     return np.asarray(np.max(bounds, axis=0) > _HOPEFUL)
 
 
-def _bound(
-    gray: np.ndarray, dots: Fit, band: tuple[float, float], bits: set[int]
-) -> np.ndarray:
+def _bound(gray: np.ndarray, dots: Fit, band: tuple[float, float], bits: set[int]) -> np.ndarray:
     """Return a bound of the mean evidence of readings for words of some lengths, shape (k,)."""
     polar = polar_images(gray, dots, band, _ANGLES)
     best = np.full(len(dots.frames), -np.inf)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ahf_ros.codes.ring import Family
-from ahf_ros.detectors.ring.confidence import CERTAIN, confidence
+from ahf_ros.detectors.ring.confidence import CERTAIN, confidence, features
 from ahf_ros.detectors.ring.decoding import Words
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
@@ -76,6 +76,11 @@ class Hypotheses(ArrayRecord):
         return certain
 
     @property
+    def shift(self) -> np.ndarray:
+        """Shifts of edges where a word was read, NaN elsewhere, px, float64, shape (k,)."""
+        return np.where(self.words > 0, self.edge_shift, np.nan)
+
+    @property
     def reach(self) -> np.ndarray:
         """Radii of the targets with their bands, px, ndarray of float64, shape (k,)."""
         _, minor, _ = frame.ellipse_axes(self.frames)
@@ -108,7 +113,7 @@ class Hypotheses(ArrayRecord):
             families=np.full(len(words.words), family, object),
             confidence=np.zeros(len(words.words)),
         )
-        return replace(read, confidence=np.where(read.words > 0, confidence(read), 0.0))
+        return replace(read, confidence=np.where(read.words > 0, confidence(features(read)), 0.0))
 
     @staticmethod
     def unread(dots: Fit, family: Family) -> Hypotheses:

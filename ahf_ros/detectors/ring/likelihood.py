@@ -187,7 +187,10 @@ def level_evidence(
     along = 2 * np.pi * radii / levels.shape[1]
     apart = np.diff(radii, append=2 * radii[-1] - radii[-2])
     share = np.prod(
-        [np.clip(of * polar.size[:, None] / CORRELATION, _MINIMUM_WEIGHT, 1) for of in (along, apart)],
+        [
+            np.clip(of * polar.size[:, None] / CORRELATION, _MINIMUM_WEIGHT, 1)
+            for of in (along, apart)
+        ],
         axis=0,
     ).astype(np.float32)
     seen = known & polar.visible[..., None]

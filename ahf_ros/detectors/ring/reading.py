@@ -33,7 +33,10 @@ _USUAL_SHIFT = 1.0  # standard deviation of the shift of edges, px
 _MAXIMUM_GROWTH = 0.3  # dot radii
 _DEPTHS = np.array([0.2, 0.4, 0.6, 0.8])  # of the band, where its levels are read
 _DOT_RADII = np.array([0.3, 0.6])  # where the level of the dot is read, dot radii
-_HOPEFUL, _HOPEFUL_IN_LIGHT = 0.3, 0.4  # mean log odds of a reading of edges, from which a band is read on
+_HOPEFUL, _HOPEFUL_IN_LIGHT = (
+    0.3,
+    0.4,
+)  # mean log odds of a reading of edges, from which a band is read on
 _PART = 256  # dots at a time, which bounds the memory
 
 
@@ -80,7 +83,13 @@ def _read_part(
     printed = replace(printed, frames=frame.scaled(printed.frames, 1 - growth))
     # In the frame of the printed dot, the same growth is a larger share.
     words = _words(
-        gray, printed, polar.select(read), edges.select(read), growth / (1 - growth), family, expected
+        gray,
+        printed,
+        polar.select(read),
+        edges.select(read),
+        growth / (1 - growth),
+        family,
+        expected,
     )
     good = _mean_odds(words, edges.weight[read]) > _HOPEFUL_IN_LIGHT
     read, printed, words = read[good], printed.select(good), words.select(good)
@@ -95,7 +104,9 @@ def _read_part(
     return unread.replaced(read, Hypotheses.of(fit, words, family))
 
 
-def best_growth(polar: PolarImages, band: tuple[float, float], shifts: np.ndarray = _SHIFTS) -> np.ndarray:
+def best_growth(
+    polar: PolarImages, band: tuple[float, float], shifts: np.ndarray = _SHIFTS
+) -> np.ndarray:
     """Return by how much the colour of dots has grown on all edges, so that these fit best, (k,).
 
     In the dot radii of the image; a dot that is seen with radius 1 was printed with less.

@@ -31,11 +31,12 @@ _FARTHEST, _FARTHEST_SHARE = 1.0, 0.2  # that a centre is moved: px, or radii of
 
 @dataclass(frozen=True, slots=True)
 class _Located(ArrayRecord):
-    """Frames, covariances of their centres, and shares of the expected edges."""
+    """Frames, covariances of their centres, shares of the expected edges, and their shifts."""
 
     frames: np.ndarray
     covariance: np.ndarray
     share: np.ndarray
+    shift: np.ndarray
 
 
 def refine_centres(
@@ -84,7 +85,7 @@ def refine_centres(
     moved = np.hypot(*(located.frames[:, :2, 2] - start[:, :2, 2]).T)
     reach = np.maximum(_FARTHEST, _FARTHEST_SHARE * frame.ellipse_axes(start)[1])
     good = (located.share >= _MINIMUM_SHARE) & (moved <= reach)
-    places = ellipse_fields(located.frames, located.covariance)
+    places = ellipse_fields(located.frames, located.covariance, located.shift)
     return [
         replace(target, **place) if is_good else target
         for target, place, is_good in zip(targets, places, good, strict=True)
@@ -142,7 +143,8 @@ def _agreeing(
 
 
 def _located(of: Fit | Hypotheses) -> _Located:
-    return _Located(of.frames, of.covariance, of.share)
+    shift = of.shift if isinstance(of, Hypotheses) else np.full(len(of.frames), np.nan)
+    return _Located(of.frames, of.covariance, of.share, shift)
 
 
 def _fit_either_polarity(gray: np.ndarray, frames: np.ndarray, polarities: Sequence[int]) -> Fit:
