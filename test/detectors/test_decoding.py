@@ -166,7 +166,8 @@ def test_the_sectors_at_a_phase_are_those_of_a_word() -> None:
     word = CODE.word(88)
     for phase in (0, 4, 9):
         marked = of_word(word, phase)[0]
-        assert marked[places[phase]].mean(axis=1).tolist() == [word >> bit & 1 for bit in range(12)]
+        of_sectors = marked[places[phase]].mean(axis=1)
+        assert of_sectors.tolist() == [word >> bit & 1 for bit in range(12)]
 
 
 def test_bands_do_not_touch_each_other() -> None:

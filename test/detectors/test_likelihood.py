@@ -35,7 +35,8 @@ def polar(
 ) -> PolarImages:
     """Return the polar image of a target of light (m,) whose marks have grown."""
     inner, outer = band_edges(np.array([radius]), np.array([growth]), BAND)
-    inked = (RADII < radius + growth) | (MARKED[:, None] & (RADII > inner) & (RADII < outer))
+    in_band = np.abs(RADII - (inner + outer) / 2) < (outer - inner) / 2
+    inked = (radius + growth > RADII) | (MARKED[:, None] & in_band)
     dark = inked == (polarity > 0)
     lit = np.broadcast_to(np.asarray(light, float), ANGLES)[:, None]
     return PolarImages(
@@ -112,7 +113,8 @@ def test_readings_of_neighbours_that_are_alike_share_one_weight() -> None:
     assert sparse.tolist() == [1.0]
     assert dense[0] == pytest.approx(2 * np.pi * 2.25 * 6 / ANGLES / 2.5)
     small, large = (edge_evidence(polar(size=of), ONE, NONE, BAND) for of in (8.0, 16.0))
-    assert (large.paper / large.weight)[0, 15] == pytest.approx((small.paper / small.weight)[0, 15])
+    of_paper = [(of.paper / of.weight)[0, 15] for of in (small, large)]
+    assert of_paper[0] == pytest.approx(of_paper[1])
 
 
 def test_gaps_tell_how_often_light_has_edges() -> None:
