@@ -70,8 +70,9 @@ def test_what_is_covered_is_found_and_says_nothing_about_the_word() -> None:
     found, whole = read(evidence), read(clear)
     assert (found.words, found.starts) == (whole.words, whole.starts)
     assert np.flatnonzero(found.hidden[0]).tolist() == list(range(120))[covered]
-    # The price of a cover and what is not seen, but not what lies on the band.
-    assert found.seen[0] == pytest.approx(whole.seen[0] - 15 * (FOR + 0.1) - 4.8, abs=1)
+    # What is not seen, and the price of a cover, but not what lies on the band.
+    lost = whole.seen[0] - found.seen[0] - whole.seen[0] / ANGLES * 15
+    assert 4 < lost < 10
     assert found.margin[0] < whole.margin[0]
 
 
