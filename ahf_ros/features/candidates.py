@@ -9,7 +9,9 @@ which silences projected stripes.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -18,18 +20,27 @@ from ahf_ros.features import frame
 from ahf_ros.features.dots import best
 from ahf_ros.features.log_edges import LogEdges, mask_of
 from ahf_ros.features.pyramid import LARGEST_RADIUS
+from ahf_ros.features.votes import Peaks, find_peaks, highest
+
+class _Range(NamedTuple):
+    low: float
+    high: float
+    cell: int
+    votes: float
+
 
 MAXIMUM_CANDIDATES = 6000
 """Candidates kept at the most for one range of radii, those with the most votes."""
 
-_MINIMUM_VOTES = 1.5  # a px of the circumference
-_RANGES = ((5.8, LARGEST_RADIUS, 2),)  # radii and accumulator cell, px
-_FIRST_RANGES = ((2.0, 3.4, 1), (3.4, 5.8, 1), *_RANGES)  # of the first level
+_RANGES = (_Range(5.8, LARGEST_RADIUS, 2, 1.2),)
+_FIRST_RANGES = (_Range(2.0, 3.4, 1, 0.65), _Range(3.4, 5.8, 1, 1.2), *_RANGES)  # of the first level
+_SHAPES = ((1.0, 1), (0.5, 6))
+_OBLIQUE = 3.0
+_OBLIQUE_CELL = 2
+_OBLIQUE_VOTES = 1.5
+_GATE = 0.75
+_SUB = 2
 _STEP = 0.8  # of the radii voted for, in cells
-_SHIFT = 2
-_BLOCK = 1 << _SHIFT  # cells, side of the blocks in which votes are counted first
-_MAXIMUM_VOTES = 7000  # that are counted in a cell, so that nine of them fit into 16 bits
-_OUTSIDE = cv2.BORDER_CONSTANT  # no votes are there
 _LONG = 1.5  # length of an edge that is straight, in radii of the largest dot
 
 
@@ -83,9 +94,9 @@ def find_candidates(
     candidates, mask = [], None
     for level, of_level in enumerate(edges, start=1):
         ranges = [
-            (low, high, cell)
-            for low, high, cell in (_FIRST_RANGES if level == 1 else _RANGES)
-            if high * 2**level >= min_radius and low * 2**level <= max_radius
+            some
+            for some in (_FIRST_RANGES if level == 1 else _RANGES)
+            if some.high * 2**level >= min_radius and some.low * 2**level <= max_radius
         ]
         if not ranges:
             continue
@@ -97,17 +108,17 @@ def find_candidates(
         else:
             mask = cv2.resize(mask, shape[::-1], interpolation=cv2.INTER_NEAREST)
         rest = of_level.unmasked(mask)
-        for low, high, cell in ranges:
-            curved = rest.curved(_LONG * high)
-            points = [_vote(curved, (low, high), cell, polarity) for polarity in polarities]
+        for some in ranges:
+            curved = rest.curved(_LONG * some.high)
+            points = [_vote(curved, some, polarity) for polarity in polarities]
             polarity = np.repeat(polarities, [len(of_one) for of_one in points])
-            candidates.append(Candidates(level, np.concatenate(points), (low, high), polarity))
+            candidates.append(Candidates(level, np.concatenate(points), (some.low, some.high), polarity))
     return candidates
 
 
 def _too_few(
     edges: LogEdges,
-    ranges: Sequence[tuple[float, float, int]],
+    ranges: Sequence[_Range],
     explained: Sequence[np.ndarray] | np.ndarray,
     polarities: Sequence[int],
 ) -> bool:
@@ -116,8 +127,8 @@ def _too_few(
     This is looked at only where it takes less time than to hide what is explained.
     """
     return len(edges.x) < len(explained) and not any(
-        len(_vote(edges, (low, high), cell, polarity))
-        for low, high, cell in ranges
+        len(_vote(edges, some, polarity))
+        for some in ranges
         for polarity in polarities
     )
 
@@ -131,44 +142,66 @@ def _reduced(
     return [frame.reduced(outline, level) for outline in outlines]
 
 
-def _vote(edges: LogEdges, radii: tuple[float, float], cell: int, polarity: int) -> np.ndarray:
+def _vote(edges: LogEdges, of: _Range, polarity: int) -> np.ndarray:
     """Return the points, shape (k, 2), that enough edges at the radii point away from."""
-    low, high = radii
-    needed = _MINIMUM_VOTES * 2 * np.pi * low
-    height, width = (side // cell + 1 for side in edges.marked.shape)
-    count = max(2, int(np.ceil((high - low) / (_STEP * cell))))
-    if count * len(edges.x) <= needed:
+    found=[]
+    for aspect, directions in _SHAPES:
+        if aspect < 1 and of.low < _OBLIQUE:
+            continue
+        cell = of.cell if aspect == 1 else _OBLIQUE_CELL
+        votes = of.votes if aspect == 1 else _OBLIQUE_VOTES
+        margin = 1 + int(np.ceil(of.high / cell))
+        height, width = (side // cell + 1 for side in edges.marked.shape)
+        shape = (height + 2 * margin, width + 2 * margin)
+        count = max(2, int(np.ceil((of.high - of.low) / (_STEP * cell))))
+        steps = polarity * (of.low + (np.arange(count) + 0.5) * (of.high - of.low) / count)
+        for direction in np.pi * np.arange(directions) / directions:
+            x,y, unit_x, unit_y, length = _moves(edges, aspect, direction)
+            needed = votes * of.low * length
+            if count * len(unit_x) <= needed:
+                continue
+            columns, rows = (
+                _cells(at, unit, steps, cell, margin)
+                for at, unit in ((x, unit_x), (y, unit_y))
+            )
+            p = find_peaks(columns, rows, shape, needed, max(1, round(of.low / cell / 2)))
+            found.append(replace(p, x=(p.x-margin + .5) * cell - 0.5, y=(p.y-margin+.5)*cell-.5))
+    if not found:
         return np.zeros((0, 2))
-    steps = polarity * (low + (np.arange(count) + 0.5) * (high - low) / count)
-    margin = _BLOCK * int(np.ceil(high / cell / _BLOCK))  # votes may lie outside of the image
-    columns, rows = (
-        _cells(at, unit, steps, cell, margin)
-        for at, unit in ((edges.x, edges.unit_x), (edges.y, edges.unit_y))
-    )
-    votes = _votes(columns, rows, (height + 2 * margin, width + 2 * margin), needed)
-    if votes is None:
-        return np.zeros((0, 2))
-    rows, columns = _peaks(votes, needed, max(1, round(low / cell / 2)))
-    rows, columns = rows - margin, columns - margin
-    inside = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
-    rows, columns = rows[inside], columns[inside]
-    ranks = -votes[rows + margin, columns + margin].astype(int)
-    kept = best(np.arange(len(ranks)), ranks, MAXIMUM_CANDIDATES, 'candidates of one size')
-    return (np.stack([columns[kept], rows[kept]], axis=-1) + 0.5) * cell - 0.5
+    p = found[0]
+    if len(found) > 1:
+        p = Peaks.joined(found)
+        margin = 2 + int(np.ceil(of.high / cell))
+        shape = (height + 2 * margin, width + 2 * margin)
+        cells = (np.rint(p.y/cell).astype(int) + margin) * shape[1] + np.rint(p.x/cell).astype(int) + margin
+        p = p.select(highest(cells, p.votes, shape, max(1, round(of.low / cell / 2))))
+    height, width = edges.marked.shape
+    p = p.select((p.y > -1) & (p.y < height) & (p.x > -1) & (p.x < width))
+    kept = best(np.arange(len(p.x)), -p.votes, MAXIMUM_CANDIDATES, 'candidates of one size')
+    return np.stack([p.x[kept], p.y[kept]], axis=-1)
 
 
-def _peaks(votes: np.ndarray, needed: float, reach: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return rows and columns of the cells with enough votes, and none with more within reach."""
-    wide = votes.shape[1]
-    high = np.flatnonzero(votes > int(needed))
-    values = votes.ravel()
-    own = values[high]
-    peak = np.ones(len(high), bool)
-    for down in range(-reach, reach + 1):
-        for across in range(-reach, reach + 1):
-            peak &= own >= values.take(high + (down * wide + across), mode='clip')
-    rows, columns = np.divmod(high[peak], wide)
-    return rows, columns
+def _moves(edges, aspect, direction):
+    """Return edges, and the vectors from the middle of an ellipse of major axis 1 to them."""
+    if aspect == 1:
+        return edges.x, edges.y, edges.unit_x, edges.unit_y, 2 * np.pi
+    c, s = np.float32(np.cos(direction)), np.float32(np.sin(direction))
+    x,y,ux,uy=edges.x[::_SUB],edges.y[::_SUB],edges.unit_x[::_SUB],edges.unit_y[::_SUB]
+    along = ux * c + uy * s
+    which = np.flatnonzero(np.abs(along) < _GATE)
+    along = along[which]
+    across = uy[which] * c - ux[which] * s
+    scale = 1 / np.sqrt(along * along + np.float32(aspect**2) * across * across)
+    along *= scale
+    across *= np.float32(aspect**2) * scale
+    return x[which], y[which], along * c - across * s, along * s + across * c, 2 * np.pi * _length(aspect)
+
+
+@lru_cache
+def _length(asp):
+    t=np.linspace(0,2*np.pi,2000); dx,dy=-np.sin(t),asp*np.cos(t); ds=np.hypot(dx,dy)
+    nx,ny=asp*np.cos(t),np.sin(t); n=np.hypot(nx,ny); g=np.abs(nx/n)<_GATE if asp<1 else np.ones(len(t),bool)
+    return float((ds*g).mean()/ (_SUB if asp<1 else 1))
 
 
 def _cells(
@@ -178,35 +211,3 @@ def _cells(
     start = (at.astype(np.float32) + np.float32(0.5)) / np.float32(cell) + np.float32(margin)
     moves = (steps / cell).astype(np.float32)[:, None] * unit
     return np.subtract(start, moves, out=moves).astype(np.int32).ravel()
-
-
-def _votes(
-    columns: np.ndarray, rows: np.ndarray, shape: tuple[int, int], needed: float
-) -> np.ndarray | None:
-    """Return the votes in the nine cells about each cell, uint16, if any has those needed.
-
-    Votes are counted only in blocks of cells that, with their neighbours, have so many.
-    """
-    tall, wide = (-(-side // _BLOCK) for side in shape)
-    block = (rows >> _SHIFT) * np.int32(wide) + (columns >> _SHIFT)
-    cast = np.bincount(block, minlength=tall * wide).reshape(tall, wide)
-    of_blocks = np.minimum(cast, _MAXIMUM_VOTES).astype(np.uint16)
-    around = cv2.boxFilter(of_blocks, cv2.CV_32F, (3, 3), normalize=False, borderType=_OUTSIDE)
-    enough = (around > needed).astype(np.uint8)
-    hot = (cv2.dilate(enough, np.ones((3, 3), np.uint8)) > 0) & (of_blocks > 0)
-    count = np.count_nonzero(hot)
-    if not count:
-        return None
-    slots = np.zeros(hot.shape, np.int32)
-    slots[hot] = np.arange(1, count + 1)
-    last = np.int32(_BLOCK - 1)
-    places = slots.ravel()[block] << 2 * _SHIFT
-    places += (rows & last) << _SHIFT
-    places += columns & last
-    of_cells = np.bincount(places, minlength=(count + 1) << 2 * _SHIFT)[_BLOCK**2 :]
-    votes = np.zeros((tall, _BLOCK, wide, _BLOCK), np.uint16)
-    down, across = np.nonzero(hot)
-    of_hot = np.minimum(of_cells, _MAXIMUM_VOTES).reshape(count, _BLOCK, _BLOCK)
-    votes[down, :, across] = of_hot
-    whole = votes.reshape(tall * _BLOCK, wide * _BLOCK)
-    return cv2.boxFilter(whole, cv2.CV_16U, (3, 3), normalize=False, borderType=_OUTSIDE)

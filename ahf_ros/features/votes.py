@@ -1,0 +1,138 @@
+"""Votes for places in an image, counted in cells, and the places with the most.
+
+Most votes are strays. So they are counted in blocks of cells first, and one by one only where
+blocks have enough.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from ahf_ros.features.array_record import ArrayRecord
+
+_SHIFT = 2
+_BLOCK = 1 << _SHIFT  # cells, side of a block
+_MAXIMUM_VOTES = 10_000  # that are counted in a block
+_WEIGHTS = (0.5, 1.0, 0.5)  # of votes for the cell before, for a cell itself, and the next one
+_OUTSIDE = cv2.BORDER_CONSTANT  # no votes are there
+_FLAT = 1e-6  # curvature of votes from which their top is computed
+
+
+@dataclass(frozen=True, slots=True)
+class Peaks(ArrayRecord):
+    """k places with more votes than their neighbourhood.
+
+    Attributes
+    ----------
+    x, y : ndarray of float64, shape (k,)
+        In cells; the middle of the first one is at 0.
+    votes : ndarray of float64, shape (k,)
+        In units of those needed.
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    votes: np.ndarray
+
+
+_NONE = np.zeros(0)
+NO_PEAKS = Peaks(_NONE, _NONE, _NONE)
+"""An empty record."""
+
+
+def find_peaks(
+    columns: np.ndarray, rows: np.ndarray, shape: tuple[int, int], needed: float, reach: int
+) -> Peaks:
+    """Return the cells with enough votes in them and beside them, and none with more within reach.
+
+    Parameters
+    ----------
+    columns, rows : ndarray of int32, shape (n,)
+        Cells voted for.
+    shape : tuple of 2 int
+        Number of rows and columns; nobody votes for those within `reach` of the border.
+    needed : float
+        Votes; one for a neighbouring cell counts half, and a quarter on the diagonal.
+    reach : int
+        Cells.
+    """
+    which = _promising(columns, rows, shape, needed)
+    if not len(which):
+        return NO_PEAKS
+    wide = shape[1]
+    cells, counts = np.unique(rows[which] * np.int32(wide) + columns[which], return_counts=True)
+    votes = np.zeros(shape[0] * wide, np.float32)
+    votes[cells] = counts
+    sums = _weighted(votes, cells, wide)
+    enough = sums > needed
+    cells, sums = cells[enough], sums[enough]
+    kept = highest(cells, sums, shape, reach)
+    cells, sums = cells[kept], sums[kept]
+    rows, columns = np.divmod(cells, wide)
+    x, y = (
+        middles + _top(_weighted(votes, cells - step, wide), sums, _weighted(votes, cells + step, wide))
+        for middles, step in ((columns, 1), (rows, wide))
+    )
+    return Peaks(x, y, sums / needed)
+
+
+def highest(
+    cells: np.ndarray, values: np.ndarray, shape: tuple[int, int], reach: int
+) -> np.ndarray:
+    """Return whether no value within reach is higher, shape (k,).
+
+    Parameters
+    ----------
+    cells : ndarray of int, shape (k,)
+        Indices of the cells with values, row by row.
+    values : ndarray of float, shape (k,)
+        More than 0.
+    shape : tuple of 2 int
+        Number of rows and columns.
+    reach : int
+        Cells.
+    """
+    field = np.zeros(shape[0] * shape[1], np.float32)
+    values = values.astype(np.float32)
+    np.maximum.at(field, cells, values)
+    free = np.ones(len(cells), bool)
+    for down in range(-reach, reach + 1):
+        for across in range(-reach, reach + 1):
+            free &= values >= field.take(cells + (down * shape[1] + across), mode='clip')
+    return free
+
+
+def _promising(
+    columns: np.ndarray, rows: np.ndarray, shape: tuple[int, int], needed: float
+) -> np.ndarray:
+    """Return the indices of the votes in blocks that, with some neighbours, have enough."""
+    tall, wide = (-(-side // _BLOCK) for side in shape)
+    block = (rows >> _SHIFT) * np.int32(wide) + (columns >> _SHIFT)
+    cast = np.bincount(block, minlength=tall * wide).reshape(tall, wide)
+    of_blocks = np.minimum(cast, _MAXIMUM_VOTES).astype(np.uint16)
+    # A cell and its neighbours lie in two by two blocks.
+    of_four = cv2.boxFilter(of_blocks, -1, (2, 2), normalize=False, borderType=_OUTSIDE)
+    enough = (of_four > needed).astype(np.uint8)
+    if not enough.any():
+        return np.zeros(0, np.intp)
+    hot = cv2.dilate(enough, np.ones((2, 2), np.uint8), anchor=(0, 0))
+    return np.flatnonzero(hot.ravel().take(block))
+
+
+def _weighted(votes: np.ndarray, cells: np.ndarray, wide: int) -> np.ndarray:
+    """Return the votes in cells and, with less weight, beside them, float32, shape (k,)."""
+    sums = np.zeros(len(cells), np.float32)
+    for down, of_row in zip((-wide, 0, wide), _WEIGHTS, strict=True):
+        for across, of_column in zip((-1, 0, 1), _WEIGHTS, strict=True):
+            beside = votes.take(cells + (down + across), mode='clip')
+            sums += np.float32(of_row * of_column) * beside
+    return sums
+
+
+def _top(before: np.ndarray, value: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Return where the parabola through values at -1, 0 and 1 is highest, at most half a cell."""
+    curvature = np.maximum(2 * value - before - after, _FLAT)
+    return np.clip((after - before) / (2 * curvature), -0.5, 0.5)
