@@ -2,15 +2,17 @@
 
 The direction of an edge says where the centre of a dot may lie: each edge pixel votes, along its
 gradient, for the centres at the radii of interest (Kimme, Ballard & Sklansky, Comm. ACM 18, 1975).
-An edge that runs straight on for longer than a dot is wide belongs to no dot and does not vote,
-which silences projected stripes.
+On an ellipse the centre does not lie along the gradient, but in a direction that follows from it
+and from the shape; so oblique dots are voted for with ellipses in several directions. An edge that
+runs straight on for longer than a dot is wide belongs to no dot and does not vote, which silences
+projected stripes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import lru_cache
+from dataclasses import dataclass
+from math import ceil
 from typing import NamedTuple
 
 import cv2
@@ -20,28 +22,49 @@ from ahf_ros.features import frame
 from ahf_ros.features.dots import best
 from ahf_ros.features.log_edges import LogEdges, mask_of
 from ahf_ros.features.pyramid import LARGEST_RADIUS
-from ahf_ros.features.votes import Peaks, find_peaks, highest
-
-class _Range(NamedTuple):
-    low: float
-    high: float
-    cell: int
-    votes: float
-
+from ahf_ros.features.votes import NO_PEAKS, Peaks, find_peaks, highest
 
 MAXIMUM_CANDIDATES = 6000
-"""Candidates kept at the most for one range of radii, those with the most votes."""
+"""Candidates kept at the most for one range of radii and one polarity, those with the most votes."""
 
-_RANGES = (_Range(5.8, LARGEST_RADIUS, 2, 1.2),)
-_FIRST_RANGES = (_Range(2.0, 3.4, 1, 0.65), _Range(3.4, 5.8, 1, 1.2), *_RANGES)  # of the first level
-_SHAPES = ((1.0, 1), (0.5, 6))
-_OBLIQUE = 3.0
-_OBLIQUE_CELL = 2
-_OBLIQUE_VOTES = 1.5
-_GATE = 0.75
-_SUB = 2
 _STEP = 0.8  # of the radii voted for, in cells
+_CELL = 2  # in which the votes for different shapes are compared, px
 _LONG = 1.5  # length of an edge that is straight, in radii of the largest dot
+_REACH = 0.5  # within which no other centre has more votes, in radii of the smallest dot
+
+
+class _Shape(NamedTuple):
+    """Ellipses that are voted for.
+
+    Attributes
+    ----------
+    aspect : float
+        Ratio of their axes.
+    directions : int
+        Number of directions of the major axis.
+    cell : int
+        Side of the cells in which votes are counted, px.
+    votes : float
+        Needed, for a px of the circumference of the smallest dot, as if it were round.
+    every : int
+        One of so many edges votes.
+    """
+
+    aspect: float
+    directions: int
+    cell: int
+    votes: float
+    every: int
+
+
+_OBLIQUE = _Shape(0.5, 6, 2, 1.15, 2)
+_RANGES = {(5.8, LARGEST_RADIUS): (_Shape(1.0, 1, 2, 1.4, 1), _OBLIQUE)}  # by radii, px
+_FIRST_RANGES = {  # of the first level
+    (2.0, 3.4): (_Shape(1.0, 1, 1, 0.5, 1),),
+    (3.4, 5.8): (_Shape(1.0, 1, 1, 1.4, 1), _OBLIQUE),
+    **_RANGES,
+}
+_FLAT = 0.75  # sine of the angle between an edge of an ellipse and its major axis, at the most
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +76,7 @@ class Candidates:
     level : int
         The level; its pixels are 2^level wide.
     points : ndarray of float64, shape (k, 2)
-        Centres, px of the level, to about two pixels.
+        Centres, px of the level, to about a pixel.
     radii : tuple of 2 float
         Smallest and largest radius of the dots, px of the level.
     polarity : ndarray of int, shape (k,)
@@ -93,14 +116,18 @@ def find_candidates(
     """
     candidates, mask = [], None
     for level, of_level in enumerate(edges, start=1):
-        ranges = [
-            some
-            for some in (_FIRST_RANGES if level == 1 else _RANGES)
-            if some.high * 2**level >= min_radius and some.low * 2**level <= max_radius
-        ]
+        ranges = {
+            radii: shapes
+            for radii, shapes in (_FIRST_RANGES if level == 1 else _RANGES).items()
+            if radii[1] * 2**level >= min_radius and radii[0] * 2**level <= max_radius
+        }
         if not ranges:
             continue
-        if _too_few(of_level, ranges, explained, polarities):
+        # This is looked at only where it takes less time than to hide what is explained.
+        if len(of_level.x) < len(explained) and not any(
+            len(_elected(of_level, radii, shapes, polarities)[0])
+            for radii, shapes in ranges.items()
+        ):
             continue
         shape = of_level.marked.shape
         if mask is None:
@@ -108,29 +135,10 @@ def find_candidates(
         else:
             mask = cv2.resize(mask, shape[::-1], interpolation=cv2.INTER_NEAREST)
         rest = of_level.unmasked(mask)
-        for some in ranges:
-            curved = rest.curved(_LONG * some.high)
-            points = [_vote(curved, some, polarity) for polarity in polarities]
-            polarity = np.repeat(polarities, [len(of_one) for of_one in points])
-            candidates.append(Candidates(level, np.concatenate(points), (some.low, some.high), polarity))
+        for radii, shapes in ranges.items():
+            points, polarity = _elected(rest.curved(_LONG * radii[1]), radii, shapes, polarities)
+            candidates.append(Candidates(level, points, radii, polarity))
     return candidates
-
-
-def _too_few(
-    edges: LogEdges,
-    ranges: Sequence[_Range],
-    explained: Sequence[np.ndarray] | np.ndarray,
-    polarities: Sequence[int],
-) -> bool:
-    """Return whether edges are too few for any dot, even if nothing explains them.
-
-    This is looked at only where it takes less time than to hide what is explained.
-    """
-    return len(edges.x) < len(explained) and not any(
-        len(_vote(edges, some, polarity))
-        for some in ranges
-        for polarity in polarities
-    )
 
 
 def _reduced(
@@ -142,72 +150,106 @@ def _reduced(
     return [frame.reduced(outline, level) for outline in outlines]
 
 
-def _vote(edges: LogEdges, of: _Range, polarity: int) -> np.ndarray:
-    """Return the points, shape (k, 2), that enough edges at the radii point away from."""
-    found=[]
-    for aspect, directions in _SHAPES:
-        if aspect < 1 and of.low < _OBLIQUE:
-            continue
-        cell = of.cell if aspect == 1 else _OBLIQUE_CELL
-        votes = of.votes if aspect == 1 else _OBLIQUE_VOTES
-        margin = 1 + int(np.ceil(of.high / cell))
-        height, width = (side // cell + 1 for side in edges.marked.shape)
-        shape = (height + 2 * margin, width + 2 * margin)
-        count = max(2, int(np.ceil((of.high - of.low) / (_STEP * cell))))
-        steps = polarity * (of.low + (np.arange(count) + 0.5) * (of.high - of.low) / count)
-        for direction in np.pi * np.arange(directions) / directions:
-            x,y, unit_x, unit_y, length = _moves(edges, aspect, direction)
-            needed = votes * of.low * length
-            if count * len(unit_x) <= needed:
-                continue
-            columns, rows = (
-                _cells(at, unit, steps, cell, margin)
-                for at, unit in ((x, unit_x), (y, unit_y))
-            )
-            p = find_peaks(columns, rows, shape, needed, max(1, round(of.low / cell / 2)))
-            found.append(replace(p, x=(p.x-margin + .5) * cell - 0.5, y=(p.y-margin+.5)*cell-.5))
-    if not found:
-        return np.zeros((0, 2))
-    p = found[0]
-    if len(found) > 1:
-        p = Peaks.joined(found)
-        margin = 2 + int(np.ceil(of.high / cell))
-        shape = (height + 2 * margin, width + 2 * margin)
-        cells = (np.rint(p.y/cell).astype(int) + margin) * shape[1] + np.rint(p.x/cell).astype(int) + margin
-        p = p.select(highest(cells, p.votes, shape, max(1, round(of.low / cell / 2))))
-    height, width = edges.marked.shape
-    p = p.select((p.y > -1) & (p.y < height) & (p.x > -1) & (p.x < width))
-    kept = best(np.arange(len(p.x)), -p.votes, MAXIMUM_CANDIDATES, 'candidates of one size')
-    return np.stack([p.x[kept], p.y[kept]], axis=-1)
+def _elected(
+    edges: LogEdges,
+    radii: tuple[float, float],
+    shapes: Sequence[_Shape],
+    polarities: Sequence[int],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the points, shape (k, 2), that enough edges vote for, and polarities, shape (k,)."""
+    found = Peaks.joined([_peaks(edges, radii, of, polarities) for of in shapes])
+    reach = max(1, round(_REACH * radii[0] / _CELL))
+    margin = ceil(radii[1] / _CELL) + reach
+    tall, wide = (side // _CELL + 1 + 2 * margin for side in edges.marked.shape)
+    columns = np.rint((found.x + 0.5) / _CELL - 0.5).astype(int) + margin
+    rows = np.rint((found.y + 0.5) / _CELL - 0.5).astype(int) + margin
+    cells = (found.plane * tall + rows) * wide + columns
+    found = found.select(highest(cells, found.votes, (len(polarities) * tall, wide), reach))
+    points = np.stack([found.x, found.y], axis=-1)
+    inside = ((points > -1) & (points < edges.marked.shape[::-1])).all(axis=1)
+    found, points = found.select(inside), points[inside]
+    limit = MAXIMUM_CANDIDATES * len(polarities)
+    kept = best(np.arange(len(points)), -found.votes, limit, 'candidates of one size')
+    return points[kept], np.asarray(polarities, int)[found.plane[kept]]
 
 
-def _moves(edges, aspect, direction):
-    """Return edges, and the vectors from the middle of an ellipse of major axis 1 to them."""
-    if aspect == 1:
-        return edges.x, edges.y, edges.unit_x, edges.unit_y, 2 * np.pi
-    c, s = np.float32(np.cos(direction)), np.float32(np.sin(direction))
-    x,y,ux,uy=edges.x[::_SUB],edges.y[::_SUB],edges.unit_x[::_SUB],edges.unit_y[::_SUB]
-    along = ux * c + uy * s
-    which = np.flatnonzero(np.abs(along) < _GATE)
+def _peaks(
+    edges: LogEdges, radii: tuple[float, float], of: _Shape, polarities: Sequence[int]
+) -> Peaks:
+    """Return the points that enough edges of a shape vote for, px, and indices of polarities."""
+    low, high = radii
+    count = max(2, ceil((high - low) / (_STEP * of.cell)))
+    every = low + (np.arange(count) + 0.5) * (high - low) / count
+    needed = of.votes * 2 * np.pi * low
+    if len(polarities) == 0 or count * len(edges.x) <= needed:
+        return NO_PEAKS
+    reach = max(1, round(_REACH * low / of.cell))
+    margin = reach + ceil(high / of.cell) + 1  # votes may lie outside of the image
+    tall, wide = (side // of.cell + 1 + 2 * margin for side in edges.marked.shape)
+    # Votes for each polarity and direction are counted in a plane of their own.
+    columns, rows = _votes(edges, of, np.outer(polarities, every), margin, tall)
+    planes = len(polarities) * of.directions
+    peaks = find_peaks(columns, rows, (planes * tall, wide), needed / of.every, reach)
+    plane, y = np.divmod(peaks.y + 0.5, tall)
+    return Peaks(
+        (peaks.x + 0.5 - margin) * of.cell - 0.5,
+        (y - margin) * of.cell - 0.5,
+        plane.astype(int) // of.directions,
+        peaks.votes,
+    )
+
+
+def _votes(
+    edges: LogEdges, of: _Shape, radii: np.ndarray, margin: int, tall: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the columns and rows of the cells that edges vote for, int32, shape (n,).
+
+    Parameters
+    ----------
+    edges : LogEdges
+    of : _Shape
+    radii : ndarray of float, shape (k, n)
+        Signed, to vote for k polarities.
+    margin : int
+        Cells about the image.
+    tall : int
+        Rows of a plane.
+    """
+    columns, rows = [], []
+    cell = np.float32(of.cell)
+    some = edges.select(slice(None, None, of.every)) if of.every > 1 else edges
+    x, y = ((at + np.float32(0.5)) / cell + np.float32(margin) for at in (some.x, some.y))
+    steps = (radii / of.cell).astype(np.float32)[..., None]
+    for number, angle in enumerate(np.pi * np.arange(of.directions) / of.directions):
+        start_x, start_y, unit_x, unit_y = x, y, some.unit_x, some.unit_y
+        if of.aspect < 1:
+            which, unit_x, unit_y = _towards_centres(some, of.aspect, angle)
+            start_x, start_y = x[which], y[which]
+        for polarity, moves in enumerate(steps):
+            top = np.int32((polarity * of.directions + number) * tall)
+            columns.append((start_x - moves * unit_x).astype(np.int32).ravel())
+            rows.append((start_y - moves * unit_y).astype(np.int32).ravel() + top)
+    return np.concatenate(columns), np.concatenate(rows)
+
+
+def _towards_centres(
+    edges: LogEdges, aspect: float, angle: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return edges that may be flat ones of an ellipse, and where they lie on it.
+
+    Returns
+    -------
+    which : ndarray of int, shape (k,)
+    x, y : ndarray of float32, shape (k,)
+        From the centre of the ellipse whose semi-major axis is 1.
+    """
+    cosine, sine = np.float32(np.cos(angle)), np.float32(np.sin(angle))
+    along = edges.unit_x * cosine + edges.unit_y * sine
+    which = np.flatnonzero(np.abs(along) < np.float32(_FLAT))
     along = along[which]
-    across = uy[which] * c - ux[which] * s
-    scale = 1 / np.sqrt(along * along + np.float32(aspect**2) * across * across)
-    along *= scale
-    across *= np.float32(aspect**2) * scale
-    return x[which], y[which], along * c - across * s, along * s + across * c, 2 * np.pi * _length(aspect)
-
-
-@lru_cache
-def _length(asp):
-    t=np.linspace(0,2*np.pi,2000); dx,dy=-np.sin(t),asp*np.cos(t); ds=np.hypot(dx,dy)
-    nx,ny=asp*np.cos(t),np.sin(t); n=np.hypot(nx,ny); g=np.abs(nx/n)<_GATE if asp<1 else np.ones(len(t),bool)
-    return float((ds*g).mean()/ (_SUB if asp<1 else 1))
-
-
-def _cells(
-    at: np.ndarray, unit: np.ndarray, steps: np.ndarray, cell: int, margin: int
-) -> np.ndarray:
-    """Return the rows, or columns, of the cells that edges vote for, int32, shape (n,)."""
-    start = (at.astype(np.float32) + np.float32(0.5)) / np.float32(cell) + np.float32(margin)
-    moves = (steps / cell).astype(np.float32)[:, None] * unit
-    return np.subtract(start, moves, out=moves).astype(np.int32).ravel()
+    across = edges.unit_y[which] * cosine - edges.unit_x[which] * sine
+    # The point of the ellipse (u / 1)^2 + (v / aspect)^2 = 1 with this normal.
+    square = np.float32(aspect**2)
+    scale = 1 / np.sqrt(along * along + square * across * across)
+    along, across = along * scale, across * (square * scale)
+    return which, along * cosine - across * sine, along * sine + across * cosine

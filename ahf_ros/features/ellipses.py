@@ -15,19 +15,20 @@ from ahf_ros.features.log_edges import LOG_SCALE
 from ahf_ros.features.robust import fit_linear
 from ahf_ros.features.sampling import sample_circles
 
-_RAYS = 32
+_RAYS = 24
 _ANGLES = 2 * np.pi * np.arange(_RAYS) / _RAYS
-_BINS = 26  # of the radius, in equal ratios
+_BINS = 22  # of the radius, in equal ratios
 _NEAREST, _FARTHEST = 0.4, 1.35  # radii sampled, in the smallest and the largest of the range
 _WIDTH = 1.5  # from the middle of an ellipse to where its weights end, bins
 _SHAPES = ((1.0, 1), (0.75, 4), (0.55, 6), (0.4, 8))  # aspect, number of directions
+_BESIDE, _SIDES = 0.4, 6
 _MINIMUM_COUNTED, _MAXIMUM_COUNTED = -0.3, 0.6  # steps of ln; one beyond counts no more
 _MINIMUM_SCORE = 0.15  # mean step of ln along the ellipse
 _COARSE = 8.0  # largest radius of a range that is fitted one level below its own, px
 _OVERSIZE = 1.6  # semi-major axis of a dot, in the largest radius of its range, at the most
-_WINDOWS = (0.35, 0.22, 0.14)  # about the ellipse, in its own radius
+_WINDOWS = ((0.5, 0.35), (0.3, 0.45), (0.15, 0.55))
 _MINIMUM_WINDOW, _MAXIMUM_WINDOW = 2.0, 0.5  # the same: px, and in its own radius
-_PROFILE, _SAMPLES = 1.15, 13  # half length of a profile across it, in windows, and its samples
+_PROFILE, _SAMPLES = 1.15, 11  # half length of a profile across it, in windows, and its samples
 _MINIMUM_STEP = 0.1  # of ln, for a ray to count in the fit
 _CLEAR_STEP = 1.5 * _MINIMUM_STEP  # for a ray to show the edge
 _FLAT = -1e-3  # curvature of a peak of the steps, from which its top is computed
@@ -96,11 +97,11 @@ def refine_ellipses(
         Indices of the ellipses that these were.
     """
     dots, kept = Dots(frames, polarity, np.zeros(len(frames))), np.arange(len(frames))
-    for window in _WINDOWS:
+    for window, minimum in _WINDOWS:
         dots = _refined(log, dots, window)
         major, minor, _ = frame.ellipse_axes(dots.frames)
         good = (minor > _MINIMUM_ASPECT * major) & (minor > _MINIMUM_MINOR)
-        good &= dots.share > _MINIMUM_INLIERS
+        good &= dots.share > minimum
         dots, kept = dots.select(good), kept[good]
     return dots, kept
 
@@ -121,13 +122,13 @@ def _best_ellipses(
     x, y = ((candidates.points[part] + 0.5) * shrink - 0.5).T
     polarity = candidates.polarity[part]
     low, high = candidates.radii[0] * shrink, candidates.radii[1] * shrink
-    templates, radii, majors, minors, directions = _templates(low, high)
+    templates, radii, move_x, move_y, majors, minors, directions = _templates(low, high)
     one = np.ones(len(x))
     frames = frame.affine_frames(x, y, one, one, 0 * one)
     steps = _steps(log, frames, radii, polarity)
     scores = steps.reshape(len(x), len(templates)) @ templates
     best, highest = scores.argmax(axis=1), scores.max(axis=1)
-    fitted = frame.affine_frames(x, y, majors[best], minors[best], directions[best])
+    fitted = frame.affine_frames(x + move_x[best], y + move_y[best], majors[best], minors[best], directions[best])
     dots = Dots(fitted, polarity, highest).select(highest > _MINIMUM_SCORE)
     return dots, np.full(len(dots.frames), _OVERSIZE * high)
 
@@ -139,16 +140,26 @@ def _templates(low: float, high: float) -> tuple[np.ndarray, ...]:
     ratio = np.log(radii[1] / radii[0])
     middle = radii[1:-1]
     weights, ellipses = [], []
+
+    def add(ellipse: tuple[float, ...], outline: np.ndarray) -> None:
+        bins = np.log(outline / middle[0]) / ratio
+        distance = np.abs(bins[:, None] - np.arange(len(middle)))
+        weights.append(np.clip(_WIDTH - distance, 0, 1).ravel() / _RAYS)
+        ellipses.append(ellipse)
+
     for aspect, count in _SHAPES:
         for direction in np.pi * np.arange(count) / count:
             along = np.cos(_ANGLES - direction) ** 2 + (np.sin(_ANGLES - direction) / aspect) ** 2
             for major in middle[middle * aspect >= middle[0]]:
-                bins = np.log(major / np.sqrt(along) / middle[0]) / ratio
-                distance = np.abs(bins[:, None] - np.arange(len(middle)))
-                weights.append(np.clip(_WIDTH - distance, 0, 1).ravel() / _RAYS)
-                ellipses.append((major, aspect * major, direction))
-    majors, minors, directions = np.array(ellipses).T
-    return np.array(weights, np.float32).T, radii, majors, minors, directions
+                add((0.0, 0.0, major, aspect * major, direction), major / np.sqrt(along))
+    for direction in 2 * np.pi * np.arange(_SIDES) / _SIDES:
+        across = _BESIDE * np.sin(_ANGLES - direction)
+        outline = _BESIDE * np.cos(_ANGLES - direction) + np.sqrt(1 - across**2)
+        x, y = _BESIDE * np.cos(direction), _BESIDE * np.sin(direction)
+        for radius in middle[middle * (1 - _BESIDE) >= middle[0]]:
+            add((x * radius, y * radius, radius, radius, 0.0), radius * outline)
+    x, y, majors, minors, directions = np.array(ellipses).T
+    return np.array(weights, np.float32).T, radii, x, y, majors, minors, directions
 
 
 def _steps(

@@ -29,17 +29,20 @@ class Peaks(ArrayRecord):
     ----------
     x, y : ndarray of float64, shape (k,)
         In cells; the middle of the first one is at 0.
+    plane : ndarray of int, shape (k,)
+        What is voted for there, a number.
     votes : ndarray of float64, shape (k,)
         In units of those needed.
     """
 
     x: np.ndarray
     y: np.ndarray
+    plane: np.ndarray
     votes: np.ndarray
 
 
 _NONE = np.zeros(0)
-NO_PEAKS = Peaks(_NONE, _NONE, _NONE)
+NO_PEAKS = Peaks(_NONE, _NONE, _NONE.astype(int), _NONE)
 """An empty record."""
 
 
@@ -76,7 +79,7 @@ def find_peaks(
         middles + _top(_weighted(votes, cells - step, wide), sums, _weighted(votes, cells + step, wide))
         for middles, step in ((columns, 1), (rows, wide))
     )
-    return Peaks(x, y, sums / needed)
+    return Peaks(x, y, np.zeros(len(x), int), sums / needed)
 
 
 def highest(
