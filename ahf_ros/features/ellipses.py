@@ -32,6 +32,7 @@ _PROFILE, _SAMPLES = 1.15, 11  # half length of a profile across it, in windows,
 _MINIMUM_STEP = 0.1  # of ln, for a ray to count in the fit
 _CLEAR_STEP = 1.5 * _MINIMUM_STEP  # for a ray to show the edge
 _FLAT = -1e-3  # curvature of a peak of the steps, from which its top is computed
+_ROUNDS = 3  # of robust least squares
 _OUTLIERS = 5.0  # to a window: residuals that quarter the weight of a ray
 _INLIER, _PIXEL_INLIER = 0.06, 0.4  # of the radius, or px
 _MINIMUM_INLIERS = 0.55
@@ -186,10 +187,11 @@ def _refined(log: np.ndarray, dots: Dots, window: float) -> Dots:
     shift = np.clip(0.5 * (before - after) / curvature, -1, 1)
     spacing = radii[:, 1:2] - radii[:, :1]
     displacement = np.take_along_axis(radii, best + 1, axis=1) + shift * spacing - 1
-    usual = np.maximum(np.median(step, axis=1, keepdims=True), _MINIMUM_STEP)
+    middle = np.partition(step, _RAYS // 2, axis=1)[:, _RAYS // 2, None]
+    usual = np.maximum(middle, _MINIMUM_STEP)
     weights = np.clip(step / usual, 0, 1) * (step > _MINIMUM_STEP)
     basis = frame.displacement_basis(_ANGLES, np.ones(_RAYS))[:, :5]
-    changes, errors = fit_linear(displacement, weights, basis, window / _OUTLIERS)
+    changes, errors = fit_linear(displacement, weights, basis, window / _OUTLIERS, _ROUNDS)
     inlying = np.abs(errors) < np.maximum(_INLIER, _PIXEL_INLIER / size)
     share = (inlying & (step > _CLEAR_STEP)).mean(axis=1)
     frames = frame.moved(dots.frames, np.clip(changes, -windows, windows))

@@ -13,9 +13,9 @@ import numpy as np
 
 from ahf_ros.features.array_record import ArrayRecord
 
-_SHIFT = 2
+_SHIFT = 1
 _BLOCK = 1 << _SHIFT  # cells, side of a block
-_MAXIMUM_VOTES = 10_000  # that are counted in a block
+_SPREAD = 1.4  # votes in a cell and beside it, in weighted votes, at the least
 _WEIGHTS = (0.5, 1.0, 0.5)  # of votes for the cell before, for a cell itself, and the next one
 _OUTSIDE = cv2.BORDER_CONSTANT  # no votes are there
 _FLAT = 1e-6  # curvature of votes from which their top is computed
@@ -114,11 +114,11 @@ def _promising(
     """Return the indices of the votes in blocks that, with some neighbours, have enough."""
     tall, wide = (-(-side // _BLOCK) for side in shape)
     block = (rows >> _SHIFT) * np.int32(wide) + (columns >> _SHIFT)
-    cast = np.bincount(block, minlength=tall * wide).reshape(tall, wide)
-    of_blocks = np.minimum(cast, _MAXIMUM_VOTES).astype(np.uint16)
+    of_blocks = np.zeros((tall, wide), np.uint16)
+    np.add.at(of_blocks.ravel(), block, np.uint16(1))
     # A cell and its neighbours lie in two by two blocks.
     of_four = cv2.boxFilter(of_blocks, -1, (2, 2), normalize=False, borderType=_OUTSIDE)
-    enough = (of_four > needed).astype(np.uint8)
+    enough = (of_four > _SPREAD * needed).astype(np.uint8)
     if not enough.any():
         return np.zeros(0, np.intp)
     hot = cv2.dilate(enough, np.ones((2, 2), np.uint8), anchor=(0, 0))
