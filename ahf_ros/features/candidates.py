@@ -57,10 +57,10 @@ class _Shape(NamedTuple):
     every: int
 
 
-_OBLIQUE = _Shape(0.5, 6, 2, 1.15, 2)
+_OBLIQUE = _Shape(0.5, 6, 2, 1.2, 2)
 _RANGES = {(5.8, LARGEST_RADIUS): (_Shape(1.0, 1, 2, 1.4, 1), _OBLIQUE)}  # by radii, px
 _FIRST_RANGES = {  # of the first level
-    (2.0, 3.4): (_Shape(1.0, 1, 1, 0.5, 1),),
+    (2.0, 3.4): (_Shape(1.0, 1, 1, 0.6, 1),),
     (3.4, 5.8): (_Shape(1.0, 1, 1, 1.4, 1), _OBLIQUE),
     **_RANGES,
 }

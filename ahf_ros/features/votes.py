@@ -16,6 +16,7 @@ from ahf_ros.features.array_record import ArrayRecord
 _SHIFT = 1
 _BLOCK = 1 << _SHIFT  # cells, side of a block
 _SPREAD = 1.4  # votes in a cell and beside it, in weighted votes, at the least
+_OWN = 1 / 8  # of the weighted votes of a peak, that its own cell has
 _WEIGHTS = (0.5, 1.0, 0.5)  # of votes for the cell before, for a cell itself, and the next one
 _OUTSIDE = cv2.BORDER_CONSTANT  # no votes are there
 _FLAT = 1e-6  # curvature of votes from which their top is computed
@@ -67,8 +68,9 @@ def find_peaks(
         return NO_PEAKS
     wide = shape[1]
     cells, counts = np.unique(rows[which] * np.int32(wide) + columns[which], return_counts=True)
-    votes = np.zeros(shape[0] * wide, np.float32)
+    votes = np.zeros(shape[0] * wide, np.uint16)
     votes[cells] = counts
+    cells = cells[counts > _OWN * needed]
     sums = _weighted(votes, cells, wide)
     enough = sums > needed
     cells, sums = cells[enough], sums[enough]
@@ -131,7 +133,7 @@ def _weighted(votes: np.ndarray, cells: np.ndarray, wide: int) -> np.ndarray:
     for down, of_row in zip((-wide, 0, wide), _WEIGHTS, strict=True):
         for across, of_column in zip((-1, 0, 1), _WEIGHTS, strict=True):
             beside = votes.take(cells + (down + across), mode='clip')
-            sums += np.float32(of_row * of_column) * beside
+            sums += np.float32(of_row * of_column) * beside.astype(np.float32)
     return sums
 
 
