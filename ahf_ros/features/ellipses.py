@@ -27,6 +27,7 @@ _MINIMUM_SCORE = 0.15  # mean step of ln along the ellipse
 _COARSE = 8.0  # largest radius of a range that is fitted one level below its own, px
 _OVERSIZE = 1.6  # semi-major axis of a dot, in the largest radius of its range, at the most
 _WINDOWS = ((0.5, 0.35), (0.3, 0.45), (0.15, 0.55))
+_LINEAR = (0, 0, 1)
 _MINIMUM_WINDOW, _MAXIMUM_WINDOW = 2.0, 0.5  # the same: px, and in its own radius
 _PROFILE, _SAMPLES = 1.15, 11  # half length of a profile across it, in windows, and its samples
 _MINIMUM_STEP = 0.1  # of ln, for a ray to count in the fit
@@ -98,8 +99,8 @@ def refine_ellipses(
         Indices of the ellipses that these were.
     """
     dots, kept = Dots(frames, polarity, np.zeros(len(frames))), np.arange(len(frames))
-    for window, minimum in _WINDOWS:
-        dots = _refined(log, dots, window)
+    for (window, minimum), linear in zip(_WINDOWS, _LINEAR):
+        dots = _refined(log, dots, window, linear)
         major, minor, _ = frame.ellipse_axes(dots.frames)
         good = (minor > _MINIMUM_ASPECT * major) & (minor > _MINIMUM_MINOR)
         good &= dots.share > minimum
@@ -172,12 +173,19 @@ def _steps(
     return np.clip(steps, _MINIMUM_COUNTED, _MAXIMUM_COUNTED, dtype=np.float32)
 
 
-def _refined(log: np.ndarray, dots: Dots, window: float) -> Dots:
+def _refined(log: np.ndarray, dots: Dots, window: float, linear=0) -> Dots:
     """Return dots moved onto the strongest steps near their ellipses."""
     size = frame.mean_radii(dots.frames)[:, None]
     windows = np.clip(_MINIMUM_WINDOW / size, window, _MAXIMUM_WINDOW)
     radii = 1 + np.linspace(-_PROFILE, _PROFILE, _SAMPLES) * windows
-    steps = _steps(log, dots.frames, radii, dots.polarity)
+    if linear:
+        values = sample_circles(log, dots.frames, _ANGLES, radii).astype(np.float32)
+        values -= values.max(axis=2, keepdims=True)
+        values /= np.float32(LOG_SCALE)
+        np.exp(values, out=values)
+        steps = (values[:, :, 2:] - values[:, :, :-2]) * dots.polarity.astype(np.float32)[:, None, None]
+    else:
+        steps = _steps(log, dots.frames, radii, dots.polarity)
     best = np.clip(steps.argmax(axis=2), 1, steps.shape[2] - 2)
     before, step, after = (
         np.take_along_axis(steps, (best + shift)[..., None], axis=2)[..., 0].astype(np.float64)
