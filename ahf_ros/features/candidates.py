@@ -11,7 +11,7 @@ projected stripes.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil
 from typing import NamedTuple
 
@@ -25,12 +25,7 @@ from ahf_ros.features.pyramid import LARGEST_RADIUS
 from ahf_ros.features.votes import NO_PEAKS, Peaks, find_peaks, highest
 
 MAXIMUM_CANDIDATES = 6000
-"""Candidates kept at the most for one range of radii and one polarity, those with the most votes."""
-
-_STEP = 0.8  # of the radii voted for, in cells
-_CELL = 2  # in which the votes for different shapes are compared, px
-_LONG = 1.5  # length of an edge that is straight, in radii of the largest dot
-_REACH = 0.5  # within which no other centre has more votes, in radii of the smallest dot
+"""Candidates kept at the most for one range of radii and one polarity, those with most votes."""
 
 
 class _Shape(NamedTuple):
@@ -57,14 +52,24 @@ class _Shape(NamedTuple):
     every: int
 
 
-_OBLIQUE = _Shape(0.5, 6, 2, 1.2, 2)
-_RANGES = {(5.8, LARGEST_RADIUS): (_Shape(1.0, 1, 2, 1.4, 1), _OBLIQUE)}  # by radii, px
-_FIRST_RANGES = {  # of the first level
-    (2.0, 3.4): (_Shape(1.0, 1, 1, 0.6, 1),),
-    (3.4, 5.8): (_Shape(1.0, 1, 1, 1.4, 1), _OBLIQUE),
-    **_RANGES,
+_SMALLEST = _Shape(1.0, 1, 1, 0.6, 1)  # whose edges are the least exact
+_SMALL = _Shape(1.0, 1, 1, 1.4, 1)
+_LARGE = _Shape(1.0, 1, 2, 1.4, 1)
+_OBLIQUE = _Shape(0.5, 6, 2, 1.2, 2)  # finds those of 0.3 to 0.7, up to 70 degrees
+_RANGES = {  # by semi-major axes, px
+    (3.4, 5.8): (_SMALL,),  # out of focus, as others are found on the level below
+    (5.8, LARGEST_RADIUS): (_LARGE, _OBLIQUE),
 }
+_FIRST_RANGES = {  # of the first level
+    (2.0, 3.4): (_SMALLEST,),
+    (3.4, 5.8): (_SMALL, _OBLIQUE),
+    (5.8, LARGEST_RADIUS): (_LARGE, _OBLIQUE),
+}
+_STEP = 0.8  # of the radii voted for, in cells
 _FLAT = 0.75  # sine of the angle between an edge of an ellipse and its major axis, at the most
+_REACH = 0.5  # within which no other centre has more votes, in radii of the smallest dot
+_CELL = 2  # in which the votes for different shapes are compared, px
+_LONG = 1.5  # length of an edge that is straight, in radii of the largest dot
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,16 +163,16 @@ def _elected(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the points, shape (k, 2), that enough edges vote for, and polarities, shape (k,)."""
     found = Peaks.joined([_peaks(edges, radii, of, polarities) for of in shapes])
-    reach = max(1, round(_REACH * radii[0] / _CELL))
-    margin = ceil(radii[1] / _CELL) + reach
-    tall, wide = (side // _CELL + 1 + 2 * margin for side in edges.marked.shape)
-    columns = np.rint((found.x + 0.5) / _CELL - 0.5).astype(int) + margin
-    rows = np.rint((found.y + 0.5) / _CELL - 0.5).astype(int) + margin
-    cells = (found.plane * tall + rows) * wide + columns
-    found = found.select(highest(cells, found.votes, (len(polarities) * tall, wide), reach))
     points = np.stack([found.x, found.y], axis=-1)
-    inside = ((points > -1) & (points < edges.marked.shape[::-1])).all(axis=1)
+    inside = np.all((points > -1) & (points < edges.marked.shape[::-1]), axis=1)
     found, points = found.select(inside), points[inside]
+    reach = max(1, round(_REACH * radii[0] / _CELL))
+    margin = reach + 1
+    tall, wide = (side // _CELL + 1 + 2 * margin for side in edges.marked.shape)
+    columns, rows = np.rint((points.T + 0.5) / _CELL - 0.5).astype(int) + margin
+    cells = (found.plane * tall + rows) * wide + columns
+    kept = highest(cells, found.votes, (len(polarities) * tall, wide), reach)
+    found, points = found.select(kept), points[kept]
     limit = MAXIMUM_CANDIDATES * len(polarities)
     kept = best(np.arange(len(points)), -found.votes, limit, 'candidates of one size')
     return points[kept], np.asarray(polarities, int)[found.plane[kept]]
@@ -176,27 +181,22 @@ def _elected(
 def _peaks(
     edges: LogEdges, radii: tuple[float, float], of: _Shape, polarities: Sequence[int]
 ) -> Peaks:
-    """Return the points that enough edges of a shape vote for, px, and indices of polarities."""
+    """Return the points that enough edges of a shape vote for, px, with indices of polarities."""
     low, high = radii
     count = max(2, ceil((high - low) / (_STEP * of.cell)))
-    every = low + (np.arange(count) + 0.5) * (high - low) / count
+    steps = low + (np.arange(count) + 0.5) * (high - low) / count
     needed = of.votes * 2 * np.pi * low
-    if len(polarities) == 0 or count * len(edges.x) <= needed:
+    if not len(polarities) or count * len(edges.x) <= needed:
         return NO_PEAKS
     reach = max(1, round(_REACH * low / of.cell))
     margin = reach + ceil(high / of.cell) + 1  # votes may lie outside of the image
     tall, wide = (side // of.cell + 1 + 2 * margin for side in edges.marked.shape)
     # Votes for each polarity and direction are counted in a plane of their own.
-    columns, rows = _votes(edges, of, np.outer(polarities, every), margin, tall)
+    columns, rows = _votes(edges, of, np.outer(polarities, steps), margin, tall)
     planes = len(polarities) * of.directions
-    peaks = find_peaks(columns, rows, (planes * tall, wide), needed / of.every, reach)
-    plane, y = np.divmod(peaks.y + 0.5, tall)
-    return Peaks(
-        (peaks.x + 0.5 - margin) * of.cell - 0.5,
-        (y - margin) * of.cell - 0.5,
-        plane.astype(int) // of.directions,
-        peaks.votes,
-    )
+    peaks = find_peaks(columns, rows, (planes, tall, wide), needed / of.every, reach)
+    x, y = ((at - margin + 0.5) * of.cell - 0.5 for at in (peaks.x, peaks.y))
+    return replace(peaks, x=x, y=y, plane=peaks.plane // of.directions)
 
 
 def _votes(
@@ -217,7 +217,7 @@ def _votes(
     """
     columns, rows = [], []
     cell = np.float32(of.cell)
-    some = edges.select(slice(None, None, of.every)) if of.every > 1 else edges
+    some = edges.select(slice(None, None, of.every))
     x, y = ((at + np.float32(0.5)) / cell + np.float32(margin) for at in (some.x, some.y))
     steps = (radii / of.cell).astype(np.float32)[..., None]
     for number, angle in enumerate(np.pi * np.arange(of.directions) / of.directions):

@@ -42,8 +42,8 @@ class LogEdges:
     unit_y: np.ndarray
     strength: np.ndarray
 
-    def select(self, which: np.ndarray) -> LogEdges:
-        """Return some of the edge pixels, by an index array or a mask of shape (m,)."""
+    def select(self, which: np.ndarray | slice) -> LogEdges:
+        """Return some of the edge pixels, by an index array, a mask of shape (m,) or a slice."""
         names = ('x', 'y', 'unit_x', 'unit_y', 'strength')
         return replace(self, **{name: getattr(self, name)[which] for name in names})
 

@@ -1,7 +1,7 @@
 """Votes for places in an image, counted in cells, and the places with the most.
 
-Most votes are strays. So they are counted in blocks of cells first, and one by one only where
-blocks have enough.
+Most votes are strays. So they are counted in blocks of cells first, and cell by cell only where
+blocks have enough. Votes for different things are counted in planes of their own.
 """
 
 from __future__ import annotations
@@ -29,9 +29,8 @@ class Peaks(ArrayRecord):
     Attributes
     ----------
     x, y : ndarray of float64, shape (k,)
-        In cells; the middle of the first one is at 0.
+        In cells; the middle of the first one of a plane is at 0.
     plane : ndarray of int, shape (k,)
-        What is voted for there, a number.
     votes : ndarray of float64, shape (k,)
         In units of those needed.
     """
@@ -48,46 +47,53 @@ NO_PEAKS = Peaks(_NONE, _NONE, _NONE.astype(int), _NONE)
 
 
 def find_peaks(
-    columns: np.ndarray, rows: np.ndarray, shape: tuple[int, int], needed: float, reach: int
+    columns: np.ndarray,
+    rows: np.ndarray,
+    shape: tuple[int, int, int],
+    needed: float,
+    reach: int,
 ) -> Peaks:
     """Return the cells with enough votes in them and beside them, and none with more within reach.
 
     Parameters
     ----------
     columns, rows : ndarray of int32, shape (n,)
-        Cells voted for.
-    shape : tuple of 2 int
-        Number of rows and columns; nobody votes for those within `reach` of the border.
+        Cells voted for; rows count through all planes.
+    shape : tuple of 3 int
+        Number of planes, and of rows and columns of each; nobody votes for those within `reach`
+        of its border.
     needed : float
         Votes; one for a neighbouring cell counts half, and a quarter on the diagonal.
     reach : int
         Cells.
     """
-    which = _promising(columns, rows, shape, needed)
+    planes, tall, wide = shape
+    which = _promising(columns, rows, (planes * tall, wide), needed)
     if not len(which):
         return NO_PEAKS
-    wide = shape[1]
     cells, counts = np.unique(rows[which] * np.int32(wide) + columns[which], return_counts=True)
-    votes = np.zeros(shape[0] * wide, np.uint16)
+    votes = np.zeros(planes * tall * wide, np.uint16)
     votes[cells] = counts
     cells = cells[counts > _OWN * needed]
     sums = _weighted(votes, cells, wide)
     enough = sums > needed
     cells, sums = cells[enough], sums[enough]
-    kept = highest(cells, sums, shape, reach)
+    kept = highest(cells, sums, (planes * tall, wide), reach)
     cells, sums = cells[kept], sums[kept]
-    rows, columns = np.divmod(cells, wide)
+    row, column = np.divmod(cells, wide)
+    plane, row = np.divmod(row, tall)
     x, y = (
-        middles + _top(_weighted(votes, cells - step, wide), sums, _weighted(votes, cells + step, wide))
-        for middles, step in ((columns, 1), (rows, wide))
+        middle
+        + _top(_weighted(votes, cells - step, wide), sums, _weighted(votes, cells + step, wide))
+        for middle, step in ((column, 1), (row, wide))
     )
-    return Peaks(x, y, np.zeros(len(x), int), sums / needed)
+    return Peaks(x, y, plane.astype(int), sums / needed)
 
 
 def highest(
     cells: np.ndarray, values: np.ndarray, shape: tuple[int, int], reach: int
 ) -> np.ndarray:
-    """Return whether no value within reach is higher, shape (k,).
+    """Return whether no value within reach is higher, for k values, shape (k,).
 
     Parameters
     ----------
