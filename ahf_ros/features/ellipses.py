@@ -15,8 +15,8 @@ from ahf_ros.features.log_edges import LOG_SCALE
 from ahf_ros.features.robust import fit_linear
 from ahf_ros.features.sampling import sample_circles
 
-_RAYS = 24
-_ANGLES = 2 * np.pi * np.arange(_RAYS) / _RAYS
+_RAYS, _FEW_RAYS = 32, 24  # about an ellipse that is refined, and about a candidate
+_ANGLES, _FEW_ANGLES = (2 * np.pi * np.arange(rays) / rays for rays in (_RAYS, _FEW_RAYS))
 _BINS = 22  # of the radius, in equal ratios
 _NEAREST, _FARTHEST = 0.4, 1.35  # radii sampled, in the smallest and the largest of the range
 _WIDTH = 1.5  # from the middle of an ellipse to where its weights end, bins
@@ -127,7 +127,7 @@ def _best_ellipses(
     templates, radii, ellipses = _templates(low, high)
     one = np.ones(len(x))
     frames = frame.affine_frames(x, y, one, one, 0 * one)
-    steps = _steps(log, frames, radii, polarity)
+    steps = _steps(log, frames, _FEW_ANGLES, radii, polarity)
     scores = steps.reshape(len(x), len(templates)) @ templates
     best, highest = scores.argmax(axis=1), scores.max(axis=1)
     move_x, move_y, *axes = ellipses[best].T
@@ -155,36 +155,44 @@ def _templates(low: float, high: float) -> tuple[np.ndarray, np.ndarray, np.ndar
     outlines, ellipses = [], []
     for aspect, count in _SHAPES:
         for direction in np.pi * np.arange(count) / count:
-            along, across = np.cos(_ANGLES - direction), np.sin(_ANGLES - direction) / aspect
+            along, across = np.cos(_FEW_ANGLES - direction), np.sin(_FEW_ANGLES - direction) / aspect
             for major in middle[middle * aspect >= middle[0]]:
                 outlines.append(major / np.hypot(along, across))
                 ellipses.append((0.0, 0.0, major, aspect * major, direction))
     for direction in 2 * np.pi * np.arange(_SIDES) / _SIDES:
-        along, across = (_BESIDE * of(_ANGLES - direction) for of in (np.cos, np.sin))
+        along, across = (_BESIDE * of(_FEW_ANGLES - direction) for of in (np.cos, np.sin))
         x, y = _BESIDE * np.cos(direction), _BESIDE * np.sin(direction)
         for radius in middle[middle * (1 - _BESIDE) >= middle[0]]:
             outlines.append(radius * (along + np.sqrt(1 - across**2)))
             ellipses.append((x * radius, y * radius, radius, radius, 0.0))
     bins = np.log(np.array(outlines) / middle[0]) / ratio
     distance = np.abs(bins[:, :, None] - np.arange(len(middle)))
-    weights = np.clip(_WIDTH - distance, 0, 1, dtype=np.float32) / _RAYS
+    weights = np.clip(_WIDTH - distance, 0, 1, dtype=np.float32) / _FEW_RAYS
     return weights.reshape(len(weights), -1).T, radii, np.array(ellipses)
 
 
 def _steps(
-    log: np.ndarray, frames: np.ndarray, radii: np.ndarray, polarity: np.ndarray
+    log: np.ndarray,
+    frames: np.ndarray,
+    angles: np.ndarray,
+    radii: np.ndarray,
+    polarity: np.ndarray,
 ) -> np.ndarray:
     """Return the steps of ln outwards, from dark to bright, at all but the end radii."""
-    values = sample_circles(log, frames, _ANGLES, radii).astype(np.float32)
+    values = sample_circles(log, frames, angles, radii).astype(np.float32)
     steps = (values[:, :, 2:] - values[:, :, :-2]) * (polarity / LOG_SCALE)[:, None, None]
     return np.clip(steps, _MINIMUM_COUNTED, _MAXIMUM_COUNTED, dtype=np.float32)
 
 
 def _relative_steps(
-    log: np.ndarray, frames: np.ndarray, radii: np.ndarray, polarity: np.ndarray
+    log: np.ndarray,
+    frames: np.ndarray,
+    angles: np.ndarray,
+    radii: np.ndarray,
+    polarity: np.ndarray,
 ) -> np.ndarray:
     """Return the same for gray values, in units of the brightest one of the ray."""
-    values = sample_circles(log, frames, _ANGLES, radii).astype(np.float32)
+    values = sample_circles(log, frames, angles, radii).astype(np.float32)
     values -= values.max(axis=2, keepdims=True)
     values /= np.float32(LOG_SCALE)
     np.exp(values, out=values)
@@ -200,7 +208,7 @@ def _refined(
     size = frame.mean_radii(dots.frames)[:, None]
     windows = np.clip(_MINIMUM_WINDOW / size, window, _MAXIMUM_WINDOW)
     radii = 1 + np.linspace(-_PROFILE, _PROFILE, _SAMPLES) * windows
-    steps = steps_of(log, dots.frames, radii, dots.polarity)
+    steps = steps_of(log, dots.frames, _ANGLES, radii, dots.polarity)
     best = np.clip(steps.argmax(axis=2), 1, steps.shape[2] - 2)
     before, step, after = (
         np.take_along_axis(steps, (best + shift)[..., None], axis=2)[..., 0].astype(np.float64)
