@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 
@@ -28,8 +28,8 @@ _SMALL = 8.0  # largest radius of a range of the first level that is fitted in t
 _OVERSIZE = 1.6  # semi-major axis of a dot, in the largest radius of its range, at the most
 _WINDOWS = ((0.5, 0.35), (0.3, 0.45), (0.15, 0.55))  # about the ellipse, in its own radius; share
 _MINIMUM_WINDOW, _MAXIMUM_WINDOW = 2.0, 0.5  # the same: px, and in its own radius
-_PROFILE, _SAMPLES = 1.15, 11  # half length of a profile across it, in windows, and its samples
-_MINIMUM_STEP = 0.1  # of ln, or relative, for a ray to count in the fit
+_PROFILE, _SAMPLES = 1.15, 13  # half length of a profile across it, in windows, and its samples
+_MINIMUM_STEP = 0.1  # of ln, for a ray to count in the fit
 _CLEAR_STEP = 1.5 * _MINIMUM_STEP  # for a ray to show the edge
 _FLAT = -1e-3  # curvature of a peak of the steps, from which its top is computed
 _ROUNDS = 3  # of robust least squares
@@ -98,14 +98,12 @@ def refine_ellipses(
     """
     dots, kept = Dots(frames, polarity, np.zeros(len(frames))), np.arange(len(frames))
     for window, minimum_share in _WINDOWS:
-        # In a logarithm a blurred edge lies on its dark side.
-        steps = _steps if window > _WINDOWS[-1][0] else _relative_steps
-        dots = _refined(log, dots, window, steps)
+        dots = _refined(log, dots, window)
         major, minor, _ = frame.ellipse_axes(dots.frames)
         good = (minor > _MINIMUM_ASPECT * major) & (minor > _MINIMUM_MINOR)
         good &= dots.share > minimum_share
         dots, kept = dots.select(good), kept[good]
-    return dots, kept
+    return _resized(log, dots), kept
 
 
 def _best_ellipses(
@@ -155,7 +153,10 @@ def _templates(low: float, high: float) -> tuple[np.ndarray, np.ndarray, np.ndar
     outlines, ellipses = [], []
     for aspect, count in _SHAPES:
         for direction in np.pi * np.arange(count) / count:
-            along, across = np.cos(_FEW_ANGLES - direction), np.sin(_FEW_ANGLES - direction) / aspect
+            along, across = (
+                np.cos(_FEW_ANGLES - direction),
+                np.sin(_FEW_ANGLES - direction) / aspect,
+            )
             for major in middle[middle * aspect >= middle[0]]:
                 outlines.append(major / np.hypot(along, across))
                 ellipses.append((0.0, 0.0, major, aspect * major, direction))
@@ -184,40 +185,12 @@ def _steps(
     return np.clip(steps, _MINIMUM_COUNTED, _MAXIMUM_COUNTED, dtype=np.float32)
 
 
-def _relative_steps(
-    log: np.ndarray,
-    frames: np.ndarray,
-    angles: np.ndarray,
-    radii: np.ndarray,
-    polarity: np.ndarray,
-) -> np.ndarray:
-    """Return the same for gray values, in units of the brightest one of the ray."""
-    values = sample_circles(log, frames, angles, radii).astype(np.float32)
-    values -= values.max(axis=2, keepdims=True)
-    values /= np.float32(LOG_SCALE)
-    np.exp(values, out=values)
-    outwards = polarity.astype(np.float32)[:, None, None]
-    steps: np.ndarray = outwards * (values[:, :, 2:] - values[:, :, :-2])
-    return steps
-
-
-def _refined(
-    log: np.ndarray, dots: Dots, window: float, steps_of: Callable[..., np.ndarray]
-) -> Dots:
+def _refined(log: np.ndarray, dots: Dots, window: float) -> Dots:
     """Return dots moved onto the strongest steps near their ellipses."""
     size = frame.mean_radii(dots.frames)[:, None]
-    windows = np.clip(_MINIMUM_WINDOW / size, window, _MAXIMUM_WINDOW)
-    radii = 1 + np.linspace(-_PROFILE, _PROFILE, _SAMPLES) * windows
-    steps = steps_of(log, dots.frames, _ANGLES, radii, dots.polarity)
-    best = np.clip(steps.argmax(axis=2), 1, steps.shape[2] - 2)
-    before, step, after = (
-        np.take_along_axis(steps, (best + shift)[..., None], axis=2)[..., 0].astype(np.float64)
-        for shift in (-1, 0, 1)
-    )
-    curvature = np.minimum(before - 2 * step + after, _FLAT)
-    shift = np.clip(0.5 * (before - after) / curvature, -1, 1)
-    spacing = radii[:, 1:2] - radii[:, :1]
-    displacement = np.take_along_axis(radii, best + 1, axis=1) + shift * spacing - 1
+    radii, windows = _profiles(size, window)
+    steps = _steps(log, dots.frames, _ANGLES, radii, dots.polarity)
+    displacement, step = _strongest(steps, radii)
     middle = np.partition(step, _RAYS // 2, axis=1)[:, _RAYS // 2, None]
     usual = np.maximum(middle, _MINIMUM_STEP)
     weights = np.clip(step / usual, 0, 1) * (step > _MINIMUM_STEP)
@@ -227,3 +200,37 @@ def _refined(
     share = (inlying & (step > _CLEAR_STEP)).mean(axis=1)
     frames = frame.moved(dots.frames, np.clip(changes, -windows, windows))
     return Dots(frames, dots.polarity, share)
+
+
+def _resized(log: np.ndarray, dots: Dots) -> Dots:
+    """Return dots with their sizes in gray values.
+
+    In a logarithm a blurred edge lies on its dark side.
+    """
+    radii, _ = _profiles(frame.mean_radii(dots.frames)[:, None], _WINDOWS[-1][0])
+    values = sample_circles(log, dots.frames, _ANGLES, radii).astype(np.float32)
+    values = np.exp((values - values.max(axis=2, keepdims=True)) / np.float32(LOG_SCALE))
+    steps = (values[:, :, 2:] - values[:, :, :-2]) * dots.polarity[:, None, None]
+    displacement, _ = _strongest(steps, radii)
+    frames = dots.frames.copy()
+    frames[:, :2, :2] *= 1 + np.median(displacement, axis=1)[:, None, None]
+    return replace(dots, frames=frames)
+
+
+def _profiles(size: np.ndarray, window: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the radii of profiles across ellipses, and their windows."""
+    windows = np.clip(_MINIMUM_WINDOW / size, window, _MAXIMUM_WINDOW)
+    return 1 + np.linspace(-_PROFILE, _PROFILE, _SAMPLES) * windows, windows
+
+
+def _strongest(steps: np.ndarray, radii: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return how far the strongest steps of rays lie outside of ellipses, and these steps."""
+    best = np.clip(steps.argmax(axis=2), 1, steps.shape[2] - 2)
+    before, step, after = (
+        np.take_along_axis(steps, (best + shift)[..., None], axis=2)[..., 0].astype(np.float64)
+        for shift in (-1, 0, 1)
+    )
+    curvature = np.minimum(before - 2 * step + after, _FLAT)
+    shift = np.clip(0.5 * (before - after) / curvature, -1, 1)
+    spacing = radii[:, 1:2] - radii[:, :1]
+    return np.take_along_axis(radii, best + 1, axis=1) + shift * spacing - 1, step
