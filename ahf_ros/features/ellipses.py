@@ -26,7 +26,11 @@ _MINIMUM_COUNTED, _MAXIMUM_COUNTED = -0.3, 0.6  # steps of ln; one beyond counts
 _MINIMUM_SCORE = 0.15  # mean step of ln along the ellipse
 _SMALL = 8.0  # largest radius of a range of the first level that is fitted in the image, px
 _OVERSIZE = 1.6  # semi-major axis of a dot, in the largest radius of its range, at the most
-_WINDOWS = ((0.5, 0.35), (0.3, 0.45), (0.15, 0.55))  # about the ellipse, in its own radius; share
+_WINDOWS = (  # about the ellipse, in its own radius; share of inliers; one of so many rays
+    (0.5, 0.35, 2),
+    (0.3, 0.45, 1),
+    (0.15, 0.55, 1),
+)
 _MINIMUM_WINDOW, _MAXIMUM_WINDOW = 2.0, 0.5  # the same: px, and in its own radius
 _PROFILE, _SAMPLES = 1.15, 13  # half length of a profile across it, in windows, and its samples
 _MINIMUM_STEP = 0.1  # of ln, for a ray to count in the fit
@@ -97,8 +101,8 @@ def refine_ellipses(
         Indices of the ellipses that these were.
     """
     dots, kept = Dots(frames, polarity, np.zeros(len(frames))), np.arange(len(frames))
-    for window, minimum_share in _WINDOWS:
-        dots = _refined(log, dots, window)
+    for window, minimum_share, every in _WINDOWS:
+        dots = _refined(log, dots, window, _ANGLES[::every])
         major, minor, _ = frame.ellipse_axes(dots.frames)
         good = (minor > _MINIMUM_ASPECT * major) & (minor > _MINIMUM_MINOR)
         good &= dots.share > minimum_share
@@ -185,16 +189,17 @@ def _steps(
     return np.clip(steps, _MINIMUM_COUNTED, _MAXIMUM_COUNTED, dtype=np.float32)
 
 
-def _refined(log: np.ndarray, dots: Dots, window: float) -> Dots:
+def _refined(log: np.ndarray, dots: Dots, window: float, angles: np.ndarray) -> Dots:
     """Return dots moved onto the strongest steps near their ellipses."""
     size = frame.mean_radii(dots.frames)[:, None]
     radii, windows = _profiles(size, window)
-    steps = _steps(log, dots.frames, _ANGLES, radii, dots.polarity)
+    steps = _steps(log, dots.frames, angles, radii, dots.polarity)
     displacement, step = _strongest(steps, radii)
-    middle = np.partition(step, _RAYS // 2, axis=1)[:, _RAYS // 2, None]
+    half = len(angles) // 2
+    middle = np.partition(step, half, axis=1)[:, half, None]
     usual = np.maximum(middle, _MINIMUM_STEP)
     weights = np.clip(step / usual, 0, 1) * (step > _MINIMUM_STEP)
-    basis = frame.displacement_basis(_ANGLES, np.ones(_RAYS))[:, :5]
+    basis = frame.displacement_basis(angles, np.ones(len(angles)))[:, :5]
     changes, errors = fit_linear(displacement, weights, basis, window / _OUTLIERS, _ROUNDS)
     inlying = np.abs(errors) < np.maximum(_INLIER, _PIXEL_INLIER / size)
     share = (inlying & (step > _CLEAR_STEP)).mean(axis=1)
@@ -207,10 +212,12 @@ def _resized(log: np.ndarray, dots: Dots) -> Dots:
 
     In a logarithm a blurred edge lies on its dark side.
     """
-    radii, _ = _profiles(frame.mean_radii(dots.frames)[:, None], _WINDOWS[-1][0])
-    values = sample_circles(log, dots.frames, _ANGLES, radii).astype(np.float32)
+    window, _, _ = _WINDOWS[-1]
+    radii, _ = _profiles(frame.mean_radii(dots.frames)[:, None], window)
+    values = sample_circles(log, dots.frames, _ANGLES[::2], radii).astype(np.float32)
     values = np.exp((values - values.max(axis=2, keepdims=True)) / np.float32(LOG_SCALE))
-    steps = (values[:, :, 2:] - values[:, :, :-2]) * dots.polarity[:, None, None]
+    outwards = dots.polarity.astype(np.float32)[:, None, None]
+    steps = outwards * (values[:, :, 2:] - values[:, :, :-2])
     displacement, _ = _strongest(steps, radii)
     frames = dots.frames.copy()
     frames[:, :2, :2] *= 1 + np.median(displacement, axis=1)[:, None, None]
