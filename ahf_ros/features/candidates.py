@@ -173,8 +173,12 @@ def _elected(
     cells = (found.plane * tall + rows) * wide + columns
     kept = highest(cells, found.votes, (len(polarities) * tall, wide), reach)
     found, points = found.select(kept), points[kept]
-    limit = MAXIMUM_CANDIDATES * len(polarities)
-    kept = best(np.arange(len(points)), -found.votes, limit, 'candidates of one size')
+    # Spots of light may be many, of one polarity, and must not crowd out the other.
+    chosen = [
+        best(which, -found.votes[which], MAXIMUM_CANDIDATES, 'candidates of one size')
+        for which in (np.flatnonzero(found.plane == number) for number in range(len(polarities)))
+    ]
+    kept = np.concatenate([np.zeros(0, np.intp), *chosen])
     return points[kept], np.asarray(polarities, int)[found.plane[kept]]
 
 
