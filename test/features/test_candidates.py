@@ -189,6 +189,20 @@ def test_candidates_are_bounded_where_dots_are_everywhere():
     assert all(len(group.points) <= 2 * MAXIMUM_CANDIDATES for group in groups)
 
 
+def test_many_bright_spots_do_not_crowd_out_dark_dots(monkeypatch):
+    gray = drawn([(x, y, 8.0) for x in range(20, 200, 30) for y in range(20, 230, 30)], 30, 220)
+    gray[:, 200:] = stripes(drawn([(230.0, 60.0, 8.0), (280.0, 150.0, 8.0)]), 18, 0.4)[:, 200:]
+    edges = edges_of(gray)
+    every = candidates.find_candidates(edges, 4, 60, (1, -1))
+    monkeypatch.setattr(candidates, 'MAXIMUM_CANDIDATES', 2)
+    few = candidates.find_candidates(edges, 4, 60, (1, -1))
+    for polarity in (1, -1):
+        counts = [np.count_nonzero(group.polarity == polarity) for group in every]
+        assert max(counts) > 0
+        kept = [np.count_nonzero(group.polarity == polarity) for group in few]
+        assert kept == [min(count, 2) for count in counts]
+
+
 def test_more_dots_than_are_looked_at_are_said_and_the_roundest_stay(monkeypatch):
     image = np.full((400, 400), 200, np.uint8)
     for row in range(20, 400, 40):
