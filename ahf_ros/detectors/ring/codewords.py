@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import cache, lru_cache
 
 import numpy as np
@@ -16,6 +15,7 @@ _MINIMUM_EVIDENCE = 2.0  # for ones, in units of ln
 COMPETITORS = 24
 """Number of words of each band that are returned, more than there are rotations of one."""
 
+_PHASES = 4  # of a band, at which words compete
 _UNCERTAIN = 10  # sectors whose bits are varied where not all words compete
 _UNEXPECTED = 30.0  # evidence against words that are not expected, more than for a cover
 
@@ -26,9 +26,9 @@ def best_words(
     """Return the valid words with the most evidence.
 
     Bands without evidence for any mark are not read. In the others every rotation of every word
-    competes at p phases, which are p ways to divide the band into sectors. In families of more
-    than 50000 rotations, only those words compete that differ from the sectors' own evidence in
-    the ten least certain sectors at most.
+    competes at the likeliest of p phases, which are ways to divide the band into sectors. In
+    families of more than 50000 rotations, only those words compete that differ from the sectors'
+    own evidence in the ten least certain sectors at most.
 
     Parameters
     ----------
@@ -47,30 +47,25 @@ def best_words(
     """
     words = np.zeros((len(sectors), COMPETITORS), np.int64)
     phases = np.zeros(words.shape, np.intp)
-    for index, competing, of_phases in _scored(sectors, family, expected):
-        of_word = of_phases.max(axis=0)
-        # Where fewer words compete, the last ones are repeated.
-        best = np.argpartition(of_word, -min(COMPETITORS, len(of_word)))[-COMPETITORS:]
-        best = np.resize(best[np.argsort(-of_word[best], kind='stable')], COMPETITORS)
-        words[index], phases[index] = competing[best], of_phases[:, best].argmax(axis=0)
-    return words, phases
-
-
-def _scored(
-    sectors: np.ndarray, family: Family, expected: frozenset[int]
-) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
-    """Yield bands that are read, the words that compete, and the evidence at each phase."""
     everything = len(family.words) * family.bits <= _EXHAUSTIVE
     hopeful = np.maximum(sectors, 0).sum(axis=2).max(axis=1) > _MINIMUM_EVIDENCE
+    # Where sectors begin, each says most for one or zero; any other phase mixes neighbours.
+    likely = np.argsort(-np.abs(sectors).sum(axis=2), axis=1, kind='stable')[:, :_PHASES]
     for index in np.flatnonzero(hopeful).tolist():
-        of_band = sectors[index].astype(np.float32)
+        of_band = sectors[index, likely[index]].astype(np.float32)
         competing, ones = (
             _all_rotations(family) if everything else _near_rotations(of_band, family, expected)
         )
         of_phases = of_band @ ones
         if expected:
             of_phases += prior(competing, family, expected)
-        yield index, competing, of_phases
+        of_word = of_phases.max(axis=0)
+        # Where fewer words compete, the last ones are repeated.
+        best = np.argpartition(of_word, -min(COMPETITORS, len(of_word)))[-COMPETITORS:]
+        best = np.resize(best[np.argsort(-of_word[best], kind='stable')], COMPETITORS)
+        words[index] = competing[best]
+        phases[index] = likely[index, of_phases[:, best].argmax(axis=0)]
+    return words, phases
 
 
 def prior(words: np.ndarray, family: Family, expected: frozenset[int]) -> np.ndarray:

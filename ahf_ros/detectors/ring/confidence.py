@@ -5,7 +5,8 @@ whatever covers a part of it. Each has a log odds, which would be the probabilit
 were independent and all scenes alike. A logistic regression on rendered scenes, on targets that
 are covered, glossy, over-exposed or of other families and on clutter, says how far they can be
 trusted. None of its weights is negative: what speaks for a reading speaks for it everywhere. Its
-probability is multiplied by that of the margin over the next ID. `benchmarks.confidence` fits it and shows how far it can be trusted.
+probability is multiplied by that of the margin over the next ID. `benchmarks.confidence` fits it
+and shows how far it can be trusted.
 """
 
 from __future__ import annotations

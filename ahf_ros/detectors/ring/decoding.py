@@ -89,19 +89,18 @@ def decode(
     expected : frozenset of int
         IDs that are likely to be there. Empty: all IDs are equally likely.
     """
-    evidence = _doubted(evidence)
-    paper, ink = evidence.paper, evidence.ink
-    count, angles = paper.shape
+    of_bands = _doubted(evidence)
+    count, angles = of_bands.paper.shape
     per_sector = angles // family.bits
-    cap = _RANKED * evidence.weight[:, None]
-    ranked = np.clip(ink - paper, -cap, cap)
+    cap = _RANKED * of_bands.weight[:, None]
+    ranked = np.clip(of_bands.ink - of_bands.paper, -cap, cap)
     sectors = ranked[:, sectors_by_phase(per_sector, family)].sum(axis=3)
     words, phases = best_words(sectors, family, expected)
     read = np.flatnonzero(words[:, 0] > 0)
     decoded = Words.none(count, angles)
     if not read.size:
         return decoded
-    words, phases, some = words[read], phases[read], evidence.select(read)
+    words, phases, some = words[read], phases[read], of_bands.select(read)
     bits = lengthened(bits_at(words, phases, per_sector, family), overhang[read])
     order = _clearest(some)
     turned = replace(
@@ -121,12 +120,12 @@ def decode(
     hidden = np.empty(turned_hidden.shape, bool)
     np.put_along_axis(hidden, order, turned_hidden, axis=1)
     score = scores[rows, best].astype(np.float64)
-    bare = np.maximum(turned.paper.sum(axis=1), 0) - some.dot
+    bare = np.maximum(turned.paper.sum(axis=1), 0)
     found = Words(
         words=words[rows, best],
         starts=2 * np.pi * phases[rows, best] / angles,
         margin=margin.astype(np.float64),
-        marked=score - bare,
+        marked=score - bare + some.dot,
         coded=score - _free_paths(turned),
         seen=score,
         hidden=hidden,
@@ -134,11 +133,24 @@ def decode(
     return decoded.replaced(read, found)
 
 
-def _doubted(evidence: Evidence) -> Evidence:
-    """Return evidence no reading of which counts more than `_DOUBT`: light may do anything."""
+@dataclass(frozen=True, slots=True)
+class _Angles(ArrayRecord):
+    """Evidence of k bands for paper and ink, (k, m), its weight and that of the dot, (k,)."""
+
+    paper: np.ndarray
+    ink: np.ndarray
+    weight: np.ndarray
+    dot: np.ndarray
+
+
+def _doubted(evidence: Evidence) -> _Angles:
+    """Return the evidence of whole bands, no reading of which counts too much.
+
+    Light may do anything at any angle.
+    """
     most = np.float32(_DOUBT) * evidence.weight[:, None]
-    paper, ink = (most * np.tanh(of / most) for of in (evidence.paper, evidence.ink))
-    return replace(evidence, paper=paper, ink=ink)
+    paper, ink = (most * np.tanh(of.sum(axis=1) / most) for of in (evidence.paper, evidence.ink))
+    return _Angles(paper, ink, evidence.weight, evidence.dot)
 
 
 def sectors_by_phase(per_sector: int, family: Family) -> np.ndarray:
@@ -182,14 +194,14 @@ def lengthened(bits: np.ndarray, overhang: np.ndarray) -> np.ndarray:
     return bits
 
 
-def _clearest(evidence: Evidence) -> np.ndarray:
+def _clearest(evidence: _Angles) -> np.ndarray:
     """Return the angles of each band from that on at which it is seen best, shape (k, m)."""
     best = np.maximum(evidence.paper, evidence.ink)
     window = np.sum([np.roll(best, shift, axis=1) for shift in range(-_NEAR, _NEAR + 1)], axis=0)
     return (window.argmax(axis=1)[:, None] + np.arange(best.shape[1])) % best.shape[1]
 
 
-def _along_words(evidence: Evidence, bits: np.ndarray) -> np.ndarray:
+def _along_words(evidence: _Angles, bits: np.ndarray) -> np.ndarray:
     """Return the evidence for words at each angle, bits (k, w, m), shape (m, k, w).
 
     A border between two sectors may lie to either side of the angles next to it.
@@ -238,7 +250,7 @@ def _hidden(seen: np.ndarray, weight: np.ndarray) -> np.ndarray:
     return hidden.T
 
 
-def _free_paths(evidence: Evidence) -> np.ndarray:
+def _free_paths(evidence: _Angles) -> np.ndarray:
     """Return the evidence for arcs of ink of any length, with their best covers, shape (k,)."""
     cost = np.float32(_COVERED) * evidence.weight
     border, cover = np.float32(_BORDER), np.float32(_COVER)

@@ -28,6 +28,7 @@ from ahf_ros.detectors.ring.hypotheses import (
     resolve_ids,
     resolve_overlaps,
 )
+from ahf_ros.detectors.ring.prior import Prior
 from ahf_ros.detectors.ring.proposals import PROPOSALS, Proposal, measure_dots, propose_whole
 from ahf_ros.detectors.ring.refinement import refine_centres
 from ahf_ros.features import frame
@@ -140,7 +141,8 @@ def read_image(
             fits = measure_dots(part, dots, families, keep_all=settings.report_undecoded)
             if not explained.certain.any():
                 families = by_clear_dots(part, fits, families)
-            read = read_families(part, fits, families, expected)
+            shifts = explained.shifts[explained.certain] / 2**octave.level
+            read = read_families(part, fits, families, Prior.after(expected, shifts))
             read = at_full_size(images[: octave.level + 1], read)
             explained = Explained.joined([explained, Explained.by(read)])
             found.append(read)

@@ -15,6 +15,7 @@ import numpy as np
 from ahf_ros.codes.ring import Family, canonical, family
 from ahf_ros.codes.same_print import words_of_print
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
+from ahf_ros.detectors.ring.prior import NOTHING_KNOWN, Prior
 from ahf_ros.detectors.ring.reading import read_bands
 from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import Fit
@@ -45,7 +46,7 @@ def read_families(
     gray: np.ndarray,
     dots: Fit,
     families: Sequence[Family],
-    expected: frozenset[int] = frozenset(),
+    prior: Prior = NOTHING_KNOWN,
 ) -> Hypotheses:
     """Read the bands about dots as words of several families.
 
@@ -57,8 +58,8 @@ def read_families(
         Of k dots.
     families : sequence of Family
         The first one reads all dots, the others those that are not certain yet.
-    expected : frozenset of int
-        IDs that are likely to be there. Empty: all IDs are equally likely.
+    prior : Prior
+        What is known before.
 
     Returns
     -------
@@ -66,13 +67,13 @@ def read_families(
         At least one of each dot.
     """
     first, *others = families
-    found = read_bands(gray, dots, first, expected)
+    found = read_bands(gray, dots, first, prior)
     if not others:
         return found
     rest = dots.select(~found.certain)
     parts = [found]
     for code in others:
-        read = read_bands(gray, rest, code, expected)
+        read = read_bands(gray, rest, code, prior)
         parts.append(read.select(read.words > 0))
     return _contested(Hypotheses.joined(parts))
 

@@ -14,8 +14,8 @@ from dataclasses import replace
 import numpy as np
 
 from ahf_ros.codes.ring import Family
-from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.circles import REACH, target_circles
+from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.reading import PER_SECTOR
 from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import fit_circles

@@ -53,9 +53,9 @@ def _bound(gray: np.ndarray, dots: Fit, band: tuple[float, float], bits: set[int
         edges = edge_evidence(polar, 1 - growth, growth, band)
         cap = _CAP * edges.weight[:, None]
         for count in bits:
-            paper, ink = (_of_sectors(of, count) for of in (edges.paper, edges.ink))
+            paper, ink = (_of_sectors(of.sum(axis=1), count) for of in (edges.paper, edges.ink))
             of_word = np.maximum(np.maximum(paper, ink), -_COVER).sum(axis=2)
-            marked = _of_sectors(np.clip(edges.ink - edges.paper, -cap, cap), count)
+            marked = _of_sectors(np.clip((edges.ink - edges.paper).sum(axis=1), -cap, cap), count)
             bound = np.minimum(of_word, np.maximum(marked, 0).sum(axis=2)).max(axis=1)
             best = np.maximum(best, bound / (_ANGLES * edges.weight))
     return best

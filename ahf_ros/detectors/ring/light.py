@@ -79,7 +79,7 @@ def predicted_light(
         best = np.argpartition(differ, _SHIFTS, axis=1)[:, :_SHIFTS]
         of_best = np.take_along_axis(differ, best, axis=1)
         weight = 1 / (of_best + of_best.min(axis=1, keepdims=True) / 2)
-        kernel = np.zeros((len(logs), _TRANSFORM**2))
+        kernel = np.zeros((len(logs), _TRANSFORM**2), np.float32)
         weight /= weight.sum(axis=1, keepdims=True)
         error = (weight * of_best).sum(axis=1)[:, None, None]
         np.put_along_axis(kernel, candidates[best], weight, axis=1)

@@ -130,7 +130,7 @@ def polar_images(
 
 
 def angles_of(count: int) -> np.ndarray:
-    """Return the angles at which bands are read, counter-clockwise as seen, rad, shape (count,)."""
+    """Return the angles at which bands are read, counter-clockwise as seen, rad, (count,)."""
     return -2 * np.pi * (np.arange(count) + 0.5) / count
 
 

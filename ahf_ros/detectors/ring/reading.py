@@ -17,8 +17,14 @@ from ahf_ros.detectors.ring.circles import REACH, target_circles
 from ahf_ros.detectors.ring.decoding import Words, decode
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.light import predicted_light
-from ahf_ros.detectors.ring.likelihood import Evidence, edge_evidence, level_evidence
+from ahf_ros.detectors.ring.likelihood import (
+    Evidence,
+    edge_evidence,
+    level_evidence,
+    under_one_light,
+)
 from ahf_ros.detectors.ring.polar import PolarImages, angles_of, polar_images
+from ahf_ros.detectors.ring.prior import NOTHING_KNOWN, Prior
 from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import Fit, fit_circles
 from ahf_ros.features.sampling import sample_circles
@@ -29,10 +35,11 @@ PER_SECTOR = 10
 
 _FIRST_PER_SECTOR = 5  # points on each edge of a sector in the first joint fit
 _SHIFTS = np.arange(-2.4, 2.41, 0.4)  # of edges, that are tried, px
-_USUAL_SHIFT = 1.0  # standard deviation of the shift of edges, px
 _MAXIMUM_GROWTH = 0.3  # dot radii
 _DEPTHS = np.array([0.2, 0.4, 0.6, 0.8])  # of the band, where its levels are read
 _DOT_RADII = np.array([0.3, 0.6])  # where the level of the dot is read, dot radii
+_GAP_DEPTHS = np.array([0.4, 0.65])  # the same of the gap, in its width
+_MARGIN_DEPTHS = np.array([0.3, 0.6])  # the same beyond the band, dot radii
 _HOPEFUL, _HOPEFUL_IN_LIGHT = (
     0.3,
     0.4,
@@ -41,7 +48,7 @@ _PART = 256  # dots at a time, which bounds the memory
 
 
 def read_bands(
-    gray: np.ndarray, dots: Fit, family: Family, expected: frozenset[int] = frozenset()
+    gray: np.ndarray, dots: Fit, family: Family, prior: Prior = NOTHING_KNOWN
 ) -> Hypotheses:
     """Read the bands about dots, and refine dot and band together.
 
@@ -52,8 +59,8 @@ def read_bands(
     dots : Fit
         Of k dots.
     family : Family
-    expected : frozenset of int
-        IDs that are likely to be there. Empty: all IDs are equally likely.
+    prior : Prior
+        What is known before, in px of the image.
 
     Returns
     -------
@@ -61,22 +68,20 @@ def read_bands(
         One of each dot.
     """
     parts = [
-        _read_part(gray, dots.select(slice(start, start + _PART)), family, expected)
+        _read_part(gray, dots.select(slice(start, start + _PART)), family, prior)
         for start in range(0, max(len(dots.frames), 1), _PART)
     ]
     return Hypotheses.joined(parts)
 
 
-def _read_part(
-    gray: np.ndarray, dots: Fit, family: Family, expected: frozenset[int]
-) -> Hypotheses:
+def _read_part(gray: np.ndarray, dots: Fit, family: Family, prior: Prior) -> Hypotheses:
     unread = Hypotheses.unread(dots, family)
     if not len(dots.frames):
         return unread
     polar = polar_images(gray, dots, family.band, family.bits * PER_SECTOR)
-    growth = best_growth(polar, family.band)
+    growth = best_growth(polar, family.band, prior)
     edges = edge_evidence(polar, 1 - growth, growth, family.band)
-    first = decode(edges, _overhang(growth, family), family, expected)
+    first = decode(edges, _overhang(growth, family), family, prior.expected)
     read = np.flatnonzero(_mean_odds(first, edges.weight) > _HOPEFUL)
     growth = growth[read]
     printed = dots.select(read)
@@ -89,7 +94,7 @@ def _read_part(
         edges.select(read),
         growth / (1 - growth),
         family,
-        expected,
+        prior.expected,
     )
     good = _mean_odds(words, edges.weight[read]) > _HOPEFUL_IN_LIGHT
     read, printed, words = read[good], printed.select(good), words.select(good)
@@ -97,7 +102,7 @@ def _read_part(
     growth = fit.polarity * fit.edge_shift / fit.size
     polar = polar_images(gray, fit, family.band, family.bits * PER_SECTOR)
     edges = edge_evidence(polar, np.ones(len(read)), growth, family.band)
-    words = _words(gray, fit, polar, edges, growth, family, expected)
+    words = _words(gray, fit, polar, edges, growth, family, prior.expected)
     good = words.words > 0
     read, fit, words = read[good], fit.select(good), words.select(good)
     fit = _joint_fit(gray, fit, words, PER_SECTOR, 2, family)
@@ -105,7 +110,7 @@ def _read_part(
 
 
 def best_growth(
-    polar: PolarImages, band: tuple[float, float], shifts: np.ndarray = _SHIFTS
+    polar: PolarImages, band: tuple[float, float], prior: Prior = NOTHING_KNOWN
 ) -> np.ndarray:
     """Return by how much the colour of dots has grown on all edges, so that these fit best, (k,).
 
@@ -115,15 +120,19 @@ def best_growth(
     ----------
     polar : PolarImages
         Of k dots.
-    family : Family
+    band : tuple of 2 float
+        Radii of the band, dot radii.
+    prior : Prior
     """
     best = np.full(len(polar.size), -np.inf)
     growth = np.zeros(len(polar.size))
-    for shift in shifts:
+    for shift in _SHIFTS:
         tried = np.clip(shift / polar.size, -_MAXIMUM_GROWTH, _MAXIMUM_GROWTH)
         edges = edge_evidence(polar, 1 - tried, tried, band)
-        score = np.maximum(np.maximum(edges.paper, edges.ink), 0).sum(axis=1)
-        score = score - 0.5 * (shift / _USUAL_SHIFT) ** 2
+        paper, ink = edges.paper.sum(axis=1), edges.ink.sum(axis=1)
+        score = np.maximum(np.maximum(paper, ink), 0).sum(axis=1)
+        unusual = (polar.polarity * shift - prior.shift) / prior.deviation
+        score = score - 0.5 * unusual**2
         growth = np.where(score > best, tried, growth)
         best = np.maximum(score, best)
     return growth
@@ -140,12 +149,22 @@ def _words(
 ) -> Words:
     """Return the words of targets by all evidence, with their frames and ink that has grown."""
     inner, outer = family.band
-    radii = np.concatenate([_DOT_RADII, inner + (outer - inner) * _DEPTHS])
+    radii = np.concatenate(
+        [
+            _DOT_RADII,
+            1 + (inner - 1) * _GAP_DEPTHS,
+            inner + (outer - inner) * _DEPTHS,
+            outer + _MARGIN_DEPTHS,
+        ]
+    )
     angles = angles_of(family.bits * PER_SECTOR)
     levels = np.maximum(sample_circles(gray, targets.frames, angles, radii), 0)
     levels = lifted(levels, polar.lift.astype(np.float32)[:, None, None])
     light = predicted_light(gray, targets.frames, polar.lift, angles, radii, family.band)
-    evidence = edges.plus(level_evidence(polar, levels, *light, radii))
+    evidence = edges.plus(level_evidence(polar, levels, *light, radii, family.band))
+    gap, margin = (radii > 1) & (radii < inner), radii > outer
+    counted = under_one_light(polar, levels[..., gap], levels[..., margin])
+    evidence = evidence.scaled(counted)
     return decode(evidence, _overhang(growth, family), family, expected)
 
 

@@ -13,9 +13,10 @@ import numpy as np
 
 from ahf_ros.codes import ring
 from ahf_ros.codes.ring import Family, canonical
+from ahf_ros.detectors.ring.circles import REACH
 from ahf_ros.detectors.ring.full_size import with_soft_edges
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
-from ahf_ros.detectors.ring.circles import REACH
+from ahf_ros.detectors.ring.prior import Prior
 from ahf_ros.detectors.ring.reading import read_bands
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
@@ -133,7 +134,7 @@ def _agreeing(
         of_family = decoded[names[decoded] == name]
         code = family if name == family.name else ring.family(name)
         some = dots.select(of_family)
-        read = read_bands(gray, some, code, expected)
+        read = read_bands(gray, some, code, Prior(expected))
         which = of_family
         agreed = (read.words > 0) & (canonical(read.words, code)[0] == codes[which])
         agreed &= read.share >= _MINIMUM_SHARE
