@@ -25,11 +25,11 @@ FOR, AGAINST = 1.9, -5.0  # of a reading, for what is there and for what is not
 
 def seen(marked: np.ndarray, weight: float = 1.0) -> Evidence:
     """Return the evidence of bands that show marks at some angles, shape (k, m)."""
-    there, absent = (np.float32(weight * of) for of in (FOR, AGAINST))
-    count = len(marked)
+    there, absent = (np.float32(weight * of / 2) for of in (FOR, AGAINST))  # of either half
+    count, halves = len(marked), np.stack([marked, marked], axis=1)
     return Evidence(
-        paper=np.where(marked, absent, there),
-        ink=np.where(marked, there, absent),
+        paper=np.where(halves, absent, there),
+        ink=np.where(halves, there, absent),
         weight=np.full(count, weight, np.float32),
         dot=np.zeros(count, np.float32),
     )
@@ -66,7 +66,7 @@ def test_what_is_covered_is_found_and_says_nothing_about_the_word() -> None:
     covered = slice(43, 58)
     clear = seen(of_word(word))
     evidence = replace(clear, paper=clear.paper.copy(), ink=clear.ink.copy())
-    evidence.paper[:, covered] = evidence.ink[:, covered] = -4.0
+    evidence.paper[..., covered] = evidence.ink[..., covered] = -2.0
     found, whole = read(evidence), read(clear)
     assert (found.words, found.starts) == (whole.words, whole.starts)
     assert np.flatnonzero(found.hidden[0]).tolist() == list(range(120))[covered]
@@ -81,7 +81,7 @@ def test_a_cover_may_lie_across_the_first_angle(start: int) -> None:
     clear = seen(of_word(CODE.word(30)))
     covered = (np.arange(12) + start) % ANGLES
     evidence = replace(clear, paper=clear.paper.copy(), ink=clear.ink.copy())
-    evidence.paper[:, covered] = evidence.ink[:, covered] = -4.0
+    evidence.paper[..., covered] = evidence.ink[..., covered] = -2.0
     found = read(evidence)
     assert canonical(found.words, CODE)[1].tolist() == [30]
     assert set(np.flatnonzero(found.hidden[0])) == set(covered.tolist())
@@ -91,7 +91,7 @@ def test_two_ids_that_differ_below_a_cover_are_a_draw() -> None:
     one, other = 0b000001011111, 0b000001011001  # apart in two sectors
     differ = (of_word(one) != of_word(other))[0]
     evidence = seen(of_word(one))
-    evidence.paper[:, differ] = evidence.ink[:, differ] = -4.0
+    evidence.paper[..., differ] = evidence.ink[..., differ] = -2.0
     found = read(evidence)
     assert found.hidden[0, differ].mean() > 0.9
     assert found.margin[0] < 1
@@ -123,7 +123,7 @@ def test_the_dot_speaks_for_a_target_and_not_for_a_word() -> None:
 def test_one_reading_never_says_more_than_its_share() -> None:
     clear = seen(of_word(CODE.word(30)))
     paper = clear.paper.copy()
-    paper[0, 3] = -1000.0 if paper[0, 3] > 0 else 1000.0
+    paper[0, :, 3] = -1000.0 if paper[0, 0, 3] > 0 else 1000.0
     found = read(replace(clear, paper=paper))
     assert canonical(found.words, CODE)[1].tolist() == [30]
     assert read(clear).seen[0] - found.seen[0] < 7
@@ -136,12 +136,13 @@ def test_readings_that_are_alike_count_less() -> None:
     assert half.seen == pytest.approx(full.seen / 2, rel=0.03)
 
 
-def test_ink_that_has_grown_is_longer_along_the_band() -> None:
+@pytest.mark.parametrize('overhang', [-2.0, 2.0])
+def test_ink_that_has_grown_is_longer_along_the_band(overhang: float) -> None:
     word = of_word(CODE.word(30))
-    grown = lengthened(word, np.array([3.0]))
-    assert canonical(read(seen(grown), 3.0).words, CODE)[1].tolist() == [30]
-    assert read(seen(grown), 3.0).seen[0] > read(seen(grown)).seen[0] + 10
-    assert read(seen(word)).seen[0] > read(seen(word), 3.0).seen[0] + 10
+    grown = lengthened(word, np.array([overhang]))
+    assert canonical(read(seen(grown), overhang).words, CODE)[1].tolist() == [30]
+    assert read(seen(grown), overhang).seen[0] > read(seen(grown)).seen[0] + 10
+    assert read(seen(word)).seen[0] > read(seen(word), overhang).seen[0] + 10
 
 
 @pytest.mark.parametrize(
@@ -187,7 +188,7 @@ def test_what_is_expected_wins_a_draw_and_nothing_more() -> None:
     of_other = CODE.number(other)
     differ = (of_word(one) != of_word(other))[0]
     covered = seen(of_word(one))
-    covered.paper[:, differ] = covered.ink[:, differ] = -4.0
+    covered.paper[..., differ] = covered.ink[..., differ] = -2.0
     expected = frozenset({of_other})
     drawn = decode(covered, np.zeros(1), CODE, expected)
     assert canonical(drawn.words, CODE)[1].tolist() == [of_other]

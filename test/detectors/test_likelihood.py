@@ -12,6 +12,7 @@ from ahf_ros.detectors.ring.likelihood import (
     edge_evidence,
     level_evidence,
     light_edges,
+    under_one_light,
     weights,
 )
 from ahf_ros.detectors.ring.polar import SATURATED, PolarImages, angles_of, polar_images
@@ -25,6 +26,11 @@ MARKED = np.arange(ANGLES) // 10 % 2 == 0
 ONE, NONE = np.ones(1), np.zeros(1)
 
 
+def inside(low: float, high: float) -> np.ndarray:
+    """Return which circles are between two radii."""
+    return np.abs(RADII - (low + high) / 2) < (high - low) / 2
+
+
 def polar(
     light: float | np.ndarray = 200.0,
     polarity: int = 1,
@@ -35,8 +41,7 @@ def polar(
 ) -> PolarImages:
     """Return the polar image of a target of light (m,) whose marks have grown."""
     inner, outer = band_edges(np.array([radius]), np.array([growth]), BAND)
-    in_band = np.abs(RADII - (inner + outer) / 2) < (outer - inner) / 2
-    inked = (radius + growth > RADII) | (MARKED[:, None] & in_band)
+    inked = inside(0, radius + growth) | (MARKED[:, None] & inside(inner[0], outer[0]))
     dark = inked == (polarity > 0)
     lit = np.broadcast_to(np.asarray(light, float), ANGLES)[:, None]
     return PolarImages(
@@ -54,8 +59,8 @@ def polar(
 def split(image: PolarImages, radius: float = 1.0, growth: float = 0.0) -> np.ndarray:
     """Return the least evidence for what is there over what is not, of a reading."""
     evidence = edge_evidence(image, np.array([radius]), np.array([growth]), BAND)
-    odds = np.where(MARKED, 1, -1) * (evidence.ink - evidence.paper) / evidence.weight
-    return odds.min()
+    odds = np.where(MARKED, 1, -1) * (evidence.ink - evidence.paper).sum(axis=1)
+    return odds.min() / evidence.weight[0]
 
 
 @pytest.mark.parametrize('polarity', [1, -1])
@@ -82,30 +87,38 @@ def test_bands_grow_on_both_sides() -> None:
 
 
 def test_what_is_neither_paper_nor_ink_speaks_against_both() -> None:
-    covered = polar()
-    covered.gray[:, :20, RADII > 2.25] = 5.0  # all that lies outwards
-    inward = edge_evidence(covered, ONE, NONE, BAND)
-    covered.gray[:, :20, RADII > 2.25] = 230.0
-    bright = edge_evidence(covered, ONE, NONE, BAND)
-    assert (np.maximum(inward.paper, inward.ink)[0, 1:19] < 1).all()
-    assert (bright.ink[0, :20] < 0).all()
+    between = polar()
+    between.gray[:, :20, inside(*BAND)] = 110.0
+    evidence = edge_evidence(between, ONE, NONE, BAND)
+    assert (np.maximum(evidence.paper, evidence.ink)[..., :20] < 0).all()
+
+
+def test_the_halves_of_a_band_are_seen_apart() -> None:
+    half = polar()
+    half.gray[:, :10, inside(3, BAND[1])] = 110.0  # only the outer edge
+    whole, seen = (edge_evidence(of, ONE, NONE, BAND) for of in (polar(), half))
+    assert seen.ink[0, 0] == pytest.approx(whole.ink[0, 0])
+    assert (seen.ink[0, 1, :10] < 0).all()
+    assert seen.ink[0, 1, 10:] == pytest.approx(whole.ink[0, 1, 10:])
 
 
 def test_angles_that_the_image_does_not_show_say_nothing() -> None:
     hidden = np.ones((1, ANGLES), bool)
     hidden[0, 5:25] = False
     evidence = edge_evidence(replace(polar(), visible=hidden), ONE, NONE, BAND)
-    assert not evidence.paper[0, 5:25].any()
-    assert not evidence.ink[0, 5:25].any()
-    assert evidence.paper[0, 25:].all()
+    assert not evidence.paper[..., 5:25].any()
+    assert not evidence.ink[..., 5:25].any()
+    assert evidence.paper[..., 25:].all()
 
 
-def test_glare_is_no_paper_but_an_over_exposed_image_may_be() -> None:
+def test_glare_says_nothing_but_over_exposed_paper_does() -> None:
     glare, white = polar(), polar(light=255.0)
     glare.gray[:, :20] = 255.0
     of_glare, of_white = (edge_evidence(it, ONE, NONE, BAND) for it in (glare, white))
-    assert of_glare.paper[0, :20].max() <= 0
-    assert of_white.paper[0, ~MARKED].min() > 0
+    assert not of_glare.paper[..., :20].any()
+    assert not of_glare.ink[..., :20].any()
+    assert of_white.paper[..., ~MARKED].min() > 0
+    assert of_white.ink[..., MARKED].min() > 0
 
 
 def test_readings_of_neighbours_that_are_alike_share_one_weight() -> None:
@@ -113,7 +126,7 @@ def test_readings_of_neighbours_that_are_alike_share_one_weight() -> None:
     assert sparse.tolist() == [1.0]
     assert dense[0] == pytest.approx(2 * np.pi * 2.25 * 6 / ANGLES / 2.5)
     small, large = (edge_evidence(polar(size=of), ONE, NONE, BAND) for of in (8.0, 16.0))
-    of_paper = [(of.paper / of.weight)[0, 15] for of in (small, large)]
+    of_paper = [(of.paper / of.weight)[0, 0, 15] for of in (small, large)]
     assert of_paper[0] == pytest.approx(of_paper[1])
 
 
@@ -125,12 +138,12 @@ def test_gaps_tell_how_often_light_has_edges() -> None:
     assert light_edges(restless, ONE, NONE, inner)[0] == pytest.approx(1 / 3, abs=0.02)
     doubtful = edge_evidence(restless, ONE, NONE, BAND)
     certain = edge_evidence(calm, ONE, NONE, BAND)
-    assert doubtful.ink[0, 1] < certain.ink[0, 1]
+    assert (doubtful.ink[0, :, 1] < certain.ink[0, :, 1]).all()
 
 
 def levels(of: PolarImages, spread: float) -> tuple[np.ndarray, ...]:
     """Return what `level_evidence` is given: levels, their light, its spread and the radii."""
-    radii = np.array([0.5, 2.6, 3.1])
+    radii = np.array([0.5, 1.6, 2.6, 3.1, 3.9])
     values = np.stack([of.at(np.array([radius])) for radius in radii], axis=2)
     light = np.full_like(values, 200.0)
     return values, light, np.full_like(values, spread), radii
@@ -141,19 +154,42 @@ def test_levels_tell_ink_from_paper_where_light_is_known(polarity: int) -> None:
     target = polar(200.0, polarity)
     values, light, spread, radii = levels(target, 0.05)
     paper = light if polarity > 0 else 0.25 * light
-    evidence = level_evidence(target, values, paper, spread, radii)
-    assert (evidence.ink > evidence.paper)[0].tolist() == MARKED.tolist()
+    evidence = level_evidence(target, values, paper, spread, radii, BAND)
+    for half in range(2):
+        assert (evidence.ink > evidence.paper)[0, half].tolist() == MARKED.tolist()
     assert evidence.dot[0] > 5
-    unknown = level_evidence(target, values, paper, np.full_like(spread, np.inf), radii)
-    assert not unknown.ink.any() and not unknown.paper.any() and not unknown.dot.any()
-    vague = level_evidence(target, values, paper, np.full_like(spread, 1.0), radii)
+    unknown = np.full_like(spread, np.inf)
+    silent = level_evidence(target, values, paper, unknown, radii, BAND)
+    assert not silent.ink.any() and not silent.paper.any() and not silent.dot.any()
+    vague = level_evidence(target, values, paper, np.full_like(spread, 1.0), radii, BAND)
     assert np.abs(vague.ink - vague.paper).max() < np.abs(evidence.ink - evidence.paper).min()
+
+
+def test_ground_beside_the_band_that_is_not_as_predicted_speaks_against_both() -> None:
+    target = polar()
+    target.gray[:, :8, inside(BAND[1], 9)] = 90.0  # something lies on the margin
+    values, light, spread, radii = levels(target, 0.02)
+    evidence = level_evidence(target, values, light, spread, radii, BAND)
+    assert (evidence.ink[0, 1, :8] < evidence.ink[0, 1, 20:28] - 0.5).all()
+    assert (evidence.ink[0, 0, :8] == evidence.ink[0, 0, 20:28]).all()  # of the half inside
 
 
 def test_a_dot_of_light_on_paper_is_no_ink() -> None:
     target = polar()
     values, _, spread, radii = levels(target, 0.05)
-    assert level_evidence(target, values, values, spread, radii).dot[0] < -5
+    assert level_evidence(target, values, values, spread, radii, BAND).dot[0] < -5
+
+
+def test_what_lies_on_the_ground_is_no_light_unless_much_of_the_ground_is_unlike() -> None:
+    even = np.full((1, ANGLES, 2), 180.0, np.float32)
+    few, many = even.copy(), even.copy()
+    few[:, 10:14], many[:, ::2] = 60.0, 60.0
+    shares = under_one_light(polar(), even, few)
+    assert (shares[0, 0] == 1).all()
+    assert np.flatnonzero(shares[0, 1] == 0).tolist() == [10, 11, 12, 13]
+    assert (under_one_light(polar(), many, many) == 1).all()
+    nothing = polar().select(slice(0))
+    assert under_one_light(nothing, even[:0], even[:0]).shape == (0, 2, ANGLES)
 
 
 def test_ink_under_light() -> None:
