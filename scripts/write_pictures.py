@@ -26,7 +26,12 @@ from ahf_ros.detectors.ring.decoding import Words, decode
 from ahf_ros.detectors.ring.detector import find_hypotheses
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.light import predicted_light
-from ahf_ros.detectors.ring.likelihood import Evidence, edge_evidence, level_evidence
+from ahf_ros.detectors.ring.likelihood import (
+    Evidence,
+    edge_evidence,
+    level_evidence,
+    under_one_light,
+)
 from ahf_ros.detectors.ring.polar import angles_of, polar_images
 from ahf_ros.features.circle_fit import fit_dots
 from ahf_ros.features.dot_search import voted_dots, whole_dots
@@ -174,10 +179,10 @@ def reading() -> Figure:
     for radius in TABLE.band:
         grid['b'].axhline(radius, color='tab:orange', linewidth=1)
     grid['b'].set(ylabel='radius', title='polar image, counter-clockwise')
-    at = np.linspace(0, 360, evidence.paper.shape[1])
+    at = np.linspace(0, 360, evidence.paper.shape[2])
     grid['c'].axhline(0, color='silver', linewidth=1)
-    grid['c'].plot(at, evidence.paper[0], color='tab:blue', label='paper')
-    grid['c'].plot(at, evidence.ink[0], color='black', label='ink')
+    grid['c'].plot(at, evidence.paper[0].sum(axis=0), color='tab:blue', label='paper')
+    grid['c'].plot(at, evidence.ink[0].sum(axis=0), color='black', label='ink')
     grid['c'].set(xlim=(0, 360), ylabel='evidence')
     grid['c'].legend(loc='lower left', fontsize=8)
     _word(grid['d'], words)
@@ -235,10 +240,11 @@ def _evidence(gray: np.ndarray, best: Hypotheses) -> tuple[Evidence, Words]:
     polar = polar_images(gray, dot, TABLE.band, len(angles))
     growth = best.polarity * best.edge_shift / dot.size
     edges = edge_evidence(polar, np.ones(1), growth, TABLE.band)
-    radii = np.array([0.3, 0.6, 2.5, 2.75, 3.0, 3.25])
+    radii = np.array([0.3, 0.6, 1.5, 1.8, 2.5, 2.75, 3.0, 3.25, 3.8, 4.1])
     levels = sample_circles(gray, best.frames, angles, radii)
     known = predicted_light(gray, best.frames, polar.lift, angles, radii, TABLE.band)
-    evidence = edges.plus(level_evidence(polar, levels, *known, radii))
+    evidence = edges.plus(level_evidence(polar, levels, *known, radii, TABLE.band))
+    evidence = evidence.scaled(under_one_light(polar, levels[..., 2:4], levels[..., 8:]))
     return evidence, decode(evidence, 0 * growth, TABLE)
 
 
