@@ -61,9 +61,20 @@ class Evidence(ArrayRecord):
     weight: np.ndarray
     dot: np.ndarray
 
-    def scaled(self, shares: np.ndarray) -> Evidence:
-        """Return the evidence of which only shares of (k, 2, m) count."""
-        return replace(self, paper=self.paper * shares, ink=self.ink * shares)
+    def without(self, covered: np.ndarray, lit: np.ndarray) -> Evidence:
+        """Return the evidence less that of readings beside foreign ground.
+
+        What covers the ground covers the band. Additional light, such as glare, leaves its steps,
+        but what is flat says nothing under it.
+
+        Parameters
+        ----------
+        covered, lit : ndarray of float32, shape (k, 2, m)
+            Shares of readings that something darker lies on, or additional light.
+        """
+        paper, ink = (of * (1 - covered) for of in (self.paper, self.ink))
+        paper = paper - lit * np.maximum(paper, 0)
+        return replace(self, paper=paper, ink=ink - lit * np.minimum(ink, 0))
 
     def plus(self, other: Evidence) -> Evidence:
         """Return the sum of two kinds of evidence at the same angles."""
@@ -244,11 +255,13 @@ def level_evidence(
     )
 
 
-def under_one_light(polar: PolarImages, gap: np.ndarray, margin: np.ndarray) -> np.ndarray:
-    """Return the shares of evidence that count, (k, 2, m), by the light on the ground beside it.
+def foreign_ground(
+    polar: PolarImages, gap: np.ndarray, margin: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return how far something else than the light on the target lies on its ground.
 
-    A small part of the ground that is unlike the rest is no light but something that lies there;
-    where much of it is unlike, it is light.
+    A small part of the ground that is unlike the rest is no light of the scene but something that
+    covers it, or glare; where much of it is unlike, it is light.
 
     Parameters
     ----------
@@ -256,18 +269,22 @@ def under_one_light(polar: PolarImages, gap: np.ndarray, margin: np.ndarray) -> 
         Of k targets.
     gap, margin : ndarray of float32, shape (k, m, d)
         Gray values at d places each.
+
+    Returns
+    -------
+    covered, lit : ndarray of float32, shape (k, 2, m)
+        Where it is darker than the rest, and where it is brighter.
     """
-    halves = np.stack([gap, margin], axis=1)
-    level, noise = polar.logs(halves)
-    flat = level.reshape(len(level), -1)
-    middle = np.median(flat, axis=1, keepdims=True)
-    spread = np.median(np.abs(flat - middle), axis=1, keepdims=True) / _MEDIAN
-    width = np.maximum(np.maximum(spread, _EVEN)[..., None, None], noise)
-    unlike = (np.abs(level - middle[..., None, None]) > _UNLIKE * width).any(axis=3)
+    level, noise = polar.logs(np.stack([gap, margin], axis=1))
+    axes = (1, 2, 3)
+    away = level - np.median(level, axis=axes, keepdims=True)
+    spread = np.median(np.abs(away), axis=axes, keepdims=True) / _MEDIAN
+    width = _UNLIKE * np.maximum(np.maximum(spread, _EVEN), noise)
+    darker, brighter = (away < -width).any(axis=3), (away > width).any(axis=3)
     few, many = _UNLIKE_SHARES
-    doubt = np.clip((many - unlike.mean(axis=(1, 2))) / (many - few), 0, 1)[:, None, None]
-    near = unlike
-    return np.where(near, 1 - doubt, 1.0).astype(np.float32)
+    share = (darker | brighter).mean(axis=(1, 2))
+    doubt = np.clip((many - share) / (many - few), 0, 1).astype(np.float32)[:, None, None]
+    return darker * doubt, (brighter & ~darker) * doubt
 
 
 def _surprise(errors: np.ndarray, width: np.ndarray, which: np.ndarray) -> np.ndarray:
