@@ -30,7 +30,6 @@ from ahf_ros.imaging.image import as_gray
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 from ahf_ros.target import Target
-from benchmarks.confidence import logistic_regression
 from benchmarks.reliability import NEAR, reliability_table, run
 from benchmarks.textures import lookalikes
 
@@ -120,6 +119,21 @@ def fitted(seeds: Sequence[int]) -> dict[str, np.ndarray]:
         'target': np.round(logistic_regression(every.target_features, every.of_target), 2),
         'word': np.round(logistic_regression(some.word_features, some.right), 2),
     }
+
+
+def logistic_regression(features: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Return intercept and weights with the highest likelihood, under a weak prior."""
+    mean, spread = features.mean(axis=0), features.std(axis=0)
+    basis = np.column_stack([np.ones(len(features)), (features - mean) / spread])
+    prior = np.diag([0.0] + [1.0] * features.shape[1])
+    weights = np.zeros(basis.shape[1])
+    for _ in range(100):
+        probability = 1 / (1 + np.exp(-basis @ weights))
+        gradient = basis.T @ (probability - right) + prior @ weights
+        curvature = (basis.T * (probability * (1 - probability))) @ basis + prior
+        weights -= np.linalg.solve(curvature, gradient)
+    slopes = weights[1:] / spread
+    return np.concatenate([[weights[0] - slopes @ mean], slopes])
 
 
 def reliability(seeds: Sequence[int]) -> Iterator[str]:

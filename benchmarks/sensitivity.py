@@ -31,11 +31,8 @@ from ahf_ros.synthetic.scene import SceneSettings, render
 from benchmarks.changed_constant import assigned
 
 ROOT = Path(__file__).resolve().parent.parent
-ROOMS = ('features', 'detectors/ring')
-OTHERS = {'blobs', 'counting', 'grey_gradient', 'traditional'}
-"""Modules in these rooms that `ring` does without."""
-
-BOUNDED = {'_CERTAIN', '_STRAIGHT', '_WHOLE', '_MINIMUM_AGREEMENT', '_FAINTEST'}
+ROOMS = ('ahf_ros.features.', 'ahf_ros.detectors.ring.')
+BOUNDED = {'CERTAIN', '_STRAIGHT', 'WHOLE', '_MINIMUM_AGREEMENT', '_FAINTEST'}
 """Constants that are meaningful up to 1 only: their distance from 1 is halved and doubled."""
 
 LIGHTS = ('stripe', 'fine_stripe', 'lattice', 'dense_lattice')
@@ -94,17 +91,21 @@ class Outcome:
 
 def constants() -> Iterator[tuple[str, float]]:
     """Yield the name and the value of every constant of `ring` that is one number."""
-    for room in ROOMS:
-        for file in sorted((ROOT / 'ahf_ros' / room).glob('*.py')):
-            if file.stem in OTHERS:
-                continue
-            module = '.'.join(file.relative_to(ROOT).with_suffix('').parts)
-            for name in assigned(ast.parse(file.read_text())):
-                if not re.fullmatch('_?[A-Z][A-Z0-9_]*', name):
-                    continue
-                value = getattr(import_module(module), name)
-                if isinstance(value, float):
-                    yield f'{module}.{name}', value
+    for module in modules():
+        loaded = import_module(module)
+        for name in assigned(ast.parse(Path(str(loaded.__file__)).read_text())):
+            value = getattr(loaded, name)
+            if re.fullmatch('_?[A-Z][A-Z0-9_]*', name) and isinstance(value, float):
+                yield f'{module}.{name}', value
+
+
+def modules() -> list[str]:
+    """Return the modules in the rooms of `ring` that it imports, as a new process tells."""
+    names = 'import sys, ahf_ros.detectors.ring.detector; print(*sorted(sys.modules))'
+    done = subprocess.run(
+        [sys.executable, '-c', names], cwd=ROOT, check=True, capture_output=True, text=True
+    )
+    return [name for name in done.stdout.split() if name.startswith(ROOMS)]
 
 
 def written(scenes: Scenes, folder: Path) -> Path:

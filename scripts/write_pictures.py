@@ -21,18 +21,18 @@ from ahf_ros.codes.designs import printed_design, proportions
 from ahf_ros.codes.families import numbers_of
 from ahf_ros.codes.ring import canonical, family
 from ahf_ros.detectors.contract import DetectorSettings
-from ahf_ros.detectors.ring.band_evidence import band_evidence
-from ahf_ros.detectors.ring.band_samples import sample_bands
-from ahf_ros.detectors.ring.decoding import sector_angles
+from ahf_ros.detectors.ring.circles import REACH
+from ahf_ros.detectors.ring.decoding import Words, decode
 from ahf_ros.detectors.ring.detector import find_hypotheses
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
-from ahf_ros.detectors.ring.reading import mark_appearance
-from ahf_ros.detectors.ring.target_circles import REACH
+from ahf_ros.detectors.ring.light import predicted_light
+from ahf_ros.detectors.ring.likelihood import Evidence, edge_evidence, level_evidence
+from ahf_ros.detectors.ring.polar import angles_of, polar_images
 from ahf_ros.features.circle_fit import fit_dots
 from ahf_ros.features.dot_search import voted_dots, whole_dots
-from ahf_ros.features.frame import circle_outlines
+from ahf_ros.features.frame import circle_outlines, project
 from ahf_ros.features.pyramid import image_pyramid
-from ahf_ros.features.sampling import sample_circles
+from ahf_ros.features.sampling import sample, sample_circles
 from ahf_ros.filtering.homomorphic import HomomorphicFilter
 from ahf_ros.imaging.logarithm import logarithm
 from ahf_ros.imaging.stack import COMBINATIONS
@@ -42,6 +42,7 @@ from ahf_ros.synthetic.patterns import LIGHT_NAMES
 
 FOLDER = Path(__file__).resolve().parent.parent / 'docs' / 'pictures'
 DPI = 110
+TABLE = family('metashape12')
 SIDE = 24.0  # of the picture of a target, mm
 
 SCENE = SceneSettings(
@@ -152,50 +153,106 @@ def dots() -> Figure:
 
 
 def reading() -> Figure:
-    """Return a target, its band unrolled, the evidence at each angle, and its word."""
-    rendering = render(SCENE)
-    gray, table = rendering.image.astype(np.float32), family('metashape12')
-    target = min(rendering.targets, key=lambda it: abs(it.x - 320))
-    found = find_hypotheses(gray, DetectorSettings())
-    away = np.hypot(*(found.frames[:, :2, 2] - (target.x, target.y)).T)
-    best = found.select(np.argmin(np.where(found.certain, away, np.inf), keepdims=True))
-    assert canonical(best.words, table)[1] == target.id
-    figure = Figure(figsize=(9, 3.6), layout='constrained')
+    """Return a target that is covered in part, its polar image, the evidence, and its word."""
+    image = _covered(render(SCENE).image, *_certain(render(SCENE).image, 320).frames[0, :2, 2])
+    best = _certain(image, 320)
+    evidence, words = _evidence(image.astype(np.float32), best)
+    figure = Figure(figsize=(9, 3.9), layout='constrained')
     grid = figure.subplot_mosaic('ab;ac;ad', width_ratios=(1, 2), height_ratios=(3, 2, 1))
     for panel in grid.values():
         panel.set_xticks(())
         panel.set_yticks(())
-    _show(grid['a'], rendering.image, f'target {target.id}')
-    for radius in (1.0, *table.band):
+    _show(grid['a'], image, f'target {canonical(best.words, TABLE)[1][0]}')
+    for radius in (1.0, *TABLE.band):
         (outline,) = circle_outlines(best.frames, np.array([radius]))
         grid['a'].plot(*np.vstack((outline, outline[:1])).T, color='tab:orange', linewidth=1)
-    grid['a'].set(xlim=(target.x - 62, target.x + 62), ylim=(target.y + 62, target.y - 62))
-    angles = sector_angles(table, 40)
-    (strip,) = sample_circles(gray, best.frames, angles, np.linspace(4.0, 0.5, 70))
+    x, y = best.frames[0, :2, 2]
+    grid['a'].set(xlim=(x - 62, x + 62), ylim=(y + 62, y - 62))
+    radii = np.linspace(4.0, 0.5, 70)
+    (strip,) = sample_circles(image.astype(np.float32), best.frames, angles_of(480), radii)
     grid['b'].imshow(strip.T, cmap='gray', aspect='auto', extent=(0, 360, 0.5, 4.0))
-    for radius in table.band:
+    for radius in TABLE.band:
         grid['b'].axhline(radius, color='tab:orange', linewidth=1)
-    grid['b'].set(ylabel='radius', title='unrolled, counter-clockwise')
-    _evidence(grid['c'], gray, best, angles)
-    width = 360 / table.bits
-    for bit in range(table.bits):
-        colour = 'black' if int(best.words[0]) >> bit & 1 else 'white'
-        at = (np.degrees(best.starts[0]) + bit * width) % 360
-        grid['d'].barh(0, width, left=(at, at - 360), color=colour, edgecolor='gray')
-    grid['d'].set(xlim=(0, 360), ylabel='word')
+    grid['b'].set(ylabel='radius', title='polar image, counter-clockwise')
+    at = np.linspace(0, 360, evidence.paper.shape[1])
+    grid['c'].axhline(0, color='silver', linewidth=1)
+    grid['c'].plot(at, evidence.paper[0], color='tab:blue', label='paper')
+    grid['c'].plot(at, evidence.ink[0], color='black', label='ink')
+    grid['c'].set(xlim=(0, 360), ylabel='evidence')
+    grid['c'].legend(loc='lower left', fontsize=8)
+    _word(grid['d'], words)
     return figure
 
 
-def _evidence(panel: Axes, gray: np.ndarray, best: Hypotheses, angles: np.ndarray) -> None:
-    """Draw the evidence for a mark at each angle."""
-    table = family('metashape12')
-    marks = mark_appearance(gray, fit_dots(gray, best.frames, best.polarity, rays=24, reach=REACH))
-    samples = sample_bands(gray, best.frames, marks.blur, angles, table)
-    evidence = band_evidence(samples, marks, best.frames, table).marked[0]
-    at = np.linspace(0, 360, len(evidence))
-    panel.fill_between(at, evidence, where=evidence > 0, color='black', step='mid')
-    panel.fill_between(at, evidence, where=evidence < 0, color='tab:blue', step='mid')
-    panel.set(xlim=(0, 360), ylabel='evidence')
+def light() -> Figure:
+    """Return a target, the light that its ground predicts, and what is left without it."""
+    image = render(replace(SCENE, light='lattice', light_scale=0.5)).image.astype(np.float32)
+    frames = _certain(image, 320).frames
+    reach = TABLE.band_outer + 0.6
+    along = np.linspace(-reach, reach, 300)
+    x, y = np.meshgrid(along, along)
+    (seen,) = sample(image, project(frames, np.stack((x, y), axis=-1)))
+    angles, radii = np.linspace(-np.pi, np.pi, 720), np.linspace(0.01, reach, 200)
+    (polar,), (spread,) = predicted_light(image, frames, np.zeros(1), angles, radii, TABLE.band)
+    polar = np.where(np.isfinite(spread), polar, np.nan)
+    row = (np.arctan2(y, x) + np.pi) / (2 * np.pi) * (len(angles) - 1)
+    column = np.hypot(x, y) / reach * (len(radii) - 1)
+    places = column.astype(np.float32), row.astype(np.float32)
+    known = cv2.remap(polar, *places, cv2.INTER_LINEAR)
+    outside = np.hypot(x, y) > reach
+    figure, panels = _panels(1, 3, 3.0, 3.2)
+    for panel, values, brightest, title in (
+        (panels[0], seen, 255, 'target under a lattice'),
+        (panels[1], known, 255, 'light predicted by its ground'),
+        (panels[2], seen / np.maximum(known, 1), 1.3, 'their ratio: the ink'),
+    ):
+        shown = np.where(outside, np.nan, values)
+        panel.imshow(shown, cmap='gray', vmin=0, vmax=brightest)
+        panel.set_title(title, fontsize=10)
+    return figure
+
+
+def _certain(image: np.ndarray, x: float) -> Hypotheses:
+    """Return what the target was read as that is nearest to a column of the image."""
+    found = find_hypotheses(image, DetectorSettings())
+    found = found.select(found.certain)
+    return found.select(np.argmin(np.abs(found.frames[:, 0, 2] - x), keepdims=True))
+
+
+def _covered(image: np.ndarray, x: float, y: float) -> np.ndarray:
+    """Return an image with a gray strip across the band of the target at a place."""
+    covered = image.copy()
+    left, middle = round(x), round(y)
+    covered[middle - 8 : middle + 12, left - 70 : left - 34] = 140
+    return covered
+
+
+def _evidence(gray: np.ndarray, best: Hypotheses) -> tuple[Evidence, Words]:
+    """Return the evidence for paper and ink of a band, and its word."""
+    angles = angles_of(TABLE.bits * 10)
+    dot = fit_dots(gray, best.frames, best.polarity, rays=24, reach=REACH, rounds=1)
+    dot = replace(dot, frames=best.frames)
+    polar = polar_images(gray, dot, TABLE.band, len(angles))
+    growth = best.polarity * best.edge_shift / dot.size
+    edges = edge_evidence(polar, np.ones(1), growth, TABLE.band)
+    radii = np.array([0.3, 0.6, 2.5, 2.75, 3.0, 3.25])
+    levels = sample_circles(gray, best.frames, angles, radii)
+    known = predicted_light(gray, best.frames, polar.lift, angles, radii, TABLE.band)
+    evidence = edges.plus(level_evidence(polar, levels, *known, radii))
+    return evidence, decode(evidence, 0 * growth, TABLE)
+
+
+def _word(panel: Axes, words: Words) -> None:
+    """Draw the sectors of a word, and what covers the band."""
+    width = 360 / TABLE.bits
+    for bit in range(TABLE.bits):
+        colour = 'black' if int(words.words[0]) >> bit & 1 else 'white'
+        at = (np.degrees(words.starts[0]) + bit * width) % 360
+        panel.barh(0, width, left=(at, at - 360), color=colour, edgecolor='gray')
+    hidden = words.hidden[0]
+    at = (np.flatnonzero(hidden) + 0.5) * 360 / len(hidden)
+    panel.barh(0, 360 / len(hidden), left=at, color='tab:orange', height=0.5)
+    panel.set(xlim=(0, 360), ylabel='word')
 
 
 def stack() -> Figure:
@@ -230,6 +287,7 @@ PICTURES: dict[str, Callable[[], Figure | None]] = {
     'search': search,
     'dots': dots,
     'reading': reading,
+    'light': light,
     'stack': stack,
 }
 """What makes each picture; `targets` writes its own files."""

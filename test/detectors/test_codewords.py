@@ -1,80 +1,95 @@
+"""Which words compete for a band, and by how much they differ."""
+
+from __future__ import annotations
+
 import numpy as np
 import pytest
 
-from ahf_ros.codes.ring import FAMILY_NAMES, family, sectors
-from ahf_ros.detectors.ring.codewords import COMPETITORS, best_words, margins
+from ahf_ros.codes.ring import FAMILY_NAMES, Family, canonical, family, sectors
+from ahf_ros.detectors.ring.codewords import COMPETITORS, best_words, margins, prior
 
 PHASES = 4
 
 
-def evidence(word, bits, phase, strength=8.0):
-    """Return what sectors and borders say of one band that shows a word at one phase."""
-    ones = sectors(word, bits)
-    single = np.zeros((1, PHASES, bits))
-    single[0, phase] = np.where(ones, strength, -strength)
-    return single, np.zeros_like(single), np.zeros_like(single)
+def evidence(word: int, bits: int, phase: int, strength: float = 8.0) -> np.ndarray:
+    """Return what the sectors of one band say that shows a word at one phase."""
+    says = np.zeros((1, PHASES, bits))
+    says[0, phase] = np.where(sectors(word, bits), strength, -strength)
+    return says
 
 
-def read(parts, of_family):
-    """Return the best words, their phases and their margins."""
-    words, phases, scores = best_words(*parts, of_family)
-    best = np.zeros(len(words), int)
-    return words[:, 0], phases[:, 0], margins(words, scores, best, of_family)
+def of_words(says: np.ndarray, words: np.ndarray, phases: np.ndarray, code: Family) -> np.ndarray:
+    """Return the evidence of the sectors that words mark, shape (c,), of one band."""
+    ones = words[:, None] >> np.arange(code.bits) & 1
+    return (says[0, phases] * ones).sum(axis=1)
 
 
 @pytest.mark.parametrize('name', FAMILY_NAMES)
 @pytest.mark.parametrize('index', [0, 7, -1])
-def test_clear_evidence_gives_the_word_its_phase_and_a_margin(name, index):
-    of_family = family(name)
-    word = int(of_family.words[index])
-    rotated = (word << 3 | word >> (of_family.bits - 3)) & (1 << of_family.bits) - 1
-    words, phases, margin = read(evidence(rotated, of_family.bits, 2), of_family)
-    assert of_family.number(int(words[0])) == of_family.number(word)
-    assert phases[0] == 2
+def test_clear_evidence_gives_the_word_and_its_phase(name: str, index: int) -> None:
+    code = family(name)
+    word = int(code.words[index])
+    rotated = (word << 3 | word >> (code.bits - 3)) & (1 << code.bits) - 1
+    says = evidence(rotated, code.bits, 2)
+    words, phases = best_words(says, code)
+    assert words.shape == phases.shape == (1, COMPETITORS)
+    assert (words[0, 0], phases[0, 0]) == (rotated, 2)
+    scores = of_words(says, words[0], phases[0], code)
+    assert (np.diff(scores) <= 0).all()
+    assert scores[0] == 8.0 * int(word).bit_count()
     # The nearest other word differs in two sectors, whose evidence turns round.
-    assert margin[0] == pytest.approx(16.0)
+    found = margins(words, scores[None], np.zeros(1, int), code)
+    assert found[0] == pytest.approx(16.0)
 
 
-def test_a_band_without_ones_is_not_read():
-    of_family = family('metashape12')
-    words, _, margin = read(evidence(0, 12, 0), of_family)
-    assert words[0] == 0
-    assert margin[0] == 0
+def test_a_band_without_ones_is_not_read() -> None:
+    words, phases = best_words(evidence(0, 12, 0), family('metashape12'))
+    assert not words.any()
+    assert not phases.any()
 
 
-def test_an_invalid_word_gives_the_nearest_valid_one_without_a_margin():
-    of_family = family('metashape12')
-    odd = int(of_family.words[20]) ^ 1 << 11
-    words, _, margin = read(evidence(odd, 12, 1), of_family)
-    assert of_family.number(int(words[0])) is not None
-    assert margin[0] == pytest.approx(0.0)
+def test_an_invalid_word_gives_the_nearest_valid_ones() -> None:
+    code = family('metashape12')
+    odd = int(code.words[20]) ^ 1 << 11
+    words, phases = best_words(evidence(odd, 12, 1), code)
+    there = phases[0] == 1
+    differ = np.array([int(word ^ odd).bit_count() for word in words[0, there].tolist()])
+    assert differ[:2].tolist() == [1, 1]
+    assert len(set(canonical(words[0, :2], code)[1].tolist())) == 2
 
 
-def test_borders_decide_where_sectors_are_silent():
-    of_family = family('metashape12')
-    word = of_family.word(30)
-    ones = sectors(word, 12)
-    single, onto, off = evidence(word, 12, 0)
-    silent = int(np.flatnonzero(ones)[0])
-    single[0, 0, silent] = 0
-    before, after = ones[silent - 1], ones[(silent + 1) % 12]
-    onto[0, 0, silent - 1] = -6.0 if before else 6.0
-    off[0, 0, silent] = -6.0 if after else 6.0
-    words, _, margin = read((single, onto, off), of_family)
-    assert of_family.number(int(words[0])) == 30
-    assert margin[0] > 1
+def test_the_margin_is_that_over_another_id_and_not_over_a_rotation() -> None:
+    code = family('metashape12')
+    word, other = code.word(30), code.word(31)
+    turned = word >> 1 | (word & 1) << 11
+    words = np.array([[word, turned, other], [word, turned, turned]])
+    scores = np.array([[9.0, 8.0, 3.0], [9.0, 8.0, 7.0]])
+    assert margins(words, scores, np.zeros(2, int), code).tolist() == [6.0, 0.0]
 
 
-def test_bands_do_not_touch_each_other():
-    of_family = family('aicon14')
-    parts = [evidence(of_family.word(number), 14, number % PHASES) for number in (3, 200, 516)]
-    together = best_words(*(np.concatenate(part) for part in zip(*parts, strict=True)), of_family)
+@pytest.mark.parametrize('name', ['metashape12', 'metashape20'])
+def test_an_expected_word_competes_however_little_speaks_for_it(name: str) -> None:
+    code = family(name)
+    shown, expected = code.word(100), code.word(5)
+    says = evidence(shown, code.bits, 0)
+    assert expected not in canonical(best_words(says, code)[0][0], code)[0]
+    words, _ = best_words(says, code, frozenset({5}))
+    assert expected in canonical(words[0], code)[0]
+    before = prior(np.array([shown, expected]), code, frozenset({5}))
+    assert before[1] == 0 > before[0]
+    assert not prior(np.array([shown, expected]), code, frozenset()).any()
+
+
+def test_bands_do_not_touch_each_other() -> None:
+    code = family('aicon14')
+    parts = [evidence(code.word(number), 14, number % PHASES) for number in (3, 200, 516)]
+    together = best_words(np.concatenate(parts), code)
     for index, part in enumerate(parts):
-        alone = best_words(*part, of_family)
+        alone = best_words(part, code)
         for values, of_one in zip(together, alone, strict=True):
             assert values[index].tolist() == of_one[0].tolist()
 
 
-def test_no_band_at_all():
-    words, phases, scores = best_words(*np.zeros((3, 0, 10, 12)), family('metashape12'))
-    assert words.shape == phases.shape == scores.shape == (0, COMPETITORS)
+def test_no_band_at_all() -> None:
+    words, phases = best_words(np.zeros((0, 10, 12)), family('metashape12'))
+    assert words.shape == phases.shape == (0, COMPETITORS)

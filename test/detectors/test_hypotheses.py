@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from ahf_ros.codes.ring import family
-from ahf_ros.detectors.ring.confidence import FEATURES
-from ahf_ros.detectors.ring.decoding import Readings
+from ahf_ros.detectors.ring.decoding import Words
 from ahf_ros.detectors.ring.hypotheses import (
     Hypotheses,
     resolve_dots,
@@ -21,28 +22,37 @@ CODE = family('metashape12')
 RADIUS = 10.0
 
 
-def hypotheses(places: list[tuple[float, float]], margins: list[float]) -> Hypotheses:
-    count = len(places)
-    frames = frame.affine_frames(*np.array(places).T, RADIUS, RADIUS, 0.0)
-    return Hypotheses(
-        frames=frames,
-        covariance=np.tile(np.eye(2), (count, 1, 1)),
-        share=np.ones(count),
-        words=np.full(count, 71),
-        margin=np.array(margins),
-        features=np.zeros((count, FEATURES)),
-        confidence=np.ones(count),
-        families=np.full(count, CODE, object),
-        sharpness=np.full(count, 5.0),
+def dots(x: list[float], share: float = 1.0) -> Fit:
+    """Return dots in a row."""
+    count = len(x)
+    return Fit(
+        frames=frame.affine_frames(np.array(x), 50.0, RADIUS, RADIUS, 0.0),
         polarity=np.ones(count, int),
-        starts=np.zeros(count),
+        contrast=np.full(count, 0.3),
+        bright=np.full(count, 200.0),
+        share=np.full(count, share),
+        deviation=np.full(count, 0.5),
+        covariance=np.tile(np.eye(2), (count, 1, 1)),
         blur=np.full(count, 0.8),
+        edge_shift=np.full(count, -0.3),
     )
 
 
-def resolved(places, margins, ids, certain=None):
+def hypotheses(places: list[tuple[float, float]], odds: list[float]) -> Hypotheses:
+    count = len(places)
+    x, y = np.array(places).T
+    return replace(
+        Hypotheses.unread(dots(x.tolist()), CODE),
+        frames=frame.affine_frames(x, y, RADIUS, RADIUS, 0.0),
+        words=np.full(count, 71),
+        seen=np.array(odds, float),
+        confidence=np.ones(count),
+    )
+
+
+def resolved(places, odds, ids, certain=None):
     certain = np.ones(len(places), bool) if certain is None else np.array(certain)
-    found = hypotheses(places, margins)
+    found = hypotheses(places, odds)
     kept, uncontested = resolve_dots(found, np.array(ids), certain, found.reach)
     return kept.tolist(), uncontested.tolist()
 
@@ -88,7 +98,7 @@ def test_of_two_claims_to_an_id_the_clearly_better_one_stays():
 
 
 @pytest.mark.parametrize(
-    ('apart', 'margins', 'on_top'),
+    ('apart', 'odds', 'on_top'),
     [
         (55, [90, 50], [True, False]),
         (55, [90, 80], [False, False]),
@@ -96,9 +106,9 @@ def test_of_two_claims_to_an_id_the_clearly_better_one_stays():
     ],
 )
 def test_of_two_targets_whose_bands_overlap_only_the_clearly_better_one_is_certain(
-    apart, margins, on_top
+    apart, odds, on_top
 ):
-    found = hypotheses([(50, 50), (50 + apart, 50)], margins)
+    found = hypotheses([(50, 50), (50 + apart, 50)], odds)
     assert resolve_overlaps(found, np.ones(2, bool)).tolist() == on_top
     assert resolve_overlaps(found, np.array([False, True])).tolist() == [False, True]
 
@@ -112,53 +122,38 @@ def test_uncertain_claims_do_not_count():
 def test_parts_of_finds_stay_in_order():
     found = hypotheses([(50, 50), (150, 50), (250, 50)], [3, 2, 1])
     parts = [found.select(np.array([2])), found.select(np.array([0, 1]))]
-    assert Hypotheses.joined(parts).margin.tolist() == [1, 3, 2]
+    assert Hypotheses.joined(parts).seen.tolist() == [1, 3, 2]
 
 
 def test_readings_are_taken_over_where_they_belong():
-    fit = Fit(
-        frames=frame.affine_frames([10.0, 20.0], 5.0, 4.0, 3.0, 0.0),
-        polarity=np.ones(2, int),
-        contrast=np.full(2, 0.3),
-        bright=np.full(2, 200.0),
-        share=np.array([0.8, 0.9]),
-        deviation=np.full(2, 0.1),
-        covariance=np.tile(np.eye(2), (2, 1, 1)),
-        blur=np.full(2, 0.8),
-    )
+    fit, better = dots([10.0, 20.0], share=0.8), dots([20.5])
     unread = Hypotheses.unread(fit, CODE)
     assert not unread.words.any() and not unread.confidence.any()
-    better = Fit(
-        frames=frame.affine_frames([20.5], 5.0, 4.0, 3.0, 0.0),
-        polarity=np.ones(1, int),
-        contrast=np.full(1, 0.3),
-        bright=np.full(1, 200.0),
-        share=np.array([1.0]),
-        deviation=np.full(1, 0.02),
-        covariance=0.1 * np.eye(2)[None],
-        blur=np.full(1, 0.8),
-    )
-    one = np.ones(1)
-    readings = Readings(
+    assert np.isnan(unread.shift).all()
+    words = replace(
+        Words.none(1, 120),
         words=np.array([71]),
-        start=0 * one,
-        margin=13 * one,
-        support=100 * one,
-        contradiction=0 * one,
-        explained=np.ones((1, 4)),
-        unexplained=0 * one,
-        hidden=np.zeros((1, 120), bool),
-        price=0 * one,
-        plausible=one > 0,
+        margin=np.array([13.0]),
+        marked=np.array([150.0]),
+        coded=np.array([20.0]),
+        seen=np.array([100.0]),
+        hidden=np.arange(120)[None] < 12,
     )
-    dot, whole = unread.select(np.array([1])), np.zeros(1, bool)
-    found = unread.replaced(np.array([1]), Hypotheses.read(readings, better, dot, whole))
+    found = unread.replaced(np.array([1]), Hypotheses.of(better, words, CODE))
     assert found.words.tolist() == [0, 71]
     assert found.frames[:, 0, 2].tolist() == [10.0, 20.5]
     assert found.share.tolist() == [0.8, 1.0]
-    assert found.margin.tolist() == [0.0, 100.0]
+    assert found.margin.tolist() == [0.0, 13.0]
+    assert found.hidden.tolist() == [0.0, 0.1]
+    assert found.deviation.tolist() == [0.05, 0.05]  # dot radii
+    assert found.shift[1] == -0.3
     assert found.confidence[0] == 0 and found.confidence[1] > 0.9
-    foreign = Hypotheses.read(readings, better, dot, ~whole)
-    assert (foreign.words[0], foreign.confidence[0]) == (71, 0.0)
     assert fit.frames[1, 0, 2] == 20.0  # what was given is not changed
     assert not unread.words.any()
+
+
+def test_centres_on_the_dots_of_others():
+    found = hypotheses([(50, 50), (150, 50)], [2, 1])
+    near = hypotheses([(58, 50), (162, 50)], [2, 1])
+    assert near.on_dots(found).tolist() == [True, False]
+    assert found.on_dots(found.select(np.zeros(2, bool))).tolist() == [False, False]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.codes.ring import family
-from ahf_ros.detectors.ring.target_circles import target_circles
+from ahf_ros.detectors.ring.circles import target_circles
 
 CODE = family('metashape12')
 

@@ -1,0 +1,190 @@
+"""What steps and levels say of paper and ink, on polar images that are written down."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ahf_ros.detectors.ring.likelihood import (
+    band_edges,
+    edge_evidence,
+    level_evidence,
+    light_edges,
+    weights,
+)
+from ahf_ros.detectors.ring.polar import SATURATED, PolarImages, angles_of, polar_images
+from ahf_ros.features.circle_fit import fit_dots
+from ahf_ros.features.frame import affine_frames
+
+BAND = (2.25, 3.5)
+ANGLES, CIRCLES, OUTERMOST = 60, 200, BAND[1] + 0.95
+RADII = np.linspace(0.3, OUTERMOST, CIRCLES)
+MARKED = np.arange(ANGLES) // 10 % 2 == 0
+ONE, NONE = np.ones(1), np.zeros(1)
+
+
+def polar(
+    light: float | np.ndarray = 200.0,
+    polarity: int = 1,
+    contrast: float = 0.25,
+    growth: float = 0.0,
+    radius: float = 1.0,
+    size: float = 10.0,
+) -> PolarImages:
+    """Return the polar image of a target of light (m,) whose marks have grown."""
+    inner, outer = band_edges(np.array([radius]), np.array([growth]), BAND)
+    in_band = np.abs(RADII - (inner + outer) / 2) < (outer - inner) / 2
+    inked = (radius + growth > RADII) | (MARKED[:, None] & in_band)
+    dark = inked == (polarity > 0)
+    lit = np.broadcast_to(np.asarray(light, float), ANGLES)[:, None]
+    return PolarImages(
+        gray=np.where(dark, contrast * lit, lit).astype(np.float32)[None],
+        visible=np.ones((1, ANGLES), bool),
+        outermost=np.array([OUTERMOST]),
+        polarity=np.array([polarity]),
+        contrast=np.array([contrast]),
+        lift=np.zeros(1),
+        size=np.array([size]),
+        noise=np.array([1.2]),
+    )
+
+
+def split(image: PolarImages, radius: float = 1.0, growth: float = 0.0) -> np.ndarray:
+    """Return the least evidence for what is there over what is not, of a reading."""
+    evidence = edge_evidence(image, np.array([radius]), np.array([growth]), BAND)
+    odds = np.where(MARKED, 1, -1) * (evidence.ink - evidence.paper) / evidence.weight
+    return odds.min()
+
+
+@pytest.mark.parametrize('polarity', [1, -1])
+@pytest.mark.parametrize('light', [220.0, 80.0, 40.0])
+def test_steps_tell_ink_from_paper_in_light_and_in_shadow(light: float, polarity: int) -> None:
+    assert split(polar(light, polarity)) > 3
+
+
+def test_light_that_changes_along_the_band_changes_no_step() -> None:
+    stripes = np.where(np.arange(ANGLES) // 7 % 2, 200.0, 40.0)
+    assert split(polar(stripes)) == pytest.approx(split(polar(40.0)))
+
+
+def test_an_edge_is_read_where_ink_has_grown_to() -> None:
+    grown = polar(growth=0.28)
+    assert split(grown, growth=0.28) == pytest.approx(split(polar()), abs=0.5)
+    assert split(grown) < 1
+
+
+def test_bands_grow_on_both_sides() -> None:
+    inner, outer = band_edges(np.array([1.0, 0.9]), np.array([0.0, 0.1]), BAND)
+    assert inner == pytest.approx([2.25, 1.925])
+    assert outer == pytest.approx([3.5, 3.25])
+
+
+def test_what_is_neither_paper_nor_ink_speaks_against_both() -> None:
+    covered = polar()
+    covered.gray[:, :20, RADII > 2.25] = 5.0  # all that lies outwards
+    inward = edge_evidence(covered, ONE, NONE, BAND)
+    covered.gray[:, :20, RADII > 2.25] = 230.0
+    bright = edge_evidence(covered, ONE, NONE, BAND)
+    assert (np.maximum(inward.paper, inward.ink)[0, 1:19] < 1).all()
+    assert (bright.ink[0, :20] < 0).all()
+
+
+def test_angles_that_the_image_does_not_show_say_nothing() -> None:
+    hidden = np.ones((1, ANGLES), bool)
+    hidden[0, 5:25] = False
+    evidence = edge_evidence(replace(polar(), visible=hidden), ONE, NONE, BAND)
+    assert not evidence.paper[0, 5:25].any()
+    assert not evidence.ink[0, 5:25].any()
+    assert evidence.paper[0, 25:].all()
+
+
+def test_glare_is_no_paper_but_an_over_exposed_image_may_be() -> None:
+    glare, white = polar(), polar(light=255.0)
+    glare.gray[:, :20] = 255.0
+    of_glare, of_white = (edge_evidence(it, ONE, NONE, BAND) for it in (glare, white))
+    assert of_glare.paper[0, :20].max() <= 0
+    assert of_white.paper[0, ~MARKED].min() > 0
+
+
+def test_readings_of_neighbours_that_are_alike_share_one_weight() -> None:
+    sparse, dense = weights(polar(size=60.0), 2.25), weights(polar(size=6.0), 2.25)
+    assert sparse.tolist() == [1.0]
+    assert dense[0] == pytest.approx(2 * np.pi * 2.25 * 6 / ANGLES / 2.5)
+    small, large = (edge_evidence(polar(size=of), ONE, NONE, BAND) for of in (8.0, 16.0))
+    of_paper = [(of.paper / of.weight)[0, 15] for of in (small, large)]
+    assert of_paper[0] == pytest.approx(of_paper[1])
+
+
+def test_gaps_tell_how_often_light_has_edges() -> None:
+    calm, restless = polar(), polar()
+    restless.gray[:, ::3, RADII > 1.6] *= 0.3
+    inner = np.array([BAND[0]])
+    assert light_edges(calm, ONE, NONE, inner).tolist() == [0.02]
+    assert light_edges(restless, ONE, NONE, inner)[0] == pytest.approx(1 / 3, abs=0.02)
+    doubtful = edge_evidence(restless, ONE, NONE, BAND)
+    certain = edge_evidence(calm, ONE, NONE, BAND)
+    assert doubtful.ink[0, 1] < certain.ink[0, 1]
+
+
+def levels(of: PolarImages, spread: float) -> tuple[np.ndarray, ...]:
+    """Return what `level_evidence` is given: levels, their light, its spread and the radii."""
+    radii = np.array([0.5, 2.6, 3.1])
+    values = np.stack([of.at(np.array([radius])) for radius in radii], axis=2)
+    light = np.full_like(values, 200.0)
+    return values, light, np.full_like(values, spread), radii
+
+
+@pytest.mark.parametrize('polarity', [1, -1])
+def test_levels_tell_ink_from_paper_where_light_is_known(polarity: int) -> None:
+    target = polar(200.0, polarity)
+    values, light, spread, radii = levels(target, 0.05)
+    paper = light if polarity > 0 else 0.25 * light
+    evidence = level_evidence(target, values, paper, spread, radii)
+    assert (evidence.ink > evidence.paper)[0].tolist() == MARKED.tolist()
+    assert evidence.dot[0] > 5
+    unknown = level_evidence(target, values, paper, np.full_like(spread, np.inf), radii)
+    assert not unknown.ink.any() and not unknown.paper.any() and not unknown.dot.any()
+    vague = level_evidence(target, values, paper, np.full_like(spread, 1.0), radii)
+    assert np.abs(vague.ink - vague.paper).max() < np.abs(evidence.ink - evidence.paper).min()
+
+
+def test_a_dot_of_light_on_paper_is_no_ink() -> None:
+    target = polar()
+    values, _, spread, radii = levels(target, 0.05)
+    assert level_evidence(target, values, values, spread, radii).dot[0] < -5
+
+
+def test_ink_under_light() -> None:
+    paper = np.array([[100.0, 40.0]])
+    dark, bright = polar(), polar(polarity=-1)
+    assert dark.inked(paper, paper).tolist() == [[25.0, 10.0]]
+    assert bright.inked(paper, paper).tolist() == [[400.0, 160.0]]
+    # Of ink that is brighter than white the camera says only that it is white.
+    white = np.array([[SATURATED, 150.0]])
+    assert bright.inked(paper, white).tolist() == [[SATURATED, 160.0]]
+
+
+def test_circles_are_read_between_two_others() -> None:
+    image = polar()
+    slope = replace(image, gray=np.broadcast_to(RADII.astype(np.float32), (1, ANGLES, CIRCLES)))
+    for radius in (0.3, 1.234, OUTERMOST - 0.01):
+        assert slope.at(np.array([radius])) == pytest.approx(radius, abs=1e-5)
+
+
+def test_polar_images_of_an_image() -> None:
+    """A dot of 12 px with a bright quarter circle, at the right border."""
+    y, x = np.mgrid[0:120, 0:100]
+    away = np.hypot(x - 60, y - 60)
+    gray = np.where(away < 12, 50, 200).astype(np.float32)
+    frames = affine_frames([60.0], [60.0], [12.0], [12.0], [0.0])
+    dots = fit_dots(gray, frames, np.array([1]), rays=24, reach=0.45)
+    image = polar_images(gray, dots, BAND, ANGLES)
+    assert image.contrast[0] == pytest.approx(0.25, abs=0.05)
+    assert image.size[0] == pytest.approx(12, abs=0.3)
+    assert image.at(np.array([0.6])) == pytest.approx(50, abs=2)
+    assert image.at(np.array([2.0]))[image.visible] == pytest.approx(200, abs=2)
+    # Counter-clockwise as seen, from +x: first out of the image, then in it, then out of it again.
+    inside = 60 + (BAND[1] + 0.3) * 12 * np.cos(angles_of(ANGLES)) < 99
+    assert (image.visible[0] == inside).mean() > 0.95

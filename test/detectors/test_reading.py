@@ -1,0 +1,148 @@
+"""Reading bands in the frames of their dots: words, covers, growth and what is no target."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from ahf_ros.codes.ring import FAMILY_NAMES, canonical, family
+from ahf_ros.detectors.ring.circles import REACH
+from ahf_ros.detectors.ring.confidence import CERTAIN, confidence, features
+from ahf_ros.detectors.ring.hypotheses import Hypotheses
+from ahf_ros.detectors.ring.polar import polar_images
+from ahf_ros.detectors.ring.reading import best_growth, read_bands
+from ahf_ros.features import frame
+from ahf_ros.features.circle_fit import Fit, fit_dots
+from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
+
+SMALL = SceneSettings(width=800, height=600, targets=6, dot_radius=18.0, seed=7)
+CODE = family(SMALL.family)
+
+rendered = lru_cache(render)
+
+
+def dots_of(rendering: Rendering) -> Fit:
+    """Return the dots of a scene, measured from where they truly are."""
+    values = [(of.x, of.y, of.semi_major, of.semi_minor, of.angle) for of in rendering.targets]
+    frames = frame.affine_frames(*np.array(values).T)
+    polarity = np.full(len(frames), 1 if rendering.settings.polarity == 'dark' else -1)
+    gray = rendering.image.astype(np.float32)
+    return fit_dots(gray, frames, polarity, rays=24, reach=REACH)
+
+
+def read(rendering: Rendering, name: str = '') -> Hypotheses:
+    gray = rendering.image.astype(np.float32)
+    return read_bands(gray, dots_of(rendering), family(name or rendering.settings.family))
+
+
+@pytest.mark.parametrize('polarity', ['dark', 'bright'])
+@pytest.mark.parametrize('name', FAMILY_NAMES)
+def test_words_are_read_in_their_direction(name: str, polarity: str) -> None:
+    rendering = rendered(replace(SMALL, family=name, polarity=polarity))
+    found = read(rendering)
+    codes, numbers = canonical(found.words, family(name))
+    assert codes.tolist() == [target.code for target in rendering.targets]
+    assert numbers.tolist() == [target.id for target in rendering.targets]
+    assert found.margin.min() > 10
+    assert found.certain.all()
+    assert not found.hidden.any()
+
+
+@pytest.mark.parametrize('light', ['stripe', 'lattice', 'fringe', 'shadow', 'spots'])
+def test_light_changes_the_margin_and_not_the_words(light: str) -> None:
+    rendering = rendered(replace(SMALL, light=light))
+    found = read(rendering)
+    _, numbers = canonical(found.words, CODE)
+    assert numbers.tolist() == [target.id for target in rendering.targets]
+    assert found.margin.min() > 5
+    assert found.marked.min() > 0
+    assert found.hidden.max() < 0.1
+
+
+@pytest.mark.parametrize('shift', [-1.2, -0.8, 0.8, 1.2])
+@pytest.mark.parametrize('polarity', ['dark', 'bright'])
+def test_growth_is_found_on_ink_that_has_grown(polarity: str, shift: float) -> None:
+    """To half a step of the growths that are tried, and the camera's gamma has a share in it."""
+    scene = replace(SMALL, dot_radius=12.0, polarity=polarity)
+    sign = 1 if polarity == 'dark' else -1
+    found = []
+    for of in (0.0, shift):
+        rendering = rendered(replace(scene, edge_shift=of))
+        dots = dots_of(rendering)
+        image = polar_images(rendering.image.astype(np.float32), dots, CODE.band, 120)
+        found.append(sign * best_growth(image, CODE.band) * dots.size)
+    assert np.mean(found[1] - found[0]) == pytest.approx(shift, abs=0.35)
+
+
+def sectors_at(rendering: Rendering, start: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return at which sector of the first target each pixel lies, and how far out, dot radii."""
+    target = rendering.targets[0]
+    rows, columns = np.indices(rendering.image.shape)
+    x, y = (columns - target.x) / target.semi_major, (target.y - rows) / target.semi_major
+    turn = (np.arctan2(y, x) - start) % (2 * np.pi)
+    return turn / (2 * np.pi) * CODE.bits, np.hypot(x, y)
+
+
+@pytest.mark.parametrize('first', range(0, 12, 2))
+def test_a_covered_mark_is_hidden_and_the_word_still_read(first: int) -> None:
+    """A gray cover of two sectors looks like paper in another light where it hides no mark."""
+    rendering = rendered(SMALL)
+    clean = read(rendering)
+    sector, away = sectors_at(rendering, clean.starts[0])
+    inside = (sector > first + 0.3) & (sector < first + 1.7) & (away > 1.5) & (away < 4.2)
+    covered = np.where(inside, np.uint8(128), rendering.image)
+    found = read(replace(rendering, image=covered))
+    assert canonical(found.words, CODE)[1].tolist() == canonical(clean.words, CODE)[1].tolist()
+    hides_marks = int(clean.words[0]) >> first & 0b11 > 0
+    assert (0.04 < found.hidden[0] < 0.16) == hides_marks
+    assert not found.hidden[1:].any()
+    assert found.margin[0] < clean.margin[0]
+    assert found.seen[0] < clean.seen[0]
+
+
+def test_bare_paper_is_no_target() -> None:
+    rendering = rendered(SMALL)
+    _, away = sectors_at(rendering, 0.0)
+    blank = np.where((away > 1.6) & (away < 4.2), np.uint8(200), rendering.image)
+    found = read(replace(rendering, image=blank))
+    assert (found.words[0] == 0) | (found.marked[0] < 0)
+    assert found.certain.tolist() == [False] + 5 * [True]
+
+
+def test_a_ring_of_ink_is_no_word() -> None:
+    rendering = rendered(SMALL)
+    _, away = sectors_at(rendering, 0.0)
+    ring = np.where((away > 1.6) & (away < 4.2), np.uint8(200), rendering.image)
+    ring = np.where((away > 2.25) & (away < 3.5), np.uint8(60), ring)
+    found = read(replace(rendering, image=ring))
+    assert found.certain.tolist() == [False] + 5 * [True]
+
+
+def test_arcs_of_another_number_of_sectors_are_explained_worse() -> None:
+    other = rendered(replace(SMALL, family='metashape14'))
+    right, wrong = read(other), read(other, SMALL.family)
+    assert right.coded.min() > 10
+    assert (wrong.coded < right.coded - 10).all()
+
+
+def test_no_dots_no_readings() -> None:
+    rendering = rendered(SMALL)
+    none = dots_of(rendering).select(np.zeros(6, bool))
+    assert read_bands(rendering.image.astype(np.float32), none, CODE).words.shape == (0,)
+
+
+def test_confidence_is_a_probability_that_grows_with_the_evidence() -> None:
+    found = read(rendered(SMALL))
+    sure = confidence(features(found))
+    assert features(found).shape == (6, 5)
+    assert ((sure > 0.9) & (sure <= 1)).all()
+    assert np.array_equal(sure, found.confidence)
+    for name in ('margin', 'marked', 'seen', 'coded', 'share'):
+        less = confidence(features(replace(found, **{name: getattr(found, name) / 10})))
+        assert ((less >= 0) & (less <= sure)).all(), name
+    against = replace(found, marked=-found.marked, coded=-found.coded)
+    assert (confidence(features(against)) < CERTAIN).all()
+    assert confidence(features(replace(found, margin=0 * found.margin))).max() <= 0.5
