@@ -20,6 +20,8 @@ from ahf_ros.features.array_record import ArrayRecord
 _DOUBT = 5.0  # most that a reading says for or against a word
 _COVER = 6.0  # price of something that covers a stretch of the band
 _LIKE_PAPER = 8.5  # the same of something that looks like paper
+_USUAL, _IN_LIGHT = 0.05, 15.0  # probability of edges of light from which, times which it grows
+_MORE = 0.6  # of each further reading of that
 _COVERED = 0.1  # the same, of each further reading that it covers
 _BORDER = 4.8  # price of a border of an arc of any length, at one of about 120 angles
 _RANKED = 1.2  # evidence of a reading that ranks words, which one cover must not settle
@@ -136,12 +138,22 @@ def decode(
 
 @dataclass(frozen=True, slots=True)
 class _Angles(ArrayRecord):
-    """Evidence of k bands for paper and ink, (k, m), its weight and that of the dot, (k,)."""
+    """Evidence of k bands for paper and ink, (k, m), its weight, that of the dot, and light, (k,).
+
+    Where light has many edges, it explains what looks like paper on a mark.
+    """
 
     paper: np.ndarray
     ink: np.ndarray
     weight: np.ndarray
     dot: np.ndarray
+    lit: np.ndarray
+
+    @property
+    def like_paper(self) -> np.ndarray:
+        """Price of something that looks like paper, float32, shape (k,)."""
+        more = np.maximum(self.lit - np.float32(_USUAL), 0)
+        return np.float32(_LIKE_PAPER) * (1 + np.float32(_IN_LIGHT) * more)
 
 
 def _doubted(evidence: Evidence) -> _Angles:
@@ -151,7 +163,7 @@ def _doubted(evidence: Evidence) -> _Angles:
     """
     most = np.float32(_DOUBT) * evidence.weight[:, None]
     paper, ink = (most * np.tanh(of.sum(axis=1) / most) for of in (evidence.paper, evidence.ink))
-    return _Angles(paper, ink, evidence.weight, evidence.dot)
+    return _Angles(paper, ink, evidence.weight, evidence.dot, evidence.lit)
 
 
 def sectors_by_phase(per_sector: int, family: Family) -> np.ndarray:
@@ -225,20 +237,22 @@ def _covered_paths(seen: np.ndarray, of: _Angles) -> np.ndarray:
         Of k bands.
     """
     cost, paper = np.float32(_COVERED) * of.weight[:, None], of.paper.T[..., None]
+    price = of.like_paper[:, None]
     clear = seen[0]
     covered, like_paper = (np.full_like(clear, _NEVER) for _ in range(2))
     for of_angle, as_paper in zip(seen[1:], paper[1:], strict=True):
         before = clear
         clear = np.maximum(np.maximum(clear, covered), like_paper) + of_angle
         covered = np.maximum(covered, before - np.float32(_COVER)) - cost
-        like_paper = np.maximum(like_paper, before - np.float32(_LIKE_PAPER)) + as_paper
+        like_paper = np.maximum(like_paper, before - price)
+        like_paper += as_paper - np.float32(_MORE) * of.weight[:, None]
     return np.maximum(np.maximum(clear, covered), like_paper)
 
 
 def _hidden(seen: np.ndarray, of: _Angles) -> np.ndarray:
     """Return where the best paths of one word of each band are covered, seen (m, k), (k, m)."""
     cost, paper = np.float32(_COVERED) * of.weight, of.paper.T
-    prices = np.array([0.0, _COVER, _LIKE_PAPER], np.float32)[:, None]
+    prices = np.stack([0 * cost, np.full_like(cost, _COVER), of.like_paper])
     scores = np.full((3, seen.shape[1]), _NEVER)
     scores[0] = seen[0]
     came = np.zeros((len(seen), 3, seen.shape[1]), np.intp)
@@ -249,7 +263,8 @@ def _hidden(seen: np.ndarray, of: _Angles) -> np.ndarray:
         came[index, 0] = scores.argmax(axis=0)
         best = np.maximum(scores, begun)
         best[0] = scores.max(axis=0)
-        scores = best + np.stack([seen[index], -cost, paper[index]])
+        more = np.float32(_MORE) * of.weight
+        scores = best + np.stack([seen[index], -cost, paper[index] - more])
     hidden = np.empty(seen.shape, bool)
     state = scores.argmax(axis=0)
     for index in range(len(seen) - 1, -1, -1):

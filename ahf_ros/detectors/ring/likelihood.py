@@ -54,12 +54,15 @@ class Evidence(ArrayRecord):
         Of a reading, which is part of both; less than 1 where neighbours tell the same.
     dot : ndarray of float32, shape (k,)
         Of the dot as ink, over the dot as light on paper.
+    lit : ndarray of float32, shape (k,)
+        Probability that an edge of light lies between two neighbouring readings.
     """
 
     paper: np.ndarray
     ink: np.ndarray
     weight: np.ndarray
     dot: np.ndarray
+    lit: np.ndarray
 
     def without(self, covered: np.ndarray, lit: np.ndarray) -> Evidence:
         """Return the evidence less that of readings beside foreign ground.
@@ -83,6 +86,7 @@ class Evidence(ArrayRecord):
             ink=self.ink + other.ink,
             weight=self.weight,
             dot=self.dot + other.dot,
+            lit=np.maximum(self.lit, other.lit),
         )
 
 
@@ -138,7 +142,8 @@ def edge_evidence(
         clear = ~glare | (np.maximum(*seen) < SATURATED)
         paper[:, half], ink[:, half] = np.where(clear, of_paper, 0), np.where(clear, of_ink, 0)
     share = (weight[:, None] * polar.visible)[:, None]
-    return Evidence(paper * share, ink * share, weight, np.zeros_like(weight))
+    dot = np.zeros_like(weight)
+    return Evidence(paper * share, ink * share, weight, dot, edges.astype(np.float32))
 
 
 def light_edges(
@@ -252,6 +257,7 @@ def level_evidence(
         ink=of_halves[1],
         weight=share[:, -1],
         dot=(ink - paper)[..., in_dot].sum(axis=(1, 2)),
+        lit=surprise[:, 0, 0].astype(np.float32),
     )
 
 
