@@ -57,10 +57,7 @@ def confidence_features(
         share of the dots whose edges are missing.
     """
     radius = float(family.template_radii[family.reference])
-    minor = np.maximum(ellipse_axes(reference_frames(placement.homographies, radius))[1], 0.1)
-    always, linear, steep = _GROWTH
-    usual = always + linear / minor + steep / minor**4
-    growth = np.maximum(np.abs(placement.growth) - usual, 0) / _EXCESS
+    minor = ellipse_axes(reference_frames(placement.homographies, radius))[1] * placement.scale
     perspective = placement.homographies[:, 2, :2] * family.reach / _PERSPECTIVE
     missing = np.where(minor >= _MEASURABLE, np.maximum(_SHARE - placement.share, 0), 0.0)
     return np.stack(
@@ -69,7 +66,7 @@ def confidence_features(
             readings.weakest,
             readings.margin,
             placement.misplacement,
-            np.minimum(growth**2, _MOST),
+            0.0 * placement.unevenness,
             np.minimum((perspective**2).sum(axis=1), _MOST),
             missing,
         ],

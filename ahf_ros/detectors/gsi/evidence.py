@@ -51,7 +51,11 @@ class Evidence(ArrayRecord):
 
 
 def find_evidence(
-    log: np.ndarray, homographies: np.ndarray, polarity: np.ndarray, family: PointFamily
+    log: np.ndarray,
+    homographies: np.ndarray,
+    polarity: np.ndarray,
+    scale: np.ndarray,
+    family: PointFamily,
 ) -> Evidence:
     """Return the evidence for dots at all places of targets.
 
@@ -61,10 +65,12 @@ def find_evidence(
         LOG_SCALE ln(I + 8).
     homographies : ndarray of float64, shape (k, 3, 3)
     polarity : ndarray of int, shape (k,)
+    scale : ndarray of float64, shape (k,)
+        Radius of the dots in that of the printed design.
     family : PointFamily
     """
     shape, count = (len(homographies), len(family.places)), len(family.template)
-    frames = local_frames(homographies, family.places, family.radii)
+    frames = local_frames(homographies, family.places, family.radii * scale[:, None])
     single = frames.reshape(-1, 3, 3)
     sides, inside = circle_sides(log, single)
     farther, _ = circle_sides(log, single, _FARTHER * ellipse_axes(single)[1])
