@@ -20,7 +20,7 @@ from ahf_ros.codes.gsi import PointFamily
 from ahf_ros.codes.gsi_library import point_family
 from ahf_ros.detectors.contract import DetectorSettings, FamilyDetector
 from ahf_ros.detectors.gsi.confidence import confidence_features
-from ahf_ros.detectors.gsi.evidence import find_evidence
+from ahf_ros.detectors.gsi.evidence import find_evidence, seen_templates
 from ahf_ros.detectors.gsi.grouping import find_templates
 from ahf_ros.detectors.gsi.hypotheses import (
     OBVIOUS,
@@ -170,7 +170,7 @@ def read_targets(
     obvious : bool
         As for `plausible`.
     """
-    templates = find_templates(dots, code)
+    templates = seen_templates(pyramid.logs[0], find_templates(dots, code), code)
     if not len(templates.homographies):
         return no_hypotheses()
     evidence = find_evidence(

@@ -144,6 +144,7 @@ def _members(
     apart, shortest = np.abs(pairs.offset), lengths[partner] / largest
     likely = apart < longest + pairs.error_at(longest)
     likely &= apart > shortest - pairs.error_at(shortest)
+    likely &= pairs.crowd > (1 + pairs.error[0]) * apart * lengths.max() / lengths[partner]
     partners = np.flatnonzero(likely)
     begin, end = pairs.as_long_as(
         pairs.first[partners], apart[partners] * lengths[third] / lengths[partner]

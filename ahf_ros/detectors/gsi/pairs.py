@@ -15,11 +15,11 @@ from ahf_ros.features.neighbours import pairs_within
 PART = 400_000
 """Pairs or triples of dots at a time, which bounds the memory."""
 
-_RADII = (0.08, 0.43)
+_RADII = (0.065, 0.43)
 # Of dots, in the least distance of two template dots: 1.0 to 3.6 mm where these are 11 mm apart,
 # and a third more for bright ones that bloom.
 _SIZE_RATIO = 0.55  # of two dots of a target, in ln, for their printed sizes
-_CROWD = 5  # times the dots of a target: neighbours of a dot that are looked at, the nearest ones
+_CROWD = 5  # times the dots of a target, from which on so many neighbours make a pattern of light
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +32,8 @@ class Pairs:
         Indices of dots.
     offset : ndarray of complex128, shape (p,)
         From the first to the second, y up, in units of the ellipse of the first.
+    crowd : ndarray of float64, shape (p,)
+        How far from the first dot there are so many others that no target is that large.
     error : tuple of 2 float
         Of the offsets: a share of their length, and what is added to it.
     """
@@ -39,6 +41,7 @@ class Pairs:
     first: np.ndarray
     second: np.ndarray
     offset: np.ndarray
+    crowd: np.ndarray
     error: tuple[float, float]
 
     def as_long_as(self, first: np.ndarray, lengths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -95,14 +98,21 @@ def neighbours(
     inverse = np.linalg.inv(dots.frames[:, :2, :2])
     widest = np.log(family.template_radii.max() / family.template_radii.min())
     crowd = _CROWD * (len(places) + family.rule.dots)
-    parts = [(np.zeros(0, int), np.zeros(0, int), np.zeros(0, complex))]
+    parts = [(np.zeros(0, int), np.zeros(0, int), np.zeros(0, complex), np.zeros(0))]
     for first, second in pairs_within(centres, reach * major, PART):
         near = np.abs(np.log(major[second] / major[first])) < _SIZE_RATIO + widest
         first, second = first[near], second[near]
         difference = centres[second] - centres[first]
         across, down = (inverse[first] @ difference[..., None])[..., 0].T
-        order = np.lexsort((np.hypot(across, down), first))
-        owner = first[order]
-        nearest = order[np.arange(len(owner)) - np.searchsorted(owner, owner) < crowd]
-        parts.append((first[nearest], second[nearest], (across - 1j * down)[nearest]))
+        offset = across - 1j * down
+        length = np.abs(offset) / (2 * reach)
+        near = np.flatnonzero(length < 0.5)
+        order = near[np.argsort(first[near] + length[near])]
+        first, second, offset = first[order], second[order], offset[order]
+        rank = np.arange(len(first)) - np.searchsorted(first, first)
+        limit = np.full(len(centres), np.inf)
+        last = rank == crowd
+        limit[first[last]] = np.abs(offset[last])
+        near = np.flatnonzero(rank < crowd)
+        parts.append((first[near], second[near], offset[near], limit[first[near]]))
     return Pairs(*(np.concatenate(column) for column in zip(*parts, strict=True)), error)
