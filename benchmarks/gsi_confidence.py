@@ -37,7 +37,7 @@ from benchmarks.gsi import texture
 from benchmarks.reliability import NEAR, reliability_table, run
 
 BASE = SceneSettings(
-    family='gsi', width=1300, height=900, targets=6, dot_radius=5.0, focal_length=6.0
+    family='gsi', width=1600, height=1200, targets=6, dot_radius=5.0, focal_length=6.0
 )
 """A scene, of which others differ."""
 
