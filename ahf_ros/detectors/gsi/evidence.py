@@ -55,7 +55,7 @@ class Evidence(ArrayRecord):
 
 
 def seen_templates(log: np.ndarray, templates: Templates, family: PointFamily) -> Templates:
-    """Return the templates at all of whose places there may be a dot.
+    """Return the templates in the image at all of whose places there may be a dot.
 
     Parameters
     ----------
@@ -68,7 +68,8 @@ def seen_templates(log: np.ndarray, templates: Templates, family: PointFamily) -
     evidence = find_evidence(
         log, templates.homographies, templates.polarity, templates.scale, alone
     )
-    return templates.select((evidence.ratio > _CONTRADICTED).all(axis=1))
+    seen = evidence.inside & (evidence.ratio > _CONTRADICTED)
+    return templates.select(seen.all(axis=1))
 
 
 def find_evidence(
