@@ -60,6 +60,9 @@ class Fit(ArrayRecord):
         Of the image of the centre, px^2; NaN where it was not asked for.
     blur : ndarray of float64, shape (k,)
         Of the edges, standard deviation in px.
+    edge_shift : ndarray of float64, shape (k,)
+        Length by which dark areas are larger in the image than in the print, on every edge, px;
+        NaN where the fit was not projective.
     """
 
     frames: np.ndarray
@@ -70,6 +73,7 @@ class Fit(ArrayRecord):
     deviation: np.ndarray
     covariance: np.ndarray
     blur: np.ndarray
+    edge_shift: np.ndarray
 
     @property
     def size(self) -> np.ndarray:
@@ -79,7 +83,15 @@ class Fit(ArrayRecord):
 
 _NONE = np.zeros(0)
 NO_FITS = Fit(
-    np.zeros((0, 3, 3)), _NONE.astype(int), _NONE, _NONE, _NONE, _NONE, np.zeros((0, 2, 2)), _NONE
+    np.zeros((0, 3, 3)),
+    _NONE.astype(int),
+    _NONE,
+    _NONE,
+    _NONE,
+    _NONE,
+    np.zeros((0, 2, 2)),
+    _NONE,
+    _NONE,
 )
 """The record of none."""
 
@@ -166,9 +178,10 @@ def fit_circles(
         edges = measure_edges(gray, frames, circles, blur, reach)
         blur = np.clip(blur + median(edges.softness, edges.visible, 0.0), *BLURS)
         solution = _solve(edges, circles, window, projective)
-        np.clip(solution.changes, -_MAXIMUM_CHANGE, _MAXIMUM_CHANGE, out=solution.changes)
+        of_frames = solution.changes[:, : 7 if projective else 5]
+        np.clip(of_frames, -_MAXIMUM_CHANGE, _MAXIMUM_CHANGE, out=of_frames)
         if remaining:
-            frames = frame.moved(frames, solution.changes[:, : 7 if projective else 5])
+            frames = frame.moved(frames, of_frames)
     return _fit(solution, frames, circles, blur, covariances)
 
 
@@ -229,7 +242,8 @@ def _fit(
     moved = frame.moved(frames, of.changes[:, : 7 if of.model.projective else 5])
     affine = frame.local_affine(moved)
     covariance = affine @ covariance @ affine.transpose(0, 2, 1) + _SYSTEMATIC**2 * np.eye(2)
-    return Fit(moved, polarity, own.contrast, bright, share, scatter, covariance, blur)
+    shift = -of.changes[:, -1] if of.model.projective else np.full(len(frames), np.nan)
+    return Fit(moved, polarity, own.contrast, bright, share, scatter, covariance, blur, shift)
 
 
 def _covariance(of: _Solution, frames: np.ndarray, circles: Circles) -> np.ndarray:

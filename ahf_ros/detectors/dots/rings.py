@@ -55,8 +55,10 @@ class Rings(ArrayRecord):
         As read, counter-clockwise in the image from the first place.
     phase : ndarray of float64, shape (k,)
         Direction of that place in the frame, rad clockwise from +x.
+    edge_shift : ndarray of float64, shape (k,)
+        Of the edges of disc and border, as in `Fit`, px.
     radius : ndarray of float64, shape (k,)
-        Of the small dots, in that of the disc.
+        Of the small dots as seen, in that of the disc.
     target_features, word_features : ndarray of float64, shape (k, n) and (k, m)
         As `confidence` weighs them.
     """
@@ -66,6 +68,7 @@ class Rings(ArrayRecord):
     polarity: np.ndarray
     words: np.ndarray
     phase: np.ndarray
+    edge_shift: np.ndarray
     radius: np.ndarray
     target_features: np.ndarray
     word_features: np.ndarray
@@ -118,6 +121,7 @@ def _read_part(pyramid: ImagePyramid, discs: Dots, code: DotFamily) -> Rings:
         fit.polarity,
         readings.words,
         readings.phase,
+        fit.edge_shift,
         readings.radius,
         target_features(readings, fit),
         word_features(readings, fit),
