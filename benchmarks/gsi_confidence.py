@@ -50,8 +50,8 @@ TEXTURES = 6
 RADII = (1.0, 1.5, 2.0, 2.5, 3.0, 3.6)
 """Of dots, in the unit of the printed design."""
 
-SIGNS = np.array([1, 1, 1, -1, -1, -1, -1])
-"""Of the weights: support, weakest dot and margin speak for a target, all else against it."""
+SIGNS = np.array([1, 1, 1, -1, -1, -1, 1])
+"""Of the weights: support, weakest dot, margin and edges that were found speak for a target."""
 
 
 def design(folder: Path, radius: float) -> str:
