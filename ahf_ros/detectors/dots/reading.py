@@ -17,7 +17,7 @@ _PHASES = 12  # of the ring, in the angle from one place to the next
 _SHRUNK = np.array([0.5, 0.63, 0.8, 1.0])  # radii that small dots may have, in the printed one
 _GROWN = np.array([1.2, 1.45])  # the same, as far as there is room for them
 _FULLEST = 0.9  # share of this room
-_SPREAD = 0.55  # standard deviation of their ln, which decides where blur hides the radius
+_SPREAD = (0.7, 0.45)  # standard deviation of their ln below and above, as blur looks like growth
 _LIMIT = 12.0  # evidence that one place may give
 _FAINTEST = 0.12  # step of ln of a disc
 _FAINTEST_SHARE = 0.6  # step of a dot, in the one that the blur leaves it
@@ -87,7 +87,8 @@ def read_rings(log: np.ndarray, fit: Fit, code: DotFamily) -> Readings:
     # The right radius is the one that sees most of the dots, at the right phase.
     middle = np.median(steps, axis=4)
     seen = np.maximum(middle, 0).sum(axis=3).max(axis=2).T
-    usual = np.exp(-0.5 * (np.log(radii / code.dot_radius) / _SPREAD) ** 2)
+    change = np.log(radii / code.dot_radius)
+    usual = np.exp(-0.5 * (change / np.where(change < 0, *_SPREAD)) ** 2)
     own, every = (seen * usual).argmax(axis=1), np.arange(count)
     # Dots are fainter than the disc where they are small, all of them alike.
     steps, small, middle = steps[own, every], small[own, every], middle[own, every]
