@@ -1,14 +1,14 @@
 """How far the confidence of point-distributed targets can be trusted, and the weights behind it.
 
 Scenes of GSI's targets under all lights, of all sizes and views, with dots of all radii that the
-detector takes, are rendered, also without any target, with targets that lack a decoding dot, which have no right code, and textures. Every
-hypothesis of the detector `gsi` is compared with the truth. The table shows the reliability of the
-weights in force, by condition. With --fit, a logistic regression whose weights have the right sign
-is fitted to the hypotheses and written to the file of fitted weights. Seeds from 101 on are for
-tests, those below for development.
+detector takes, are rendered, also without any target, with targets that lack a decoding dot, which
+have no right code, and textures. Every hypothesis of the detector `gsi` is compared with the
+truth. The table shows the reliability of the weights in force, by condition. With --fit, a
+logistic regression whose weights have the right sign is fitted to the hypotheses and written to
+the file of fitted weights. Seeds from 101 on are for tests, those below for development.
 
     python -m benchmarks.gsi_confidence [--seeds 101 102]
-    python -m benchmarks.gsi_confidence --fit 1 2
+    python -m benchmarks.gsi_confidence --fit 1 2 3 4
 """
 
 from __future__ import annotations

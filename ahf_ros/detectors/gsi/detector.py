@@ -186,9 +186,7 @@ def read_targets(
     if not len(again):
         return first
     found = first.select(again)
-    second = _placed(
-        pyramid, found.homographies, found.polarity, found.scale, found.words, code
-    )
+    second = _placed(pyramid, found.homographies, found.polarity, found.scale, found.words, code)
     return first.replaced(again, second)
 
 

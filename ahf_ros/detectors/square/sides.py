@@ -4,9 +4,8 @@ A side is a straight edge with the dark side inside. Profiles across it are fitt
 like edges of light lose their weight, and a line is fitted to the rest. A corner is the
 intersection of the lines of two neighbouring sides, so that light near a corner does not move it.
 
-Where ink or light has grown, all edges have moved by one length. White cells beside the border show
-the inner edge of the border, which moved the other way: so it is known how far, and lines are moved
-back.
+Where ink or light has grown, all edges have moved by one length. White cells beside the border
+show its inner edge, which has moved the other way: that tells how far, and lines are moved back.
 """
 
 from __future__ import annotations
@@ -162,9 +161,7 @@ def _edge_shift(
     side = np.stack([along, np.full(along.size, 1 / cells)], axis=1) - 0.5
     turns = [np.linalg.matrix_power(np.array([[0, -1], [1, 0]]), turn) for turn in range(4)]
     print_corners = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]], np.float32)
-    planes = [
-        cv2.getPerspectiveTransform(print_corners, of.astype(np.float32)) for of in corners
-    ]
+    planes = [cv2.getPerspectiveTransform(print_corners, of.astype(np.float32)) for of in corners]
     frames = np.array(planes).reshape(-1, 3, 3)
     points, before, inner = (
         project(frames, np.stack([(side + offset) @ turn.T for turn in turns]))
@@ -172,10 +169,10 @@ def _edge_shift(
     )
     normals = _normals(before, points)
     cell = np.linalg.norm(inner - points, axis=3)
-    count, each = len(corners), (len(corners), 4 * along.size)
+    each = (len(corners), 4 * along.size)
     outlines = OutlinePoints(
-        points.reshape(count, -1, 2),
-        normals.reshape(count, -1, 2),
+        points.reshape(*each, 2),
+        normals.reshape(*each, 2),
         -np.ones(each, int),
         _REACH_IN_CELLS * cell.reshape(each),
         (cell * (_IN_CELL[1] - _IN_CELL[0])).reshape(each),
