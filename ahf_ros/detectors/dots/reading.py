@@ -80,7 +80,9 @@ def read_rings(log: np.ndarray, fit: Fit, code: DotFamily) -> Readings:
     shape = (len(radii), count, _PHASES, bits)
     small = np.stack([local_frames(fit.frames, points, np.full(len(points), r)) for r in radii])
     single = small.reshape(len(radii), -1, 3, 3)
-    steps = np.stack([circle_steps(log, frames, aside)[0] for frames in single])
+    of_radii = [circle_steps(log, frames, aside) for frames in single]
+    inside = np.asarray(of_radii[-1][1].reshape(count, _PHASES * bits).all(axis=1))
+    steps = np.stack([of_one for of_one, _ in of_radii])
     steps = steps.reshape(*shape, steps.shape[-1]) * polarity[:, None, None, None]
     steps /= usual[:, None, None, None]
     small = small.reshape(*shape, 3, 3)
@@ -111,7 +113,7 @@ def read_rings(log: np.ndarray, fit: Fit, code: DotFamily) -> Readings:
         radii[own],
         border_steps(log, fit.frames, polarity, code)[:, 0],
         highest / faintest,
-        circle_steps(log, single[-1], aside)[1].reshape(count, _PHASES * bits).all(axis=1),
+        inside,
     )
 
 

@@ -69,7 +69,7 @@ def seen_templates(log: np.ndarray, templates: Templates, family: PointFamily) -
         log, templates.homographies, templates.polarity, templates.scale, alone
     )
     seen = evidence.inside & (evidence.ratio > _CONTRADICTED)
-    return templates.select(seen.all(axis=1))
+    return templates.select(np.flatnonzero(seen.all(axis=1)))
 
 
 def find_evidence(

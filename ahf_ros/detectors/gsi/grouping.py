@@ -263,7 +263,8 @@ def _fitted(dots: Dots, members: np.ndarray, family: PointFamily, polarity: int)
     good = (misfit < 1) & (np.linalg.det(fit.homographies) < 0)  # y is up, then down
     ratio = frame.mean_radii(dots.frames)[members] / frame.mean_radii(implied).reshape(there.shape)
     scale = median(ratio, there)
-    good &= (scale > (bounds := radius_scales(family))[0]) & (scale < bounds[1])
+    smallest, largest = radius_scales(family)
+    good &= (scale > smallest) & (scale < largest)
     signs = np.full(len(members), polarity)
     return Templates(fit.homographies, members, signs, scale, misfit).select(good)
 

@@ -115,4 +115,5 @@ def neighbours(
         limit[first[last]] = np.abs(offset[last])
         near = np.flatnonzero(rank < crowd)
         parts.append((first[near], second[near], offset[near], limit[first[near]]))
-    return Pairs(*(np.concatenate(column) for column in zip(*parts, strict=True)), error)
+    first, second, offset, limit = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return Pairs(first, second, offset, limit, error)
