@@ -32,6 +32,9 @@ class Target:
         Row-major covariance of (x, y), px^2.
     family : str
         Name of the family of the code; empty if undecoded or unknown.
+    edge_shift : float, optional
+        Length by which dark areas are larger in the image than in the print, on every edge, px:
+        positive where ink has grown, negative where light has. None where it was not measured.
 
     Examples
     --------
@@ -49,6 +52,8 @@ class Target:
     confidence: float = 1.0
     covariance: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     family: str = ''
+    # By name only, so that the fields of the classes below follow `family` in their order.
+    edge_shift: float | None = field(default=None, kw_only=True)
 
     @property
     def key(self) -> tuple[str, int]:
@@ -230,6 +235,8 @@ class Identification:
         The IDs that the image was expected to show, in ascending order; empty if they are unknown.
     search : SearchTrace or None
         The search for a filter; None if there was none.
+    edge_shift : float, optional
+        Edge shift of the image, px, as in `Target`; None where it is unknown.
 
     Examples
     --------
@@ -246,6 +253,7 @@ class Identification:
     combination: str = ''
     expected_ids: tuple[int, ...] = ()
     search: SearchTrace | None = None
+    edge_shift: float | None = None
 
     @property
     def count(self) -> int:

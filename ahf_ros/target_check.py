@@ -73,8 +73,9 @@ def checked_target(target: Any, name: str) -> Target:
     target : Target
         Its fields may be of any type. Accepted are an `id` from -1 to 2^31 - 1, a `code` from 0 to
         2^32 - 1, finite coordinates and semi-axes, an `angle` within a turn, a `confidence` from
-        0 to 1, a covariance that is symmetric and positive semidefinite, and a `family` that is a
-        printable text; numpy scalars and arrays are converted.
+        0 to 1, a covariance that is symmetric and positive semidefinite, a `family` that is a
+        printable text, and an `edge_shift` that is None or a number of px; numpy scalars and
+        arrays are converted.
     name : str
         What errors call it.
 
@@ -186,6 +187,11 @@ def _numbers(minimum: float, maximum: float) -> Callable[[Any, str], float]:
     return lambda value, name: checked_number(value, name, minimum, maximum)
 
 
+def _edge_shift(value: Any, name: str) -> float | None:
+    limit = MAXIMUM_LENGTH_PX
+    return None if value is None else checked_number(value, name, -limit, limit)
+
+
 _PLACE = _numbers(-MAXIMUM_LENGTH_PX, MAXIMUM_LENGTH_PX)
 _AXIS = _numbers(0, MAXIMUM_LENGTH_PX)
 _CHECKS: dict[str, Callable[[Any, str], Any]] = {
@@ -199,4 +205,5 @@ _CHECKS: dict[str, Callable[[Any, str], Any]] = {
     'confidence': _numbers(0, 1),
     'covariance': _covariance,
     'family': checked_text,
+    'edge_shift': _edge_shift,
 }

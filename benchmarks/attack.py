@@ -26,6 +26,7 @@ from hypothesis import strategies as st
 
 from ahf_ros.bag.definitions import CODED_TARGETS, message_types, typestore
 from ahf_ros.drawing.overlay import draw
+from ahf_ros.edge_shift import median_edge_shift
 from ahf_ros.interchange.image_files import decode_bytes
 from ahf_ros.interchange.target_json import to_json
 from ahf_ros.interchange.target_messages import coded_target_array
@@ -104,6 +105,7 @@ _GOOD = {
     'confidence': st.floats(0, 1),
     'covariance': st.tuples(_VARIANCES, st.just(0), st.just(0.0), _VARIANCES),
     'family': st.sampled_from(('', 'metashape12')),
+    'edge_shift': st.one_of(st.none(), st.floats(-9, 9)),
 }
 _BAD = st.one_of(
     NUMBERS,
@@ -137,7 +139,8 @@ def check_result(found: object) -> bool:
     except ValueError as error:
         assert str(error).startswith('detector') and str(error).isprintable()
         return False
-    identification = Identification(tuple(targets))
+    shift = median_edge_shift(targets)
+    identification = Identification(tuple(targets), edge_shift=shift)
     content = to_json(identification, 'a', GRAY.shape, 'f', 'd')
     assert len(json.loads(json.dumps(content, allow_nan=False))['targets']) == len(targets)
     draw(GRAY, identification)

@@ -19,7 +19,7 @@ from rich.progress import track
 
 from ahf_ros.codes.ring import canonical, family
 from ahf_ros.detectors.contract import DetectorSettings
-from ahf_ros.detectors.ring.confidence import HIDDEN, MARGIN, UNEXPLAINED, confidence, even, terms
+from ahf_ros.detectors.ring.confidence import confidence, features
 from ahf_ros.detectors.ring.detector import find_hypotheses
 from ahf_ros.imaging.image import as_gray
 from benchmarks.conditions import COMMON, Scene, scenes
@@ -31,8 +31,7 @@ RARE = 0.1
 _PRIOR = 1.0  # inverse variance of scaled weights
 _ITERATIONS = 3000
 _NO_SPREAD = 1e-9
-_MINIMUM_MARGIN = np.log1p(1.0)  # of readings that count
-_TRACE = np.log1p(1.0)  # what is unexplained where something leaves a trace
+_MINIMUM_MARGIN = np.log1p(3.0)  # of readings that count: others are not certain in any case
 
 
 def readings(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
@@ -52,7 +51,7 @@ def readings(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     near = np.hypot(read.frames[:, :1, 2] - x, read.frames[:, 1:2, 2] - y) < NEAR
     right = (near & (ids[:, None] == number)).any(axis=1)
     seen = near.any(axis=1) | (not scene.others)
-    return read.features[seen], right[seen]
+    return features(read.select(seen)), right[seen]
 
 
 def gathered(seeds: Iterable[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -62,23 +61,8 @@ def gathered(seeds: Iterable[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         for scene in track(scenes(seed), f'seed {seed}', total=None):
             part = readings(scene)
             parts.append((*part, np.full(len(part[0]), scene.condition)))
-    features, right, condition = (np.concatenate(part) for part in zip(*parts, strict=True))
-    return features, right, condition
-
-
-def logistic_regression(features: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Return intercept and weights with the highest likelihood, under a weak prior."""
-    mean, spread = features.mean(axis=0), features.std(axis=0)
-    basis = np.column_stack([np.ones(len(features)), (features - mean) / spread])
-    prior = np.diag([0.0] + [1.0] * features.shape[1])
-    weights = np.zeros(basis.shape[1])
-    for _ in range(100):
-        probability = 1 / (1 + np.exp(-basis @ weights))
-        gradient = basis.T @ (probability - right) + prior @ weights
-        curvature = (basis.T * (probability * (1 - probability))) @ basis + prior
-        weights -= np.linalg.solve(curvature, gradient)
-    slopes = weights[1:] / spread
-    return np.concatenate([[weights[0] - slopes @ mean], slopes])
+    values, right, condition = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return values, right, condition
 
 
 def rising_regression(
@@ -116,22 +100,17 @@ def rising_regression(
 
 def fitted(seeds: Iterable[int]) -> dict[str, np.ndarray]:
     """Return the numbers of the regression on the scenes of some seeds, by their names."""
-    features, right, condition = gathered(seeds)
-    # A cover without a trace cannot be told, nor can a word that is printed alike in two families.
-    no_trace = ~right & (features[:, UNEXPLAINED] < _TRACE) & (features[:, HIDDEN] == 0)
-    told = (features[:, MARGIN] > _MINIMUM_MARGIN) & ~no_trace
-    counts = np.where(np.isin(condition, COMMON), 1.0, RARE)
-    parts = [told & of for of in (even(features), ~even(features))]
-    fits = [rising_regression(terms(features[of]), right[of], counts[of]) for of in parts]
-    (at_even, of_even), (at_edges, of_edges) = fits
-    numbers = {'intercepts': np.array([at_even, at_edges]), 'even': of_even, 'edges': of_edges}
-    return {name: np.round(values, 3) for name, values in numbers.items()}
+    values, right, condition = gathered(seeds)
+    told = values[:, 0] > _MINIMUM_MARGIN
+    counts = np.where(np.isin(condition, COMMON), 1.0, RARE)[told]
+    intercept, weights = rising_regression(values[told], right[told], counts)
+    return {'intercept': np.round([intercept], 3), 'weights': np.round(weights, 3)}
 
 
 def reliability(seeds: Iterable[int]) -> Iterator[str]:
     """Yield the lines of the table of the scenes of some seeds."""
-    features, right, condition = gathered(seeds)
-    return reliability_table(condition, confidence(features), right)
+    values, right, condition = gathered(seeds)
+    return reliability_table(condition, confidence(values), right)
 
 
 if __name__ == '__main__':

@@ -45,6 +45,13 @@ def exposures() -> dict[str, Exposure]:
         rows[f'{name} finger 2 dot radii wide'] = Exposure(occluder=bar)
     spot = occluders.disc(1.0, COVERS['white'])
     rows['white spot of 1 dot radius'] = Exposure(occluder=spot)
+    dirt = 1 / RADIUS, 3 / RADIUS
+    for count in (15, 40):
+        grains = occluders.specks(count, dirt)
+        rows[f'{count} specks of 1 to 3 px'] = Exposure(occluder=grains)
+    for count in (3, 6):
+        lines = occluders.scratches(count, dirt)
+        rows[f'{count} scratches 1 to 3 px wide'] = Exposure(occluder=lines)
     for radius, levels in ((1.0, 200.0), (1.0, 400.0), (1.5, 200.0)):
         glare = occluders.highlight(radius, levels)
         rows[f'highlight of {radius} dot radii, +{levels:.0f}'] = Exposure(glare=glare)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
 import numpy as np
@@ -13,6 +13,8 @@ from ahf_ros.synthetic.covers import ring_cover
 from benchmarks.exposure import GAMMA, INK, WHITE, Cell, Glare, Occluder
 
 _LABEL = 3.8  # radius of the paper that another target is printed on, dot radii
+_DIRTY = 3.8  # radius of the area that dirt lies in, dot radii
+_DARKEST, _BRIGHTEST = 40.0, 235.0  # gray values of dirt, beyond those of ink and of paper
 
 
 def over_sectors(count: float, gray: float, *, whole: bool = False) -> Occluder:
@@ -89,6 +91,64 @@ def _disc(
     radius: float, gray: float, cell: Cell, generator: np.random.Generator
 ) -> tuple[np.ndarray, float]:
     return _share(radius - _from_band(cell, generator), cell), gray
+
+
+def specks(count: int, widths: tuple[float, float]) -> Occluder:
+    """Return specks of dirt of any gray value, all over the target.
+
+    Parameters
+    ----------
+    count : int
+        Of one target.
+    widths : tuple of 2 float
+        Smallest and largest diameter, dot radii.
+    """
+    return partial(_dirt, _speck, count, widths)
+
+
+def scratches(count: int, widths: tuple[float, float]) -> Occluder:
+    """Return straight scratches of any gray value that go across the target.
+
+    Parameters
+    ----------
+    count : int
+        Of one target.
+    widths : tuple of 2 float
+        Smallest and largest width, dot radii.
+    """
+    return partial(_dirt, _scratch, count, widths)
+
+
+def _dirt(
+    draw: Callable[[Cell, np.random.Generator], np.ndarray],
+    count: int,
+    widths: tuple[float, float],
+    cell: Cell,
+    generator: np.random.Generator,
+) -> tuple[np.ndarray, np.ndarray]:
+    covered, gray = np.zeros_like(cell.x), np.full_like(cell.x, WHITE)
+    for _ in range(count):
+        distance = draw(cell, generator)
+        share = _share(np.float32(generator.uniform(*widths) / 2) - distance, cell)
+        gray[share > 0] = generator.uniform(_DARKEST, _BRIGHTEST)
+        np.maximum(covered, share, out=covered)
+    return covered, gray
+
+
+def _speck(cell: Cell, generator: np.random.Generator) -> np.ndarray:
+    """Return the distances of the samples from a random point of the target."""
+    direction = generator.uniform(0, 2 * math.pi)
+    reach = _DIRTY * math.sqrt(generator.uniform())
+    x = cell.x - np.float32(reach * math.cos(direction))
+    y = cell.y - np.float32(reach * math.sin(direction))
+    distance: np.ndarray = np.sqrt(x * x + y * y)
+    return distance
+
+
+def _scratch(cell: Cell, generator: np.random.Generator) -> np.ndarray:
+    """Return the distances of the samples from a random line across the target."""
+    offset = np.float32(generator.uniform(-cell.outer, cell.outer))
+    return np.abs(_beside(cell, generator.uniform(0, math.pi)) - offset)
 
 
 def other_targets(

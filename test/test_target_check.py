@@ -55,6 +55,8 @@ def changed(**values: object) -> Target:
         ('covariance', (1, 2, 2, 1), 'positive semidefinite'),
         ('covariance', (1, 0.5, -0.5, 1), 'symmetric'),
         ('covariance', (1, 0, 0, math.nan), 'four finite numbers'),
+        ('edge_shift', math.nan, 'a number from -65536 to 65536'),
+        ('edge_shift', 'wide', 'a number'),
         ('family', None, 'a printable text of at most 200 characters'),
         ('family', 7, 'a printable text'),
         ('family', 'a' * 201, 'a printable text'),
@@ -88,11 +90,15 @@ def test_numbers_of_numpy_are_converted():
         1,
         np.array([[1, 0], [0, 2]]),
         np.str_('aicon12'),
+        edge_shift=np.float32(-0.5),
     )
     checked = checked_target(target, 'x')
-    assert checked == Target(7, 9, 10.5, 20.0, 4.0, 3.0, 0.5, 1.0, (1.0, 0.0, 0.0, 2.0), 'aicon12')
+    covariance = (1.0, 0.0, 0.0, 2.0)
+    assert checked == Target(
+        7, 9, 10.5, 20.0, 4.0, 3.0, 0.5, 1.0, covariance, 'aicon12', edge_shift=-0.5
+    )
     types = [type(getattr(checked, name)) for name in NAMES]
-    assert types == [int, int, float, float, float, float, float, float, tuple, str]
+    assert types == [int, int, float, float, float, float, float, float, tuple, str, float]
     assert all(type(it) is float for it in checked.covariance)
 
 

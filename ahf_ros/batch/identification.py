@@ -19,6 +19,7 @@ from ahf_ros.batch.fingerprints import file_fingerprint
 from ahf_ros.batch.task import ImageOutcome, ImageTask, Level, Message
 from ahf_ros.detectors import Detector, DetectorSettings, create_detector
 from ahf_ros.drawing.overlay import draw, summary
+from ahf_ros.edge_shift import edge_shift_remark
 from ahf_ros.filtering.trials import Elsewhere
 from ahf_ros.imaging.image import check_image
 from ahf_ros.imaging.stack import ImageStack
@@ -195,6 +196,8 @@ def _messages(of: _Found) -> Iterator[Message]:
             f'{path}: the image seems to be mirrored: most IDs are not among the expected ones, '
             'and most would be in a mirror'
         )
+    if remark := edge_shift_remark(found.edge_shift):
+        yield Message(f'{path}: {remark}')
     for target in found.targets:
         yield Message(
             f'{target.id:>8} {target.family:<11} {target.x:10.3f} {target.y:10.3f} px'

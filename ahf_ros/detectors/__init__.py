@@ -88,7 +88,7 @@ _ENTRIES = {
         'detectors.ring.counting:estimate_count',
         several=True,
     ),
-    'traditional': _Entry('detectors.ring.traditional:TraditionalDetector', KINDS['ring']),
+    'traditional': _Entry('detectors.traditional.detector:TraditionalDetector', KINDS['ring']),
     'aruco': _Entry('detectors.square.detector:SquareDetector', KINDS['aruco']),
     'apriltag': _Entry('detectors.square.detector:SquareDetector', KINDS['apriltag']),
     'gsi': _Entry('detectors.gsi.detector:GsiDetector', KINDS['gsi']),

@@ -2,14 +2,18 @@
 
 The direction of an edge says where the centre of a dot may lie: each edge pixel votes, along its
 gradient, for the centres at the radii of interest (Kimme, Ballard & Sklansky, Comm. ACM 18, 1975).
-An edge that runs straight on for longer than a dot is wide belongs to no dot and does not vote,
-which silences projected stripes.
+On an ellipse the centre does not lie along the gradient, but in a direction that follows from it
+and from the shape; so oblique dots are voted for with ellipses in several directions. An edge that
+runs straight on for longer than a dot is wide belongs to no dot and does not vote, which silences
+projected stripes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import ceil
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -18,18 +22,53 @@ from ahf_ros.features import frame
 from ahf_ros.features.dots import best
 from ahf_ros.features.log_edges import LogEdges, mask_of
 from ahf_ros.features.pyramid import LARGEST_RADIUS
+from ahf_ros.features.votes import NO_PEAKS, Peaks, find_peaks, highest
 
 MAXIMUM_CANDIDATES = 6000
-"""Candidates kept at the most for one range of radii, those with the most votes."""
+"""Candidates kept at the most for one range of radii and one polarity, those with most votes."""
 
-_MINIMUM_VOTES = 1.5  # a px of the circumference
-_RANGES = ((5.8, LARGEST_RADIUS, 2),)  # radii and accumulator cell, px
-_FIRST_RANGES = ((2.0, 3.4, 1), (3.4, 5.8, 1), *_RANGES)  # of the first level
+
+class _Shape(NamedTuple):
+    """Ellipses that are voted for.
+
+    Attributes
+    ----------
+    aspect : float
+        Ratio of their axes.
+    directions : int
+        Number of directions of the major axis.
+    cell : int
+        Side of the cells in which votes are counted, px.
+    votes : float
+        Needed, for a px of the circumference of the smallest dot, as if it were round.
+    every : int
+        One of so many edges votes.
+    """
+
+    aspect: float
+    directions: int
+    cell: int
+    votes: float
+    every: int
+
+
+_SMALLEST = _Shape(1.0, 1, 1, 0.6, 1)  # whose edges are the least exact
+_SMALL = _Shape(1.0, 1, 1, 1.4, 1)
+_LARGE = _Shape(1.0, 1, 2, 1.4, 1)
+_OBLIQUE = _Shape(0.5, 6, 2, 1.2, 2)  # finds those of 0.3 to 0.7, up to 70 degrees
+_RANGES = {  # by semi-major axes, px
+    (3.4, 5.8): (_SMALL,),  # out of focus, as others are found on the level below
+    (5.8, LARGEST_RADIUS): (_LARGE, _OBLIQUE),
+}
+_FIRST_RANGES = {  # of the first level
+    (2.0, 3.4): (_SMALLEST,),
+    (3.4, 5.8): (_SMALL, _OBLIQUE),
+    (5.8, LARGEST_RADIUS): (_LARGE, _OBLIQUE),
+}
 _STEP = 0.8  # of the radii voted for, in cells
-_SHIFT = 2
-_BLOCK = 1 << _SHIFT  # cells, side of the blocks in which votes are counted first
-_MAXIMUM_VOTES = 7000  # that are counted in a cell, so that nine of them fit into 16 bits
-_OUTSIDE = cv2.BORDER_CONSTANT  # no votes are there
+_FLAT = 0.75  # sine of the angle between an edge of an ellipse and its major axis, at the most
+_REACH = 0.5  # within which no other centre has more votes, in radii of the smallest dot
+_CELL = 2  # in which the votes for different shapes are compared, px
 _LONG = 1.5  # length of an edge that is straight, in radii of the largest dot
 
 
@@ -42,7 +81,7 @@ class Candidates:
     level : int
         The level; its pixels are 2^level wide.
     points : ndarray of float64, shape (k, 2)
-        Centres, px of the level, to about two pixels.
+        Centres, px of the level, to about a pixel.
     radii : tuple of 2 float
         Smallest and largest radius of the dots, px of the level.
     polarity : ndarray of int, shape (k,)
@@ -82,14 +121,18 @@ def find_candidates(
     """
     candidates, mask = [], None
     for level, of_level in enumerate(edges, start=1):
-        ranges = [
-            (low, high, cell)
-            for low, high, cell in (_FIRST_RANGES if level == 1 else _RANGES)
-            if high * 2**level >= min_radius and low * 2**level <= max_radius
-        ]
+        ranges = {
+            radii: shapes
+            for radii, shapes in (_FIRST_RANGES if level == 1 else _RANGES).items()
+            if radii[1] * 2**level >= min_radius and radii[0] * 2**level <= max_radius
+        }
         if not ranges:
             continue
-        if _too_few(of_level, ranges, explained, polarities):
+        # This is looked at only where it takes less time than to hide what is explained.
+        if len(of_level.x) < len(explained) and not any(
+            len(_elected(of_level, radii, shapes, polarities)[0])
+            for radii, shapes in ranges.items()
+        ):
             continue
         shape = of_level.marked.shape
         if mask is None:
@@ -97,29 +140,10 @@ def find_candidates(
         else:
             mask = cv2.resize(mask, shape[::-1], interpolation=cv2.INTER_NEAREST)
         rest = of_level.unmasked(mask)
-        for low, high, cell in ranges:
-            curved = rest.curved(_LONG * high)
-            points = [_vote(curved, (low, high), cell, polarity) for polarity in polarities]
-            polarity = np.repeat(polarities, [len(of_one) for of_one in points])
-            candidates.append(Candidates(level, np.concatenate(points), (low, high), polarity))
+        for radii, shapes in ranges.items():
+            points, polarity = _elected(rest.curved(_LONG * radii[1]), radii, shapes, polarities)
+            candidates.append(Candidates(level, points, radii, polarity))
     return candidates
-
-
-def _too_few(
-    edges: LogEdges,
-    ranges: Sequence[tuple[float, float, int]],
-    explained: Sequence[np.ndarray] | np.ndarray,
-    polarities: Sequence[int],
-) -> bool:
-    """Return whether edges are too few for any dot, even if nothing explains them.
-
-    This is looked at only where it takes less time than to hide what is explained.
-    """
-    return len(edges.x) < len(explained) and not any(
-        len(_vote(edges, (low, high), cell, polarity))
-        for low, high, cell in ranges
-        for polarity in polarities
-    )
 
 
 def _reduced(
@@ -131,82 +155,105 @@ def _reduced(
     return [frame.reduced(outline, level) for outline in outlines]
 
 
-def _vote(edges: LogEdges, radii: tuple[float, float], cell: int, polarity: int) -> np.ndarray:
-    """Return the points, shape (k, 2), that enough edges at the radii point away from."""
+def _elected(
+    edges: LogEdges,
+    radii: tuple[float, float],
+    shapes: Sequence[_Shape],
+    polarities: Sequence[int],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the points, shape (k, 2), that enough edges vote for, and polarities, shape (k,)."""
+    found = Peaks.joined([_peaks(edges, radii, of, polarities) for of in shapes])
+    points = np.stack([found.x, found.y], axis=-1)
+    inside = np.all((points > -1) & (points < edges.marked.shape[::-1]), axis=1)
+    found, points = found.select(inside), points[inside]
+    reach = max(1, round(_REACH * radii[0] / _CELL))
+    margin = reach + 1
+    tall, wide = (side // _CELL + 1 + 2 * margin for side in edges.marked.shape)
+    columns, rows = np.rint((points.T + 0.5) / _CELL - 0.5).astype(int) + margin
+    cells = (found.plane * tall + rows) * wide + columns
+    kept = highest(cells, found.votes, (len(polarities) * tall, wide), reach)
+    found, points = found.select(kept), points[kept]
+    # Spots of light may be many, of one polarity, and must not crowd out the other.
+    chosen = [
+        best(which, -found.votes[which], MAXIMUM_CANDIDATES, 'candidates of one size')
+        for which in (np.flatnonzero(found.plane == number) for number in range(len(polarities)))
+    ]
+    kept = np.concatenate([np.zeros(0, np.intp), *chosen])
+    return points[kept], np.asarray(polarities, int)[found.plane[kept]]
+
+
+def _peaks(
+    edges: LogEdges, radii: tuple[float, float], of: _Shape, polarities: Sequence[int]
+) -> Peaks:
+    """Return the points that enough edges of a shape vote for, px, with indices of polarities."""
     low, high = radii
-    needed = _MINIMUM_VOTES * 2 * np.pi * low
-    height, width = (side // cell + 1 for side in edges.marked.shape)
-    count = max(2, int(np.ceil((high - low) / (_STEP * cell))))
-    if count * len(edges.x) <= needed:
-        return np.zeros((0, 2))
-    steps = polarity * (low + (np.arange(count) + 0.5) * (high - low) / count)
-    margin = _BLOCK * int(np.ceil(high / cell / _BLOCK))  # votes may lie outside of the image
-    columns, rows = (
-        _cells(at, unit, steps, cell, margin)
-        for at, unit in ((edges.x, edges.unit_x), (edges.y, edges.unit_y))
-    )
-    votes = _votes(columns, rows, (height + 2 * margin, width + 2 * margin), needed)
-    if votes is None:
-        return np.zeros((0, 2))
-    rows, columns = _peaks(votes, needed, max(1, round(low / cell / 2)))
-    rows, columns = rows - margin, columns - margin
-    inside = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
-    rows, columns = rows[inside], columns[inside]
-    ranks = -votes[rows + margin, columns + margin].astype(int)
-    kept = best(np.arange(len(ranks)), ranks, MAXIMUM_CANDIDATES, 'candidates of one size')
-    return (np.stack([columns[kept], rows[kept]], axis=-1) + 0.5) * cell - 0.5
-
-
-def _peaks(votes: np.ndarray, needed: float, reach: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return rows and columns of the cells with enough votes, and none with more within reach."""
-    wide = votes.shape[1]
-    high = np.flatnonzero(votes > int(needed))
-    values = votes.ravel()
-    own = values[high]
-    peak = np.ones(len(high), bool)
-    for down in range(-reach, reach + 1):
-        for across in range(-reach, reach + 1):
-            peak &= own >= values.take(high + (down * wide + across), mode='clip')
-    rows, columns = np.divmod(high[peak], wide)
-    return rows, columns
-
-
-def _cells(
-    at: np.ndarray, unit: np.ndarray, steps: np.ndarray, cell: int, margin: int
-) -> np.ndarray:
-    """Return the rows, or columns, of the cells that edges vote for, int32, shape (n,)."""
-    start = (at.astype(np.float32) + np.float32(0.5)) / np.float32(cell) + np.float32(margin)
-    moves = (steps / cell).astype(np.float32)[:, None] * unit
-    return np.subtract(start, moves, out=moves).astype(np.int32).ravel()
+    count = max(2, ceil((high - low) / (_STEP * of.cell)))
+    steps = low + (np.arange(count) + 0.5) * (high - low) / count
+    needed = of.votes * 2 * np.pi * low
+    if not len(polarities) or count * len(edges.x) <= needed:
+        return NO_PEAKS
+    reach = max(1, round(_REACH * low / of.cell))
+    margin = reach + ceil(high / of.cell) + 1  # votes may lie outside of the image
+    tall, wide = (side // of.cell + 1 + 2 * margin for side in edges.marked.shape)
+    # Votes for each polarity and direction are counted in a plane of their own.
+    columns, rows = _votes(edges, of, np.outer(polarities, steps), margin, tall)
+    planes = len(polarities) * of.directions
+    peaks = find_peaks(columns, rows, (planes, tall, wide), needed / of.every, reach)
+    x, y = ((at - margin + 0.5) * of.cell - 0.5 for at in (peaks.x, peaks.y))
+    return replace(peaks, x=x, y=y, plane=peaks.plane // of.directions)
 
 
 def _votes(
-    columns: np.ndarray, rows: np.ndarray, shape: tuple[int, int], needed: float
-) -> np.ndarray | None:
-    """Return the votes in the nine cells about each cell, uint16, if any has those needed.
+    edges: LogEdges, of: _Shape, radii: np.ndarray, margin: int, tall: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the columns and rows of the cells that edges vote for, int32, shape (n,).
 
-    Votes are counted only in blocks of cells that, with their neighbours, have so many.
+    Parameters
+    ----------
+    edges : LogEdges
+    of : _Shape
+    radii : ndarray of float, shape (k, n)
+        Signed, to vote for k polarities.
+    margin : int
+        Cells about the image.
+    tall : int
+        Rows of a plane.
     """
-    tall, wide = (-(-side // _BLOCK) for side in shape)
-    block = (rows >> _SHIFT) * np.int32(wide) + (columns >> _SHIFT)
-    cast = np.bincount(block, minlength=tall * wide).reshape(tall, wide)
-    of_blocks = np.minimum(cast, _MAXIMUM_VOTES).astype(np.uint16)
-    around = cv2.boxFilter(of_blocks, cv2.CV_32F, (3, 3), normalize=False, borderType=_OUTSIDE)
-    enough = (around > needed).astype(np.uint8)
-    hot = (cv2.dilate(enough, np.ones((3, 3), np.uint8)) > 0) & (of_blocks > 0)
-    count = np.count_nonzero(hot)
-    if not count:
-        return None
-    slots = np.zeros(hot.shape, np.int32)
-    slots[hot] = np.arange(1, count + 1)
-    last = np.int32(_BLOCK - 1)
-    places = slots.ravel()[block] << 2 * _SHIFT
-    places += (rows & last) << _SHIFT
-    places += columns & last
-    of_cells = np.bincount(places, minlength=(count + 1) << 2 * _SHIFT)[_BLOCK**2 :]
-    votes = np.zeros((tall, _BLOCK, wide, _BLOCK), np.uint16)
-    down, across = np.nonzero(hot)
-    of_hot = np.minimum(of_cells, _MAXIMUM_VOTES).reshape(count, _BLOCK, _BLOCK)
-    votes[down, :, across] = of_hot
-    whole = votes.reshape(tall * _BLOCK, wide * _BLOCK)
-    return cv2.boxFilter(whole, cv2.CV_16U, (3, 3), normalize=False, borderType=_OUTSIDE)
+    columns, rows = [], []
+    cell = np.float32(of.cell)
+    some = edges.select(slice(None, None, of.every))
+    x, y = ((at + np.float32(0.5)) / cell + np.float32(margin) for at in (some.x, some.y))
+    steps = (radii / of.cell).astype(np.float32)[..., None]
+    for number, angle in enumerate(np.pi * np.arange(of.directions) / of.directions):
+        start_x, start_y, unit_x, unit_y = x, y, some.unit_x, some.unit_y
+        if of.aspect < 1:
+            which, unit_x, unit_y = _towards_centres(some, of.aspect, angle)
+            start_x, start_y = x[which], y[which]
+        for polarity, moves in enumerate(steps):
+            top = np.int32((polarity * of.directions + number) * tall)
+            columns.append((start_x - moves * unit_x).astype(np.int32).ravel())
+            rows.append((start_y - moves * unit_y).astype(np.int32).ravel() + top)
+    return np.concatenate(columns), np.concatenate(rows)
+
+
+def _towards_centres(
+    edges: LogEdges, aspect: float, angle: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return edges that may be flat ones of an ellipse, and where they lie on it.
+
+    Returns
+    -------
+    which : ndarray of int, shape (k,)
+    x, y : ndarray of float32, shape (k,)
+        From the centre of the ellipse whose semi-major axis is 1.
+    """
+    cosine, sine = np.float32(np.cos(angle)), np.float32(np.sin(angle))
+    along = edges.unit_x * cosine + edges.unit_y * sine
+    which = np.flatnonzero(np.abs(along) < np.float32(_FLAT))
+    along = along[which]
+    across = edges.unit_y[which] * cosine - edges.unit_x[which] * sine
+    # The point of the ellipse (u / 1)^2 + (v / aspect)^2 = 1 with this normal.
+    square = np.float32(aspect**2)
+    scale = 1 / np.sqrt(along * along + square * across * across)
+    along, across = along * scale, across * (square * scale)
+    return which, along * cosine - across * sine, along * sine + across * cosine

@@ -61,8 +61,7 @@ class Fit(ArrayRecord):
     blur : ndarray of float64, shape (k,)
         Of the edges, standard deviation in px.
     edge_shift : ndarray of float64, shape (k,)
-        Length by which dark areas are larger in the image than in the print, on every edge, px;
-        NaN where the fit was not projective.
+        By how much what is dark has grown on all edges, px; 0 where one circle does not tell.
     """
 
     frames: np.ndarray
@@ -83,17 +82,17 @@ class Fit(ArrayRecord):
 
 _NONE = np.zeros(0)
 NO_FITS = Fit(
-    np.zeros((0, 3, 3)),
-    _NONE.astype(int),
-    _NONE,
-    _NONE,
-    _NONE,
-    _NONE,
-    np.zeros((0, 2, 2)),
-    _NONE,
-    _NONE,
+    frames=np.zeros((0, 3, 3)),
+    polarity=_NONE.astype(int),
+    contrast=_NONE,
+    bright=_NONE,
+    share=_NONE,
+    deviation=_NONE,
+    covariance=np.zeros((0, 2, 2)),
+    blur=_NONE,
+    edge_shift=_NONE,
 )
-"""The record of none."""
+"""An empty record."""
 
 
 def fit_dots(
@@ -178,10 +177,10 @@ def fit_circles(
         edges = measure_edges(gray, frames, circles, blur, reach)
         blur = np.clip(blur + median(edges.softness, edges.visible, 0.0), *BLURS)
         solution = _solve(edges, circles, window, projective)
-        of_frames = solution.changes[:, : 7 if projective else 5]
-        np.clip(of_frames, -_MAXIMUM_CHANGE, _MAXIMUM_CHANGE, out=of_frames)
+        of_frame = solution.changes[:, :7]
+        np.clip(of_frame, -_MAXIMUM_CHANGE, _MAXIMUM_CHANGE, out=of_frame)
         if remaining:
-            frames = frame.moved(frames, of_frames)
+            frames = frame.moved(frames, solution.changes[:, : 7 if projective else 5])
     return _fit(solution, frames, circles, blur, covariances)
 
 
@@ -242,8 +241,18 @@ def _fit(
     moved = frame.moved(frames, of.changes[:, : 7 if of.model.projective else 5])
     affine = frame.local_affine(moved)
     covariance = affine @ covariance @ affine.transpose(0, 2, 1) + _SYSTEMATIC**2 * np.eye(2)
-    shift = -of.changes[:, -1] if of.model.projective else np.full(len(frames), np.nan)
-    return Fit(moved, polarity, own.contrast, bright, share, scatter, covariance, blur, shift)
+    shift = -of.changes[:, -1] if of.model.projective else np.zeros(len(frames))
+    return Fit(
+        frames=moved,
+        polarity=polarity,
+        contrast=own.contrast,
+        bright=bright,
+        share=share,
+        deviation=scatter,
+        covariance=covariance,
+        blur=blur,
+        edge_shift=shift,
+    )
 
 
 def _covariance(of: _Solution, frames: np.ndarray, circles: Circles) -> np.ndarray:

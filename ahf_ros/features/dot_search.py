@@ -2,7 +2,8 @@
 
 `whole_dots` takes the outlines that an edge follows all the way round: fast, and enough where the
 light is even. `voted_dots` finds the others, whose outlines the edges of light interrupt, in what
-is left of the edges when those of explained objects are hidden.
+is left of the edges when those of explained objects are hidden: round ones, those seen at up to 70
+degrees, and those out of focus. `propose_dots` does both.
 """
 
 from __future__ import annotations
@@ -72,10 +73,61 @@ def voted_dots(
     Returns
     -------
     Dots
-        Without duplicates, those with the largest share first, in px of the image.
+        Without duplicates, those with the largest share first, in px of the image. Centres are
+        known to about two tenths of a pixel, radii to half a pixel and the blur.
     """
     candidates = find_candidates(pyramid.edges, min_radius, max_radius, polarities, explained)
     return distinct(fit_ellipses(pyramid.logs, candidates))
+
+
+def propose_dots(
+    pyramid: ImagePyramid,
+    min_radius: float,
+    max_radius: float,
+    polarities: Sequence[int],
+    explained: Sequence[np.ndarray] | np.ndarray = (),
+) -> Dots:
+    """Return the dots of an image at any tilt up to 70 degrees, sharp or not.
+
+    Parameters
+    ----------
+    pyramid : ImagePyramid
+        Of an image, or of an octave of it.
+    min_radius, max_radius : float
+        Bounds of the semi-major axis, px; dots that are a little smaller or larger may be among
+        those returned.
+    polarities : sequence of int
+        1 to find dark dots, -1 to find bright ones.
+    explained : sequence of ndarray of float, each of shape (m, 2)
+        Outlines of objects that are known already, px of the image. Interrupted dots are not
+        looked for inside.
+
+    Returns
+    -------
+    Dots
+        No two of them the same, those with the largest share first, in px of the image. Centres
+        are known to about two tenths of a pixel, radii to half a pixel and the blur.
+    """
+    whole = whole_dots(pyramid, min_radius, max_radius, polarities)
+    return distinct(
+        Dots.joined(
+            [whole, _others(pyramid, whole, min_radius, max_radius, polarities, explained)]
+        )
+    )
+
+
+def _others(
+    pyramid: ImagePyramid,
+    whole: Dots,
+    min_radius: float,
+    max_radius: float,
+    polarities: Sequence[int],
+    explained: Sequence[np.ndarray] | np.ndarray,
+) -> Dots:
+    """Return the dots that votes find outside of whole ones."""
+    outlines = frame.circle_outlines(whole.frames, np.full(len(whole.frames), 1 + _MARGIN))
+    known = [*outlines, *explained]
+    return voted_dots(pyramid, min_radius, max_radius, polarities, explained=known)
 
 
 def with_other_dots(
@@ -106,9 +158,7 @@ def with_other_dots(
     Dots
         No two of them the same.
     """
-    outlines = frame.circle_outlines(whole.frames, np.full(len(whole.frames), 1 + _MARGIN))
-    known = [*outlines, *explained]
-    found = [whole, voted_dots(pyramid, min_radius, max_radius, polarities, explained=known)]
+    found = [whole, _others(pyramid, whole, min_radius, max_radius, polarities, explained)]
     if min_radius < _SMALL:
         low, high = _SMALLER * min_radius, min(max_radius, _SMALL)
         small = small_dots(pyramid.logs[0], low, high, polarities, LOG_SCALE, explained)

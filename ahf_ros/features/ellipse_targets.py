@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -10,15 +11,28 @@ from ahf_ros.features.frame import ellipse_axes
 from ahf_ros.target import UNDECODED, Target
 
 
-def ellipse_fields(frames: np.ndarray, covariance: np.ndarray) -> list[dict[str, Any]]:
-    """Return the fields of `Target` that say where it is, from (k, 3, 3) and (k, 2, 2)."""
+def ellipse_fields(
+    frames: np.ndarray, covariance: np.ndarray, edge_shift: np.ndarray | None = None
+) -> list[dict[str, Any]]:
+    """Return the fields of `Target` that say where and how large it is.
+
+    Parameters
+    ----------
+    frames, covariance, edge_shift : ndarray
+        As for `targets_from_frames`.
+    """
     columns = (frames[:, 0, 2], frames[:, 1, 2], *ellipse_axes(frames))
     names = ('x', 'y', 'semi_major', 'semi_minor', 'angle')
+    places = np.stack(columns, axis=1).tolist()
+    spreads = covariance.reshape(-1, 4).tolist()
+    shifts = [math.nan] * len(frames) if edge_shift is None else edge_shift.tolist()
     return [
-        {**dict(zip(names, row, strict=True)), 'covariance': tuple(of_row)}
-        for row, of_row in zip(
-            np.stack(columns, axis=1).tolist(), covariance.reshape(-1, 4).tolist(), strict=True
-        )
+        {
+            **dict(zip(names, place, strict=True)),
+            'covariance': tuple(spread),
+            'edge_shift': None if math.isnan(shift) else shift,
+        }
+        for place, spread, shift in zip(places, spreads, shifts, strict=True)
     ]
 
 
@@ -29,6 +43,7 @@ def targets_from_frames(
     codes: np.ndarray,
     confidence: np.ndarray,
     family: str | np.ndarray,
+    edge_shift: np.ndarray | None = None,
 ) -> list[Target]:
     """Return targets, in the order given.
 
@@ -45,11 +60,14 @@ def targets_from_frames(
     confidence : ndarray of float64, shape (k,)
     family : str, or ndarray of str, shape (k,)
         Names of the families of the codes; none is reported where the ID is `UNDECODED`.
+    edge_shift : ndarray of float64, shape (k,), optional
+        As in `Target`, px; NaN where it is unknown, as all are by default.
     """
     undecoded = ids == UNDECODED
     columns = (ids, np.where(undecoded, 0, codes), confidence, np.where(undecoded, '', family))
-    rows = (*(column.tolist() for column in columns), ellipse_fields(frames, covariance))
+    fields = ellipse_fields(frames, covariance, edge_shift)
+    rows = (*(column.tolist() for column in columns), fields)
     return [
-        Target(id=identifier, code=code, confidence=certainty, family=name, **fields)
-        for identifier, code, certainty, name, fields in zip(*rows, strict=True)
+        Target(id=identifier, code=code, confidence=certainty, family=name, **places)
+        for identifier, code, certainty, name, places in zip(*rows, strict=True)
     ]

@@ -15,25 +15,30 @@ from ahf_ros.features.log_edges import LOG_SCALE
 from ahf_ros.features.robust import fit_linear
 from ahf_ros.features.sampling import sample_circles
 
-_RAYS = 32
-_ANGLES = 2 * np.pi * np.arange(_RAYS) / _RAYS
-_BINS = 26  # of the radius, in equal ratios
+_RAYS, _FEW_RAYS = 32, 24  # about an ellipse that is refined, and about a candidate
+_ANGLES, _FEW_ANGLES = (2 * np.pi * np.arange(rays) / rays for rays in (_RAYS, _FEW_RAYS))
+_BINS = 22  # of the radius, in equal ratios
 _NEAREST, _FARTHEST = 0.4, 1.35  # radii sampled, in the smallest and the largest of the range
 _WIDTH = 1.5  # from the middle of an ellipse to where its weights end, bins
 _SHAPES = ((1.0, 1), (0.75, 4), (0.55, 6), (0.4, 8))  # aspect, number of directions
+_BESIDE, _SIDES = 0.4, 6  # distance of circles beside a candidate in their radius, directions
 _MINIMUM_COUNTED, _MAXIMUM_COUNTED = -0.3, 0.6  # steps of ln; one beyond counts no more
 _MINIMUM_SCORE = 0.15  # mean step of ln along the ellipse
-_COARSE = 8.0  # largest radius of a range that is fitted one level below its own, px
+_SMALL = 8.0  # largest radius of a range of the first level that is fitted in the image, px
 _OVERSIZE = 1.6  # semi-major axis of a dot, in the largest radius of its range, at the most
-_WINDOWS = (0.35, 0.22, 0.14)  # about the ellipse, in its own radius
+_WINDOWS = (  # about the ellipse, in its own radius; share of inliers; one of so many rays
+    (0.5, 0.35, 2),
+    (0.3, 0.45, 1),
+    (0.15, 0.55, 1),
+)
 _MINIMUM_WINDOW, _MAXIMUM_WINDOW = 2.0, 0.5  # the same: px, and in its own radius
 _PROFILE, _SAMPLES = 1.15, 13  # half length of a profile across it, in windows, and its samples
 _MINIMUM_STEP = 0.1  # of ln, for a ray to count in the fit
 _CLEAR_STEP = 1.5 * _MINIMUM_STEP  # for a ray to show the edge
 _FLAT = -1e-3  # curvature of a peak of the steps, from which its top is computed
+_ROUNDS = 3  # of robust least squares
 _OUTLIERS = 5.0  # to a window: residuals that quarter the weight of a ray
 _INLIER, _PIXEL_INLIER = 0.06, 0.4  # of the radius, or px
-_MINIMUM_INLIERS = 0.45
 _MINIMUM_ASPECT = 0.28
 _MINIMUM_MINOR = 1.0  # px
 _PART = 512  # dots fitted at a time, which stay in the cache
@@ -58,7 +63,7 @@ def fit_ellipses(logs: Sequence[np.ndarray], candidates: Sequence[Candidates]) -
     """
     started: dict[int, list[tuple[Dots, np.ndarray]]] = {}
     for some in candidates:
-        level = some.level - (some.radii[1] < _COARSE)
+        level = 0 if some.level == 1 and some.radii[1] < _SMALL else some.level
         for start in range(0, len(some.points), _PART):
             part = slice(start, start + _PART)
             begun = _best_ellipses(logs[level], some, level, part)
@@ -96,13 +101,13 @@ def refine_ellipses(
         Indices of the ellipses that these were.
     """
     dots, kept = Dots(frames, polarity, np.zeros(len(frames))), np.arange(len(frames))
-    for window in _WINDOWS:
-        dots = _refined(log, dots, window)
+    for window, minimum_share, every in _WINDOWS:
+        dots = _refined(log, dots, window, _ANGLES[::every])
         major, minor, _ = frame.ellipse_axes(dots.frames)
         good = (minor > _MINIMUM_ASPECT * major) & (minor > _MINIMUM_MINOR)
-        good &= dots.share > _MINIMUM_INLIERS
+        good &= dots.share > minimum_share
         dots, kept = dots.select(good), kept[good]
-    return dots, kept
+    return _resized(log, dots), kept
 
 
 def _best_ellipses(
@@ -121,51 +126,112 @@ def _best_ellipses(
     x, y = ((candidates.points[part] + 0.5) * shrink - 0.5).T
     polarity = candidates.polarity[part]
     low, high = candidates.radii[0] * shrink, candidates.radii[1] * shrink
-    templates, radii, majors, minors, directions = _templates(low, high)
+    templates, radii, ellipses = _templates(low, high)
     one = np.ones(len(x))
     frames = frame.affine_frames(x, y, one, one, 0 * one)
-    steps = _steps(log, frames, radii, polarity)
+    steps = _steps(log, frames, _FEW_ANGLES, radii, polarity)
     scores = steps.reshape(len(x), len(templates)) @ templates
     best, highest = scores.argmax(axis=1), scores.max(axis=1)
-    fitted = frame.affine_frames(x, y, majors[best], minors[best], directions[best])
+    move_x, move_y, *axes = ellipses[best].T
+    fitted = frame.affine_frames(x + move_x, y + move_y, *axes)
     dots = Dots(fitted, polarity, highest).select(highest > _MINIMUM_SCORE)
     return dots, np.full(len(dots.frames), _OVERSIZE * high)
 
 
 @lru_cache(maxsize=16)  # a megabyte each; radii may be set to any number while a node runs
-def _templates(low: float, high: float) -> tuple[np.ndarray, ...]:
-    """Return weights that average steps along ellipses, the sampled radii, and the ellipses."""
+def _templates(low: float, high: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return templates of ellipses about a candidate, and of circles beside it.
+
+    Returns
+    -------
+    weights : ndarray of float32, shape (rays x bins, n)
+        That average steps along each of them.
+    radii : ndarray of float64, shape (bins + 2,)
+        That are sampled.
+    ellipses : ndarray of float64, shape (n, 5)
+        Centres, seen from the candidate, semi-axes and directions.
+    """
     radii = np.geomspace(_NEAREST * low, _FARTHEST * high, _BINS)
     ratio = np.log(radii[1] / radii[0])
     middle = radii[1:-1]
-    weights, ellipses = [], []
+    outlines, ellipses = [], []
     for aspect, count in _SHAPES:
         for direction in np.pi * np.arange(count) / count:
-            along = np.cos(_ANGLES - direction) ** 2 + (np.sin(_ANGLES - direction) / aspect) ** 2
+            along, across = (
+                np.cos(_FEW_ANGLES - direction),
+                np.sin(_FEW_ANGLES - direction) / aspect,
+            )
             for major in middle[middle * aspect >= middle[0]]:
-                bins = np.log(major / np.sqrt(along) / middle[0]) / ratio
-                distance = np.abs(bins[:, None] - np.arange(len(middle)))
-                weights.append(np.clip(_WIDTH - distance, 0, 1).ravel() / _RAYS)
-                ellipses.append((major, aspect * major, direction))
-    majors, minors, directions = np.array(ellipses).T
-    return np.array(weights, np.float32).T, radii, majors, minors, directions
+                outlines.append(major / np.hypot(along, across))
+                ellipses.append((0.0, 0.0, major, aspect * major, direction))
+    for direction in 2 * np.pi * np.arange(_SIDES) / _SIDES:
+        along, across = (_BESIDE * of(_FEW_ANGLES - direction) for of in (np.cos, np.sin))
+        x, y = _BESIDE * np.cos(direction), _BESIDE * np.sin(direction)
+        for radius in middle[middle * (1 - _BESIDE) >= middle[0]]:
+            outlines.append(radius * (along + np.sqrt(1 - across**2)))
+            ellipses.append((x * radius, y * radius, radius, radius, 0.0))
+    bins = np.log(np.array(outlines) / middle[0]) / ratio
+    distance = np.abs(bins[:, :, None] - np.arange(len(middle)))
+    weights = np.clip(_WIDTH - distance, 0, 1, dtype=np.float32) / _FEW_RAYS
+    return weights.reshape(len(weights), -1).T, radii, np.array(ellipses)
 
 
 def _steps(
-    log: np.ndarray, frames: np.ndarray, radii: np.ndarray, polarity: np.ndarray
+    log: np.ndarray,
+    frames: np.ndarray,
+    angles: np.ndarray,
+    radii: np.ndarray,
+    polarity: np.ndarray,
 ) -> np.ndarray:
     """Return the steps of ln outwards, from dark to bright, at all but the end radii."""
-    values = sample_circles(log, frames, _ANGLES, radii).astype(np.float32)
+    values = sample_circles(log, frames, angles, radii).astype(np.float32)
     steps = (values[:, :, 2:] - values[:, :, :-2]) * (polarity / LOG_SCALE)[:, None, None]
     return np.clip(steps, _MINIMUM_COUNTED, _MAXIMUM_COUNTED, dtype=np.float32)
 
 
-def _refined(log: np.ndarray, dots: Dots, window: float) -> Dots:
+def _refined(log: np.ndarray, dots: Dots, window: float, angles: np.ndarray) -> Dots:
     """Return dots moved onto the strongest steps near their ellipses."""
     size = frame.mean_radii(dots.frames)[:, None]
+    radii, windows = _profiles(size, window)
+    steps = _steps(log, dots.frames, angles, radii, dots.polarity)
+    displacement, step = _strongest(steps, radii)
+    half = len(angles) // 2
+    middle = np.partition(step, half, axis=1)[:, half, None]
+    usual = np.maximum(middle, _MINIMUM_STEP)
+    weights = np.clip(step / usual, 0, 1) * (step > _MINIMUM_STEP)
+    basis = frame.displacement_basis(angles, np.ones(len(angles)))[:, :5]
+    changes, errors = fit_linear(displacement, weights, basis, window / _OUTLIERS, _ROUNDS)
+    inlying = np.abs(errors) < np.maximum(_INLIER, _PIXEL_INLIER / size)
+    share = (inlying & (step > _CLEAR_STEP)).mean(axis=1)
+    frames = frame.moved(dots.frames, np.clip(changes, -windows, windows))
+    return Dots(frames, dots.polarity, share)
+
+
+def _resized(log: np.ndarray, dots: Dots) -> Dots:
+    """Return dots with their sizes in gray values.
+
+    In a logarithm a blurred edge lies on its dark side.
+    """
+    window, _, _ = _WINDOWS[-1]
+    radii, _ = _profiles(frame.mean_radii(dots.frames)[:, None], window)
+    values = sample_circles(log, dots.frames, _ANGLES[::2], radii).astype(np.float32)
+    values = np.exp((values - values.max(axis=2, keepdims=True)) / np.float32(LOG_SCALE))
+    outwards = dots.polarity.astype(np.float32)[:, None, None]
+    steps = outwards * (values[:, :, 2:] - values[:, :, :-2])
+    displacement, _ = _strongest(steps, radii)
+    frames = dots.frames.copy()
+    frames[:, :2, :2] *= 1 + np.median(displacement, axis=1)[:, None, None]
+    return replace(dots, frames=frames)
+
+
+def _profiles(size: np.ndarray, window: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the radii of profiles across ellipses, and their windows."""
     windows = np.clip(_MINIMUM_WINDOW / size, window, _MAXIMUM_WINDOW)
-    radii = 1 + np.linspace(-_PROFILE, _PROFILE, _SAMPLES) * windows
-    steps = _steps(log, dots.frames, radii, dots.polarity)
+    return 1 + np.linspace(-_PROFILE, _PROFILE, _SAMPLES) * windows, windows
+
+
+def _strongest(steps: np.ndarray, radii: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return how far the strongest steps of rays lie outside of ellipses, and these steps."""
     best = np.clip(steps.argmax(axis=2), 1, steps.shape[2] - 2)
     before, step, after = (
         np.take_along_axis(steps, (best + shift)[..., None], axis=2)[..., 0].astype(np.float64)
@@ -174,12 +240,4 @@ def _refined(log: np.ndarray, dots: Dots, window: float) -> Dots:
     curvature = np.minimum(before - 2 * step + after, _FLAT)
     shift = np.clip(0.5 * (before - after) / curvature, -1, 1)
     spacing = radii[:, 1:2] - radii[:, :1]
-    displacement = np.take_along_axis(radii, best + 1, axis=1) + shift * spacing - 1
-    usual = np.maximum(np.median(step, axis=1, keepdims=True), _MINIMUM_STEP)
-    weights = np.clip(step / usual, 0, 1) * (step > _MINIMUM_STEP)
-    basis = frame.displacement_basis(_ANGLES, np.ones(_RAYS))[:, :5]
-    changes, errors = fit_linear(displacement, weights, basis, window / _OUTLIERS)
-    inlying = np.abs(errors) < np.maximum(_INLIER, _PIXEL_INLIER / size)
-    share = (inlying & (step > _CLEAR_STEP)).mean(axis=1)
-    frames = frame.moved(dots.frames, np.clip(changes, -windows, windows))
-    return Dots(frames, dots.polarity, share)
+    return np.take_along_axis(radii, best + 1, axis=1) + shift * spacing - 1, step

@@ -220,6 +220,13 @@ def translated(frames: np.ndarray, x: float, y: float) -> np.ndarray:
     return np.array([[1.0, 0, x], [0, 1.0, y], [0, 0, 1.0]]) @ frames
 
 
+def scaled(frames: np.ndarray, factor: np.ndarray) -> np.ndarray:
+    """Return the frames of dots of other radii about the same centres, factors (k,)."""
+    changed = frames.copy()
+    changed[:, :, :2] *= factor[:, None, None]
+    return changed
+
+
 def enlarged(frames: np.ndarray, level: int) -> np.ndarray:
     """Return frames in the pixels of the image that was halved `level` times to give theirs."""
     scale = 2.0**level

@@ -13,6 +13,7 @@ LOG_SCALE = 1000.0
 
 _WEAK_EDGE, _STRONG_EDGE = 0.15, 0.22  # steps of ln, of the thresholds with hysteresis
 _STRAIGHT = 0.97  # cosine between the directions of an edge and of its continuation
+_PART = 32_768  # edges looked at at a time, which stay in the cache
 _CONTINUED = 0.5  # of the strength of an edge, that its continuation has at least
 
 
@@ -41,8 +42,8 @@ class LogEdges:
     unit_y: np.ndarray
     strength: np.ndarray
 
-    def select(self, which: np.ndarray) -> LogEdges:
-        """Return some of the edge pixels, by an index array or a mask of shape (m,)."""
+    def select(self, which: np.ndarray | slice) -> LogEdges:
+        """Return some of the edge pixels, by an index array, a mask of shape (m,) or a slice."""
         names = ('x', 'y', 'unit_x', 'unit_y', 'strength')
         return replace(self, **{name: getattr(self, name)[which] for name in names})
 
@@ -56,23 +57,23 @@ class LogEdges:
 
     def curved(self, length: float) -> LogEdges:
         """Return the edges that do not run straight on for `length` px, to neither side."""
-        straight = np.ones(len(self.x), bool)
-        for way in (length, -length):
-            rest = np.flatnonzero(straight)
-            straight[rest] = self._continues(rest, way)
-        return self.select(~straight)
+        straight = [np.zeros(0, bool)]
+        for start in range(0, len(self.x), _PART):
+            part = slice(start, start + _PART)
+            straight.append(self._continues(part, length) & self._continues(part, -length))
+        return self.select(np.flatnonzero(~np.concatenate(straight)))
 
-    def _continues(self, which: np.ndarray, way: float) -> np.ndarray:
-        """Return whether edges have the same gradient `way` px along themselves."""
+    def _continues(self, part: slice, way: float) -> np.ndarray:
+        """Return whether some edges have the same gradient `way` px along themselves."""
         height, width = self.dx.shape
-        unit_x, unit_y = self.unit_x[which], self.unit_y[which]
-        x = np.rint(self.x[which] - np.float32(way) * unit_y)
-        y = np.rint(self.y[which] + np.float32(way) * unit_x)
+        unit_x, unit_y = self.unit_x[part], self.unit_y[part]
+        x = np.rint(self.x[part] - np.float32(way) * unit_y)
+        y = np.rint(self.y[part] + np.float32(way) * unit_x)
         at = np.clip(y, 0, height - 1).astype(np.intp) * width
         at += np.clip(x, 0, width - 1).astype(np.intp)
         across, down = (of.ravel().take(at).astype(np.float32) for of in (self.dx, self.dy))
         along = across * unit_x + down * unit_y
-        strong = along > np.float32(_CONTINUED) * self.strength[which]
+        strong = along > np.float32(_CONTINUED) * self.strength[part]
         squares = across * across + down * down
         return strong & (along * along > np.float32(_STRAIGHT**2) * squares)
 

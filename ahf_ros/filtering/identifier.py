@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from ahf_ros.edge_shift import median_edge_shift
 from ahf_ros.filtering.choice import Choice, choose
 from ahf_ros.filtering.fusion import fused
 from ahf_ros.filtering.genes import genes_of, tuned
@@ -235,6 +236,7 @@ class Identifier:
             name,
             tuple(sorted(settings.listed)),
             trace_of(choice.search, trials, stack) if choice.search else None,
+            median_edge_shift(ordered),
         )
 
     def trials_of(self, stack: ImageStack) -> Trials:

@@ -31,6 +31,7 @@ _ABSENT = {
     'confidence': 1.0,
     'covariance': (0.0, 0.0, 0.0, 0.0),
     'family': '',
+    'edge_shift': None,
 }
 """What the optional fields of a target are where they are not given."""
 
@@ -96,6 +97,7 @@ def to_json(
         'estimated': identification.estimated,
         'expected_ids': list(identification.expected_ids),
         'mirrored': identification.mirrored,
+        'edge_shift': identification.edge_shift,
         'targets': [asdict(target) for target in identification.targets],
         'filter': used,
         'search': asdict(identification.search) if identification.search else None,

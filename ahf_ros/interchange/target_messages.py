@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, fields
 from typing import Any, Protocol
 
 import numpy as np
 
 from ahf_ros.target import FilterState, Identification, Target
+
+_TARGET_FIELDS = [it.name for it in fields(Target) if it.name != 'edge_shift']
 
 
 class MessageTypes(Protocol):
@@ -46,6 +49,7 @@ def coded_target_array(
         An instance of that class of `types`.
     """
     height, width = shape
+    shift = identification.edge_shift
     return types.CodedTargetArray(
         header=header,
         width=width,
@@ -56,29 +60,31 @@ def coded_target_array(
         mirrored=identification.mirrored,
         targets=[_coded_target(target, types) for target in identification.targets],
         filter=types.FilterState(**asdict(identification.filter)),
+        edge_shift=math.nan if shift is None else shift,
     )
 
 
 def identification_from(message: Any) -> Identification:
     """Return the identification that a CodedTargetArray carries."""
+    shift = message.edge_shift
     return Identification(
         tuple(
-            Target(**_values(Target, item) | {'covariance': tuple(item.covariance.tolist())})
+            Target(**_values(item) | {'covariance': tuple(item.covariance.tolist())})
             for item in message.targets
         ),
         message.expected,
-        FilterState(**_values(FilterState, message.filter)),
+        FilterState(**{it.name: getattr(message.filter, it.name) for it in fields(FilterState)}),
         message.estimated,
         message.mirrored,
+        edge_shift=None if math.isnan(shift) else shift,
     )
 
 
 def _coded_target(target: Target, types: MessageTypes) -> Any:
     """Return the message of a target, which may be of a class with more fields than `Target`."""
-    values = _values(Target, target)
-    return types.CodedTarget(**values | {'covariance': np.array(target.covariance)})
+    return types.CodedTarget(**_values(target) | {'covariance': np.array(target.covariance)})
 
 
-def _values(record: type, source: Any) -> dict[str, Any]:
-    """Return the values that `source` has for the fields of a record."""
-    return {item.name: getattr(source, item.name) for item in fields(record)}
+def _values(source: Any) -> dict[str, Any]:
+    """Return what a target, or its message, has for the fields that both have."""
+    return {name: getattr(source, name) for name in _TARGET_FIELDS}

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from std_msgs.msg import Header
 
+from ahf_ros.edge_shift import edge_shift_remark
 from ahf_ros.target import Identification
 from ahf_ros.text import printable
 
@@ -181,7 +182,7 @@ class Diagnostics:
         warning = '' if tally.inactive else _warning(tally, before)
         message = f'the node is {tally.inactive}' if tally.inactive else ''
         level = DiagnosticStatus.WARN if warning else DiagnosticStatus.OK
-        used = tally.last.filter
+        used, shift = tally.last.filter, tally.last.edge_shift
         values = {
             'rate (Hz)': f'{answered / period:.2f}',
             'latency (s)': f'{tally.latency:.3f}',
@@ -199,6 +200,7 @@ class Diagnostics:
             'expected (N)': tally.last.expected,
             'N estimated': tally.last.estimated,
             'mirrored': tally.last.mirrored,
+            'edge shift (px)': '' if shift is None else f'{shift:.2f}',
             'filter applied': used.applied,
             'gamma_high': f'{used.gamma_high:.2f}',
             'gamma_low': f'{used.gamma_low:.2f}',
@@ -234,6 +236,7 @@ def _warning(tally: Tally, before: Tally) -> str:
         tally.several,
         changes and f'size or encoding changed {changes} times: {tally.change}',
         tally.last.mirrored and 'the last image seems to be mirrored',
+        edge_shift_remark(tally.last.edge_shift),
         tally.uncalibrated,
     )
     return '; '.join(text for text in reports if text)

@@ -37,6 +37,8 @@ class ImageResult:
     expected_ids : tuple of int
         Empty if unknown.
     estimated, mirrored : bool
+    edge_shift : float, optional
+        Of the image, px; None if it is unknown.
     targets : tuple of Target
     filter : FilterState
     mapping : dict of str to float
@@ -60,6 +62,7 @@ class ImageResult:
     expected_ids: tuple[int, ...] = ()
     estimated: bool = False
     mirrored: bool = False
+    edge_shift: float | None = None
     filter: FilterState = field(default_factory=FilterState)
     mapping: dict[str, float] = field(default_factory=dict)
     search: SearchTrace | None = None
@@ -113,6 +116,7 @@ def result_from_json(content: Any, source: Path, where: str) -> ImageResult:
         expected_ids=tuple(int(it) for it in record.numbers('expected_ids')),
         estimated=record.flag('estimated'),
         mirrored=record.flag('mirrored'),
+        edge_shift=None if content.get('edge_shift') is None else record.number('edge_shift'),
         filter=FilterState(
             applied=used.flag('applied'),
             gamma_high=used.number('gamma_high'),

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
+from ahf_ros.edge_shift import edge_shift_remark
 from ahf_ros.evaluation import FALSE, RIGHT, WRONG, judge
 from ahf_ros.report.results import ImageResult
 from ahf_ros.target import (
@@ -64,6 +65,7 @@ def row(
         'expected': expected,
         'estimated': result.estimated,
         'mirrored': result.mirrored,
+        'edges': edge_shift_remark(result.edge_shift),
         'identified': identified,
         'missed': len(missed) if known is not None else max(0, expected - identified),
         'missedIds': missed,

@@ -21,7 +21,9 @@ is the change of (x, y) across the width of an anti-aliased edge, along the colu
 """
 
 
-def ring_cover(family: Family, word: int, turn: float, pinhole: float) -> Cover:
+def ring_cover(
+    family: Family, word: int, turn: float, pinhole: float, growth: float = 0.0
+) -> Cover:
     """Return the ink of a ring target.
 
     The signed distance to each edge, in widths of an anti-aliased edge, gives the covered
@@ -37,28 +39,33 @@ def ring_cover(family: Family, word: int, turn: float, pinhole: float) -> Cover:
         Direction of the edge at which sector 0 begins, rad.
     pinhole : float
         Radius of the hole in the centre of the dot, in radii of the dot; 0 for none.
+    growth : float
+        Length by which the ink is larger on every edge, in radii of the dot; less than half of a
+        sector.
     """
+    inner, outer = np.float32(family.band_inner - growth), np.float32(family.band_outer + growth)
 
     def cover(x: np.ndarray, y: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
         distance = np.sqrt(x * x + y * y)
         radial = edge_width(jacobian, x, y, distance)
-        inked = inside_share(1 - distance, radial)
-        if pinhole:
-            inked -= inside_share(pinhole - distance, radial)
+        inked = dot_share(distance, radial, pinhole, growth)
         margin = np.float32(2 * radial.max())
-        band = (distance > family.band_inner - margin) & (distance < family.band_outer + margin)
+        band = (distance > inner - margin) & (distance < outer + margin)
         distance, radial, x, y = distance[band], radial[band], x[band], y[band]
-        ring = inside_share(distance - np.float32(family.band_inner), radial)
-        ring *= inside_share(np.float32(family.band_outer) - distance, radial)
+        ring = inside_share(distance - inner, radial)
+        ring *= inside_share(outer - distance, radial)
         around = edge_width(jacobian, -y, x, distance) / distance
-        ring *= _sector_cover(sectors(word, family.bits), np.arctan2(y, x) - turn, around)
+        angle, wider = np.arctan2(y, x) - turn, np.float32(growth) / distance
+        ring *= _sector_cover(sectors(word, family.bits), angle, around, wider)
         inked[band] += ring
         return inked
 
     return cover
 
 
-def square_cover(name: str, number: int, half_side: float, turn: float) -> Cover:
+def square_cover(
+    name: str, number: int, half_side: float, turn: float, growth: float = 0.0
+) -> Cover:
     """Return the ink of a square marker.
 
     Parameters
@@ -71,11 +78,26 @@ def square_cover(name: str, number: int, half_side: float, turn: float) -> Cover
         Half the side of the marker, in radii of the mark.
     turn : float
         Rotation of the marker, counter-clockwise, rad.
+    growth : float
+        Length by which the ink is larger on every edge, in radii of the mark; less than a cell.
     """
     ink = 255 - marker(name, number, _CELL)
     side = len(ink)
-    ink = np.pad(ink, _CELL)
+    ink = _grown(np.pad(ink, _CELL), growth * side / (2 * half_side))
     return stamp_cover(ink, half_side * len(ink) / side, turn)
+
+
+def card_cover(half_width: float, turn: float) -> Cover:
+    """Return a regular octagon, turned counter-clockwise by an angle in rad."""
+    cosine, sine = np.float32(math.cos(turn)), np.float32(math.sin(turn))
+
+    def cover(x: np.ndarray, y: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
+        width = np.float32(np.sqrt(abs(np.linalg.det(jacobian))))
+        across, up = np.abs(x * cosine + y * sine), np.abs(y * cosine - x * sine)
+        outermost = np.maximum(np.maximum(across, up), (across + up) * np.float32(math.sqrt(0.5)))
+        return inside_share(np.float32(half_width) - outermost, width)
+
+    return cover
 
 
 def stamp_cover(stamp: np.ndarray, half_side: float, turn: float) -> Cover:
@@ -121,13 +143,54 @@ def inside_share(distance: np.ndarray, width: np.ndarray) -> np.ndarray:
     return np.clip(share, 0, 1, out=share)
 
 
-def _sector_cover(colours: np.ndarray, angle: np.ndarray, width: np.ndarray) -> np.ndarray:
-    """Return the fraction of each sample that inked sectors cover; edges are `width` rad wide."""
+def dot_share(
+    distance: np.ndarray, width: np.ndarray, pinhole: float, growth: float
+) -> np.ndarray:
+    """Return the fraction of each sample that a dot of radius 1 covers.
+
+    Parameters
+    ----------
+    distance : ndarray of float32
+        Of the samples from its centre, in its radii.
+    width : ndarray of float32
+        Of its edge, in its radii.
+    pinhole, growth : float
+        As for `ring_cover`.
+    """
+    inked = inside_share(np.float32(1 + growth) - distance, width)
+    if pinhole:
+        inked -= inside_share(np.float32(pinhole - growth) - distance, width)
+    return inked
+
+
+def _grown(ink: np.ndarray, growth: float) -> np.ndarray:
+    """Return a picture of ink, 255, that is larger by a length in px on every edge."""
+    inside, outside = (
+        cv2.distanceTransform(where.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+        for where in (ink > 0, ink == 0)
+    )
+    beyond = np.where(ink > 0, inside - 0.5, 0.5 - outside) + growth  # an edge is between pixels
+    return np.rint(inside_share(beyond, np.float32(1)) * 255).astype(np.uint8)
+
+
+def _sector_cover(
+    colours: np.ndarray, angle: np.ndarray, width: np.ndarray, growth: np.ndarray
+) -> np.ndarray:
+    """Return the fraction of each sample that inked sectors cover; angles are in rad.
+
+    Parameters
+    ----------
+    colours : ndarray of bool, shape (bits,)
+    angle, width, growth : ndarray of float32
+        Angle of each sample, width of an edge there, and length by which ink is wider there, less
+        than half of a sector.
+    """
     bits = len(colours)
     position = angle * np.float32(bits / (2 * math.pi))
     edge = np.rint(position)
-    share = inside_share((position - edge) * np.float32(2 * math.pi / bits), width)
     after = edge.astype(np.int32) % bits
     shades = colours.astype(np.float32)
+    beyond = (position - edge) * np.float32(2 * math.pi / bits)
+    share = inside_share(beyond + growth * (shades[after] - shades[after - 1]), width)
     cover: np.ndarray = shades[after] * share + shades[after - 1] * (1 - share)
     return cover

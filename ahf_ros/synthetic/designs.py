@@ -17,8 +17,9 @@ from ahf_ros.codes.square import SQUARE_NAMES, dictionary
 from ahf_ros.synthetic.covers import Cover, ring_cover, square_cover
 from ahf_ros.synthetic.dot_covers import dot_ring_cover, point_cover
 
-CoverOf = Callable[[int, float], tuple[int, Cover]]
-"""From an ID and a counter-clockwise rotation in rad to the code word and the ink."""
+CoverOf = Callable[[int, float, float], tuple[int, Cover]]
+"""From an ID, a counter-clockwise rotation in rad and the length by which ink is larger on every
+edge, in radii of the dot, to the code word and the ink."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +46,7 @@ class Design:
 
 def designs(
     name: str, pinhole: float, file: str = ''
-) -> tuple[np.ndarray, Callable[[int, float], Design]]:
+) -> tuple[np.ndarray, Callable[[int, float, float], Design]]:
     """Return the designs of a family.
 
     Parameters
@@ -62,13 +63,15 @@ def designs(
     ids : ndarray of int
         All IDs of the family.
     design_of : callable
-        From an ID and a counter-clockwise rotation in rad to the `Design`.
+        From an ID, a counter-clockwise rotation in rad, and the length by which the ink is larger
+        on every edge, in radii of the dot, to the `Design`.
     """
     ids, cover_of = _covers(name, pinhole, file)
     common = proportions(name, file)
 
-    def design_of(number: int, turn: float) -> Design:
-        return Design(*cover_of(number, turn), common.reach, common.radius)
+    def design_of(number: int, turn: float, growth: float) -> Design:
+        reach = common.reach + max(growth, 0.0)
+        return Design(*cover_of(number, turn, growth), reach, common.radius)
 
     return ids, design_of
 
@@ -86,22 +89,24 @@ def _covers(name: str, pinhole: float, file: str) -> tuple[np.ndarray, CoverOf]:
     return np.arange(1, table.words.size + 1), partial(_ring_cover, table, pinhole)
 
 
-def _ring_cover(table: Family, pinhole: float, number: int, turn: float) -> tuple[int, Cover]:
+def _ring_cover(
+    table: Family, pinhole: float, number: int, turn: float, growth: float
+) -> tuple[int, Cover]:
     word = table.word(number)
-    return word, ring_cover(table, word, turn, pinhole)
+    return word, ring_cover(table, word, turn, pinhole, growth)
 
 
-def _square_cover(name: str, number: int, turn: float) -> tuple[int, Cover]:
-    return number, square_cover(name, number, HALF_SIDE, turn)
+def _square_cover(name: str, number: int, turn: float, growth: float) -> tuple[int, Cover]:
+    return number, square_cover(name, number, HALF_SIDE, turn, growth)
 
 
-def _point_cover(table: PointFamily, number: int, turn: float) -> tuple[int, Cover]:
+def _point_cover(table: PointFamily, number: int, turn: float, growth: float) -> tuple[int, Cover]:
     word = table.word(number)
-    return word, point_cover(table, word, turn)
+    return word, point_cover(table, word, turn, growth)
 
 
 def _dot_ring_cover(
-    table: DotFamily, pinhole: float, number: int, turn: float
+    table: DotFamily, pinhole: float, number: int, turn: float, growth: float
 ) -> tuple[int, Cover]:
     word = table.word(number)
-    return word, dot_ring_cover(table, word, turn, pinhole)
+    return word, dot_ring_cover(table, word, turn, pinhole, growth)

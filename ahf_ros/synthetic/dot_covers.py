@@ -8,10 +8,10 @@ import numpy as np
 
 from ahf_ros.codes.dots import DotFamily
 from ahf_ros.codes.gsi import PointFamily
-from ahf_ros.synthetic.covers import Cover, edge_width, inside_share
+from ahf_ros.synthetic.covers import Cover, dot_share, edge_width, inside_share
 
 
-def point_cover(family: PointFamily, word: int, turn: float) -> Cover:
+def point_cover(family: PointFamily, word: int, turn: float, growth: float = 0.0) -> Cover:
     """Return the ink of a point-distributed target.
 
     Parameters
@@ -22,20 +22,24 @@ def point_cover(family: PointFamily, word: int, turn: float) -> Cover:
         Value of the code.
     turn : float
         Counter-clockwise rotation about the reference point, rad.
+    growth : float
+        Length by which the ink is larger on every edge, in units of length.
     """
     places, radii = family.dots(word)
-    places, radii = _turned(places, turn) / family.dot_radius, radii / family.dot_radius
+    places, radii = _turned(places, turn) / family.dot_radius, radii / family.dot_radius + growth
 
     def cover(x: np.ndarray, y: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
         inked = np.zeros_like(x)
         for place, radius in zip(places, radii, strict=True):
             _add_dot(inked, x, y, place, radius, jacobian)
-        return inked
+        return np.minimum(inked, 1, out=inked)
 
     return cover
 
 
-def dot_ring_cover(family: DotFamily, word: int, turn: float, pinhole: float) -> Cover:
+def dot_ring_cover(
+    family: DotFamily, word: int, turn: float, pinhole: float, growth: float = 0.0
+) -> Cover:
     """Return the ink of a ring of dots.
 
     Parameters
@@ -48,21 +52,23 @@ def dot_ring_cover(family: DotFamily, word: int, turn: float, pinhole: float) ->
         Direction of the place of dot 0, rad.
     pinhole : float
         Radius of the hole in the disc, in radii of the disc; 0 for none.
+    growth : float
+        Length by which the ink is larger on every edge, in radii of the disc.
     """
     places = family.places(word, turn)
+    inner = np.float32(family.ground_radius - growth)
+    outer = np.float32(family.border_radius + growth)
 
     def cover(x: np.ndarray, y: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
         distance = np.sqrt(x * x + y * y)
         width = edge_width(jacobian, x, y, distance)
-        inked = inside_share(1 - distance, width)
-        if pinhole:
-            inked -= inside_share(pinhole - distance, width)
-        border = inside_share(distance - np.float32(family.ground_radius), width)
-        border *= inside_share(np.float32(family.border_radius) - distance, width)
+        inked = dot_share(distance, width, pinhole, growth)
+        border = inside_share(distance - inner, width)
+        border *= inside_share(outer - distance, width)
         inked += border
         for place in places:
-            _add_dot(inked, x, y, place, family.dot_radius, jacobian)
-        return inked
+            _add_dot(inked, x, y, place, family.dot_radius + growth, jacobian)
+        return np.minimum(inked, 1, out=inked)
 
     return cover
 

@@ -8,154 +8,23 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from ahf_ros.codes.designs import proportions
-from ahf_ros.codes.families import FAMILY_NAMES
-from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.synthetic.camera import Camera, Sensor, tilted_camera
+from ahf_ros.synthetic.covers import card_cover
 from ahf_ros.synthetic.designs import designs
 from ahf_ros.synthetic.distractors import distractor_marks
-from ahf_ros.synthetic.layout import (
-    Placements,
-    finest_grid,
-    grid_placements,
-    quiet_radius,
-    size_ratios,
-)
-from ahf_ros.synthetic.patterns import LIGHT_NAMES, light_pattern, turned
+from ahf_ros.synthetic.layout import Placements, grid_placements, quiet_radius, size_ratios
+from ahf_ros.synthetic.patterns import light_pattern, turned
 from ahf_ros.synthetic.prints import Mark, mark_at, print_mark
 from ahf_ros.synthetic.projector import rig_projector
 from ahf_ros.synthetic.radiance import paper_texture, wall_radiance
+from ahf_ros.synthetic.settings import CARD_WIDTH, SceneSettings
 from ahf_ros.target import Target, TrueTarget, sorted_targets
+
+__all__ = ['Rendering', 'SceneSettings', 'render']
 
 _PROJECTOR_PIXELS = 6.4  # per radius of a dot: 1280 across an image of 200 radii, as by default
 _PIXEL_DEVIATION = 12**-0.5  # standard deviation of a position inside a pixel, px
 _STRIP = 128  # rows exposed at a time, to bound the memory
-
-
-@dataclass(frozen=True, slots=True)
-class SceneSettings:
-    """The wall, its light and the camera.
-
-    Examples
-    --------
-    >>> SceneSettings(targets=6, light='stripe', seed=3).family
-    'metashape12'
-    """
-
-    width: int = parameter(3984, 'Width of the image, px.', minimum=16, maximum=20000)
-    height: int = parameter(2656, 'Height of the image, px.', minimum=16, maximum=20000)
-    targets: int = parameter(54, 'Number of coded targets in the image.', minimum=0)
-    family: str = parameter('metashape12', 'Family of the codes.', choices=FAMILY_NAMES)
-    family_file: str = parameter(
-        '', 'Data file that describes the family gsi or dots; empty: the usual design.'
-    )
-    polarity: str = parameter(
-        'dark',
-        'Dark targets on white, or bright ones on black.',
-        choices=('dark', 'bright'),
-    )
-    dot_radius: float = parameter(
-        20.0, 'Semi-major axis of the central dot in the image, px.', minimum=1.0, maximum=500.0
-    )
-    radius_spread: float = parameter(
-        0.1, 'Largest deviation from the radius, as a fraction of it.', minimum=0.0, maximum=0.5
-    )
-    sizes: str = parameter(
-        '1', 'Sizes of the targets as ratios, mixed in equal numbers, such as 0.5, 1, 2.'
-    )
-    distractors: int = parameter(
-        0, 'Number of marks that are not coded targets: dots, rings, text, leaves.', minimum=0
-    )
-    pinhole: float = parameter(
-        0.05, 'Radius of the hole in the dot, in dot radii.', minimum=0.0, maximum=0.5
-    )
-    tilt: float = parameter(
-        0.0, 'Angle between the optical axis and the wall normal, deg.', minimum=0.0, maximum=80.0
-    )
-    focal_length: float = parameter(
-        1.8, 'Focal length in image widths.', minimum=0.5, maximum=20.0
-    )
-    distortion: float = parameter(
-        0.0, 'Radial lens distortion k1, dimensionless.', minimum=-0.3, maximum=0.3
-    )
-    light: str = parameter('normal', 'Projected pattern.', choices=LIGHT_NAMES)
-    light_scale: float = parameter(1.0, 'Scale of the pattern.', minimum=0.1, maximum=10.0)
-    light_turn: float = parameter(0.0, 'Turn of the pattern, deg.', minimum=-180.0, maximum=180.0)
-    ambient: float = parameter(
-        0.3,
-        'Ambient light as a fraction of the projected light.',
-        minimum=0.0,
-        maximum=10.0,
-    )
-    phases: int = parameter(
-        1,
-        'Number of images of the scene, between which the pattern shifts by equal parts of its '
-        'period.',
-        minimum=1,
-        maximum=1000,
-    )
-    defocus: float = parameter(
-        0.5,
-        'Blur of the projector, standard deviation in projector px.',
-        minimum=0.0,
-        maximum=20.0,
-    )
-    black: float = parameter(
-        0.06, 'Reflectance of black as a fraction of white.', minimum=0.0, maximum=1.0
-    )
-    texture: float = parameter(
-        0.02,
-        'Unevenness of the paper, relative standard deviation.',
-        minimum=0.0,
-        maximum=0.2,
-    )
-    blur: float = parameter(
-        0.7, 'Blur of the lens, standard deviation in px.', minimum=0.0, maximum=20.0
-    )
-    exposure: float = parameter(220.0, 'Mean gray value of lit white.', minimum=1.0, maximum=255.0)
-    gamma: float = parameter(
-        2.2, 'Gray values are light to the power of 1 / gamma.', minimum=0.5, maximum=4.0
-    )
-    full_well: float = parameter(
-        10000.0, 'Photoelectrons at saturation; 0: no noise.', minimum=0.0
-    )
-    read_noise: float = parameter(4.0, 'Readout noise, electrons.', minimum=0.0, maximum=1000.0)
-    seed: int = parameter(
-        0, 'Seed of poses, positions, codes, phases and noise.', minimum=0, maximum=2**31 - 1
-    )
-
-    def __post_init__(self) -> None:
-        """Check each parameter, that the wall fills the image and that the targets fit.
-
-        Raises
-        ------
-        ValueError
-            If not; the message names the field, its value and what is accepted.
-        """
-        check_parameters(self)
-        half_view = math.hypot(self.width, self.height) / 2 / (self.width * self.focal_length)
-        half_view += 0.02 / self.focal_length  # the principal point is off the middle
-        steepest = math.degrees(math.atan(0.95 / half_view))
-        if self.tilt > steepest:
-            raise ValueError(
-                f'tilt is {self.tilt!r}, accepted is a number from 0 to {steepest:.1f} with a '
-                f'focal_length of {self.focal_length:g}'
-            )
-        strongest = 0.13 / half_view**2  # up to 4/27, distortion is invertible in the image
-        if self.distortion < -strongest:
-            raise ValueError(
-                f'distortion is {self.distortion!r}, accepted is a number of at least '
-                f'{-strongest:.3f} with a focal_length of {self.focal_length:g}'
-            )
-        largest = self.dot_radius * (1 + self.radius_spread) * max(size_ratios(self.sizes))
-        zone = proportions(self.family, self.family_file).quiet_zone
-        reach = float(quiet_radius(largest, self.focal_length * self.width, zone))
-        columns, rows = finest_grid(self.width, self.height, reach)
-        if self.targets > columns * rows:
-            raise ValueError(
-                f'targets is {self.targets!r}, accepted is an integer from 0 to {columns * rows} '
-                f'with a dot_radius of {self.dot_radius:g} px in {self.width} x {self.height} px'
-            )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -228,8 +97,8 @@ def render(settings: SceneSettings, phase: int = 0) -> Rendering:
     )
     projector_pixel = settings.dot_radius / _PROJECTOR_PIXELS
     projector = rig_projector(camera.pose, projector_pixel, setup)
-    marks, targets, placements = _coded_targets(settings, camera, wall)
-    marks += distractor_marks(
+    cards, marks, targets, placements = _coded_targets(settings, camera, wall)
+    distractors = distractor_marks(
         settings.distractors, settings.dot_radius, camera, placements, clutter
     )
 
@@ -237,17 +106,20 @@ def render(settings: SceneSettings, phase: int = 0) -> Rendering:
     size, turn = settings.light_scale, math.radians(settings.light_turn)
     shift = phase / settings.phases
     pattern = turned(light_pattern(settings.light, softness / size, lamp, shift), size, turn)
-    average = (settings.exposure / 255) ** settings.gamma
-    highest = ((settings.exposure + 255) / 2 / 255) ** settings.gamma
+    average = settings.overexposure * (settings.exposure / 255) ** settings.gamma
+    highest = settings.overexposure * ((settings.exposure + 255) / 2 / 255) ** settings.gamma
     light = wall_radiance(camera, projector, pattern, settings.ambient, average, highest, lamp)
     if settings.texture:
         light *= paper_texture(light.shape, settings.texture, settings.dot_radius, wall)
     ground, inked = (1.0, settings.black) if settings.polarity == 'dark' else (settings.black, 1.0)
-    image: np.ndarray = light * np.float32(ground)
+    plain = ground * settings.wall
+    image: np.ndarray = light * np.float32(plain)
     if settings.blur:
         image = cv2.GaussianBlur(image, (0, 0), settings.blur, borderType=cv2.BORDER_REPLICATE)
-    for mark in marks:
-        print_mark(image, light, mark, camera, inked - ground, settings.blur)
+    prints = (cards, ground - plain), (marks, inked - ground), (distractors, inked - plain)
+    for printed, change in prints:
+        for mark in printed:
+            print_mark(image, light, mark, camera, change, settings.blur)
     del light
 
     sensor = Sensor(settings.full_well, settings.read_noise, settings.gamma)
@@ -260,8 +132,8 @@ def render(settings: SceneSettings, phase: int = 0) -> Rendering:
 
 def _coded_targets(
     settings: SceneSettings, camera: Camera, generator: np.random.Generator
-) -> tuple[list[Mark], list[Target], Placements]:
-    """Return targets with random positions, sizes, codes and directions.
+) -> tuple[list[Mark], list[Mark], list[Target], Placements]:
+    """Return targets with random positions, sizes, codes and directions, and the cards below.
 
     Prints are larger where the wall is farther away, so that every dot is about `dot_radius` in
     the image. Codes repeat only if there are more targets than codes.
@@ -276,16 +148,20 @@ def _coded_targets(
     rounds = -(-count // len(every))
     shuffled = [generator.permutation(every) for _ in range(rounds)]
     ids = np.concatenate([np.empty(0, int), *shuffled])[:count].tolist()
-    zone = proportions(settings.family, settings.family_file).quiet_zone
-    reach = quiet_radius(semi_major, float(camera.intrinsics[0, 0]), zone)
+    free = settings.free_radius
+    reach = quiet_radius(semi_major, float(camera.intrinsics[0, 0]), free)
     placements = grid_placements(camera, reach, generator)
+    gain = settings.edge_shift if settings.polarity == 'dark' else -settings.edge_shift
 
-    marks, targets = [], []
+    cards, marks, targets = [], [], []
     for number, pixel, size, turn in zip(ids, placements.centres, semi_major, turns, strict=True):
-        design = design_of(number, turn)
+        design = design_of(number, turn, gain / size)
         mark = mark_at(camera, pixel, size, design.reach, design.cover)
         x, y = camera.project(mark.centre[None])[0].tolist()
         ellipse = camera.circle(mark.centre, design.radius * mark.radius)
         marks.append(mark)
+        if settings.wall < 1:
+            card = card_cover(free * CARD_WIDTH, turn)
+            cards.append(Mark(mark.centre, mark.radius, free, card))
         targets.append(Target(number, design.code, x, y, *ellipse, family=settings.family))
-    return marks, targets, placements
+    return cards, marks, targets, placements

@@ -15,6 +15,7 @@ FOUND = Identification(
     ),
     54,
     FilterState(True, 2.7, 0.13, 1700.3, 2.2, 200, 12, 3.1),
+    edge_shift=-0.75,
 )
 
 
@@ -34,6 +35,7 @@ def test_a_message_comes_back_as_it_was() -> None:
     assert message.targets[1].x == 3983.123456789
     assert message.targets[1].covariance.tolist() == [1e-4, 0.0, 0.0, 4e-4]
     assert message.filter.gamma_high == pytest.approx(2.7, abs=1e-6)
+    assert message.edge_shift == -0.75
 
 
 @pytest.mark.parametrize('found', [FOUND, Identification(())])

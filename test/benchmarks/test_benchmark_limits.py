@@ -5,19 +5,38 @@ from __future__ import annotations
 import json
 from itertools import product
 
+import numpy as np
 import pytest
 
 from benchmarks import limits
 
 
 @pytest.mark.parametrize('family', ['metashape12', 'gsi', 'dots'])
-def test_every_row_is_a_scene_that_can_be_made(family):
-    options = ['--family', family, '--targets', '50']
-    for setting in limits.SETTINGS:
-        made = limits.parser().parse_args([*options, '--setting', setting])
+@pytest.mark.parametrize('setting', limits.SETTINGS)
+def test_every_row_is_a_scene_that_can_be_made(family, setting):
+    options = ['--family', family, '--targets', '50', '--setting', setting]
+    for group, count, twice in (('light', 32, 0), ('edge shift', 64, 8), ('exposure', 6, 0)):
+        made = limits.chosen([*options, '--group', group])
         cells = list(product(made.rows, made.lights))
         scenes = {limits.scene(made, row, light, 1) for row, light in cells}
-        assert len(scenes) == len(cells) == 32
+        assert (len(cells), len(cells) - len(scenes)) == (count, twice)  # one half of an image
+
+
+def test_the_halves_of_an_image_may_be_shifted_in_opposite_directions():
+    made = limits.chosen(['--group', 'edge shift', '--targets', '20'])
+    both, less = (
+        limits.photograph(made, f'radius 10, {name} px', 'normal', 1).image
+        for name in ('-1 and +1', '-1')
+    )
+    middle = both.shape[1] // 2
+    assert np.array_equal(both[:, :middle], less[:, :middle])
+    assert (both[:, middle:] < 128).sum() > 1.2 * (less[:, middle:] < 128).sum()
+
+
+def test_rows_of_other_groups_are_refused(capsys):
+    with pytest.raises(SystemExit):
+        limits.main(['--group', 'exposure', '--rows', 'radius 6, 0.3'])
+    assert "accepted are those of the group 'exposure'" in capsys.readouterr().err
 
 
 def test_files_hold_what_is_printed(tmp_path, capsys):

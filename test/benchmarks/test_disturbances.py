@@ -119,6 +119,22 @@ def test_paper_and_finger_and_disc_reach_as_far_as_they_should():
     assert 1.15 < distance[share > 0.5].min() < 2.1
 
 
+def test_dirt_covers_a_little_of_the_target_and_hides_ink_and_paper():
+    place = cell()
+    distance, _ = radius_and_angle(place)
+    sizes = (1 / RADIUS, 3 / RADIUS)
+    for occluder, least, most in (
+        (occluders.specks(40, sizes), 0.01, 0.035),
+        (occluders.scratches(6, sizes), 0.1, 0.4),
+    ):
+        share, gray = occluder(place, np.random.default_rng(4))
+        inside = distance < 3.5
+        assert least < share[inside].mean() < most
+        assert np.ptp(gray[share > 0.5]) > 100  # some is bright, some dark
+    share, _ = occluders.specks(40, sizes)(place, np.random.default_rng(4))
+    assert distance[share > 0].max() < 4
+
+
 def test_a_highlight_is_brightest_on_the_band():
     place = cell()
     added = occluders.highlight(1.0, 200.0)(place, np.random.default_rng(3))

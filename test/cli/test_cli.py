@@ -23,9 +23,9 @@ from support.command_line import ahf
 ROOT = Path(__file__).resolve().parents[2]
 SCENE = ['--width', '640', '--height', '480', '--targets', '6', '--dot-radius', '10']
 KEYS = (
-    'image width height upright family detector expected estimated expected_ids mirrored targets '
-    'filter search elapsed_s',
-    'id code x y semi_major semi_minor angle confidence covariance family',
+    'image width height upright family detector expected estimated expected_ids mirrored '
+    'edge_shift targets filter search elapsed_s',
+    'id code x y semi_major semi_minor angle confidence covariance family edge_shift',
     'applied gamma_high gamma_low cutoff attenuation evaluations generations log_offset '
     'black_percentile white_percentile',
 )
@@ -155,6 +155,27 @@ def test_evaluation_names_images_without_truth(folder):
     *_, other, together = map(json.loads, told.stdout.splitlines())
     assert (other['image'], other['false_positives'], other['recall']) == ('other.png', 1, None)
     assert (together['expected'], together['recall']) == (12, 0.0)
+
+
+def test_edges_that_are_not_where_they_should_be_are_reported(folder, tmp_path, capsys):
+    found = {'targets': [{'id': 7, 'x': 1, 'y': 2, 'edge_shift': -0.75}]}
+    (tmp_path / 'program.py').write_text(f'print({json.dumps(found)!r})')
+    program = ['--detector', 'command', '--command', f'{sys.executable} {tmp_path}/program.py']
+    assert status('identify', folder / 'normal_0.3_4.png', *program, '--json') == 0
+    printed = capsys.readouterr()
+    assert json.loads(printed.out)['edge_shift'] == -0.75
+    said = 'normal_0.3_4.png: edges are 0.8 px too bright: the photograph is over-exposed'
+    assert said in printed.err
+
+
+def test_scenes_are_rendered_with_ink_gain_and_over_exposure(tmp_path):
+    shares = {}
+    for option, value in (('--edge-shift', 0), ('--edge-shift', 2), ('--overexposure', 9)):
+        assert status('render', tmp_path, *SCENE, option, value) == 0
+        image = read_image(tmp_path / 'normal_0.3_0.png')
+        shares[option, value] = (image < 128).mean()
+    assert shares['--edge-shift', 2] > 1.3 * shares['--edge-shift', 0] > 0
+    assert shares['--overexposure', 9] == 0
 
 
 def test_overlays_are_written(folder, tmp_path):

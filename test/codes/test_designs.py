@@ -55,7 +55,7 @@ def test_outlines_hold_the_ink_of_rendered_targets(name: str) -> None:
     every = numbers_of(name)
     generator = np.random.default_rng(5)
     for number in (every[0], every[len(every) // 2], every[-1]):
-        rendered, printed = design_of(number, 0.0), printed_design(name, number, pinhole)
+        rendered, printed = design_of(number, 0.0, 0.0), printed_design(name, number, pinhole)
         assert printed.code == rendered.code
         points = generator.uniform(-1.1, 1.1, (1500, 2)) * rendered.reach
         points[:100] /= 5 * rendered.reach  # in the dot, about its hole

@@ -133,7 +133,6 @@ def test_confidence_is_a_probability_that_grows_with_the_evidence():
             deviation=np.full(6, deviation),
             covariance=np.tile(1e-4 * np.eye(2), (6, 1, 1)),
             blur=np.full(6, 0.8),
-            edge_shift=np.zeros(6),
         )
         features = confidence_features(readings, fit)
         assert features.shape == (6, FEATURES)

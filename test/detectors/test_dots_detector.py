@@ -98,6 +98,7 @@ def test_edges_that_moved_and_dots_of_other_radii_are_read(
     reported = create_detector(family='dots')(shown.image)
     figures = score(shown.truth, reported)
     assert (figures.right, figures.wrong, figures.false_positives) == (6, 0, 0)
+    assert all(target.edge_shift == pytest.approx(shift, abs=0.1) for target in reported)
 
 
 def test_a_target_and_its_mirror_image_are_one_code() -> None:

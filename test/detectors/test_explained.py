@@ -26,15 +26,7 @@ def dots(
     covariance = np.tile(np.eye(2), (count, 1, 1))
     polarity = ones.astype(int)
     return Fit(
-        frames,
-        polarity,
-        ones / 4,
-        200 * ones,
-        share * ones,
-        ones / 50,
-        covariance,
-        blur * ones,
-        0 * ones,
+        frames, polarity, ones / 4, 200 * ones, share * ones, ones / 50, covariance, blur * ones
     )
 
 

@@ -125,7 +125,6 @@ def test_readings_are_taken_over_where_they_belong():
         deviation=np.full(2, 0.1),
         covariance=np.tile(np.eye(2), (2, 1, 1)),
         blur=np.full(2, 0.8),
-        edge_shift=np.zeros(2),
     )
     unread = Hypotheses.unread(fit, CODE)
     assert not unread.words.any() and not unread.confidence.any()
@@ -138,7 +137,6 @@ def test_readings_are_taken_over_where_they_belong():
         deviation=np.full(1, 0.02),
         covariance=0.1 * np.eye(2)[None],
         blur=np.full(1, 0.8),
-        edge_shift=np.zeros(1),
     )
     one = np.ones(1)
     readings = Readings(

@@ -131,6 +131,27 @@ def test_votes_find_dots_of_all_sizes_under_stripes(radius, polarity):
     assert np.linalg.norm(points - (150, 120), axis=1).min() < 0.3 * radius
 
 
+@pytest.mark.parametrize('radius', [4.6, 5.6, 6.6])
+@pytest.mark.parametrize('shift', [0.0, 2.3, 4.6, 6.9])
+def test_small_dots_are_placed_between_pixels_under_fine_stripes(radius, shift):
+    gray = stripes(drawn([(150.3 + shift, 120.4, radius)]), 19, 0.4)
+    points, _ = places(candidates.find_candidates(edges_of(gray), 4, 60, (1,)))
+    assert np.linalg.norm(points - (150.3 + shift, 120.4), axis=1).min() < 0.25 * radius
+
+
+@pytest.mark.parametrize('angle', [0.0, 0.4, 1.1, 2.0])
+@pytest.mark.parametrize('aspect', [0.65, 0.5, 0.42])
+def test_votes_find_the_middles_of_oblique_dots_under_stripes(angle, aspect):
+    image = np.full((4 * 240, 4 * 320), 200, np.uint8)
+    axes = (80 * 16, round(80 * aspect * 16))
+    middle = (round((4 * 150 + 1.5) * 16), round((4 * 120 + 1.5) * 16))
+    cv2.ellipse(image, middle, axes, np.degrees(angle), 0, 360, 30, -1, cv2.LINE_AA, 4)
+    small = cv2.resize(image, (320, 240), interpolation=cv2.INTER_AREA)
+    gray = stripes(cv2.GaussianBlur(small, (0, 0), 0.7), 50, 0.4)
+    points, _ = places(candidates.find_candidates(edges_of(gray), 4, 60, (1,)))
+    assert np.linalg.norm(points - (150, 120), axis=1).min() < 0.25 * 20 * aspect**0.5
+
+
 def test_only_the_polarity_that_is_asked_for_votes():
     edges = edges_of(drawn([(150.0, 120.0, 12.0)]))
     points, polarity = places(candidates.find_candidates(edges, 4, 60, (1,)))
@@ -166,6 +187,20 @@ def test_candidates_are_bounded_where_dots_are_everywhere():
     gray = np.where(np.hypot(row % 12 - 6, column % 12 - 6) < 4.4, 30, 200).astype(np.uint8)
     groups = candidates.find_candidates(edges_of(gray), 4, 60, (1, -1))
     assert all(len(group.points) <= 2 * MAXIMUM_CANDIDATES for group in groups)
+
+
+def test_many_bright_spots_do_not_crowd_out_dark_dots(monkeypatch):
+    gray = drawn([(x, y, 8.0) for x in range(20, 200, 30) for y in range(20, 230, 30)], 30, 220)
+    gray[:, 200:] = stripes(drawn([(230.0, 60.0, 8.0), (280.0, 150.0, 8.0)]), 18, 0.4)[:, 200:]
+    edges = edges_of(gray)
+    every = candidates.find_candidates(edges, 4, 60, (1, -1))
+    monkeypatch.setattr(candidates, 'MAXIMUM_CANDIDATES', 2)
+    few = candidates.find_candidates(edges, 4, 60, (1, -1))
+    for polarity in (1, -1):
+        counts = [np.count_nonzero(group.polarity == polarity) for group in every]
+        assert max(counts) > 0
+        kept = [np.count_nonzero(group.polarity == polarity) for group in few]
+        assert kept == [min(count, 2) for count in counts]
 
 
 def test_more_dots_than_are_looked_at_are_said_and_the_roundest_stay(monkeypatch):

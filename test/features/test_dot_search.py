@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.features import frame
-from ahf_ros.features.dot_search import voted_dots, whole_dots
+from ahf_ros.features.dot_search import propose_dots, voted_dots, whole_dots
 from ahf_ros.features.dots import Dots, distinct
 from ahf_ros.features.pyramid import image_pyramid
 from ahf_ros.synthetic.scene import SceneSettings, render
@@ -56,6 +56,25 @@ def test_votes_find_dots_whose_outlines_are_interrupted(light):
     size = frame.mean_radii(dots.frames)
     alike = np.abs(np.log(size[:, None] / size)) < 0.3
     assert (apart[~np.eye(len(size), dtype=bool) & alike] > 0.3 * size.min()).all()
+
+
+@pytest.mark.parametrize(
+    'view',
+    [
+        {'dot_radius': 6.0, 'light': 'stripe'},
+        {'dot_radius': 6.0, 'light': 'lattice'},
+        {'tilt': 62.0, 'focal_length': 3.0, 'light': 'stripe'},
+        {'tilt': 62.0, 'focal_length': 3.0, 'light': 'lattice'},
+        {'blur': 2.0, 'light': 'fine_stripe'},
+    ],
+    ids=lambda view: ', '.join(map(str, view.values())),
+)
+def test_small_oblique_and_blurred_dots_are_proposed_by_one_call(view):
+    few = {'width': 1200, 'height': 900, 'targets': 9}
+    rendering = render(SceneSettings(**few, ambient=0.12, seed=4, **view))
+    dots = propose_dots(image_pyramid(rendering.image, 60.0), *SIZES, (1,))
+    sizes = np.array([(it.semi_major * it.semi_minor) ** 0.5 for it in rendering.targets])
+    assert (distances(dots, rendering) < 0.25 * sizes).all()
 
 
 def test_edges_within_explained_outlines_do_not_vote():

@@ -64,6 +64,16 @@ def test_a_start_that_is_near_comes_onto_the_edge(ellipse, polarity):
         assert axes[2] == pytest.approx(angle, abs=0.05)
 
 
+@pytest.mark.parametrize('blur', [0.5, 2.0])
+@pytest.mark.parametrize('polarity', [1, -1])
+def test_the_size_of_a_dot_does_not_depend_on_its_blur(blur, polarity):
+    ellipse = (100.3, 90.6, 18.0, 15.0, 0.7)
+    gray = drawn([ellipse], *((210, 30) if polarity == 1 else (30, 210)))
+    log = log_image(cv2.GaussianBlur(gray, (0, 0), blur))
+    dots, _ = refine_ellipses(log, frames_of(ellipse), np.array([polarity]))
+    assert frame.mean_radii(dots.frames)[0] == pytest.approx((18 * 15) ** 0.5, abs=0.25)
+
+
 @pytest.mark.parametrize('angle', [0.0, 0.8, 2.0])
 def test_an_edge_of_light_across_the_dot_moves_it_little(angle):
     gray = half_in_shadow(drawn([(100.3, 90.6, 16.0, 14.0, 0.3)]), 104, 92, angle)
@@ -100,6 +110,15 @@ def test_an_ellipse_is_found_about_a_candidate(ellipse, level):
     assert dots.frames[0, :2, 2] == pytest.approx((x, y), abs=0.3 * scale)
     fitted = [axis[0] for axis in frame.ellipse_axes(dots.frames)]
     assert fitted[:2] == pytest.approx((major, minor), abs=scale)
+
+
+@pytest.mark.parametrize('direction', np.arange(0, 6, 0.7))
+def test_a_circle_is_found_beside_a_candidate(direction):
+    x, y = 100.3 + 6 * np.cos(direction), 90.6 + 6 * np.sin(direction)
+    candidate = Candidates(1, (np.array([[x, y]]) + 0.5) / 2 - 0.5, (5.8, 11.2), np.array([1]))
+    gray = half_in_shadow(drawn([(100.3, 90.6, 13, 13, 0)]), 104, 92, 0.8)
+    dots = fit_ellipses(image_pyramid(gray, 60.0).logs, [candidate])
+    assert dots.frames[0, :2, 2] == pytest.approx((100.3, 90.6), abs=0.6)
 
 
 def test_a_candidate_on_even_ground_has_no_ellipse():

@@ -66,6 +66,13 @@ class Dots:
         ]
 
 
+def test_the_edge_shift_of_an_image_is_the_median_of_its_decoded_targets():
+    shifts = {UNDECODED: 9.0, 1: -0.5, 2: -0.75, 3: None, 4: 2.0}
+    targets = [replace(target(number), edge_shift=it) for number, it in shifts.items()]
+    assert identify(BRIGHT, lambda _: targets, 0).edge_shift == -0.5
+    assert identify(BRIGHT, lambda _: targets[:1], 0).edge_shift is None
+
+
 def test_the_image_as_received_comes_first_and_may_be_enough():
     detector = Dots()
     result = identify(BRIGHT, detector, COUNT)

@@ -23,12 +23,14 @@ NONE = (0.0, 0.0, 0.0, 0.0)
 
 def test_what_becomes_json_is_read_again():
     covariance = (0.1, 0.01, 0.01, 0.2)
-    target = Target(7, 19, 1.25, 2.5, 20.0, 18.0, 0.3, 0.9, covariance, 'aicon14')
-    found = Identification((target,), 4, FilterState(True, 2.0, 0.5, 80.0, 1.5, 9, 1, 0.25), True)
+    target = Target(7, 19, 1.25, 2.5, 20.0, 18.0, 0.3, 0.9, covariance, 'aicon14', edge_shift=-0.5)
+    state = FilterState(True, 2.0, 0.5, 80.0, 1.5, 9, 1, 0.25)
+    found = Identification((target,), 4, state, True, edge_shift=-0.6)
     printed = json.loads(json.dumps(to_json(found, 'in/a.png', (30, 20), 'ring12', 'ring')))
     assert targets_from_json(printed, 'record') == [target]
     assert (printed['width'], printed['height']) == (20, 30)
     assert (printed['family'], printed['mirrored']) == ('ring12', False)
+    assert (printed['edge_shift'], printed['targets'][0]['edge_shift']) == (-0.6, -0.5)
     assert (printed['elapsed_s'], printed['filter']['evaluations']) == (0.25, 9)
     assert (printed['expected_ids'], printed['search'], printed['upright']) == ([], None, False)
 
@@ -56,6 +58,7 @@ def test_searches_and_the_reasons_of_undecoded_targets_become_json():
         ({'reason': 'lost'}, "reason is 'lost', accepted is one of unread, uncertain, contested"),
         ({'reason': 'unread', 'likely_id': -2}, 'target 0: likely_id is -2'),
         ({'dots': 3}, 'dots is 3'),
+        ({'edge_shift': math.inf}, 'target 0: edge_shift is inf, accepted is a number'),
         ({'dots': [[1, 2, 3]]}, 'dots has .1, 2, 3., accepted are rows of 5 numbers'),
         ({'dots': [[1, 2, 3, 4, math.inf]]}, 'dots is inf'),
         ({'dots': [[1, 2, 3, 4, 5]], 'template_dots': 2}, 'template_dots is 2'),

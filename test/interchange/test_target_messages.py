@@ -33,6 +33,7 @@ FOUND = Identification(
     FilterState(True, 2.75, 0.5, 1700.25, 2.25, 200, 12, 3.5),
     True,
     True,
+    edge_shift=-0.75,
 )
 
 

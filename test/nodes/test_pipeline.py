@@ -15,13 +15,14 @@ pytest.importorskip('rclpy', reason='ROS 2 is not installed')
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
-from ahf_ros.msg import CodedTargetArray
+from ahf_ros.interchange.target_messages import identification_from
 from ahf_ros.nodes import pipeline
 from ahf_ros.nodes.ahead import ImageJob
 from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.nodes.settings import DetectorNodeSettings
 from ahf_ros.settings.nested import assemble
 from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.target import Identification
 
 SCENE = SceneSettings(width=1000, height=700, targets=6, light='stripe', seed=2)
 
@@ -63,10 +64,10 @@ def test_what_is_identified_ahead_changes_no_answer() -> None:
     made = pipeline.Pipeline(assemble(DetectorNodeSettings, given), threading.Event())
     right = []
 
-    def answer(message: Image, speculation: pipeline.Speculation | None) -> CodedTargetArray | str:
+    def answer(message: Image, speculation: pipeline.Speculation | None) -> Identification | str:
         right.append(bool(speculation) and speculation.before == made._identifier.memory)
         try:
-            return made.answer(message, speculation=speculation).message
+            return identification_from(made.answer(message, speculation=speculation).message)
         except ValueError as error:
             return str(error)
 

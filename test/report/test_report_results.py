@@ -124,3 +124,11 @@ def test_a_row_tells_what_is_missed_and_what_is_doubtful() -> None:
     assert judged['truth']['wrong'] == [1]
     assert judged['truth']['missed'] == [[8, 100.0, 100.0]]
     assert judged['truth']['errors'] == [[0, -0.5, 0.0]]
+
+
+def test_a_row_tells_what_is_wrong_with_the_edges() -> None:
+    lines = (record('a.png', edge_shift=it) for it in (0.7, 0.1, None))
+    edges = [row(result(line), [], 0.95)['edges'] for line in lines]
+    assert edges == ['edges are 0.7 px too dark: ink gain or under-exposure', '', '']
+    with pytest.raises(ValueError, match="edge_shift is 'wide', accepted is a number"):
+        result({**record('a.png'), 'edge_shift': 'wide'})

@@ -254,6 +254,43 @@ def test_distractors_leave_the_targets_alone() -> None:
         assert np.hypot(x - target.x, y - target.y).min() > 4.2 * target.semi_major
 
 
+@pytest.mark.parametrize('shift', [-1.5, 0.75, 2.0])
+def test_ink_that_is_gained_makes_dots_larger_about_the_same_centres(shift: float) -> None:
+    for settings, sign in ((IDEAL, 1), (replace(IDEAL, polarity='bright'), -1)):
+        moved = replace(settings, edge_shift=shift, radius_spread=0.0)
+        light = light_of(render(moved))
+        plain = light_of(render(replace(moved, black=1.0)))
+        share = (light / plain - moved.black) / (1 - moved.black)  # of white
+        ink = 1 - share if sign == 1 else share
+        y, x = np.mgrid[: ink.shape[0], : ink.shape[1]]
+        for target in render(moved).targets:
+            assert target.semi_major == pytest.approx(12, abs=0.01)
+            dot = ink * (np.hypot(x - target.x, y - target.y) < 1.7 * 12)
+            radius = math.sqrt(dot.sum() / math.pi)
+            assert radius == pytest.approx(12 + sign * shift, abs=0.05)
+            assert (dot * x).sum() / dot.sum() == pytest.approx(target.x, abs=0.05)
+            assert (dot * y).sum() / dot.sum() == pytest.approx(target.y, abs=0.05)
+
+
+def test_light_above_saturation_is_lost() -> None:
+    usual, over = light_of(render(IDEAL)), light_of(render(replace(IDEAL, overexposure=4.0)))
+    assert over == pytest.approx(np.minimum(4 * usual, 1), abs=0.04)
+    assert (over == 1).mean() > 0.8
+    assert usual.max() < 1
+
+
+def test_targets_are_on_white_cards_before_a_darker_wall() -> None:
+    settings = replace(IDEAL, width=640, wall=0.4, distractors=2)
+    rendering = render(settings)
+    light = light_of(rendering)
+    assert np.median(light) == pytest.approx(0.4 * light.max(), rel=0.25)
+    assert light.min() > 0.02  # distractors are as dark as any ink
+    for target in rendering.targets:
+        corners = [(1, 1), (1, -1), (-1, 1), (-1, -1)]
+        gap = [light[round(target.y + 14 * v), round(target.x + 14 * u)] for u, v in corners]
+        assert min(gap) > 2 * np.median(light)
+
+
 def test_an_image_may_show_distractors_alone() -> None:
     rendering = render(replace(SMALL, targets=0, distractors=10))
     assert rendering.targets == ()
@@ -273,6 +310,7 @@ def test_an_image_may_show_distractors_alone() -> None:
         ({'dot_radius': math.nan}, r'dot_radius is nan, accepted is a number from 1'),
         ({'tilt': 75.0, 'focal_length': 1.0}, r'tilt is 75\.0, accepted is a number from 0 to 5'),
         ({'distortion': -0.3, 'focal_length': 0.6}, r'distortion is -0\.3, accepted .* of at l'),
+        ({'edge_shift': 4.0}, r'edge_shift is 4\.0, accepted is a number from -3\.78 to 3\.78'),
         ({'seed': 0.5}, r'seed is 0\.5, accepted is an integer'),
     ],
 )

@@ -28,7 +28,7 @@ def camera(tilt: float = 0.0) -> Camera:
 
 def printed(family: str, number: int, turn: float, radius: float, looking: Camera) -> np.ndarray:
     """Return the ink in each pixel under even light."""
-    design = designs(family, 0.0)[1](number, turn)
+    design = designs(family, 0.0)[1](number, turn, 0.0)
     image = np.zeros((400, 400), np.float32)
     mark = Mark(np.zeros(2), radius, design.reach, design.cover)
     print_mark(image, np.ones_like(image), mark, looking, 1.0, 0.7)

@@ -149,7 +149,7 @@ def report(rings: Rings, settings: DetectorSettings, code: DotFamily) -> list[Do
 
 def _targets(rings: Rings, ids: np.ndarray, code: DotFamily) -> list[DottedTarget]:
     decoded = ids != UNDECODED
-    places = ellipse_fields(rings.frames, rings.covariance)
+    places = ellipse_fields(rings.frames, rings.covariance, rings.edge_shift)
     codes = np.where(decoded, code.canonical(rings.words), 0).tolist()
     certainty = np.where(decoded, rings.of_word, 0.0).tolist()
     words = np.where(decoded, rings.words, 0).tolist()

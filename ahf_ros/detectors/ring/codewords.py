@@ -1,8 +1,7 @@
-"""The competition of code words for the evidence of sectors and of the borders between them."""
+"""The competition of code words for the evidence of sectors."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import cache, lru_cache
 
 import numpy as np
@@ -11,36 +10,30 @@ from ahf_ros.codes.cyclic import rotated_words
 from ahf_ros.codes.ring import Family, canonical
 
 _EXHAUSTIVE = 50_000  # rotations of words, up to which all of them compete
-_MINIMUM_EVIDENCE = 10.0  # for ones, in units of ln
+_MINIMUM_EVIDENCE = 2.0  # for ones, in units of ln
 
 COMPETITORS = 24
 """Number of words of each band that are returned, more than there are rotations of one."""
 
+_PHASES = 4  # of a band, at which words compete
 _UNCERTAIN = 10  # sectors whose bits are varied where not all words compete
 _UNEXPECTED = 30.0  # evidence against words that are not expected, more than for a cover
 
 
 def best_words(
-    sectors: np.ndarray,
-    onto: np.ndarray,
-    off: np.ndarray,
-    family: Family,
-    expected: frozenset[int] = frozenset(),
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    sectors: np.ndarray, family: Family, expected: frozenset[int] = frozenset()
+) -> tuple[np.ndarray, np.ndarray]:
     """Return the valid words with the most evidence.
 
     Bands without evidence for any mark are not read. In the others every rotation of every word
-    competes at p phases, which are p ways to divide the band into sectors. In families of more
-    than 50000 rotations, only those words compete that differ from the sectors' own evidence in
-    the ten least certain sectors at most.
+    competes at the likeliest of p phases, which are ways to divide the band into sectors. In
+    families of more than 50000 rotations, only those words compete that differ from the sectors'
+    own evidence in the ten least certain sectors at most.
 
     Parameters
     ----------
     sectors : ndarray of float, shape (k, p, n)
         Evidence for one over zero in each of the n bits of k bands.
-    onto, off : ndarray of float, shape (k, p, n)
-        Evidence for zero followed by one, and for one followed by zero, at the border after each
-        sector, over equal bits.
     family : Family
     expected : frozenset of int
         As for `prior`.
@@ -51,70 +44,28 @@ def best_words(
         In the rotation read, the best first; 0 where there is none.
     phases : ndarray of int, shape (k, COMPETITORS)
         The best phase of each.
-    scores : ndarray of float32, shape (k, COMPETITORS)
-        Evidence for each, over a word without ones, with the prior.
     """
     words = np.zeros((len(sectors), COMPETITORS), np.int64)
     phases = np.zeros(words.shape, np.intp)
-    scores = np.zeros(words.shape, np.float32)
-    for index, competing, of_phases in _scored(sectors, onto, off, family, expected):
+    everything = len(family.words) * family.bits <= _EXHAUSTIVE
+    hopeful = np.maximum(sectors, 0).sum(axis=2).max(axis=1) > _MINIMUM_EVIDENCE
+    # Where sectors begin, each says most for one or zero; any other phase mixes neighbours.
+    likely = np.argsort(-np.abs(sectors).sum(axis=2), axis=1, kind='stable')[:, :_PHASES]
+    for index in np.flatnonzero(hopeful).tolist():
+        of_band = sectors[index, likely[index]].astype(np.float32)
+        competing, ones = (
+            _all_rotations(family) if everything else _near_rotations(of_band, family, expected)
+        )
+        of_phases = of_band @ ones
+        if expected:
+            of_phases += prior(competing, family, expected)
         of_word = of_phases.max(axis=0)
         # Where fewer words compete, the last ones are repeated.
         best = np.argpartition(of_word, -min(COMPETITORS, len(of_word)))[-COMPETITORS:]
         best = np.resize(best[np.argsort(-of_word[best], kind='stable')], COMPETITORS)
-        words[index], scores[index] = competing[best], of_word[best]
-        phases[index] = of_phases[:, best].argmax(axis=0)
-    return words, phases, scores
-
-
-def best_word(
-    sectors: np.ndarray, onto: np.ndarray, off: np.ndarray, family: Family
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return only the best word of each band, its phase and its margin, shape (k,) all.
-
-    Parameters are as for `best_words`, which takes longer.
-
-    Returns
-    -------
-    words, phases : ndarray of int
-        As there.
-    margins : ndarray of float64
-        Evidence over the best word of another ID; 0 where there is none.
-    """
-    words, phases = np.zeros((2, len(sectors)), np.int64)
-    margin, numbers = np.zeros(len(sectors)), _number_table(family)
-    for index, competing, of_phases in _scored(sectors, onto, off, family):
-        of_word = of_phases.max(axis=0)
-        best = of_word.argmax()
-        others = of_word[numbers[competing] != numbers[competing[best]]]
-        words[index], phases[index] = competing[best], of_phases[:, best].argmax()
-        margin[index] = of_word[best] - others.max() if others.size else 0.0
-    return words, phases, margin
-
-
-def _scored(
-    sectors: np.ndarray,
-    onto: np.ndarray,
-    off: np.ndarray,
-    family: Family,
-    expected: frozenset[int] = frozenset(),
-) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
-    """Yield bands that are read, the words that compete, and the evidence at each phase."""
-    # A border between the bits a and b gives onto (1 - a) b + off a (1 - b).
-    single = sectors + off + np.roll(onto, 1, axis=2)
-    evidence = np.concatenate([single, -(onto + off)], axis=2).astype(np.float32)
-    everything = len(family.words) * family.bits <= _EXHAUSTIVE
-    hopeful = np.maximum(sectors, 0).sum(axis=2).max(axis=1) > _MINIMUM_EVIDENCE
-    for index in np.flatnonzero(hopeful).tolist():
-        competing, features = (
-            _all_rotations(family)
-            if everything
-            else _near_rotations(single[index], family, expected)
-        )
-        of_phases = evidence[index] @ features
-        if expected:
-            of_phases += prior(competing, family, expected)
-        yield index, competing, of_phases
+        words[index] = competing[best]
+        phases[index] = likely[index, of_phases[:, best].argmax(axis=0)]
+    return words, phases
 
 
 def prior(words: np.ndarray, family: Family, expected: frozenset[int]) -> np.ndarray:
@@ -152,25 +103,25 @@ def margins(words: np.ndarray, scores: np.ndarray, best: np.ndarray, family: Fam
 
 @cache
 def _all_rotations(family: Family) -> tuple[np.ndarray, np.ndarray]:
-    """Return the features of all rotations of all words, see `_features`."""
-    return _features(np.flatnonzero(_number_table(family)), family.bits)
+    """Return all rotations of all words, and their bits."""
+    return _with_ones(np.flatnonzero(_number_table(family)), family.bits)
 
 
 def _near_rotations(
-    single: np.ndarray, family: Family, expected: frozenset[int]
+    sectors: np.ndarray, family: Family, expected: frozenset[int]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the features of the words near to what the sectors say at any of the phases.
+    """Return the words near to what the sectors say at any of the phases, and their bits.
 
     Those that are expected compete as well.
     """
-    uncertain = np.argsort(np.abs(single), axis=1)[:, :_UNCERTAIN]
-    certain = (single > 0) @ (1 << np.arange(family.bits)) & ~(1 << uncertain).sum(axis=1)
+    uncertain = np.argsort(np.abs(sectors), axis=1)[:, :_UNCERTAIN]
+    certain = (sectors > 0) @ (1 << np.arange(family.bits)) & ~(1 << uncertain).sum(axis=1)
     choices = np.arange(1 << _UNCERTAIN)[:, None] >> np.arange(_UNCERTAIN) & 1
     words = np.unique(certain[:, None] + (1 << uncertain) @ choices.T)
     valid = words[_number_table(family)[words] > 0]
     # At least two words have to compete.
     words = np.concatenate([valid, family.words[:2], _rotations(family, expected)])
-    return _features(np.unique(words), family.bits)
+    return _with_ones(np.unique(words), family.bits)
 
 
 @lru_cache(maxsize=8)
@@ -197,10 +148,6 @@ def _number_table(family: Family) -> np.ndarray:
     return numbers
 
 
-def _features(words: np.ndarray, bits: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return words and what evidence weighs, shape (2 n, number of words).
-
-    These are the bits and the products of neighbouring ones.
-    """
-    ones = (words >> np.arange(bits)[:, None] & 1).astype(np.float32)
-    return words, np.concatenate([ones, ones * np.roll(ones, -1, axis=0)])
+def _with_ones(words: np.ndarray, bits: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return words and their bits, float32, shape (bits, number of words)."""
+    return words, (words >> np.arange(bits)[:, None] & 1).astype(np.float32)

@@ -1,19 +1,18 @@
 """Estimation of the number of coded targets in an image.
 
-Dots are found as the detector `ring` finds them. Their surroundings tell which of them are centres
-of targets. No word is decoded, so that a target also counts where its band is partly hidden or too
-dark.
+Dots are found and read as the detector `ring` does. A dot counts where a word says far more than
+no target at all, whichever of several words it is, so that a target also counts where its band is
+partly hidden.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from ahf_ros.codes.ring import family
 from ahf_ros.detectors.contract import DetectorSettings
+from ahf_ros.detectors.ring.confidence import features, target_probability
 from ahf_ros.detectors.ring.detector import find_hypotheses
 from ahf_ros.detectors.ring.hypotheses import resolve_dots
-from ahf_ros.detectors.ring.surroundings import designs, likely_targets
 from ahf_ros.features import frame
 from ahf_ros.imaging.image import as_gray, check_image
 
@@ -42,20 +41,13 @@ def estimate_count(image: np.ndarray, settings: DetectorSettings | None = None) 
     """
     settings = settings or DetectorSettings()
     check_image(image)
-    gray = as_gray(image)
-    dots = find_hypotheses(gray, settings)
-    major, _, _ = frame.ellipse_axes(dots.frames)
+    read = find_hypotheses(as_gray(image), settings)
+    major, _, _ = frame.ellipse_axes(read.frames)
     minimum, maximum = settings.radii
-    dots = dots.select((major >= minimum) & (major <= maximum))
-    gray = gray.astype(np.float32, copy=False)
-    prints = designs([family(name) for name in settings.families])
-    of_prints = np.array([likely_targets(gray, dots, code) for code in prints])
-    which, probability = of_prints.argmax(axis=0), of_prints.max(axis=0)
-    best_first = np.argsort(-probability, kind='stable')
-    order = best_first[probability[best_first] >= _COUNTED]
-    reach = np.array([code.band_outer for code in prints])[which[order]]
+    probability = np.where(read.words > 0, target_probability(features(read)), 0.0)
+    counted = (probability >= _COUNTED) & (major >= minimum) & (major <= maximum)
+    order = np.argsort(-read.seen[counted], kind='stable')
+    targets = read.select(np.flatnonzero(counted)[order])
     count = len(order)
-    targets = dots.select(order)
-    reach *= frame.ellipse_axes(targets.frames)[1]
-    distinct, _ = resolve_dots(targets, np.zeros(count), np.ones(count, bool), reach)
+    distinct, _ = resolve_dots(targets, np.zeros(count), np.ones(count, bool), targets.reach)
     return len(distinct)

@@ -1,155 +1,156 @@
-"""Decoding of bands: the code word, phase and rotation with the most evidence.
+"""Decoding of bands: one circular dynamic program over word and cover.
 
-All valid words compete at all rotations and phases.
+Every valid word competes at all rotations and phases. A band is seen at each angle, as paper or as
+ink, or something covers it, which explains anything at a price. The path with the most evidence
+(Viterbi 1967) gives the word, its margin over the next ID, the angles that are covered and the log
+odds against everything that is no target: bare paper, and arcs of ink of any length.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ahf_ros.codes.ring import Family
-from ahf_ros.detectors.ring.band_evidence import BandEvidence
-from ahf_ros.detectors.ring.band_samples import BandSamples
-from ahf_ros.detectors.ring.codewords import best_word
-from ahf_ros.detectors.ring.evidence import MarkAppearance, log_ratio
+from ahf_ros.detectors.ring.codewords import best_words, margins, prior
+from ahf_ros.detectors.ring.likelihood import Evidence
 from ahf_ros.features.array_record import ArrayRecord
 
-_AGREEMENT = 0.35  # of ln, or of the step of a mark, between a step and what a word expects
-_MINIMUM_MARGIN = 3.0  # of a plausible word where light has edges; elsewhere anything else
-_FEW_EDGES = 0.05  # probability of an edge of light between neighbours
-_MINIMUM_WEAKEST = -60.0  # evidence of a sector, against its bit in a plausible word
-
-MINIMUM_EXPLAINED = 0.25
-"""Share of the steps that a plausible word explains."""
+_DOUBT = 5.0  # most that a reading says for or against a word
+_COVER = 6.0  # price of something that covers a stretch of the band
+_COVERED = 0.1  # the same, of each further reading that it covers
+_BORDER = 4.8  # price of a border of an arc of any length, at one of about 120 angles
+_RANKED = 1.2  # evidence of a reading that ranks words, which one cover must not settle
+_NEAR = 3  # angles on either side of the clearest one
+_DRAW = 5.0  # lead of a word that is not expected, which is as good as none
+_NEVER = np.float32(-1e9)
 
 
 @dataclass(frozen=True, slots=True)
-class Readings(ArrayRecord):
-    """The words read from k bands.
+class Words(ArrayRecord):
+    """The words read from k bands at m angles.
 
     Attributes
     ----------
     words : ndarray of int64, shape (k,)
-        The best valid word, in the rotation read from `start`; 0 where there is none.
-    start : ndarray of float64, shape (k,)
+        The best valid word, in the rotation read from `starts`; 0 where there is none.
+    starts : ndarray of float64, shape (k,)
         Where in the frame the sector of the lowest bit starts, rad counter-clockwise from +x.
     margin : ndarray of float64, shape (k,)
-        Evidence for the best word over the best one of another ID, in units of ln.
-    support : ndarray of float64, shape (k,)
-        The same, of the steps and levels that light and print explain, if nothing is hidden;
-        negative where they speak for another ID, by as much as for that one over the next.
-    contradiction : ndarray of float64, shape (k,)
-        Evidence of the steps at an unmarked sector for a mark, in units of ln, at the sector
-        where it is largest. A spot of light can make a mark as gray as the ground, but hardly up
-        to its very edges.
-    explained : ndarray of float64, shape (k, 4)
-        Share of the steps that are as the word expects: onto unmarked sectors at the inner and
-        the outer edge of the band, and onto marked ones at both.
-    unexplained : ndarray of float64, shape (k,)
-        Evidence for arcs of any length over that for the word, in units of ln.
+        Log odds of the word against the best one of another ID.
+    marked : ndarray of float64, shape (k,)
+        Log odds of the word against bare paper, and against anything.
+    coded : ndarray of float64, shape (k,)
+        Log odds of the word against arcs of ink of any length.
+    seen : ndarray of float64, shape (k,)
+        Log odds of the word, where it is not covered, against anything.
     hidden : ndarray of bool, shape (k, m)
-        Whether something hides the band at each angle.
-    price : ndarray of float64, shape (k,)
-        Evidence that it takes to believe so, beyond the usual, because the light has edges.
-    plausible : ndarray of bool, shape (k,)
-        Whether it is worth a closer look.
+        Where something covers the band.
     """
 
     words: np.ndarray
-    start: np.ndarray
+    starts: np.ndarray
     margin: np.ndarray
-    support: np.ndarray
-    contradiction: np.ndarray
-    explained: np.ndarray
-    unexplained: np.ndarray
+    marked: np.ndarray
+    coded: np.ndarray
+    seen: np.ndarray
     hidden: np.ndarray
-    price: np.ndarray
-    plausible: np.ndarray
 
-
-def sector_angles(family: Family, samples_per_sector: int) -> np.ndarray:
-    """Return the angles at which bands are sampled to be decoded, in the order of the sectors.
-
-    Returns
-    -------
-    ndarray of float64, shape (family.bits * samples_per_sector,)
-        rad from +x towards +y, descending: counter-clockwise as seen.
-    """
-    count = family.bits * samples_per_sector
-    return -2 * np.pi * (np.arange(count) + 0.5) / count
+    @staticmethod
+    def none(count: int, angles: int = 1) -> Words:
+        """Return bands without words."""
+        return Words(
+            words=np.zeros(count, np.int64),
+            starts=np.zeros(count),
+            margin=np.zeros(count),
+            marked=np.zeros(count),
+            coded=np.zeros(count),
+            seen=np.zeros(count),
+            hidden=np.zeros((count, angles), bool),
+        )
 
 
 def decode(
-    samples: BandSamples, evidence: BandEvidence, marks: MarkAppearance, family: Family
-) -> Readings:
+    evidence: Evidence,
+    overhang: np.ndarray,
+    family: Family,
+    expected: frozenset[int] = frozenset(),
+) -> Words:
     """Return the words with the most evidence.
 
     Parameters
     ----------
-    samples : BandSamples
-        Of k targets, at the angles of `sector_angles`.
-    evidence : BandEvidence
-        Of these samples.
-    marks : MarkAppearance
+    evidence : Evidence
+        Of k bands at m angles, in the order of the sectors.
+    overhang : ndarray of float64, shape (k,)
+        By how many angles ink is longer at either end than its sectors.
     family : Family
+    expected : frozenset of int
+        IDs that are likely to be there. Empty: all IDs are equally likely.
     """
-    per_sector = evidence.marked.shape[1] // family.bits
-    angles = sectors_by_phase(per_sector, family)
-    last, marked = angles[..., -1], evidence.marked[:, angles].sum(axis=3)
-    words, phases, margin = best_word(
-        marked, evidence.onto[:, last], evidence.off[:, last], family
+    of_bands = _doubted(evidence)
+    count, angles = of_bands.paper.shape
+    per_sector = angles // family.bits
+    cap = _RANKED * of_bands.weight[:, None]
+    ranked = np.clip(of_bands.ink - of_bands.paper, -cap, cap)
+    sectors = ranked[:, sectors_by_phase(per_sector, family)].sum(axis=3)
+    words, phases = best_words(sectors, family, expected)
+    read = np.flatnonzero(words[:, 0] > 0)
+    decoded = Words.none(count, angles)
+    if not read.size:
+        return decoded
+    words, phases, some = words[read], phases[read], of_bands.select(read)
+    bits = lengthened(bits_at(words, phases, per_sector, family), overhang[read])
+    order = _clearest(some)
+    turned = replace(
+        some,
+        paper=np.take_along_axis(some.paper, order, 1),
+        ink=np.take_along_axis(some.ink, order, 1),
     )
-    bits = bits_at(words, phases, per_sector, family)
-    own = sums_of_sectors(np.where(bits, 1, -1) * evidence.marked, phases, family.bits)
-    minimum = np.where(evidence.edges < _FEW_EDGES, 0, _MINIMUM_MARGIN)
-    explained, contradiction = explanation(
-        samples, evidence, marks, words, phases, np.zeros(bits.shape, bool), family
+    evidence_of = _along_words(turned, np.take_along_axis(bits, order[:, None], axis=2))
+    scores = _covered_paths(evidence_of, turned.weight[:, None])
+    likely = scores + prior(words, family, expected)
+    rows, best = np.arange(len(read)), likely.argmax(axis=1)
+    # What is expected wins a draw, but an ID that is read clearly is no other one.
+    margin = np.minimum(
+        margins(words, likely, best, family), margins(words, scores, best, family) + _DRAW
     )
-    plausible = (margin > minimum) & (own.min(axis=1) > _MINIMUM_WEAKEST)
-    return Readings(
-        words,
-        2 * np.pi * phases / bits.shape[1],
-        margin,
-        margin,
-        contradiction,
-        explained,
-        np.zeros(len(words)),
-        np.zeros(bits.shape, bool),
-        np.zeros(len(words)),
-        plausible & (explained.min(axis=1) > MINIMUM_EXPLAINED),
+    turned_hidden = _hidden(evidence_of[:, rows, best], turned.weight)
+    hidden = np.empty(turned_hidden.shape, bool)
+    np.put_along_axis(hidden, order, turned_hidden, axis=1)
+    score = scores[rows, best].astype(np.float64)
+    bare = np.maximum(turned.paper.sum(axis=1), 0)
+    found = Words(
+        words=words[rows, best],
+        starts=2 * np.pi * phases[rows, best] / angles,
+        margin=margin.astype(np.float64),
+        marked=score - bare + some.dot,
+        coded=score - _free_paths(turned),
+        seen=score,
+        hidden=hidden,
     )
+    return decoded.replaced(read, found)
 
 
-def explanation(
-    samples: BandSamples,
-    evidence: BandEvidence,
-    marks: MarkAppearance,
-    words: np.ndarray,
-    phases: np.ndarray,
-    hidden: np.ndarray,
-    family: Family,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return how far the steps are as words expect them, where the band is not hidden.
+@dataclass(frozen=True, slots=True)
+class _Angles(ArrayRecord):
+    """Evidence of k bands for paper and ink, (k, m), its weight and that of the dot, (k,)."""
 
-    Parameters
-    ----------
-    samples, evidence, marks, family
-        As for `decode`.
-    words, phases : ndarray of int, shape (k,)
-    hidden : ndarray of bool, shape (k, m)
+    paper: np.ndarray
+    ink: np.ndarray
+    weight: np.ndarray
+    dot: np.ndarray
 
-    Returns
-    -------
-    explained : ndarray of float64, shape (k, 4)
-    contradiction : ndarray of float64, shape (k,)
-        As in `Readings`.
+
+def _doubted(evidence: Evidence) -> _Angles:
+    """Return the evidence of whole bands, no reading of which counts too much.
+
+    Light may do anything at any angle.
     """
-    bits = bits_at(words, phases, hidden.shape[1] // family.bits, family)
-    against = np.where(bits | hidden, 0, np.maximum(evidence.steps, 0).sum(axis=0))
-    contradiction = sums_of_sectors(against, phases, family.bits).max(axis=1)
-    return _explained(samples, marks, bits, ~hidden), contradiction
+    most = np.float32(_DOUBT) * evidence.weight[:, None]
+    paper, ink = (most * np.tanh(of.sum(axis=1) / most) for of in (evidence.paper, evidence.ink))
+    return _Angles(paper, ink, evidence.weight, evidence.dot)
 
 
 def sectors_by_phase(per_sector: int, family: Family) -> np.ndarray:
@@ -183,32 +184,84 @@ def bits_at(words: np.ndarray, phases: np.ndarray, per_sector: int, family: Fami
     return (words[..., None] >> sector & 1).astype(bool)
 
 
-def sums_of_sectors(values: np.ndarray, phases: np.ndarray, bits: int) -> np.ndarray:
-    """Return the sums of values (k, angles) over sectors, at phases (k,), shape (k, bits)."""
-    count = values.shape[1]
-    sector = (np.arange(count) - phases[:, None]) % count // (count // bits)
-    keys = sector + bits * np.arange(len(sector))[:, None]
-    sums = np.bincount(keys.ravel(), values.ravel(), bits * len(sector))
-    return sums.reshape(len(sector), bits)
+def lengthened(bits: np.ndarray, overhang: np.ndarray) -> np.ndarray:
+    """Return bits (k, ..., m) whose arcs of ink are longer at either end by angles, shape (k,)."""
+    longer = np.rint(overhang).astype(int).reshape(-1, *(1,) * (bits.ndim - 1))
+    for step in range(1, int(np.abs(longer).max(initial=0)) + 1):
+        before, after = np.roll(bits, 1, axis=-1), np.roll(bits, -1, axis=-1)
+        bits = np.where(longer >= step, bits | before | after, bits)
+        bits = np.where(longer <= -step, bits & before & after, bits)
+    return bits
 
 
-def _explained(
-    samples: BandSamples, marks: MarkAppearance, bits: np.ndarray, seen: np.ndarray
-) -> np.ndarray:
-    """Return the shares of the steps seen that are as words expect them, shape (k, 4)."""
-    agree = []
-    for ground, band in samples.edges:
-        step = log_ratio(band, ground)
-        mark = marks.step(np.maximum(band, ground))
-        # Where a mark would make no step, nothing tells it from the ground.
-        allowed = _AGREEMENT * np.maximum(np.abs(mark), 1)
-        as_mark = (np.abs(step - mark) < allowed) & (np.abs(mark) > _AGREEMENT)
-        agree.append(np.where(bits, as_mark, np.abs(step) < _AGREEMENT))
-    shares = []
-    for which in (~bits & seen, bits & seen):
-        for of_edge, visible in zip(agree, samples.visible, strict=True):
-            counted = which & visible
-            of_all = counted.sum(axis=1)
-            share = (of_edge & counted).sum(axis=1) / np.maximum(of_all, 1)
-            shares.append(np.where(of_all > 0, share, 1.0))
-    return np.stack(shares, axis=1)
+def _clearest(evidence: _Angles) -> np.ndarray:
+    """Return the angles of each band from that on at which it is seen best, shape (k, m)."""
+    best = np.maximum(evidence.paper, evidence.ink)
+    window = np.sum([np.roll(best, shift, axis=1) for shift in range(-_NEAR, _NEAR + 1)], axis=0)
+    return (window.argmax(axis=1)[:, None] + np.arange(best.shape[1])) % best.shape[1]
+
+
+def _along_words(evidence: _Angles, bits: np.ndarray) -> np.ndarray:
+    """Return the evidence for words at each angle, bits (k, w, m), shape (m, k, w).
+
+    A border between two sectors may lie to either side of the angles next to it.
+    """
+    along = bits.transpose(2, 0, 1)
+    paper, ink = evidence.paper.T[..., None], evidence.ink.T[..., None]
+    seen = np.where(along, ink, paper)
+    border = (along != np.roll(along, 1, axis=0)) | (along != np.roll(along, -1, axis=0))
+    return np.where(border, np.maximum(paper, ink), seen)
+
+
+def _covered_paths(seen: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Return the evidence for words with their best covers, shape (...).
+
+    Parameters
+    ----------
+    seen : ndarray of float32, shape (m, ...)
+        Evidence where nothing covers the band.
+    weight : ndarray of float32
+        Of a reading, of a shape that is broadcast to (...).
+    """
+    cost, cover = np.float32(_COVERED) * weight, np.float32(_COVER)
+    clear, covered = seen[0], np.full_like(seen[0], _NEVER)
+    for of_angle in seen[1:]:
+        begun = clear - cover
+        clear = np.maximum(clear, covered) + of_angle
+        covered = np.maximum(covered, begun) - cost
+    return np.maximum(clear, covered)
+
+
+def _hidden(seen: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Return where the best paths are covered, seen (m, k) and weight (k,), shape (k, m)."""
+    cost, cover = np.float32(_COVERED) * weight, np.float32(_COVER)
+    clear, covered = seen[0], np.full_like(seen[0], _NEVER)
+    uncovers, begins = np.zeros((2, *seen.shape), bool)
+    for index in range(1, len(seen)):
+        begun = clear - cover
+        uncovers[index], begins[index] = covered > clear, begun > covered
+        clear = np.maximum(clear, covered) + seen[index]
+        covered = np.maximum(covered, begun) - cost
+    hidden = np.empty(seen.shape, bool)
+    state = covered > clear
+    for index in range(len(seen) - 1, -1, -1):
+        hidden[index] = state
+        state = np.where(state, ~begins[index], uncovers[index])
+    return hidden.T
+
+
+def _free_paths(evidence: _Angles) -> np.ndarray:
+    """Return the evidence for arcs of ink of any length, with their best covers, shape (k,)."""
+    cost = np.float32(_COVERED) * evidence.weight
+    border, cover = np.float32(_BORDER), np.float32(_COVER)
+    paper, ink = evidence.paper.T, evidence.ink.T
+    white, dark = paper[0], ink[0]
+    covered = np.full_like(white, _NEVER)
+    for of_paper, of_ink in zip(paper[1:], ink[1:], strict=True):
+        begun = np.maximum(white, dark) - cover
+        white, dark = (
+            np.maximum(np.maximum(white, dark - border), covered) + of_paper,
+            np.maximum(np.maximum(dark, white - border), covered) + of_ink,
+        )
+        covered = np.maximum(covered, begun) - cost
+    return np.maximum(np.maximum(white, dark), covered)

@@ -9,41 +9,37 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
-from functools import partial
 
 import numpy as np
 
-from ahf_ros.codes.ring import Family, family
+from ahf_ros.codes.ring import family
 from ahf_ros.detectors.contract import DetectorSettings
-from ahf_ros.detectors.ring.competition import PART, by_clear_dots, read_families
 from ahf_ros.detectors.ring.explained import NOTHING, WHOLE, Explained
-from ahf_ros.detectors.ring.faint import with_faint
+from ahf_ros.detectors.ring.families import (
+    by_clear_dots,
+    decoded,
+    read_families,
+    settle_same_prints,
+)
 from ahf_ros.detectors.ring.full_size import at_full_size
-from ahf_ros.detectors.ring.glance import may_be_targets
 from ahf_ros.detectors.ring.hypotheses import (
     Hypotheses,
     resolve_dots,
     resolve_ids,
     resolve_overlaps,
 )
-from ahf_ros.detectors.ring.oblique import oblique_dots, rounding
+from ahf_ros.detectors.ring.prior import Prior
+from ahf_ros.detectors.ring.proposals import PROPOSALS, Proposal, measure_dots, propose_whole
 from ahf_ros.detectors.ring.refinement import refine_centres
-from ahf_ros.detectors.ring.same_prints import decoded, settle_same_prints
-from ahf_ros.detectors.ring.soft import soft_dots
-from ahf_ros.detectors.ring.target_circles import REACH
 from ahf_ros.features import frame
-from ahf_ros.features.circle_fit import NO_FITS, Fit, fit_dots
-from ahf_ros.features.dot_search import voted_dots, whole_dots
-from ahf_ros.features.dots import NO_DOTS, Dots
+from ahf_ros.features.circle_fit import NO_FITS
 from ahf_ros.features.ellipse_targets import targets_from_frames
-from ahf_ros.features.pyramid import Octave, image_pyramid, octaves
+from ahf_ros.features.pyramid import image_pyramid, octaves
+from ahf_ros.imaging.faint import faint_parts
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, Target, UndecodedTarget, sorted_targets
 
-_RAYS = 24  # about a dot
-_MINIMUM_SHARE = 0.5  # of the edge of a dot, for its band to be read
 _UNLIKELY = 0.02  # confidence of a word below which a dot counts as unread
-_FAINTEST = 0.8  # contrast of a dot, dark over bright, for its band to be read
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +91,9 @@ def find_hypotheses(
 ) -> Hypotheses:
     """Return all dots of an image and the words that their bands may show, before any decision.
 
+    Parts of faint contrast are stretched and read as images of their own. Of what they show, only
+    certain words that the image itself does not show are added.
+
     Parameters
     ----------
     gray : ndarray of uint8 or float32, shape (height, width)
@@ -102,20 +101,23 @@ def find_hypotheses(
     settings : DetectorSettings
         What the targets look like.
     expected : frozenset of int
-        IDs that are likely to be there; all are alike where it is empty.
+        IDs that are likely to be there. Empty: all IDs are equally likely.
     """
     found = read_image(gray, settings, expected)
-    return with_faint(
-        gray, found, lambda part: read_image(part, settings, expected, whole_only=True)
-    )
+    for part in faint_parts(gray):
+        seen = read_image(part.gray, settings, expected, (propose_whole,))
+        seen = seen.select(seen.certain)
+        seen = replace(seen, frames=frame.translated(seen.frames, part.x, part.y))
+        new = ~seen.on_dots(found.select(found.certain))
+        found = Hypotheses.joined([found, seen.select(new)])
+    return found
 
 
 def read_image(
     gray: np.ndarray,
     settings: DetectorSettings,
     expected: frozenset[int] = frozenset(),
-    *,
-    whole_only: bool = False,
+    proposals: Sequence[Proposal] = PROPOSALS,
 ) -> Hypotheses:
     """Return the dots and words that an image shows at its own contrast.
 
@@ -123,120 +125,28 @@ def read_image(
     ----------
     gray, settings, expected
         As for `find_hypotheses`.
-    whole_only : bool
-        Whether only dots with a whole outline are looked for.
+    proposals : sequence of callable
+        Ways to propose dots, one after the other. What is read of the dots of one explains edges,
+        which the next ones need not look at.
     """
     families = [family(name) for name in settings.families]
     pyramid = image_pyramid(gray, settings.max_radius)
     images = (pyramid.gray, *pyramid.halves)
-    found: list[Hypotheses] = []
+    found = [Hypotheses.unread(NO_FITS, families[0])]
     explained = NOTHING
-
-    def explain(read: Hypotheses, level: int) -> Hypotheses:
-        nonlocal explained
-        whole = at_full_size(images[: level + 1], read)
-        explained = Explained.joined([explained, Explained.by(whole)])
-        return whole
-
     for octave in octaves(pyramid, *settings.radii):
-        gray = octave.pyramid.gray
-        parts: list[tuple[Fit, Hypotheses]] = []
-        unlikely = NO_FITS
-        for search in (_whole,) if whole_only else (_whole, _voted, _oblique):
-            dots = search(octave, settings.polarities, explained)
-            if not len(dots.frames):
-                continue
-            fits, others = _fitted(gray, dots, families, settings)
-            explain(Hypotheses.unread(others, families[0]), octave.level)
+        part = octave.pyramid.gray
+        for propose in proposals:
+            dots = propose(octave, settings.polarities, explained)
+            fits = measure_dots(part, dots, families, keep_all=settings.report_undecoded)
             if not explained.certain.any():
-                families = by_clear_dots(gray, fits, families)
-            read = read_families(gray, fits, families, expected)
-            parts.append((fits, read))
-            unlikely = Fit.joined([unlikely, others])
-            found.append(explain(read, octave.level))
-        # What is out of focus is sharper in the next half.
-        for level in range(octave.level + 1, 0 if whole_only else len(images)):
-            again = partial(_fitted_again, gray, settings=settings)
-            blurred = soft_dots(parts, unlikely, again)
-            if not len(blurred.frames):
-                break
-            gray = images[level].astype(np.float32, copy=False)
-            few = len(blurred.frames) <= PART  # which are read however little they show
-            fits, unlikely = _fitted(gray, blurred, families, settings, every=few)
-            parts = [(fits, read_families(gray, fits, families, expected))]
-            found.append(explain(parts[0][1], level))
-    if not found:
-        return Hypotheses.unread(NO_FITS, families[0])
+                families = by_clear_dots(part, fits, families)
+            shifts = explained.shifts[explained.certain] / 2**octave.level
+            read = read_families(part, fits, families, Prior.after(expected, shifts))
+            read = at_full_size(images[: octave.level + 1], read)
+            explained = Explained.joined([explained, Explained.by(read)])
+            found.append(read)
     return Hypotheses.joined(found)
-
-
-def _whole(octave: Octave, polarities: Sequence[int], _explained: Explained) -> Dots:
-    """Return the dots of an octave with a whole outline."""
-    return whole_dots(octave.pyramid, *octave.radii, polarities)
-
-
-def _voted(octave: Octave, polarities: Sequence[int], explained: Explained) -> Dots:
-    """Return the dots of an octave that edges vote for which nothing explains yet."""
-    outlines = explained.outlines_in(octave.level)
-    return voted_dots(octave.pyramid, *octave.radii, polarities, explained=outlines)
-
-
-def _oblique(octave: Octave, polarities: Sequence[int], explained: Explained) -> Dots:
-    """Return the dots of an octave that edges vote for where a view is seen straight ahead."""
-    certain = explained.select(explained.certain)
-    rounded = rounding(certain.frames)
-    if rounded is None:
-        return NO_DOTS
-    outlines = explained.select(explained.clear).outlines_in(octave.level)
-    return oblique_dots(octave.pyramid.gray, rounded, *octave.radii, polarities, outlines)
-
-
-def _fitted(
-    gray: np.ndarray,
-    dots: Dots,
-    families: Sequence[Family],
-    settings: DetectorSettings,
-    every: bool = False,
-) -> tuple[Fit, Fit]:
-    """Return the fits of the dots whose bands are worth reading, or of every one, and of others.
-
-    Those are measured once, which is enough to see that they are no targets.
-    """
-    worth, others = [], []
-    for start in range(0, max(len(dots.frames), 1), PART):
-        part = dots.select(slice(start, start + PART))
-        once = _fit_once(gray, part.frames, part.polarity, settings)
-        likely = np.ones(len(once.frames), bool)
-        if not every and not settings.report_undecoded:
-            likely = may_be_targets(gray, once.frames, families, many=len(dots.frames) > PART)
-        others.append(once.select(~likely))
-        worth.append(_fitted_again(gray, once.select(likely), settings))
-    return Fit.joined(worth), Fit.joined(others)
-
-
-def _fitted_again(gray: np.ndarray, once: Fit, settings: DetectorSettings) -> Fit:
-    """Return better fits of dots whose edges are where those of a dot are."""
-    fit = _fit_once(gray, once.frames, once.polarity, settings, once.blur)
-    return fit.select((fit.share >= _MINIMUM_SHARE) & (fit.contrast <= _FAINTEST))
-
-
-def _fit_once(
-    gray: np.ndarray,
-    frames: np.ndarray,
-    polarity: np.ndarray,
-    settings: DetectorSettings,
-    blur: np.ndarray | None = None,
-) -> Fit:
-    return fit_dots(
-        gray,
-        frames,
-        polarity,
-        rays=_RAYS,
-        reach=REACH,
-        rounds=1,
-        blur=blur,
-        covariances=settings.report_undecoded,
-    )
 
 
 def report(hypotheses: Hypotheses, settings: DetectorSettings) -> list[Target]:
@@ -248,7 +158,7 @@ def report(hypotheses: Hypotheses, settings: DetectorSettings) -> list[Target]:
     hypotheses = settle_same_prints(hypotheses.select(of_size), settings.families)
     whole = whole[of_size]
     hypotheses = hypotheses.select(hypotheses.certain | whole)
-    hypotheses = hypotheses.select(np.lexsort((-hypotheses.margin, ~hypotheses.certain)))
+    hypotheses = hypotheses.select(np.lexsort((-hypotheses.seen, ~hypotheses.certain)))
     names, codes, ids = decoded(hypotheses)
     keys = np.unique(
         [f'{name} {number}' for name, number in zip(names, ids, strict=True)], return_inverse=True
@@ -261,7 +171,7 @@ def report(hypotheses: Hypotheses, settings: DetectorSettings) -> list[Target]:
     likely, ids = ids[kept], np.where(certain, ids, UNDECODED)
     some = hypotheses.select(kept)
     columns = (some.frames, some.covariance, ids[kept], codes[kept], some.confidence)
-    targets = targets_from_frames(*columns, names[kept])
+    targets = targets_from_frames(*columns, names[kept], some.shift)
     rows = zip(targets, some.certain.tolist(), names[kept].tolist(), likely.tolist(), strict=True)
     return sorted_targets(_explained(*row) for row in rows)
 

@@ -31,12 +31,15 @@ class Explained(ArrayRecord):
         Smaller radii of these, px.
     certain : ndarray of bool, shape (k,)
         Whether they are targets.
+    shifts : ndarray of float64, shape (k,)
+        Of their edges, px of the image; see `Hypotheses.edge_shift`.
     """
 
     frames: np.ndarray
     outlines: np.ndarray
     sizes: np.ndarray
     certain: np.ndarray
+    shifts: np.ndarray
 
     @staticmethod
     def by(read: Hypotheses) -> Explained:
@@ -47,7 +50,7 @@ class Explained(ArrayRecord):
         _, minor, _ = frame.ellipse_axes(read.frames)
         radii = np.where(certain, read.reach / minor, 1.0) + _MARGIN
         outlines = frame.circle_outlines(read.frames, radii)
-        return Explained(read.frames, outlines, radii * minor, certain)
+        return Explained(read.frames, outlines, radii * minor, certain, read.edge_shift)
 
     @property
     def clear(self) -> np.ndarray:
@@ -61,6 +64,10 @@ class Explained(ArrayRecord):
 
 _NO_FRAMES, _NO_SIZES = np.zeros((0, 3, 3)), np.zeros(0)
 NOTHING = Explained(
-    _NO_FRAMES, frame.circle_outlines(_NO_FRAMES, _NO_SIZES), _NO_SIZES, np.zeros(0, bool)
+    _NO_FRAMES,
+    frame.circle_outlines(_NO_FRAMES, _NO_SIZES),
+    _NO_SIZES,
+    np.zeros(0, bool),
+    _NO_SIZES,
 )
 """The record of an image of which nothing is known."""

@@ -14,14 +14,15 @@ from dataclasses import replace
 import numpy as np
 
 from ahf_ros.codes.ring import Family
+from ahf_ros.detectors.ring.circles import REACH, target_circles
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
-from ahf_ros.detectors.ring.reading import PASSES
-from ahf_ros.detectors.ring.target_circles import REACH, target_circles
+from ahf_ros.detectors.ring.reading import PER_SECTOR
 from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import fit_circles
 from ahf_ros.features.profiles import USUAL_BLUR
 from ahf_ros.features.soft_edges import ROUNDS, SOFT
 
+_USUAL_ROUNDS = 2  # how often edges are measured that are not soft
 _MINIMUM_SHARE = 0.5  # of the expected edges, for a fit to count
 _FARTHEST, _FARTHEST_SOFT = 2.0, 0.4  # that a centre is moved in a larger image or the same, px
 
@@ -43,6 +44,7 @@ def at_full_size(images: Sequence[np.ndarray], read: Hypotheses) -> Hypotheses:
             frames=frame.enlarged(read.frames, 1),
             covariance=4 * read.covariance,
             blur=_enlarged(read.blur),
+            edge_shift=2 * read.edge_shift,
         )
         read = _measured(image, read, read.certain, _FARTHEST)
     return read
@@ -79,7 +81,7 @@ def _measured(
     soft = read.blur > SOFT
     for code in dict.fromkeys(read.families[selected]):
         of_code = selected[read.families[selected] == code]
-        for of_kind, rounds in ((~soft, PASSES[-1][1]), (soft, ROUNDS)):
+        for of_kind, rounds in ((~soft, _USUAL_ROUNDS), (soft, ROUNDS)):
             some = of_code[of_kind[of_code]]
             if some.size:
                 fitted = _fitted(gray, read.select(some), code, rounds, farthest)
@@ -91,13 +93,18 @@ def _fitted(
     gray: np.ndarray, read: Hypotheses, code: Family, rounds: int, farthest: float
 ) -> Hypotheses:
     """Return hypotheses of one family with frames from the edges of an image, if it shows them."""
-    circles = target_circles(read.words, read.starts, read.polarity, PASSES[-1][0], code)
+    circles = target_circles(read.words, read.starts, read.polarity, PER_SECTOR, code)
     fit = fit_circles(
         gray, read.frames, circles, reach=REACH, projective=True, rounds=rounds, blur=read.blur
     )
     moved = np.hypot(*(fit.frames[:, :2, 2] - read.frames[:, :2, 2]).T)
     good = (fit.share >= _MINIMUM_SHARE) & (moved <= farthest)
     better = replace(
-        read, frames=fit.frames, covariance=fit.covariance, share=fit.share, blur=fit.blur
+        read,
+        frames=fit.frames,
+        covariance=fit.covariance,
+        share=fit.share,
+        blur=fit.blur,
+        edge_shift=fit.edge_shift,
     )
     return read.replaced(good, better.select(good))

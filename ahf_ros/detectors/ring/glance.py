@@ -1,7 +1,9 @@
-"""Which dots may be middles of targets, at a glance.
+"""Which dots may be middles of targets, by bounds that take a small part of the time of reading.
 
-Most dots of a scene are not: spots of a lattice, holes, letters, sectors of bands. To see that
-takes a small part of the time that it takes to measure and to read them.
+Most dots of a scene are none: spots of a lattice, holes, letters, sectors of bands. The sectors of
+any word are each paper, ink, or covered, so that the best of the three in each sector bounds the
+evidence of the edges for every word, and what speaks for ink rather than paper bounds that against
+bare paper.
 """
 
 from __future__ import annotations
@@ -11,62 +13,65 @@ from collections.abc import Sequence
 import numpy as np
 
 from ahf_ros.codes.ring import Family
-from ahf_ros.detectors.ring.band_samples import (
-    beside_edges,
-    edge_circles,
-    gap_circles,
-    near_borders,
-)
-from ahf_ros.detectors.ring.evidence import light_levels, log_ratio, step_evidence
-from ahf_ros.detectors.ring.surroundings import designs, seen_marks
-from ahf_ros.features.sampling import sample_circles
+from ahf_ros.detectors.ring.likelihood import edge_evidence
+from ahf_ros.detectors.ring.polar import polar_images
+from ahf_ros.features.circle_fit import Fit
 
-_PER_SECTOR = 3  # angles a sector
-_BLUR = 2.2  # that readings keep away from, px
-_EACH, _BOTH = 0.5, 2.0  # evidence of each edge of a band for a mark, and of both, in units of ln
+_ANGLES = 64
+_PHASES = 4  # of the sectors
+_SHIFTS = (-1.2, 0.0, 1.2)  # of edges, px; readings keep farther away from these than the error
+_USUAL_SHIFT = 1.0  # standard deviation, px
+_MAXIMUM_GROWTH = 0.3  # dot radii
+_COVER = 5.0  # price of a sector that is covered
+_HOPEFUL = 0.2  # bound of the mean evidence of a reading, from which a band is read
+_CAP = 3.0  # evidence of a reading against bare paper
 
 
-def may_be_targets(
-    gray: np.ndarray, frames: np.ndarray, families: Sequence[Family], *, many: bool
-) -> np.ndarray:
+def may_be_targets(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> np.ndarray:
     """Return whether dots may be the middles of targets of any family, shape (k,).
 
     Parameters
     ----------
     gray : ndarray of float32, shape (height, width)
         Gray values from 0 to 255.
-    frames : ndarray of float64, shape (k, 3, 3)
-        To a few percent of the radius.
+    dots : Fit
     families : sequence of Family
-    many : bool
-        Whether the image has so many dots that most are spots of light.
     """
-    likely = np.zeros(len(frames), bool)
-    for code in designs(families):
-        inner, outer = _edge_evidence(gray, frames, code)
-        marked = (np.minimum(inner, outer) > _EACH).sum(axis=1)
-        if many:
-            likely |= marked > 1
-        else:
-            likely |= (marked > 0) | ((inner + outer > _BOTH).sum(axis=1) > 1)
-            likely |= near_borders(frames, code, gray.shape)
-    return likely
+    bits: dict[tuple[float, float], set[int]] = {}
+    for code in families:
+        bits.setdefault(code.band, set()).add(code.bits)
+    bounds = [_bound(gray, dots, band, of_band) for band, of_band in bits.items()]
+    return np.asarray(np.max(bounds, axis=0) > _HOPEFUL)
 
 
-def _edge_evidence(
-    gray: np.ndarray, frames: np.ndarray, code: Family
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the evidence of the inner and the outer edge of bands for marks, shape (k, m)."""
-    count = code.bits * _PER_SECTOR
-    angles = 2 * np.pi * np.arange(count) / count
-    beside = beside_edges(frames, _BLUR)
-    fixed = np.broadcast_to(gap_circles(code), (len(frames), 2))
-    radii = np.concatenate([1 - beside, 1 + beside, fixed, edge_circles(beside, code)], axis=1)
-    values = np.moveaxis(np.maximum(sample_circles(gray, frames, angles, radii), 0), 2, 0)
-    inside, outside, gap, edges = np.split(np.ascontiguousarray(values), (1, 2, 4))
-    marks = seen_marks(inside[0], outside[0], log_ratio(outside[0], inside[0]))
-    ground = np.concatenate([gap, edges[[0, 3]]])
-    bright = np.where((marks.polarity > 0)[:, None], ground, inside)
-    light = light_levels(np.moveaxis(bright, 0, 2), gap, marks)
-    inner = step_evidence(edges[0], edges[1], marks, light)
-    return inner, step_evidence(edges[3], edges[2], marks, light)
+def _bound(gray: np.ndarray, dots: Fit, band: tuple[float, float], bits: set[int]) -> np.ndarray:
+    """Return a bound of the mean evidence of readings for words of some lengths, shape (k,)."""
+    polar = polar_images(gray, dots, band, _ANGLES)
+    best = np.full(len(dots.frames), -np.inf)
+    for shift in _SHIFTS:
+        growth = np.clip(shift / polar.size, -_MAXIMUM_GROWTH, _MAXIMUM_GROWTH)
+        edges = edge_evidence(polar, 1 - growth, growth, band)
+        cap = _CAP * edges.weight[:, None]
+        for count in bits:
+            paper, ink = (_of_sectors(of.sum(axis=1), count) for of in (edges.paper, edges.ink))
+            of_word = np.maximum(np.maximum(paper, ink), -_COVER).sum(axis=2)
+            marked = _of_sectors(np.clip((edges.ink - edges.paper).sum(axis=1), -cap, cap), count)
+            bound = np.minimum(of_word, np.maximum(marked, 0).sum(axis=2)).max(axis=1)
+            best = np.maximum(best, bound / (_ANGLES * edges.weight))
+    return best
+
+
+def _of_sectors(values: np.ndarray, bits: int) -> np.ndarray:
+    """Return the sums of values (k, m) over sectors at some phases, shape (k, phases, bits)."""
+    count = values.shape[1]
+    sums = np.cumsum(np.concatenate([values, values], axis=1), axis=1, dtype=np.float64)
+    starts = (np.arange(_PHASES)[:, None] / _PHASES + np.arange(bits)) * count / bits
+    ends = starts + count / bits
+
+    def until(places: np.ndarray) -> np.ndarray:
+        """Return the integral from the first value to places, of steps of width 1."""
+        below = places.astype(np.intp)
+        before = np.where(below > 0, sums[:, np.maximum(below - 1, 0)], 0.0)
+        return before + (places - below) * (sums[:, below] - before)
+
+    return until(ends) - until(starts)

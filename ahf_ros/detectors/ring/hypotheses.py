@@ -7,19 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ahf_ros.codes.ring import Family
-from ahf_ros.detectors.ring.confidence import (
-    FEATURES,
-    confidence,
-    confidence_features,
-    minimum_confidence,
-)
-from ahf_ros.detectors.ring.decoding import Readings
-from ahf_ros.detectors.ring.other_prints import sharpness
+from ahf_ros.detectors.ring.confidence import CERTAIN, confidence, features
+from ahf_ros.detectors.ring.decoding import Words
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.circle_fit import Fit
 
-_LIKELY = 0.5  # confidence from which a word tells where the edges of its band are
 _CLEARLY = 2.0  # times the evidence of another claim to the same ID or dot
 _OVERLAP = 0.92  # of the radii of two targets, at which the paper of one hides marks of the other
 _ON_TOP = 1.25  # times the evidence of a target that is partly below it
@@ -37,44 +30,55 @@ class Hypotheses(ArrayRecord):
         Of the image of the centre, px^2.
     share : ndarray of float64, shape (k,)
         Share of the expected edges that were measured where they are expected.
-    words : ndarray of int64, shape (k,)
-        In the rotation read; 0 where no word is plausible.
-    margin : ndarray of float64, shape (k,)
-        Evidence over the best word of another ID, in units of ln.
-    features : ndarray of float64, shape (k, n)
-        What the confidence is computed from, see `confidence_features`.
-    confidence : ndarray of float64, shape (k,)
-        Probability that the word is right.
-    families : ndarray of Family, shape (k,)
-        Those of the words.
-    sharpness : ndarray of float64, shape (k,)
-        How well the edges agree with the word and the print, see `other_prints.sharpness`.
-    polarity : ndarray of int, shape (k,)
-        1 for a dark target on bright ground, -1 for a bright one on dark.
-    starts : ndarray of float64, shape (k,)
-        Where in the frame the sector of the lowest bit starts, rad counter-clockwise from +x.
+    deviation : ndarray of float64, shape (k,)
+        Standard deviation of these edges, dot radii.
     blur : ndarray of float64, shape (k,)
         Of the edges, standard deviation in px of the image that they were measured in.
+    edge_shift : ndarray of float64, shape (k,)
+        By how much what is dark has grown on all edges, px of that image.
+    polarity : ndarray of int, shape (k,)
+        1 for a dark target on bright ground, -1 for a bright one on dark.
+    words : ndarray of int64, shape (k,)
+        In the rotation read; 0 where there is none.
+    starts : ndarray of float64, shape (k,)
+        Where in the frame the sector of the lowest bit starts, rad counter-clockwise from +x.
+    margin, marked, coded, seen : ndarray of float64, shape (k,)
+        Log odds of the word, see `ahf_ros.detectors.ring.decoding.Words`.
+    hidden : ndarray of float64, shape (k,)
+        Share of the band that something covers.
+    families : ndarray of Family, shape (k,)
+        Those of the words.
+    confidence : ndarray of float64, shape (k,)
+        Probability that the word is right.
     """
 
     frames: np.ndarray
     covariance: np.ndarray
     share: np.ndarray
-    words: np.ndarray
-    margin: np.ndarray
-    features: np.ndarray
-    confidence: np.ndarray
-    families: np.ndarray
-    sharpness: np.ndarray
-    polarity: np.ndarray
-    starts: np.ndarray
+    deviation: np.ndarray
     blur: np.ndarray
+    edge_shift: np.ndarray
+    polarity: np.ndarray
+    words: np.ndarray
+    starts: np.ndarray
+    margin: np.ndarray
+    marked: np.ndarray
+    coded: np.ndarray
+    seen: np.ndarray
+    hidden: np.ndarray
+    families: np.ndarray
+    confidence: np.ndarray
 
     @property
     def certain(self) -> np.ndarray:
         """Whether words are certain enough to be reported, ndarray of bool, shape (k,)."""
-        certain: np.ndarray = self.confidence >= minimum_confidence(self.features)
+        certain: np.ndarray = self.confidence >= CERTAIN
         return certain
+
+    @property
+    def shift(self) -> np.ndarray:
+        """Shifts of edges where a word was read, NaN elsewhere, px, float64, shape (k,)."""
+        return np.where(self.words > 0, self.edge_shift, np.nan)
 
     @property
     def reach(self) -> np.ndarray:
@@ -82,66 +86,39 @@ class Hypotheses(ArrayRecord):
         _, minor, _ = frame.ellipse_axes(self.frames)
         return minor * np.array([code.band_outer for code in self.families])
 
+    def on_dots(self, others: Hypotheses) -> np.ndarray:
+        """Return whether centres lie on the dots of others, ndarray of bool, shape (k,)."""
+        away = self.frames[:, None, :2, 2] - others.frames[:, :2, 2]
+        radii = frame.mean_radii(others.frames)
+        return np.asarray((np.hypot(away[..., 0], away[..., 1]) < radii).any(axis=1))
+
+    @staticmethod
+    def of(fit: Fit, words: Words, family: Family) -> Hypotheses:
+        """Return the hypotheses of words, and of the frames that were fitted to them."""
+        read = Hypotheses(
+            frames=fit.frames,
+            covariance=fit.covariance,
+            share=fit.share,
+            deviation=fit.deviation / fit.size,
+            blur=fit.blur,
+            edge_shift=fit.edge_shift,
+            polarity=fit.polarity,
+            words=words.words,
+            starts=words.starts,
+            margin=words.margin,
+            marked=words.marked,
+            coded=words.coded,
+            seen=words.seen,
+            hidden=words.hidden.mean(axis=1),
+            families=np.full(len(words.words), family, object),
+            confidence=np.zeros(len(words.words)),
+        )
+        return replace(read, confidence=np.where(read.words > 0, confidence(features(read)), 0.0))
+
     @staticmethod
     def unread(dots: Fit, family: Family) -> Hypotheses:
-        """Return dots whose bands are not read."""
-        count = len(dots.frames)
-        words, nothing = np.zeros(count, np.int64), np.zeros(count)
-        features = np.zeros((count, FEATURES))
-        return Hypotheses(
-            dots.frames,
-            dots.covariance,
-            dots.share,
-            words,
-            nothing,
-            features,
-            nothing,
-            np.full(count, family, object),
-            nothing,
-            dots.polarity,
-            nothing,
-            dots.blur,
-        )
-
-    @staticmethod
-    def read(readings: Readings, fit: Fit, dots: Hypotheses, foreign: np.ndarray) -> Hypotheses:
-        """Return bands that are read, with the frames of dot and band where their word is likely.
-
-        Parameters
-        ----------
-        readings : Readings
-        fit : Fit
-            Of dot and band.
-        dots : Hypotheses
-            The same dots, whose bands are not read.
-        foreign : ndarray of bool, shape (k,)
-            Whether the bands are of another print, so that no word is likely.
-        """
-        features = confidence_features(readings, fit)
-        certainty = np.where(foreign, 0.0, confidence(features))
-        likely = certainty >= _LIKELY
-        every = Hypotheses(
-            fit.frames,
-            fit.covariance,
-            fit.share,
-            readings.words,
-            np.maximum(readings.margin, readings.support),
-            features,
-            certainty,
-            dots.families,
-            sharpness(fit),
-            fit.polarity,
-            readings.start,
-            fit.blur,
-        )
-        alone = dots.select(~likely)
-        doubtful = replace(
-            every.select(~likely),
-            frames=alone.frames,
-            covariance=alone.covariance,
-            share=alone.share,
-        )
-        return every.replaced(~likely, doubtful)
+        """Return dots without words."""
+        return Hypotheses.of(dots, Words.none(len(dots.frames)), family)
 
 
 def resolve_dots(
@@ -168,7 +145,7 @@ def resolve_dots(
         Whether a hypothesis is kept and no other reading of its dot comes near to it.
     """
     reach = np.where(certain, reach, frame.ellipse_axes(hypotheses.frames)[0])
-    centres, margin = hypotheses.frames[:, :2, 2], hypotheses.margin
+    centres, odds = hypotheses.frames[:, :2, 2], hypotheses.seen
     uncontested = np.ones(len(ids), bool)
     kept: list[int] = []
     for index, centre in enumerate(centres):
@@ -178,7 +155,7 @@ def resolve_dots(
             kept.append(index)
         for other in same:
             if certain[index] and ids[index] != ids[other]:
-                uncontested[other] &= margin[other] > _CLEARLY * margin[index]
+                uncontested[other] &= odds[other] > _CLEARLY * odds[index]
     dropped = np.ones(len(ids), bool)
     dropped[kept] = False
     return np.array(kept, np.intp), uncontested & ~dropped
@@ -207,7 +184,7 @@ def resolve_overlaps(hypotheses: Hypotheses, certain: np.ndarray) -> np.ndarray:
         distance = np.hypot(x, y) / np.abs(scale) * major[index]
         near = distance < _OVERLAP * (outer + outer[index])
         near[index] = False
-        on_top[which[index]] &= (some.margin[index] > _ON_TOP * some.margin[near]).all()
+        on_top[which[index]] &= (some.seen[index] > _ON_TOP * some.seen[near]).all()
     return on_top
 
 
@@ -220,6 +197,6 @@ def resolve_ids(hypotheses: Hypotheses, ids: np.ndarray, certain: np.ndarray) ->
     for identifier in np.unique(ids[certain]):
         best, *others = np.flatnonzero(certain & (ids == identifier))
         certain[others] = False
-        if others and hypotheses.margin[best] <= _CLEARLY * hypotheses.margin[others[0]]:
+        if others and hypotheses.seen[best] <= _CLEARLY * hypotheses.seen[others[0]]:
             certain[best] = False
     return certain

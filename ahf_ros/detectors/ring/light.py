@@ -1,141 +1,140 @@
-"""The light on targets: the gray values that ground and marks have under it.
+"""The light on a target, predicted from its ground.
 
-An edge of light and an edge of an object before a target look alike. Light is what both sides of
-one of the target's own edges have in common, so only the ground beside the dot and beside marks
-says under which light a target lies.
+Stripes, fringes and lattices repeat themselves, and even light is the same everywhere. The light
+at a point of the band is that of the ground at all places that are alike: moved by the shifts that
+bring the ground of the target, gap and margin, best onto itself. Correlations by Fourier
+transforms compare all shifts at once, and give the prediction for all points at once.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
-from ahf_ros.detectors.ring.band_samples import BandSamples
-from ahf_ros.detectors.ring.evidence import (
-    LEVEL_BIN,
-    LEVELS,
-    MarkAppearance,
-    level_bins,
-    log_ratio,
-    normal_density,
-)
-from ahf_ros.features.array_record import ArrayRecord
+from ahf_ros.features import frame
+from ahf_ros.features.sampling import sample
+from ahf_ros.imaging.black import lifted
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
-_AGREEMENT = 0.35  # of the step of a mark, between it and a step that confirms the light
-_MINIMUM_STEP = 0.5  # of ln, that this is a share of
-_UNUSUAL, _MINIMUM_UNUSUAL = 4.0, 0.08  # times the usual deviation of steps, and of ln
-_SPREADS = np.array([0.05, 0.065, 0.08, 0.1, 0.12, 0.16, 0.22, 0.3, 0.42])  # of levels of ln I
-_MINIMUM_MARK_SPREAD = 0.1  # of marks
-_MAXIMUM_SPREAD = 0.12  # of the ground, but for noise
-_DEVIATIONS = 2.0  # usual deviations of the ground, that make up a spread
-_STEP_SPREAD = 1.33  # spreads of levels, that make up that of a step
-_STEP_SPREADS = (0.08, 0.16)
-_DISTANCES = np.arange(len(LEVELS))[:, None] - np.arange(len(LEVELS))
-_KERNELS = [normal_density(_DISTANCES * LEVEL_BIN, spread) for spread in _SPREADS]
+_CELLS, _TRANSFORM = 64, 96  # sides of the rectified target and of its transforms
+_MARGIN = 0.85  # beyond the band, dot radii
+_FARTHEST = 3.6  # shift, dot radii
+_ASIDE = 0.18  # distance of ground from edges, dot radii
+_OVERLAP = 0.12  # share of the ground that a shift must compare
+_SHIFTS = 60  # best ones, that predict
+_EVEN = 1e-5  # smallest square of ln by which ground differs from itself
+_UNKNOWN = 0.03  # weight of ground below which a point is not predicted
+_PART = 64  # targets at a time, which bounds the memory
 
 
-@dataclass(frozen=True, slots=True)
-class Light(ArrayRecord):
-    """The light on k targets.
-
-    Attributes
-    ----------
-    ground, marks : ndarray of float64, shape (k, n)
-        Densities of n levels of ln I, of the ground and of marks.
-    spread : ndarray of float64, shape (k,)
-        Standard deviation of steps of ln I on the ground, where there is no edge.
-    edges : ndarray of float64, shape (k,)
-        Probability that an edge of light lies between two neighbouring readings.
-    uneven : ndarray of float64, shape (k,)
-        Usual deviation of the ground, of ln.
-    """
-
-    ground: np.ndarray
-    marks: np.ndarray
-    spread: np.ndarray
-    edges: np.ndarray
-    uneven: np.ndarray
-
-
-def seen_light(
-    samples: BandSamples, marks: MarkAppearance, edges: np.ndarray, noise: np.ndarray
-) -> Light:
-    """Return the light on targets.
+def predicted_light(
+    gray: np.ndarray,
+    frames: np.ndarray,
+    lift: np.ndarray,
+    angles: np.ndarray,
+    radii: np.ndarray,
+    band: tuple[float, float],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the gray values that paper has at points of bands, and how far they are known.
 
     Parameters
     ----------
-    samples : BandSamples
-        Of k targets.
-    marks : MarkAppearance
-    edges : ndarray of float64, shape (k,)
-        Probability of an edge of light between two neighbouring readings.
-    noise : ndarray of float64, shape (k,)
-        Of gray values.
+    gray : ndarray of float32, shape (height, width)
+        Gray values from 0 to 255.
+    frames : ndarray of float64, shape (k, 3, 3)
+        Of the targets.
+    lift : ndarray of float64, shape (k,)
+        Gray values that black is lifted to.
+    angles, radii : ndarray of float64, shape (m,) and (d,)
+        Of the points, rad and dot radii.
+    band : tuple of 2 float
+        Radii of the band, dot radii.
+
+    Returns
+    -------
+    light : ndarray of float32, shape (k, m, d)
+    spread : ndarray of float32, shape (k, m, d)
+        Standard deviation of its logarithm; infinite where no ground predicts it.
     """
-    dark = (marks.polarity > 0)[:, None]
-    sides = [(samples.gap[0], samples.dot[1]), *samples.edges]
-    agree = [_agrees(ground, inked, marks) for ground, inked in sides]
-    agree[0] &= _of_one_light(*sides[0])
-    agree[1:] = [agree[1] & agree[2]] * 2
-    bright = np.concatenate([np.where(dark, *side) for side in sides], axis=1)
-    weights = np.concatenate(agree, axis=1).astype(np.float64)
-    levels = np.log(bright + LOG_OFFSET)
-    middle = _weighted_median(levels, weights)
-    deviation = 1.4826 * _weighted_median(np.abs(levels - middle), weights)[:, 0]
-    spread = np.clip(_DEVIATIONS * deviation, _SPREADS[0], _MAXIMUM_SPREAD)
-    gray = np.exp(middle[:, 0])
-    dark_gray = np.maximum(gray - LOG_OFFSET, 0) * marks.contrast + LOG_OFFSET
-    high_spread = np.maximum(spread, noise / gray)
-    low_spread = np.maximum(np.maximum(spread, _MINIMUM_MARK_SPREAD), noise / dark_gray)
+    points, ground, candidates = _geometry(band)
+    seen = np.fft.rfft2(ground, (_TRANSFORM,) * 2)
+    overlap = np.fft.irfft2(np.abs(seen) ** 2, (_TRANSFORM,) * 2).ravel()[candidates]
+    place = _places(band[1] + _MARGIN, angles, radii)
+    shape = len(frames), len(angles), len(radii)
+    light, spread = np.empty(shape, np.float32), np.empty(shape, np.float32)
+    for start in range(0, len(frames), _PART):
+        part = slice(start, start + _PART)
+        values = np.maximum(sample(gray, frame.project(frames[part], points)), 0)
+        values = lifted(values, lift[part].astype(np.float32)[:, None, None])
+        logs = np.log(values + np.float32(LOG_OFFSET))
+        middle = (logs * ground).sum(axis=(1, 2), keepdims=True) / ground.sum()
+        logs = (logs - middle) * ground
+        first, second = (np.fft.rfft2(of, (_TRANSFORM,) * 2) for of in (logs, logs * logs))
+        # Of the squares of differences between ground and shifted ground.
+        both = 2 * seen.conj() * second - 2 * np.abs(first) ** 2
+        differ = np.fft.irfft2(both, (_TRANSFORM,) * 2)
+        differ = (differ + _turned(differ)).reshape(len(logs), -1)[:, candidates] / 2
+        differ = np.maximum(differ / overlap, _EVEN)
+        best = np.argpartition(differ, _SHIFTS, axis=1)[:, :_SHIFTS]
+        of_best = np.take_along_axis(differ, best, axis=1)
+        weight = 1 / (of_best + of_best.min(axis=1, keepdims=True) / 2)
+        kernel = np.zeros((len(logs), _TRANSFORM**2), np.float32)
+        weight /= weight.sum(axis=1, keepdims=True)
+        error = (weight * of_best).sum(axis=1)[:, None, None]
+        np.put_along_axis(kernel, candidates[best], weight, axis=1)
+        moved = np.fft.rfft2(kernel.reshape(-1, _TRANSFORM, _TRANSFORM)).conj()
+        known, sums, second_sums = (
+            _read(np.fft.irfft2(moved * of, (_TRANSFORM,) * 2), *place)
+            for of in (seen, first, second)
+        )
+        mean = sums / np.maximum(known, _UNKNOWN)
+        variance = np.maximum(second_sums / np.maximum(known, _UNKNOWN) - mean**2, 0)
+        light[part] = np.exp(mean + middle) - LOG_OFFSET
+        spread[part] = np.where(known > _UNKNOWN, np.sqrt(variance + error), np.inf)
+    return np.maximum(light, 0), spread
 
-    seen = level_bins(bright)
-    grays = np.broadcast_to(np.exp(LEVELS) - LOG_OFFSET, (len(seen), len(LEVELS)))
-    inked = LEVELS - np.abs(marks.step(grays)) - LEVELS[0]
-    inked = np.clip(np.rint(inked / LEVEL_BIN).astype(np.intp), 0, len(LEVELS) - 1)
-    high = _density(seen, weights, high_spread)
-    low = _density(np.take_along_axis(inked, seen, axis=1), weights, low_spread)
-    return Light(
-        np.where(dark, high, low),
-        np.where(dark, low, high),
-        np.clip(_STEP_SPREAD * spread, *_STEP_SPREADS),
-        edges,
-        deviation,
+
+@lru_cache(maxsize=16)
+def _geometry(band: tuple[float, float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the cells of a rectified target, its ground, and the shifts that are compared."""
+    inner, outer = band
+    reach = outer + _MARGIN
+    along = (np.arange(_CELLS) - (_CELLS - 1) / 2) * (2 * reach / _CELLS)
+    points = np.stack(np.meshgrid(along, along), axis=-1)
+    radii = np.hypot(*np.moveaxis(points, 2, 0))
+    ground = ((radii > 1 + _ASIDE) & (radii < inner - _ASIDE)) | (radii > outer + _ASIDE)
+    whole = ground.astype(np.float32)
+    seen = np.fft.rfft2(whole, (_TRANSFORM,) * 2)
+    overlap = np.fft.irfft2(np.abs(seen) ** 2, (_TRANSFORM,) * 2)
+    steps = np.fft.fftfreq(_TRANSFORM, 1 / _TRANSFORM) * (2 * reach / _CELLS)
+    away = np.hypot(steps[:, None], steps)
+    candidates = (overlap > _OVERLAP * whole.sum()) & (away > 0) & (away <= _FARTHEST)
+    return points, whole, np.flatnonzero(candidates)
+
+
+def _turned(of_shifts: np.ndarray) -> np.ndarray:
+    """Return what belongs to the opposite shifts, which compare the same pairs of points."""
+    return np.roll(of_shifts[:, ::-1, ::-1], 1, axis=(1, 2))
+
+
+def _places(
+    reach: float, angles: np.ndarray, radii: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return rows and columns of cells at points, and how far beyond each lies, (m, d) each."""
+    unit = _CELLS / (2 * reach)
+    across, down = (
+        np.outer(of(angles), radii) * unit + (_CELLS - 1) / 2 for of in (np.cos, np.sin)
     )
+    row, column = down.astype(np.intp), across.astype(np.intp)
+    return row, column, down - row, across - column
 
 
-def _agrees(ground: np.ndarray, inked: np.ndarray, marks: MarkAppearance) -> np.ndarray:
-    """Return whether the steps from ground to ink are those of marks."""
-    expected = marks.step(np.maximum(ground, inked))
-    allowed = _AGREEMENT * np.maximum(np.abs(expected), _MINIMUM_STEP)
-    return np.abs(log_ratio(inked, ground) - expected) < allowed
-
-
-def _of_one_light(ground: np.ndarray, inked: np.ndarray) -> np.ndarray:
-    """Return whether steps from ground to ink are as usual, so that nothing covers the ground."""
-    step = log_ratio(inked, ground)
-    off = np.abs(step - np.median(step, axis=1, keepdims=True))
-    usual = 1.4826 * np.median(off, axis=1, keepdims=True)
-    return off < np.maximum(_UNUSUAL * usual, _MINIMUM_UNUSUAL)
-
-
-def _weighted_median(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Return the medians of the values whose weight is not 0, shape (k, 1)."""
-    order = np.argsort(np.where(weights > 0, values, np.inf), axis=1)
-    count = np.count_nonzero(weights, axis=1)[:, None]
-    middle = np.take_along_axis(order, np.maximum(count - 1, 0) // 2, axis=1)
-    return np.take_along_axis(values, middle, axis=1)
-
-
-def _density(seen: np.ndarray, weights: np.ndarray, spread: np.ndarray) -> np.ndarray:
-    """Return the densities of k sets of bins with a spread each, shape (k, number of levels)."""
-    size = len(LEVELS)
-    keys = (seen + size * np.arange(len(seen))[:, None]).ravel()
-    counts = np.bincount(keys, weights.ravel(), size * len(seen)).reshape(len(seen), size)
-    counts = counts / np.maximum(weights.sum(axis=1), 1e-9)[:, None]
-    nearest = np.abs(_SPREADS - spread[:, None]).argmin(axis=1)
-    density = np.empty_like(counts)
-    for index, kernel in enumerate(_KERNELS):
-        density[nearest == index] = counts[nearest == index] @ kernel
-    return density
+def _read(
+    images: np.ndarray, row: np.ndarray, column: np.ndarray, down: np.ndarray, across: np.ndarray
+) -> np.ndarray:
+    """Return the interpolated values of images (k, n, n) at places, shape (k, m, d)."""
+    above = images[:, row, column] * (1 - across) + images[:, row, column + 1] * across
+    below = images[:, row + 1, column] * (1 - across) + images[:, row + 1, column + 1] * across
+    read: np.ndarray = above * (1 - down) + below * down
+    return read

@@ -1,46 +1,55 @@
-"""Reading of the bands about dots, with the joint refinement of dot and band.
+"""Reading of the bands about dots, in a line of stages.
 
-A pass goes from the samples of a band to the frame of dot and band. A correct reading improves the
-frame, and a better frame the reading, so there are two passes.
+Polar images of the dots; the growth of ink; the evidence of edges, which is a bound for what can
+be a target; the evidence of levels in the light that a target's ground predicts; the words; the
+joint fit of dot and band. A right word improves the frame and a better frame the evidence, so that
+evidence, words and fit come twice.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from ahf_ros.codes.ring import Family
-from ahf_ros.detectors.ring.band_evidence import band_evidence
-from ahf_ros.detectors.ring.band_samples import sample_bands
-from ahf_ros.detectors.ring.decoding import decode, sector_angles
-from ahf_ros.detectors.ring.evidence import MarkAppearance
+from ahf_ros.detectors.ring.circles import REACH, target_circles
+from ahf_ros.detectors.ring.decoding import Words, decode
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
-from ahf_ros.detectors.ring.occluded_decoding import decode_occluded
-from ahf_ros.detectors.ring.other_prints import of_other_prints
-from ahf_ros.detectors.ring.target_circles import REACH, target_circles
+from ahf_ros.detectors.ring.light import predicted_light
+from ahf_ros.detectors.ring.likelihood import (
+    Evidence,
+    edge_evidence,
+    level_evidence,
+    under_one_light,
+)
+from ahf_ros.detectors.ring.polar import PolarImages, angles_of, polar_images
+from ahf_ros.detectors.ring.prior import NOTHING_KNOWN, Prior
+from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import Fit, fit_circles
-from ahf_ros.features.edge_shift import SMALL, unshifted
 from ahf_ros.features.sampling import sample_circles
+from ahf_ros.imaging.black import lifted
 
-PASSES = ((5, 1), (10, 2))
-"""Samples per sector and rounds of the fit of each pass."""
+PER_SECTOR = 10
+"""Angles of a sector at which bands are read."""
 
-_LEVEL_RADII = np.array([0.75, 1.4])  # dot radii, where the levels of dot and gap are read
-_LEVEL_ANGLES = 2 * np.pi * np.arange(24) / 24
-_MINIMUM_LEVEL = 1.0  # gray value that ratios are taken of
-_PRINTED = 0.25  # usual contrast of prints
+_FIRST_PER_SECTOR = 5  # points on each edge of a sector in the first joint fit
+_SHIFTS = np.arange(-2.4, 2.41, 0.4)  # of edges, that are tried, px
+_MAXIMUM_GROWTH = 0.3  # dot radii
+_DEPTHS = np.array([0.2, 0.4, 0.6, 0.8])  # of the band, where its levels are read
+_DOT_RADII = np.array([0.3, 0.6])  # where the level of the dot is read, dot radii
+_GAP_DEPTHS = np.array([0.4, 0.65])  # the same of the gap, in its width
+_MARGIN_DEPTHS = np.array([0.3, 0.6])  # the same beyond the band, dot radii
+_HOPEFUL, _HOPEFUL_IN_LIGHT = (
+    0.3,
+    0.4,
+)  # mean log odds of a reading of edges, from which a band is read on
+_PART = 256  # dots at a time, which bounds the memory
 
 
 def read_bands(
-    gray: np.ndarray,
-    dots: Fit,
-    family: Family,
-    expected: frozenset[int] = frozenset(),
-    passes: Sequence[tuple[int, int]] = PASSES,
-    other_prints: bool = True,
-    hidden: bool = True,
-) -> tuple[Hypotheses, np.ndarray]:
+    gray: np.ndarray, dots: Fit, family: Family, prior: Prior = NOTHING_KNOWN
+) -> Hypotheses:
     """Read the bands about dots, and refine dot and band together.
 
     Parameters
@@ -50,82 +59,139 @@ def read_bands(
     dots : Fit
         Of k dots.
     family : Family
-    expected : frozenset of int
-        IDs that are likely to be there; all are alike where it is empty.
-    passes : sequence of (int, int)
-        As `PASSES` has them; one is enough where frames are right to a tenth of a pixel.
-    other_prints : bool
-        Whether words are refused where bands of other prints agree better.
-    hidden : bool
-        Whether words count that are plausible only where something hides a part of the band.
+    prior : Prior
+        What is known before, in px of the image.
 
     Returns
     -------
-    hypotheses : Hypotheses
-        One of each dot, then a second one of each small dot.
-    which : ndarray of int, shape (m,)
-        The dot that each is of.
+    Hypotheses
+        One of each dot.
     """
+    parts = [
+        _read_part(gray, dots.select(slice(start, start + _PART)), family, prior)
+        for start in range(0, max(len(dots.frames), 1), _PART)
+    ]
+    return Hypotheses.joined(parts)
+
+
+def _read_part(gray: np.ndarray, dots: Fit, family: Family, prior: Prior) -> Hypotheses:
+    unread = Hypotheses.unread(dots, family)
     if not len(dots.frames):
-        return Hypotheses.unread(dots, family), np.zeros(0, np.intp)
-    which, frames = unshifted(dots)
-    marks = mark_appearance(gray, dots).select(which)
-    marks, lift, read, alone = marks.lifted(), marks.lift, np.arange(len(which)), frames
-    for per_sector, rounds in passes:
-        angles = sector_angles(family, per_sector)
-        samples = sample_bands(gray, frames, marks.blur, angles, family, lift)
-        evidence = band_evidence(samples, marks, frames, family)
-        readings = decode(samples, evidence, marks, family)
-        last = (per_sector, rounds) == PASSES[-1]
-        good = readings.plausible | (hidden and last)
-        if last and good.any():
-            readings = decode_occluded(
-                samples, evidence, readings, marks, frames, family, expected
-            )
-            good &= readings.plausible
-        if not good.any():
-            return Hypotheses.unread(dots.select(which), family), which
-        read, readings, marks = read[good], readings.select(good), marks.select(good)
-        lift = lift[good]
-        words, starts = readings.words, readings.start
-        circles = target_circles(words, starts, marks.polarity, per_sector, family)
-        fit = fit_circles(
-            gray,
-            frames[good],
-            circles,
-            reach=REACH,
-            projective=True,
-            rounds=rounds,
-            covariances=last,
-        )
-        frames = fit.frames
-    foreign = np.zeros(len(read), bool)
-    if other_prints:
-        foreign = of_other_prints(gray, alone[read], fit, words, starts, per_sector, family)
-    unread = Hypotheses.unread(dots.select(which), family)
-    return unread.replaced(
-        read, Hypotheses.read(readings, fit, unread.select(read), foreign)
-    ), which
+        return unread
+    polar = polar_images(gray, dots, family.band, family.bits * PER_SECTOR)
+    growth = best_growth(polar, family.band, prior)
+    edges = edge_evidence(polar, 1 - growth, growth, family.band)
+    first = decode(edges, _overhang(growth, family), family, prior.expected)
+    read = np.flatnonzero(_mean_odds(first, edges.weight) > _HOPEFUL)
+    growth = growth[read]
+    printed = dots.select(read)
+    printed = replace(printed, frames=frame.scaled(printed.frames, 1 - growth))
+    # In the frame of the printed dot, the same growth is a larger share.
+    words = _words(
+        gray,
+        printed,
+        polar.select(read),
+        edges.select(read),
+        growth / (1 - growth),
+        family,
+        prior.expected,
+    )
+    good = _mean_odds(words, edges.weight[read]) > _HOPEFUL_IN_LIGHT
+    read, printed, words = read[good], printed.select(good), words.select(good)
+    fit = _joint_fit(gray, printed, words, _FIRST_PER_SECTOR, 1, family)
+    growth = fit.polarity * fit.edge_shift / fit.size
+    polar = polar_images(gray, fit, family.band, family.bits * PER_SECTOR)
+    edges = edge_evidence(polar, np.ones(len(read)), growth, family.band)
+    words = _words(gray, fit, polar, edges, growth, family, prior.expected)
+    good = words.words > 0
+    read, fit, words = read[good], fit.select(good), words.select(good)
+    fit = _joint_fit(gray, fit, words, PER_SECTOR, 2, family)
+    return unread.replaced(read, Hypotheses.of(fit, words, family))
 
 
-def mark_appearance(gray: np.ndarray, dots: Fit) -> MarkAppearance:
-    """Return how marks about dots are expected to look.
+def best_growth(
+    polar: PolarImages, band: tuple[float, float], prior: Prior = NOTHING_KNOWN
+) -> np.ndarray:
+    """Return by how much the colour of dots has grown on all edges, so that these fit best, (k,).
 
-    Their contrast is that of the dot's edge. Where a camera sharpens, that edge is darker than
-    marks are, and where marks are small blur makes them less dark. The levels beside the edge then
-    tell more; at large dots only up to the usual contrast of prints, because the light may change
-    between them.
+    In the dot radii of the image; a dot that is seen with radius 1 was printed with less.
 
     Parameters
     ----------
-    gray : ndarray of float32, shape (height, width)
-        Gray values from 0 to 255.
-    dots : Fit
+    polar : PolarImages
         Of k dots.
+    band : tuple of 2 float
+        Radii of the band, dot radii.
+    prior : Prior
     """
-    values = sample_circles(gray, dots.frames, _LEVEL_ANGLES, _LEVEL_RADII)
-    inside, outside = np.moveaxis(np.maximum(values, _MINIMUM_LEVEL), 2, 0)
-    ratio = np.median(inside / outside, axis=1) ** dots.polarity
-    by_levels = np.where(dots.size < SMALL, ratio, np.minimum(ratio, _PRINTED))
-    contrast = np.maximum(dots.contrast, by_levels)
-    return MarkAppearance(dots.polarity, contrast, dots.bright, dots.blur)
+    best = np.full(len(polar.size), -np.inf)
+    growth = np.zeros(len(polar.size))
+    for shift in _SHIFTS:
+        tried = np.clip(shift / polar.size, -_MAXIMUM_GROWTH, _MAXIMUM_GROWTH)
+        edges = edge_evidence(polar, 1 - tried, tried, band)
+        paper, ink = edges.paper.sum(axis=1), edges.ink.sum(axis=1)
+        score = np.maximum(np.maximum(paper, ink), 0).sum(axis=1)
+        unusual = (polar.polarity * shift - prior.shift) / prior.deviation
+        score = score - 0.5 * unusual**2
+        growth = np.where(score > best, tried, growth)
+        best = np.maximum(score, best)
+    return growth
+
+
+def _words(
+    gray: np.ndarray,
+    targets: Fit,
+    polar: PolarImages,
+    edges: Evidence,
+    growth: np.ndarray,
+    family: Family,
+    expected: frozenset[int],
+) -> Words:
+    """Return the words of targets by all evidence, with their frames and ink that has grown."""
+    inner, outer = family.band
+    radii = np.concatenate(
+        [
+            _DOT_RADII,
+            1 + (inner - 1) * _GAP_DEPTHS,
+            inner + (outer - inner) * _DEPTHS,
+            outer + _MARGIN_DEPTHS,
+        ]
+    )
+    angles = angles_of(family.bits * PER_SECTOR)
+    levels = np.maximum(sample_circles(gray, targets.frames, angles, radii), 0)
+    levels = lifted(levels, polar.lift.astype(np.float32)[:, None, None])
+    light = predicted_light(gray, targets.frames, polar.lift, angles, radii, family.band)
+    evidence = edges.plus(level_evidence(polar, levels, *light, radii, family.band))
+    gap, margin = (radii > 1) & (radii < inner), radii > outer
+    counted = under_one_light(polar, levels[..., gap], levels[..., margin])
+    evidence = evidence.scaled(counted)
+    return decode(evidence, _overhang(growth, family), family, expected)
+
+
+def _mean_odds(words: Words, weight: np.ndarray) -> np.ndarray:
+    """Return the log odds of words against no target for a reading, shape (k,)."""
+    mean: np.ndarray = np.minimum(words.marked, words.seen) / (weight * words.hidden.shape[1])
+    return mean
+
+
+def _overhang(growth: np.ndarray, family: Family) -> np.ndarray:
+    """Return by how many angles grown arcs of ink are longer at either end, shape (k,)."""
+    middle = sum(family.band) / 2
+    return growth / middle * (family.bits * PER_SECTOR / (2 * np.pi))
+
+
+def _joint_fit(
+    gray: np.ndarray, start: Fit, words: Words, per_sector: int, rounds: int, family: Family
+) -> Fit:
+    """Return the joint fit of dots and of the marks of their words."""
+    circles = target_circles(words.words, words.starts, start.polarity, per_sector, family)
+    return fit_circles(
+        gray,
+        start.frames,
+        circles,
+        reach=REACH,
+        projective=True,
+        rounds=rounds,
+        blur=start.blur,
+        covariances=rounds > 1,
+    )

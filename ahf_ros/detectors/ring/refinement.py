@@ -13,10 +13,11 @@ import numpy as np
 
 from ahf_ros.codes import ring
 from ahf_ros.codes.ring import Family, canonical
+from ahf_ros.detectors.ring.circles import REACH
 from ahf_ros.detectors.ring.full_size import with_soft_edges
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
-from ahf_ros.detectors.ring.reading import PASSES, read_bands
-from ahf_ros.detectors.ring.target_circles import REACH
+from ahf_ros.detectors.ring.prior import Prior
+from ahf_ros.detectors.ring.reading import read_bands
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.circle_fit import Fit, fit_dots
@@ -31,11 +32,12 @@ _FARTHEST, _FARTHEST_SHARE = 1.0, 0.2  # that a centre is moved: px, or radii of
 
 @dataclass(frozen=True, slots=True)
 class _Located(ArrayRecord):
-    """Frames, covariances of their centres, and shares of the expected edges."""
+    """Frames, covariances of their centres, shares of the expected edges, and their shifts."""
 
     frames: np.ndarray
     covariance: np.ndarray
     share: np.ndarray
+    shift: np.ndarray
 
 
 def refine_centres(
@@ -84,7 +86,7 @@ def refine_centres(
     moved = np.hypot(*(located.frames[:, :2, 2] - start[:, :2, 2]).T)
     reach = np.maximum(_FARTHEST, _FARTHEST_SHARE * frame.ellipse_axes(start)[1])
     good = (located.share >= _MINIMUM_SHARE) & (moved <= reach)
-    places = ellipse_fields(located.frames, located.covariance)
+    places = ellipse_fields(located.frames, located.covariance, located.shift)
     return [
         replace(target, **place) if is_good else target
         for target, place, is_good in zip(targets, places, good, strict=True)
@@ -106,7 +108,7 @@ def _locate(
     )
     hypotheses, which = _agreeing(gray, dots, decoded, targets, family, expected)
     # Of two hypotheses on one target, the one with the larger margin comes first.
-    order = np.argsort(-hypotheses.margin, kind='stable')
+    order = np.argsort(-hypotheses.seen, kind='stable')
     by_band, best = np.unique(which[order], return_index=True)
     rest = np.setdiff1d(np.arange(len(targets)), by_band)
     alone = fit_dots(gray, start[rest], dots.polarity[rest], rays=_RAYS, reach=REACH)
@@ -132,8 +134,8 @@ def _agreeing(
         of_family = decoded[names[decoded] == name]
         code = family if name == family.name else ring.family(name)
         some = dots.select(of_family)
-        read, of_read = read_bands(gray, some, code, expected, PASSES[-1:])
-        which = of_family[of_read]
+        read = read_bands(gray, some, code, Prior(expected))
+        which = of_family
         agreed = (read.words > 0) & (canonical(read.words, code)[0] == codes[which])
         agreed &= read.share >= _MINIMUM_SHARE
         parts.append(with_soft_edges(gray, read, agreed).select(agreed))
@@ -142,7 +144,8 @@ def _agreeing(
 
 
 def _located(of: Fit | Hypotheses) -> _Located:
-    return _Located(of.frames, of.covariance, of.share)
+    shift = of.shift if isinstance(of, Hypotheses) else np.full(len(of.frames), np.nan)
+    return _Located(of.frames, of.covariance, of.share, shift)
 
 
 def _fit_either_polarity(gray: np.ndarray, frames: np.ndarray, polarities: Sequence[int]) -> Fit:

@@ -23,10 +23,10 @@ import numpy as np
 
 from ahf_ros.codes.ring import Family, family
 from ahf_ros.detectors.contract import DetectorSettings
-from ahf_ros.detectors.ring.blobs import blob_frames, masks
-from ahf_ros.detectors.ring.grey_gradient import BandReadings, read_by_gradient
+from ahf_ros.detectors.ring.circles import REACH, target_circles
 from ahf_ros.detectors.ring.refinement import refine_centres
-from ahf_ros.detectors.ring.target_circles import REACH, target_circles
+from ahf_ros.detectors.traditional.blobs import blob_frames, masks
+from ahf_ros.detectors.traditional.grey_gradient import BandReadings, read_by_gradient
 from ahf_ros.features.circle_fit import Fit, fit_circles, fit_dots
 from ahf_ros.features.ellipse_targets import targets_from_frames
 from ahf_ros.features.frame import ellipse_axes

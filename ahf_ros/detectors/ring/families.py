@@ -1,0 +1,144 @@
+"""The competition of families for the bands about dots.
+
+Every family reads a band by the same likelihood, so that their words compare by their evidence. To
+save time, the family that most of the clearest dots have reads all dots, and the others those that
+are not certain yet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ahf_ros.codes.ring import Family, canonical, family
+from ahf_ros.codes.same_print import words_of_print
+from ahf_ros.detectors.ring.hypotheses import Hypotheses
+from ahf_ros.detectors.ring.prior import NOTHING_KNOWN, Prior
+from ahf_ros.detectors.ring.reading import read_bands
+from ahf_ros.features import frame
+from ahf_ros.features.circle_fit import Fit
+
+_CLEAREST = 48  # dots that tell which family comes first
+
+
+def by_clear_dots(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> list[Family]:
+    """Return families in the order of how many of the clearest dots are theirs.
+
+    Parameters
+    ----------
+    gray : ndarray of float32, shape (height, width)
+        Gray values from 0 to 255.
+    dots : Fit
+    families : sequence of Family
+    """
+    if len(families) == 1 or not len(dots.frames):
+        return list(families)
+    clearest = np.argsort(-dots.share * (1 - dots.contrast), kind='stable')[:_CLEAREST]
+    some = dots.select(clearest)
+    odds = np.stack([_odds(read_bands(gray, some, code)) for code in families])
+    won = np.bincount(odds.argmax(axis=0)[odds.max(axis=0) > 0], minlength=len(families))
+    return [families[index] for index in np.argsort(-won, kind='stable')]
+
+
+def read_families(
+    gray: np.ndarray,
+    dots: Fit,
+    families: Sequence[Family],
+    prior: Prior = NOTHING_KNOWN,
+) -> Hypotheses:
+    """Read the bands about dots as words of several families.
+
+    Parameters
+    ----------
+    gray : ndarray of float32, shape (height, width)
+        Gray values from 0 to 255.
+    dots : Fit
+        Of k dots.
+    families : sequence of Family
+        The first one reads all dots, the others those that are not certain yet.
+    prior : Prior
+        What is known before.
+
+    Returns
+    -------
+    Hypotheses
+        At least one of each dot.
+    """
+    first, *others = families
+    found = read_bands(gray, dots, first, prior)
+    if not others:
+        return found
+    rest = dots.select(~found.certain)
+    parts = [found]
+    for code in others:
+        read = read_bands(gray, rest, code, prior)
+        parts.append(read.select(read.words > 0))
+    return _contested(Hypotheses.joined(parts))
+
+
+def _odds(read: Hypotheses) -> np.ndarray:
+    """Return the log odds of words of different families, shape (k,); 0 where none is certain."""
+    choices = np.array([len(code.words) * code.bits for code in read.families], float)
+    return np.where(read.certain, read.seen - np.log(np.maximum(choices, 1)), 0.0)
+
+
+def _contested(read: Hypotheses) -> Hypotheses:
+    """Return hypotheses of which none is certain where another family has more evidence."""
+    confidence, odds = read.confidence.copy(), _odds(read)
+    certain = np.flatnonzero(read.certain)
+    centres, families = read.frames[:, :2, 2], read.families
+    _, minor, _ = frame.ellipse_axes(read.frames)
+    for index in certain:
+        same = np.hypot(*(centres[certain] - centres[index]).T) < minor[index]
+        rivals = certain[same & (families[certain] != families[index])]
+        if (odds[rivals] > odds[index]).any():
+            confidence[index] = 0.0
+    return replace(read, confidence=confidence)
+
+
+def decoded(hypotheses: Hypotheses) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the families, the canonical code words and the IDs of hypotheses.
+
+    Returns
+    -------
+    names : ndarray of str, shape (k,)
+    codes, ids : ndarray of int64, shape (k,)
+    """
+    names = np.array([code.name for code in hypotheses.families], str)
+    codes, ids = np.zeros((2, len(names)), np.int64)
+    for name in np.unique(names):
+        which = names == name
+        codes[which], ids[which] = canonical(hypotheses.words[which], family(str(name)))
+    return names, codes, ids
+
+
+def settle_same_prints(hypotheses: Hypotheses, families: Sequence[str]) -> Hypotheses:
+    """Assign prints shared by several families to one family, or mark them uncertain.
+
+    Parameters
+    ----------
+    hypotheses : Hypotheses
+        Of all dots of an image.
+    families : sequence of str
+        Names of the families that the image may show.
+    """
+    names, codes, _ = decoded(hypotheses)
+    certain = np.flatnonzero(hypotheses.certain)
+    prints = {int(i): words_of_print(str(names[i]), int(codes[i])) for i in certain}
+    doubtful = [index for index, words in prints.items() if len(words) > 1]
+    clear = np.array([index for index, words in prints.items() if len(words) == 1], int)
+    words, confidence = hypotheses.words.copy(), hypotheses.confidence.copy()
+    of_families = hypotheses.families.copy()
+    centres = hypotheses.frames[:, :2, 2]
+    for index in doubtful:
+        of_print = {name: word for name, word in prints[index].items() if name in families}
+        others = clear[np.isin(names[clear], list(of_print))]
+        if not others.size:
+            confidence[index] = 0.0
+            continue
+        nearest = others[np.hypot(*(centres[others] - centres[index]).T).argmin()]
+        words[index] = of_print[names[nearest]]
+        of_families[index] = family(str(names[nearest]))
+    return replace(hypotheses, words=words, confidence=confidence, families=of_families)

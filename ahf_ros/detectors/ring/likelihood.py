@@ -1,0 +1,283 @@
+"""The likelihood of what is seen about a dot: paper, ink, or anything.
+
+Ink multiplies light, so that in ln I the edge of a mark is a step of known height wherever the
+light falls. At every angle two kinds of readings are compared with what paper and ink would give:
+
+- steps across the inner and the outer edge of the band, with the light on the ground beside them;
+- levels in gap, band and margin, with the light that the rest of the target's ground shows, where
+  light repeats itself or is even (`light.predicted_light`).
+
+All are logarithms of ratios to the density of what lies about any dot: flat ground mostly, else
+edges of any height. Their sum over a target is the log odds of a word against no target at all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ahf_ros.detectors.ring.polar import CORRELATION, SATURATED, PolarImages
+from ahf_ros.features.array_record import ArrayRecord
+
+_BESIDE = 2.6  # distance of a reading from an edge that is sharp, px
+_NEAREST, _FARTHEST = 0.13, 0.36  # bounds of that distance, dot radii
+_FLAT = 0.12  # deviation of steps of ln where there is no edge, but for noise
+_MARK, _MARK_TAIL = 0.18, 0.3  # of the step of a mark: towards less, where blur fills it, and more
+_PAPER_LEVEL, _INK_LEVEL = 0.05, 0.12  # of levels of paper and ink under predicted light
+_MEDIAN = 0.6745  # of the size of a normal deviate
+_ANY_STEP, _ANY_LEVEL = 0.2, 0.25  # densities of steps and levels of ln where anything lies
+_PLAIN = 0.35  # share of what lies about any dot that is as flat as ground
+_SURPRISES = (0.05, 0.5)  # smallest and largest probability of a level that nothing predicts
+_EVEN = 0.015  # deviation of ln of ground in even light
+_UNLIKE = 4.0  # standard deviations of ground, from which a level is unlike the rest
+_UNLIKE_SHARES = (0.25, 0.4)  # shares of the ground that are nothing but covers, nothing but light
+_UNLIKELY = 2.5  # standard deviations, from which a level was not predicted
+_LIGHT_EDGE = 0.3  # of ln, of an edge of light
+_LIGHT_EDGES = (0.02, 0.5)  # smallest and largest probability of one between two readings
+_MINIMUM_WEIGHT = 0.08  # of a reading among many that are alike
+_WHITE_OUT = 0.4  # share of what is seen that is saturated, from which that is no glare
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence(ArrayRecord):
+    """Log likelihoods of k targets at m angles, over those of anything.
+
+    The inner and the outer half of the band, with the ground beside each, are seen apart, because
+    what lies on one may leave the other.
+
+    Attributes
+    ----------
+    paper, ink : ndarray of float32, shape (k, 2, m)
+        Where the band is unmarked, and where it is marked.
+    weight : ndarray of float32, shape (k,)
+        Of a reading, which is part of both; less than 1 where neighbours tell the same.
+    dot : ndarray of float32, shape (k,)
+        Of the dot as ink, over the dot as light on paper.
+    """
+
+    paper: np.ndarray
+    ink: np.ndarray
+    weight: np.ndarray
+    dot: np.ndarray
+
+    def scaled(self, shares: np.ndarray) -> Evidence:
+        """Return the evidence of which only shares of (k, 2, m) count."""
+        return replace(self, paper=self.paper * shares, ink=self.ink * shares)
+
+    def plus(self, other: Evidence) -> Evidence:
+        """Return the sum of two kinds of evidence at the same angles."""
+        return Evidence(
+            paper=self.paper + other.paper,
+            ink=self.ink + other.ink,
+            weight=self.weight,
+            dot=self.dot + other.dot,
+        )
+
+
+def band_edges(
+    radius: np.ndarray, growth: np.ndarray, band: tuple[float, float]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the radii of the edges of a band whose ink has grown on all sides, shape (k,) each.
+
+    Parameters
+    ----------
+    radius : ndarray of float64, shape (k,)
+        Of the dot as printed.
+    growth : ndarray of float64, shape (k,)
+        Of what has the colour of the dot; the unit of both is that of the frame.
+    band : tuple of 2 float
+        Radii of the band, dot radii.
+    """
+    inner, outer = band
+    return inner * radius - growth, outer * radius + growth
+
+
+def weights(polar: PolarImages, inner: float) -> np.ndarray:
+    """Return the weights of readings at neighbouring angles, ndarray of float32, shape (k,)."""
+    along = 2 * np.pi * inner * polar.size / polar.gray.shape[1]
+    return np.clip(along / CORRELATION, _MINIMUM_WEIGHT, 1).astype(np.float32)
+
+
+def edge_evidence(
+    polar: PolarImages, radius: np.ndarray, growth: np.ndarray, band: tuple[float, float]
+) -> Evidence:
+    """Return the evidence of steps across the edges of bands.
+
+    Parameters
+    ----------
+    polar : PolarImages
+        Of k dots.
+    radius, growth, band
+        As for `band_edges`.
+    """
+    inner, outer = band_edges(radius, growth, band)
+    beside = np.clip(_BESIDE / polar.size, _NEAREST, _FARTHEST)
+    beside = np.minimum(beside, 0.45 * (outer - inner))
+    before = np.minimum(beside, 0.5 * (inner - radius - growth))
+    edges = light_edges(polar, radius, growth, inner)
+    weight = weights(polar, band[0])
+    glare = ~white_out(polar.at((radius + inner) / 2)[..., None])[..., 0]
+    count, angles = polar.visible.shape
+    paper, ink = np.empty((2, count, 2, angles), np.float32)
+    sides = (inner - before, inner + beside), (outer + beside, outer - beside)
+    for half, (ground, inked) in enumerate(sides):
+        seen = polar.at(inked), polar.at(ground)
+        of_paper, of_ink = _step_evidence(polar, *seen, edges)
+        clear = ~glare | (np.maximum(*seen) < SATURATED)
+        paper[:, half], ink[:, half] = np.where(clear, of_paper, 0), np.where(clear, of_ink, 0)
+    share = (weight[:, None] * polar.visible)[:, None]
+    return Evidence(paper * share, ink * share, weight, np.zeros_like(weight))
+
+
+def light_edges(
+    polar: PolarImages, radius: np.ndarray, growth: np.ndarray, inner: np.ndarray
+) -> np.ndarray:
+    """Return the probabilities of an edge of light between neighbours, as gaps show it, (k,)."""
+    start, width = radius + growth, inner - radius - growth
+    near, far = (polar.logs(polar.at(start + part * width)) for part in (0.3, 0.75))
+    noise = np.hypot(near[1], far[1])
+    many = (np.abs(near[0] - far[0]) > np.hypot(_LIGHT_EDGE, 2 * noise)).mean(axis=1)
+    return np.clip(many, *_LIGHT_EDGES)
+
+
+def white_out(ground: np.ndarray) -> np.ndarray:
+    """Return whether targets are so bright that white paper is no glare, (k, 1, 1).
+
+    Parameters
+    ----------
+    ground : ndarray of float32, shape (k, m, d)
+        Gray values.
+    """
+    return np.asarray((ground >= SATURATED).mean(axis=(1, 2)) > _WHITE_OUT)[:, None, None]
+
+
+def _step_evidence(
+    polar: PolarImages, band: np.ndarray, ground: np.ndarray, edges: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the evidence of steps from ground into a band for paper and for ink, (k, m) each."""
+    (level, noise), (beside, of_ground) = polar.logs(band), polar.logs(ground)
+    mark = polar.logs(polar.inked(ground, band))[0] - beside
+    noise = np.hypot(noise, of_ground)
+    step = level - beside
+    flat = _normal(step, np.hypot(np.float32(_FLAT), noise))
+    more = (step - mark) * np.sign(mark)
+    low, high = (np.hypot(np.float32(spread), noise) for spread in (_MARK, _MARK_TAIL))
+    width = np.where(more > 0, high, low)
+    inked = _normal(more, width) * (2 * width / (low + high))
+    lit = edges.astype(np.float32)[:, None]
+    anything = _PLAIN * flat + (1 - _PLAIN) * _ANY_STEP
+    paper, ink = (
+        np.log(((1 - lit) * density + lit * _ANY_STEP) / anything) for density in (flat, inked)
+    )
+    return paper, ink
+
+
+def level_evidence(
+    polar: PolarImages,
+    levels: np.ndarray,
+    light: np.ndarray,
+    spread: np.ndarray,
+    radii: np.ndarray,
+    band: tuple[float, float],
+) -> Evidence:
+    """Return the evidence of levels in dots and bands, and beside these, under predicted light.
+
+    Parameters
+    ----------
+    polar : PolarImages
+        Of k targets, for how ink looks.
+    levels : ndarray of float32, shape (k, m, d)
+        Gray values.
+    light : ndarray of float32, shape (k, m, d)
+        Gray values of paper there, as `predicted_light` gives them.
+    spread : ndarray of float32, shape (k, m, d)
+        Deviation of its logarithm; infinite where nothing predicts it.
+    radii : ndarray of float64, shape (d,)
+        Where they are, in dot radii: in the dot, in the gap, in the band or beyond it.
+    band : tuple of 2 float
+        Radii of the band, dot radii.
+    """
+    level, noise = polar.logs(levels)
+    known = np.isfinite(spread)
+    width = np.sqrt(noise**2 + np.where(known, spread, 1) ** 2)
+    of_paper, of_ink = (np.hypot(least, width) for least in (_PAPER_LEVEL, _INK_LEVEL))
+    errors = level - polar.logs(light)[0]
+    densities = [
+        _normal(errors, of_paper),
+        _normal(level - polar.logs(polar.inked(light, levels))[0], of_ink),
+    ]
+    anything = _PLAIN * densities[0] + (1 - _PLAIN) * _ANY_LEVEL
+    along = 2 * np.pi * radii / levels.shape[1]
+    apart = np.diff(radii, append=2 * radii[-1] - radii[-2])
+    share = np.prod(
+        [
+            np.clip(of * polar.size[:, None] / CORRELATION, _MINIMUM_WEIGHT, 1)
+            for of in (along, apart)
+        ],
+        axis=0,
+    ).astype(np.float32)
+    glare = (levels >= SATURATED) & ~white_out(levels[..., radii > 1])
+    seen = known & polar.visible[..., None] & ~glare
+    inner, outer = band
+    in_dot, in_band = radii < 1, (radii > inner) & (radii < outer)
+    on_ground = ~in_dot & ~in_band
+    surprise = _surprise(errors, of_paper, seen & on_ground)
+    paper, ink = (
+        np.where(seen, np.log(((1 - surprise) * of + surprise * _ANY_LEVEL) / anything), 0)
+        * share[:, None]
+        for of in densities
+    )
+    middle = (inner + outer) / 2
+    halves = (radii > 1) & (radii < middle), radii > middle
+    ground = [paper[..., half & on_ground].sum(axis=2) for half in halves]
+    beside = list(zip(halves, ground, strict=True))
+    of_halves = [
+        np.stack([of[..., half & in_band].sum(axis=2) + below for half, below in beside], axis=1)
+        for of in (paper, ink)
+    ]
+    return Evidence(
+        paper=of_halves[0],
+        ink=of_halves[1],
+        weight=share[:, -1],
+        dot=(ink - paper)[..., in_dot].sum(axis=(1, 2)),
+    )
+
+
+def under_one_light(polar: PolarImages, gap: np.ndarray, margin: np.ndarray) -> np.ndarray:
+    """Return the shares of evidence that count, (k, 2, m), by the light on the ground beside it.
+
+    A small part of the ground that is unlike the rest is no light but something that lies there;
+    where much of it is unlike, it is light.
+
+    Parameters
+    ----------
+    polar : PolarImages
+        Of k targets.
+    gap, margin : ndarray of float32, shape (k, m, d)
+        Gray values at d places each.
+    """
+    halves = np.stack([gap, margin], axis=1)
+    level, noise = polar.logs(halves)
+    flat = level.reshape(len(level), -1)
+    middle = np.median(flat, axis=1, keepdims=True)
+    spread = np.median(np.abs(flat - middle), axis=1, keepdims=True) / _MEDIAN
+    width = np.maximum(np.maximum(spread, _EVEN)[..., None, None], noise)
+    unlike = (np.abs(level - middle[..., None, None]) > _UNLIKE * width).any(axis=3)
+    few, many = _UNLIKE_SHARES
+    doubt = np.clip((many - unlike.mean(axis=(1, 2))) / (many - few), 0, 1)[:, None, None]
+    near = unlike
+    return np.where(near, 1 - doubt, 1.0).astype(np.float32)
+
+
+def _surprise(errors: np.ndarray, width: np.ndarray, which: np.ndarray) -> np.ndarray:
+    """Return the probabilities that nothing predicts a level, as ground shows them, (k, 1, 1)."""
+    outside = (np.abs(errors) > _UNLIKELY * width) & which
+    share = outside.sum(axis=(1, 2)) / np.maximum(which.sum(axis=(1, 2)), 1)
+    return np.clip(share, *_SURPRISES)[:, None, None]
+
+
+def _normal(values: np.ndarray, spread: np.ndarray) -> np.ndarray:
+    """Return the densities of values under normal distributions about 0."""
+    density: np.ndarray = np.exp(-0.5 * (values / spread) ** 2) / (spread * np.sqrt(2 * np.pi))
+    return density

@@ -1,0 +1,182 @@
+"""Polar images of targets: gray values on circles about their dots, and how their ink looks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ahf_ros.features import frame
+from ahf_ros.features.array_record import ArrayRecord
+from ahf_ros.features.circle_fit import Fit
+from ahf_ros.features.sampling import sample_circles, within
+from ahf_ros.imaging.black import black_lift, lifted
+from ahf_ros.imaging.logarithm import LOG_OFFSET
+
+CORRELATION = 2.5
+"""Distance of independent readings, px."""
+
+SATURATED = 253.0
+"""Gray value from which a reading is white, whatever the light."""
+
+_CIRCLES = 56  # of a polar image, which are then less than a tenth of a dot radius apart
+_INNERMOST, _MARGIN = 0.3, 0.95  # first circle, and last one beyond the band, dot radii
+_PERSPECTIVE = 1.5  # of circles, more than perspective makes one side of them larger
+_SMALL = 7.0  # radius of a dot whose levels tell more than its edge, px
+_PRINTED = 0.25  # usual contrast of prints, up to which the levels of larger dots count
+_LEVELS = (0.75, 1.4)  # where the levels of dot and gap are read, dot radii
+_MINIMUM_LEVEL = 1.0  # gray value that ratios are taken of
+_MINIMUM_CONTRAST = 0.02  # dark over bright, that bright marks are computed from
+_GAP = (0.35, 0.65)  # where noise is measured, shares of the gap
+_NOISE = (1.2, 40.0)  # smallest and largest noise, gray values
+_MEDIAN = 0.6745  # of the size of a normal deviate
+
+
+@dataclass(frozen=True, slots=True)
+class PolarImages(ArrayRecord):
+    """Gray values about k dots, at m angles on n circles, and how dots and marks look.
+
+    Attributes
+    ----------
+    gray : ndarray of float32, shape (k, m, n)
+        Black is lifted, see `ahf_ros.imaging.black`.
+    visible : ndarray of bool, shape (k, m)
+        Whether the image shows the target at an angle.
+    outermost : ndarray of float64, shape (k,)
+        Radius of the last circle, dot radii.
+    polarity : ndarray of int, shape (k,)
+        1 where marks are dark, -1 where they are bright.
+    contrast : ndarray of float64, shape (k,)
+        Gray value of dark over bright under the same light.
+    lift : ndarray of float64, shape (k,)
+        Gray values that black is lifted to.
+    size : ndarray of float64, shape (k,)
+        Radius of the dot, px.
+    noise : ndarray of float64, shape (k,)
+        Of gray values.
+    """
+
+    gray: np.ndarray
+    visible: np.ndarray
+    outermost: np.ndarray
+    polarity: np.ndarray
+    contrast: np.ndarray
+    lift: np.ndarray
+    size: np.ndarray
+    noise: np.ndarray
+
+    def at(self, radii: np.ndarray) -> np.ndarray:
+        """Return gray values on a circle of each dot, of radii (k,) in dot radii, shape (k, m)."""
+        spacing = (self.outermost - _INNERMOST) / (self.gray.shape[2] - 1)
+        place = np.clip((radii - _INNERMOST) / spacing, 0, self.gray.shape[2] - 1.001)
+        below = place.astype(np.intp)
+        rows, share = np.arange(len(place)), (place - below).astype(np.float32)[:, None]
+        values: np.ndarray = self.gray[rows, :, below] * (1 - share)
+        values += self.gray[rows, :, below + 1] * share
+        return values
+
+    def inked(self, paper: np.ndarray, seen: np.ndarray) -> np.ndarray:
+        """Return the gray values of ink of the dot's colour where paper has some, (k, ...).
+
+        Ink that would be brighter than white is as bright as what is `seen` if that is white.
+        """
+        polarity, contrast = (
+            _along(of, paper).astype(np.float32) for of in (self.polarity, self.contrast)
+        )
+        bright = paper / np.maximum(contrast, _MINIMUM_CONTRAST)
+        bright = np.where(seen >= SATURATED, np.minimum(bright, seen), bright)
+        return np.where(polarity > 0, contrast * paper, bright)
+
+    def logs(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return ln(I + offset) of gray values (k, ...), and the deviation of its noise."""
+        raised = np.maximum(values, 0) + np.float32(LOG_OFFSET)
+        return np.log(raised), _along(self.noise, values).astype(np.float32) / raised
+
+
+def polar_images(
+    gray: np.ndarray, dots: Fit, band: tuple[float, float], count: int
+) -> PolarImages:
+    """Return the polar images of targets.
+
+    Parameters
+    ----------
+    gray : ndarray of float32, shape (height, width)
+        Gray values from 0 to 255.
+    dots : Fit
+        Of k dots, or of dots and bands.
+    band : tuple of 2 float
+        Radii of the band, dot radii.
+    count : int
+        Number of angles, see `angles_of`.
+    """
+    angles, (inner, outer) = angles_of(count), band
+    outermost = outer + _MARGIN
+    radii = np.linspace(_INNERMOST, outermost, _CIRCLES)
+    values = np.maximum(sample_circles(gray, dots.frames, angles, radii), 0)
+    contrast, lift = _appearance(gray, dots)
+    values = lifted(values, lift.astype(np.float32)[:, None, None])
+    of_gap = [np.abs(radii - 1 - (inner - 1) * part).argmin() for part in _GAP]
+    apart = 2 * np.pi * inner * dots.size / count
+    return PolarImages(
+        gray=values,
+        visible=_visible(gray.shape, dots.frames, angles, outer),
+        outermost=np.full(len(values), outermost),
+        polarity=dots.polarity,
+        contrast=contrast,
+        lift=lift,
+        size=dots.size,
+        noise=_noise(values[:, :, of_gap], apart),
+    )
+
+
+def angles_of(count: int) -> np.ndarray:
+    """Return the angles at which bands are read, counter-clockwise as seen, rad, (count,)."""
+    return -2 * np.pi * (np.arange(count) + 0.5) / count
+
+
+def _appearance(gray: np.ndarray, dots: Fit) -> tuple[np.ndarray, np.ndarray]:
+    """Return contrasts of dots, and gray values that black is to be lifted to, shape (k,) each.
+
+    The contrast is that of the dot's edge. Where a camera sharpens, that edge is darker than marks
+    are, and where marks are small blur makes them less dark. The levels beside the edge then tell
+    more; at large dots only up to the usual contrast of prints, because light may change between.
+    """
+    angles = 2 * np.pi * np.arange(24) / 24
+    values = sample_circles(gray, dots.frames, angles, np.array(_LEVELS))
+    inside, outside = np.moveaxis(np.maximum(values, _MINIMUM_LEVEL), 2, 0)
+    ratio = np.median(inside / outside, axis=1) ** dots.polarity
+    by_levels = np.where(dots.size < _SMALL, ratio, np.minimum(ratio, _PRINTED))
+    contrast = np.maximum(dots.contrast, by_levels)
+    lift = black_lift(contrast, dots.bright)
+    dark, bright = (lifted(of, lift) for of in (contrast * dots.bright, dots.bright))
+    return dark / np.maximum(bright, _MINIMUM_LEVEL), lift
+
+
+def _noise(gap: np.ndarray, apart: np.ndarray) -> np.ndarray:
+    """Return the noise of gray values, from readings (k, m, 2) that are far enough apart, (k,)."""
+    count = gap.shape[1]
+    lags = np.clip(np.ceil(CORRELATION / np.maximum(apart, 1e-9)), 1, count // 4).astype(np.intp)
+    later = (np.arange(count) + lags[:, None]) % count
+    change = np.abs(np.take_along_axis(gap, later[..., None], axis=1) - gap)
+    usual = np.median(change.reshape(len(gap), 2 * count), axis=1) / (_MEDIAN * np.sqrt(2))
+    return np.clip(usual, *_NOISE)
+
+
+def _visible(
+    shape: tuple[int, ...], frames: np.ndarray, angles: np.ndarray, outer: float
+) -> np.ndarray:
+    """Return whether an image shows targets at angles, ndarray of bool, shape (k, m)."""
+    visible = np.ones((len(frames), len(angles)), bool)
+    major, _, _ = frame.ellipse_axes(frames)
+    reach = (_PERSPECTIVE * (outer + _MARGIN) * major)[:, None]
+    centres = frames[:, :2, 2] / frames[:, 2:, 2]
+    inside = (centres > reach) & (centres < np.array(shape[1::-1]) - 1 - reach)
+    border = np.flatnonzero(~inside.all(axis=1))
+    edge = frame.circle_points(angles, np.array([outer + _MARGIN / 3]))
+    visible[border] = within(frame.project(frames[border], edge), shape)[..., 0]
+    return visible
+
+
+def _along(of_targets: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return values of targets, shape (k,), with the axes of others, shape (k, ...)."""
+    return of_targets.reshape(-1, *(1,) * (values.ndim - 1))

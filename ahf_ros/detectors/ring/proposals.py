@@ -1,0 +1,81 @@
+"""Proposals of dots, and the measurement of those that may be middles of targets."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from ahf_ros.codes.ring import Family
+from ahf_ros.detectors.ring.circles import REACH
+from ahf_ros.detectors.ring.explained import Explained
+from ahf_ros.detectors.ring.glance import may_be_targets
+from ahf_ros.detectors.ring.oblique import oblique_dots, rounding
+from ahf_ros.features.circle_fit import Fit, fit_dots
+from ahf_ros.features.dot_search import voted_dots, whole_dots
+from ahf_ros.features.dots import NO_DOTS, Dots
+from ahf_ros.features.pyramid import Octave
+
+Proposal = Callable[[Octave, Sequence[int], Explained], Dots]
+"""From an octave, the polarities of dots and what is explained already to dots of the octave."""
+
+_RAYS = 24  # about a dot
+_MINIMUM_SHARE = 0.5  # of the edge of a dot, for its band to be read
+_FAINTEST = 0.8  # contrast of a dot, dark over bright, for its band to be read
+_PART = 256  # dots at a time, which bounds the memory
+
+
+def propose_whole(octave: Octave, polarities: Sequence[int], _explained: Explained) -> Dots:
+    """Return the dots of an octave with a whole outline."""
+    return whole_dots(octave.pyramid, *octave.radii, polarities)
+
+
+def propose_voted(octave: Octave, polarities: Sequence[int], explained: Explained) -> Dots:
+    """Return the dots of an octave that edges vote for which nothing explains yet."""
+    outlines = explained.outlines_in(octave.level)
+    return voted_dots(octave.pyramid, *octave.radii, polarities, explained=outlines)
+
+
+def propose_oblique(octave: Octave, polarities: Sequence[int], explained: Explained) -> Dots:
+    """Return the dots of an octave that edges vote for where a view is seen straight ahead."""
+    rounded = rounding(explained.select(explained.certain).frames)
+    if rounded is None:
+        return NO_DOTS
+    outlines = explained.select(explained.clear).outlines_in(octave.level)
+    return oblique_dots(octave.pyramid.gray, rounded, *octave.radii, polarities, outlines)
+
+
+PROPOSALS: tuple[Proposal, ...] = (propose_whole, propose_voted, propose_oblique)
+"""The ways to propose dots, the fastest first."""
+
+
+def measure_dots(
+    gray: np.ndarray, dots: Dots, families: Sequence[Family], *, keep_all: bool = False
+) -> Fit:
+    """Return the fits of the dots whose bands are worth reading.
+
+    Parameters
+    ----------
+    gray : ndarray of float32, shape (height, width)
+        Gray values from 0 to 255.
+    dots : Dots
+        In px of the image.
+    families : sequence of Family
+    keep_all : bool
+        Whether dots that are no middles of targets are measured as well.
+    """
+    worth = []
+    for start in range(0, max(len(dots.frames), 1), _PART):
+        part = dots.select(slice(start, start + _PART))
+        fit = _fit_once(gray, part.frames, part.polarity)
+        if not keep_all:
+            fit = fit.select(may_be_targets(gray, fit, families))
+        worth.append(_fit_once(gray, fit.frames, fit.polarity, fit.blur))
+    fit = Fit.joined(worth)
+    return fit.select((fit.share >= _MINIMUM_SHARE) & (fit.contrast <= _FAINTEST))
+
+
+def _fit_once(
+    gray: np.ndarray, frames: np.ndarray, polarity: np.ndarray, blur: np.ndarray | None = None
+) -> Fit:
+    return fit_dots(gray, frames, polarity, rays=_RAYS, reach=REACH, rounds=1, blur=blur)

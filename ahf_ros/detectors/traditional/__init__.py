@@ -1,0 +1,1 @@
+"""Traditional identification of ring targets, as the paper compares it."""
