@@ -1,14 +1,14 @@
 """How far the confidence of point-distributed targets can be trusted, and the weights behind it.
 
-Scenes of GSI's targets under all lights, of all sizes and views, are rendered, also without any
-target, with targets that lack a decoding dot, which have no right code, and textures. Every
-hypothesis of the detector `gsi` is compared with the truth. The table shows the reliability of the
-weights in force, by condition. With --fit, a logistic regression whose weights have the right sign
-is fitted to the hypotheses and written to the file of fitted weights. Seeds from 101 on are for
-tests, those below for development.
+Scenes of GSI's targets under all lights, of all sizes and views, with dots of all radii that the
+detector takes, are rendered, also without any target, with targets that lack a decoding dot, which
+have no right code, and textures. Every hypothesis of the detector `gsi` is compared with the
+truth. The table shows the reliability of the weights in force, by condition. With --fit, a
+logistic regression whose weights have the right sign is fitted to the hypotheses and written to
+the file of fitted weights. Seeds from 101 on are for tests, those below for development.
 
     python -m benchmarks.gsi_confidence [--seeds 101 102]
-    python -m benchmarks.gsi_confidence --fit 1 2
+    python -m benchmarks.gsi_confidence --fit 1 2 3 4
 """
 
 from __future__ import annotations
@@ -16,12 +16,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from itertools import product
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from rich.console import Console
 from rich.progress import track
 
-from ahf_ros.codes.gsi_library import point_family
+from ahf_ros.codes.gsi_library import GSI_LIBRARY, point_family
 from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.detectors.gsi.confidence import WEIGHTS, probability
 from ahf_ros.detectors.gsi.detector import find_hypotheses
@@ -35,7 +37,7 @@ from benchmarks.gsi import texture
 from benchmarks.reliability import NEAR, reliability_table, run
 
 BASE = SceneSettings(
-    family='gsi', width=1300, height=900, targets=6, dot_radius=5.0, focal_length=6.0
+    family='gsi', width=1600, height=1200, targets=6, dot_radius=5.0, focal_length=6.0
 )
 """A scene, of which others differ."""
 
@@ -45,22 +47,44 @@ COVERED = 2
 TEXTURES = 6
 """Textured images of a seed, which show no target."""
 
-SIGNS = np.array([1, 1, 1, -1, -1, -1, -1])
-"""Of the weights: support, weakest dot and margin speak for a target, all else against it."""
+RADII = (1.0, 1.5, 2.0, 2.5, 3.0, 3.6)
+"""Of dots, in the unit of the printed design."""
+
+SIGNS = np.array([1, 1, 1, -1, -1, -1, 1])
+"""Of the weights: support, weakest dot, margin and edges that were found speak for a target."""
 
 
-def scenes(seed: int) -> Iterator[tuple[str, SceneSettings]]:
+def design(folder: Path, radius: float) -> str:
+    """Return a data file that describes GSI's targets with dots of another radius."""
+    path = folder / f'gsi_{radius:g}.json'
+    path.write_text(
+        GSI_LIBRARY.read_text(encoding='utf-8').replace(
+            f'"dot_radius": {point_family().dot_radius:g}', f'"dot_radius": {radius:g}'
+        ),
+        encoding='utf-8',
+    )
+    return str(path)
+
+
+def scenes(seed: int, folder: Path) -> Iterator[tuple[str, SceneSettings]]:
     """Yield the condition and the settings of every scene of a seed."""
     generator = np.random.default_rng(seed)
+
+    def printed(scene: SceneSettings) -> SceneSettings:
+        """Return a scene whose dots have another radius, in targets of the same size."""
+        radius = float(generator.choice(RADII))
+        pixels = scene.dot_radius * radius / point_family().dot_radius
+        return replace(scene, family_file=design(folder, radius), dot_radius=pixels, seed=seed)
+
     for light, ambient in product(LIGHT_NAMES[1:], (0.3, 0.12, 0.04)):
         radius = float(generator.choice([5.0, 6.0, 8.0, 10.0]))
         polarity = str(generator.choice(['dark', 'bright']))
-        changes = {'dot_radius': radius, 'polarity': polarity, 'seed': seed}
-        yield light, replace(BASE, light=light, ambient=ambient, **changes)
+        changes = {'dot_radius': radius, 'polarity': polarity}
+        yield light, printed(replace(BASE, light=light, ambient=ambient, **changes))
     for tilt, radius in product((0.0, 45.0, 70.0, 80.0), (2.5, 4.0, 5.0)):
         polarity = str(generator.choice(['dark', 'bright']))
         scene = replace(BASE, tilt=tilt, dot_radius=radius, polarity=polarity, targets=12)
-        yield 'even light', replace(scene, seed=seed)
+        yield 'even light', printed(scene)
     for light in ('normal', 'stripe', 'lattice'):
         clutter = replace(BASE, targets=0, distractors=30, dot_radius=8.0, light=light)
         yield 'no targets', replace(clutter, seed=seed)
@@ -114,11 +138,12 @@ def gathered(seeds: Iterable[int]) -> tuple[list[str], np.ndarray, np.ndarray]:
     """Return conditions, features and rightness of the hypotheses of the images of some seeds."""
     conditions, parts = [], []
     for seed in seeds:
-        for condition, settings in track(
-            list(scenes(seed)), f'scenes of {seed}', console=Console(stderr=True)
-        ):
-            parts.append(hypotheses(render(settings)))
-            conditions += [condition] * len(parts[-1][1])
+        with TemporaryDirectory() as folder:
+            for condition, settings in track(
+                list(scenes(seed, Path(folder))), f'scenes of {seed}', console=Console(stderr=True)
+            ):
+                parts.append(hypotheses(render(settings)))
+                conditions += [condition] * len(parts[-1][1])
         for number in range(TEXTURES):
             features = found_in(texture(100 * seed + number)[0]).features
             parts.append((features, np.zeros(len(features), bool)))

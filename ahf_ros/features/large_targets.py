@@ -53,6 +53,7 @@ def _enlarged(target: Target) -> Target:
         'semi_major': 2 * target.semi_major,
         'semi_minor': 2 * target.semi_minor,
         'covariance': tuple(4 * element for element in target.covariance),
+        'edge_shift': None if target.edge_shift is None else 2 * target.edge_shift,
     }
     if not isinstance(target, DottedTarget):
         return replace(target, **place)

@@ -11,11 +11,13 @@ import numpy as np
 import pytest
 
 from ahf_ros.codes.dots import DOTS_DESIGN, dot_family
-from ahf_ros.detectors import create_detector
+from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.detectors.dots.confidence import WEIGHTS
+from ahf_ros.detectors.dots.detector import find_rings
 from ahf_ros.detectors.dots.regions import open_regions
 from ahf_ros.detectors.dots.rings import CERTAIN
 from ahf_ros.evaluation import score
+from ahf_ros.features.frame import ellipse_axes
 from ahf_ros.features.pyramid import image_pyramid
 from ahf_ros.filtering.homomorphic import HomomorphicFilter
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
@@ -60,6 +62,43 @@ def test_targets_are_identified_and_placed(changes: dict, bound: float) -> None:
     codes = {target.id: target.code for target in shown.targets}
     assert all(target.code == codes[target.id] for target in found)
     assert all(CERTAIN <= target.confidence <= 1 for target in found)
+
+
+def design(folder: Path, pixels: float, shift: float, radius: float) -> tuple[str, float]:
+    """Return a data file of dark targets whose edges moved, and the radius of the disc, px."""
+    made = json.loads(DOTS_DESIGN.read_text())
+    grown, scale = shift / pixels, 1 + shift / pixels
+    made['dot_circle'] /= scale
+    made['dot_radius'] = (radius + grown) / scale
+    made['ground_radius'] = (made['ground_radius'] - grown) / scale
+    made['border_radius'] = (made['border_radius'] + grown) / scale
+    path = folder / 'grown.json'
+    path.write_text(json.dumps(made))
+    return str(path), scale * pixels
+
+
+@pytest.mark.parametrize('light', ['normal', 'stripe'])
+@pytest.mark.parametrize(
+    ('shift', 'radius'), [(-1, 0.32), (-0.6, 0.32), (0.6, 0.32), (1, 0.32), (0, 0.2), (0, 0.45)]
+)
+def test_edges_that_moved_and_dots_of_other_radii_are_read(
+    tmp_path: Path, light: str, shift: float, radius: float
+) -> None:
+    path, pixels = design(tmp_path, 14.0, shift, radius)
+    own = {'family_file': path, 'dot_radius': pixels, 'radius_spread': 0.0, 'gamma': 1.0}
+    shown = render(SceneSettings(**SIZE | own, light=light, seed=6))
+    found = find_rings(image_pyramid(shown.image, 60.0), DetectorSettings(), dot_family())
+    certain = found.select(found.of_word >= CERTAIN)
+    assert set(dot_family().ids(certain.words)) == {target.id for target in shown.targets}
+    assert certain.edge_shift == pytest.approx(np.full(len(certain.words), shift), abs=0.1)
+    assert certain.radius == pytest.approx(
+        np.full(len(certain.words), radius + shift / 14), rel=0.25
+    )
+    assert ellipse_axes(certain.frames)[0] == pytest.approx(14.0, rel=0.01)
+    reported = create_detector(family='dots')(shown.image)
+    figures = score(shown.truth, reported)
+    assert (figures.right, figures.wrong, figures.false_positives) == (6, 0, 0)
+    assert all(target.edge_shift == pytest.approx(shift, abs=0.1) for target in reported)
 
 
 def test_a_target_and_its_mirror_image_are_one_code() -> None:

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from ahf_ros.codes.gsi import positions_of, value_of
-from ahf_ros.codes.gsi_library import point_family
+from ahf_ros.codes.gsi_library import GSI_LIBRARY, point_family
 from ahf_ros.detectors import create_detector
+from ahf_ros.detectors.gsi.evidence import Evidence
 from ahf_ros.detectors.gsi.grouping import find_templates
+from ahf_ros.detectors.gsi.reading import read_codes
 from ahf_ros.drawing.colours import DECODED_COLOUR, DECODING_DOT_COLOUR
 from ahf_ros.drawing.overlay import draw
 from ahf_ros.evaluation import score
@@ -58,6 +60,46 @@ def test_targets_are_identified_and_placed(changes: dict, bound: float) -> None:
     codes = {target.id: target.code for target in shown.targets}
     assert all(target.code == codes[target.id] for target in found)
     assert all(0.95 <= target.confidence <= 1 for target in found)
+
+
+@pytest.mark.parametrize('radius', [1.0, 1.25, 2.0, 2.5, 3.0, 3.6])
+@pytest.mark.parametrize(
+    'changes', [{}, {'polarity': 'bright', 'light': 'stripe'}, {'light': 'lattice'}]
+)
+def test_dots_have_any_radius_and_the_data_file_need_not_say_which(
+    tmp_path: Path, radius: float, changes: dict
+) -> None:
+    path = tmp_path / 'gsi.json'
+    path.write_text(
+        GSI_LIBRARY.read_text().replace('"dot_radius": 1.5', f'"dot_radius": {radius}')
+    )
+    pixels = 8.0 * radius / point_family().dot_radius
+    own = {'targets': 3, 'dot_radius': pixels, 'family_file': str(path), 'seed': 5}
+    shown = render(SceneSettings(**{**SIZE, 'width': 1600, 'height': 1200, **own, **changes}))
+    found = create_detector(family='gsi')(shown.image)
+    figures = score(shown.truth, found)
+    assert (figures.right, figures.wrong, figures.false_positives) == (3, 0, 0)
+    assert np.hypot(*errors(shown, found).T).max() < 0.15
+    sizes = {target.id: target.semi_major for target in shown.targets}
+    for target in found:
+        assert target.semi_major == pytest.approx(sizes[target.id], rel=0.1)
+
+
+def test_places_within_two_radii_of_a_dot_tell_nothing_new() -> None:
+    family = point_family()
+    count, word = len(family.template), family.words[:1]
+    shown = np.zeros(len(family.places), bool)
+    shown[:count] = shown[count + family.decoding_dots(int(word[0]))] = True
+    near = np.hypot(*(family.places[:, None] - family.places[shown]).transpose(2, 0, 1)).min(
+        axis=1
+    )
+    ratio = np.where(shown, 8.0, -6.0)
+    ratio[~shown & (near < 5)] = 3.0  # as large dots cover them in part
+    evidence = Evidence(ratio[None], np.ones((1, len(ratio)), bool))
+    small, large = (read_codes(evidence, np.array([scale]), family) for scale in (1.0, 2.0))
+    assert small.words == large.words == word
+    assert small.support[0] < 0.95
+    assert large.support[0] == pytest.approx(1)
 
 
 def test_covariances_are_about_right() -> None:

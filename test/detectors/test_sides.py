@@ -14,15 +14,32 @@ NEAR = np.array([[1.2, -0.7], [-1.1, 0.9], [0.6, 1.3], [-0.8, -1.0]])
 """What corners are off by before they are fitted, px."""
 
 
-def drawn(corners: np.ndarray = CORNERS, light: np.ndarray | float = 200.0) -> np.ndarray:
-    """Return gray values, shape (210, 220), of a dark quadrilateral, as a camera would blur it."""
+def drawn(
+    corners: np.ndarray = CORNERS,
+    light: np.ndarray | float = 200.0,
+    *,
+    hollow: bool = False,
+    grown: float = 0.0,
+) -> np.ndarray:
+    """Return gray values, shape (210, 220), of a dark quadrilateral, as a camera would blur it.
+
+    A hollow one is white but for a border of a cell. Ink may have grown, by a length in px.
+    """
     width, height, scale = 220, 210, 8
     x = (np.arange(width * scale) + 0.5) / scale - 0.5
     y = (np.arange(height * scale)[:, None] + 0.5) / scale - 0.5
     inside = np.ones((len(y), len(x)), bool)
     for (x0, y0), (x1, y1) in zip(corners, np.roll(corners, -1, axis=0), strict=True):
         inside &= (x1 - x0) * (y - y0) > (y1 - y0) * (x - x0)
-    fine = np.where(inside, np.float32(0.25), np.float32(1))
+    if hollow:
+        plane = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float32)
+        view = cv2.getPerspectiveTransform(corners.astype(np.float32), plane)
+        columns, rows, depth = (row[0] * x + row[1] * y + row[2] for row in view)
+        edge = 0.5 - 1 / CELLS
+        inside &= np.maximum(np.abs(columns / depth - 0.5), np.abs(rows / depth - 0.5)) > edge
+    spread = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, [2 * round(abs(grown) * scale) + 1] * 2)
+    ink = (cv2.dilate if grown > 0 else cv2.erode)(inside.astype(np.uint8), spread)
+    fine = np.where(ink > 0, np.float32(0.25), np.float32(1))
     shown = cv2.resize(fine, (width, height), interpolation=cv2.INTER_AREA)
     shown = cv2.GaussianBlur(shown, (0, 0), 0.7)
     return (shown * light).astype(np.float32)
@@ -34,6 +51,18 @@ def test_corners_and_centre_of_a_quadrilateral():
     assert np.abs(centres(fitted.corners) - centres(CORNERS[None])).max() < 0.01
     assert fitted.share[0] > 0.95
     assert np.linalg.eigvalsh(fitted.covariance[0]).min() > 0
+
+
+@pytest.mark.parametrize('shift', [-1.0, -0.4, 0.0, 0.5, 1.0])
+def test_edges_that_moved_are_known_and_move_neither_corners_nor_centres(shift):
+    fitted = fit_sides(drawn(hollow=True, grown=shift), (CORNERS + NEAR)[None], CELLS)
+    assert fitted.edge_shift[0] == pytest.approx(shift, abs=0.05)
+    assert np.abs(fitted.corners[0] - CORNERS).max() < 0.1
+    assert np.abs(centres(fitted.corners) - centres(CORNERS[None])).max() < 0.02
+
+
+def test_where_no_cell_is_white_beside_the_border_no_shift_is_known():
+    assert np.isnan(fit_sides(drawn(), (CORNERS + NEAR)[None], CELLS).edge_shift[0])
 
 
 def test_the_centre_is_where_the_diagonals_meet():

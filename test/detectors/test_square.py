@@ -51,6 +51,17 @@ def test_the_ellipse_is_inscribed_in_the_marker():
         assert target.semi_minor == pytest.approx(true[target.id].semi_minor, rel=0.03)
 
 
+@pytest.mark.parametrize(('gamma', 'low', 'high'), [(1.0, -0.03, 0.03), (2.2, -0.42, -0.28)])
+def test_the_shift_that_gamma_causes_is_reported_and_does_not_change_the_size(gamma, low, high):
+    rendering = render(replace(SCENE, gamma=gamma, dot_radius=30.0, targets=2))
+    true = {target.id: target for target in rendering.targets}
+    found = create_detector(family=SCENE.family)(rendering.image)
+    assert len(found) == 2
+    for target in found:
+        assert low < target.edge_shift < high
+        assert target.semi_major == pytest.approx(true[target.id].semi_major, rel=0.002)
+
+
 def test_markers_of_another_dictionary_are_not_seen():
     rendering = render(SCENE)
     assert create_detector(family='aruco_7x7_50')(rendering.image) == []

@@ -19,6 +19,7 @@ def test_small_dots_are_read_without_and_with_the_shift_of_their_edge(polarity):
         *(np.ones(2) for _ in range(4)),
         covariance=np.tile(np.eye(2), (2, 1, 1)),
         blur=np.full(2, 0.8),
+        edge_shift=np.zeros(2),
     )
     which, frames = unshifted(fit)
     assert which.tolist() == [0, 1, 0]
@@ -39,6 +40,7 @@ def test_beside_a_saturated_ground_a_larger_shift_is_tried_as_well(polarity):
         deviation=np.ones(3),
         covariance=np.tile(np.eye(2), (3, 1, 1)),
         blur=np.full(3, 0.8),
+        edge_shift=np.zeros(3),
     )
     which, frames = unshifted(fit)
     assert which.tolist() == [0, 1, 2, 1, 1, 2]

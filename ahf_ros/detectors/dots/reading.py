@@ -14,6 +14,10 @@ from ahf_ros.features.dot_evidence import PIXELS_ASIDE, circle_steps, dot_eviden
 from ahf_ros.features.homography import local_frames
 
 _PHASES = 12  # of the ring, in the angle from one place to the next
+_SHRUNK = np.array([0.5, 0.63, 0.8, 1.0])  # radii that small dots may have, in the printed one
+_GROWN = np.array([1.2, 1.45])  # the same, as far as there is room for them
+_FULLEST = 0.9  # share of this room
+_SPREAD = (0.7, 0.45)  # standard deviation of their ln below and above, as blur looks like growth
 _LIMIT = 12.0  # evidence that one place may give
 _FAINTEST = 0.12  # step of ln of a disc
 _FAINTEST_SHARE = 0.6  # step of a dot, in the one that the blur leaves it
@@ -35,6 +39,8 @@ class Readings(ArrayRecord):
         The highest evidence for a dot halfway between places, where no target has any.
     phase : ndarray of float64, shape (k,)
         Direction of the first place in the frame, rad clockwise from +x.
+    radius : ndarray of float64, shape (k,)
+        Of the small dots, in that of the disc.
     seen : ndarray of float64, shape (k,)
         Mean step of ln I at disc and border, in that of the disc.
     height : ndarray of float64, shape (k,)
@@ -47,6 +53,7 @@ class Readings(ArrayRecord):
     evidence: np.ndarray
     between: np.ndarray
     phase: np.ndarray
+    radius: np.ndarray
     seen: np.ndarray
     height: np.ndarray
     inside: np.ndarray
@@ -67,31 +74,54 @@ def read_rings(log: np.ndarray, fit: Fit, code: DotFamily) -> Readings:
     disc, _ = circle_steps(log, fit.frames)
     usual = np.maximum(np.median(disc * polarity[:, None], axis=1), _FAINTEST)
     phases = 2 * np.pi / bits * np.arange(_PHASES) / _PHASES
-    angles = (phases[:, None] - 2 * np.pi * np.arange(bits) / bits).ravel()
-    radii = np.full(angles.size, code.dot_radius)
-    small = local_frames(fit.frames, dot_points(angles, code), radii)
-    aside = np.maximum(PIXELS_ASIDE, _ASIDE * fit.blur)
-    steps, inside = circle_steps(log, small.reshape(-1, 3, 3), np.repeat(aside, _PHASES * bits))
-    steps = steps.reshape(count, _PHASES, bits, steps.shape[1]) * polarity[:, None, None, None]
+    points = dot_points((phases[:, None] - 2 * np.pi * np.arange(bits) / bits).ravel(), code)
+    aside = np.repeat(np.maximum(PIXELS_ASIDE, _ASIDE * fit.blur), _PHASES * bits)
+    radii = _radii(code)
+    shape = (len(radii), count, _PHASES, bits)
+    small = np.stack([local_frames(fit.frames, points, np.full(len(points), r)) for r in radii])
+    single = small.reshape(len(radii), -1, 3, 3)
+    of_radii = [circle_steps(log, frames, aside) for frames in single]
+    inside = np.asarray(of_radii[-1][1].reshape(count, _PHASES * bits).all(axis=1))
+    steps = np.stack([of_one for of_one, _ in of_radii])
+    steps = steps.reshape(*shape, steps.shape[-1]) * polarity[:, None, None, None]
     steps /= usual[:, None, None, None]
+    small = small.reshape(*shape, 3, 3)
+    # The right radius is the one that sees most of the dots, at the right phase.
+    middle = np.median(steps, axis=4)
+    seen = np.maximum(middle, 0).sum(axis=3).max(axis=2).T
+    change = np.log(radii / code.dot_radius)
+    usual = np.exp(-0.5 * (change / np.where(change < 0, *_SPREAD)) ** 2)
+    own, every = (seen * usual).argmax(axis=1), np.arange(count)
     # Dots are fainter than the disc where they are small, all of them alike.
-    size = np.sqrt(np.abs(np.linalg.det(small[:, 0, :2, :2])))
+    steps, small, middle = steps[own, every], small[own, every], middle[own, every]
+    size = np.sqrt(np.abs(np.linalg.det(small[:, 0, 0, :2, :2])))
     faintest = 1 - np.exp(-0.5 * (size / fit.blur) ** 2)
-    highest = np.median(steps, axis=3).max(axis=(1, 2))
+    highest = middle.max(axis=(1, 2))
     height = np.clip(highest, _FAINTEST_SHARE * faintest, _BRIGHTEST)
     steps /= height[:, None, None, None]
-    of_phases = small.reshape(count, _PHASES, bits, 3, 3)
-    evidence = dot_evidence(steps, of_phases)
+    evidence = dot_evidence(steps, small)
     # Between the places nothing is seen; the right phase is the one that sees most of the dots.
     best = np.maximum(evidence, 0).sum(axis=2).argmax(axis=1)
     halfway = (best + _PHASES // 2) % _PHASES
-    between = evidence[np.arange(count), halfway].max(axis=1)
-    evidence = np.clip(evidence[np.arange(count), best], -_LIMIT, _LIMIT)
-    words = (evidence > 0) @ (1 << np.arange(bits, dtype=np.int64))
-    whole = np.asarray(inside.reshape(count, _PHASES * bits).all(axis=1))
-    seen = border_steps(log, fit.frames, polarity, code)[:, 0]
-    between = np.clip(between, -_LIMIT, _LIMIT)
-    return Readings(words, evidence, between, phases[best], seen, highest / faintest, whole)
+    between = np.clip(evidence[every, halfway].max(axis=1), -_LIMIT, _LIMIT)
+    evidence = np.clip(evidence[every, best], -_LIMIT, _LIMIT)
+    return Readings(
+        (evidence > 0) @ (1 << np.arange(bits, dtype=np.int64)),
+        evidence,
+        between,
+        phases[best],
+        radii[own],
+        border_steps(log, fit.frames, polarity, code)[:, 0],
+        highest / faintest,
+        inside,
+    )
+
+
+def _radii(code: DotFamily) -> np.ndarray:
+    """Return the radii that small dots may have, in those of the disc."""
+    room = min(code.dot_circle - 1, code.ground_radius - code.dot_circle)
+    widest = _FULLEST * min(room, code.dot_circle * np.sin(np.pi / code.bits))
+    return np.append(code.dot_radius * _SHRUNK, np.minimum(code.dot_radius * _GROWN, widest))
 
 
 def dot_points(angles: np.ndarray, code: DotFamily) -> np.ndarray:

@@ -40,7 +40,7 @@ def refined(gray: np.ndarray, targets: Sequence[Target], code: DotFamily) -> lis
     reach = np.maximum(_FARTHEST, _FARTHEST_SHARE * ellipse_axes(start)[1])
     good = (fit.share >= _PLAUSIBLE) & (moved <= reach)
     changes = fit.frames @ np.linalg.inv(start)
-    places = ellipse_fields(fit.frames, fit.covariance)
+    places = ellipse_fields(fit.frames, fit.covariance, fit.edge_shift)
     better: dict[Target, Target] = {
         target: replace(target, dots=_moved(target, change), **place)
         for target, change, place, is_good in zip(dotted, changes, places, good, strict=True)

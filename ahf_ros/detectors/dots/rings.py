@@ -55,6 +55,10 @@ class Rings(ArrayRecord):
         As read, counter-clockwise in the image from the first place.
     phase : ndarray of float64, shape (k,)
         Direction of that place in the frame, rad clockwise from +x.
+    edge_shift : ndarray of float64, shape (k,)
+        Of the edges of disc and border, as in `Fit`, px.
+    radius : ndarray of float64, shape (k,)
+        Of the small dots as seen, in that of the disc.
     target_features, word_features : ndarray of float64, shape (k, n) and (k, m)
         As `confidence` weighs them.
     """
@@ -64,6 +68,8 @@ class Rings(ArrayRecord):
     polarity: np.ndarray
     words: np.ndarray
     phase: np.ndarray
+    edge_shift: np.ndarray
+    radius: np.ndarray
     target_features: np.ndarray
     word_features: np.ndarray
 
@@ -115,6 +121,8 @@ def _read_part(pyramid: ImagePyramid, discs: Dots, code: DotFamily) -> Rings:
         fit.polarity,
         readings.words,
         readings.phase,
+        fit.edge_shift,
+        readings.radius,
         target_features(readings, fit),
         word_features(readings, fit),
     )
@@ -141,7 +149,7 @@ def report(rings: Rings, settings: DetectorSettings, code: DotFamily) -> list[Do
 
 def _targets(rings: Rings, ids: np.ndarray, code: DotFamily) -> list[DottedTarget]:
     decoded = ids != UNDECODED
-    places = ellipse_fields(rings.frames, rings.covariance)
+    places = ellipse_fields(rings.frames, rings.covariance, rings.edge_shift)
     codes = np.where(decoded, code.canonical(rings.words), 0).tolist()
     certainty = np.where(decoded, rings.of_word, 0.0).tolist()
     words = np.where(decoded, rings.words, 0).tolist()
@@ -152,10 +160,10 @@ def _targets(rings: Rings, ids: np.ndarray, code: DotFamily) -> list[DottedTarge
             confidence=sure,
             polarity=sign,
             family='' if identifier == UNDECODED else FAMILY,
-            **ellipses(frame[None], word, phase, code),
+            **ellipses(frame[None], word, phase, radius, code),
             **place,
         )
-        for identifier, of_code, sure, sign, frame, word, phase, place in zip(
+        for identifier, of_code, sure, sign, frame, word, phase, radius, place in zip(
             ids.tolist(),
             codes,
             certainty,
@@ -163,13 +171,16 @@ def _targets(rings: Rings, ids: np.ndarray, code: DotFamily) -> list[DottedTarge
             rings.frames,
             words,
             rings.phase.tolist(),
+            rings.radius.tolist(),
             places,
             strict=True,
         )
     ]
 
 
-def ellipses(frame: np.ndarray, word: int, phase: float, code: DotFamily) -> dict[str, Any]:
+def ellipses(
+    frame: np.ndarray, word: int, phase: float, radius: float, code: DotFamily
+) -> dict[str, Any]:
     """Return the ellipses of disc, border and dots as `DottedTarget` has them.
 
     Parameters
@@ -179,12 +190,14 @@ def ellipses(frame: np.ndarray, word: int, phase: float, code: DotFamily) -> dic
         As read from the first place, counter-clockwise in the image.
     phase : float
         Direction of that place in the frame, rad clockwise from +x.
+    radius : float
+        Of the small dots, in that of the disc.
     code : DotFamily
     """
     which = np.flatnonzero(word >> np.arange(code.bits) & 1)
     points = dot_points(phase - 2 * np.pi * which / code.bits, code)
     points = np.concatenate([np.zeros((2, 2)), points])
-    radii = np.array([1.0, code.border_radius] + [code.dot_radius] * len(which))
+    radii = np.array([1.0, code.border_radius] + [radius] * len(which))
     frames = local_frames(frame, points, radii)[0]
     columns = (frames[:, 0, 2], frames[:, 1, 2], *ellipse_axes(frames))
     return {'dots': tuple(zip(*(of.tolist() for of in columns), strict=True)), 'template_dots': 2}

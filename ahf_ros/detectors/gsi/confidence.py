@@ -26,12 +26,9 @@ FEATURES = 7
 SUPPORT = 0
 """Which of these is the support."""
 
-_GROWTH = (0.03, 0.4, 0.15)  # that is usual: of any dot, of the minor axis in px, of its 4th power
-_EXCESS = 0.02  # of growth, that counts as 1
-_SHARE = 0.8  # of dots whose edges are found, from which on no more are asked for
+_UNEVEN = (0.005, 0.05)  # difference of radii that counts as 1, in ln: of any dot, and in px
 _PERSPECTIVE = 0.08  # change of depth from the centre to the edge of a target, that counts as 1
-_MEASURABLE = 2.0  # semi-minor axis of dots whose edges can be found, px
-_MOST = 30.0  # of these squares
+_MOST = 6.0  # of both
 
 (_OF_TARGET,) = read_weights(WEIGHTS, 'gsi_confidence', 'weights')
 
@@ -52,26 +49,24 @@ def confidence_features(
     Returns
     -------
     ndarray of float64, shape (k, 7)
-        Support, weakest dot and margin of the reading; the misplacement; the square of the growth
-        of the dots over what is usual, and that of the perspective, both up to a bound; and the
-        share of the dots whose edges are missing.
+        Support, weakest dot and margin of the reading; the misplacement; the differences of the
+        radii of dots, and the perspective, both up to a bound; and the share of the dots whose
+        edges were found where they should be.
     """
     radius = float(family.template_radii[family.reference])
-    minor = np.maximum(ellipse_axes(reference_frames(placement.homographies, radius))[1], 0.1)
-    always, linear, steep = _GROWTH
-    usual = always + linear / minor + steep / minor**4
-    growth = np.maximum(np.abs(placement.growth) - usual, 0) / _EXCESS
+    minor = ellipse_axes(reference_frames(placement.homographies, radius))[1] * placement.scale
+    always, of_pixel = _UNEVEN
+    uneven = placement.unevenness / (always + of_pixel / np.maximum(minor, 0.1))
     perspective = placement.homographies[:, 2, :2] * family.reach / _PERSPECTIVE
-    missing = np.where(minor >= _MEASURABLE, np.maximum(_SHARE - placement.share, 0), 0.0)
     return np.stack(
         [
             readings.support,
             readings.weakest,
             readings.margin,
             placement.misplacement,
-            np.minimum(growth**2, _MOST),
-            np.minimum((perspective**2).sum(axis=1), _MOST),
-            missing,
+            np.minimum(uneven, _MOST),
+            np.minimum(np.hypot(*perspective.T), _MOST),
+            placement.share,
         ],
         axis=1,
     )

@@ -20,7 +20,7 @@ from ahf_ros.codes.gsi import PointFamily
 from ahf_ros.codes.gsi_library import point_family
 from ahf_ros.detectors.contract import DetectorSettings, FamilyDetector
 from ahf_ros.detectors.gsi.confidence import confidence_features
-from ahf_ros.detectors.gsi.evidence import find_evidence
+from ahf_ros.detectors.gsi.evidence import find_evidence, seen_templates
 from ahf_ros.detectors.gsi.grouping import find_templates
 from ahf_ros.detectors.gsi.hypotheses import (
     OBVIOUS,
@@ -36,7 +36,7 @@ from ahf_ros.features import frame
 from ahf_ros.features.dot_search import whole_dots, with_other_dots
 from ahf_ros.features.dots import Dots
 from ahf_ros.features.ellipse_targets import ellipse_fields, targets_from_frames
-from ahf_ros.features.homography import reference_frames
+from ahf_ros.features.homography import local_frames
 from ahf_ros.features.large_targets import targets_of_octaves
 from ahf_ros.features.pyramid import ImagePyramid, Octave, image_pyramid
 from ahf_ros.imaging.image import as_gray, check_image
@@ -115,7 +115,7 @@ class GsiDetector(FamilyDetector):
         moved = np.hypot(*(placed.homographies[:, :2, 2] - [(it.x, it.y) for it in dotted]).T)
         reach = np.maximum(_FARTHEST, _FARTHEST * np.array([it.semi_minor for it in dotted]))
         words = np.array([it.code for it in dotted])
-        places = _fields(placed.homographies, placed.covariance, words, code)
+        places = _fields(placed.homographies, placed.covariance, placed.scale, words, code)
         better: dict[Target, Target] = {
             target: replace(target, **place)
             for target, place, good in zip(
@@ -146,7 +146,7 @@ def find_hypotheses(
     first = read_targets(pyramid, whole, code, obvious=True)
     certain = first.select(resolve(first, code, OBVIOUS))
     which = _dots_of(certain.words, code)
-    places, radii = code.places[which], code.radii[which]
+    places, radii = code.places[which], code.radii[which] * certain.scale[:, None]
     rest, explained = np.ones(len(whole.frames), bool), []
     for frames in dot_frames(certain.homographies, places, (1 + _MARGIN) * radii):
         rest &= ~inside(whole.frames[:, :2, 2], frames)
@@ -170,22 +170,23 @@ def read_targets(
     obvious : bool
         As for `plausible`.
     """
-    templates = find_templates(dots, code)
+    templates = seen_templates(pyramid.logs[0], find_templates(dots, code), code)
     if not len(templates.homographies):
         return no_hypotheses()
-    evidence = find_evidence(pyramid.logs[0], templates.homographies, templates.polarity, code)
-    readings = read_codes(evidence, code)
+    evidence = find_evidence(
+        pyramid.logs[0], templates.homographies, templates.polarity, templates.scale, code
+    )
+    readings = read_codes(evidence, templates.scale, code)
     which = plausible(templates, readings, code, obvious=obvious)
     if not len(which):
         return no_hypotheses()
     some, words = templates.select(which), readings.words[which]
-    first = _placed(pyramid, some.homographies, some.polarity, words, code)
+    first = _placed(pyramid, some.homographies, some.polarity, some.scale, words, code)
     again = np.flatnonzero((first.words != words) & (first.support >= _PROMISING))
     if not len(again):
         return first
-    second = _placed(
-        pyramid, first.homographies[again], some.polarity[again], first.words[again], code
-    )
+    found = first.select(again)
+    second = _placed(pyramid, found.homographies, found.polarity, found.scale, found.words, code)
     return first.replaced(again, second)
 
 
@@ -193,20 +194,24 @@ def _placed(
     pyramid: ImagePyramid,
     homographies: np.ndarray,
     polarity: np.ndarray,
+    scale: np.ndarray,
     words: np.ndarray,
     code: PointFamily,
 ) -> Hypotheses:
     """Return hypotheses with homographies through all of their dots, read once more."""
     dots = _dots_of(words, code)
     places, radii = code.places[dots], code.radii[dots]
-    frames = dot_frames(homographies, places, radii)
+    frames = dot_frames(homographies, places, radii * scale[:, None])
     placement = place_targets(pyramid.gray, frames, polarity, places, radii, code.reach)
-    evidence = find_evidence(pyramid.logs[0], placement.homographies, polarity, code)
-    readings = read_codes(evidence, code)
+    evidence = find_evidence(
+        pyramid.logs[0], placement.homographies, polarity, placement.scale, code
+    )
+    readings = read_codes(evidence, placement.scale, code)
     return Hypotheses(
         placement.homographies,
         placement.covariance,
         polarity,
+        placement.scale,
         readings.words,
         confidence_features(placement, readings, code),
     )
@@ -215,7 +220,7 @@ def _placed(
 def report(hypotheses: Hypotheses, code: PointFamily) -> list[Target]:
     """Return the targets whose codes are certain, each ID once."""
     some = hypotheses.select(resolve(hypotheses, code))
-    fields = _fields(some.homographies, some.covariance, some.words, code)
+    fields = _fields(some.homographies, some.covariance, some.scale, some.words, code)
     return [
         DottedTarget(
             id=code.number(int(word)) or 0,
@@ -267,13 +272,19 @@ def _dots_of(words: np.ndarray, code: PointFamily) -> np.ndarray:
 
 
 def _fields(
-    homographies: np.ndarray, covariance: np.ndarray, words: np.ndarray, code: PointFamily
+    homographies: np.ndarray,
+    covariance: np.ndarray,
+    scale: np.ndarray,
+    words: np.ndarray,
+    code: PointFamily,
 ) -> list[dict[str, Any]]:
     """Return the fields of targets that say where they and their dots are."""
-    radius = float(code.template_radii[code.reference])
-    fields = ellipse_fields(reference_frames(homographies, radius), covariance)
     which = _dots_of(words, code)
-    frames = dot_frames(homographies, code.places[which], code.radii[which])
+    places, radii = code.places[which], code.radii[which] * scale[:, None]
+    own = [code.reference]
+    references = local_frames(homographies, places[:, own], radii[:, own])[:, 0]
+    fields = ellipse_fields(references, covariance)
+    frames = dot_frames(homographies, places, radii)
     axes = np.stack(frame.ellipse_axes(frames.reshape(-1, 3, 3)), axis=1)
     ellipses = np.concatenate([frames[..., :2, 2], axes.reshape(*which.shape, 3)], axis=2)
     return [

@@ -6,11 +6,12 @@ smaller steps than that. The brighter side of an edge tells how small; noise cou
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ahf_ros.codes.gsi import PointFamily
+from ahf_ros.detectors.gsi.grouping import Templates
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.dot_evidence import circle_sides, dot_evidence, independent_rays
 from ahf_ros.features.frame import ellipse_axes
@@ -34,6 +35,9 @@ _SMOOTHING = np.exp(-0.5 * (_DISTANCE / _SPREAD) ** 2)
 _SMOOTHING /= _SMOOTHING.sum(axis=1, keepdims=True)
 
 
+_CONTRADICTED = -6.0  # evidence at a place of a template dot that nearly rules one out
+
+
 @dataclass(frozen=True, slots=True)
 class Evidence(ArrayRecord):
     """Evidence at the places of k targets; the template dots come before the positions.
@@ -50,8 +54,30 @@ class Evidence(ArrayRecord):
     inside: np.ndarray
 
 
+def seen_templates(log: np.ndarray, templates: Templates, family: PointFamily) -> Templates:
+    """Return the templates in the image at all of whose places there may be a dot.
+
+    Parameters
+    ----------
+    log : ndarray of int16, shape (height, width)
+        LOG_SCALE ln(I + 8).
+    templates : Templates
+    family : PointFamily
+    """
+    alone = replace(family, positions=family.positions[:0], position_radii=np.zeros(0))
+    evidence = find_evidence(
+        log, templates.homographies, templates.polarity, templates.scale, alone
+    )
+    seen = evidence.inside & (evidence.ratio > _CONTRADICTED)
+    return templates.select(np.flatnonzero(seen.all(axis=1)))
+
+
 def find_evidence(
-    log: np.ndarray, homographies: np.ndarray, polarity: np.ndarray, family: PointFamily
+    log: np.ndarray,
+    homographies: np.ndarray,
+    polarity: np.ndarray,
+    scale: np.ndarray,
+    family: PointFamily,
 ) -> Evidence:
     """Return the evidence for dots at all places of targets.
 
@@ -61,10 +87,12 @@ def find_evidence(
         LOG_SCALE ln(I + 8).
     homographies : ndarray of float64, shape (k, 3, 3)
     polarity : ndarray of int, shape (k,)
+    scale : ndarray of float64, shape (k,)
+        Radius of the dots in that of the printed design.
     family : PointFamily
     """
     shape, count = (len(homographies), len(family.places)), len(family.template)
-    frames = local_frames(homographies, family.places, family.radii)
+    frames = local_frames(homographies, family.places, family.radii * scale[:, None])
     single = frames.reshape(-1, 3, 3)
     sides, inside = circle_sides(log, single)
     farther, _ = circle_sides(log, single, _FARTHER * ellipse_axes(single)[1])

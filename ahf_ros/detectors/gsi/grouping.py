@@ -1,9 +1,10 @@
 """Templates among the dots of an image.
 
 The ellipse of a dot tells how its neighbourhood is foreshortened, to about a fifth: seen in units
-of its ellipse the template of a target is nearly the printed one, turned. So each dot is tried in
-the role of each template dot, a partner is looked for at the right distance, and a third dot where
-these two predict it. Three dots give an affine map, which predicts the others well.
+of its ellipse the template of a target is nearly the printed one, turned. How large dots are in
+the print is not known. So each dot is tried in the role of each template dot with any neighbour as
+its partner, which tells the scale, and a third dot is looked for where these two predict it. Three
+dots give an affine map, which predicts the others well; their areas tell the radius of the dots.
 """
 
 from __future__ import annotations
@@ -16,20 +17,21 @@ from itertools import pairwise
 import numpy as np
 
 from ahf_ros.codes.gsi import PointFamily
-from ahf_ros.detectors.gsi.pairs import PART, Pairs, neighbours
+from ahf_ros.detectors.gsi.pairs import PART, Pairs, neighbours, radius_scales
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.dots import Dots
 from ahf_ros.features.homography import fit_homographies, local_frames
 from ahf_ros.features.nearest_dots import NearestDots
+from ahf_ros.features.robust import median
 
 _LENGTH_ERROR = (0.35, 0.7)  # of a distance in units of an ellipse: share of it, and dot radii
 _LENGTH_ERROR_OF_MANY = (0.25, 0.5)  # the same, where there are many dots
 _ELLIPSE_ERROR = 0.25  # of the axes of a dot, from those that three dots imply, in ln
 _ELLIPSE_PIXELS = 1.2  # added to it, px over the semi-minor axis: blobs consist of whole pixels
-_PREDICTED = 0.9  # error of a dot that is predicted by three others, dot radii
+_PREDICTED = 0.9  # error of a dot that is predicted by three others, printed dot radii
 _PERSPECTIVE = 0.06  # the same, in its distance from them
-_RESIDUAL = 0.35  # of the dots of a template about a homography, root mean square, dot radii
+_RESIDUAL = 0.35  # of the dots of a template about a homography, root mean square, printed radii
 _PIXELS = 0.35  # the same, px, which counts where dots are small
 _WELL = 0.25  # share of what is accepted, of a template that fits well
 _MAXIMUM_GROUPS = 2000  # of one part, for a homography to be fitted
@@ -49,6 +51,8 @@ class Templates(ArrayRecord):
     members : ndarray of int, shape (k, n)
         Which dot is each template dot, -1 where there is none.
     polarity : ndarray of int, shape (k,)
+    scale : ndarray of float64, shape (k,)
+        Radius of the dots in that of the printed design.
     misfit : ndarray of float64, shape (k,)
         Root mean square distance of the dots from where they should be, as a share of what is
         accepted; a dot that is missing counts as 1.
@@ -57,6 +61,7 @@ class Templates(ArrayRecord):
     homographies: np.ndarray
     members: np.ndarray
     polarity: np.ndarray
+    scale: np.ndarray
     misfit: np.ndarray
 
 
@@ -118,7 +123,7 @@ def _triples(places: np.ndarray, reference: int, thorough: bool) -> list[tuple[i
 
 def _nothing(count: int) -> Templates:
     nobody = np.zeros((0, count), int)
-    return Templates(np.zeros((0, 3, 3)), nobody, np.zeros(0, int), np.zeros(0))
+    return Templates(np.zeros((0, 3, 3)), nobody, np.zeros(0, int), np.zeros(0), np.zeros(0))
 
 
 def _members(
@@ -131,21 +136,34 @@ def _members(
     """Return groups of dots in which a dot has a role, shape (k, n), -1 where one is missing."""
     places = family.places[: len(family.template)]
     role, partner, third = triple
-    arms = (places - places[role]) / family.template_radii[role]
+    radius = family.template_radii[role]
+    arms = (places - places[role]) / radius
     lengths = np.hypot(*arms.T)
-    partners, thirds = pairs.at(arms[partner]), pairs.at(arms[third])
-    degree = np.diff(thirds.start)[partners.first]
-    parts = np.searchsorted(np.cumsum(degree), np.arange(0, degree.sum() + PART, PART))
+    smallest, largest = radius_scales(family)
+    longest = lengths[partner] / smallest
+    apart, shortest = np.abs(pairs.offset), lengths[partner] / largest
+    likely = apart < longest + pairs.error_at(longest)
+    likely &= apart > shortest - pairs.error_at(shortest)
+    likely &= pairs.crowd > (1 + pairs.error[0]) * apart * lengths.max() / lengths[partner]
+    partners = np.flatnonzero(likely)
+    begin, end = pairs.as_long_as(
+        pairs.first[partners], apart[partners] * lengths[third] / lengths[partner]
+    )
+    total = np.cumsum(end - begin)
+    parts = np.searchsorted(total, np.arange(0, total[-1:].sum() + PART, PART))
     found = [np.zeros((0, len(places)), int)]
-    for begin, end in pairwise(parts):
-        first, other = _thirds(partners, slice(begin, end), thirds, arms[partner], arms[third])
-        affine = _affine(partners.offset[first], thirds.offset[other], arms[partner], arms[third])
+    for low, high in pairwise(parts):
+        of_part = slice(low, high)
+        first, other = _thirds(
+            pairs, partners[of_part], begin[of_part], end[of_part], arms[partner], arms[third]
+        )
+        affine = _affine(pairs.offset[first], pairs.offset[other], arms[partner], arms[third])
         members = np.full((len(first), len(places)), -1)
-        members[:, role] = partners.first[first]
-        members[:, partner], members[:, third] = partners.second[first], thirds.second[other]
+        members[:, role] = pairs.first[first]
+        members[:, partner], members[:, third] = pairs.second[first], pairs.second[other]
         base = dots.frames[members[:, role], :2, :2] @ [[1, 0], [0, -1]]
-        affine = base @ affine  # px a dot radius
-        good = _bears_out(dots, members[:, (role, partner, third)], affine)
+        affine = base @ affine  # px a printed dot radius
+        good = _bears_out(dots, members, affine, family, (role, partner, third))
         if not good.any():
             continue
         members, affine = members[good], affine[good]
@@ -163,59 +181,69 @@ def _members(
 
 
 def _thirds(
-    partners: Pairs, part: slice, thirds: Pairs, partner: np.ndarray, third: np.ndarray
+    pairs: Pairs,
+    partners: np.ndarray,
+    begin: np.ndarray,
+    end: np.ndarray,
+    partner: np.ndarray,
+    third: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return pairs, and for each a pair with the same first dot whose second is about a third dot.
 
-    It is where the template has it, turned so that the partner is where the first pair says.
+    It is where the template has it, turned and scaled so that the partner is where the first pair
+    says. Pairs from `begin` to `end` are about as long as that.
     """
-    of_partner, of_third = _complex(partners.offset[part]), _complex(thirds.offset)
-    turn = of_partner / _complex(partner)
-    expected = turn / np.abs(turn) * _complex(third)
-    begin = thirds.start[partners.first[part]]
-    count = thirds.start[partners.first[part] + 1] - begin
+    expected = pairs.offset[partners] / complex(*partner) * complex(*third)
+    count = end - begin
     place = np.repeat(np.arange(len(begin)), count)
     inside = np.arange(len(place)) - np.repeat(np.cumsum(count) - count, count)
     other = begin[place] + inside
-    gap = np.abs(of_third[other] - expected[place])
-    near = gap < thirds.error_at(np.hypot(*third))
-    return part.start + place[near], other[near]
+    gap = np.abs(pairs.offset[other] - expected[place])
+    near = gap < pairs.error_at(np.abs(expected))[place]
+    return partners[place[near]], other[near]
 
 
 def _affine(
     first: np.ndarray, second: np.ndarray, arm: np.ndarray, other: np.ndarray
 ) -> np.ndarray:
     """Return the linear maps, shape (k, 2, 2), that take two arms to their images."""
-    images = np.stack([first, second], axis=2)
+    images = np.array([[first.real, second.real], [first.imag, second.imag]]).transpose(2, 0, 1)
     maps: np.ndarray = images @ np.linalg.inv(np.stack([arm, other], axis=1))
     return maps
 
 
-def _bears_out(dots: Dots, members: np.ndarray, affine: np.ndarray) -> np.ndarray:
-    """Return where the ellipses of three dots are those that their affine map implies."""
+def _bears_out(
+    dots: Dots,
+    members: np.ndarray,
+    affine: np.ndarray,
+    family: PointFamily,
+    roles: tuple[int, int, int],
+) -> np.ndarray:
+    """Return where the ellipses of three dots are those that their affine map implies.
+
+    They may all be larger than printed or smaller, by one factor.
+    """
     good = affine[:, 0, 0] * affine[:, 1, 1] < affine[:, 0, 1] * affine[:, 1, 0]  # y up, then down
     _, minor, _ = frame.ellipse_axes(dots.frames)
-    allowed = _ELLIPSE_ERROR + _ELLIPSE_PIXELS / minor
+    which = members[:, roles]
+    allowed = _ELLIPSE_ERROR + _ELLIPSE_PIXELS / minor[which]
     inverse = np.linalg.inv(dots.frames[:, :2, :2])
-    for column in members.T:
-        relative = inverse[column] @ affine
-        square = (relative**2).sum(axis=(1, 2)) / 2
-        determinant = np.abs(_cross(relative[:, 0], relative[:, 1]))
-        half = np.sqrt(np.maximum(square**2 - determinant**2, 0))
-        large = np.log(np.maximum(square + half, 1e-9)) / 2
-        small = np.log(np.maximum(square - half, 1e-9)) / 2
-        good &= (large < allowed[column]) & (small > -allowed[column])
-    return good
+    printed = family.template_radii[[*roles]] / family.template_radii[roles[0]]
+    relative = inverse[which] @ affine[:, None] * printed[:, None, None]
+    square = (relative**2).sum(axis=(2, 3)) / 2
+    determinant = np.abs(_cross(relative[:, :, 0], relative[:, :, 1]))
+    half = np.sqrt(np.maximum(square**2 - determinant**2, 0))
+    large = np.log(np.maximum(square + half, 1e-9)) / 2
+    small = np.log(np.maximum(square - half, 1e-9)) / 2
+    scale = -np.median((large + small) / 2, axis=1)
+    good &= ((large + scale[:, None] < allowed) & (small + scale[:, None] > -allowed)).all(axis=1)
+    smallest, largest = np.log(radius_scales(family))
+    return good & (scale > smallest - allowed[:, 0]) & (scale < largest + allowed[:, 0])
 
 
 def _cross(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     area: np.ndarray = first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
     return area
-
-
-def _complex(points: np.ndarray) -> np.ndarray:
-    values: np.ndarray = points[..., 0] + 1j * points[..., 1]
-    return values
 
 
 def _fitted(dots: Dots, members: np.ndarray, family: PointFamily, polarity: int) -> Templates:
@@ -227,13 +255,18 @@ def _fitted(dots: Dots, members: np.ndarray, family: PointFamily, polarity: int)
     fit = fit_homographies(places, images, there.astype(float), reach)
     expected = frame.project(fit.homographies, places)
     squares = ((expected - images) ** 2).sum(axis=2)
-    _, minor, _ = frame.ellipse_axes(dots.frames)
-    allowed = np.maximum(_RESIDUAL * minor[members], _PIXELS)
+    implied = local_frames(fit.homographies, places, family.template_radii).reshape(-1, 3, 3)
+    minor = frame.ellipse_axes(implied)[1].reshape(members.shape)
+    allowed = np.maximum(_RESIDUAL * minor, _PIXELS)
     relative = np.where(there, squares / allowed**2, 1.0)
     misfit = np.sqrt(relative.mean(axis=1))
     good = (misfit < 1) & (np.linalg.det(fit.homographies) < 0)  # y is up, then down
-    templates = Templates(fit.homographies, members, np.full(len(members), polarity), misfit)
-    return templates.select(good)
+    ratio = frame.mean_radii(dots.frames)[members] / frame.mean_radii(implied).reshape(there.shape)
+    scale = median(ratio, there)
+    smallest, largest = radius_scales(family)
+    good &= (scale > smallest) & (scale < largest)
+    signs = np.full(len(members), polarity)
+    return Templates(fit.homographies, members, signs, scale, misfit).select(good)
 
 
 def _mostly_empty(templates: Templates, nearest: NearestDots, family: PointFamily) -> np.ndarray:

@@ -39,6 +39,8 @@ class Hypotheses(ArrayRecord):
     covariance : ndarray of float64, shape (k, 2, 2)
         Of the image of the reference point, px^2.
     polarity : ndarray of int, shape (k,)
+    scale : ndarray of float64, shape (k,)
+        Radius of the dots in that of the printed design.
     words : ndarray of int64, shape (k,)
         Value of the code.
     features : ndarray of float64, shape (k, 7)
@@ -48,6 +50,7 @@ class Hypotheses(ArrayRecord):
     homographies: np.ndarray
     covariance: np.ndarray
     polarity: np.ndarray
+    scale: np.ndarray
     words: np.ndarray
     features: np.ndarray
 
@@ -66,7 +69,7 @@ def no_hypotheses() -> Hypotheses:
     """Return the record of none."""
     nobody = np.zeros(0, int)
     nowhere, unmeasured = np.zeros((0, 3, 3)), np.zeros((0, 2, 2))
-    return Hypotheses(nowhere, unmeasured, nobody, nobody, np.zeros((0, FEATURES)))
+    return Hypotheses(nowhere, unmeasured, nobody, np.zeros(0), nobody, np.zeros((0, FEATURES)))
 
 
 def plausible(

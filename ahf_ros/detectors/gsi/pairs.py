@@ -1,4 +1,4 @@
-"""Pairs of dots that may belong to one target, by distance and size."""
+"""Pairs of dots that may belong to one target."""
 
 from __future__ import annotations
 
@@ -15,22 +15,25 @@ from ahf_ros.features.neighbours import pairs_within
 PART = 400_000
 """Pairs or triples of dots at a time, which bounds the memory."""
 
+_RADII = (0.065, 0.43)
+# Of dots, in the least distance of two template dots: 1.0 to 3.6 mm where these are 11 mm apart,
+# and a third more for bright ones that bloom.
 _SIZE_RATIO = 0.55  # of two dots of a target, in ln, for their printed sizes
 _CROWD = 5  # times the dots of a target, from which on so many neighbours make a pattern of light
 
 
 @dataclass(frozen=True, slots=True)
 class Pairs:
-    """Ordered pairs of neighbours, sorted by the first one.
+    """Ordered pairs of neighbours, sorted by the first one, then by their length.
 
     Attributes
     ----------
     first, second : ndarray of int, shape (p,)
         Indices of dots.
-    offset : ndarray of float64, shape (p, 2)
+    offset : ndarray of complex128, shape (p,)
         From the first to the second, y up, in units of the ellipse of the first.
-    start : ndarray of int, shape (k + 1,)
-        Where the pairs of each dot begin.
+    crowd : ndarray of float64, shape (p,)
+        How far from the first dot there are so many others that no target is that large.
     error : tuple of 2 float
         Of the offsets: a share of their length, and what is added to it.
     """
@@ -38,20 +41,30 @@ class Pairs:
     first: np.ndarray
     second: np.ndarray
     offset: np.ndarray
-    start: np.ndarray
+    crowd: np.ndarray
     error: tuple[float, float]
 
-    def at(self, arm: np.ndarray) -> Pairs:
-        """Return the pairs that are about as far apart as a printed arm is long."""
-        length = np.hypot(*arm)
-        near = np.abs(np.hypot(*self.offset.T) - length) < self.error_at(length)
-        before = np.concatenate([[0], np.cumsum(near)])
-        columns = (self.first[near], self.second[near], self.offset[near])
-        return Pairs(*columns, before[self.start], self.error)
+    def as_long_as(self, first: np.ndarray, lengths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return where the pairs with given first dots and about given lengths begin and end."""
+        own = np.abs(self.offset)
+        apart = 2 * own.max(initial=0.0) + 1
+        key, error = self.first * apart + own, self.error_at(lengths)
+        low, high = np.maximum(lengths - error, 0), np.minimum(lengths + error, apart / 2)
+        begin = np.searchsorted(key, first * apart + low)
+        return begin, np.maximum(np.searchsorted(key, first * apart + high), begin)
 
-    def error_at(self, length: float) -> float:
-        """Return how far an offset may be from where it should be at a length."""
-        return self.error[0] * length + self.error[1]
+    def error_at(self, lengths: np.ndarray) -> np.ndarray:
+        """Return how far offsets may be from where they should be at some lengths."""
+        return self.error[0] * lengths + self.error[1]
+
+
+def radius_scales(family: PointFamily) -> tuple[float, float]:
+    """Return the bounds of the radii that dots may have, in those of the printed design."""
+    places = family.places[: len(family.template)]
+    gaps = np.hypot(*(places[:, None] - places).transpose(2, 0, 1))
+    least = float(gaps[gaps > 0].min()) / float(family.template_radii[family.reference])
+    smallest, largest = _RADII
+    return min(smallest * least, 1.0), max(largest * least, 1.0)
 
 
 def neighbours(
@@ -73,10 +86,11 @@ def neighbours(
         As in `Pairs`.
     """
     places = family.places[: len(family.template)]
+    smallest, _ = radius_scales(family)
     longest = max(
-        float(np.hypot(*(places[list(others)] - places[role]).T).max() / radius)
+        float(np.hypot(*(places[list(others)] - places[role]).T).max())
+        / (smallest * float(family.template_radii[role]))
         for role, *others in triples
-        for radius in family.template_radii[[role]]
     )
     reach = (1 + error[0]) * longest + error[1]
     centres = dots.frames[:, :2, 2]
@@ -84,16 +98,22 @@ def neighbours(
     inverse = np.linalg.inv(dots.frames[:, :2, :2])
     widest = np.log(family.template_radii.max() / family.template_radii.min())
     crowd = _CROWD * (len(places) + family.rule.dots)
-    parts = [(np.zeros(0, int), np.zeros(0, int), np.zeros((0, 2)))]
+    parts = [(np.zeros(0, int), np.zeros(0, int), np.zeros(0, complex), np.zeros(0))]
     for first, second in pairs_within(centres, reach * major, PART):
         near = np.abs(np.log(major[second] / major[first])) < _SIZE_RATIO + widest
         first, second = first[near], second[near]
         difference = centres[second] - centres[first]
-        offset = (inverse[first] @ difference[..., None])[..., 0] * [1, -1]
-        distance = np.hypot(*offset.T)
-        near = distance < reach
-        near &= np.bincount(first, near, len(centres))[first] < crowd
-        parts.append((first[near], second[near], offset[near]))
-    first, second, offset = (np.concatenate(column) for column in zip(*parts, strict=True))
-    start = np.searchsorted(first, np.arange(len(centres) + 1))
-    return Pairs(first, second, offset, start, error)
+        across, down = (inverse[first] @ difference[..., None])[..., 0].T
+        offset = across - 1j * down
+        length = np.abs(offset) / (2 * reach)
+        near = np.flatnonzero(length < 0.5)
+        order = near[np.argsort(first[near] + length[near])]
+        first, second, offset = first[order], second[order], offset[order]
+        rank = np.arange(len(first)) - np.searchsorted(first, first)
+        limit = np.full(len(centres), np.inf)
+        last = rank == crowd
+        limit[first[last]] = np.abs(offset[last])
+        near = np.flatnonzero(rank < crowd)
+        parts.append((first[near], second[near], offset[near], limit[first[near]]))
+    first, second, offset, limit = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return Pairs(first, second, offset, limit, error)

@@ -30,25 +30,25 @@ class Readings(ArrayRecord):
         Evidence for a target with this code: for its dots, and against dots at all other places,
         as a share of the most there may be.
     weakest : ndarray of float64, shape (k,)
-        The second lowest evidence for one of its dots.
-    strangest : ndarray of float64, shape (k,)
-        The highest evidence for a dot where it has none.
+        The lowest evidence for one of its dots.
     """
 
     words: np.ndarray
     margin: np.ndarray
     support: np.ndarray
     weakest: np.ndarray
-    strangest: np.ndarray
 
 
-def read_codes(evidence: Evidence, family: PointFamily) -> Readings:
+def read_codes(evidence: Evidence, scale: np.ndarray, family: PointFamily) -> Readings:
     """Return the codes that the evidence speaks for.
 
     Parameters
     ----------
     evidence : Evidence
         Of k groups.
+    scale : ndarray of float64, shape (k,)
+        Radius of the dots in that of the printed design. What is seen at places nearer to dots
+        than two radii is these dots, and tells nothing new.
     family : PointFamily
     """
     count = len(family.template)
@@ -61,18 +61,28 @@ def read_codes(evidence: Evidence, family: PointFamily) -> Readings:
     scores[rows, best] = highest - _GREATEST_MARGIN
     margin = highest - scores.max(axis=1)
     marked = incidence[best] > 0
+    empty = ~marked & ~_covered(marked, scale, family)
     of_dots = np.concatenate([template, np.where(marked, positions, _MOST_FOR)], axis=1)
-    against = np.where(marked, 0.0, -positions).sum(axis=1)
+    against = np.where(empty, -positions, 0.0).sum(axis=1)
     dots = template.sum(axis=1) + np.where(marked, positions, 0.0).sum(axis=1)
-    empty = (~marked & evidence.inside[:, count:]).sum(axis=1)
-    most = (count + marked.sum(axis=1)) * _MOST_FOR + empty * _MOST_AGAINST
+    empty &= evidence.inside[:, count:]
+    most = (count + marked.sum(axis=1)) * _MOST_FOR + empty.sum(axis=1) * _MOST_AGAINST
     return Readings(
         family.words[best],
         margin,
         (dots + against) / most,
-        np.sort(of_dots, axis=1)[:, 1],
-        np.where(marked, -_MOST_AGAINST, positions).max(axis=1, initial=-_MOST_AGAINST),
+        of_dots.min(axis=1),
     )
+
+
+def _covered(marked: np.ndarray, scale: np.ndarray, family: PointFamily) -> np.ndarray:
+    """Return which positions lie within two radii of a dot, shape (k, positions)."""
+    count, places, radii = len(family.template), family.places, family.radii
+    gaps = np.hypot(*(places[:, None] - places[count:]).transpose(2, 0, 1))
+    near = gaps / (radii[:, None] + radii[count:]) < scale[:, None, None]
+    shown = np.concatenate([np.ones((len(marked), count), bool), marked], axis=1)
+    covered: np.ndarray = (near & shown[:, :, None]).any(axis=1)
+    return covered
 
 
 @lru_cache(maxsize=8)

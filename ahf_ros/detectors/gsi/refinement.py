@@ -49,15 +49,18 @@ class Placement(ArrayRecord):
     misplacement : ndarray of float64, shape (k,)
         Sum of ln(1 + (d / s)^2) over the dots but the worst, with the distance d of a dot from
         the homography and the usual one, s.
-    growth : ndarray of float64, shape (k,)
-        Their usual radius over that which the homography implies, in ln.
+    scale : ndarray of float64, shape (k,)
+        Usual radius of the dots in that of the printed design.
+    unevenness : ndarray of float64, shape (k,)
+        Usual difference of a radius from that, in ln.
     """
 
     homographies: np.ndarray
     covariance: np.ndarray
     share: np.ndarray
     misplacement: np.ndarray
-    growth: np.ndarray
+    scale: np.ndarray
+    unevenness: np.ndarray
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,6 +157,7 @@ def place_targets(
     places : ndarray of float64, shape (k, n, 2)
         Of the dots in the printed design, about the reference point.
     radii : ndarray of float64, shape (k, n)
+        Printed ones; those in the image may all be larger or smaller by one factor.
     reach : float
         Size of the printed design.
     """
@@ -165,11 +169,16 @@ def place_targets(
     centres = np.where(near[..., None], fitted, frames[..., :2, 2])
     weights = np.linalg.inv(dots.covariance).reshape(*shape, 2, 2)
     robust = weights
+    size = np.log(mean_radii(dots.frames)).reshape(shape)
+    measured = found | ~found.any(axis=1, keepdims=True)
     shift = np.zeros((*shape, 2))
     for _ in range(_ROUNDS):
         fit = fit_homographies(places, centres - shift, robust, reach)
         expected = project(fit.homographies, places[:, :, None])[:, :, 0]
-        shift = ellipse_centres(fit.homographies, places, radii) - expected
+        implied = mean_radii(local_frames(fit.homographies, places, radii).reshape(-1, 3, 3))
+        growth = size - np.log(implied).reshape(shape)
+        scale = np.exp(median(growth, measured))
+        shift = ellipse_centres(fit.homographies, places, radii * scale[:, None]) - expected
         error = (centres - shift - expected)[..., None]
         squares = (error.swapaxes(2, 3) @ weights @ error)[..., 0, 0]
         usual = np.maximum(np.median(squares, axis=1, keepdims=True), 1.0)
@@ -177,17 +186,17 @@ def place_targets(
     # Dots that lie farther from the homography than they should say how wrong the errors are.
     free = max(2 * shape[1] - 8, 1)
     excess = np.maximum((squares / (1 + squares / _OUTLIER**2)).sum(axis=1) / free, 1.0)
-    implied = local_frames(fit.homographies, places, radii).reshape(-1, 3, 3)
-    usual_distance = _USUAL[0] + _USUAL[1] * mean_radii(implied).reshape(shape)
+    usual_distance = _USUAL[0] + _USUAL[1] * np.exp(size)
     distance = np.hypot(*np.moveaxis(fitted - shift - expected, 2, 0)) / usual_distance
     misplaced = np.sort(np.where(found, np.log1p(distance**2), 0.0), axis=1)[:, :-1]
-    growth = np.log(mean_radii(dots.frames) / mean_radii(implied)).reshape(shape)
+    uneven = median(np.abs(growth - np.log(scale)[:, None]), measured)
     return Placement(
         fit.homographies,
         fit.covariance * excess[:, None, None],
         near.mean(axis=1),
         misplaced.sum(axis=1),
-        median(growth, found, 0.0),
+        scale,
+        uneven,
     )
 
 

@@ -57,15 +57,20 @@ def best_words(
             _all_rotations(family) if everything else _near_rotations(of_band, family, expected)
         )
         of_phases = of_band @ ones
+        of_word = np.round(of_phases.max(axis=0), 2)  # last bits differ between processors
+        best = _best(of_word, COMPETITORS)
         if expected:
-            of_phases += prior(competing, family, expected)
-        of_word = of_phases.max(axis=0)
-        # Where fewer words compete, the last ones are repeated.
-        best = np.argpartition(of_word, -min(COMPETITORS, len(of_word)))[-COMPETITORS:]
-        best = np.resize(best[np.argsort(-of_word[best], kind='stable')], COMPETITORS)
+            likely = _best(of_word + prior(competing, family, expected), COMPETITORS // 2)
+            best = np.concatenate([likely, best[: COMPETITORS // 2]])
         words[index] = competing[best]
         phases[index] = likely[index, of_phases[:, best].argmax(axis=0)]
     return words, phases
+
+
+def _best(scores: np.ndarray, count: int) -> np.ndarray:
+    """Return the indices of the highest scores, repeated where there are fewer."""
+    best = np.argpartition(scores, -min(count, len(scores)))[-count:]
+    return np.resize(best[np.argsort(-scores[best], kind='stable')], count)
 
 
 def prior(words: np.ndarray, family: Family, expected: frozenset[int]) -> np.ndarray:

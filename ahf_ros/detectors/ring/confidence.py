@@ -27,10 +27,11 @@ _INTERCEPT, _WEIGHTS = fitted_weights('confidence', 'intercept', 'weights')
 
 
 def features(read: Hypotheses) -> np.ndarray:
-    """Return what tells right readings from others, float64, shape (k, 5).
+    """Return what speaks for readings, float64, shape (k, 6).
 
     Logarithms of the log odds of words against the next ID, against bare paper, against anything
-    and against arcs of any length; and the share of the expected edges that are in their place.
+    and against arcs of any length; the share of the expected edges that are in their place, and
+    that of the band that is seen.
 
     Parameters
     ----------
@@ -38,7 +39,8 @@ def features(read: Hypotheses) -> np.ndarray:
         Of k words.
     """
     against = np.stack([read.margin, read.marked, read.seen, read.coded], axis=1)
-    return np.column_stack([np.sign(against) * np.log1p(np.abs(against)), read.share])
+    odds = np.sign(against) * np.log1p(np.abs(against))
+    return np.column_stack([odds, read.share, 1 - read.hidden])
 
 
 def confidence(values: np.ndarray) -> np.ndarray:
@@ -46,14 +48,14 @@ def confidence(values: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    values : ndarray of float, shape (k, 5)
+    values : ndarray of float, shape (k, 6)
         As `features` gives them.
     """
     return target_probability(values) * _logistic(np.expm1(values[:, 0]))
 
 
 def target_probability(values: np.ndarray) -> np.ndarray:
-    """Return the probabilities that readings are of targets, shape (k,), values (k, 5)."""
+    """Return the probabilities that readings are of targets, shape (k,), values (k, 6)."""
     return _logistic(_INTERCEPT + values @ _WEIGHTS)
 
 

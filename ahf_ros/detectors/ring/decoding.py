@@ -19,6 +19,9 @@ from ahf_ros.features.array_record import ArrayRecord
 
 _DOUBT = 5.0  # most that a reading says for or against a word
 _COVER = 6.0  # price of something that covers a stretch of the band
+_LIKE_PAPER = 8.5  # the same of something that looks like paper
+_USUAL, _IN_LIGHT = 0.05, 15.0  # probability of edges of light from which, times which it grows
+_MORE = 0.6  # of each further reading of that
 _COVERED = 0.1  # the same, of each further reading that it covers
 _BORDER = 4.8  # price of a border of an arc of any length, at one of about 120 angles
 _RANKED = 1.2  # evidence of a reading that ranks words, which one cover must not settle
@@ -42,7 +45,7 @@ class Words(ArrayRecord):
     marked : ndarray of float64, shape (k,)
         Log odds of the word against bare paper, and against anything.
     coded : ndarray of float64, shape (k,)
-        Log odds of the word against arcs of ink of any length.
+        Log odds of the word against arcs of ink of any length, whose ends have no price.
     seen : ndarray of float64, shape (k,)
         Log odds of the word, where it is not covered, against anything.
     hidden : ndarray of bool, shape (k, m)
@@ -109,14 +112,14 @@ def decode(
         ink=np.take_along_axis(some.ink, order, 1),
     )
     evidence_of = _along_words(turned, np.take_along_axis(bits, order[:, None], axis=2))
-    scores = _covered_paths(evidence_of, turned.weight[:, None])
+    scores = _covered_paths(evidence_of, turned)
     likely = scores + prior(words, family, expected)
     rows, best = np.arange(len(read)), likely.argmax(axis=1)
     # What is expected wins a draw, but an ID that is read clearly is no other one.
     margin = np.minimum(
         margins(words, likely, best, family), margins(words, scores, best, family) + _DRAW
     )
-    turned_hidden = _hidden(evidence_of[:, rows, best], turned.weight)
+    turned_hidden = _hidden(evidence_of[:, rows, best], turned)
     hidden = np.empty(turned_hidden.shape, bool)
     np.put_along_axis(hidden, order, turned_hidden, axis=1)
     score = scores[rows, best].astype(np.float64)
@@ -126,7 +129,7 @@ def decode(
         starts=2 * np.pi * phases[rows, best] / angles,
         margin=margin.astype(np.float64),
         marked=score - bare + some.dot,
-        coded=score - _free_paths(turned),
+        coded=score - _free_paths(turned) - _BORDER * _borders(bits[rows, best]),
         seen=score,
         hidden=hidden,
     )
@@ -135,12 +138,22 @@ def decode(
 
 @dataclass(frozen=True, slots=True)
 class _Angles(ArrayRecord):
-    """Evidence of k bands for paper and ink, (k, m), its weight and that of the dot, (k,)."""
+    """Evidence of k bands for paper and ink, (k, m), its weight, that of the dot, and light, (k,).
+
+    Where light has many edges, it explains what looks like paper on a mark.
+    """
 
     paper: np.ndarray
     ink: np.ndarray
     weight: np.ndarray
     dot: np.ndarray
+    lit: np.ndarray
+
+    @property
+    def like_paper(self) -> np.ndarray:
+        """Price of something that looks like paper, float32, shape (k,)."""
+        more = np.maximum(self.lit - np.float32(_USUAL), 0)
+        return np.float32(_LIKE_PAPER) * (1 + np.float32(_IN_LIGHT) * more)
 
 
 def _doubted(evidence: Evidence) -> _Angles:
@@ -150,7 +163,7 @@ def _doubted(evidence: Evidence) -> _Angles:
     """
     most = np.float32(_DOUBT) * evidence.weight[:, None]
     paper, ink = (most * np.tanh(of.sum(axis=1) / most) for of in (evidence.paper, evidence.ink))
-    return _Angles(paper, ink, evidence.weight, evidence.dot)
+    return _Angles(paper, ink, evidence.weight, evidence.dot, evidence.lit)
 
 
 def sectors_by_phase(per_sector: int, family: Family) -> np.ndarray:
@@ -213,41 +226,56 @@ def _along_words(evidence: _Angles, bits: np.ndarray) -> np.ndarray:
     return np.where(border, np.maximum(paper, ink), seen)
 
 
-def _covered_paths(seen: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Return the evidence for words with their best covers, shape (...).
+def _covered_paths(seen: np.ndarray, of: _Angles) -> np.ndarray:
+    """Return the evidence for words with their best covers, shape (k, w).
 
     Parameters
     ----------
-    seen : ndarray of float32, shape (m, ...)
+    seen : ndarray of float32, shape (m, k, w)
         Evidence where nothing covers the band.
-    weight : ndarray of float32
-        Of a reading, of a shape that is broadcast to (...).
+    of : _Angles
+        Of k bands.
     """
-    cost, cover = np.float32(_COVERED) * weight, np.float32(_COVER)
-    clear, covered = seen[0], np.full_like(seen[0], _NEVER)
-    for of_angle in seen[1:]:
-        begun = clear - cover
-        clear = np.maximum(clear, covered) + of_angle
-        covered = np.maximum(covered, begun) - cost
-    return np.maximum(clear, covered)
+    cost, paper = np.float32(_COVERED) * of.weight[:, None], of.paper.T[..., None]
+    price = of.like_paper[:, None]
+    clear = seen[0]
+    covered, like_paper = (np.full_like(clear, _NEVER) for _ in range(2))
+    for of_angle, as_paper in zip(seen[1:], paper[1:], strict=True):
+        before = clear
+        clear = np.maximum(np.maximum(clear, covered), like_paper) + of_angle
+        covered = np.maximum(covered, before - np.float32(_COVER)) - cost
+        like_paper = np.maximum(like_paper, before - price)
+        like_paper += as_paper - np.float32(_MORE) * of.weight[:, None]
+    return np.maximum(np.maximum(clear, covered), like_paper)
 
 
-def _hidden(seen: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Return where the best paths are covered, seen (m, k) and weight (k,), shape (k, m)."""
-    cost, cover = np.float32(_COVERED) * weight, np.float32(_COVER)
-    clear, covered = seen[0], np.full_like(seen[0], _NEVER)
-    uncovers, begins = np.zeros((2, *seen.shape), bool)
+def _hidden(seen: np.ndarray, of: _Angles) -> np.ndarray:
+    """Return where the best paths of one word of each band are covered, seen (m, k), (k, m)."""
+    cost, paper = np.float32(_COVERED) * of.weight, of.paper.T
+    prices = np.stack([0 * cost, np.full_like(cost, _COVER), of.like_paper])
+    scores = np.full((3, seen.shape[1]), _NEVER)
+    scores[0] = seen[0]
+    came = np.zeros((len(seen), 3, seen.shape[1]), np.intp)
+    rows = np.arange(seen.shape[1])
     for index in range(1, len(seen)):
-        begun = clear - cover
-        uncovers[index], begins[index] = covered > clear, begun > covered
-        clear = np.maximum(clear, covered) + seen[index]
-        covered = np.maximum(covered, begun) - cost
+        begun = scores[0] - prices
+        came[index] = np.where(scores >= begun, np.arange(3)[:, None], 0)
+        came[index, 0] = scores.argmax(axis=0)
+        best = np.maximum(scores, begun)
+        best[0] = scores.max(axis=0)
+        more = np.float32(_MORE) * of.weight
+        scores = best + np.stack([seen[index], -cost, paper[index] - more])
     hidden = np.empty(seen.shape, bool)
-    state = covered > clear
+    state = scores.argmax(axis=0)
     for index in range(len(seen) - 1, -1, -1):
-        hidden[index] = state
-        state = np.where(state, ~begins[index], uncovers[index])
+        hidden[index] = state > 0
+        state = came[index, state, rows]
     return hidden.T
+
+
+def _borders(bits: np.ndarray) -> np.ndarray:
+    """Return the number of borders of arcs of ink, bits (k, m), shape (k,)."""
+    return np.count_nonzero(bits != np.roll(bits, 1, axis=1), axis=1)
 
 
 def _free_paths(evidence: _Angles) -> np.ndarray:

@@ -13,7 +13,6 @@ from ahf_ros.features.array_record import ArrayRecord
 WHOLE = 0.9
 """Share of the edge of a dot that is explained, or reported, without a word."""
 
-_LARGE = 12.0  # dot with its margin, px
 _MARGIN = 0.4  # width of the quiet margin round a dot or a band, dot radii
 
 
@@ -51,11 +50,6 @@ class Explained(ArrayRecord):
         radii = np.where(certain, read.reach / minor, 1.0) + _MARGIN
         outlines = frame.circle_outlines(read.frames, radii)
         return Explained(read.frames, outlines, radii * minor, certain, read.edge_shift)
-
-    @property
-    def clear(self) -> np.ndarray:
-        """Whether they are targets, or so large that their edges are clear, shape (k,)."""
-        return self.certain | (self.sizes > _LARGE)
 
     def outlines_in(self, level: int) -> np.ndarray:
         """Return the outlines with edges in the image that is halved `level` times, its px."""

@@ -54,16 +54,30 @@ class Evidence(ArrayRecord):
         Of a reading, which is part of both; less than 1 where neighbours tell the same.
     dot : ndarray of float32, shape (k,)
         Of the dot as ink, over the dot as light on paper.
+    lit : ndarray of float32, shape (k,)
+        Probability that an edge of light lies between two neighbouring readings.
     """
 
     paper: np.ndarray
     ink: np.ndarray
     weight: np.ndarray
     dot: np.ndarray
+    lit: np.ndarray
 
-    def scaled(self, shares: np.ndarray) -> Evidence:
-        """Return the evidence of which only shares of (k, 2, m) count."""
-        return replace(self, paper=self.paper * shares, ink=self.ink * shares)
+    def without(self, covered: np.ndarray, lit: np.ndarray) -> Evidence:
+        """Return the evidence less that of readings beside foreign ground.
+
+        What covers the ground covers the band. Additional light, such as glare, leaves its steps,
+        but what is flat says nothing under it.
+
+        Parameters
+        ----------
+        covered, lit : ndarray of float32, shape (k, 2, m)
+            Shares of readings that something darker lies on, or additional light.
+        """
+        paper, ink = (of * (1 - covered) for of in (self.paper, self.ink))
+        paper = paper - lit * np.maximum(paper, 0)
+        return replace(self, paper=paper, ink=ink - lit * np.minimum(ink, 0))
 
     def plus(self, other: Evidence) -> Evidence:
         """Return the sum of two kinds of evidence at the same angles."""
@@ -72,6 +86,7 @@ class Evidence(ArrayRecord):
             ink=self.ink + other.ink,
             weight=self.weight,
             dot=self.dot + other.dot,
+            lit=np.maximum(self.lit, other.lit),
         )
 
 
@@ -127,7 +142,8 @@ def edge_evidence(
         clear = ~glare | (np.maximum(*seen) < SATURATED)
         paper[:, half], ink[:, half] = np.where(clear, of_paper, 0), np.where(clear, of_ink, 0)
     share = (weight[:, None] * polar.visible)[:, None]
-    return Evidence(paper * share, ink * share, weight, np.zeros_like(weight))
+    dot = np.zeros_like(weight)
+    return Evidence(paper * share, ink * share, weight, dot, edges.astype(np.float32))
 
 
 def light_edges(
@@ -241,14 +257,17 @@ def level_evidence(
         ink=of_halves[1],
         weight=share[:, -1],
         dot=(ink - paper)[..., in_dot].sum(axis=(1, 2)),
+        lit=surprise[:, 0, 0].astype(np.float32),
     )
 
 
-def under_one_light(polar: PolarImages, gap: np.ndarray, margin: np.ndarray) -> np.ndarray:
-    """Return the shares of evidence that count, (k, 2, m), by the light on the ground beside it.
+def foreign_ground(
+    polar: PolarImages, gap: np.ndarray, margin: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return how far something else than the light on the target lies on its ground.
 
-    A small part of the ground that is unlike the rest is no light but something that lies there;
-    where much of it is unlike, it is light.
+    A small part of the ground that is unlike the rest is no light of the scene but something that
+    covers it, or glare; where much of it is unlike, it is light.
 
     Parameters
     ----------
@@ -256,18 +275,22 @@ def under_one_light(polar: PolarImages, gap: np.ndarray, margin: np.ndarray) -> 
         Of k targets.
     gap, margin : ndarray of float32, shape (k, m, d)
         Gray values at d places each.
+
+    Returns
+    -------
+    covered, lit : ndarray of float32, shape (k, 2, m)
+        Where it is darker than the rest, and where it is brighter.
     """
-    halves = np.stack([gap, margin], axis=1)
-    level, noise = polar.logs(halves)
-    flat = level.reshape(len(level), -1)
-    middle = np.median(flat, axis=1, keepdims=True)
-    spread = np.median(np.abs(flat - middle), axis=1, keepdims=True) / _MEDIAN
-    width = np.maximum(np.maximum(spread, _EVEN)[..., None, None], noise)
-    unlike = (np.abs(level - middle[..., None, None]) > _UNLIKE * width).any(axis=3)
+    level, noise = polar.logs(np.stack([gap, margin], axis=1))
+    axes = (1, 2, 3)
+    away = level - np.median(level, axis=axes, keepdims=True)
+    spread = np.median(np.abs(away), axis=axes, keepdims=True) / _MEDIAN
+    width = _UNLIKE * np.maximum(np.maximum(spread, _EVEN), noise)
+    darker, brighter = (away < -width).any(axis=3), (away > width).any(axis=3)
     few, many = _UNLIKE_SHARES
-    doubt = np.clip((many - unlike.mean(axis=(1, 2))) / (many - few), 0, 1)[:, None, None]
-    near = unlike
-    return np.where(near, 1 - doubt, 1.0).astype(np.float32)
+    share = (darker | brighter).mean(axis=(1, 2))
+    doubt = np.clip((many - share) / (many - few), 0, 1).astype(np.float32)[:, None, None]
+    return darker * doubt, (brighter & ~darker) * doubt
 
 
 def _surprise(errors: np.ndarray, width: np.ndarray, which: np.ndarray) -> np.ndarray:

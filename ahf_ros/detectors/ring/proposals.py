@@ -10,10 +10,9 @@ from ahf_ros.codes.ring import Family
 from ahf_ros.detectors.ring.circles import REACH
 from ahf_ros.detectors.ring.explained import Explained
 from ahf_ros.detectors.ring.glance import may_be_targets
-from ahf_ros.detectors.ring.oblique import oblique_dots, rounding
 from ahf_ros.features.circle_fit import Fit, fit_dots
 from ahf_ros.features.dot_search import voted_dots, whole_dots
-from ahf_ros.features.dots import NO_DOTS, Dots
+from ahf_ros.features.dots import Dots
 from ahf_ros.features.pyramid import Octave
 
 Proposal = Callable[[Octave, Sequence[int], Explained], Dots]
@@ -36,16 +35,7 @@ def propose_voted(octave: Octave, polarities: Sequence[int], explained: Explaine
     return voted_dots(octave.pyramid, *octave.radii, polarities, explained=outlines)
 
 
-def propose_oblique(octave: Octave, polarities: Sequence[int], explained: Explained) -> Dots:
-    """Return the dots of an octave that edges vote for where a view is seen straight ahead."""
-    rounded = rounding(explained.select(explained.certain).frames)
-    if rounded is None:
-        return NO_DOTS
-    outlines = explained.select(explained.clear).outlines_in(octave.level)
-    return oblique_dots(octave.pyramid.gray, rounded, *octave.radii, polarities, outlines)
-
-
-PROPOSALS: tuple[Proposal, ...] = (propose_whole, propose_voted, propose_oblique)
+PROPOSALS: tuple[Proposal, ...] = (propose_whole, propose_voted)
 """The ways to propose dots, the fastest first."""
 
 

@@ -20,8 +20,8 @@ from ahf_ros.detectors.ring.light import predicted_light
 from ahf_ros.detectors.ring.likelihood import (
     Evidence,
     edge_evidence,
+    foreign_ground,
     level_evidence,
-    under_one_light,
 )
 from ahf_ros.detectors.ring.polar import PolarImages, angles_of, polar_images
 from ahf_ros.detectors.ring.prior import NOTHING_KNOWN, Prior
@@ -148,6 +148,8 @@ def _words(
     expected: frozenset[int],
 ) -> Words:
     """Return the words of targets by all evidence, with their frames and ink that has grown."""
+    if not len(targets.frames):
+        return Words.none(0, family.bits * PER_SECTOR)
     inner, outer = family.band
     radii = np.concatenate(
         [
@@ -163,8 +165,7 @@ def _words(
     light = predicted_light(gray, targets.frames, polar.lift, angles, radii, family.band)
     evidence = edges.plus(level_evidence(polar, levels, *light, radii, family.band))
     gap, margin = (radii > 1) & (radii < inner), radii > outer
-    counted = under_one_light(polar, levels[..., gap], levels[..., margin])
-    evidence = evidence.scaled(counted)
+    evidence = evidence.without(*foreign_ground(polar, levels[..., gap], levels[..., margin]))
     return decode(evidence, _overhang(growth, family), family, expected)
 
 

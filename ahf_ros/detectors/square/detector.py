@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import ceil, log2
+from math import ceil, isnan, log2
 
 import cv2
 import numpy as np
@@ -86,7 +86,11 @@ class SquareDetector(FamilyDetector):
             return []
         covariances = np.tile(_DRAFT_DEVIATION**2 * np.eye(2), (len(numbers), 1, 1))
         found = _markers(
-            numbers.ravel(), np.reshape(corners, (-1, 4, 2)), covariances, self.family
+            numbers.ravel(),
+            np.reshape(corners, (-1, 4, 2)),
+            covariances,
+            self.family,
+            np.full(len(numbers), np.nan),
         )
         return sorted_targets(found)
 
@@ -120,7 +124,7 @@ class SquareDetector(FamilyDetector):
         corners = _from_halves(gray, np.array([it.corners for it in markers]), cells)
         sides = fit_sides(gray, corners, cells)
         numbers = np.array([it.id for it in markers])
-        moved = _markers(numbers, sides.corners, sides.covariance, self.family)
+        moved = _markers(numbers, sides.corners, sides.covariance, self.family, sides.edge_shift)
         better: dict[Target, Target] = {
             marker: by_sides
             for marker, by_sides, share in zip(markers, moved, sides.share, strict=True)
@@ -147,7 +151,11 @@ def _from_halves(gray: np.ndarray, corners: np.ndarray, cells: int) -> np.ndarra
 
 
 def _markers(
-    numbers: np.ndarray, corners: np.ndarray, covariances: np.ndarray, family: str
+    numbers: np.ndarray,
+    corners: np.ndarray,
+    covariances: np.ndarray,
+    family: str,
+    shifts: np.ndarray,
 ) -> list[SquareMarker]:
     """Return the markers with given corners, shape (k, 4, 2), in the order of `SquareMarker`."""
     corners = corners.astype(np.float64)
@@ -167,9 +175,17 @@ def _markers(
             angle=float(angle),
             covariance=tuple(covariance.ravel().tolist()),
             family=family,
+            edge_shift=None if isnan(shift) else shift,
             corners=tuple((float(u), float(v)) for u, v in of_marker),
         )
-        for number, (x, y), (major, minor), angle, covariance, of_marker in zip(
-            numbers, centres(corners), axes, angles, covariances, corners, strict=True
+        for number, (x, y), (major, minor), angle, covariance, of_marker, shift in zip(
+            numbers,
+            centres(corners),
+            axes,
+            angles,
+            covariances,
+            corners,
+            shifts.tolist(),
+            strict=True,
         )
     ]

@@ -3,16 +3,21 @@
 A side is a straight edge with the dark side inside. Profiles across it are fitted, those that look
 like edges of light lose their weight, and a line is fitted to the rest. A corner is the
 intersection of the lines of two neighbouring sides, so that light near a corner does not move it.
+
+Where ink or light has grown, all edges have moved by one length. White cells beside the border
+show its inner edge, which has moved the other way: that tells how far, and lines are moved back.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 from ahf_ros.features.edge_covariance import common_errors
 from ahf_ros.features.edge_weights import weigh_edges
+from ahf_ros.features.frame import project
 from ahf_ros.features.light_slope import common_slope, smooth_slopes, unevenness
 from ahf_ros.features.profiles import (
     BLURS,
@@ -42,6 +47,9 @@ _DIFFERENCE = 1e-3  # step of numerical derivatives, px
 _FEWEST = 3.0  # independent edges of a side, two of which its line takes
 _NO_WEIGHT = 1e-9  # instead of a sum of no weights
 _THROUGH = 0.25  # of what cells behind the border do to a centre, px, by (blur / cell)^2
+_IN_CELL = (0.35, 0.5, 0.65)  # where the inner edge of the border is measured, in each cell
+_FEWEST_INNER = 6  # such edges, of which the usual one tells the shift of all edges
+_THICK = 4.0  # width of a border of which both edges can be told, blurs
 _SYSTEMATIC = 0.003  # standard deviation of the effects of lens distortion and pixels, px
 
 
@@ -57,11 +65,15 @@ class Sides:
         Fraction of the edges that belong to their line, minimum over the four sides.
     covariance : ndarray of float64, shape (k, 2, 2)
         Covariance of the centre, px^2.
+    edge_shift : ndarray of float64, shape (k,)
+        Length by which dark areas are larger in the image than in the print, on every edge, px;
+        NaN where that was not measured. The corners are those without it.
     """
 
     corners: np.ndarray
     share: np.ndarray
     covariance: np.ndarray
+    edge_shift: np.ndarray
 
 
 def centres(corners: np.ndarray) -> np.ndarray:
@@ -96,7 +108,7 @@ def fit_sides(gray: np.ndarray, corners: np.ndarray, cells: int) -> Sides:
     -------
     Sides
     """
-    blur = np.full(len(corners), USUAL_BLUR)
+    blur, contrast = np.full(len(corners), USUAL_BLUR), np.ones(len(corners))
     share, covariance = np.zeros(len(corners)), np.zeros((len(corners), 2, 2))
     for _ in range(_MEASUREMENTS if len(corners) else 0):
         starts, ends = corners, np.roll(corners, -1, axis=1)
@@ -105,6 +117,7 @@ def fit_sides(gray: np.ndarray, corners: np.ndarray, cells: int) -> Sides:
         edges = measure_outlines(gray, points, blur, reach=1.0)
         blur = np.clip(blur + median(edges.softness, edges.visible, 0.0), *BLURS)
         own = weigh_edges(edges)
+        contrast = own.contrast
         step = np.maximum(edges.bright - edges.dark, _MINIMUM_STEP)
         of_side = (len(corners), 4, _PROFILES)
         slopes, uneven = _slopes(edges, own.weights)
@@ -123,7 +136,55 @@ def fit_sides(gray: np.ndarray, corners: np.ndarray, cells: int) -> Sides:
         through = _THROUGH * (blur / np.maximum(cell, 1.0)) ** 2
         covariance *= (1 + _BY_LIGHT * uneven)[:, None, None]
         covariance += (through**2)[:, None, None] * np.eye(2)
-    return Sides(corners, share, covariance)
+    shift = _edge_shift(gray, corners, cells, blur, contrast)
+    back = np.where(np.isfinite(shift), -shift, 0.0)[:, None, None]
+    ends = np.roll(corners, -1, axis=1)
+    moved = back * _normals(corners, ends)
+    return Sides(_met(corners + moved, ends + moved), share, covariance, shift)
+
+
+def _edge_shift(
+    gray: np.ndarray, corners: np.ndarray, cells: int, blur: np.ndarray, contrast: np.ndarray
+) -> np.ndarray:
+    """Return by how much dark areas have grown, shape (k,), from both edges of the borders.
+
+    Parameters
+    ----------
+    gray, corners, cells
+        As for `fit_sides`; corners are where the sides that were measured meet.
+    blur : ndarray of float64, shape (k,)
+        Of the edges, standard deviation in px.
+    contrast : ndarray of float64, shape (k,)
+        Gray value of ink over that of paper.
+    """
+    along = np.add.outer(np.arange(1, cells - 1), _IN_CELL).ravel() / cells
+    side = np.stack([along, np.full(along.size, 1 / cells)], axis=1) - 0.5
+    turns = [np.linalg.matrix_power(np.array([[0, -1], [1, 0]]), turn) for turn in range(4)]
+    print_corners = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]], np.float32)
+    planes = [cv2.getPerspectiveTransform(print_corners, of.astype(np.float32)) for of in corners]
+    frames = np.array(planes).reshape(-1, 3, 3)
+    points, before, inner = (
+        project(frames, np.stack([(side + offset) @ turn.T for turn in turns]))
+        for offset in ((0.0, 0.0), (-0.1 / cells, 0.0), (0.0, 0.9 / cells))
+    )
+    normals = _normals(before, points)
+    cell = np.linalg.norm(inner - points, axis=3)
+    each = (len(corners), 4 * along.size)
+    outlines = OutlinePoints(
+        points.reshape(*each, 2),
+        normals.reshape(*each, 2),
+        -np.ones(each, int),
+        _REACH_IN_CELLS * cell.reshape(each),
+        (cell * (_IN_CELL[1] - _IN_CELL[0])).reshape(each),
+        np.zeros(each),
+    )
+    edges = measure_outlines(gray, outlines, blur, reach=1.0)
+    halfway = (1 + contrast[:, None]) / 2 * edges.bright
+    seen = edges.visible & (edges.bright > _MINIMUM_STEP) & (edges.dark < halfway)
+    thick = cell.reshape(each).min(axis=1, initial=np.inf) > _THICK * blur
+    # The outer sides, whose places these are relative to, have moved outwards by it.
+    shift = -median(edges.offset, seen, np.nan) / (2 - 2 / cells)
+    return np.where(thick & (seen.sum(axis=1) >= _FEWEST_INNER), shift, np.nan)
 
 
 def _slopes(edges: Edges, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -145,10 +206,10 @@ def _slopes(edges: Edges, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _normals(starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """Return the outward unit normals of sides, shape (k, 4, 2)."""
+    """Return the outward unit normals of sides, shape (..., 2)."""
     sides = ends - starts
-    lengths = np.maximum(np.linalg.norm(sides, axis=2, keepdims=True), 1e-9)
-    return np.stack([sides[..., 1], -sides[..., 0]], axis=2) / lengths
+    lengths = np.maximum(np.linalg.norm(sides, axis=-1, keepdims=True), 1e-9)
+    return np.stack([sides[..., 1], -sides[..., 0]], axis=-1) / lengths
 
 
 def _outlines(
@@ -230,10 +291,7 @@ def _corners(
     """Return the intersections of neighbouring sides, and the covariance of the centres."""
 
     def met(offsets: np.ndarray) -> np.ndarray:
-        first = starts + offsets[..., :1] * normals
-        second = ends + offsets[..., 1:] * normals
-        before, behind = (np.roll(of, 1, axis=1) for of in (first, second))
-        return _meet(before, behind, first, second)
+        return _met(starts + offsets[..., :1] * normals, ends + offsets[..., 1:] * normals)
 
     corners = met(lines.offsets)
     middle = centres(corners)
@@ -245,6 +303,12 @@ def _corners(
         change = np.stack([centres(met(of)) - middle for of in moved], axis=2) / _DIFFERENCE
         covariance += change @ lines.covariance[:, side] @ change.transpose(0, 2, 1)
     return corners, covariance
+
+
+def _met(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Return where sides from first to second points, shape (k, 4, 2), meet those before them."""
+    before, behind = (np.roll(of, 1, axis=1) for of in (first, second))
+    return _meet(before, behind, first, second)
 
 
 def _meet(
