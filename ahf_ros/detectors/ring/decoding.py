@@ -97,7 +97,8 @@ def decode(
     per_sector = angles // family.bits
     cap = _RANKED * of_bands.weight[:, None]
     ranked = np.clip(of_bands.ink - of_bands.paper, -cap, cap)
-    sectors = ranked[:, sectors_by_phase(per_sector, family)].sum(axis=3)
+    sectors = ranked[:, sectors_by_phase(per_sector, family)]
+    sectors = (sectors * _middles(overhang, per_sector)[:, None, None]).sum(axis=3)
     words, phases = best_words(sectors, family, expected)
     read = np.flatnonzero(words[:, 0] > 0)
     decoded = Words.none(count, angles)
@@ -176,6 +177,13 @@ def sectors_by_phase(per_sector: int, family: Family) -> np.ndarray:
     count = family.bits * per_sector
     first = np.arange(per_sector)[:, None] + np.arange(0, count, per_sector)
     return (first[..., None] + np.arange(per_sector)) % count
+
+
+def _middles(overhang: np.ndarray, per_sector: int) -> np.ndarray:
+    """Return which angles of sectors no neighbour's overhang reaches, (k, per_sector)."""
+    away = np.abs(np.arange(per_sector) - (per_sector - 1) / 2)
+    reach = np.maximum(per_sector / 2 - np.rint(np.abs(overhang)), 1)
+    return away < reach[:, None]
 
 
 def bits_at(words: np.ndarray, phases: np.ndarray, per_sector: int, family: Family) -> np.ndarray:

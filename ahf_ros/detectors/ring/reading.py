@@ -123,6 +123,7 @@ def best_growth(
     band : tuple of 2 float
         Radii of the band, dot radii.
     prior : Prior
+        What is known before, in px of the image.
     """
     best = np.full(len(polar.size), -np.inf)
     growth = np.zeros(len(polar.size))
@@ -166,7 +167,8 @@ def _words(
     evidence = edges.plus(level_evidence(polar, levels, *light, radii, family.band))
     gap, margin = (radii > 1) & (radii < inner), radii > outer
     evidence = evidence.without(*foreign_ground(polar, levels[..., gap], levels[..., margin]))
-    return decode(evidence, _overhang(growth, family), family, expected)
+    words = decode(evidence, _overhang(growth, family), family, expected)
+    return replace(words, hidden=words.hidden | ~polar.visible)
 
 
 def _mean_odds(words: Words, weight: np.ndarray) -> np.ndarray:
