@@ -13,10 +13,10 @@ from typing import ClassVar
 import numpy as np
 
 from ahf_ros.codes.dots import DotFamily, dot_family
+from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import DetectorSettings, FamilyDetector
 from ahf_ros.detectors.dots.discs import small_discs, voted_discs, whole_discs
 from ahf_ros.detectors.dots.refinement import refined
-from ahf_ros.detectors.dots.resolving import best_of_each
 from ahf_ros.detectors.dots.rings import CERTAIN, Rings, read_discs, report
 from ahf_ros.features.large_targets import targets_of_octaves
 from ahf_ros.features.pyramid import ImagePyramid, Octave, image_pyramid
@@ -52,7 +52,7 @@ class DotsDetector(FamilyDetector):
         code = self.design
         pyramid = image_pyramid(as_gray(image), self.settings.max_radius)
         found = targets_of_octaves(pyramid, self.settings.radii, self._identify, self.refine)
-        return sorted_targets(best_of_each(found, code.border_radius))
+        return sorted_targets(best_targets(found, code.border_radius))
 
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
         """Return targets with their places in an image; see `refined`."""

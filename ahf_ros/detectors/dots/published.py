@@ -21,9 +21,9 @@ import cv2
 import numpy as np
 
 from ahf_ros.codes.dots import DotFamily, dot_family
+from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import DetectorSettings, FamilyDetector
 from ahf_ros.detectors.dots.local_otsu import local_otsu
-from ahf_ros.detectors.dots.resolving import best_of_each
 from ahf_ros.detectors.dots.rings import FAMILY
 from ahf_ros.features.ellipse_targets import targets_from_frames
 from ahf_ros.features.frame import affine_frames, circle_points, project
@@ -79,7 +79,7 @@ class PublishedDotsDetector(FamilyDetector):
         for polarity in settings.polarities:
             frames, points = _concentric(polarity * height < 0, settings, code)
             targets += _identified(polarity * height, frames, points, code)
-        targets = best_of_each(targets, code.border_radius)
+        targets = best_targets(targets, code.border_radius)
         if not settings.report_undecoded:
             targets = [target for target in targets if target.id != UNDECODED]
         return sorted_targets(targets)

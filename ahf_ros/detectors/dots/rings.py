@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ahf_ros.codes.dots import DotFamily
+from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.dots.circles import fit_targets
 from ahf_ros.detectors.dots.confidence import (
@@ -18,7 +19,6 @@ from ahf_ros.detectors.dots.confidence import (
     word_probability,
 )
 from ahf_ros.detectors.dots.reading import dot_points, read_rings
-from ahf_ros.detectors.dots.resolving import best_of_each
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.dots import Dots
 from ahf_ros.features.ellipse_targets import ellipse_fields
@@ -144,7 +144,7 @@ def report(rings: Rings, settings: DetectorSettings, code: DotFamily) -> list[Do
     shown = decoded | (settings.report_undecoded & (rings.whole | (rings.of_target >= CERTAIN)))
     which = np.flatnonzero(shown & (major >= minimum) & (major <= maximum))
     targets = _targets(rings.select(which), np.where(decoded, ids, UNDECODED)[which], code)
-    return best_of_each(targets, code.border_radius)
+    return best_targets(targets, code.border_radius)
 
 
 def _targets(rings: Rings, ids: np.ndarray, code: DotFamily) -> list[DottedTarget]:

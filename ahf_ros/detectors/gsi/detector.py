@@ -18,6 +18,7 @@ import numpy as np
 
 from ahf_ros.codes.gsi import PointFamily
 from ahf_ros.codes.gsi_library import point_family
+from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import DetectorSettings, FamilyDetector
 from ahf_ros.detectors.gsi.confidence import confidence_features
 from ahf_ros.detectors.gsi.evidence import find_evidence, seen_templates
@@ -75,12 +76,7 @@ class GsiDetector(FamilyDetector):
         check_image(image)
         pyramid = image_pyramid(as_gray(image), self.settings.max_radius)
         found = targets_of_octaves(pyramid, self.settings.radii, self._identify, self.refine)
-        best: dict[int, Target] = {}
-        for target in sorted(found, key=lambda it: it.confidence):
-            best[target.id] = target
-        single = [target for target in found if target.id == UNDECODED]
-        best.pop(UNDECODED, None)
-        return sorted_targets([*best.values(), *single])
+        return sorted_targets(best_targets(found))
 
     def _identify(self, octave: Octave) -> list[Target]:
         """Return the targets of an octave, in its pixels."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ahf_ros.codes.gsi import PointFamily
+from ahf_ros.detectors.claims import owners
 from ahf_ros.detectors.gsi.confidence import FEATURES, SUPPORT, probability
 from ahf_ros.detectors.gsi.grouping import Templates
 from ahf_ros.detectors.gsi.reading import Readings
@@ -93,17 +94,14 @@ def plausible(
     equal = family.template_radii[family.reference] * _EQUAL
     units = reference_frames(templates.homographies[order], float(equal))
     around = reference_frames(templates.homographies[order], family.reach * _APART)
-    free = np.ones(len(order), bool)
-    words, support, kept = readings.words[order], readings.support[order], []
-    for position in range(len(order)):
-        if free[position]:
-            kept.append(position)
-            free &= ~(_within(units, position) & (words == words[position]))
-            worse = support < support[position] - (0.0 if obvious else _CLEARLY)
-            free &= ~(_within(around, position) & worse)
-            if len(kept) == _MAXIMUM:
-                break
-    return order[kept]
+    words, support = readings.words[order], readings.support[order]
+
+    def rivals(index: int) -> np.ndarray:
+        worse = support < support[index] - (0.0 if obvious else _CLEARLY)
+        equal = _within(units, index) & (words == words[index])
+        return equal | _within(around, index) & worse
+
+    return order[owners(len(order), rivals)][:_MAXIMUM]
 
 
 def resolve(hypotheses: Hypotheses, family: PointFamily, minimum: float = CERTAIN) -> np.ndarray:
@@ -120,13 +118,8 @@ def resolve(hypotheses: Hypotheses, family: PointFamily, minimum: float = CERTAI
     order = np.argsort(-confidence, kind='stable')
     order = order[confidence[order] >= minimum]
     units = reference_frames(hypotheses.homographies[order], family.reach * _SAME)
-    words, kept = hypotheses.words[order], []
-    free = np.ones(len(order), bool)
-    for position in range(len(order)):
-        if free[position]:
-            kept.append(position)
-            free &= ~_within(units, position) & (words != words[position])
-    return order[kept]
+    words = hypotheses.words[order]
+    return order[owners(len(order), lambda it: _within(units, it) | (words == words[it]))]
 
 
 def inside(points: np.ndarray, frames: np.ndarray) -> np.ndarray:

@@ -28,6 +28,7 @@ import numpy as np
 
 from ahf_ros.codes.gsi import PointFamily
 from ahf_ros.codes.gsi_library import point_family
+from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import FamilyDetector
 from ahf_ros.detectors.gsi.published_decoding import LARGEST_BIAS, Decoded, check_family, decode
 from ahf_ros.imaging.image import as_gray, check_image
@@ -75,17 +76,14 @@ class PublishedGsiDetector(FamilyDetector):
         check_image(image)
         settings, code = self.settings, self.design
         gray = as_gray(image)
-        best: dict[int, Target] = {}
-        single: list[Target] = []
+        found: list[Target] = []
         for polarity in settings.polarities:
             dots = find_dots(gray, polarity, settings.min_radius, settings.max_radius)
             decoded = decode(dots[:, :2], code)
-            for target in _targets(dots, decoded, polarity, code):
-                if target.id not in best or target.confidence > best[target.id].confidence:
-                    best[target.id] = target
+            found += _targets(dots, decoded, polarity, code)
             if settings.report_undecoded:
-                single += _undecoded(np.delete(dots, decoded.members, axis=0))
-        return sorted_targets([*best.values(), *single])
+                found += _undecoded(np.delete(dots, decoded.members, axis=0))
+        return sorted_targets(best_targets(found))
 
 
 def find_dots(gray: np.ndarray, polarity: int, min_radius: float, max_radius: float) -> np.ndarray:

@@ -164,7 +164,7 @@ def report(hypotheses: Hypotheses, settings: DetectorSettings) -> list[Target]:
         [f'{name} {number}' for name, number in zip(names, ids, strict=True)], return_inverse=True
     )[1]
     kept, uncontested = resolve_dots(hypotheses, keys, hypotheses.certain, hypotheses.reach)
-    certain = resolve_overlaps(hypotheses, hypotheses.certain & uncontested)
+    certain = resolve_overlaps(hypotheses, uncontested)
     certain = resolve_ids(hypotheses, keys, certain)
     if not settings.report_undecoded:
         kept = kept[certain[kept]]

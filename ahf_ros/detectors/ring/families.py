@@ -14,6 +14,7 @@ import numpy as np
 
 from ahf_ros.codes.ring import FAMILY_NAMES, Family, canonical, family
 from ahf_ros.codes.same_print import words_of_print
+from ahf_ros.detectors.claims import leading
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.prior import NOTHING_KNOWN, Prior
 from ahf_ros.detectors.ring.reading import read_bands
@@ -118,16 +119,15 @@ def _odds(read: Hypotheses) -> np.ndarray:
 
 def _contested(read: Hypotheses) -> Hypotheses:
     """Return hypotheses of which none is certain where another family has more evidence."""
-    confidence, odds = read.confidence.copy(), _odds(read)
-    certain = np.flatnonzero(read.certain)
-    centres, families = read.frames[:, :2, 2], read.families
     _, minor, _ = frame.ellipse_axes(read.frames)
-    for index in certain:
-        same = np.hypot(*(centres[certain] - centres[index]).T) < minor[index]
-        rivals = certain[same & (families[certain] != families[index])]
-        if (odds[rivals] > odds[index]).any():
-            confidence[index] = 0.0
-    return replace(read, confidence=confidence)
+    centres, names = read.frames[:, :2, 2], np.array([code.name for code in read.families], str)
+
+    def rivals(index: int) -> np.ndarray:
+        near = np.hypot(*(centres - centres[index]).T) < minor[index]
+        return near & (names != names[index])
+
+    beaten = read.certain & ~leading(_odds(read), read.certain, rivals, 1.0)
+    return replace(read, confidence=np.where(beaten, 0.0, read.confidence))
 
 
 def decoded(hypotheses: Hypotheses) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

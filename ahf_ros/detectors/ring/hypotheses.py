@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ahf_ros.codes.ring import Family
+from ahf_ros.detectors.claims import leading, owners
 from ahf_ros.detectors.ring.confidence import CERTAIN, confidence, features
 from ahf_ros.detectors.ring.decoding import Words
 from ahf_ros.features import frame
@@ -142,23 +143,20 @@ def resolve_dots(
         Indices of the best hypothesis of each dot. Dots on the band of a certain target are its
         sectors and are dropped.
     uncontested : ndarray of bool, shape (k,)
-        Whether a hypothesis is kept and no other reading of its dot comes near to it.
+        Whether a hypothesis is certain, is kept and no other reading of its dot comes near to it.
     """
     reach = np.where(certain, reach, frame.ellipse_axes(hypotheses.frames)[0])
-    centres, odds = hypotheses.frames[:, :2, 2], hypotheses.seen
-    uncontested = np.ones(len(ids), bool)
-    kept: list[int] = []
-    for index, centre in enumerate(centres):
-        distance = np.hypot(*(centres[kept] - centre).T)
-        same = [other for other, near in zip(kept, distance < reach[kept], strict=True) if near]
-        if not same:
-            kept.append(index)
-        for other in same:
-            if certain[index] and ids[index] != ids[other]:
-                uncontested[other] &= odds[other] > _CLEARLY * odds[index]
-    dropped = np.ones(len(ids), bool)
-    dropped[kept] = False
-    return np.array(kept, np.intp), uncontested & ~dropped
+    centres, order = hypotheses.frames[:, :2, 2], np.arange(len(ids))
+
+    def on_it(index: int) -> np.ndarray:
+        return np.asarray(np.hypot(*(centres - centres[index]).T) < reach[index])
+
+    def against(index: int) -> np.ndarray:
+        return on_it(index) & (ids != ids[index]) & (order > index)
+
+    kept = owners(len(ids), on_it)
+    uncontested = kept & leading(hypotheses.seen, certain, against, _CLEARLY)
+    return np.flatnonzero(kept), uncontested
 
 
 def resolve_overlaps(hypotheses: Hypotheses, certain: np.ndarray) -> np.ndarray:
@@ -173,19 +171,16 @@ def resolve_overlaps(hypotheses: Hypotheses, certain: np.ndarray) -> np.ndarray:
     hypotheses : Hypotheses
     certain : ndarray of bool, shape (k,)
     """
-    on_top = certain.copy()
-    which = np.flatnonzero(certain)
-    some = hypotheses.select(which)
-    major, _, _ = frame.ellipse_axes(some.frames)
-    outer = major * np.array([code.band_outer for code in some.families])
-    centres = np.column_stack([some.frames[:, :2, 2], np.ones(len(which))])
-    for index, plane in enumerate(some.frames):
-        x, y, scale = np.linalg.solve(plane, centres.T)
+    major, _, _ = frame.ellipse_axes(hypotheses.frames)
+    outer = major * np.array([code.band_outer for code in hypotheses.families])
+    centres = np.column_stack([hypotheses.frames[:, :2, 2], np.ones(len(major))])
+
+    def overlapping(index: int) -> np.ndarray:
+        x, y, scale = np.linalg.solve(hypotheses.frames[index], centres.T)
         distance = np.hypot(x, y) / np.abs(scale) * major[index]
-        near = distance < _OVERLAP * (outer + outer[index])
-        near[index] = False
-        on_top[which[index]] &= (some.seen[index] > _ON_TOP * some.seen[near]).all()
-    return on_top
+        return np.asarray(distance < _OVERLAP * (outer + outer[index]))
+
+    return leading(hypotheses.seen, certain, overlapping, _ON_TOP)
 
 
 def resolve_ids(hypotheses: Hypotheses, ids: np.ndarray, certain: np.ndarray) -> np.ndarray:
@@ -193,10 +188,4 @@ def resolve_ids(hypotheses: Hypotheses, ids: np.ndarray, certain: np.ndarray) ->
 
     Parameters are as for `resolve_dots`.
     """
-    certain = certain.copy()
-    for identifier in np.unique(ids[certain]):
-        best, *others = np.flatnonzero(certain & (ids == identifier))
-        certain[others] = False
-        if others and hypotheses.seen[best] <= _CLEARLY * hypotheses.seen[others[0]]:
-            certain[best] = False
-    return certain
+    return leading(hypotheses.seen, certain, lambda index: ids == ids[index], _CLEARLY)

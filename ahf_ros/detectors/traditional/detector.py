@@ -22,6 +22,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ahf_ros.codes.ring import Family, family
+from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.ring.circles import REACH, target_circles
 from ahf_ros.detectors.ring.refinement import refine_centres
@@ -147,20 +148,11 @@ def _resolve(targets: list[Target], code: Family) -> list[Target]:
 
     Undecoded blobs in the band of a decoded target are its sectors and are dropped.
     """
-    best: dict[int, Target] = {}
-    contested, others = [], []
-    for target in sorted(targets, key=lambda target: (-target.confidence, target.y, target.x)):
-        if target.id == UNDECODED:
-            others.append(target)
-        elif target.id in best:
-            contested.append(replace(target, id=UNDECODED, code=0, confidence=0.0))
-        else:
-            best[target.id] = target
-    read = [*best.values(), *contested]
-    centres = np.array([(target.x, target.y) for target in read]).reshape(-1, 2)
-    reach = np.array([code.band_outer * target.semi_major for target in read])
-    for target in others:
-        distances = np.hypot(centres[:, 0] - target.x, centres[:, 1] - target.y)
-        if (distances > reach).all():
-            read.append(target)
-    return read
+    read = [it for it in targets if it.id != UNDECODED]
+    x, y, major = np.array([(it.x, it.y, it.semi_major) for it in read]).reshape(-1, 3).T
+    best = set(best_targets(read))
+    return [
+        it if it in best else replace(it, id=UNDECODED, code=0, confidence=0.0)
+        for it in targets
+        if it.id != UNDECODED or (np.hypot(x - it.x, y - it.y) > code.band_outer * major).all()
+    ]

@@ -1,0 +1,93 @@
+"""Which of several readings owns a dot, an ID, a place.
+
+Readings claim what they were read from, and cannot all be right. A detector says which of them are
+rivals, here it is decided between them: the first one comes first, or only a clear lead counts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TypeVar
+
+import numpy as np
+
+from ahf_ros.target import UNDECODED, Target
+
+Rivals = Callable[[int], np.ndarray]
+"""From the index of a claim to which of k claims are its rivals, ndarray of bool, shape (k,).
+
+The claim itself may be among them. The relation need not be mutual.
+"""
+
+_Target = TypeVar('_Target', bound=Target)
+
+
+def owners(count: int, rivals: Rivals) -> np.ndarray:
+    """Return which claims are no rival of an owner before them, ndarray of bool, shape (k,).
+
+    Parameters
+    ----------
+    count : int
+        Of claims, the best first.
+    rivals : callable
+        See `Rivals`.
+
+    Examples
+    --------
+    >>> ids = np.array([7, 5, 7])
+    >>> owners(3, lambda index: ids == ids[index])
+    array([ True,  True, False])
+    """
+    owning = np.ones(count, bool)
+    for index in range(count):
+        if owning[index]:
+            owning[index + 1 :] &= ~rivals(index)[index + 1 :]
+    return owning
+
+
+def leading(scores: np.ndarray, certain: np.ndarray, rivals: Rivals, times: float) -> np.ndarray:
+    """Return which certain claims lead all certain rivals, ndarray of bool, shape (k,).
+
+    Parameters
+    ----------
+    scores : ndarray of float, shape (k,)
+    certain : ndarray of bool, shape (k,)
+    rivals : callable
+        See `Rivals`.
+    times : float
+        The score of a rival that a leading claim has at least.
+
+    Examples
+    --------
+    >>> ids = np.array([7, 5, 7])
+    >>> scores, certain = np.array([30.0, 20.0, 16.0]), np.ones(3, bool)
+    >>> leading(scores, certain, lambda index: ids == ids[index], 2.0)
+    array([False,  True, False])
+    """
+    ahead = certain.copy()
+    for index in np.flatnonzero(certain).tolist():
+        others = certain & rivals(index)
+        others[index] = False
+        ahead[index] = (scores[index] >= times * scores[others]).all()
+    return ahead
+
+
+def best_targets(targets: Sequence[_Target], reach: float = 0.0) -> list[_Target]:
+    """Return the most certain target of each place and each ID, decoded ones first.
+
+    Parameters
+    ----------
+    targets : sequence of Target
+    reach : float
+        Radius of a target, in that of its dot; no other lies in it. Only IDs count where it is 0.
+    """
+    order = sorted(targets, key=lambda it: (it.id == UNDECODED, -it.confidence, it.y, it.x))
+    x, y, minor = np.array([(it.x, it.y, it.semi_minor) for it in order]).reshape(-1, 3).T
+    ids, radii = np.array([it.id for it in order]), reach * minor
+
+    def rivals(index: int) -> np.ndarray:
+        near = np.hypot(x - x[index], y - y[index]) < np.minimum(radii, radii[index])
+        return near | (ids == ids[index]) & (ids != UNDECODED)
+
+    owning = owners(len(order), rivals)
+    return [target for target, owns in zip(order, owning, strict=True) if owns]
