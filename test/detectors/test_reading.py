@@ -131,6 +131,16 @@ def test_no_dots_no_readings() -> None:
     assert read_bands(rendering.image.astype(np.float32), none, CODE).words.shape == (0,)
 
 
+def test_a_dot_on_bare_paper_leaves_nothing_to_read() -> None:
+    columns, rows = np.meshgrid(np.arange(300), np.arange(200))
+    gray = np.where(np.hypot(columns - 150, rows - 100) < 12, 50, 200).astype(np.float32)
+    frames = frame.affine_frames([150.0], [100.0], [12.0], [12.0], [0.0])
+    dots = fit_dots(gray, frames, np.array([1]), rays=24, reach=REACH)
+    found = read_bands(gray, dots, CODE)
+    assert found.words.tolist() == [0]
+    assert not found.certain.any()
+
+
 def test_confidence_is_a_probability_that_grows_with_the_evidence() -> None:
     found = read(rendered(SMALL))
     sure = confidence(features(found))
