@@ -28,11 +28,12 @@ _INTERCEPT, _WEIGHTS = fitted_weights('confidence', 'intercept', 'weights')
 
 
 def features(read: Hypotheses) -> np.ndarray:
-    """Return what speaks for readings, float64, shape (k, 5).
+    """Return what speaks for readings, float64, shape (k, 6).
 
     Logarithm of the log odds of words against the next ID; log odds against arcs of ink of any
     length, in tens; logarithm of those against anything; the share of the expected edges that are
-    in their place, and that of the band that is seen.
+    in their place, and that of the band that is seen; and the probability of edges of light, which
+    explain where anything is missing.
 
     Parameters
     ----------
@@ -46,6 +47,7 @@ def features(read: Hypotheses) -> np.ndarray:
             np.log1p(np.maximum(read.seen, 0)),
             read.share,
             1 - read.hidden,
+            read.lit,
         ],
         axis=1,
     )
@@ -56,14 +58,14 @@ def confidence(values: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    values : ndarray of float, shape (k, 5)
+    values : ndarray of float, shape (k, 6)
         As `features` gives them.
     """
     return target_probability(values) * _logistic(np.expm1(values[:, 0]))
 
 
 def target_probability(values: np.ndarray) -> np.ndarray:
-    """Return the probabilities that readings are of targets, shape (k,), values (k, 5)."""
+    """Return the probabilities that readings are of targets, shape (k,), values (k, 6)."""
     return _logistic(_INTERCEPT + values @ _WEIGHTS)
 
 

@@ -19,8 +19,10 @@ import numpy as np
 
 from ahf_ros.detectors.ring.polar import CORRELATION, SATURATED, PolarImages
 from ahf_ros.features.array_record import ArrayRecord
+from ahf_ros.imaging.logarithm import LOG_OFFSET
 
 _BESIDE = 2.6  # distance of a reading from an edge that is sharp, px
+_SOFT, _BESIDE_SOFT = 1.0, 2.0  # blur of an edge, px, from which that grows, and how fast
 _NEAREST, _FARTHEST = 0.13, 0.36  # bounds of that distance, dot radii
 _FLAT = 0.12  # deviation of steps of ln where there is no edge, but for noise
 _MARK, _MARK_TAIL = 0.18, 0.3  # of the step of a mark: towards less, where blur fills it, and more
@@ -127,7 +129,8 @@ def edge_evidence(
         As for `band_edges`.
     """
     inner, outer = band_edges(radius, growth, band)
-    beside = np.clip(_BESIDE / polar.size, _NEAREST, _FARTHEST)
+    beside = _BESIDE + _BESIDE_SOFT * np.maximum(polar.blur - _SOFT, 0)
+    beside = np.clip(beside / polar.size, _NEAREST, _FARTHEST)
     beside = np.minimum(beside, 0.45 * (outer - inner))
     before = np.minimum(beside, 0.5 * (inner - radius - growth))
     edges = light_edges(polar, radius, growth, inner)
@@ -173,12 +176,13 @@ def _step_evidence(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the evidence of steps from ground into a band for paper and for ink, (k, m) each."""
     (level, noise), (beside, of_ground) = polar.logs(band), polar.logs(ground)
-    mark = polar.logs(polar.inked(ground, band))[0] - beside
-    noise = np.hypot(noise, of_ground)
+    ink = polar.inked(ground, band)
+    mark = polar.logs(ink)[0] - beside
     step = level - beside
-    flat = _normal(step, np.hypot(np.float32(_FLAT), noise))
+    flat = _normal(step, np.sqrt(_FLAT**2 + noise**2 + of_ground**2))
     more = (step - mark) * np.sign(mark)
-    low, high = (np.hypot(np.float32(spread), noise) for spread in (_MARK, _MARK_TAIL))
+    expected = of_ground * _gain(ground, ink)
+    low, high = (np.sqrt(spread**2 + noise**2 + expected**2) for spread in (_MARK, _MARK_TAIL))
     width = np.where(more > 0, high, low)
     inked = _normal(more, width) * (2 * width / (low + high))
     lit = edges.astype(np.float32)[:, None]
@@ -187,6 +191,12 @@ def _step_evidence(
         np.log(((1 - lit) * density + lit * _ANY_STEP) / anything) for density in (flat, inked)
     )
     return paper, ink
+
+
+def _gain(paper: np.ndarray, ink: np.ndarray) -> np.ndarray:
+    """Return how much larger an error of paper is in the ink that is expected of it, of ln."""
+    gain: np.ndarray = (ink / np.maximum(paper, 1)) * (paper + LOG_OFFSET) / (ink + LOG_OFFSET)
+    return gain
 
 
 def level_evidence(
@@ -216,13 +226,11 @@ def level_evidence(
     """
     level, noise = polar.logs(levels)
     known = np.isfinite(spread)
-    width = np.sqrt(noise**2 + np.where(known, spread, 1) ** 2)
-    of_paper, of_ink = (np.hypot(least, width) for least in (_PAPER_LEVEL, _INK_LEVEL))
+    spread, inked = np.where(known, spread, 1), polar.inked(light, levels)
+    of_paper = np.sqrt(_PAPER_LEVEL**2 + noise**2 + spread**2)
+    of_ink = np.sqrt(_INK_LEVEL**2 + noise**2 + (spread * _gain(light, inked)) ** 2)
     errors = level - polar.logs(light)[0]
-    densities = [
-        _normal(errors, of_paper),
-        _normal(level - polar.logs(polar.inked(light, levels))[0], of_ink),
-    ]
+    densities = [_normal(errors, of_paper), _normal(level - polar.logs(inked)[0], of_ink)]
     anything = _PLAIN * densities[0] + (1 - _PLAIN) * _ANY_LEVEL
     along = 2 * np.pi * radii / levels.shape[1]
     apart = np.diff(radii, append=2 * radii[-1] - radii[-2])

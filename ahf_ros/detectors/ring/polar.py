@@ -52,6 +52,8 @@ class PolarImages(ArrayRecord):
         Gray values that black is lifted to.
     size : ndarray of float64, shape (k,)
         Radius of the dot, px.
+    blur : ndarray of float64, shape (k,)
+        Of edges, standard deviation in px.
     noise : ndarray of float64, shape (k,)
         Of gray values.
     """
@@ -63,6 +65,7 @@ class PolarImages(ArrayRecord):
     contrast: np.ndarray
     lift: np.ndarray
     size: np.ndarray
+    blur: np.ndarray
     noise: np.ndarray
 
     def at(self, radii: np.ndarray) -> np.ndarray:
@@ -125,6 +128,7 @@ def polar_images(
         contrast=contrast,
         lift=lift,
         size=dots.size,
+        blur=dots.blur,
         noise=_noise(values[:, :, of_gap], apart),
     )
 
