@@ -53,6 +53,7 @@ def polar(
         lift=np.zeros(1),
         size=np.array([size]),
         noise=np.array([1.2]),
+        blur=np.array([0.7]),
     )
 
 
