@@ -16,7 +16,7 @@ import numpy as np
 from ahf_ros.features import frame
 from ahf_ros.features.candidates import find_candidates
 from ahf_ros.features.dots import Dots, distinct
-from ahf_ros.features.ellipses import fit_ellipses
+from ahf_ros.features.ellipses import fit_ellipses, resized
 from ahf_ros.features.log_edges import LOG_SCALE
 from ahf_ros.features.outlines import whole_outlines
 from ahf_ros.features.pyramid import ImagePyramid
@@ -46,7 +46,7 @@ def whole_dots(
         Without duplicates, in px of the image, to about half a pixel.
     """
     dots = whole_outlines(pyramid.edges[0], min_radius / 2, max_radius / 2)
-    dots = dots.select(np.isin(dots.polarity, polarities))
+    dots = resized(pyramid.logs[1], dots.select(np.isin(dots.polarity, polarities)))
     return distinct(replace(dots, frames=frame.enlarged(dots.frames, 1)))
 
 

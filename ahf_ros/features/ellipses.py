@@ -107,7 +107,7 @@ def refine_ellipses(
         good = (minor > _MINIMUM_ASPECT * major) & (minor > _MINIMUM_MINOR)
         good &= dots.share > minimum_share
         dots, kept = dots.select(good), kept[good]
-    return _resized(log, dots), kept
+    return resized(log, dots), kept
 
 
 def _best_ellipses(
@@ -207,11 +207,20 @@ def _refined(log: np.ndarray, dots: Dots, window: float, angles: np.ndarray) -> 
     return Dots(frames, dots.polarity, share)
 
 
-def _resized(log: np.ndarray, dots: Dots) -> Dots:
+def resized(log: np.ndarray, dots: Dots) -> Dots:
     """Return dots with their sizes in gray values.
 
     In a logarithm a blurred edge lies on its dark side.
+
+    Parameters
+    ----------
+    log : ndarray of int16, shape (height, width)
+        LOG_SCALE ln(I + 8).
+    dots : Dots
+        In px of `log`.
     """
+    if not len(dots.frames):
+        return dots
     window, _, _ = _WINDOWS[-1]
     radii, _ = _profiles(frame.mean_radii(dots.frames)[:, None], window)
     values = sample_circles(log, dots.frames, _ANGLES[::2], radii).astype(np.float32)

@@ -45,7 +45,7 @@ def best_words(
     phases : ndarray of int, shape (k, COMPETITORS)
         The best phase of each.
     """
-    words = np.zeros((len(sectors), COMPETITORS), np.int64)
+    words = np.zeros((len(sectors), COMPETITORS * (2 if expected else 1)), np.int64)
     phases = np.zeros(words.shape, np.intp)
     everything = len(family.words) * family.bits <= _EXHAUSTIVE
     hopeful = np.maximum(sectors, 0).sum(axis=2).max(axis=1) > _MINIMUM_EVIDENCE
@@ -60,8 +60,8 @@ def best_words(
         of_word = np.round(of_phases.max(axis=0), 2)  # last bits differ between processors
         best = _best(of_word, COMPETITORS)
         if expected:
-            likely = _best(of_word + prior(competing, family, expected), COMPETITORS // 2)
-            best = np.concatenate([likely, best[: COMPETITORS // 2]])
+            with_prior = of_word + prior(competing, family, expected)
+            best = np.concatenate([_best(with_prior, COMPETITORS), best])
         words[index] = competing[best]
         phases[index] = likely[index, of_phases[:, best].argmax(axis=0)]
     return words, phases

@@ -7,6 +7,8 @@ partly hidden.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ahf_ros.detectors.contract import DetectorSettings
@@ -16,6 +18,7 @@ from ahf_ros.detectors.ring.hypotheses import resolve_dots
 from ahf_ros.features import frame
 from ahf_ros.imaging.image import as_gray, check_image
 
+_CLEAR = 20.0  # usual margin of words, which does not matter here
 _COUNTED = 0.75  # probability of being a target, from which a dot counts
 
 
@@ -44,7 +47,8 @@ def estimate_count(image: np.ndarray, settings: DetectorSettings | None = None) 
     read = find_hypotheses(as_gray(image), settings)
     major, _, _ = frame.ellipse_axes(read.frames)
     minimum, maximum = settings.radii
-    probability = np.where(read.words > 0, target_probability(features(read)), 0.0)
+    clear = replace(read, margin=np.full(len(read.words), _CLEAR))
+    probability = np.where(read.words > 0, target_probability(features(clear)), 0.0)
     counted = (probability >= _COUNTED) & (major >= minimum) & (major <= maximum)
     order = np.argsort(-read.seen[counted], kind='stable')
     targets = read.select(np.flatnonzero(counted)[order])

@@ -1,7 +1,7 @@
 """The weights that were fitted to data, all in `fitted_weights.json` beside this file.
 
 Each set says which command made it, from which seeds and at which commit. `benchmarks.confidence`
-and `benchmarks.counting` fit them anew and write the file.
+fits them anew and writes the file.
 """
 
 from __future__ import annotations

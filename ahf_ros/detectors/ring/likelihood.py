@@ -22,7 +22,7 @@ from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
 _BESIDE = 2.6  # distance of a reading from an edge that is sharp, px
-_SOFT, _BESIDE_SOFT = 1.0, 2.0  # blur of an edge, px, from which that grows, and how fast
+_SOFT, _BESIDE_SOFT = 1.0, 1.0  # blur of an edge, px, from which that grows, and how fast
 _NEAREST, _FARTHEST = 0.13, 0.36  # bounds of that distance, dot radii
 _FLAT = 0.12  # deviation of steps of ln where there is no edge, but for noise
 _MARK, _MARK_TAIL = 0.18, 0.3  # of the step of a mark: towards less, where blur fills it, and more

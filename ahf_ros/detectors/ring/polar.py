@@ -21,6 +21,7 @@ SATURATED = 253.0
 
 _CIRCLES = 56  # of a polar image, which are then less than a tenth of a dot radius apart
 _INNERMOST, _MARGIN = 0.3, 0.95  # first circle, and last one beyond the band, dot radii
+_SEEN = 0.15  # beyond the band, that the image must show, dot radii
 _PERSPECTIVE = 1.5  # of circles, more than perspective makes one side of them larger
 _SMALL = 7.0  # radius of a dot whose levels tell more than its edge, px
 _PRINTED = 0.25  # usual contrast of prints, up to which the levels of larger dots count
@@ -176,7 +177,7 @@ def _visible(
     centres = frames[:, :2, 2] / frames[:, 2:, 2]
     inside = (centres > reach) & (centres < np.array(shape[1::-1]) - 1 - reach)
     border = np.flatnonzero(~inside.all(axis=1))
-    edge = frame.circle_points(angles, np.array([outer + _MARGIN / 3]))
+    edge = frame.circle_points(angles, np.array([outer + _SEEN]))
     visible[border] = within(frame.project(frames[border], edge), shape)[..., 0]
     return visible
 
