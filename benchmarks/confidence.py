@@ -25,13 +25,20 @@ from ahf_ros.imaging.image import as_gray
 from benchmarks.conditions import COMMON, Scene, scenes
 from benchmarks.reliability import NEAR, reliability_table, run
 
-RARE = 0.1
+COVERED = ('cover', 'cover like paper')
+"""Conditions under which something lies on targets."""
+
+MARGIN, CODED, VISIBLE = 0, 1, 4
+"""Places of some features."""
+
+RARE = 0.3
 """Weight of a reading under a condition that is not common, in the fit."""
 
 _PRIOR = 1.0  # inverse variance of scaled weights
 _ITERATIONS = 3000
 _NO_SPREAD = 1e-9
-_MINIMUM_MARGIN = np.log1p(3.0)  # of readings that count: others are not certain in any case
+_MINIMUM_MARGIN = np.log1p(2.0)  # of readings that count: others are not certain in any case
+_WHOLE, _TRACE = 0.97, -1.2  # share of the band that is seen, and feature of arcs, without a trace
 
 
 def readings(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
@@ -101,7 +108,10 @@ def rising_regression(
 def fitted(seeds: Iterable[int]) -> dict[str, np.ndarray]:
     """Return the numbers of the regression on the scenes of some seeds, by their names."""
     values, right, condition = gathered(seeds)
-    told = values[:, 0] > _MINIMUM_MARGIN
+    # A cover without a trace cannot be told.
+    no_trace = ~right & np.isin(condition, COVERED) & (values[:, VISIBLE] > _WHOLE)
+    no_trace &= values[:, CODED] > _TRACE
+    told = (values[:, MARGIN] > _MINIMUM_MARGIN) & ~no_trace
     counts = np.where(np.isin(condition, COMMON), 1.0, RARE)[told]
     intercept, weights = rising_regression(values[told], right[told], counts)
     return {'intercept': np.round([intercept], 3), 'weights': np.round(weights, 3)}

@@ -29,8 +29,8 @@ from ahf_ros.detectors.ring.light import predicted_light
 from ahf_ros.detectors.ring.likelihood import (
     Evidence,
     edge_evidence,
+    foreign_ground,
     level_evidence,
-    under_one_light,
 )
 from ahf_ros.detectors.ring.polar import angles_of, polar_images
 from ahf_ros.features.circle_fit import fit_dots
@@ -244,7 +244,8 @@ def _evidence(gray: np.ndarray, best: Hypotheses) -> tuple[Evidence, Words]:
     levels = sample_circles(gray, best.frames, angles, radii)
     known = predicted_light(gray, best.frames, polar.lift, angles, radii, TABLE.band)
     evidence = edges.plus(level_evidence(polar, levels, *known, radii, TABLE.band))
-    evidence = evidence.scaled(under_one_light(polar, levels[..., 2:4], levels[..., 8:]))
+    foreign = foreign_ground(polar, levels[..., 2:4], levels[..., 8:])
+    evidence = evidence.without(*foreign)
     return evidence, decode(evidence, 0 * growth, TABLE)
 
 

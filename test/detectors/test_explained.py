@@ -42,9 +42,3 @@ def test_certain_targets_are_explained_with_their_bands_and_whole_dots_without()
     both = Explained.joined([NOTHING, target, dot])
     assert [len(both.outlines_in(level)) for level in (0, 3, 4, 6)] == [2, 2, 1, 0]
     assert np.allclose(both.outlines_in(0), both.outlines)
-
-
-def test_small_whole_dots_do_not_hide_what_an_oblique_view_may_show() -> None:
-    sizes = [Explained.by(read(False, radius)).clear for radius in (6.0, 12.0)]
-    assert np.concatenate(sizes).tolist() == [False, True]
-    assert Explained.by(read(True, 6.0)).clear.all()

@@ -6,18 +6,21 @@ import json
 
 import numpy as np
 
-from ahf_ros.detectors.ring.confidence import confidence
+from ahf_ros.codes.ring import family
+from ahf_ros.detectors.ring.confidence import confidence, features
 from ahf_ros.detectors.ring.fitted_weights import PATH, fitted_weights
+from ahf_ros.detectors.ring.hypotheses import Hypotheses
+from ahf_ros.features.circle_fit import NO_FITS
 
 
 def test_the_confidence_only_rises_with_what_speaks_for_a_reading() -> None:
+    nothing_read = Hypotheses.unread(NO_FITS, family('metashape12'))
     intercept, weights = fitted_weights('confidence', 'intercept', 'weights')
-    assert (intercept.shape, weights.shape) == ((1,), (5,))
+    assert (len(intercept), len(weights)) == (1, len(features(nothing_read).T))
     assert weights.min() >= 0
-    usual = np.array([[3.0, 5.0, 5.0, 2.0, 0.9]])
-    for column in range(5):
-        more = usual + 0.3 * (np.arange(5) == column)
-        assert confidence(more)[0] >= confidence(usual)[0]
+    usual = np.full((1, len(weights)), 2.0)
+    for more in usual + 0.3 * np.eye(len(weights)):
+        assert confidence(more[None])[0] >= confidence(usual)[0]
 
 
 def test_each_set_says_what_made_it() -> None:

@@ -10,9 +10,9 @@ import pytest
 from ahf_ros.detectors.ring.likelihood import (
     band_edges,
     edge_evidence,
+    foreign_ground,
     level_evidence,
     light_edges,
-    under_one_light,
     weights,
 )
 from ahf_ros.detectors.ring.polar import SATURATED, PolarImages, angles_of, polar_images
@@ -183,13 +183,25 @@ def test_a_dot_of_light_on_paper_is_no_ink() -> None:
 def test_what_lies_on_the_ground_is_no_light_unless_much_of_the_ground_is_unlike() -> None:
     even = np.full((1, ANGLES, 2), 180.0, np.float32)
     few, many = even.copy(), even.copy()
-    few[:, 10:14], many[:, ::2] = 60.0, 60.0
-    shares = under_one_light(polar(), even, few)
-    assert (shares[0, 0] == 1).all()
-    assert np.flatnonzero(shares[0, 1] == 0).tolist() == [10, 11, 12, 13]
-    assert (under_one_light(polar(), many, many) == 1).all()
-    nothing = polar().select(slice(0))
-    assert under_one_light(nothing, even[:0], even[:0]).shape == (0, 2, ANGLES)
+    few[:, 10:14], few[:, 30:32], many[:, ::2] = 60.0, 240.0, 60.0
+    covered, lit = foreign_ground(polar(), even, few)
+    assert not covered[0, 0].any() and not lit[0, 0].any()
+    assert np.flatnonzero(covered[0, 1]).tolist() == [10, 11, 12, 13]
+    assert np.flatnonzero(lit[0, 1]).tolist() == [30, 31]
+    assert not np.any(foreign_ground(polar(), many, many))
+
+
+def test_what_covers_the_ground_covers_the_band_and_glare_leaves_steps() -> None:
+    evidence = edge_evidence(polar(), ONE, NONE, BAND)
+    covered, lit = np.zeros((2, 1, 2, ANGLES), np.float32)
+    covered[..., 5], covered[..., 15], lit[..., 6], lit[..., 16] = 1, 1, 1, 1
+    left = evidence.without(covered, lit)
+    assert not left.paper[..., [5, 15]].any() and not left.ink[..., [5, 15]].any()
+    for marked, unmarked in ((evidence.ink, evidence.paper), (left.ink, left.paper)):
+        assert (marked[..., 6] > 0).all() and (unmarked[..., 6] < 0).all()
+    assert not left.paper[..., 16].any() and not left.ink[..., 16].any()
+    untouched = np.setdiff1d(np.arange(ANGLES), [5, 6, 15, 16])
+    assert np.array_equal(left.ink[..., untouched], evidence.ink[..., untouched])
 
 
 def test_ink_under_light() -> None:

@@ -23,24 +23,32 @@ if TYPE_CHECKING:
 CERTAIN = 0.9
 """Confidence from which words are reported."""
 
+_FREE_ARCS = -60.0  # log odds against arcs of any length, beyond which these are certain
 _INTERCEPT, _WEIGHTS = fitted_weights('confidence', 'intercept', 'weights')
 
 
 def features(read: Hypotheses) -> np.ndarray:
-    """Return what speaks for readings, float64, shape (k, 6).
+    """Return what speaks for readings, float64, shape (k, 5).
 
-    Logarithms of the log odds of words against the next ID, against bare paper, against anything
-    and against arcs of any length; the share of the expected edges that are in their place, and
-    that of the band that is seen.
+    Logarithm of the log odds of words against the next ID; log odds against arcs of ink of any
+    length, in tens; logarithm of those against anything; the share of the expected edges that are
+    in their place, and that of the band that is seen.
 
     Parameters
     ----------
     read : Hypotheses
         Of k words.
     """
-    against = np.stack([read.margin, read.marked, read.seen, read.coded], axis=1)
-    odds = np.sign(against) * np.log1p(np.abs(against))
-    return np.column_stack([odds, read.share, 1 - read.hidden])
+    return np.stack(
+        [
+            np.log1p(np.maximum(read.margin, 0)),
+            np.clip(read.coded, _FREE_ARCS, 0) / 10,
+            np.log1p(np.maximum(read.seen, 0)),
+            read.share,
+            1 - read.hidden,
+        ],
+        axis=1,
+    )
 
 
 def confidence(values: np.ndarray) -> np.ndarray:
@@ -48,14 +56,14 @@ def confidence(values: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    values : ndarray of float, shape (k, 6)
+    values : ndarray of float, shape (k, 5)
         As `features` gives them.
     """
     return target_probability(values) * _logistic(np.expm1(values[:, 0]))
 
 
 def target_probability(values: np.ndarray) -> np.ndarray:
-    """Return the probabilities that readings are of targets, shape (k,), values (k, 6)."""
+    """Return the probabilities that readings are of targets, shape (k,), values (k, 5)."""
     return _logistic(_INTERCEPT + values @ _WEIGHTS)
 
 

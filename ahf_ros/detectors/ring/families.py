@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ahf_ros.codes.ring import Family, canonical, family
+from ahf_ros.codes.ring import FAMILY_NAMES, Family, canonical, family
 from ahf_ros.codes.same_print import words_of_print
 from ahf_ros.detectors.claims import leading
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
@@ -22,6 +22,8 @@ from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import Fit
 
 _CLEAREST = 48  # dots that tell which family comes first
+_DOUBTFUL = -5.0  # log odds against arcs of any length, from which a word may be another one
+_FIRST = 8  # doubtful words that rivals read first
 
 
 def by_clear_dots(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> list[Family]:
@@ -69,6 +71,7 @@ def read_families(
     """
     first, *others = families
     found = read_bands(gray, dots, first, prior)
+    found = _against_rivals(gray, dots, found, families, prior)
     if not others:
         return found
     rest = dots.select(~found.certain)
@@ -79,10 +82,39 @@ def read_families(
     return _contested(Hypotheses.joined(parts))
 
 
+def _against_rivals(
+    gray: np.ndarray, dots: Fit, found: Hypotheses, families: Sequence[Family], prior: Prior
+) -> Hypotheses:
+    """Return hypotheses of dots, none certain where a family that is not read has more evidence.
+
+    Where arcs of any length explain a band better than its word, it may be one of theirs. If the
+    rivals contest none of the most doubtful words, they contest no other one.
+    """
+    coded = np.where(found.certain, found.coded, 0.0)
+    doubtful = np.argsort(coded, kind='stable')[: (coded < _DOUBTFUL).sum()]
+    read = {code.name for code in families}
+    rivals = [family(name) for name in FAMILY_NAMES if name not in read]
+    confidence = found.confidence.copy()
+    for some in (doubtful[:_FIRST], doubtful[_FIRST:]):
+        if not some.size or not rivals:
+            break
+        others = [_evidence(read_bands(gray, dots.select(some), code, prior)) for code in rivals]
+        contested = np.max(others, axis=0) > _evidence(found.select(some))
+        confidence[some[contested]] = 0.0
+        if not contested.any():
+            break
+    return replace(found, confidence=confidence)
+
+
+def _evidence(read: Hypotheses) -> np.ndarray:
+    """Return the evidence for words of different families, by how many each has, shape (k,)."""
+    choices = [len(code.words) * code.bits for code in read.families]
+    return read.seen - np.log(np.maximum(choices, 1))
+
+
 def _odds(read: Hypotheses) -> np.ndarray:
-    """Return the log odds of words of different families, shape (k,); 0 where none is certain."""
-    choices = np.array([len(code.words) * code.bits for code in read.families], float)
-    return np.where(read.certain, read.seen - np.log(np.maximum(choices, 1)), 0.0)
+    """Return the same where words are certain, and 0 elsewhere, shape (k,)."""
+    return np.where(read.certain, _evidence(read), 0.0)
 
 
 def _contested(read: Hypotheses) -> Hypotheses:
