@@ -1,16 +1,9 @@
-"""Contradicting readings: the first owns what they claim, or only one that clearly leads."""
+"""Of several targets with one place or one ID the most certain one is left."""
 
 from __future__ import annotations
 
-import doctest
-
-from ahf_ros.detectors import claims
+from ahf_ros.detectors.claims import best_targets
 from ahf_ros.target import UNDECODED, Target
-
-
-def test_examples():
-    results = doctest.testmod(claims)
-    assert results.attempted and not results.failed
 
 
 def test_of_targets_each_place_and_each_id_has_one():
@@ -20,5 +13,5 @@ def test_of_targets_each_place_and_each_id_has_one():
     driven_out = Target(8, 8, 300.0, 50.0, 10.0, 10.0, 0.0, confidence=0.96)
     dots = [Target(UNDECODED, 0, x, 50.0, 10.0, 10.0, 0.0) for x in (201.0, 301.0, 400.0)]
     found = [*dots, driven_out, same_id, same_place, first]
-    assert claims.best_targets(found, 2.0) == [first, driven_out, dots[0], dots[2]]
-    assert claims.best_targets(found) == [first, same_place, *dots]
+    assert best_targets(found, 2.0) == [first, driven_out, dots[0], dots[2]]
+    assert best_targets(found) == [first, same_place, *dots]
