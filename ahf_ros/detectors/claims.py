@@ -1,7 +1,7 @@
 """Which of several readings owns a dot, an ID, a place.
 
-A detector says which readings are rivals, that is, cannot both be right. Here it is decided between
-them: the better one is the owner, or only one that clearly leads counts.
+A detector says which readings are rivals, that is, cannot both be right. Here it is decided
+between them: the better one is the owner, or only one that clearly leads counts.
 """
 
 from __future__ import annotations
