@@ -1,7 +1,7 @@
 """Which of several readings owns a dot, an ID, a place.
 
-Readings claim what they were read from, and cannot all be right. A detector says which of them are
-rivals, here it is decided between them: the first one comes first, or only a clear lead counts.
+A detector says which readings are rivals, that is, cannot both be right. Here it is decided
+between them: the better one is the owner, or only one that clearly leads counts.
 """
 
 from __future__ import annotations
@@ -31,12 +31,6 @@ def owners(count: int, rivals: Rivals) -> np.ndarray:
         Of claims, the best first.
     rivals : callable
         See `Rivals`.
-
-    Examples
-    --------
-    >>> ids = np.array([7, 5, 7])
-    >>> owners(3, lambda index: ids == ids[index])
-    array([ True,  True, False])
     """
     owning = np.ones(count, bool)
     for index in range(count):
@@ -56,13 +50,6 @@ def leading(scores: np.ndarray, certain: np.ndarray, rivals: Rivals, times: floa
         See `Rivals`.
     times : float
         The score of a rival that a leading claim has at least.
-
-    Examples
-    --------
-    >>> ids = np.array([7, 5, 7])
-    >>> scores, certain = np.array([30.0, 20.0, 16.0]), np.ones(3, bool)
-    >>> leading(scores, certain, lambda index: ids == ids[index], 2.0)
-    array([False,  True, False])
     """
     ahead = certain.copy()
     for index in np.flatnonzero(certain).tolist():

@@ -9,12 +9,7 @@ import pytest
 
 from ahf_ros.codes.ring import family
 from ahf_ros.detectors.ring.decoding import Words
-from ahf_ros.detectors.ring.hypotheses import (
-    Hypotheses,
-    resolve_dots,
-    resolve_ids,
-    resolve_overlaps,
-)
+from ahf_ros.detectors.ring.hypotheses import Hypotheses, resolve
 from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import Fit
 
@@ -51,16 +46,14 @@ def hypotheses(places: list[tuple[float, float]], odds: list[float]) -> Hypothes
 
 
 def resolved(places, odds, ids, certain=None):
-    certain = np.ones(len(places), bool) if certain is None else np.array(certain)
     found = hypotheses(places, odds)
-    kept, uncontested = resolve_dots(found, np.array(ids), certain, found.reach)
-    return kept.tolist(), uncontested.tolist()
+    found = replace(found, confidence=found.confidence if certain is None else np.array(certain))
+    kept, certain = resolve(found, np.array(ids))
+    return np.flatnonzero(kept).tolist(), certain.tolist()
 
 
 def test_dots_apart_are_all_kept():
-    kept, uncontested = resolved([(50, 50), (150, 50)], [30, 20], [1, 2])
-    assert kept == [0, 1]
-    assert uncontested == [True, True]
+    assert resolved([(50, 50), (150, 50)], [30, 20], [1, 2]) == ([0, 1], [True, True])
 
 
 def test_of_two_readings_of_a_dot_the_first_is_kept():
@@ -89,12 +82,8 @@ def test_sectors_of_a_band_that_was_read_are_no_dots():
 
 def test_of_two_claims_to_an_id_the_clearly_better_one_stays():
     places = [(50, 50), (150, 50), (250, 50)]
-    certain = np.ones(3, bool)
-    clear = resolve_ids(hypotheses(places, [30, 20, 10]), np.array([1, 2, 1]), certain)
-    assert clear.tolist() == [True, True, False]
-    unclear = resolve_ids(hypotheses(places, [30, 20, 16]), np.array([1, 2, 1]), certain)
-    assert unclear.tolist() == [False, True, False]
-    assert certain.all()
+    assert resolved(places, [30, 20, 10], [1, 2, 1])[1] == [True, True, False]
+    assert resolved(places, [30, 20, 16], [1, 2, 1])[1] == [False, True, False]
 
 
 @pytest.mark.parametrize(
@@ -108,15 +97,14 @@ def test_of_two_claims_to_an_id_the_clearly_better_one_stays():
 def test_of_two_targets_whose_bands_overlap_only_the_clearly_better_one_is_certain(
     apart, odds, on_top
 ):
-    found = hypotheses([(50, 50), (50 + apart, 50)], odds)
-    assert resolve_overlaps(found, np.ones(2, bool)).tolist() == on_top
-    assert resolve_overlaps(found, np.array([False, True])).tolist() == [False, True]
+    places = [(50, 50), (50 + apart, 50)]
+    assert resolved(places, odds, [1, 2])[1] == on_top
+    assert resolved(places, odds, [1, 2], [True, False])[1] == [True, False]
 
 
 def test_uncertain_claims_do_not_count():
-    found = hypotheses([(50, 50), (150, 50)], [30, 29])
-    certain = resolve_ids(found, np.array([1, 1]), np.array([True, False]))
-    assert certain.tolist() == [True, False]
+    result = resolved([(50, 50), (150, 50)], [30, 29], [1, 1], [True, False])
+    assert result == ([0, 1], [True, False])
 
 
 def test_parts_of_finds_stay_in_order():

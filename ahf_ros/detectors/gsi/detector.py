@@ -76,7 +76,9 @@ class GsiDetector(FamilyDetector):
         check_image(image)
         pyramid = image_pyramid(as_gray(image), self.settings.max_radius)
         found = targets_of_octaves(pyramid, self.settings.radii, self._identify, self.refine)
-        return sorted_targets(best_targets(found))
+        single = [target for target in found if target.id == UNDECODED]
+        decoded = [target for target in found if target.id != UNDECODED]
+        return sorted_targets([*best_targets(decoded), *single])
 
     def _identify(self, octave: Octave) -> list[Target]:
         """Return the targets of an octave, in its pixels."""

@@ -94,12 +94,12 @@ def plausible(
     equal = family.template_radii[family.reference] * _EQUAL
     units = reference_frames(templates.homographies[order], float(equal))
     around = reference_frames(templates.homographies[order], family.reach * _APART)
-    words, support = readings.words[order], readings.support[order]
+    words, support, centres = readings.words[order], readings.support[order], units[:, :2, 2]
 
     def rivals(index: int) -> np.ndarray:
         worse = support < support[index] - (0.0 if obvious else _CLEARLY)
-        equal = _within(units, index) & (words == words[index])
-        return equal | _within(around, index) & worse
+        equal = inside(centres, units[[index]]) & (words == words[index])
+        return equal | inside(centres, around[[index]]) & worse
 
     return order[owners(len(order), rivals)][:_MAXIMUM]
 
@@ -118,8 +118,8 @@ def resolve(hypotheses: Hypotheses, family: PointFamily, minimum: float = CERTAI
     order = np.argsort(-confidence, kind='stable')
     order = order[confidence[order] >= minimum]
     units = reference_frames(hypotheses.homographies[order], family.reach * _SAME)
-    words = hypotheses.words[order]
-    return order[owners(len(order), lambda it: _within(units, it) | (words == words[it]))]
+    words, at = hypotheses.words[order], units[:, :2, 2]
+    return order[owners(len(order), lambda it: inside(at, units[[it]]) | (words == words[it]))]
 
 
 def inside(points: np.ndarray, frames: np.ndarray) -> np.ndarray:
@@ -135,10 +135,3 @@ def inside(points: np.ndarray, frames: np.ndarray) -> np.ndarray:
     offset = points - frames[:, None, :2, 2]
     relative = offset @ np.linalg.inv(frames[:, :2, :2]).swapaxes(1, 2)
     return np.asarray(((relative**2).sum(axis=2) < 1).any(axis=0))
-
-
-def _within(units: np.ndarray, position: int) -> np.ndarray:
-    """Return which circles have their centre within one of them, itself included."""
-    offset = units[:, :2, 2] - units[position, :2, 2]
-    inside: np.ndarray = (np.linalg.inv(units[position, :2, :2]) @ offset.T) ** 2
-    return inside.sum(axis=0) < 1

@@ -77,13 +77,14 @@ class PublishedGsiDetector(FamilyDetector):
         settings, code = self.settings, self.design
         gray = as_gray(image)
         found: list[Target] = []
+        single: list[Target] = []
         for polarity in settings.polarities:
             dots = find_dots(gray, polarity, settings.min_radius, settings.max_radius)
             decoded = decode(dots[:, :2], code)
             found += _targets(dots, decoded, polarity, code)
             if settings.report_undecoded:
-                found += _undecoded(np.delete(dots, decoded.members, axis=0))
-        return sorted_targets(best_targets(found))
+                single += _undecoded(np.delete(dots, decoded.members, axis=0))
+        return sorted_targets([*best_targets(found), *single])
 
 
 def find_dots(gray: np.ndarray, polarity: int, min_radius: float, max_radius: float) -> np.ndarray:

@@ -11,10 +11,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from ahf_ros.detectors.claims import owners
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.ring.confidence import features, target_probability
 from ahf_ros.detectors.ring.detector import find_hypotheses
-from ahf_ros.detectors.ring.hypotheses import resolve_dots
+from ahf_ros.detectors.ring.hypotheses import on_targets
 from ahf_ros.features import frame
 from ahf_ros.imaging.image import as_gray, check_image
 
@@ -52,6 +53,5 @@ def estimate_count(image: np.ndarray, settings: DetectorSettings | None = None) 
     counted = (probability >= _COUNTED) & (major >= minimum) & (major <= maximum)
     order = np.argsort(-read.seen[counted], kind='stable')
     targets = read.select(np.flatnonzero(counted)[order])
-    count = len(order)
-    distinct, _ = resolve_dots(targets, np.zeros(count), np.ones(count, bool), targets.reach)
-    return len(distinct)
+    certain = np.ones(len(order), bool)
+    return int(owners(len(order), on_targets(targets, certain)).sum())

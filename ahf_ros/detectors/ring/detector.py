@@ -22,12 +22,7 @@ from ahf_ros.detectors.ring.families import (
     settle_same_prints,
 )
 from ahf_ros.detectors.ring.full_size import at_full_size
-from ahf_ros.detectors.ring.hypotheses import (
-    Hypotheses,
-    resolve_dots,
-    resolve_ids,
-    resolve_overlaps,
-)
+from ahf_ros.detectors.ring.hypotheses import Hypotheses, resolve
 from ahf_ros.detectors.ring.prior import Prior
 from ahf_ros.detectors.ring.proposals import PROPOSALS, Proposal, measure_dots, propose_whole
 from ahf_ros.detectors.ring.refinement import refine_centres
@@ -163,11 +158,9 @@ def report(hypotheses: Hypotheses, settings: DetectorSettings) -> list[Target]:
     keys = np.unique(
         [f'{name} {number}' for name, number in zip(names, ids, strict=True)], return_inverse=True
     )[1]
-    kept, uncontested = resolve_dots(hypotheses, keys, hypotheses.certain, hypotheses.reach)
-    certain = resolve_overlaps(hypotheses, uncontested)
-    certain = resolve_ids(hypotheses, keys, certain)
+    kept, certain = resolve(hypotheses, keys)
     if not settings.report_undecoded:
-        kept = kept[certain[kept]]
+        kept = certain
     likely, ids = ids[kept], np.where(certain, ids, UNDECODED)
     some = hypotheses.select(kept)
     columns = (some.frames, some.covariance, ids[kept], codes[kept], some.confidence)

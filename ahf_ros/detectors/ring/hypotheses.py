@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ahf_ros.codes.ring import Family
-from ahf_ros.detectors.claims import leading, owners
+from ahf_ros.detectors.claims import Rivals, leading, owners
 from ahf_ros.detectors.ring.confidence import CERTAIN, confidence, features
 from ahf_ros.detectors.ring.decoding import Words
 from ahf_ros.features import frame
@@ -126,54 +126,50 @@ class Hypotheses(ArrayRecord):
         return Hypotheses.of(dots, Words.none(len(dots.frames)), family)
 
 
-def resolve_dots(
-    hypotheses: Hypotheses, ids: np.ndarray, certain: np.ndarray, reach: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Resolve which hypotheses on the same dot to keep.
+def resolve(hypotheses: Hypotheses, ids: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Resolve which hypotheses to keep, and which of these stay certain.
 
     Parameters
     ----------
     hypotheses : Hypotheses
-        In the order of their evidence, the best first.
+        In the order of their evidence, the certain ones first.
     ids : ndarray of int, shape (k,)
         Equal where words are the same.
-    certain : ndarray of bool, shape (k,)
-    reach : ndarray of float64, shape (k,)
-        Radii of the targets with their bands, px.
 
     Returns
     -------
-    kept : ndarray of int
-        Indices of the best hypothesis of each dot. Dots on the band of a certain target are its
-        sectors and are dropped.
-    uncontested : ndarray of bool, shape (k,)
-        Whether a hypothesis is certain, is kept and no other reading of its dot comes near to it.
+    kept : ndarray of bool, shape (k,)
+        Whether it is the best one of its dot. Dots on the band of a certain target are its sectors
+        and are dropped.
+    certain : ndarray of bool, shape (k,)
+        Whether it is kept, and neither another reading of its dot, nor a target whose band
+        overlaps, nor another claim to its ID comes near to it.
     """
-    reach = np.where(certain, reach, frame.ellipse_axes(hypotheses.frames)[0])
-    centres, order = hypotheses.frames[:, :2, 2], np.arange(len(ids))
-
-    def on_it(index: int) -> np.ndarray:
-        return np.asarray(np.hypot(*(centres - centres[index]).T) < reach[index])
+    seen, order = hypotheses.seen, np.arange(len(ids))
+    on_it = on_targets(hypotheses, hypotheses.certain)
 
     def against(index: int) -> np.ndarray:
         return on_it(index) & (ids != ids[index]) & (order > index)
 
     kept = owners(len(ids), on_it)
-    uncontested = kept & leading(hypotheses.seen, certain, against, _CLEARLY)
-    return np.flatnonzero(kept), uncontested
+    certain = kept & leading(seen, hypotheses.certain, against, _CLEARLY)
+    certain = leading(seen, certain, _overlapping(hypotheses), _ON_TOP)
+    return kept, leading(seen, certain, lambda index: ids == ids[index], _CLEARLY)
 
 
-def resolve_overlaps(hypotheses: Hypotheses, certain: np.ndarray) -> np.ndarray:
-    """Return which hypotheses are certain and below no other target, shape (k,).
+def on_targets(hypotheses: Hypotheses, certain: np.ndarray) -> Rivals:
+    """Return what lies on the dot of a hypothesis, or on the band of a certain one."""
+    reach = np.where(certain, hypotheses.reach, frame.ellipse_axes(hypotheses.frames)[0])
+    centres = hypotheses.frames[:, :2, 2]
+    return lambda index: np.hypot(*(centres - centres[index]).T) < reach[index]
 
-    Where two bands overlap the paper of one target lies on that of the other. White paper on white
-    paper may hide marks without a trace, so that only the one on top is certain. It is the one
-    that agrees better with its word.
 
-    Parameters
-    ----------
-    hypotheses : Hypotheses
-    certain : ndarray of bool, shape (k,)
+def _overlapping(hypotheses: Hypotheses) -> Rivals:
+    """Return of which hypotheses the bands overlap.
+
+    There the paper of one target lies on that of the other. White paper on white paper may hide
+    marks without a trace, so that only the one on top is certain. It is the one that agrees better
+    with its word.
     """
     major, _, _ = frame.ellipse_axes(hypotheses.frames)
     outer = major * np.array([code.band_outer for code in hypotheses.families])
@@ -184,12 +180,4 @@ def resolve_overlaps(hypotheses: Hypotheses, certain: np.ndarray) -> np.ndarray:
         distance = np.hypot(x, y) / np.abs(scale) * major[index]
         return np.asarray(distance < _OVERLAP * (outer + outer[index]))
 
-    return leading(hypotheses.seen, certain, overlapping, _ON_TOP)
-
-
-def resolve_ids(hypotheses: Hypotheses, ids: np.ndarray, certain: np.ndarray) -> np.ndarray:
-    """Return which hypotheses are certain and clearly the best claim to their ID, shape (k,).
-
-    Parameters are as for `resolve_dots`.
-    """
-    return leading(hypotheses.seen, certain, lambda index: ids == ids[index], _CLEARLY)
+    return overlapping
