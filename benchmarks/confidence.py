@@ -12,10 +12,11 @@ development.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
-from rich.progress import track
 
 from ahf_ros.codes.ring import canonical, family
 from ahf_ros.detectors.contract import DetectorSettings
@@ -61,15 +62,21 @@ def readings(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     return features(read.select(seen)), right[seen]
 
 
-def gathered(seeds: Iterable[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def gathered(seeds: Sequence[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the readings of the scenes of some seeds, and the condition of each."""
-    parts = []
-    for seed in seeds:
-        for scene in track(scenes(seed), f'seed {seed}', total=None):
-            part = readings(scene)
-            parts.append((*part, np.full(len(part[0]), scene.condition)))
+    with ProcessPoolExecutor(min(len(seeds), os.cpu_count() or 1)) as pool:
+        parts = [part for of_seed in pool.map(_gathered, seeds) for part in of_seed]
     values, right, condition = (np.concatenate(part) for part in zip(*parts, strict=True))
     return values, right, condition
+
+
+def _gathered(seed: int) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Return the readings of the scenes of a seed, scene by scene."""
+    parts = []
+    for scene in scenes(seed):
+        values, right = readings(scene)
+        parts.append((values, right, np.full(len(values), scene.condition)))
+    return parts
 
 
 def rising_regression(
@@ -105,7 +112,7 @@ def rising_regression(
     return weights[0] - slopes @ mean, slopes
 
 
-def fitted(seeds: Iterable[int]) -> dict[str, np.ndarray]:
+def fitted(seeds: Sequence[int]) -> dict[str, np.ndarray]:
     """Return the numbers of the regression on the scenes of some seeds, by their names."""
     values, right, condition = gathered(seeds)
     # A cover without a trace cannot be told.
@@ -117,7 +124,7 @@ def fitted(seeds: Iterable[int]) -> dict[str, np.ndarray]:
     return {'intercept': np.round([intercept], 3), 'weights': np.round(weights, 3)}
 
 
-def reliability(seeds: Iterable[int]) -> Iterator[str]:
+def reliability(seeds: Sequence[int]) -> Iterator[str]:
     """Yield the lines of the table of the scenes of some seeds."""
     values, right, condition = gathered(seeds)
     return reliability_table(condition, confidence(values), right)
