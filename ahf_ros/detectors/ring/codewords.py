@@ -17,7 +17,7 @@ COMPETITORS = 24
 
 _PHASES = 4  # of a band, at which words compete
 _UNCERTAIN = 10  # sectors whose bits are varied where not all words compete
-_UNEXPECTED = 30.0  # evidence against words that are not expected, more than for a cover
+_UNEXPECTED = 20.0  # evidence against words that are not expected, more than for a cover
 
 
 def best_words(

@@ -19,7 +19,7 @@ from ahf_ros.detectors.ring.hypotheses import on_targets
 from ahf_ros.features import frame
 from ahf_ros.imaging.image import as_gray, check_image
 
-_CLEAR = 20.0  # usual margin of words, which does not matter here
+_CLEAR = 20.0  # usual margin of words; which word it is does not matter here
 _COUNTED = 0.75  # probability of being a target, from which a dot counts
 
 
@@ -48,7 +48,7 @@ def estimate_count(image: np.ndarray, settings: DetectorSettings | None = None) 
     read = find_hypotheses(as_gray(image), settings)
     major, _, _ = frame.ellipse_axes(read.frames)
     minimum, maximum = settings.radii
-    clear = replace(read, margin=np.full(len(read.words), _CLEAR))
+    clear = replace(read, margin=np.full(len(read.words), _CLEAR), coded=0 * read.coded)
     probability = np.where(read.words > 0, target_probability(features(clear)), 0.0)
     counted = (probability >= _COUNTED) & (major >= minimum) & (major <= maximum)
     order = np.argsort(-read.seen[counted], kind='stable')

@@ -121,9 +121,8 @@ def decode(
     likely = scores + prior(words, family, expected)
     rows, best = np.arange(len(read)), likely.argmax(axis=1)
     # What is expected wins a draw, but an ID that is read clearly is no other one.
-    margin = np.minimum(
-        margins(words, likely, best, family), margins(words, scores, best, family) + _DRAW
-    )
+    read_as, known_as = (margins(words, of, best, family) for of in (scores, likely))
+    margin = np.clip(known_as, read_as, read_as + _DRAW)
     turned_hidden = _hidden(evidence_of[:, rows, best], turned)
     hidden = np.empty(turned_hidden.shape, bool)
     np.put_along_axis(hidden, order, turned_hidden, axis=1)
