@@ -20,7 +20,7 @@ from ahf_ros.detectors.ring.fitted_weights import fitted_weights
 if TYPE_CHECKING:
     from ahf_ros.detectors.ring.hypotheses import Hypotheses
 
-CERTAIN = 0.9
+CERTAIN = 0.87
 """Confidence from which words are reported."""
 
 _FREE_ARCS = -60.0  # log odds against arcs of any length, beyond which these are certain
@@ -28,12 +28,11 @@ _INTERCEPT, _WEIGHTS = fitted_weights('confidence', 'intercept', 'weights')
 
 
 def features(read: Hypotheses) -> np.ndarray:
-    """Return what speaks for readings, float64, shape (k, 6).
+    """Return what speaks for readings, float64, shape (k, 5).
 
     Logarithm of the log odds of words against the next ID; log odds against arcs of ink of any
     length, in tens; logarithm of those against anything; the share of the expected edges that are
-    in their place, and that of the band that is seen; and the probability of edges of light, which
-    explain where anything is missing.
+    in their place, and that of the band that is seen.
 
     Parameters
     ----------
@@ -47,7 +46,6 @@ def features(read: Hypotheses) -> np.ndarray:
             np.log1p(np.maximum(read.seen, 0)),
             read.share,
             1 - read.hidden,
-            read.lit,
         ],
         axis=1,
     )
@@ -58,14 +56,14 @@ def confidence(values: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    values : ndarray of float, shape (k, 6)
+    values : ndarray of float, shape (k, 5)
         As `features` gives them.
     """
     return target_probability(values) * _logistic(np.expm1(values[:, 0]))
 
 
 def target_probability(values: np.ndarray) -> np.ndarray:
-    """Return the probabilities that readings are of targets, shape (k,), values (k, 6)."""
+    """Return the probabilities that readings are of targets, shape (k,), values (k, 5)."""
     return _logistic(_INTERCEPT + values @ _WEIGHTS)
 
 

@@ -50,8 +50,6 @@ class Words(ArrayRecord):
         Log odds of the word, where it is not covered, against anything.
     hidden : ndarray of bool, shape (k, m)
         Where something covers the band.
-    lit : ndarray of float64, shape (k,)
-        Probability of an edge of light between neighbouring readings.
     """
 
     words: np.ndarray
@@ -61,7 +59,6 @@ class Words(ArrayRecord):
     coded: np.ndarray
     seen: np.ndarray
     hidden: np.ndarray
-    lit: np.ndarray
 
     @staticmethod
     def none(count: int, angles: int = 1) -> Words:
@@ -74,7 +71,6 @@ class Words(ArrayRecord):
             coded=np.zeros(count),
             seen=np.zeros(count),
             hidden=np.zeros((count, angles), bool),
-            lit=np.zeros(count),
         )
 
 
@@ -136,7 +132,6 @@ def decode(
         coded=score - _free_paths(turned) - _BORDER * _borders(bits[rows, best]),
         seen=score,
         hidden=hidden,
-        lit=some.lit.astype(np.float64),
     )
     return decoded.replaced(read, found)
 

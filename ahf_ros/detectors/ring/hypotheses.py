@@ -47,8 +47,6 @@ class Hypotheses(ArrayRecord):
         Log odds of the word, see `ahf_ros.detectors.ring.decoding.Words`.
     hidden : ndarray of float64, shape (k,)
         Share of the band that something covers.
-    lit : ndarray of float64, shape (k,)
-        Probability of an edge of light between neighbouring readings.
     families : ndarray of Family, shape (k,)
         Those of the words.
     confidence : ndarray of float64, shape (k,)
@@ -69,7 +67,6 @@ class Hypotheses(ArrayRecord):
     coded: np.ndarray
     seen: np.ndarray
     hidden: np.ndarray
-    lit: np.ndarray
     families: np.ndarray
     confidence: np.ndarray
 
@@ -114,7 +111,6 @@ class Hypotheses(ArrayRecord):
             coded=words.coded,
             seen=words.seen,
             hidden=words.hidden.mean(axis=1),
-            lit=words.lit,
             families=np.full(len(words.words), family, object),
             confidence=np.zeros(len(words.words)),
         )

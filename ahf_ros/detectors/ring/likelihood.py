@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ahf_ros.detectors.ring.polar import CORRELATION, SATURATED, PolarImages
+from ahf_ros.detectors.ring.polar import CORRELATION, SATURATED, PolarImages, angles_of
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
@@ -32,11 +32,14 @@ _ANY_STEP, _ANY_LEVEL = 0.2, 0.25  # densities of steps and levels of ln where a
 _PLAIN = 0.35  # share of what lies about any dot that is as flat as ground
 _SURPRISES = (0.05, 0.5)  # smallest and largest probability of a level that nothing predicts
 _EVEN = 0.015  # deviation of ln of ground in even light
+_SLOPE = 0.1  # of ln, to which light that is even may differ across a target
 _UNLIKE = 4.0  # standard deviations of ground, from which a level is unlike the rest
-_UNLIKE_SHARES = (0.25, 0.4)  # shares of the ground that are nothing but covers, nothing but light
+_UNLIKE_SHARES = (0.24, 0.28)  # of the ground, that are nothing but covers, nothing but light
 _UNLIKELY = 2.5  # standard deviations, from which a level was not predicted
 _LIGHT_EDGE = 0.3  # of ln, of an edge of light
 _LIGHT_EDGES = (0.02, 0.5)  # smallest and largest probability of one between two readings
+_ANGLES = 120  # at which large targets have all the evidence that readings can give
+_RADIUS, _DEPTH = 2.25, 0.2  # of readings, and distance of their depths, dot radii
 _MINIMUM_WEIGHT = 0.08  # of a reading among many that are alike
 _WHITE_OUT = 0.4  # share of what is seen that is saturated, from which that is no glare
 
@@ -110,10 +113,14 @@ def band_edges(
     return inner * radius - growth, outer * radius + growth
 
 
-def weights(polar: PolarImages, inner: float) -> np.ndarray:
-    """Return the weights of readings at neighbouring angles, ndarray of float32, shape (k,)."""
-    along = 2 * np.pi * inner * polar.size / polar.gray.shape[1]
-    return np.clip(along / CORRELATION, _MINIMUM_WEIGHT, 1).astype(np.float32)
+def weights(polar: PolarImages) -> np.ndarray:
+    """Return the weights of readings at neighbouring angles, ndarray of float32, shape (k,).
+
+    They add up to the same for bands of all families, so that their evidence can be compared.
+    """
+    angles = polar.gray.shape[1]
+    along = 2 * np.pi * _RADIUS * polar.size / angles / CORRELATION
+    return np.clip(along, _MINIMUM_WEIGHT, min(1.0, _ANGLES / angles)).astype(np.float32)
 
 
 def edge_evidence(
@@ -134,9 +141,9 @@ def edge_evidence(
     beside = np.minimum(beside, 0.45 * (outer - inner))
     before = np.minimum(beside, 0.5 * (inner - radius - growth))
     edges = light_edges(polar, radius, growth, inner)
-    weight = weights(polar, band[0])
+    weight = weights(polar)
     glare = ~white_out(polar.at((radius + inner) / 2)[..., None])[..., 0]
-    count, angles = polar.visible.shape
+    count, _, angles = polar.visible.shape
     paper, ink = np.empty((2, count, 2, angles), np.float32)
     sides = (inner - before, inner + beside), (outer + beside, outer - beside)
     for half, (ground, inked) in enumerate(sides):
@@ -144,7 +151,7 @@ def edge_evidence(
         of_paper, of_ink = _step_evidence(polar, *seen, edges)
         clear = ~glare | (np.maximum(*seen) < SATURATED)
         paper[:, half], ink[:, half] = np.where(clear, of_paper, 0), np.where(clear, of_ink, 0)
-    share = (weight[:, None] * polar.visible)[:, None]
+    share = weight[:, None, None] * polar.visible
     dot = np.zeros_like(weight)
     return Evidence(paper * share, ink * share, weight, dot, edges.astype(np.float32))
 
@@ -232,28 +239,23 @@ def level_evidence(
     errors = level - polar.logs(light)[0]
     densities = [_normal(errors, of_paper), _normal(level - polar.logs(inked)[0], of_ink)]
     anything = _PLAIN * densities[0] + (1 - _PLAIN) * _ANY_LEVEL
-    along = 2 * np.pi * radii / levels.shape[1]
-    apart = np.diff(radii, append=2 * radii[-1] - radii[-2])
-    share = np.prod(
-        [
-            np.clip(of * polar.size[:, None] / CORRELATION, _MINIMUM_WEIGHT, 1)
-            for of in (along, apart)
-        ],
-        axis=0,
-    ).astype(np.float32)
+    depth = np.clip(_DEPTH * polar.size / CORRELATION, _MINIMUM_WEIGHT, 1)
+    share = (weights(polar) * depth).astype(np.float32)
     glare = (levels >= SATURATED) & ~white_out(levels[..., radii > 1])
-    seen = known & polar.visible[..., None] & ~glare
+    seen = known & ~glare
     inner, outer = band
     in_dot, in_band = radii < 1, (radii > inner) & (radii < outer)
     on_ground = ~in_dot & ~in_band
+    middle = (inner + outer) / 2
+    halves = (radii > 1) & (radii < middle), radii > middle
+    for half, visible in zip(halves, polar.visible.transpose(1, 0, 2), strict=True):
+        seen[..., half] &= visible[..., None]
     surprise = _surprise(errors, of_paper, seen & on_ground)
     paper, ink = (
         np.where(seen, np.log(((1 - surprise) * of + surprise * _ANY_LEVEL) / anything), 0)
-        * share[:, None]
+        * share[:, None, None]
         for of in densities
     )
-    middle = (inner + outer) / 2
-    halves = (radii > 1) & (radii < middle), radii > middle
     ground = [paper[..., half & on_ground].sum(axis=2) for half in halves]
     beside = list(zip(halves, ground, strict=True))
     of_halves = [
@@ -263,7 +265,7 @@ def level_evidence(
     return Evidence(
         paper=of_halves[0],
         ink=of_halves[1],
-        weight=share[:, -1],
+        weight=share,
         dot=(ink - paper)[..., in_dot].sum(axis=(1, 2)),
         lit=surprise[:, 0, 0].astype(np.float32),
     )
@@ -292,6 +294,7 @@ def foreign_ground(
     level, noise = polar.logs(np.stack([gap, margin], axis=1))
     axes = (1, 2, 3)
     away = level - np.median(level, axis=axes, keepdims=True)
+    away -= _slope(away)
     spread = np.median(np.abs(away), axis=axes, keepdims=True) / _MEDIAN
     width = _UNLIKE * np.maximum(np.maximum(spread, _EVEN), noise)
     darker, brighter = (away < -width).any(axis=3), (away > width).any(axis=3)
@@ -299,6 +302,17 @@ def foreign_ground(
     share = (darker | brighter).mean(axis=(1, 2))
     doubt = np.clip((many - share) / (many - few), 0, 1).astype(np.float32)[:, None, None]
     return darker * doubt, (brighter & ~darker) * doubt
+
+
+def _slope(levels: np.ndarray) -> np.ndarray:
+    """Return the slope of light across targets, of the size of levels (k, 2, m, d)."""
+    angles = angles_of(levels.shape[2])
+    usual = np.clip(levels, -_SLOPE, _SLOPE)
+    slope = np.zeros_like(levels)
+    for wave in (np.cos(angles), np.sin(angles)):
+        along = wave.astype(np.float32)[:, None]
+        slope += 2 * (usual * along).mean(axis=(1, 2, 3), keepdims=True) * along
+    return slope
 
 
 def _surprise(errors: np.ndarray, width: np.ndarray, which: np.ndarray) -> np.ndarray:

@@ -41,8 +41,8 @@ class PolarImages(ArrayRecord):
     ----------
     gray : ndarray of float32, shape (k, m, n)
         Black is lifted, see `ahf_ros.imaging.black`.
-    visible : ndarray of bool, shape (k, m)
-        Whether the image shows the target at an angle.
+    visible : ndarray of bool, shape (k, 2, m)
+        Whether the image shows the inner and the outer half of the band at an angle.
     outermost : ndarray of float64, shape (k,)
         Radius of the last circle, dot radii.
     polarity : ndarray of int, shape (k,)
@@ -123,7 +123,7 @@ def polar_images(
     apart = 2 * np.pi * inner * dots.size / count
     return PolarImages(
         gray=values,
-        visible=_visible(gray.shape, dots.frames, angles, outer),
+        visible=_visible(gray.shape, dots.frames, angles, band),
         outermost=np.full(len(values), outermost),
         polarity=dots.polarity,
         contrast=contrast,
@@ -168,17 +168,18 @@ def _noise(gap: np.ndarray, apart: np.ndarray) -> np.ndarray:
 
 
 def _visible(
-    shape: tuple[int, ...], frames: np.ndarray, angles: np.ndarray, outer: float
+    shape: tuple[int, ...], frames: np.ndarray, angles: np.ndarray, band: tuple[float, float]
 ) -> np.ndarray:
-    """Return whether an image shows targets at angles, ndarray of bool, shape (k, m)."""
-    visible = np.ones((len(frames), len(angles)), bool)
+    """Return whether an image shows halves of bands at angles, bool, shape (k, 2, m)."""
+    inner, outer = band
+    visible = np.ones((len(frames), 2, len(angles)), bool)
     major, _, _ = frame.ellipse_axes(frames)
     reach = (_PERSPECTIVE * (outer + _MARGIN) * major)[:, None]
     centres = frames[:, :2, 2] / frames[:, 2:, 2]
     inside = (centres > reach) & (centres < np.array(shape[1::-1]) - 1 - reach)
     border = np.flatnonzero(~inside.all(axis=1))
-    edge = frame.circle_points(angles, np.array([outer + _SEEN]))
-    visible[border] = within(frame.project(frames[border], edge), shape)[..., 0]
+    ends = frame.circle_points(angles, np.array([(inner + outer) / 2, outer + _SEEN]))
+    visible[border] = within(frame.project(frames[border], ends), shape).transpose(0, 2, 1)
     return visible
 
 

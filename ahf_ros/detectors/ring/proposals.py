@@ -14,12 +14,14 @@ from ahf_ros.features.circle_fit import Fit, fit_dots
 from ahf_ros.features.dot_search import voted_dots, whole_dots
 from ahf_ros.features.dots import Dots
 from ahf_ros.features.pyramid import Octave
+from ahf_ros.features.soft_edges import ROUNDS, SOFT
 
 Proposal = Callable[[Octave, Sequence[int], Explained], Dots]
 """From an octave, the polarities of dots and what is explained already to dots of the octave."""
 
 _RAYS = 24  # about a dot
 _MINIMUM_SHARE = 0.5  # of the edge of a dot, for its band to be read
+_HOLDING = 22.0  # radius of a dot about which profiles hold the softest edge, px
 _FAINTEST = 0.8  # contrast of a dot, dark over bright, for its band to be read
 _PART = 256  # dots at a time, which bounds the memory
 
@@ -57,15 +59,21 @@ def measure_dots(
     worth = []
     for start in range(0, max(len(dots.frames), 1), _PART):
         part = dots.select(slice(start, start + _PART))
-        fit = _fit_once(gray, part.frames, part.polarity)
+        fit = _fit(gray, part)
         if not keep_all:
             fit = fit.select(may_be_targets(gray, fit, families))
-        worth.append(_fit_once(gray, fit.frames, fit.polarity, fit.blur))
+        fit = _fit(gray, fit)
+        # How soft an edge is shows only where a profile holds all of it.
+        is_soft = (fit.blur > SOFT) & (fit.share >= _MINIMUM_SHARE) & (fit.size > _HOLDING)
+        soft = np.flatnonzero(is_soft)
+        worth.append(fit.replaced(soft, _fit(gray, fit.select(soft), ROUNDS)))
     fit = Fit.joined(worth)
     return fit.select((fit.share >= _MINIMUM_SHARE) & (fit.contrast <= _FAINTEST))
 
 
-def _fit_once(
-    gray: np.ndarray, frames: np.ndarray, polarity: np.ndarray, blur: np.ndarray | None = None
-) -> Fit:
-    return fit_dots(gray, frames, polarity, rays=_RAYS, reach=REACH, rounds=1, blur=blur)
+def _fit(gray: np.ndarray, dots: Dots | Fit, rounds: int = 1) -> Fit:
+    """Return fits of dots, whose blur is that of an earlier fit or the usual one."""
+    blur = dots.blur if isinstance(dots, Fit) else None
+    return fit_dots(
+        gray, dots.frames, dots.polarity, rays=_RAYS, reach=REACH, rounds=rounds, blur=blur
+    )

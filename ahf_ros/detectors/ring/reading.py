@@ -168,7 +168,7 @@ def _words(
     gap, margin = (radii > 1) & (radii < inner), radii > outer
     evidence = evidence.without(*foreign_ground(polar, levels[..., gap], levels[..., margin]))
     words = decode(evidence, _overhang(growth, family), family, expected)
-    return replace(words, hidden=words.hidden | ~polar.visible)
+    return replace(words, hidden=words.hidden | ~polar.visible.any(axis=1))
 
 
 def _mean_odds(words: Words, weight: np.ndarray) -> np.ndarray:
