@@ -20,7 +20,7 @@ from ahf_ros.detectors.ring.fitted_weights import fitted_weights
 if TYPE_CHECKING:
     from ahf_ros.detectors.ring.hypotheses import Hypotheses
 
-CERTAIN = 0.87
+CERTAIN = 0.86
 """Confidence from which words are reported."""
 
 _FREE_ARCS = -60.0  # log odds against arcs of any length, beyond which these are certain

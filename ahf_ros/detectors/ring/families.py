@@ -23,7 +23,7 @@ from ahf_ros.features.circle_fit import Fit
 
 _CLEAREST = 48  # dots that tell which family comes first
 _DOUBTFUL = -5.0  # log odds against arcs of any length, from which a word may be another one
-_CLEARLY = 10.0  # more evidence of a rival, which is not read as carefully
+_CLEARLY = 1.03  # times the evidence of a word, of a rival that is likelier
 _FIRST = 8  # doubtful words that rivals read first
 
 
@@ -100,7 +100,7 @@ def _against_rivals(
         if not some.size or not rivals:
             break
         others = [_evidence(read_bands(gray, dots.select(some), code, prior)) for code in rivals]
-        contested = np.max(others, axis=0) > _evidence(found.select(some)) + _CLEARLY
+        contested = np.max(others, axis=0) > _CLEARLY * _evidence(found.select(some))
         confidence[some[contested]] = 0.0
         if not contested.any():
             break
