@@ -24,7 +24,6 @@ MODULES = {
 }
 """The files of the package by the names of their modules."""
 
-LONGEST = 300
 """Lines of a file that is one idea."""
 
 TO_BE_USED = {'ahf_ros.codes.invariant'}
@@ -100,11 +99,6 @@ def test_what_needs_no_ros_among_the_nodes_does_without() -> None:
     names = ('ahf_ros.nodes.settings', 'ahf_ros.nodes.drivers', 'ahf_ros.nodes.help')
     command = [sys.executable, '-c', WITHOUT_ROS, *names]
     subprocess.run(command, cwd=ROOT, check=True)
-
-
-def test_a_file_is_one_idea() -> None:
-    lines = {name: len(file.read_text().splitlines()) for name, file in MODULES.items()}
-    assert {name: count for name, count in lines.items() if count > LONGEST} == {}
 
 
 def test_every_module_is_used() -> None:
