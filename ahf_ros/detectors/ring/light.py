@@ -23,6 +23,7 @@ _FARTHEST = 3.6  # shift, dot radii
 _ASIDE = 0.18  # distance of ground from edges, dot radii
 _OVERLAP = 0.12  # share of the ground that a shift must compare
 _SHIFTS = 60  # best ones, that predict
+_ALIKE = 1.1  # ratio of differences of shifts that are as good as each other
 _EVEN = 1e-5  # smallest square of ln by which ground differs from itself
 _UNKNOWN = 0.03  # weight of ground below which a point is not predicted
 _PART = 64  # targets at a time, which bounds the memory
@@ -57,7 +58,7 @@ def predicted_light(
     spread : ndarray of float32, shape (k, m, d)
         Standard deviation of its logarithm; infinite where no ground predicts it.
     """
-    points, ground, candidates = _geometry(band)
+    points, ground, candidates, order = _geometry(band)
     seen = np.fft.rfft2(ground, (_TRANSFORM,) * 2)
     overlap = np.fft.irfft2(np.abs(seen) ** 2, (_TRANSFORM,) * 2).ravel()[candidates]
     place = _places(band[1] + _MARGIN, angles, radii)
@@ -75,7 +76,7 @@ def predicted_light(
         both = 2 * seen.conj() * second - 2 * np.abs(first) ** 2
         differ = np.fft.irfft2(both, (_TRANSFORM,) * 2)
         differ = (differ + _turned(differ)).reshape(len(logs), -1)[:, candidates] / 2
-        differ = np.maximum(differ / overlap, _EVEN)
+        differ = np.maximum(differ / overlap, _EVEN) * order
         best = np.argpartition(differ, _SHIFTS, axis=1)[:, :_SHIFTS]
         of_best = np.take_along_axis(differ, best, axis=1)
         weight = 1 / (of_best + of_best.min(axis=1, keepdims=True) / 2)
@@ -96,8 +97,13 @@ def predicted_light(
 
 
 @lru_cache(maxsize=16)
-def _geometry(band: tuple[float, float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the cells of a rectified target, its ground, and the shifts that are compared."""
+def _geometry(
+    band: tuple[float, float],
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return the cells of a rectified target, its ground, the shifts compared, and their order.
+
+    Factors near one put shifts that are alike into any order, so that they reach all places.
+    """
     inner, outer = band
     reach = outer + _MARGIN
     along = (np.arange(_CELLS) - (_CELLS - 1) / 2) * (2 * reach / _CELLS)
@@ -110,7 +116,8 @@ def _geometry(band: tuple[float, float]) -> tuple[np.ndarray, np.ndarray, np.nda
     steps = np.fft.fftfreq(_TRANSFORM, 1 / _TRANSFORM) * (2 * reach / _CELLS)
     away = np.hypot(steps[:, None], steps)
     candidates = (overlap > _OVERLAP * whole.sum()) & (away > 0) & (away <= _FARTHEST)
-    return points, whole, np.flatnonzero(candidates)
+    which = np.flatnonzero(candidates)
+    return points, whole, which, np.random.default_rng(0).uniform(1, _ALIKE, len(which))
 
 
 def _turned(of_shifts: np.ndarray) -> np.ndarray:
