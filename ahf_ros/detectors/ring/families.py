@@ -24,6 +24,7 @@ from ahf_ros.features.circle_fit import Fit
 _CLEAREST = 48  # dots that tell which family comes first
 _DOUBTFUL = -5.0  # log odds against arcs of any length, from which a word may be another one
 _CLEARLY = 1.03  # times the evidence of a word, of a rival that is likelier
+_CLEAR = 25.0  # log odds against the next ID, which no word of another family has
 _FIRST = 8  # doubtful words that rivals read first
 
 
@@ -91,7 +92,7 @@ def _against_rivals(
     Where arcs of any length explain a band better than its word, it may be one of theirs. If the
     rivals contest none of the most doubtful words, they contest no other one.
     """
-    coded = np.where(found.certain, found.coded, 0.0)
+    coded = np.where(found.certain & (found.margin < _CLEAR), found.coded, 0.0)
     doubtful = np.argsort(coded, kind='stable')[: (coded < _DOUBTFUL).sum()]
     read = {code.name for code in families}
     rivals = [family(name) for name in FAMILY_NAMES if name not in read]
