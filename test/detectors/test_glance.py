@@ -63,7 +63,7 @@ def test_a_dot_without_a_band_is_not_worth_reading(ink: int, paper: int, x: floa
 @pytest.mark.parametrize(
     'scene',
     [
-        SceneSettings(light='lattice', ambient=0.12, seed=3),
+        SceneSettings(light='lattice', ambient=0.3, seed=3),
         SceneSettings(light='stripe', ambient=0.12, dot_radius=10.0, distractors=6, seed=4),
     ],
     ids=['lattice', 'stripe'],
