@@ -13,15 +13,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from ahf_ros.codes.ring import Family
-from ahf_ros.detectors.ring.likelihood import edge_evidence
+from ahf_ros.detectors.ring.likelihood import edge_evidence, growth_by
 from ahf_ros.detectors.ring.polar import polar_images
 from ahf_ros.features.circle_fit import Fit
 
 _ANGLES = 64
 _PHASES = 4  # of the sectors
 _SHIFTS = (-1.2, 0.0, 1.2)  # of edges, px; readings keep farther away from these than the error
-_USUAL_SHIFT = 1.0  # standard deviation, px
-_MAXIMUM_GROWTH = 0.3  # dot radii
 _COVER = 5.0  # price of a sector that is covered
 _HOPEFUL = 0.2  # bound of the mean evidence of a reading, from which a band is read
 _CAP = 3.0  # evidence of a reading against bare paper
@@ -49,7 +47,7 @@ def _bound(gray: np.ndarray, dots: Fit, band: tuple[float, float], bits: set[int
     polar = polar_images(gray, dots, band, _ANGLES)
     best = np.full(len(dots.frames), -np.inf)
     for shift in _SHIFTS:
-        growth = np.clip(shift / polar.size, -_MAXIMUM_GROWTH, _MAXIMUM_GROWTH)
+        growth = growth_by(shift, polar.size)
         edges = edge_evidence(polar, 1 - growth, growth, band)
         cap = _CAP * edges.weight[:, None]
         for count in bits:

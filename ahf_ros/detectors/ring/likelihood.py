@@ -39,6 +39,7 @@ _UNLIKELY = 2.5  # standard deviations, from which a level was not predicted
 _LIGHT_EDGE = 0.3  # of ln, of an edge of light
 _LIGHT_EDGES = (0.02, 0.5)  # smallest and largest probability of one between two readings
 _ANGLES = 120  # at which large targets have all the evidence that readings can give
+_MAXIMUM_GROWTH = 0.3  # dot radii
 _RADIUS, _DEPTH = 2.25, 0.2  # of readings, and distance of their depths, dot radii
 _MINIMUM_WEIGHT = 0.08  # of a reading among many that are alike
 _WHITE_OUT = 0.4  # share of what is seen that is saturated, from which that is no glare
@@ -93,6 +94,11 @@ class Evidence(ArrayRecord):
             dot=self.dot + other.dot,
             lit=np.maximum(self.lit, other.lit),
         )
+
+
+def growth_by(shift: float, size: np.ndarray) -> np.ndarray:
+    """Return the growth of dots of radii (k,) by a shift of edges, both px, in dot radii, (k,)."""
+    return np.clip(shift / size, -_MAXIMUM_GROWTH, _MAXIMUM_GROWTH)
 
 
 def band_edges(

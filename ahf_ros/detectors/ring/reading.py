@@ -21,6 +21,7 @@ from ahf_ros.detectors.ring.likelihood import (
     Evidence,
     edge_evidence,
     foreign_ground,
+    growth_by,
     level_evidence,
 )
 from ahf_ros.detectors.ring.polar import PolarImages, angles_of, polar_images
@@ -35,7 +36,6 @@ PER_SECTOR = 10
 
 _FIRST_PER_SECTOR = 5  # points on each edge of a sector in the first joint fit
 _SHIFTS = np.arange(-2.4, 2.41, 0.4)  # of edges, that are tried, px
-_MAXIMUM_GROWTH = 0.3  # dot radii
 _DEPTHS = np.array([0.2, 0.4, 0.6, 0.8])  # of the band, where its levels are read
 _DOT_RADII = np.array([0.3, 0.6])  # where the level of the dot is read, dot radii
 _GAP_DEPTHS = np.array([0.4, 0.65])  # the same of the gap, in its width
@@ -128,7 +128,7 @@ def best_growth(
     best = np.full(len(polar.size), -np.inf)
     growth = np.zeros(len(polar.size))
     for shift in _SHIFTS:
-        tried = np.clip(shift / polar.size, -_MAXIMUM_GROWTH, _MAXIMUM_GROWTH)
+        tried = growth_by(shift, polar.size)
         edges = edge_evidence(polar, 1 - tried, tried, band)
         paper, ink = edges.paper.sum(axis=1), edges.ink.sum(axis=1)
         score = np.maximum(np.maximum(paper, ink), 0).sum(axis=1)
