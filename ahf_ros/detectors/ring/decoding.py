@@ -224,13 +224,14 @@ def _clearest(evidence: _Angles) -> np.ndarray:
 def _along_words(evidence: _Angles, bits: np.ndarray) -> np.ndarray:
     """Return the evidence for words at each angle, bits (k, w, m), shape (m, k, w).
 
-    A border between two sectors may lie to either side of the angles next to it.
+    A border between two sectors may lie to either side of the angles next to it, or in a reading,
+    which is then neither.
     """
     along = bits.transpose(2, 0, 1)
     paper, ink = evidence.paper.T[..., None], evidence.ink.T[..., None]
     seen = np.where(along, ink, paper)
     border = (along != np.roll(along, 1, axis=0)) | (along != np.roll(along, -1, axis=0))
-    return np.where(border, np.maximum(paper, ink), seen)
+    return np.where(border, np.maximum(np.maximum(paper, ink), 0), seen)
 
 
 def _covered_paths(seen: np.ndarray, of: _Angles) -> np.ndarray:
@@ -292,11 +293,12 @@ def _free_paths(evidence: _Angles) -> np.ndarray:
     paper, ink = evidence.paper.T, evidence.ink.T
     white, dark = paper[0], ink[0]
     covered = np.full_like(white, _NEVER)
-    for of_paper, of_ink in zip(paper[1:], ink[1:], strict=True):
+    mixed = np.maximum(np.maximum(paper, ink), 0) - border
+    for of_paper, of_ink, of_border in zip(paper[1:], ink[1:], mixed[1:], strict=True):
         begun = np.maximum(white, dark) - cover
         white, dark = (
-            np.maximum(np.maximum(white, dark - border), covered) + of_paper,
-            np.maximum(np.maximum(dark, white - border), covered) + of_ink,
+            np.maximum(np.maximum(white, covered) + of_paper, dark + of_border),
+            np.maximum(np.maximum(dark, covered) + of_ink, white + of_border),
         )
         covered = np.maximum(covered, begun) - cost
     return np.maximum(np.maximum(white, dark), covered)
