@@ -44,6 +44,7 @@ _HOPEFUL, _HOPEFUL_IN_LIGHT = (
     0.3,
     0.4,
 )  # mean log odds of a reading of edges, from which a band is read on
+_CLEAR = 8.0  # log odds of a word by edges alone, with which the first joint fit begins
 _PART = 256  # dots at a time, which bounds the memory
 
 
@@ -81,29 +82,27 @@ def _read_part(gray: np.ndarray, dots: Fit, family: Family, prior: Prior) -> Hyp
     polar = polar_images(gray, dots, family.band, family.bits * PER_SECTOR)
     growth = best_growth(polar, family.band, prior)
     edges = edge_evidence(polar, 1 - growth, growth, family.band)
-    first = decode(edges, _overhang(growth, family), family, prior.expected)
-    read = np.flatnonzero(_mean_odds(first, edges.weight) > _HOPEFUL)
-    growth = growth[read]
+    words = decode(edges, _overhang(growth, family), family, prior.expected)
+    read = np.flatnonzero(_mean_odds(words, edges.weight) > _HOPEFUL)
+    growth, words = growth[read], words.select(read)
     printed = dots.select(read)
     printed = replace(printed, frames=frame.scaled(printed.frames, 1 - growth))
+    # What edges leave open, levels decide, even before dot and band are fitted together.
+    some = np.flatnonzero(words.margin < _CLEAR)
     # In the frame of the printed dot, the same growth is a larger share.
-    words = _words(
-        gray,
-        printed,
-        polar.select(read),
-        edges.select(read),
-        growth / (1 - growth),
-        family,
-        prior.expected,
-    )
-    good = _mean_odds(words, edges.weight[read]) > _HOPEFUL_IN_LIGHT
-    read, printed, words = read[good], printed.select(good), words.select(good)
+    larger = growth[some] / (1 - growth[some])
+    of_some = polar.select(read[some]), edges.select(read[some]), larger
+    of_levels = _words(gray, printed.select(some), *of_some, family, prior.expected)
+    words = words.replaced(some, of_levels)
+    hopeful = np.ones(len(read), bool)
+    hopeful[some] = _mean_odds(of_levels, edges.weight[read[some]]) > _HOPEFUL_IN_LIGHT
+    read, printed, words = read[hopeful], printed.select(hopeful), words.select(hopeful)
     fit = _joint_fit(gray, printed, words, _FIRST_PER_SECTOR, 1, family)
     growth = fit.polarity * fit.edge_shift / fit.size
     polar = polar_images(gray, fit, family.band, family.bits * PER_SECTOR)
     edges = edge_evidence(polar, np.ones(len(read)), growth, family.band)
     words = _words(gray, fit, polar, edges, growth, family, prior.expected)
-    good = words.words > 0
+    good = _mean_odds(words, edges.weight) > _HOPEFUL_IN_LIGHT
     read, fit, words = read[good], fit.select(good), words.select(good)
     fit = _joint_fit(gray, fit, words, PER_SECTOR, 2, family)
     return unread.replaced(read, Hypotheses.of(fit, words, family))
