@@ -134,6 +134,8 @@ def read_image(
         for propose in proposals:
             dots = propose(octave, settings.polarities, explained)
             fits = measure_dots(part, dots, families, keep_all=settings.report_undecoded)
+            if not len(fits.frames):
+                continue
             if not explained.certain.any():
                 families = by_clear_dots(part, fits, families)
             shifts = explained.shifts[explained.certain] / 2**octave.level

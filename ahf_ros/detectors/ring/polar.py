@@ -19,7 +19,9 @@ CORRELATION = 2.5
 SATURATED = 253.0
 """Gray value from which a reading is white, whatever the light."""
 
-_CIRCLES = 56  # of a polar image, which are then less than a tenth of a dot radius apart
+CIRCLES = 56
+"""Of a polar image, which are then less than a tenth of a dot radius apart."""
+
 _INNERMOST, _MARGIN = 0.3, 0.95  # first circle, and last one beyond the band, dot radii
 _SEEN = 0.15  # beyond the band, that the image must show, dot radii
 _PERSPECTIVE = 1.5  # of circles, more than perspective makes one side of them larger
@@ -98,7 +100,11 @@ class PolarImages(ArrayRecord):
 
 
 def polar_images(
-    gray: np.ndarray, dots: Fit, band: tuple[float, float], count: int
+    gray: np.ndarray,
+    dots: Fit,
+    band: tuple[float, float],
+    count: int,
+    circles: int = CIRCLES,
 ) -> PolarImages:
     """Return the polar images of targets.
 
@@ -112,10 +118,12 @@ def polar_images(
         Radii of the band, dot radii.
     count : int
         Number of angles, see `angles_of`.
+    circles : int
+        Number of circles.
     """
     angles, (inner, outer) = angles_of(count), band
     outermost = outer + _MARGIN
-    radii = np.linspace(_INNERMOST, outermost, _CIRCLES)
+    radii = np.linspace(_INNERMOST, outermost, circles)
     values = np.maximum(sample_circles(gray, dots.frames, angles, radii), 0)
     contrast, lift = _appearance(gray, dots)
     values = lifted(values, lift.astype(np.float32)[:, None, None])

@@ -10,7 +10,7 @@ from ahf_ros.codes.ring import Family
 from ahf_ros.detectors.ring.circles import REACH
 from ahf_ros.detectors.ring.explained import Explained
 from ahf_ros.detectors.ring.glance import may_be_targets
-from ahf_ros.features.circle_fit import Fit, fit_dots
+from ahf_ros.features.circle_fit import NO_FITS, Fit, fit_dots
 from ahf_ros.features.dot_search import voted_dots, whole_dots
 from ahf_ros.features.dots import Dots
 from ahf_ros.features.pyramid import Octave
@@ -56,24 +56,34 @@ def measure_dots(
     keep_all : bool
         Whether dots that are no middles of targets are measured as well.
     """
-    worth = []
-    for start in range(0, max(len(dots.frames), 1), _PART):
+    worth = [NO_FITS]
+    for start in range(0, len(dots.frames), _PART):
         part = dots.select(slice(start, start + _PART))
-        fit = _fit(gray, part)
+        fit = _fit(gray, part, covariances=keep_all)
         if not keep_all:
             fit = fit.select(may_be_targets(gray, fit, families))
         fit = _fit(gray, fit)
         # How soft an edge is shows only where a profile holds all of it.
         is_soft = (fit.blur > SOFT) & (fit.share >= _MINIMUM_SHARE) & (fit.size > _HOLDING)
         soft = np.flatnonzero(is_soft)
-        worth.append(fit.replaced(soft, _fit(gray, fit.select(soft), ROUNDS)))
+        if soft.size:
+            fit = fit.replaced(soft, _fit(gray, fit.select(soft), ROUNDS))
+        worth.append(fit)
     fit = Fit.joined(worth)
     return fit.select((fit.share >= _MINIMUM_SHARE) & (fit.contrast <= _FAINTEST))
 
 
-def _fit(gray: np.ndarray, dots: Dots | Fit, rounds: int = 1) -> Fit:
+def _fit(
+    gray: np.ndarray, dots: Dots | Fit, rounds: int = 1, *, covariances: bool = True
+) -> Fit:
     """Return fits of dots, whose blur is that of an earlier fit or the usual one."""
-    blur = dots.blur if isinstance(dots, Fit) else None
     return fit_dots(
-        gray, dots.frames, dots.polarity, rays=_RAYS, reach=REACH, rounds=rounds, blur=blur
+        gray,
+        dots.frames,
+        dots.polarity,
+        rays=_RAYS,
+        reach=REACH,
+        rounds=rounds,
+        blur=dots.blur if isinstance(dots, Fit) else None,
+        covariances=covariances,
     )

@@ -124,6 +124,7 @@ def best_growth(
     prior : Prior
         What is known before, in px of the image.
     """
+    polar = replace(polar, gray=polar.gray[:, ::2], visible=polar.visible[..., ::2])
     best = np.full(len(polar.size), -np.inf)
     growth = np.zeros(len(polar.size))
     for shift in _SHIFTS:
