@@ -40,11 +40,9 @@ _DEPTHS = np.array([0.2, 0.4, 0.6, 0.8])  # of the band, where its levels are re
 _DOT_RADII = np.array([0.3, 0.6])  # where the level of the dot is read, dot radii
 _GAP_DEPTHS = np.array([0.4, 0.65])  # the same of the gap, in its width
 _MARGIN_DEPTHS = np.array([0.3, 0.6])  # the same beyond the band, dot radii
-_HOPEFUL, _HOPEFUL_IN_LIGHT = (
-    0.3,
-    0.4,
-)  # mean log odds of a reading of edges, from which a band is read on
-_CLEAR = 8.0  # log odds of a word by edges alone, with which the first joint fit begins
+_HOPEFUL = 0.3  # mean log odds of a reading, from which a band is read on
+_CLEAR = 15.0  # log odds of a word by edges alone against the next ID, that leave no doubt
+_DOUBT = 3.0  # log odds against it of arcs of any length, that leave one
 _PART = 256  # dots at a time, which bounds the memory
 
 
@@ -84,25 +82,29 @@ def _read_part(gray: np.ndarray, dots: Fit, family: Family, prior: Prior) -> Hyp
     edges = edge_evidence(polar, 1 - growth, growth, family.band)
     words = decode(edges, _overhang(growth, family), family, prior.expected)
     read = np.flatnonzero(_mean_odds(words, edges.weight) > _HOPEFUL)
-    growth, words = growth[read], words.select(read)
+    growth = growth[read]
     printed = dots.select(read)
     printed = replace(printed, frames=frame.scaled(printed.frames, 1 - growth))
-    # What edges leave open, levels decide, even before dot and band are fitted together.
-    some = np.flatnonzero(words.margin < _CLEAR)
     # In the frame of the printed dot, the same growth is a larger share.
-    larger = growth[some] / (1 - growth[some])
-    of_some = polar.select(read[some]), edges.select(read[some]), larger
-    of_levels = _words(gray, printed.select(some), *of_some, family, prior.expected)
-    words = words.replaced(some, of_levels)
-    hopeful = np.ones(len(read), bool)
-    hopeful[some] = _mean_odds(of_levels, edges.weight[read[some]]) > _HOPEFUL_IN_LIGHT
-    read, printed, words = read[hopeful], printed.select(hopeful), words.select(hopeful)
+    words = _with_levels(
+        gray,
+        printed,
+        polar.select(read),
+        edges.select(read),
+        growth / (1 - growth),
+        words.select(read),
+        family,
+        prior.expected,
+    )
+    good = _mean_odds(words, edges.weight[read]) > _HOPEFUL
+    read, printed, words = read[good], printed.select(good), words.select(good)
     fit = _joint_fit(gray, printed, words, _FIRST_PER_SECTOR, 1, family)
     growth = fit.polarity * fit.edge_shift / fit.size
     polar = polar_images(gray, fit, family.band, family.bits * PER_SECTOR)
     edges = edge_evidence(polar, np.ones(len(read)), growth, family.band)
-    words = _words(gray, fit, polar, edges, growth, family, prior.expected)
-    good = _mean_odds(words, edges.weight) > _HOPEFUL_IN_LIGHT
+    words = decode(edges, _overhang(growth, family), family, prior.expected)
+    words = _with_levels(gray, fit, polar, edges, growth, words, family, prior.expected)
+    good = _mean_odds(words, edges.weight) > _HOPEFUL
     read, fit, words = read[good], fit.select(good), words.select(good)
     fit = _joint_fit(gray, fit, words, PER_SECTOR, 2, family)
     return unread.replaced(read, Hypotheses.of(fit, words, family))
@@ -139,18 +141,38 @@ def best_growth(
     return growth
 
 
-def _words(
+def _with_levels(
     gray: np.ndarray,
     targets: Fit,
     polar: PolarImages,
     edges: Evidence,
     growth: np.ndarray,
+    words: Words,
     family: Family,
     expected: frozenset[int],
 ) -> Words:
-    """Return the words of targets by all evidence, with their frames and ink that has grown."""
-    if not len(targets.frames):
-        return Words.none(0, family.bits * PER_SECTOR)
+    """Return words by edges, and by levels as well where edges leave a doubt.
+
+    Parameters
+    ----------
+    gray : ndarray of float32, shape (height, width)
+    targets : Fit
+        Of k targets, in frames of their printed dots.
+    polar, edges
+        As they are seen there.
+    growth : ndarray of float64, shape (k,)
+        Of ink, dot radii.
+    words : Words
+        By edges alone.
+    family, expected
+        As for `decode`.
+    """
+    doubtful = np.flatnonzero(
+        (words.margin < _CLEAR) | (words.coded < -_DOUBT) | words.hidden.any(axis=1)
+    )
+    if not doubtful.size:
+        return words
+    targets, polar, edges = (of.select(doubtful) for of in (targets, polar, edges))
     inner, outer = family.band
     radii = np.concatenate(
         [
@@ -167,8 +189,9 @@ def _words(
     evidence = edges.plus(level_evidence(polar, levels, *light, radii, family.band))
     gap, margin = (radii > 1) & (radii < inner), radii > outer
     evidence = evidence.without(*foreign_ground(polar, levels[..., gap], levels[..., margin]))
-    words = decode(evidence, _overhang(growth, family), family, expected)
-    return replace(words, hidden=words.hidden | ~polar.visible.any(axis=1))
+    read = decode(evidence, _overhang(growth[doubtful], family), family, expected)
+    read = replace(read, hidden=read.hidden | ~polar.visible.any(axis=1))
+    return words.replaced(doubtful, read)
 
 
 def _mean_odds(words: Words, weight: np.ndarray) -> np.ndarray:
