@@ -10,6 +10,7 @@ from ahf_ros.codes.cyclic import rotated_words
 from ahf_ros.codes.ring import Family, canonical
 
 _EXHAUSTIVE = 50_000  # rotations of words, up to which all of them compete
+_AT_ONCE = 100_000  # rotations of words of all bands at a time, which stay in the cache
 _MINIMUM_EVIDENCE = 2.0  # for ones, in units of ln
 
 COMPETITORS = 24
@@ -45,32 +46,38 @@ def best_words(
     phases : ndarray of int, shape (k, COMPETITORS)
         The best phase of each.
     """
-    words = np.zeros((len(sectors), COMPETITORS * (2 if expected else 1)), np.int64)
-    phases = np.zeros(words.shape, np.intp)
     everything = len(family.words) * family.bits <= _EXHAUSTIVE
-    hopeful = np.maximum(sectors, 0).sum(axis=2).max(axis=1) > _MINIMUM_EVIDENCE
+    count = COMPETITORS * (2 if expected else 1)
+    words, phases = np.zeros((2, len(sectors), count), np.int64)
+    hopeful = np.flatnonzero(np.maximum(sectors, 0).sum(axis=2).max(axis=1) > _MINIMUM_EVIDENCE)
     # Where sectors begin, each says most for one or zero; any other phase mixes neighbours.
     likely = np.argsort(-np.abs(sectors).sum(axis=2), axis=1, kind='stable')[:, :_PHASES]
-    for index in np.flatnonzero(hopeful).tolist():
-        of_band = sectors[index, likely[index]].astype(np.float32)
+    of_phases = np.take_along_axis(sectors, likely[..., None], axis=1).astype(np.float32)
+    at_once = max(1, _AT_ONCE // (len(family.words) * family.bits)) if everything else 1
+    for start in range(0, len(hopeful), at_once):
+        some = hopeful[start : start + at_once]
         competing, ones = (
-            _all_rotations(family) if everything else _near_rotations(of_band, family, expected)
+            _all_rotations(family)
+            if everything
+            else _near_rotations(of_phases[some[0]], family, expected)
         )
-        of_phases = of_band @ ones
-        of_word = np.round(of_phases.max(axis=0), 2)  # last bits differ between processors
+        scores = of_phases[some] @ ones
+        of_word = np.round(scores.max(axis=1), 2)  # last bits differ between processors
         best = _best(of_word, COMPETITORS)
         if expected:
             with_prior = of_word + prior(competing, family, expected)
-            best = np.concatenate([_best(with_prior, COMPETITORS), best])
-        words[index] = competing[best]
-        phases[index] = likely[index, of_phases[:, best].argmax(axis=0)]
+            best = np.concatenate([_best(with_prior, COMPETITORS), best], axis=1)
+        words[some] = competing[best]
+        phase = np.take_along_axis(scores, best[:, None], axis=2).argmax(axis=1)
+        phases[some] = np.take_along_axis(likely[some], phase, axis=1)
     return words, phases
 
 
 def _best(scores: np.ndarray, count: int) -> np.ndarray:
-    """Return the indices of the highest scores, repeated where there are fewer."""
-    best = np.argpartition(scores, -min(count, len(scores)))[-count:]
-    return np.resize(best[np.argsort(-scores[best], kind='stable')], count)
+    """Return the indices of the highest scores (k, w), repeated where there are fewer."""
+    best = np.argpartition(scores, -min(count, scores.shape[1]), axis=1)[:, -count:]
+    order = np.argsort(-np.take_along_axis(scores, best, 1), axis=1, kind='stable')
+    return np.resize(np.take_along_axis(best, order, 1).T, (count, len(scores))).T
 
 
 def prior(words: np.ndarray, family: Family, expected: frozenset[int]) -> np.ndarray:

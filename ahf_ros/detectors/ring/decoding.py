@@ -27,6 +27,7 @@ _BORDER = 4.8  # price of a border of an arc of any length, at one of about 120 
 _RANKED = 1.2  # evidence of a reading that ranks words, which one cover must not settle
 _NEAR = 3  # angles on either side of the clearest one
 _DRAW = 5.0  # lead of a word that is not expected, which is as good as none
+_ROUNDING = 1e-5  # of sums of float32
 _NEVER = np.float32(-1e9)
 
 
@@ -119,7 +120,7 @@ def decode(
     # What is expected wins a draw, but an ID that is read clearly is no other one.
     read_as, known_as = (margins(words, of, best, family) for of in (scores, likely))
     margin = np.clip(known_as, read_as, read_as + _DRAW)
-    turned_hidden = _hidden(evidence_of[:, rows, best], turned)
+    turned_hidden = _hidden(evidence_of[:, rows, best], scores[rows, best], turned)
     hidden = np.empty(turned_hidden.shape, bool)
     np.put_along_axis(hidden, order, turned_hidden, axis=1)
     score = scores[rows, best].astype(np.float64)
@@ -257,8 +258,27 @@ def _covered_paths(seen: np.ndarray, of: _Angles) -> np.ndarray:
     return np.maximum(np.maximum(clear, covered), like_paper)
 
 
-def _hidden(seen: np.ndarray, of: _Angles) -> np.ndarray:
-    """Return where the best paths of one word of each band are covered, seen (m, k), (k, m)."""
+def _hidden(seen: np.ndarray, scores: np.ndarray, of: _Angles) -> np.ndarray:
+    """Return where the best paths of one word of each band are covered, shape (k, m).
+
+    Parameters
+    ----------
+    seen : ndarray of float32, shape (m, k)
+        Evidence of the word where nothing covers the band.
+    scores : ndarray of float32, shape (k,)
+        The same of its best path.
+    of : _Angles
+        Of k bands.
+    """
+    hidden = np.zeros(seen.T.shape, bool)
+    some = np.flatnonzero(scores > seen.sum(axis=0) + _ROUNDING * np.abs(seen).sum(axis=0))
+    if some.size:
+        hidden[some] = _backtracked(seen[:, some], of.select(some))
+    return hidden
+
+
+def _backtracked(seen: np.ndarray, of: _Angles) -> np.ndarray:
+    """Return the same for bands of which a part is covered."""
     cost, paper = np.float32(_COVERED) * of.weight, of.paper.T
     prices = np.stack([0 * cost, np.full_like(cost, _COVER), of.like_paper])
     scores = np.full((3, seen.shape[1]), _NEVER)

@@ -73,9 +73,7 @@ def measure_dots(
     return fit.select((fit.share >= _MINIMUM_SHARE) & (fit.contrast <= _FAINTEST))
 
 
-def _fit(
-    gray: np.ndarray, dots: Dots | Fit, rounds: int = 1, *, covariances: bool = True
-) -> Fit:
+def _fit(gray: np.ndarray, dots: Dots | Fit, rounds: int = 1, *, covariances: bool = True) -> Fit:
     """Return fits of dots, whose blur is that of an earlier fit or the usual one."""
     return fit_dots(
         gray,
