@@ -79,13 +79,21 @@ def test_what_is_covered_is_found_and_says_nothing_about_the_word() -> None:
 
 @pytest.mark.parametrize('start', range(0, ANGLES, 17))
 def test_a_cover_may_lie_across_the_first_angle(start: int) -> None:
-    clear = seen(of_word(CODE.word(30)))
+    bits = of_word(CODE.word(30))
+    clear = seen(bits)
+    borders = np.any([bits != np.roll(bits, step) for step in range(-2, 3)], axis=0)
     covered = (np.arange(12) + start) % ANGLES
     evidence = replace(clear, paper=clear.paper.copy(), ink=clear.ink.copy())
     evidence.paper[..., covered] = evidence.ink[..., covered] = -2.0
     found = read(evidence)
     assert canonical(found.words, CODE)[1].tolist() == [30]
-    assert set(np.flatnonzero(found.hidden[0])) == set(covered.tolist())
+    hidden = set(np.flatnonzero(found.hidden[0]).tolist())
+    # What may be a border of a sector is neither paper nor ink in any case.
+    assert (
+        set(covered.tolist()) - set(np.flatnonzero(borders).tolist())
+        <= hidden
+        <= set(covered.tolist())
+    )
 
 
 def test_two_ids_that_differ_below_a_cover_are_a_draw() -> None:
@@ -94,7 +102,7 @@ def test_two_ids_that_differ_below_a_cover_are_a_draw() -> None:
     evidence = seen(of_word(one))
     evidence.paper[..., differ] = evidence.ink[..., differ] = -2.0
     found = read(evidence)
-    assert found.hidden[0, differ].mean() > 0.9
+    assert found.hidden[0, differ].mean() > 0.8
     assert found.margin[0] < 1
 
 

@@ -172,7 +172,8 @@ def _with_levels(
     )
     if not doubtful.size:
         return words
-    targets, polar, edges = (of.select(doubtful) for of in (targets, polar, edges))
+    targets, polar = targets.select(doubtful), polar.select(doubtful)
+    edges = edges.select(doubtful)
     inner, outer = family.band
     radii = np.concatenate(
         [
