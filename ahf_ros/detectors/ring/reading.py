@@ -40,7 +40,7 @@ _DEPTHS = np.array([0.2, 0.4, 0.6, 0.8])  # of the band, where its levels are re
 _DOT_RADII = np.array([0.3, 0.6])  # where the level of the dot is read, dot radii
 _GAP_DEPTHS = np.array([0.4, 0.65])  # the same of the gap, in its width
 _MARGIN_DEPTHS = np.array([0.3, 0.6])  # the same beyond the band, dot radii
-_HOPEFUL = 0.3  # mean log odds of a reading, from which a band is read on
+_HOPEFUL = 0.2  # mean log odds of a reading, from which a band is read on
 _CLEAR = 15.0  # log odds of a word by edges alone against the next ID, that leave no doubt
 _DOUBT = 3.0  # log odds against it of arcs of any length, that leave one
 _PART = 256  # dots at a time, which bounds the memory
@@ -133,7 +133,8 @@ def best_growth(
         tried = growth_by(shift, polar.size)
         edges = edge_evidence(polar, 1 - tried, tried, band)
         paper, ink = edges.paper.sum(axis=1), edges.ink.sum(axis=1)
-        score = np.maximum(np.maximum(paper, ink), 0).sum(axis=1)
+        # Any ground is as even as paper somewhere, but only a band has ink.
+        score = np.maximum(ink - np.maximum(paper, 0), 0).sum(axis=1)
         unusual = (polar.polarity * shift - prior.shift) / prior.deviation
         score = score - 0.5 * unusual**2
         growth = np.where(score > best, tried, growth)
