@@ -20,19 +20,18 @@ from ahf_ros.detectors.ring.fitted_weights import fitted_weights
 if TYPE_CHECKING:
     from ahf_ros.detectors.ring.hypotheses import Hypotheses
 
-CERTAIN = 0.86
+CERTAIN = 0.84
 """Confidence from which words are reported."""
 
-_FREE_ARCS = -60.0  # log odds against arcs of any length, beyond which these are certain
 _INTERCEPT, _WEIGHTS = fitted_weights('confidence', 'intercept', 'weights')
 
 
 def features(read: Hypotheses) -> np.ndarray:
-    """Return what speaks for readings, float64, shape (k, 5).
+    """Return what speaks for readings, float64, shape (k, 4).
 
-    Logarithm of the log odds of words against the next ID; log odds against arcs of ink of any
-    length, in tens; logarithm of those against anything; the share of the expected edges that are
-    in their place, and that of the band that is seen.
+    Logarithm of the log odds of words against the next ID; root of the log odds of arcs of ink of
+    any length against them, negative; the share of the expected edges that are in their place, and
+    that of the band that is seen.
 
     Parameters
     ----------
@@ -42,8 +41,7 @@ def features(read: Hypotheses) -> np.ndarray:
     return np.stack(
         [
             np.log1p(np.maximum(read.margin, 0)),
-            np.clip(read.coded, _FREE_ARCS, 0) / 10,
-            np.log1p(np.maximum(read.seen, 0)),
+            -np.sqrt(np.maximum(-read.coded, 0)),
             read.share,
             1 - read.hidden,
         ],
@@ -56,14 +54,14 @@ def confidence(values: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    values : ndarray of float, shape (k, 5)
+    values : ndarray of float, shape (k, 4)
         As `features` gives them.
     """
     return target_probability(values) * _logistic(np.expm1(values[:, 0]))
 
 
 def target_probability(values: np.ndarray) -> np.ndarray:
-    """Return the probabilities that readings are of targets, shape (k,), values (k, 5)."""
+    """Return the probabilities that readings are of targets, shape (k,), values (k, 4)."""
     return _logistic(_INTERCEPT + values @ _WEIGHTS)
 
 
