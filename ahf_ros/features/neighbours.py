@@ -30,7 +30,7 @@ def pairs_within(
         return
     x, y = (points - points.min(axis=0)).T
     # Strips as high as the usual reach, each sorted by x, have their neighbours in a few runs.
-    height = max(float(np.median(reach)), 1e-9)
+    height = max(float(np.median(reach[reach > 0])), 1e-9) if (reach > 0).any() else 1.0
     width = float(x.max() + 2 * reach.max() + 1)
     strip = np.floor(y / height)
     key = strip * width + x

@@ -68,8 +68,12 @@ def seen_templates(log: np.ndarray, templates: Templates, family: PointFamily) -
     evidence = find_evidence(
         log, templates.homographies, templates.polarity, templates.scale, alone
     )
-    seen = evidence.inside & (evidence.ratio > _CONTRADICTED)
-    return templates.select(np.flatnonzero(seen.all(axis=1)))
+    against = evidence.ratio <= _CONTRADICTED
+    missing = templates.members < 0
+    seen = (
+        evidence.inside.all(axis=1) & ~(against & missing).any(axis=1) & (against.sum(axis=1) <= 1)
+    )
+    return templates.select(np.flatnonzero(seen))
 
 
 def find_evidence(

@@ -71,7 +71,7 @@ def read_codes(evidence: Evidence, scale: np.ndarray, family: PointFamily) -> Re
         family.words[best],
         margin,
         (dots + against) / most,
-        of_dots.min(axis=1),
+        np.sort(of_dots, axis=1)[:, 1],
     )
 
 
