@@ -175,7 +175,7 @@ def read_targets(
     """
     polarities = [np.flatnonzero(dots.polarity == polarity) for polarity in (1, -1)]
     for which in sorted(polarities, key=len):
-        certain = known.select(resolve(known, code, OBVIOUS))
+        certain = known.select(resolve(known, code))
         templates = find_templates(dots.select(which), code, certain.scale, obvious=obvious)
         known = Hypotheses.joined([known, _read(pyramid, templates, code, obvious=obvious)])
     return known
