@@ -19,11 +19,11 @@ _RADII = (0.065, 0.43)
 # Of dots, in the least distance of two template dots: 1.0 to 3.6 mm where these are 11 mm apart,
 # and a third more for bright ones that bloom.
 _SIZE_RATIO = 0.55  # of two dots of a target, in ln, for their printed sizes
-_STEPS = 4
-_CROWD = (
-    4.0,
-    1.25,
-)  # times the dots of a target, from which on so many neighbours make a pattern of light
+_STEPS = 4  # of the distance to which neighbours are looked for, until there are many
+_CROWD = (4.0, 1.25)
+# Times as dense as the dots of a target in the circle about it, from which on neighbours make a
+# pattern of light; and the same where only obvious targets are looked for. Bright targets in
+# bright lattices are lost with 3.
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +105,9 @@ def neighbours(
         for role, *others in triples
     )
     nearest, farthest = ((1 + error[0]) * longest / of + error[1] for of in (largest, smallest))
-    crowd = round(_CROWD[obvious] * (len(places) + family.rule.dots))
+    own = float(family.template_radii[family.reference])
+    circles = ((1 + error[0]) * longest * own / family.reach) ** 2
+    crowd = round(_CROWD[obvious] * circles * (len(places) + family.rule.dots))
     centres = dots.frames[:, :2, 2]
     major = frame.ellipse_axes(dots.frames)[0]
     inverse = np.linalg.inv(dots.frames[:, :2, :2])

@@ -30,7 +30,7 @@ class Readings(ArrayRecord):
         Evidence for a target with this code: for its dots, and against dots at all other places,
         as a share of the most there may be.
     weakest : ndarray of float64, shape (k,)
-        The lowest evidence for one of its dots.
+        The second lowest evidence for one of its dots, as light may hide one.
     """
 
     words: np.ndarray
