@@ -22,7 +22,7 @@ from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import DetectorSettings, FamilyDetector
 from ahf_ros.detectors.gsi.confidence import confidence_features
 from ahf_ros.detectors.gsi.evidence import find_evidence, seen_templates
-from ahf_ros.detectors.gsi.grouping import Templates, find_templates
+from ahf_ros.detectors.gsi.grouping import FEW, Templates, find_templates
 from ahf_ros.detectors.gsi.hypotheses import (
     OBVIOUS,
     Hypotheses,
@@ -160,8 +160,8 @@ def read_targets(
 ) -> Hypotheses:
     """Return hypotheses, and the groups of dots that may be targets, read as codes.
 
-    Prints in one image are alike. The polarity with fewer dots comes first, as its targets tell
-    which dots of the other one, perhaps those of a pattern of light, are of no use.
+    The polarity with fewer dots comes first. Prints in one image are alike: if there are certain
+    targets, but none of the other polarity, its dots, where they are many, are those of light.
 
     Parameters
     ----------
@@ -175,8 +175,10 @@ def read_targets(
     """
     polarities = [np.flatnonzero(dots.polarity == polarity) for polarity in (1, -1)]
     for which in sorted(polarities, key=len):
-        certain = known.select(resolve(known, code))
-        templates = find_templates(dots.select(which), code, certain.scale, obvious=obvious)
+        certain = known.polarity[resolve(known, code)]
+        if len(which) > FEW and len(certain) and not np.isin(certain, dots.polarity[which]).any():
+            continue
+        templates = find_templates(dots.select(which), code, obvious=obvious)
         known = Hypotheses.joined([known, _read(pyramid, templates, code, obvious=obvious)])
     return known
 

@@ -9,7 +9,7 @@ dots give an affine map, which predicts the others well; their areas tell the ra
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, partial
 from itertools import pairwise
@@ -37,8 +37,8 @@ _WELL = 0.25  # share of what is accepted, of a template that fits well
 _MAXIMUM_GROUPS = 2000  # of one part, for a homography to be fitted
 _MAXIMUM_TEMPLATES = 2000  # of one polarity, those that fit best
 _STRAY = 3  # dots at the positions of a target that do not belong to it
-_ALIKE = 1.25  # ratio of the radii of dots that may be of one print, as blobs show them
-_FEW = 600  # dots, up to which all template dots are tried in all roles
+FEW = 600
+"""Dots of one polarity, up to which all template dots are tried in all roles."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,13 +66,7 @@ class Templates(ArrayRecord):
     misfit: np.ndarray
 
 
-def find_templates(
-    dots: Dots,
-    family: PointFamily,
-    scale: Sequence[float] | np.ndarray = (),
-    *,
-    obvious: bool = False,
-) -> Templates:
+def find_templates(dots: Dots, family: PointFamily, *, obvious: bool = False) -> Templates:
     """Return the groups of dots that look like templates, no group twice.
 
     Parameters
@@ -81,9 +75,6 @@ def find_templates(
         Of one polarity.
     family : PointFamily
         Printed design.
-    scale : sequence of float
-        Radii of the dots of certain targets, in those of the printed design. Where there are many
-        dots, others are not looked for.
     obvious : bool
         Whether only targets without many other dots about them are looked for.
 
@@ -96,19 +87,16 @@ def find_templates(
     if len(dots.frames) < len(places) - 1:
         return _nothing(len(places))
     centres, smallest = dots.frames[:, :2, 2], frame.ellipse_axes(dots.frames)[1].min()
-    few = len(centres) <= _FEW
-    scales = radius_scales(family)
-    if len(scale) and not few:
-        scales = min(scale) / _ALIKE, max(scale) * _ALIKE
+    few = len(centres) <= FEW
     triples = _triples(places, family.reference, few)
     error = _LENGTH_ERROR if few else _LENGTH_ERROR_OF_MANY
-    pairs = neighbours(dots, family, triples, error, scales, obvious=obvious)
+    pairs = neighbours(dots, family, triples, error, obvious=obvious)
     nearest = cache(partial(NearestDots.of, centres, smallest / 3))
     templates = [_nothing(len(places))]
     for triple in triples:
         members = _members(dots, pairs, nearest, family, triple)
         if len(members):
-            fitted = _fitted(dots, members, family, scales)
+            fitted = _fitted(dots, members, family)
             templates.append(fitted.select(_mostly_empty(fitted, nearest(), family)))
     return _distinct(Templates.joined(templates))
 
@@ -147,7 +135,7 @@ def _members(
     radius = family.template_radii[role]
     arms = (places - places[role]) / radius
     lengths = np.hypot(*arms.T)
-    smallest, largest = pairs.scales
+    smallest, largest = radius_scales(family)
     longest = lengths[partner] / smallest
     apart, shortest = np.abs(pairs.offset), lengths[partner] / largest
     likely = apart < longest + pairs.error_at(longest)
@@ -171,7 +159,7 @@ def _members(
         members[:, partner], members[:, third] = pairs.second[first], pairs.second[other]
         base = dots.frames[members[:, role], :2, :2] @ [[1, 0], [0, -1]]
         affine = base @ affine  # px a printed dot radius
-        good = _bears_out(dots, members, affine, family, (role, partner, third), pairs.scales)
+        good = _bears_out(dots, members, affine, family, (role, partner, third))
         if not good.any():
             continue
         members, affine = members[good], affine[good]
@@ -226,7 +214,6 @@ def _bears_out(
     affine: np.ndarray,
     family: PointFamily,
     roles: tuple[int, int, int],
-    scales: tuple[float, float],
 ) -> np.ndarray:
     """Return where the ellipses of three dots are those that their affine map implies.
 
@@ -246,7 +233,7 @@ def _bears_out(
     small = np.log(np.maximum(square - half, 1e-9)) / 2
     scale = -np.median((large + small) / 2, axis=1)
     good &= ((large + scale[:, None] < allowed) & (small + scale[:, None] > -allowed)).all(axis=1)
-    smallest, largest = np.log(scales)
+    smallest, largest = np.log(radius_scales(family))
     return good & (scale > smallest - allowed[:, 0]) & (scale < largest + allowed[:, 0])
 
 
@@ -255,9 +242,7 @@ def _cross(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     return area
 
 
-def _fitted(
-    dots: Dots, members: np.ndarray, family: PointFamily, scales: tuple[float, float]
-) -> Templates:
+def _fitted(dots: Dots, members: np.ndarray, family: PointFamily) -> Templates:
     """Return groups with their homographies, those that fit."""
     places = family.places[: len(family.template)]
     reach = np.hypot(*places.T).max()
@@ -274,7 +259,7 @@ def _fitted(
     good = (misfit < 1) & (np.linalg.det(fit.homographies) < 0)  # y is up, then down
     ratio = frame.mean_radii(dots.frames)[members] / frame.mean_radii(implied).reshape(there.shape)
     scale = median(ratio, there)
-    smallest, largest = scales
+    smallest, largest = radius_scales(family)
     good &= (scale > smallest) & (scale < largest)
     signs = dots.polarity[members.max(axis=1)]
     return Templates(fit.homographies, members, signs, scale, misfit).select(good)

@@ -40,8 +40,6 @@ class Pairs:
         How far from the first dot there are so many others that no target is that large.
     error : tuple of 2 float
         Of the offsets: a share of their length, and what is added to it.
-    scales : tuple of 2 float
-        Bounds of the radii of dots, in those of the printed design.
     """
 
     first: np.ndarray
@@ -49,7 +47,6 @@ class Pairs:
     offset: np.ndarray
     crowd: np.ndarray
     error: tuple[float, float]
-    scales: tuple[float, float]
 
     def as_long_as(self, first: np.ndarray, lengths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return where the pairs with given first dots and about given lengths begin and end."""
@@ -79,7 +76,6 @@ def neighbours(
     family: PointFamily,
     triples: Sequence[tuple[int, int, int]],
     error: tuple[float, float],
-    scales: tuple[float, float],
     *,
     obvious: bool,
 ) -> Pairs:
@@ -92,13 +88,13 @@ def neighbours(
     family : PointFamily
     triples : sequence of tuple of 3 int
         Template dots: the role of the first dot of a pair, and those of the second.
-    error, scales : tuple of 2 float
+    error : tuple of 2 float
         As in `Pairs`.
     obvious : bool
         Whether only targets without many other dots about them are looked for.
     """
     places = family.places[: len(family.template)]
-    smallest, largest = scales
+    smallest, largest = radius_scales(family)
     longest = max(
         float(np.hypot(*(places[list(others)] - places[role]).T).max())
         / float(family.template_radii[role])
@@ -136,4 +132,4 @@ def neighbours(
     first, second, offset = (np.concatenate(column) for column in zip(*parts, strict=True))
     order = np.argsort(first, kind='stable')
     first, second, offset = first[order], second[order], offset[order]
-    return Pairs(first, second, offset, limit[first], error, scales)
+    return Pairs(first, second, offset, limit[first], error)
