@@ -17,7 +17,7 @@ def pairs_within(
     ----------
     points : ndarray of float64, shape (n, 2)
     reach : ndarray of float64, shape (n,)
-        Half the side of the square about each point.
+        Half the side of the square about each point; 0 where none is asked for.
     part : int
         Pairs that are looked at at a time, about; it bounds the memory.
 
@@ -26,11 +26,12 @@ def pairs_within(
     first, second : ndarray of int, shape (k,)
         Indices of points. All pairs with one first point come together, and ascending.
     """
-    if not len(points):
+    asked = reach[reach > 0]
+    if not len(asked):
         return
     x, y = (points - points.min(axis=0)).T
     # Strips as high as the usual reach, each sorted by x, have their neighbours in a few runs.
-    height = max(float(np.median(reach)), 1e-9)
+    height = max(float(np.median(asked)), 1e-9)
     width = float(x.max() + 2 * reach.max() + 1)
     strip = np.floor(y / height)
     key = strip * width + x

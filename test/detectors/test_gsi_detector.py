@@ -11,15 +11,16 @@ import pytest
 from ahf_ros.codes.gsi import positions_of, value_of
 from ahf_ros.codes.gsi_library import GSI_LIBRARY, point_family
 from ahf_ros.detectors import create_detector
-from ahf_ros.detectors.gsi.evidence import Evidence
-from ahf_ros.detectors.gsi.grouping import find_templates
+from ahf_ros.detectors.gsi.evidence import Evidence, seen_templates
+from ahf_ros.detectors.gsi.grouping import Templates, find_templates
 from ahf_ros.detectors.gsi.reading import read_codes
 from ahf_ros.drawing.colours import DECODED_COLOUR, DECODING_DOT_COLOUR
 from ahf_ros.drawing.overlay import draw
 from ahf_ros.evaluation import score
 from ahf_ros.features.dots import Dots
 from ahf_ros.features.frame import affine_frames
-from ahf_ros.features.homography import local_frames
+from ahf_ros.features.homography import fit_homographies, local_frames
+from ahf_ros.features.pyramid import image_pyramid
 from ahf_ros.filtering.homomorphic import HomomorphicFilter
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 from ahf_ros.target import UNDECODED, DottedTarget, Identification
@@ -198,6 +199,38 @@ def test_a_grid_of_dots_has_a_bounded_number_of_templates() -> None:
     templates = find_templates(grid(24.0, (50, 40), 5.0), point_family())
     assert len(templates.misfit) <= 4000
     assert not len(find_templates(grid(24.0, (2, 1), 5.0), point_family()).misfit)
+
+
+def test_a_dot_that_was_found_may_be_hidden_and_one_that_was_not_found_may_not() -> None:
+    shown = rendering(targets=1, tilt=0.0)
+    (target,) = create_detector(family='gsi')(shown.image)
+    assert isinstance(target, DottedTarget)
+    family = point_family()
+    count = len(family.template)
+    x, y, radius, *_ = target.dots[0]
+    image = shown.image.copy()
+    half = round(1.6 * radius)
+    patch = image[round(y) - half : round(y) + half + 1, round(x) - half : round(x) + half + 1]
+    patch[...] = patch.max()
+    centres = np.array(target.dots)[None, :count, :2]
+    fit = fit_homographies(family.places[:count], centres, np.ones((1, count)), family.reach)
+    sign = np.array([target.polarity])
+    unseen = Templates(
+        np.tile(fit.homographies, (2, 1, 1)),
+        np.array([range(count), [-1, *range(1, count)]]),
+        np.tile(sign, 2),
+        np.ones(2),
+        np.zeros(2),
+    )
+    log = image_pyramid(image, 60.0).logs[0]
+    assert seen_templates(log, unseen, family).members.tolist() == [[*range(count)]]
+
+
+def test_targets_in_deep_lattices_are_read() -> None:
+    scene = {'width': 1800, 'height': 1200, 'targets': 5, 'dot_radius': 10.0, 'seed': 5}
+    shown = rendering(light='lattice', ambient=0.04, **scene)
+    figures = score(shown.truth, create_detector(family='gsi')(shown.image))
+    assert (figures.right, figures.wrong, figures.false_positives) == (5, 0, 0)
 
 
 def test_a_grid_of_dots_is_no_target() -> None:

@@ -28,3 +28,11 @@ def test_one_point_and_none_have_no_neighbours() -> None:
     for count in (0, 1):
         parts = pairs_within(np.zeros((count, 2)), np.full(count, 9.0), 10)
         assert not sum(len(first) for first, _ in parts)
+
+
+def test_points_that_ask_for_none_are_neighbours_of_others() -> None:
+    points = np.array([[0.0, 0.0], [3.0, 0.0], [6.0, 0.0]])
+    parts = list(pairs_within(points, np.array([0.0, 5.0, 0.0]), 10))
+    first, second = (np.concatenate(column) for column in zip(*parts, strict=True))
+    assert first.tolist() == [1, 1]
+    assert sorted(second.tolist()) == [0, 2]

@@ -22,7 +22,7 @@ from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import DetectorSettings, FamilyDetector
 from ahf_ros.detectors.gsi.confidence import confidence_features
 from ahf_ros.detectors.gsi.evidence import find_evidence, seen_templates
-from ahf_ros.detectors.gsi.grouping import find_templates
+from ahf_ros.detectors.gsi.grouping import FEW, Templates, find_templates
 from ahf_ros.detectors.gsi.hypotheses import (
     OBVIOUS,
     Hypotheses,
@@ -141,7 +141,7 @@ def find_hypotheses(
     """
     kind = (*settings.radii, settings.polarities)
     whole = resized(pyramid.gray, whole_dots(pyramid, *kind))
-    first = read_targets(pyramid, whole, code, obvious=True)
+    first = read_targets(pyramid, whole, code, no_hypotheses(), obvious=True)
     certain = first.select(resolve(first, code, OBVIOUS))
     which = _dots_of(certain.words, code)
     places, radii = code.places[which], code.radii[which] * certain.scale[:, None]
@@ -152,23 +152,41 @@ def find_hypotheses(
         explained.append(cv2.convexHull(corners.astype(np.float32))[:, 0])
     dots = with_other_dots(pyramid, whole.select(rest), *kind, explained=explained)
     dots = resized(pyramid.gray, dots)
-    return Hypotheses.joined([certain, read_targets(pyramid, dots, code, obvious=False)]), dots
+    return read_targets(pyramid, dots, code, certain, obvious=False), dots
 
 
 def read_targets(
-    pyramid: ImagePyramid, dots: Dots, code: PointFamily, *, obvious: bool
+    pyramid: ImagePyramid, dots: Dots, code: PointFamily, known: Hypotheses, *, obvious: bool
 ) -> Hypotheses:
-    """Return the groups of dots that may be targets, with the code that each is read as.
+    """Return hypotheses, and the groups of dots that may be targets, read as codes.
+
+    The polarity with fewer dots comes first. Prints in one image are alike: if there are certain
+    targets, but none of the other polarity, its dots, where they are many, are those of light.
 
     Parameters
     ----------
     pyramid : ImagePyramid
     dots : Dots
     code : PointFamily
+    known : Hypotheses
+        Those that there are already.
     obvious : bool
         As for `plausible`.
     """
-    templates = seen_templates(pyramid.logs[0], find_templates(dots, code), code)
+    polarities = [np.flatnonzero(dots.polarity == polarity) for polarity in (1, -1)]
+    for which in sorted(polarities, key=len):
+        certain = known.polarity[resolve(known, code)]
+        if len(which) > FEW and len(certain) and not np.isin(certain, dots.polarity[which]).any():
+            continue
+        templates = find_templates(dots.select(which), code, obvious=obvious)
+        known = Hypotheses.joined([known, _read(pyramid, templates, code, obvious=obvious)])
+    return known
+
+
+def _read(
+    pyramid: ImagePyramid, templates: Templates, code: PointFamily, *, obvious: bool
+) -> Hypotheses:
+    templates = seen_templates(pyramid.logs[0], templates, code)
     if not len(templates.homographies):
         return no_hypotheses()
     evidence = find_evidence(

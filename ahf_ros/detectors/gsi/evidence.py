@@ -33,9 +33,8 @@ _FARTHER = 0.4  # distance from the edge of a dot of more samples of its levels,
 _DISTANCE = _BIN * np.subtract.outer(np.arange(_BINS), np.arange(_BINS))
 _SMOOTHING = np.exp(-0.5 * (_DISTANCE / _SPREAD) ** 2)
 _SMOOTHING /= _SMOOTHING.sum(axis=1, keepdims=True)
-
-
 _CONTRADICTED = -6.0  # evidence at a place of a template dot that nearly rules one out
+_HIDDEN = 1  # dots that are found and nevertheless so contradicted, in deep shadow
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +54,10 @@ class Evidence(ArrayRecord):
 
 
 def seen_templates(log: np.ndarray, templates: Templates, family: PointFamily) -> Templates:
-    """Return the templates in the image at all of whose places there may be a dot.
+    """Return the templates in the image at whose places there may be dots.
+
+    Of the dots that were found, light may hide one. Where none was found, nothing may speak
+    against it: four dots of any lattice are the corners of a template.
 
     Parameters
     ----------
@@ -68,8 +70,10 @@ def seen_templates(log: np.ndarray, templates: Templates, family: PointFamily) -
     evidence = find_evidence(
         log, templates.homographies, templates.polarity, templates.scale, alone
     )
-    seen = evidence.inside & (evidence.ratio > _CONTRADICTED)
-    return templates.select(np.flatnonzero(seen.all(axis=1)))
+    against = evidence.ratio <= _CONTRADICTED
+    found = templates.members >= 0
+    seen = evidence.inside.all(axis=1) & (found | ~against).all(axis=1)
+    return templates.select(np.flatnonzero(seen & (against.sum(axis=1) <= _HIDDEN)))
 
 
 def find_evidence(

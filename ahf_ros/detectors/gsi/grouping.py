@@ -10,7 +10,7 @@ dots give an affine map, which predicts the others well; their areas tell the ra
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, partial
 from itertools import pairwise
 
@@ -37,7 +37,8 @@ _WELL = 0.25  # share of what is accepted, of a template that fits well
 _MAXIMUM_GROUPS = 2000  # of one part, for a homography to be fitted
 _MAXIMUM_TEMPLATES = 2000  # of one polarity, those that fit best
 _STRAY = 3  # dots at the positions of a target that do not belong to it
-_FEW = 600  # dots, up to which all template dots are tried in all roles
+FEW = 600
+"""Dots of one polarity, up to which all template dots are tried in all roles."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,14 +66,17 @@ class Templates(ArrayRecord):
     misfit: np.ndarray
 
 
-def find_templates(dots: Dots, family: PointFamily) -> Templates:
+def find_templates(dots: Dots, family: PointFamily, *, obvious: bool = False) -> Templates:
     """Return the groups of dots that look like templates, no group twice.
 
     Parameters
     ----------
     dots : Dots
+        Of one polarity.
     family : PointFamily
         Printed design.
+    obvious : bool
+        Whether only targets without many other dots about them are looked for.
 
     Returns
     -------
@@ -80,29 +84,21 @@ def find_templates(dots: Dots, family: PointFamily) -> Templates:
         Best first. They may share dots.
     """
     places = family.places[: len(family.template)]
-    found = [_nothing(len(places))]
-    for polarity in (1, -1):
-        of_polarity = np.flatnonzero(dots.polarity == polarity)
-        if len(of_polarity) < len(places) - 1:
-            continue
-        part = dots.select(of_polarity)
-        centres, smallest = part.frames[:, :2, 2], frame.ellipse_axes(part.frames)[1].min()
-        few = len(centres) <= _FEW
-        triples = _triples(places, family.reference, few)
-        error = _LENGTH_ERROR if few else _LENGTH_ERROR_OF_MANY
-        pairs = neighbours(part, family, triples, error)
-        nearest = cache(partial(NearestDots.of, centres, smallest / 3))
-        templates = [_nothing(len(places))]
-        for triple in triples:
-            members = _members(part, pairs, nearest, family, triple)
-            if len(members):
-                fitted = _fitted(part, members, family, polarity)
-                templates.append(fitted.select(_mostly_empty(fitted, nearest(), family)))
-        best = _distinct(Templates.joined(templates))
-        members = np.where(best.members < 0, -1, of_polarity[best.members])
-        found.append(replace(best, members=members))
-    every = Templates.joined(found)
-    return every.select(np.argsort(every.misfit, kind='stable'))
+    if len(dots.frames) < len(places) - 1:
+        return _nothing(len(places))
+    centres, smallest = dots.frames[:, :2, 2], frame.ellipse_axes(dots.frames)[1].min()
+    few = len(centres) <= FEW
+    triples = _triples(places, family.reference, few)
+    error = _LENGTH_ERROR if few else _LENGTH_ERROR_OF_MANY
+    pairs = neighbours(dots, family, triples, error, obvious=obvious)
+    nearest = cache(partial(NearestDots.of, centres, smallest / 3))
+    templates = [_nothing(len(places))]
+    for triple in triples:
+        members = _members(dots, pairs, nearest, family, triple)
+        if len(members):
+            fitted = _fitted(dots, members, family)
+            templates.append(fitted.select(_mostly_empty(fitted, nearest(), family)))
+    return _distinct(Templates.joined(templates))
 
 
 def _triples(places: np.ndarray, reference: int, thorough: bool) -> list[tuple[int, int, int]]:
@@ -246,7 +242,7 @@ def _cross(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     return area
 
 
-def _fitted(dots: Dots, members: np.ndarray, family: PointFamily, polarity: int) -> Templates:
+def _fitted(dots: Dots, members: np.ndarray, family: PointFamily) -> Templates:
     """Return groups with their homographies, those that fit."""
     places = family.places[: len(family.template)]
     reach = np.hypot(*places.T).max()
@@ -265,7 +261,7 @@ def _fitted(dots: Dots, members: np.ndarray, family: PointFamily, polarity: int)
     scale = median(ratio, there)
     smallest, largest = radius_scales(family)
     good &= (scale > smallest) & (scale < largest)
-    signs = np.full(len(members), polarity)
+    signs = dots.polarity[members.max(axis=1)]
     return Templates(fit.homographies, members, signs, scale, misfit).select(good)
 
 

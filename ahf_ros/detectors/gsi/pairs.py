@@ -19,7 +19,11 @@ _RADII = (0.065, 0.43)
 # Of dots, in the least distance of two template dots: 1.0 to 3.6 mm where these are 11 mm apart,
 # and a third more for bright ones that bloom.
 _SIZE_RATIO = 0.55  # of two dots of a target, in ln, for their printed sizes
-_CROWD = 5  # times the dots of a target, from which on so many neighbours make a pattern of light
+_STEPS = 4  # of the distance to which neighbours are looked for, until there are many
+_CROWD = (4.0, 1.25)
+# Times as dense as the dots of a target in the circle about it, from which on neighbours make a
+# pattern of light; and the same where only obvious targets are looked for. Bright targets in
+# bright lattices are lost with 3.
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +76,8 @@ def neighbours(
     family: PointFamily,
     triples: Sequence[tuple[int, int, int]],
     error: tuple[float, float],
+    *,
+    obvious: bool,
 ) -> Pairs:
     """Return the pairs of dots of similar size that one template may hold in some roles.
 
@@ -84,36 +90,46 @@ def neighbours(
         Template dots: the role of the first dot of a pair, and those of the second.
     error : tuple of 2 float
         As in `Pairs`.
+    obvious : bool
+        Whether only targets without many other dots about them are looked for.
     """
     places = family.places[: len(family.template)]
-    smallest, _ = radius_scales(family)
+    smallest, largest = radius_scales(family)
     longest = max(
         float(np.hypot(*(places[list(others)] - places[role]).T).max())
-        / (smallest * float(family.template_radii[role]))
+        / float(family.template_radii[role])
         for role, *others in triples
     )
-    reach = (1 + error[0]) * longest + error[1]
+    nearest, farthest = ((1 + error[0]) * longest / of + error[1] for of in (largest, smallest))
+    own = float(family.template_radii[family.reference])
+    circles = ((1 + error[0]) * longest * own / family.reach) ** 2
+    crowd = round(_CROWD[obvious] * circles * (len(places) + family.rule.dots))
     centres = dots.frames[:, :2, 2]
     major = frame.ellipse_axes(dots.frames)[0]
     inverse = np.linalg.inv(dots.frames[:, :2, :2])
     widest = np.log(family.template_radii.max() / family.template_radii.min())
-    crowd = _CROWD * (len(places) + family.rule.dots)
-    parts = [(np.zeros(0, int), np.zeros(0, int), np.zeros(0, complex), np.zeros(0))]
-    for first, second in pairs_within(centres, reach * major, PART):
-        near = np.abs(np.log(major[second] / major[first])) < _SIZE_RATIO + widest
-        first, second = first[near], second[near]
-        difference = centres[second] - centres[first]
-        across, down = (inverse[first] @ difference[..., None])[..., 0].T
-        offset = across - 1j * down
-        length = np.abs(offset) / (2 * reach)
-        near = np.flatnonzero(length < 0.5)
-        order = near[np.argsort(first[near] + length[near])]
-        first, second, offset = first[order], second[order], offset[order]
-        rank = np.arange(len(first)) - np.searchsorted(first, first)
-        limit = np.full(len(centres), np.inf)
-        last = rank == crowd
-        limit[first[last]] = np.abs(offset[last])
-        near = np.flatnonzero(rank < crowd)
-        parts.append((first[near], second[near], offset[near], limit[first[near]]))
-    first, second, offset, limit = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return Pairs(first, second, offset, limit, error)
+    limit = np.full(len(centres), np.inf)
+    parts = [(np.zeros(0, int), np.zeros(0, int), np.zeros(0, complex))]
+    for reach in np.geomspace(nearest, farthest, _STEPS):
+        alone = np.isinf(limit)
+        for first, second in pairs_within(centres, np.where(alone, reach * major, 0.0), PART):
+            near = np.abs(np.log(major[second] / major[first])) < _SIZE_RATIO + widest
+            first, second = first[near], second[near]
+            difference = centres[second] - centres[first]
+            across, down = (inverse[first] @ difference[..., None])[..., 0].T
+            offset = across - 1j * down
+            length = np.abs(offset) / (2 * reach)
+            near = np.flatnonzero(length < 0.5)
+            order = near[np.argsort(first[near] + length[near])]
+            first, second, offset = first[order], second[order], offset[order]
+            rank = np.arange(len(first)) - np.searchsorted(first, first)
+            last = rank == crowd
+            limit[first[last]] = np.abs(offset[last])
+            near = rank < crowd
+            if reach < farthest:
+                near &= np.isfinite(limit[first])
+            parts.append((first[near], second[near], offset[near]))
+    first, second, offset = (np.concatenate(column) for column in zip(*parts, strict=True))
+    order = np.argsort(first, kind='stable')
+    first, second, offset = first[order], second[order], offset[order]
+    return Pairs(first, second, offset, limit[first], error)

@@ -30,7 +30,7 @@ class Readings(ArrayRecord):
         Evidence for a target with this code: for its dots, and against dots at all other places,
         as a share of the most there may be.
     weakest : ndarray of float64, shape (k,)
-        The lowest evidence for one of its dots.
+        The second lowest evidence for one of its dots, as light may hide one.
     """
 
     words: np.ndarray
@@ -71,7 +71,7 @@ def read_codes(evidence: Evidence, scale: np.ndarray, family: PointFamily) -> Re
         family.words[best],
         margin,
         (dots + against) / most,
-        of_dots.min(axis=1),
+        np.sort(of_dots, axis=1)[:, 1],
     )
 
 
