@@ -9,8 +9,8 @@ import pytest
 
 from ahf_ros.detectors.ring.likelihood import (
     band_edges,
+    covered_ground,
     edge_evidence,
-    foreign_ground,
     level_evidence,
     light_edges,
     weights,
@@ -38,6 +38,7 @@ def polar(
     growth: float = 0.0,
     radius: float = 1.0,
     size: float = 10.0,
+    glare: float = SATURATED,
 ) -> PolarImages:
     """Return the polar image of a target of light (m,) whose marks have grown."""
     inner, outer = band_edges(np.array([radius]), np.array([growth]), BAND)
@@ -54,6 +55,7 @@ def polar(
         size=np.array([size]),
         noise=np.array([1.2]),
         blur=np.array([0.7]),
+        glare=np.array([glare], np.float32),
     )
 
 
@@ -112,14 +114,40 @@ def test_angles_that_the_image_does_not_show_say_nothing() -> None:
     assert evidence.paper[..., 25:].all()
 
 
-def test_glare_says_nothing_but_over_exposed_paper_does() -> None:
-    glare, white = polar(), polar(light=255.0)
+def test_white_bands_under_glare_say_nothing_but_over_exposed_paper_does() -> None:
+    glare, white = polar(), polar(light=255.0, glare=np.inf)
     glare.gray[:, :20] = 255.0
     of_glare, of_white = (edge_evidence(it, ONE, NONE, BAND) for it in (glare, white))
     assert not of_glare.paper[..., :20].any()
     assert not of_glare.ink[..., :20].any()
     assert of_white.paper[..., ~MARKED].min() > 0
     assert of_white.ink[..., MARKED].min() > 0
+
+
+@pytest.mark.parametrize('added', [30.0, 100.0, 150.0])
+def test_marks_under_glare_are_ink_though_their_steps_are_small(added: float) -> None:
+    glossy = replace(polar(), glare=np.array([215.0], np.float32))
+    glossy.gray[:] = np.minimum(glossy.gray + added, 255)
+    evidence = edge_evidence(glossy, ONE, NONE, BAND)
+    assert (evidence.ink > evidence.paper)[..., MARKED].all()
+    assert (evidence.ink <= evidence.paper)[..., ~MARKED].all()
+
+
+def test_what_is_bright_with_soft_borders_is_glare_and_with_sharp_ones_light() -> None:
+    y, x = np.mgrid[:121, :121].astype(np.float32)
+    dot = np.where(np.hypot(x - 60, y - 60) < 12, 45.0, 180.0)
+    away = np.hypot(x - 95, y - 60)
+    frames = affine_frames([60.0], [60.0], [12.0], [12.0], [0.0])
+
+    def glare(image: np.ndarray) -> float:
+        gray = np.minimum(image, 255).astype(np.float32)
+        fit = fit_dots(gray, frames, np.array([1]), rays=24, reach=0.3)
+        return float(polar_images(gray, fit, BAND, ANGLES).glare[0])
+
+    assert 185 < glare(dot) < 200
+    assert glare(dot + 150 * np.exp(-0.5 * (away / 12) ** 2)) < 220
+    assert glare(np.where(away < 20, 1.4, 1.0) * dot) == np.inf
+    assert glare(dot + 210) == np.inf
 
 
 def test_readings_of_neighbours_that_are_alike_share_one_weight() -> None:
@@ -181,27 +209,23 @@ def test_a_dot_of_light_on_paper_is_no_ink() -> None:
     assert level_evidence(target, values, values, spread, radii, BAND).dot[0] < -5
 
 
-def test_what_lies_on_the_ground_is_no_light_unless_much_of_the_ground_is_unlike() -> None:
+def test_what_is_dark_on_the_ground_covers_it_unless_much_of_the_ground_is() -> None:
     even = np.full((1, ANGLES, 2), 180.0, np.float32)
     few, many = even.copy(), even.copy()
-    few[:, 10:14], few[:, 30:32], many[:, ::2] = 60.0, 240.0, 60.0
-    covered, lit = foreign_ground(polar(), even, few)
-    assert not covered[0, 0].any() and not lit[0, 0].any()
+    few[:, 10:14], many[:, ::2] = 60.0, 60.0
+    covered = covered_ground(polar(), even, few)
+    assert not covered[0, 0].any()
     assert np.flatnonzero(covered[0, 1]).tolist() == [10, 11, 12, 13]
-    assert np.flatnonzero(lit[0, 1]).tolist() == [30, 31]
-    assert not np.any(foreign_ground(polar(), many, many))
+    assert not covered_ground(polar(), many, many).any()
 
 
-def test_what_covers_the_ground_covers_the_band_and_glare_leaves_steps() -> None:
+def test_what_covers_the_ground_covers_the_band() -> None:
     evidence = edge_evidence(polar(), ONE, NONE, BAND)
-    covered, lit = np.zeros((2, 1, 2, ANGLES), np.float32)
-    covered[..., 5], covered[..., 15], lit[..., 6], lit[..., 16] = 1, 1, 1, 1
-    left = evidence.without(covered, lit)
+    covered = np.zeros((1, 2, ANGLES), np.float32)
+    covered[..., [5, 15]] = 1
+    left = evidence.without(covered)
     assert not left.paper[..., [5, 15]].any() and not left.ink[..., [5, 15]].any()
-    for marked, unmarked in ((evidence.ink, evidence.paper), (left.ink, left.paper)):
-        assert (marked[..., 6] > 0).all() and (unmarked[..., 6] < 0).all()
-    assert not left.paper[..., 16].any() and not left.ink[..., 16].any()
-    untouched = np.setdiff1d(np.arange(ANGLES), [5, 6, 15, 16])
+    untouched = np.setdiff1d(np.arange(ANGLES), [5, 15])
     assert np.array_equal(left.ink[..., untouched], evidence.ink[..., untouched])
 
 

@@ -19,6 +19,12 @@ CORRELATION = 2.5
 SATURATED = 253.0
 """Gray value from which a reading is white, whatever the light."""
 
+EVEN = 0.015
+"""Deviation of ln of ground in even light."""
+
+UNLIKE = 4.0
+"""Standard deviations of ground, from which a level is unlike the rest."""
+
 _CIRCLES = 56  # of a polar image, which are then less than a tenth of a dot radius apart
 _INNERMOST, _MARGIN = 0.3, 0.95  # first circle, and last one beyond the band, dot radii
 _SEEN = 0.15  # beyond the band, that the image must show, dot radii
@@ -29,8 +35,12 @@ _LEVELS = (0.75, 1.4)  # where the levels of dot and gap are read, dot radii
 _MINIMUM_LEVEL = 1.0  # gray value that ratios are taken of
 _MINIMUM_CONTRAST = 0.02  # dark over bright, that bright marks are computed from
 _GAP = (0.35, 0.65)  # where noise is measured, shares of the gap
+_BEYOND = (0.3, 0.65)  # where glare shows as well, dot radii beyond the band
 _NOISE = (1.2, 40.0)  # smallest and largest noise, gray values
 _MEDIAN = 0.6745  # of the size of a normal deviate
+_WHITE_OUT = 0.6  # share of the ground that is saturated, from which that is no glare
+_LIGHT_EDGE = 0.3  # of ln, of an edge of light
+_LIGHT_EDGES = 0.03  # share of the ground, from which light has edges
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +67,8 @@ class PolarImages(ArrayRecord):
         Of edges, standard deviation in px.
     noise : ndarray of float64, shape (k,)
         Of gray values.
+    glare : ndarray of float32, shape (k,)
+        Gray value of ground from which something else than the light on it makes it brighter.
     """
 
     gray: np.ndarray
@@ -68,6 +80,7 @@ class PolarImages(ArrayRecord):
     size: np.ndarray
     blur: np.ndarray
     noise: np.ndarray
+    glare: np.ndarray
 
     def at(self, radii: np.ndarray) -> np.ndarray:
         """Return gray values on a circle of each dot, of radii (k,) in dot radii, shape (k, m)."""
@@ -119,8 +132,11 @@ def polar_images(
     values = np.maximum(sample_circles(gray, dots.frames, angles, radii), 0)
     contrast, lift = _appearance(gray, dots)
     values = lifted(values, lift.astype(np.float32)[:, None, None])
-    of_gap = [np.abs(radii - 1 - (inner - 1) * part).argmin() for part in _GAP]
+    places = [1 + (inner - 1) * part for part in _GAP] + [outer + away for away in _BEYOND]
+    ground = values[:, :, [np.abs(radii - place).argmin() for place in places]]
     apart = 2 * np.pi * inner * dots.size / count
+    later = _later(ground, apart)
+    noise = _noise(ground[..., :2], later[..., :2])
     return PolarImages(
         gray=values,
         visible=_visible(gray.shape, dots.frames, angles, band),
@@ -130,7 +146,8 @@ def polar_images(
         lift=lift,
         size=dots.size,
         blur=dots.blur,
-        noise=_noise(values[:, :, of_gap], apart),
+        noise=noise,
+        glare=_glare(ground, later, noise),
     )
 
 
@@ -157,14 +174,44 @@ def _appearance(gray: np.ndarray, dots: Fit) -> tuple[np.ndarray, np.ndarray]:
     return dark / np.maximum(bright, _MINIMUM_LEVEL), lift
 
 
-def _noise(gap: np.ndarray, apart: np.ndarray) -> np.ndarray:
-    """Return the noise of gray values, from readings (k, m, 2) that are far enough apart, (k,)."""
+def _later(gap: np.ndarray, apart: np.ndarray) -> np.ndarray:
+    """Return the readings at angles that are far enough from those of readings (k, m, 2)."""
     count = gap.shape[1]
     lags = np.clip(np.ceil(CORRELATION / np.maximum(apart, 1e-9)), 1, count // 4).astype(np.intp)
     later = (np.arange(count) + lags[:, None]) % count
-    change = np.abs(np.take_along_axis(gap, later[..., None], axis=1) - gap)
-    usual = np.median(change.reshape(len(gap), 2 * count), axis=1) / (_MEDIAN * np.sqrt(2))
+    return np.take_along_axis(gap, later[..., None], axis=1)
+
+
+def _noise(gap: np.ndarray, later: np.ndarray) -> np.ndarray:
+    """Return the noise of gray values, from readings (k, m, 2) and later ones, shape (k,)."""
+    change = np.abs(later - gap).reshape(len(gap), 2 * gap.shape[1])
+    usual = np.median(change, axis=1) / (_MEDIAN * np.sqrt(2))
     return np.clip(usual, *_NOISE)
+
+
+def _glare(ground: np.ndarray, later: np.ndarray, noise: np.ndarray) -> np.ndarray:
+    """Return from which gray value on ground is brighter than its light makes it, shape (k,).
+
+    Glare has soft borders, and leaves much of a target as it is; else what is bright is light.
+
+    Parameters
+    ----------
+    ground, later : ndarray of float32, shape (k, m, 4)
+        Gray values at two radii in the gap and two in the margin, and those at later angles.
+    noise : ndarray of float64, shape (k,)
+        Of gray values.
+    """
+    logs, of_later = (np.log(of + np.float32(LOG_OFFSET)) for of in (ground, later))
+    values = logs.reshape(len(logs), logs.shape[1] * logs.shape[2])
+    usual = np.median(values, axis=1)
+    spread = np.median(np.abs(values - usual[:, None]), axis=1) / _MEDIAN
+    spread = np.maximum(np.maximum(spread, EVEN), noise / np.exp(usual))
+    brightest = np.minimum(np.exp(usual + UNLIKE * spread) - LOG_OFFSET, SATURATED)
+    across, along = logs[..., 1::2] - logs[..., ::2], (of_later - logs)[..., ::2]
+    edges = np.maximum(np.abs(across), np.abs(along)) > _LIGHT_EDGE
+    white = (ground >= SATURATED).mean(axis=(1, 2))
+    light = (edges.mean(axis=(1, 2)) > _LIGHT_EDGES) | (white > _WHITE_OUT)
+    return np.where(light, np.inf, brightest).astype(np.float32)
 
 
 def _visible(

@@ -19,8 +19,8 @@ from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.light import predicted_light
 from ahf_ros.detectors.ring.likelihood import (
     Evidence,
+    covered_ground,
     edge_evidence,
-    foreign_ground,
     growth_by,
     level_evidence,
 )
@@ -166,7 +166,7 @@ def _words(
     light = predicted_light(gray, targets.frames, polar.lift, angles, radii, family.band)
     evidence = edges.plus(level_evidence(polar, levels, *light, radii, family.band))
     gap, margin = (radii > 1) & (radii < inner), radii > outer
-    evidence = evidence.without(*foreign_ground(polar, levels[..., gap], levels[..., margin]))
+    evidence = evidence.without(covered_ground(polar, levels[..., gap], levels[..., margin]))
     words = decode(evidence, _overhang(growth, family), family, expected)
     return replace(words, hidden=words.hidden | ~polar.visible.any(axis=1))
 
