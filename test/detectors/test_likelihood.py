@@ -9,7 +9,6 @@ import pytest
 
 from ahf_ros.detectors.ring.likelihood import (
     band_edges,
-    covered_ground,
     edge_evidence,
     level_evidence,
     light_edges,
@@ -38,6 +37,7 @@ def polar(
     growth: float = 0.0,
     radius: float = 1.0,
     size: float = 10.0,
+    shade: float = 0.0,
     glare: float = SATURATED,
 ) -> PolarImages:
     """Return the polar image of a target of light (m,) whose marks have grown."""
@@ -55,6 +55,7 @@ def polar(
         size=np.array([size]),
         noise=np.array([1.2]),
         blur=np.array([0.7]),
+        shade=np.array([shade], np.float32),
         glare=np.array([glare], np.float32),
     )
 
@@ -133,21 +134,31 @@ def test_marks_under_glare_are_ink_though_their_steps_are_small(added: float) ->
     assert (evidence.ink <= evidence.paper)[..., ~MARKED].all()
 
 
-def test_what_is_bright_with_soft_borders_is_glare_and_with_sharp_ones_light() -> None:
-    y, x = np.mgrid[:121, :121].astype(np.float32)
-    dot = np.where(np.hypot(x - 60, y - 60) < 12, 45.0, 180.0)
-    away = np.hypot(x - 95, y - 60)
+def usual_levels(image: np.ndarray) -> tuple[float, float]:
+    """Return between which levels the ground of a target in the middle of an image is usual."""
+    gray = np.minimum(image, 255).astype(np.float32)
     frames = affine_frames([60.0], [60.0], [12.0], [12.0], [0.0])
+    dots = fit_dots(gray, frames, np.array([1]), rays=24, reach=0.3)
+    of = polar_images(gray, dots, BAND, ANGLES)
+    return float(of.shade[0]), float(of.glare[0])
 
-    def glare(image: np.ndarray) -> float:
-        gray = np.minimum(image, 255).astype(np.float32)
-        fit = fit_dots(gray, frames, np.array([1]), rays=24, reach=0.3)
-        return float(polar_images(gray, fit, BAND, ANGLES).glare[0])
 
-    assert 185 < glare(dot) < 200
-    assert glare(dot + 150 * np.exp(-0.5 * (away / 12) ** 2)) < 220
-    assert glare(np.where(away < 20, 1.4, 1.0) * dot) == np.inf
-    assert glare(dot + 210) == np.inf
+Y, X = np.mgrid[:121, :121].astype(np.float32)
+DOT = np.where(np.hypot(X - 60, Y - 60) < 12, 45.0, 180.0)
+AWAY = np.hypot(X - 95, Y - 60)
+
+
+def test_what_is_bright_with_soft_borders_is_glare_and_with_sharp_ones_light() -> None:
+    assert 185 < usual_levels(DOT)[1] < 200
+    assert usual_levels(DOT + 150 * np.exp(-0.5 * (AWAY / 12) ** 2))[1] < 220
+    assert usual_levels(np.where(AWAY < 20, 1.4, 1.0) * DOT)[1] == np.inf
+    assert usual_levels(DOT + 210)[1] == np.inf
+
+
+def test_what_is_dark_on_a_small_part_of_the_ground_covers_it() -> None:
+    assert 160 < usual_levels(DOT)[0] < 175
+    assert 160 < usual_levels(np.where(AWAY < 15, 0.5, 1.0) * DOT)[0] < 175
+    assert usual_levels(np.where(X < 55, 0.5, 1.0) * DOT)[0] <= 0
 
 
 def test_readings_of_neighbours_that_are_alike_share_one_weight() -> None:
@@ -209,24 +220,19 @@ def test_a_dot_of_light_on_paper_is_no_ink() -> None:
     assert level_evidence(target, values, values, spread, radii, BAND).dot[0] < -5
 
 
-def test_what_is_dark_on_the_ground_covers_it_unless_much_of_the_ground_is() -> None:
-    even = np.full((1, ANGLES, 2), 180.0, np.float32)
-    few, many = even.copy(), even.copy()
-    few[:, 10:14], many[:, ::2] = 60.0, 60.0
-    covered = covered_ground(polar(), even, few)
-    assert not covered[0, 0].any()
-    assert np.flatnonzero(covered[0, 1]).tolist() == [10, 11, 12, 13]
-    assert not covered_ground(polar(), many, many).any()
-
-
 def test_what_covers_the_ground_covers_the_band() -> None:
-    evidence = edge_evidence(polar(), ONE, NONE, BAND)
-    covered = np.zeros((1, 2, ANGLES), np.float32)
-    covered[..., [5, 15]] = 1
-    left = evidence.without(covered)
-    assert not left.paper[..., [5, 15]].any() and not left.ink[..., [5, 15]].any()
-    untouched = np.setdiff1d(np.arange(ANGLES), [5, 15])
-    assert np.array_equal(left.ink[..., untouched], evidence.ink[..., untouched])
+    clear, target = polar(), polar(shade=100.0)
+    target.gray[:, 5:8, inside(BAND[1], 9)] = 90.0
+    beside = slice(5, 8), slice(8, ANGLES)
+    edges = [edge_evidence(of, ONE, NONE, BAND) for of in (clear, target)]
+    known = [level_evidence(of, *levels(of, 0.05), BAND) for of in (clear, target)]
+    of_clear, of_target = (first.plus(second) for first, second in zip(edges, known, strict=True))
+    assert edges[1].paper[0, 1, beside[0]].all()
+    for paper in ('paper', 'ink'):
+        there, left = getattr(of_clear, paper), getattr(of_target, paper)
+        assert not left[0, 1, beside[0]].any()
+        assert np.array_equal(left[0, 0], there[0, 0])
+        assert left[0, 1, beside[1]] == pytest.approx(there[0, 1, beside[1]], abs=0.05)
 
 
 def test_ink_under_light() -> None:

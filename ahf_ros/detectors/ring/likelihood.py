@@ -13,17 +13,14 @@ edges of any height. Their sum over a target is the log odds of a word against n
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ahf_ros.detectors.ring.polar import (
     CORRELATION,
-    EVEN,
     SATURATED,
-    UNLIKE,
     PolarImages,
-    angles_of,
 )
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.imaging.logarithm import LOG_OFFSET
@@ -39,11 +36,6 @@ _MEDIAN = 0.6745  # of the size of a normal deviate
 _ANY_STEP, _ANY_LEVEL = 0.2, 0.25  # densities of steps and levels of ln where anything lies
 _PLAIN = 0.35  # share of what lies about any dot that is as flat as ground
 _SURPRISES = (0.05, 0.5)  # smallest and largest probability of a level that nothing predicts
-_SLOPE = 0.1  # of ln, to which light that is even may differ across a target
-_UNLIKE_SHARES = (
-    0.24,
-    0.28,
-)  # of the ground, darker, that are nothing but covers, nothing but light
 _UNLIKELY = 2.5  # standard deviations, from which a level was not predicted
 _LIGHT_EDGE = 0.3  # of ln, of an edge of light
 _LIGHT_EDGES = (0.02, 0.5)  # smallest and largest probability of one between two readings
@@ -70,6 +62,8 @@ class Evidence(ArrayRecord):
         Of the dot as ink, over the dot as light on paper.
     lit : ndarray of float32, shape (k,)
         Probability that an edge of light lies between two neighbouring readings.
+    covered : ndarray of bool, shape (k, 2, m)
+        Where something covers the ground beside the band.
     """
 
     paper: np.ndarray
@@ -77,19 +71,21 @@ class Evidence(ArrayRecord):
     weight: np.ndarray
     dot: np.ndarray
     lit: np.ndarray
-
-    def without(self, covered: np.ndarray) -> Evidence:
-        """Return the evidence less that of readings beside covered ground, shares (k, 2, m)."""
-        return replace(self, paper=self.paper * (1 - covered), ink=self.ink * (1 - covered))
+    covered: np.ndarray
 
     def plus(self, other: Evidence) -> Evidence:
-        """Return the sum of two kinds of evidence at the same angles."""
+        """Return the sum of two kinds of evidence, where nothing covers what lies beside.
+
+        What covers the ground covers the band as well.
+        """
+        covered = self.covered | other.covered
         return Evidence(
-            paper=self.paper + other.paper,
-            ink=self.ink + other.ink,
+            paper=np.where(covered, 0, self.paper + other.paper),
+            ink=np.where(covered, 0, self.ink + other.ink),
             weight=self.weight,
             dot=self.dot + other.dot,
             lit=np.maximum(self.lit, other.lit),
+            covered=covered,
         )
 
 
@@ -149,8 +145,14 @@ def edge_evidence(
     paper, ink = _step_evidence(polar, marked, ground, edges)
     weight = weights(polar)
     share = weight[:, None, None] * polar.visible
-    dot = np.zeros_like(weight)
-    return Evidence(paper * share, ink * share, weight, dot, edges.astype(np.float32))
+    return Evidence(
+        paper=paper * share,
+        ink=ink * share,
+        weight=weight,
+        dot=np.zeros_like(weight),
+        lit=edges.astype(np.float32),
+        covered=ground <= polar.shade[:, None, None],
+    )
 
 
 def light_edges(
@@ -256,6 +258,7 @@ def level_evidence(
     for half, visible in zip(halves, polar.visible.transpose(1, 0, 2), strict=True):
         glare = (levels[..., half & on_ground] >= limit).any(axis=2)
         seen[..., half] &= (visible & ~glare)[..., None]
+    dark = levels <= polar.shade[:, None, None]
     surprise = _surprise(errors, of_paper, seen & on_ground)
     paper, ink = (
         np.where(seen, np.log(((1 - surprise) * of + surprise * _ANY_LEVEL) / anything), 0)
@@ -274,49 +277,8 @@ def level_evidence(
         weight=share,
         dot=(ink - paper)[..., in_dot].sum(axis=(1, 2)),
         lit=surprise[:, 0, 0].astype(np.float32),
+        covered=np.stack([dark[..., half & on_ground].any(axis=2) for half in halves], axis=1),
     )
-
-
-def covered_ground(polar: PolarImages, gap: np.ndarray, margin: np.ndarray) -> np.ndarray:
-    """Return how far something else than the light on the target lies on its ground.
-
-    A small part of the ground that is darker than the rest is no light of the scene but something
-    that covers it, and covers the band as well; where much of it is, it is light.
-
-    Parameters
-    ----------
-    polar : PolarImages
-        Of k targets.
-    gap, margin : ndarray of float32, shape (k, m, d)
-        Gray values at d places each.
-
-    Returns
-    -------
-    ndarray of float32, shape (k, 2, m)
-        Shares of the readings beside the gap, and of those beside the margin.
-    """
-    level, noise = polar.logs(np.stack([gap, margin], axis=1))
-    axes = (1, 2, 3)
-    away = level - np.median(level, axis=axes, keepdims=True)
-    away -= _slope(away)
-    spread = np.median(np.abs(away), axis=axes, keepdims=True) / _MEDIAN
-    width = UNLIKE * np.maximum(np.maximum(spread, EVEN), noise)
-    darker = (away < -width).any(axis=3)
-    few, many = _UNLIKE_SHARES
-    share = darker.mean(axis=(1, 2))
-    doubt = np.clip((many - share) / (many - few), 0, 1).astype(np.float32)[:, None, None]
-    return darker * doubt
-
-
-def _slope(levels: np.ndarray) -> np.ndarray:
-    """Return the slope of light across targets, of the size of levels (k, 2, m, d)."""
-    angles = angles_of(levels.shape[2])
-    usual = np.clip(levels, -_SLOPE, _SLOPE)
-    slope = np.zeros_like(levels)
-    for wave in (np.cos(angles), np.sin(angles)):
-        along = wave.astype(np.float32)[:, None]
-        slope += 2 * (usual * along).mean(axis=(1, 2, 3), keepdims=True) * along
-    return slope
 
 
 def _surprise(errors: np.ndarray, width: np.ndarray, which: np.ndarray) -> np.ndarray:

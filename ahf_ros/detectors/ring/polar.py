@@ -19,12 +19,6 @@ CORRELATION = 2.5
 SATURATED = 253.0
 """Gray value from which a reading is white, whatever the light."""
 
-EVEN = 0.015
-"""Deviation of ln of ground in even light."""
-
-UNLIKE = 4.0
-"""Standard deviations of ground, from which a level is unlike the rest."""
-
 _CIRCLES = 56  # of a polar image, which are then less than a tenth of a dot radius apart
 _INNERMOST, _MARGIN = 0.3, 0.95  # first circle, and last one beyond the band, dot radii
 _SEEN = 0.15  # beyond the band, that the image must show, dot radii
@@ -38,6 +32,9 @@ _GAP = (0.35, 0.65)  # where noise is measured, shares of the gap
 _BEYOND = (0.3, 0.65)  # where glare shows as well, dot radii beyond the band
 _NOISE = (1.2, 40.0)  # smallest and largest noise, gray values
 _MEDIAN = 0.6745  # of the size of a normal deviate
+_EVEN = 0.015  # deviation of ln of ground in even light
+_UNLIKE = 4.0  # standard deviations of ground, from which a level is unlike the rest
+_COVERED = 0.26  # share of the angles whose ground is darker, from which that is light
 _WHITE_OUT = 0.6  # share of the ground that is saturated, from which that is no glare
 _LIGHT_EDGE = 0.3  # of ln, of an edge of light
 _LIGHT_EDGES = 0.03  # share of the ground, from which light has edges
@@ -67,8 +64,8 @@ class PolarImages(ArrayRecord):
         Of edges, standard deviation in px.
     noise : ndarray of float64, shape (k,)
         Of gray values.
-    glare : ndarray of float32, shape (k,)
-        Gray value of ground from which something else than the light on it makes it brighter.
+    shade, glare : ndarray of float32, shape (k,)
+        Gray values of ground up to which something covers it, and from which glare lies on it.
     """
 
     gray: np.ndarray
@@ -80,6 +77,7 @@ class PolarImages(ArrayRecord):
     size: np.ndarray
     blur: np.ndarray
     noise: np.ndarray
+    shade: np.ndarray
     glare: np.ndarray
 
     def at(self, radii: np.ndarray) -> np.ndarray:
@@ -137,6 +135,7 @@ def polar_images(
     apart = 2 * np.pi * inner * dots.size / count
     later = _later(ground, apart)
     noise = _noise(ground[..., :2], later[..., :2])
+    shade, glare = _usual_levels(ground, later, noise)
     return PolarImages(
         gray=values,
         visible=_visible(gray.shape, dots.frames, angles, band),
@@ -147,7 +146,8 @@ def polar_images(
         size=dots.size,
         blur=dots.blur,
         noise=noise,
-        glare=_glare(ground, later, noise),
+        shade=shade,
+        glare=glare,
     )
 
 
@@ -189,10 +189,13 @@ def _noise(gap: np.ndarray, later: np.ndarray) -> np.ndarray:
     return np.clip(usual, *_NOISE)
 
 
-def _glare(ground: np.ndarray, later: np.ndarray, noise: np.ndarray) -> np.ndarray:
-    """Return from which gray value on ground is brighter than its light makes it, shape (k,).
+def _usual_levels(
+    ground: np.ndarray, later: np.ndarray, noise: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return between which gray values the light on ground makes it, shape (k,) each.
 
-    Glare has soft borders, and leaves much of a target as it is; else what is bright is light.
+    A small part of the ground that is darker is covered. What is brighter, has soft borders and
+    leaves much of a target as it is, is under glare. All else is light.
 
     Parameters
     ----------
@@ -205,13 +208,16 @@ def _glare(ground: np.ndarray, later: np.ndarray, noise: np.ndarray) -> np.ndarr
     values = logs.reshape(len(logs), logs.shape[1] * logs.shape[2])
     usual = np.median(values, axis=1)
     spread = np.median(np.abs(values - usual[:, None]), axis=1) / _MEDIAN
-    spread = np.maximum(np.maximum(spread, EVEN), noise / np.exp(usual))
-    brightest = np.minimum(np.exp(usual + UNLIKE * spread) - LOG_OFFSET, SATURATED)
+    width = _UNLIKE * np.maximum(np.maximum(spread, _EVEN), noise / np.exp(usual))
+    dark = logs < (usual - width)[:, None, None]
+    darker = (dark[..., ::2] | dark[..., 1::2]).mean(axis=(1, 2))
+    shade = np.where(darker > _COVERED, 0, np.exp(usual - width) - LOG_OFFSET)
     across, along = logs[..., 1::2] - logs[..., ::2], (of_later - logs)[..., ::2]
     edges = np.maximum(np.abs(across), np.abs(along)) > _LIGHT_EDGE
     white = (ground >= SATURATED).mean(axis=(1, 2))
     light = (edges.mean(axis=(1, 2)) > _LIGHT_EDGES) | (white > _WHITE_OUT)
-    return np.where(light, np.inf, brightest).astype(np.float32)
+    glare = np.minimum(np.exp(usual + width) - LOG_OFFSET, SATURATED)
+    return shade.astype(np.float32), np.where(light, np.inf, glare).astype(np.float32)
 
 
 def _visible(

@@ -19,7 +19,6 @@ from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.light import predicted_light
 from ahf_ros.detectors.ring.likelihood import (
     Evidence,
-    covered_ground,
     edge_evidence,
     growth_by,
     level_evidence,
@@ -165,8 +164,6 @@ def _words(
     levels = lifted(levels, polar.lift.astype(np.float32)[:, None, None])
     light = predicted_light(gray, targets.frames, polar.lift, angles, radii, family.band)
     evidence = edges.plus(level_evidence(polar, levels, *light, radii, family.band))
-    gap, margin = (radii > 1) & (radii < inner), radii > outer
-    evidence = evidence.without(covered_ground(polar, levels[..., gap], levels[..., margin]))
     words = decode(evidence, _overhang(growth, family), family, expected)
     return replace(words, hidden=words.hidden | ~polar.visible.any(axis=1))
 
