@@ -220,19 +220,19 @@ def test_a_dot_of_light_on_paper_is_no_ink() -> None:
     assert level_evidence(target, values, values, spread, radii, BAND).dot[0] < -5
 
 
-def test_what_covers_the_ground_covers_the_band() -> None:
-    clear, target = polar(), polar(shade=100.0)
+def test_what_covers_the_ground_covers_the_edge_beside_it_and_the_levels() -> None:
+    target = polar(shade=100.0)
     target.gray[:, 5:8, inside(BAND[1], 9)] = 90.0
-    beside = slice(5, 8), slice(8, ANGLES)
-    edges = [edge_evidence(of, ONE, NONE, BAND) for of in (clear, target)]
-    known = [level_evidence(of, *levels(of, 0.05), BAND) for of in (clear, target)]
-    of_clear, of_target = (first.plus(second) for first, second in zip(edges, known, strict=True))
-    assert edges[1].paper[0, 1, beside[0]].all()
-    for paper in ('paper', 'ink'):
-        there, left = getattr(of_clear, paper), getattr(of_target, paper)
-        assert not left[0, 1, beside[0]].any()
-        assert np.array_equal(left[0, 0], there[0, 0])
-        assert left[0, 1, beside[1]] == pytest.approx(there[0, 1, beside[1]], abs=0.05)
+    edges = edge_evidence(target, ONE, NONE, BAND)
+    values, light, spread, radii = levels(target, 0.05)
+    seen = level_evidence(target, values, light, spread, radii, BAND)
+    both = edges.plus(seen)
+    assert np.flatnonzero(both.covered.any(axis=1)).tolist() == [5, 6, 7]
+    for name in ('paper', 'ink'):
+        of_edges, of_levels, of_both = (getattr(of, name)[0] for of in (edges, seen, both))
+        assert of_edges[1, 5:8].all() and not of_both[1, 5:8].any()
+        assert np.array_equal(of_both[0, 5:8], of_edges[0, 5:8])
+        assert np.array_equal(of_both[:, 8:], (of_edges + of_levels)[:, 8:])
 
 
 def test_ink_under_light() -> None:

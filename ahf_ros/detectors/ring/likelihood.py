@@ -36,6 +36,7 @@ _MEDIAN = 0.6745  # of the size of a normal deviate
 _ANY_STEP, _ANY_LEVEL = 0.2, 0.25  # densities of steps and levels of ln where anything lies
 _PLAIN = 0.35  # share of what lies about any dot that is as flat as ground
 _SURPRISES = (0.05, 0.5)  # smallest and largest probability of a level that nothing predicts
+_MARKED = 0.2  # share of what is dark that has marks, from which it is in shadow
 _UNLIKELY = 2.5  # standard deviations, from which a level was not predicted
 _LIGHT_EDGE = 0.3  # of ln, of an edge of light
 _LIGHT_EDGES = (0.02, 0.5)  # smallest and largest probability of one between two readings
@@ -73,19 +74,22 @@ class Evidence(ArrayRecord):
     lit: np.ndarray
     covered: np.ndarray
 
-    def plus(self, other: Evidence) -> Evidence:
-        """Return the sum of two kinds of evidence, where nothing covers what lies beside.
+    def plus(self, levels: Evidence) -> Evidence:
+        """Return the sum of the evidence of edges and of levels, where nothing covers the ground.
 
-        What covers the ground covers the band as well.
+        What covers the ground beside an edge covers the edge, and may reach under the levels of
+        both halves.
         """
-        covered = self.covered | other.covered
+        beside = np.logical_or.reduce(self.covered, axis=1, keepdims=True)
+        anywhere = np.logical_or.reduce(beside, axis=2, keepdims=True)
+        across = beside | (levels.covered & anywhere)
         return Evidence(
-            paper=np.where(covered, 0, self.paper + other.paper),
-            ink=np.where(covered, 0, self.ink + other.ink),
+            paper=np.where(self.covered, 0, self.paper) + np.where(across, 0, levels.paper),
+            ink=np.where(self.covered, 0, self.ink) + np.where(across, 0, levels.ink),
             weight=self.weight,
-            dot=self.dot + other.dot,
-            lit=np.maximum(self.lit, other.lit),
-            covered=covered,
+            dot=self.dot + levels.dot,
+            lit=np.maximum(self.lit, levels.lit),
+            covered=self.covered,
         )
 
 
@@ -141,8 +145,8 @@ def edge_evidence(
     before = np.minimum(beside, 0.5 * (inner - radius - growth))
     edges = light_edges(polar, radius, growth, inner)
     ground = np.stack([polar.at(inner - before), polar.at(outer + beside)], axis=1)
-    marked = np.stack([polar.at(inner + beside), polar.at(outer - beside)], axis=1)
-    paper, ink = _step_evidence(polar, marked, ground, edges)
+    inside = np.stack([polar.at(inner + beside), polar.at(outer - beside)], axis=1)
+    paper, ink = _step_evidence(polar, inside, ground, edges)
     weight = weights(polar)
     share = weight[:, None, None] * polar.visible
     return Evidence(
@@ -151,8 +155,24 @@ def edge_evidence(
         weight=weight,
         dot=np.zeros_like(weight),
         lit=edges.astype(np.float32),
-        covered=ground <= polar.shade[:, None, None],
+        covered=_covered(polar, inside, ground, ink > paper),
     )
+
+
+def _covered(
+    polar: PolarImages, band: np.ndarray, ground: np.ndarray, marked: np.ndarray
+) -> np.ndarray:
+    """Return where something covers the ground, which is no shadow, all of shape (k, 2, m).
+
+    Marks in shadow are darker than those in the light, and nothing that covers a target is.
+    """
+    shade = polar.shade[:, None, None]
+    covered = ground <= shade
+    if not covered.any():
+        return covered
+    in_shadow = covered & marked & (band < polar.inked(shade, band))
+    shadow = in_shadow.sum(axis=(1, 2)) > _MARKED * covered.sum(axis=(1, 2))
+    return np.asarray(covered & ~shadow[:, None, None])
 
 
 def light_edges(

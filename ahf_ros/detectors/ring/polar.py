@@ -34,10 +34,10 @@ _NOISE = (1.2, 40.0)  # smallest and largest noise, gray values
 _MEDIAN = 0.6745  # of the size of a normal deviate
 _EVEN = 0.015  # deviation of ln of ground in even light
 _UNLIKE = 4.0  # standard deviations of ground, from which a level is unlike the rest
-_COVERED = 0.26  # share of the angles whose ground is darker, from which that is light
+_COVERED = 0.34  # share of the angles whose ground is darker, from which that is light
 _WHITE_OUT = 0.6  # share of the ground that is saturated, from which that is no glare
 _LIGHT_EDGE = 0.3  # of ln, of an edge of light
-_LIGHT_EDGES = 0.03  # share of the ground, from which light has edges
+_COVERS_EDGES, _GLARE_EDGES = 0.3, 0.03  # shares of ground, more than edges of these have
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,11 +211,12 @@ def _usual_levels(
     width = _UNLIKE * np.maximum(np.maximum(spread, _EVEN), noise / np.exp(usual))
     dark = logs < (usual - width)[:, None, None]
     darker = (dark[..., ::2] | dark[..., 1::2]).mean(axis=(1, 2))
-    shade = np.where(darker > _COVERED, 0, np.exp(usual - width) - LOG_OFFSET)
     across, along = logs[..., 1::2] - logs[..., ::2], (of_later - logs)[..., ::2]
-    edges = np.maximum(np.abs(across), np.abs(along)) > _LIGHT_EDGE
+    edges = (np.maximum(np.abs(across), np.abs(along)) > _LIGHT_EDGE).mean(axis=(1, 2))
+    light = (darker > _COVERED) | (edges > _COVERS_EDGES)
+    shade = np.where(light, 0, np.exp(usual - width) - LOG_OFFSET)
     white = (ground >= SATURATED).mean(axis=(1, 2))
-    light = (edges.mean(axis=(1, 2)) > _LIGHT_EDGES) | (white > _WHITE_OUT)
+    light = (edges > _GLARE_EDGES) | (white > _WHITE_OUT)
     glare = np.minimum(np.exp(usual + width) - LOG_OFFSET, SATURATED)
     return shade.astype(np.float32), np.where(light, np.inf, glare).astype(np.float32)
 
