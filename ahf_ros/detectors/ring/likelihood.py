@@ -215,8 +215,9 @@ def _step_evidence(
     low, high = (np.sqrt(spread**2 + noise**2 + expected**2) for spread in (_MARK, _MARK_TAIL))
     width = np.where(more > 0, high, low)
     inked = _normal(more, width) * (2 * width / (low + high))
-    less = glare & (more < 0) & (more > -np.abs(mark))
-    inked = np.where(less, np.maximum(inked, 1 / np.maximum(np.abs(mark), _FLAT)), inked)
+    if glare.any():
+        less = glare & (more < 0) & (more > -np.abs(mark))
+        inked = np.where(less, np.maximum(inked, 1 / np.maximum(np.abs(mark), _FLAT)), inked)
     lit = edges.astype(np.float32)[:, None, None]
     anything = _PLAIN * flat + (1 - _PLAIN) * _ANY_STEP
     clear = (band < SATURATED) | np.isinf(limit)
