@@ -29,7 +29,6 @@ from ahf_ros.detectors.ring.light import predicted_light
 from ahf_ros.detectors.ring.likelihood import (
     Evidence,
     edge_evidence,
-    foreign_ground,
     level_evidence,
 )
 from ahf_ros.detectors.ring.polar import angles_of, polar_images
@@ -244,8 +243,6 @@ def _evidence(gray: np.ndarray, best: Hypotheses) -> tuple[Evidence, Words]:
     levels = sample_circles(gray, best.frames, angles, radii)
     known = predicted_light(gray, best.frames, polar.lift, angles, radii, TABLE.band)
     evidence = edges.plus(level_evidence(polar, levels, *known, radii, TABLE.band))
-    foreign = foreign_ground(polar, levels[..., 2:4], levels[..., 8:])
-    evidence = evidence.without(*foreign)
     return evidence, decode(evidence, 0 * growth, TABLE)
 
 

@@ -33,6 +33,7 @@ def seen(marked: np.ndarray, weight: float = 1.0) -> Evidence:
         weight=np.full(count, weight, np.float32),
         dot=np.zeros(count, np.float32),
         lit=np.full(count, 0.02, np.float32),
+        covered=np.zeros(halves.shape, bool),
     )
 
 

@@ -10,7 +10,6 @@ import pytest
 from ahf_ros.detectors.ring.likelihood import (
     band_edges,
     edge_evidence,
-    foreign_ground,
     level_evidence,
     light_edges,
     weights,
@@ -38,6 +37,8 @@ def polar(
     growth: float = 0.0,
     radius: float = 1.0,
     size: float = 10.0,
+    shade: float = 0.0,
+    glare: float = SATURATED,
 ) -> PolarImages:
     """Return the polar image of a target of light (m,) whose marks have grown."""
     inner, outer = band_edges(np.array([radius]), np.array([growth]), BAND)
@@ -54,6 +55,8 @@ def polar(
         size=np.array([size]),
         noise=np.array([1.2]),
         blur=np.array([0.7]),
+        shade=np.array([shade], np.float32),
+        glare=np.array([glare], np.float32),
     )
 
 
@@ -112,14 +115,50 @@ def test_angles_that_the_image_does_not_show_say_nothing() -> None:
     assert evidence.paper[..., 25:].all()
 
 
-def test_glare_says_nothing_but_over_exposed_paper_does() -> None:
-    glare, white = polar(), polar(light=255.0)
+def test_white_bands_under_glare_say_nothing_but_over_exposed_paper_does() -> None:
+    glare, white = polar(), polar(light=255.0, glare=np.inf)
     glare.gray[:, :20] = 255.0
     of_glare, of_white = (edge_evidence(it, ONE, NONE, BAND) for it in (glare, white))
     assert not of_glare.paper[..., :20].any()
     assert not of_glare.ink[..., :20].any()
     assert of_white.paper[..., ~MARKED].min() > 0
     assert of_white.ink[..., MARKED].min() > 0
+
+
+@pytest.mark.parametrize('added', [30.0, 100.0, 150.0])
+def test_marks_under_glare_are_ink_though_their_steps_are_small(added: float) -> None:
+    glossy = replace(polar(), glare=np.array([215.0], np.float32))
+    glossy.gray[:] = np.minimum(glossy.gray + added, 255)
+    evidence = edge_evidence(glossy, ONE, NONE, BAND)
+    assert (evidence.ink > evidence.paper)[..., MARKED].all()
+    assert (evidence.ink <= evidence.paper)[..., ~MARKED].all()
+
+
+def usual_levels(image: np.ndarray) -> tuple[float, float]:
+    """Return between which levels the ground of a target in the middle of an image is usual."""
+    gray = np.minimum(image, 255).astype(np.float32)
+    frames = affine_frames([60.0], [60.0], [12.0], [12.0], [0.0])
+    dots = fit_dots(gray, frames, np.array([1]), rays=24, reach=0.3)
+    of = polar_images(gray, dots, BAND, ANGLES)
+    return float(of.shade[0]), float(of.glare[0])
+
+
+Y, X = np.mgrid[:121, :121].astype(np.float32)
+DOT = np.where(np.hypot(X - 60, Y - 60) < 12, 45.0, 180.0)
+AWAY = np.hypot(X - 95, Y - 60)
+
+
+def test_what_is_bright_with_soft_borders_is_glare_and_with_sharp_ones_light() -> None:
+    assert 185 < usual_levels(DOT)[1] < 200
+    assert usual_levels(DOT + 150 * np.exp(-0.5 * (AWAY / 12) ** 2))[1] < 220
+    assert usual_levels(np.where(AWAY < 20, 1.4, 1.0) * DOT)[1] == np.inf
+    assert usual_levels(DOT + 210)[1] == np.inf
+
+
+def test_what_is_dark_on_a_small_part_of_the_ground_covers_it() -> None:
+    assert 160 < usual_levels(DOT)[0] < 175
+    assert 160 < usual_levels(np.where(AWAY < 15, 0.5, 1.0) * DOT)[0] < 175
+    assert usual_levels(np.where(X < 55, 0.5, 1.0) * DOT)[0] <= 0
 
 
 def test_readings_of_neighbours_that_are_alike_share_one_weight() -> None:
@@ -181,28 +220,19 @@ def test_a_dot_of_light_on_paper_is_no_ink() -> None:
     assert level_evidence(target, values, values, spread, radii, BAND).dot[0] < -5
 
 
-def test_what_lies_on_the_ground_is_no_light_unless_much_of_the_ground_is_unlike() -> None:
-    even = np.full((1, ANGLES, 2), 180.0, np.float32)
-    few, many = even.copy(), even.copy()
-    few[:, 10:14], few[:, 30:32], many[:, ::2] = 60.0, 240.0, 60.0
-    covered, lit = foreign_ground(polar(), even, few)
-    assert not covered[0, 0].any() and not lit[0, 0].any()
-    assert np.flatnonzero(covered[0, 1]).tolist() == [10, 11, 12, 13]
-    assert np.flatnonzero(lit[0, 1]).tolist() == [30, 31]
-    assert not np.any(foreign_ground(polar(), many, many))
-
-
-def test_what_covers_the_ground_covers_the_band_and_glare_leaves_steps() -> None:
-    evidence = edge_evidence(polar(), ONE, NONE, BAND)
-    covered, lit = np.zeros((2, 1, 2, ANGLES), np.float32)
-    covered[..., 5], covered[..., 15], lit[..., 6], lit[..., 16] = 1, 1, 1, 1
-    left = evidence.without(covered, lit)
-    assert not left.paper[..., [5, 15]].any() and not left.ink[..., [5, 15]].any()
-    for marked, unmarked in ((evidence.ink, evidence.paper), (left.ink, left.paper)):
-        assert (marked[..., 6] > 0).all() and (unmarked[..., 6] < 0).all()
-    assert not left.paper[..., 16].any() and not left.ink[..., 16].any()
-    untouched = np.setdiff1d(np.arange(ANGLES), [5, 6, 15, 16])
-    assert np.array_equal(left.ink[..., untouched], evidence.ink[..., untouched])
+def test_what_covers_the_ground_covers_the_edge_beside_it_and_the_levels() -> None:
+    target = polar(shade=100.0)
+    target.gray[:, 5:8, inside(BAND[1], 9)] = 90.0
+    edges = edge_evidence(target, ONE, NONE, BAND)
+    values, light, spread, radii = levels(target, 0.05)
+    seen = level_evidence(target, values, light, spread, radii, BAND)
+    both = edges.plus(seen)
+    assert np.flatnonzero(both.covered.any(axis=1)).tolist() == [5, 6, 7]
+    for name in ('paper', 'ink'):
+        of_edges, of_levels, of_both = (getattr(of, name)[0] for of in (edges, seen, both))
+        assert of_edges[1, 5:8].all() and not of_both[1, 5:8].any()
+        assert np.array_equal(of_both[0, 5:8], of_edges[0, 5:8])
+        assert np.array_equal(of_both[:, 8:], (of_edges + of_levels)[:, 8:])
 
 
 def test_ink_under_light() -> None:

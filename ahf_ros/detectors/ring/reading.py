@@ -20,7 +20,6 @@ from ahf_ros.detectors.ring.light import predicted_light
 from ahf_ros.detectors.ring.likelihood import (
     Evidence,
     edge_evidence,
-    foreign_ground,
     growth_by,
     level_evidence,
 )
@@ -189,8 +188,6 @@ def _with_levels(
     levels = lifted(levels, polar.lift.astype(np.float32)[:, None, None])
     light = predicted_light(gray, targets.frames, polar.lift, angles, radii, family.band)
     evidence = edges.plus(level_evidence(polar, levels, *light, radii, family.band))
-    gap, margin = (radii > 1) & (radii < inner), radii > outer
-    evidence = evidence.without(*foreign_ground(polar, levels[..., gap], levels[..., margin]))
     read = decode(evidence, _overhang(growth[doubtful], family), family, expected)
     read = replace(read, hidden=read.hidden | ~polar.visible.any(axis=1))
     return words.replaced(doubtful, read)
