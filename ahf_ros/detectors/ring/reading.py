@@ -42,6 +42,7 @@ _MARGIN_DEPTHS = np.array([0.3, 0.6])  # the same beyond the band, dot radii
 _HOPEFUL = 0.2  # mean log odds of a reading, from which a band is read on
 _CLEAR = 15.0  # log odds of a word by edges alone against the next ID, that leave no doubt
 _DOUBT = 3.0  # log odds against it of arcs of any length, that leave one
+_PLENTY = 1.4  # mean log odds of a reading, below which they leave one as well
 _PART = 256  # dots at a time, which bounds the memory
 
 
@@ -167,9 +168,8 @@ def _with_levels(
     family, expected
         As for `decode`.
     """
-    doubtful = np.flatnonzero(
-        (words.margin < _CLEAR) | (words.coded < -_DOUBT) | words.hidden.any(axis=1)
-    )
+    doubt = (words.margin < _CLEAR) | (words.coded < -_DOUBT) | words.hidden.any(axis=1)
+    doubtful = np.flatnonzero(doubt | (_mean_odds(words, edges.weight) < _PLENTY))
     if not doubtful.size:
         return words
     targets, polar = targets.select(doubtful), polar.select(doubtful)
