@@ -106,10 +106,10 @@ def results(folder: Path) -> dict[str, Any]:
     from ahf_ros.evaluation import score, total
     from ahf_ros.target import TrueTarget
 
-    detector = RingDetector(DetectorSettings(polarity='dark'))
     scores = []
     for path in sorted(folder.glob('*.npz')):
         with np.load(path) as scene:
+            detector = RingDetector(DetectorSettings(family=str(scene['family'])))
             truth = [TrueTarget(int(number), x, y) for number, x, y in scene['truth'].tolist()]
             scores.append(score(truth, detector(scene['image'])))
     figures = total(scores)

@@ -2,10 +2,11 @@
 
     python -m benchmarks.sensitivity [MODULE.NAME ...] [--count 10]
 
-Without names, all named numbers of `ring` and `features` that are not integers are screened on
-small scenes. Those whose change costs most are then measured on more and larger scenes, and the
-first of these are printed. All scenes have development seeds and little ambient light, where the
-detector reaches its limits.
+Without names, all named numbers of `ring` and `features` that are not integers are screened: on
+small scenes under little ambient light, some with shifted edges, and on some of those that
+`benchmarks.confidence` is fitted to, with covers, glare, other families and marks that are no
+targets. Those whose change costs most are then measured on more and larger scenes, and the first
+of these are printed. All scenes have development seeds.
 """
 
 from __future__ import annotations
@@ -14,13 +15,16 @@ import argparse
 import ast
 import json
 import math
+import os
 import re
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib import import_module
+from itertools import chain, islice
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +33,7 @@ from rich.progress import track
 
 from ahf_ros.synthetic.scene import SceneSettings, render
 from benchmarks.changed_constant import assigned
+from benchmarks.conditions import Scene, disturbed, strange
 
 ROOT = Path(__file__).resolve().parent.parent
 ROOMS = ('ahf_ros.features.', 'ahf_ros.detectors.ring.')
@@ -40,15 +45,26 @@ FACTORS = (0.5, 2.0)
 PATIENCE = 600.0
 """Longest time for the scenes with one constant changed, s."""
 
-Scenes = Sequence[SceneSettings]
-
-SMALL: Scenes = [
-    SceneSettings(width=1600, height=1066, targets=12, distractors=4, light=light, ambient=0.04)
+SMALL = [
+    SceneSettings(
+        width=1600,
+        height=1066,
+        targets=12,
+        distractors=4,
+        dot_radius=radius,
+        light=light,
+        ambient=ambient,
+        edge_shift=shift,
+    )
+    for radius, ambient, shift in ((20.0, 0.04, 0.0), (7.0, 0.12, 0.0), (12.0, 0.12, -0.8))
     for light in LIGHTS
 ]
 """For screening."""
 
-LARGE: Scenes = [
+EVERY = 7
+"""One of so many disturbed scenes is for screening."""
+
+LARGE = [
     SceneSettings(
         width=2000,
         height=1500,
@@ -108,13 +124,27 @@ def modules() -> list[str]:
     return [name for name in done.stdout.split() if name.startswith(ROOMS)]
 
 
-def written(scenes: Scenes, folder: Path) -> Path:
-    """Render scenes with their truth into a folder."""
+def rendered(scenes: Sequence[SceneSettings]) -> Iterator[Scene]:
+    """Yield scenes under light."""
+    for settings in scenes:
+        rendering = render(settings)
+        yield Scene('light', rendering.image, rendering.truth, settings.family)
+
+
+def screened() -> Iterator[Scene]:
+    """Yield the scenes for screening."""
+    yield from rendered(SMALL)
+    yield from islice(chain(disturbed(1), strange(1)), 0, None, EVERY)
+
+
+def written(scenes: Iterable[Scene], folder: Path) -> Path:
+    """Write scenes with their truth into a folder."""
     folder.mkdir()
-    for number, settings in enumerate(scenes):
-        scene = render(settings)
-        truth = [(target.id, target.x, target.y) for target in scene.targets]
-        np.savez(folder / f'{number:03}.npz', image=scene.image, truth=np.array(truth))
+    for number, scene in enumerate(scenes):
+        truth = np.array([(target.id, target.x, target.y) for target in scene.truth])
+        truth = truth.reshape(-1, 3)
+        path = folder / f'{number:03}.npz'
+        np.savez(path, image=scene.image, truth=truth, family=scene.family)
     return folder
 
 
@@ -149,9 +179,14 @@ def measured(
 ) -> tuple[Outcome, dict[str, list[Outcome]]]:
     """Return the outcome as it is, and those with each constant halved and doubled."""
     console = Console(stderr=True)
+    changes = [(name, changed(name, names[name], factor)) for name in names for factor in FACTORS]
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        done = pool.map(lambda change: outcome(folder, *change), changes)
+        count = len(changes)
+        found = list(track(done, what, count, console=console, disable=not names))
     tried = {
-        name: [outcome(folder, name, changed(name, value, factor)) for factor in FACTORS]
-        for name, value in track(names.items(), what, console=console, disable=not names)
+        name: found[start : start + len(FACTORS)]
+        for name, start in zip(names, range(0, len(found), len(FACTORS)), strict=True)
     }
     return outcome(folder), tried
 
@@ -184,11 +219,11 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         names = {name: values[name] for name in options.names}
         if not names:
-            small = written(SMALL, Path(folder, 'small'))
+            small = written(screened(), Path(folder, 'small'))
             default, tried = measured(small, values, f'{len(values)} constants')
             print(table(values, default, tried), end='\n\n', file=sys.stderr)
             names = {name: values[name] for name in ranked(tried)[: 3 * options.count // 2]}
-        large = written(LARGE, Path(folder, 'large'))
+        large = written(rendered(LARGE), Path(folder, 'large'))
         default, tried = measured(large, names, 'the table')
         total = sum(settings.targets for settings in LARGE)
         print(f'Targets with the right ID, of {total}, and the RMSE of their centres in px.\n')

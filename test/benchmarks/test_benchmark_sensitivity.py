@@ -16,6 +16,7 @@ from benchmarks.sensitivity import (
     main,
     outcome,
     ranked,
+    rendered,
     table,
     written,
 )
@@ -29,7 +30,7 @@ SCENE = SceneSettings(width=480, height=320, targets=3, dot_radius=9.0)
 
 @pytest.fixture(scope='module')
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return written([SCENE], tmp_path_factory.mktemp('sensitivity') / 'scenes')
+    return written(rendered([SCENE]), tmp_path_factory.mktemp('sensitivity') / 'scenes')
 
 
 def test_nothing_changed_is_the_detector_as_it_is(folder: Path) -> None:
