@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ahf_ros.sequence import (
+from ahf_ros.stream import (
     SLIDING,
     StackSettings,
     Window,
