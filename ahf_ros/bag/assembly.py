@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from collections import Counter
 from collections.abc import Mapping
@@ -12,6 +13,7 @@ from pathlib import Path
 
 from rosbags.interfaces import Connection, ConnectionExtRosbag2, MessageDefinitionFormat
 from rosbags.rosbag2 import StoragePlugin, Writer
+from ruamel.yaml import YAML
 
 from ahf_ros.bag.answering import AnswerTopics
 from ahf_ros.bag.definitions import typestore
@@ -29,6 +31,7 @@ OUTCOME_KEY = 'ahf_ros_outcome'
 UNKNOWN_HASH = f'RIHS01_{0:064x}'
 """Hash of a type whose definition is missing or not accepted."""
 
+_UNPRINTABLE = re.compile('[\x7f-\x9f\u2028\u2029\ud800-\udfff\ufeff\ufffe\uffff]')
 _ASSEMBLED = '.assembled'
 
 
@@ -86,16 +89,15 @@ def assemble(
     remove_assembled(output)
     bag = output / _ASSEMBLED / output.name
     with Writer(bag, version=9, storage_plugin=STORAGES[storage]) as writer:
-        for name, value in (source.metadata.custom | {TASK_KEY: origin}).items():
-            writer.set_custom_data(name, value)
         _write(source, output, topics, journal, writer)
-        outcome = Outcome(
-            images=len(journal.entries),
-            refused=sum(bool(entry.reason) for entry in journal.entries),
-            lost=tuple(source.lost),
-            left_out=tuple(source.left_out),
-        )
-        writer.set_custom_data(OUTCOME_KEY, json.dumps(asdict(outcome)))
+    outcome = Outcome(
+        images=len(journal.entries),
+        refused=sum(bool(entry.reason) for entry in journal.entries),
+        lost=tuple(source.lost),
+        left_out=tuple(source.left_out),
+    )
+    own = {TASK_KEY: origin, OUTCOME_KEY: json.dumps(asdict(outcome))}
+    _set_custom_data(bag / METADATA, source.metadata.custom | own)
     for file in sorted(bag.iterdir(), key=lambda file: file.name == METADATA):
         # The metadata last: they say that the bag is finished.
         file.replace(output / file.name)
@@ -152,6 +154,19 @@ def check_entry(source: Source, output: Path, entry: Entry, topic: str, timestam
             f'{source.path} is not the bag that {output} was begun with: {topic} at {timestamp} '
             f'ns is read where {entry.topic} at {entry.timestamp} ns was'
         )
+
+
+def _set_custom_data(path: Path, custom: dict[str, str]) -> None:
+    """Add custom data to the metadata of a bag.
+
+    They are written as JSON that is YAML, too. What rosbags writes does not always read back: its
+    YAML breaks long lines within the backslashes of a text.
+    """
+    content = YAML(typ='safe').load(path.read_text(encoding='utf-8'))
+    content['rosbag2_bagfile_information']['custom_data'] = custom
+    text = json.dumps(content, indent=1, ensure_ascii=False)  # YAML joins no surrogates
+    escaped = _UNPRINTABLE.sub(lambda found: f'\\u{ord(found[0]):04x}', text)
+    path.write_text(escaped, encoding='utf-8')
 
 
 def _frozen(value: object) -> object:

@@ -27,7 +27,7 @@ from rosbags.interfaces import Connection, ConnectionExtRosbag1, ConnectionExtRo
 from ruamel.yaml import YAML
 
 from ahf_ros.bag.definitions import COMPRESSED_IMAGE, IMAGE, TypeStores, as_ros2
-from ahf_ros.text import counted, reason_of, shown
+from ahf_ros.text import counted, printable, reason_of
 
 Message = tuple[Connection, int, bytes]
 """Topic of a message, its time of recording in ns, and its bytes."""
@@ -422,7 +422,7 @@ class Source:
                 # With bad definitions, the parser and the code generator may raise anything.
                 messages = counted(item.msgcount, 'message')
                 self._unopened.append(
-                    f'{shown(item.topic)}: {messages} cannot be converted: {reason_of(error)}'
+                    f'{printable(str(item.topic))}: {messages} cannot be converted: {reason_of(error)}'
                 )
         return topics
 
@@ -438,7 +438,7 @@ class Source:
                     continue
                 connection = topic.connection
                 try:
-                    if not 0 <= time < 2**63:
+                    if not (isinstance(time, int) and 0 <= time < 2**63):
                         raise ValueError(f'{time} ns is not a time')
                     converted = topic.convert(data)
                 except Exception as error:
