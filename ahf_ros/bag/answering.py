@@ -127,7 +127,7 @@ class Answering:
     def _frame(self, message: Message) -> Frame[Any]:
         """Return a decoded image with its header."""
         connection, _, data = message
-        received = self._source.deserialize(connection, data)
+        received = self._source.stores.deserialize(connection, data)
         image = DECODERS[connection.msgtype](received)
         height, width = image.shape
         coding = getattr(received, 'encoding', '') or received.format

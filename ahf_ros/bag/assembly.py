@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 from rosbags.interfaces import Connection, ConnectionExtRosbag2, MessageDefinitionFormat
 from rosbags.rosbag2 import StoragePlugin, Writer
@@ -169,7 +170,7 @@ def _set_custom_data(path: Path, custom: dict[str, str]) -> None:
     path.write_text(escaped, encoding='utf-8')
 
 
-def _frozen(value: object) -> object:
+def _frozen(value: Any) -> Any:
     return tuple(value) if isinstance(value, list) else value
 
 
@@ -219,7 +220,7 @@ def _added(writer: Writer, item: Connection, source: Source) -> Connection:
     definition, digest = item.msgdef.data, item.digest
     with suppress(Exception):
         # Types that are not accepted are copied with the hash of unknown types.
-        store = source.store_of(item)
+        store = source.stores.of(item)
         if item.msgdef.format == MessageDefinitionFormat.NONE:
             definition, _ = store.generate_msgdef(item.msgtype, ros_version=2)
         digest = digest or store.hash_rihs01(item.msgtype)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rosbags.interfaces import (
     Connection,
@@ -22,11 +22,13 @@ from rosbags.interfaces import (
     QosTime,
 )
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
-from rosbags.typesys.store import Typestore
 
 import ahf_ros
 from ahf_ros.interchange.target_messages import MessageTypes
 from ahf_ros.text import reason_of
+
+if TYPE_CHECKING:
+    from rosbags.typesys.store import Typestore
 
 CODED_TARGETS = 'ahf_ros/msg/CodedTargetArray'
 COMPRESSED_IMAGE = 'sensor_msgs/msg/CompressedImage'

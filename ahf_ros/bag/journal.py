@@ -68,7 +68,7 @@ class Journal:
 
     def __init__(self, folder: Path) -> None:
         self._database = sqlite3.connect(folder / NAME)
-        # What the system holds outlives a killed process; waiting for the disk takes 8 ms an image.
+        # What the system holds outlives a killed process; the disk would take 8 ms an image.
         self._database.execute('PRAGMA synchronous=OFF')
         rows = self._database.execute('SELECT entry FROM images ORDER BY number')
         self.entries = [_entry(text) for (text,) in rows]

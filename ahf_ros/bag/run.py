@@ -47,7 +47,12 @@ _FORMAT = 3  # version of the journal and of the data stored in a bag
 _TOPIC_NAME = re.compile(r'/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*', re.ASCII)
 _ADDRESS = re.compile('[?#%]')  # rosbags opens SQLite files by an address
 _OF_STACKS = tuple(item.name for item in parameters(StackSettings))
-_IRRELEVANT = ('source', 'output', 'threads', 'lock_timeout')  # settings that do not change the bag
+_IRRELEVANT = (
+    'source',
+    'output',
+    'threads',
+    'lock_timeout',
+)  # settings that do not change the bag
 
 
 @dataclass(frozen=True, slots=True)

@@ -139,6 +139,8 @@ class Source:
         Topics whose messages are serialized in another way than those of ROS.
     metadata : Metadata
         Contents of metadata.yaml.
+    stores : TypeStores
+        Types of the messages.
 
     Raises
     ------
@@ -152,7 +154,7 @@ class Source:
         self.connections: list[Connection] = []
         self.foreign: list[Connection] = []
         self._left_out: dict[str, None] = {}  # an ordered set
-        self._stores = TypeStores()
+        self.stores = TypeStores()
         self._files: list[_File] = []
         self._unopened: list[str] = []
         self._damages: dict[str, str] = {}  # by file, as of the last reading
@@ -179,8 +181,7 @@ class Source:
     def lost(self) -> list[str]:
         """What could not be read when the bag was last read, in a bounded number of lines."""
         refused = [
-            f'{topic}: {counted(count, "message")} cannot be converted: {reason}'
-            for (topic, reason), count in self._refused.items()
+            _refused(topic, count, reason) for (topic, reason), count in self._refused.items()
         ]
         lines = [*self._unopened, *self._damages.values(), *refused, *self._uncounted]
         more = len(lines) - _MAXIMUM_LINES
@@ -208,7 +209,9 @@ class Source:
         accepted = [topic for topic, kind in kinds.items() if kind in (IMAGE, COMPRESSED_IMAGE)]
         if not accepted:
             lost = f'; not readable: {"; ".join(self.lost)}' if self.lost else ''
-            lost += ''.join(f'; {it.topic} is serialized as {_encoding(it)}' for it in self.foreign)
+            lost += ''.join(
+                f'; {it.topic} is serialized as {_encoding(it)}' for it in self.foreign
+            )
             raise ValueError(
                 f'{self.path} has no images, accepted are topics of {IMAGE} or '
                 f'{COMPRESSED_IMAGE}{lost}'
@@ -220,20 +223,6 @@ class Source:
                     f'{self.path}: topic {name} {what}, accepted is one of {", ".join(accepted)}'
                 )
         return list(names) or accepted
-
-    def deserialize(self, connection: Connection, data: bytes) -> Any:
-        """Return a message.
-
-        Raises
-        ------
-        ValueError
-            If the data do not match their type.
-        """
-        return self._stores.deserialize(connection, data)
-
-    def store_of(self, connection: Connection) -> Any:
-        """Return the types of a topic, see `TypeStores.of`."""
-        return self._stores.of(connection)
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[Message]:
         """Yield the messages of some topics of ROS, or all of them; note what is missing.
@@ -269,7 +258,9 @@ class Source:
                 self.metadata = read_metadata(self.path)
                 paths = [self.path / name for name in self.metadata.files]
                 unlisted = (it.name for it in found if it not in paths)
-                self._left_out |= {f'{it}, which {METADATA} does not list': None for it in unlisted}
+                self._left_out |= {
+                    f'{it}, which {METADATA} does not list': None for it in unlisted
+                }
             except ValueError as error:
                 self._unopened.append(str(error))
         scratch = Path(self._stack.enter_context(TemporaryDirectory(prefix='ahf_')))
@@ -420,9 +411,8 @@ class Source:
                 topics[item.id] = _topic(item)
             except Exception as error:
                 # With bad definitions, the parser and the code generator may raise anything.
-                messages = counted(item.msgcount, 'message')
                 self._unopened.append(
-                    f'{printable(str(item.topic))}: {messages} cannot be converted: {reason_of(error)}'
+                    _refused(printable(str(item.topic)), item.msgcount, reason_of(error))
                 )
         return topics
 
@@ -464,6 +454,10 @@ def seconds(timestamp: int) -> str:
     return f'{"-" if timestamp < 0 else ""}{whole}.{part:09}'
 
 
+def _refused(topic: str, count: int, reason: str) -> str:
+    return f'{topic}: {counted(count, "message")} cannot be converted: {reason}'
+
+
 def _encoding(item: Connection) -> str:
     """Return how the messages of a topic are serialized."""
     assert isinstance(item.ext, ConnectionExtRosbag2)
@@ -488,9 +482,8 @@ def _plain(data: object) -> bytes:
     """Return a message of ROS 2, decompressed where it is compressed."""
     if not isinstance(data, bytes | bytearray | memoryview):
         raise ValueError(f'a message is of type {type(data).__name__}, accepted are bytes')
-    if not bytes(data[:4]) == _ZSTD_MAGIC:
+    if bytes(data[:4]) != _ZSTD_MAGIC:
         return bytes(data)
     if (size := zstandard.frame_content_size(data)) > MAXIMUM_SIZE:
         raise ValueError(f'a message has {size} bytes, accepted are at most {MAXIMUM_SIZE}')
     return zstandard.decompress(data, MAXIMUM_SIZE)
-

@@ -334,9 +334,7 @@ def test_tf_of_old_bags_has_its_name_in_ros2(images: list[np.ndarray], tmp_path:
         item = writer.add_connection('/image', IMAGE, typestore=store)
         message = bags.image(store, images[0], 10**9)
         writer.write(item, 10**9, bytes(store.serialize_ros1(message, IMAGE)))
-        tf = writer.add_connection(
-            '/tf', 'tf/msg/tfMessage', msgdef=definition, md5sum='0' * 32
-        )
+        tf = writer.add_connection('/tf', 'tf/msg/tfMessage', msgdef=definition, md5sum='0' * 32)
         writer.write(tf, 10**9, bytes(4))
     assert status(tmp_path / 'in.bag', tmp_path / 'out') == 0
     with rosbag2.Reader(tmp_path / 'out') as made:
