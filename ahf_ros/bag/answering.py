@@ -58,7 +58,7 @@ class Answering:
     Parameters
     ----------
     source : Source
-        That the images come from.
+        Where the images come from.
     topics : mapping of str to AnswerTopics
         By the topic of the images.
     settings : IdentificationSettings

@@ -142,8 +142,8 @@ class TypeStores:
 def as_ros2(item: Connection) -> tuple[Connection, Callable[[bytes], bytes]]:
     """Return a topic of ROS 1 as one of ROS 2, and what converts its messages.
 
-    Only the header differs: that of ROS 2 has no number. Raises anything where the definition is
-    not accepted.
+    Only the header differs: in ROS 2 it has no number. A definition that is not accepted raises
+    anything.
     """
     assert isinstance(item.ext, ConnectionExtRosbag1)
     name = _RENAMED.get(item.msgtype, item.msgtype)

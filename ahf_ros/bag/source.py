@@ -136,7 +136,7 @@ class Source:
     connections : list of rosbags.interfaces.Connection
         All topics of ROS, as those of ROS 2; one that was recorded in several ways has several.
     foreign : list of rosbags.interfaces.Connection
-        Topics whose messages are serialized in another way than those of ROS.
+        Topics whose messages are not serialized as in ROS.
     metadata : Metadata
         Contents of metadata.yaml.
     stores : TypeStores
@@ -241,7 +241,7 @@ class Source:
             self.check_counts(read)
 
     def check_counts(self, counts: Counter[str]) -> None:
-        """Note the topics of which there are fewer messages than the metadata count."""
+        """Note each topic that has fewer messages than the metadata count."""
         foreign = {item.topic for item in self.foreign}
         self._uncounted += [
             f'{topic}: {counts[topic]} of {count} messages were read'
@@ -346,7 +346,7 @@ class Source:
         schemas: dict[int, int] = {}
         channels: dict[int, int] = {}
         counts: Counter[int] = Counter()
-        times: list[int] = []
+        start: int | None = None
         definitions = scratch / f'{path.stem}.definitions.mcap'
         with definitions.open('wb') as file:
             writer = Writer(file, compression=CompressionType.NONE)
@@ -354,7 +354,7 @@ class Source:
             for record in self._records(path):
                 if isinstance(record, McapMessage):
                     counts[record.channel_id] += 1
-                    times = times or [record.log_time]
+                    start = record.log_time if start is None else start
                 elif isinstance(record, Attachment | McapMetadata):
                     self._leave_out([record], type(record).__name__.lower())
                 elif isinstance(record, Schema) and record.encoding in _SCHEMAS:
@@ -385,7 +385,7 @@ class Source:
 
         return _File(
             name=path.name,
-            start=min(times, default=0),
+            start=start or 0,
             count=counts.total(),
             topics=topics,
             messages=messages,
@@ -445,7 +445,8 @@ class Source:
 
     def _note_damage(self, name: str, last: int | None, error: Exception) -> None:
         where = 'nothing' if last is None else f'nothing after {seconds(last)} s'
-        self._damages[name] = f'{name}: {where} can be read: {reason_of(error)}'
+        reason = reason_of(error).removesuffix(': ')
+        self._damages[name] = f'{name}: {where} can be read: {reason}'
 
 
 def seconds(timestamp: int) -> str:

@@ -144,7 +144,7 @@ def _outcomes(
     tasks: Sequence[BagTask], jobs: int, scheduler: str, report: Any
 ) -> Iterator[tuple[BagTask, Outcome | ValueError]]:
     """Yield the outcome of each bag, or the error that ended it, as soon as it is known."""
-    engine = create_engine('bag', _attempt, min(jobs, len(tasks)), scheduler, _told_by, report)
+    engine = create_engine('bag', _attempt, min(jobs, len(tasks)), scheduler, _with_machine, report)
     with closing(engine):
         for item in finished_tasks(engine, tasks):
             outcome = item.result
@@ -153,7 +153,7 @@ def _outcomes(
             yield item.task, outcome
 
 
-def _told_by(outcome: Outcome | ValueError, machine: str) -> Outcome | ValueError:
+def _with_machine(outcome: Outcome | ValueError, machine: str) -> Outcome | ValueError:
     if isinstance(outcome, ValueError):
         return ValueError(f'{outcome} (on {machine})')
     return outcome

@@ -378,20 +378,6 @@ def test_a_journal_of_sqlite_that_was_not_merged_is_named(
     assert 'missing: in.db3-wal was not merged into in.db3' in capfd.readouterr().err
 
 
-def test_a_view_that_never_ends_is_refused(
-    images: list[np.ndarray], tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    source = recorded(tmp_path, images, 'sqlite3')
-    with closing(sqlite3.connect(source / 'in.db3')) as database, database:
-        database.execute('DROP TABLE messages')
-        database.execute(
-            'CREATE VIEW messages AS WITH RECURSIVE n(x) AS (SELECT 1 UNION ALL SELECT x FROM n) '
-            "SELECT x AS id, 1 AS topic_id, x AS timestamp, x'00' AS data FROM n"
-        )
-    assert status(source, tmp_path / 'out') == 1
-    assert 'is not a bag that can be read: in.db3 cannot be read' in capfd.readouterr().err
-
-
 def test_a_file_that_is_none_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     (tmp_path / 'in').mkdir()
     os.mkfifo(tmp_path / 'in' / 'a.mcap')
