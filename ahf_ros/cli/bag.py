@@ -144,7 +144,9 @@ def _outcomes(
     tasks: Sequence[BagTask], jobs: int, scheduler: str, report: Any
 ) -> Iterator[tuple[BagTask, Outcome | ValueError]]:
     """Yield the outcome of each bag, or the error that ended it, as soon as it is known."""
-    engine = create_engine('bag', _attempt, min(jobs, len(tasks)), scheduler, _with_machine, report)
+    engine = create_engine(
+        'bag', _attempt, min(jobs, len(tasks)), scheduler, _with_machine, report
+    )
     with closing(engine):
         for item in finished_tasks(engine, tasks):
             outcome = item.result
