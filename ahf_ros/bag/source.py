@@ -2,18 +2,21 @@
 
 The readers of rosbags read each file of a bag through its index. MCAP files without an index, such
 as those of a recorder that was killed, and those with channels that are not of ROS are read from
-their beginning by mcap. A damage ends its file there.
+their beginning by mcap. SQLite files that rosbags refuses are copied as far as they can be read. A
+damage ends its file there.
 """
 
 from __future__ import annotations
 
+import sqlite3
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, closing, suppress
 from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 from tempfile import TemporaryDirectory
 from typing import Any
+from urllib.parse import quote
 
 import zstandard
 from mcap.reader import make_reader
@@ -42,6 +45,7 @@ _COMPRESSED = '.zstd'
 _ZSTD_MAGIC = b'\x28\xb5\x2f\xfd'  # no serialized message begins like that
 _SERIALIZATION = 'cdr'
 _SCHEMAS = ('ros2msg', 'ros2idl', 'omgidl')  # encodings that rosbags reads
+_TABLES = ('schema', 'topics', 'message_definitions', 'messages')
 _OWN_METADATA = 'rosbag2'  # a copy of metadata.yaml in MCAP files
 _MAXIMUM_TOPICS = 2000  # time to write a bag grows with the square of their number
 _MAXIMUM_LINES = 100  # about what is missing; more are only counted
@@ -302,10 +306,12 @@ class Source:
         try:
             self._stack.enter_context(reader)
         except Exception:
-            # Such as channels that are not of ROS.
-            if path.suffix != '.mcap':
+            # Such as damages, and channels that are not of ROS.
+            if path.suffix == '.mcap':
+                return self._unindexed(path, scratch)
+            if path.suffix != '.db3':
                 raise
-            return self._unindexed(path, scratch)
+            reader = self._stack.enter_context(rosbag2.Reader(self._recovered(path, scratch)))
         return _File(
             name=path.name,
             start=reader.start_time,
@@ -322,6 +328,34 @@ class Source:
                 zstandard.ZstdDecompressor().copy_stream(source, target)
             except zstandard.ZstdError as error:
                 self._unopened.append(f'{path.name}: {error}')
+        return copy
+
+    def _recovered(self, path: Path, scratch: Path) -> Path:
+        """Return a copy of a damaged SQLite file, up to where it is damaged."""
+        copy = scratch / f'{len(self._files)}.db3'
+        address = f'file:{quote(str(path.absolute()))}?immutable=1'
+        with (
+            closing(sqlite3.connect(address, uri=True)) as damaged,
+            closing(sqlite3.connect(copy)) as database,
+            database,
+        ):
+            # Without it SQLite refuses a file that is shorter than its header says.
+            damaged.execute('PRAGMA writable_schema=ON')
+            query = "SELECT sql FROM sqlite_master WHERE type = 'table' AND name = ?"
+            for table in _TABLES:
+                read = 0
+                try:
+                    for (made,) in damaged.execute(query, (table,)).fetchall():
+                        database.execute(made)
+                        for row in damaged.execute(f'SELECT * FROM {table}'):
+                            marks = ', '.join('?' * len(row))
+                            database.execute(f'INSERT INTO {table} VALUES ({marks})', row)
+                            read += 1
+                except sqlite3.Error as error:
+                    rows = f'{counted(read, "row")} of {table}'
+                    reason = f'nothing after {rows} can be read: {reason_of(error)}'
+                    self._unopened.append(f'{path.name}: {reason}')
+            database.execute('CREATE INDEX timestamp_idx ON messages (timestamp)')
         return copy
 
     def _is_indexed(self, path: Path) -> bool:

@@ -250,34 +250,34 @@ def cut(path: Path, share: float) -> None:
     path.write_bytes(content[: int(share * len(content))])
 
 
+@pytest.mark.parametrize(('storage', 'file'), [('mcap', 'in.mcap'), ('sqlite3', 'in.db3')])
 def test_a_bag_that_is_cut_is_answered_up_to_there(
-    images: list[np.ndarray], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    images: list[np.ndarray],
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    storage: str,
+    file: str,
 ) -> None:
     many = images * 10  # several chunks
-    source = bags.write_ros2(tmp_path / 'in', bags.recorded(typestore(), many))
-    cut(source / 'in.mcap', 0.5)
+    source = bags.write_ros2(tmp_path / 'in', bags.recorded(typestore(), many), storage)
+    cut(source / file, 0.5)
     for _ in range(2):
         assert status(source, tmp_path / 'out', '--detector', 'traditional') == 1
         errors = capfd.readouterr().err
-        assert f'{source}: missing: in.mcap: nothing after ' in errors
+        assert f'{source}: missing: {file}: nothing after ' in errors
         assert f'{source}: missing: /image: ' in errors
     times = [time for time, _ in bags.answers(tmp_path / 'out')]
     assert 20 <= len(times) <= 30
     assert times == [(1 + number) * 10**8 for number in range(len(times))]
 
 
-@pytest.mark.parametrize('storage', ['sqlite3', 'ros1'])
-def test_a_bag_that_is_cut_and_has_no_index_is_refused(
-    images: list[np.ndarray], tmp_path: Path, capfd: pytest.CaptureFixture[str], storage: str
+def test_a_bag_of_ros1_that_is_cut_is_refused(
+    images: list[np.ndarray], tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    if storage == 'ros1':
-        source = file = bags.write_ros1(tmp_path / 'in.bag', bags.recorded(bags.ros1(), images))
-    else:
-        source = bags.write_ros2(tmp_path / 'in', bags.recorded(typestore(), images), storage)
-        file = source / 'in.db3'
-    cut(file, 0.5)
+    source = bags.write_ros1(tmp_path / 'in.bag', bags.recorded(bags.ros1(), images))
+    cut(source, 0.5)
     assert status(source, tmp_path / 'out') == 1
-    reason = f'{source} is not a bag that can be read: {file.name} cannot be read: '
+    reason = f'{source} is not a bag that can be read: in.bag cannot be read: '
     assert reason in capfd.readouterr().err
     assert not (tmp_path / 'out').exists()
 

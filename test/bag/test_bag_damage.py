@@ -250,11 +250,12 @@ def test_bombs_are_named_before_they_are_allocated(
     assert counts(tmp_path / 'out') == {'/image': 1, '/image/coded_targets': 1}
 
 
+@pytest.mark.parametrize('storage', ['mcap', 'sqlite3'])
 def test_names_may_have_any_letters(
-    images: list[np.ndarray], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    images: list[np.ndarray], tmp_path: Path, storage: str, capfd: pytest.CaptureFixture[str]
 ) -> None:
     name = 'what? 100%25 #1'
-    source = recorded(tmp_path, images).rename(tmp_path / name)
+    source = recorded(tmp_path, images, storage).rename(tmp_path / name)
     target = tmp_path / f'{name} out'
     assert status(source, target, '--storage', 'sqlite3') == 1
     assert 'accepted with storage sqlite3 is a path without ?, # and %' in capfd.readouterr().err
