@@ -23,13 +23,13 @@ HERE = Path(__file__).resolve().parent
 NAME = 'ahf_ros'
 DISTRIBUTION = os.environ.get('AHF_ROS_DISTRIBUTION') or 'jazzy'
 REQUIREMENTS = [
-    'backports.zstd; python_version < "3.14"',
-    'lz4',
+    'mcap>=1.2.1',
     'numpy>=1.21',
     'opencv-python-headless>=4.5',
     'rich>=12',
-    'rosbags>=0.11.7,<0.12',  # ahf_ros.bag uses more of it than its public API
+    'rosbags>=0.11.7',
     'ruamel.yaml',
+    'zstandard',
 ]
 SITE = Path(f'lib/python{sys.version_info[0]}.{sys.version_info[1]}/site-packages')
 

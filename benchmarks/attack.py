@@ -38,7 +38,6 @@ from support import bags
 
 TESTS = (
     'test/bag/test_bag_damage.py',
-    'test/bag/test_bag_hostile.py',
     'test/cli/test_cli_ending.py',
     'test/detectors/test_command.py',
     'test/detectors/test_registry.py',

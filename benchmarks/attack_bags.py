@@ -196,9 +196,9 @@ def check(source: Path, target: Path) -> bool:
     assert finished(target) == outcome
     answers = sum(count for topic, count in made.items() if topic.endswith('/coded_targets'))
     assert answers + outcome.refused == outcome.images
-    if outcome.lost:
+    if outcome.lost or outcome.left_out:
         return False
     # Without a loss that is named everything is there; a name may be what was damaged.
-    copied = sum(made.values()) - answers + outcome.others
+    copied = sum(made.values()) - answers
     assert copied >= RECORDED.total(), (dict(made), outcome)
     return True

@@ -22,9 +22,9 @@ from rich.console import Console
 from rich.progress import track
 
 import ahf_ros.blas  # noqa: F401  before numpy
-from ahf_ros.sequence import identify_parts
 from ahf_ros.session import create_identifier
 from ahf_ros.session_settings import StackSettings
+from ahf_ros.stream import identify_parts
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
 from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import Identification

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from zlib import crc32
 
-from backports import zstd
+import zstandard
 
 MAGIC = b'\x89MCAP0\r\n'
 
@@ -58,7 +58,7 @@ def chunk(
     """Return the record of a chunk, without an index."""
     crc = crc32(records) if checksum else 0
     head = struct.pack('<QQQI', start, stop, len(records), crc)
-    stored = zstd.compress(records) if compressed else records
+    stored = zstandard.compress(records) if compressed else records
     name = text('zstd' if compressed else '')
     return record(6, head + name + struct.pack('<Q', len(stored)) + stored)
 

@@ -1,31 +1,38 @@
-"""The finished bag: its source and the answers, counted, in the place of the journal."""
+"""The finished bag: its source and the answers, in the place of the journal."""
 
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
+
+from rosbags.interfaces import Connection, ConnectionExtRosbag2, MessageDefinitionFormat
+from rosbags.rosbag2 import StoragePlugin, Writer
+from ruamel.yaml import YAML
 
 from ahf_ros.bag.answering import AnswerTopics
-from ahf_ros.bag.copying import Copy
 from ahf_ros.bag.definitions import typestore
-from ahf_ros.bag.folder import MALFORMED, METADATA
-from ahf_ros.bag.journal import Entry, Journal, Output, custom_data
-from ahf_ros.bag.other_messages import NAME as OTHER_MESSAGES
-from ahf_ros.bag.other_messages import OtherMessages, check_others
-from ahf_ros.bag.source import Source, is_ros
-from ahf_ros.bag.writing import BagWriter
-from ahf_ros.text import reason_of
+from ahf_ros.bag.journal import Entry, Journal
+from ahf_ros.bag.source import METADATA, Source, read_metadata
+
+STORAGES = {'mcap': StoragePlugin.MCAP, 'sqlite3': StoragePlugin.SQLITE3}
 
 TASK_KEY = 'ahf_ros'
 """Under which a bag keeps what it was made from."""
 
 OUTCOME_KEY = 'ahf_ros_outcome'
-"""Under which a finished bag keeps what became of it."""
+"""Under which a bag keeps what became of it."""
 
+UNKNOWN_HASH = f'RIHS01_{0:064x}'
+"""Hash of a type whose definition is missing or not accepted."""
+
+_UNPRINTABLE = re.compile('[\x7f-\x9f\u2028\u2029\ud800-\udfff\ufeff\ufffe\uffff]')
 _ASSEMBLED = '.assembled'
 
 
@@ -43,37 +50,36 @@ class Outcome:
         Messages that are missing, with topic and time where they are known.
     left_out : tuple of str
         What else of the source the new bag does not have.
-    others : int
-        Number of messages in `ahf_ros.bag.other_messages.NAME`, because a ROS 2 bag cannot hold
-        them.
     """
 
     images: int
     refused: int
     lost: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
-    others: int = 0
 
 
 def assemble(
     source: Source,
-    target: Path,
+    output: Path,
     topics: Mapping[str, AnswerTopics],
     journal: Journal,
     storage: str,
+    origin: str,
 ) -> Outcome:
-    """Write a bag from its source and the journal, and put it in the place of the journal.
+    """Write a bag from its source and the journal into the folder of the journal.
 
     Parameters
     ----------
     source : Source
-    target : Path
-        The bag, until now a journal.
+    output : Path
+        The folder.
     topics : mapping of str to AnswerTopics
         By the topic of the images.
     journal : Journal
     storage : str
-        One of `ahf_ros.bag.writing.STORAGES`.
+        One of `STORAGES`.
+    origin : str
+        Description of what the bag is made from.
 
     Raises
     ------
@@ -81,35 +87,25 @@ def assemble(
         If what was read is not what was answered before. The journal with all answers is left
         as it is then.
     """
-    remove_assembled(target)
-    bag = target / _ASSEMBLED / target.name
-    kept = custom_data(target)[TASK_KEY]
-    with BagWriter(bag, storage) as writer:
-        for name, value in source.metadata.custom.items():
-            writer.set_custom_data(name, value)
-        writer.set_custom_data(TASK_KEY, kept)
-        with OtherMessages(bag / OTHER_MESSAGES) as others:
-            copy = Copy(source, writer, others)
-            answers = _write(source, target, topics, journal, writer, copy)
-        written = sum(writer.counts.values())
-        if written != answers + copy.counts.total():
-            raise ValueError(
-                f'{target} would hold {written} messages, accepted are the '
-                f'{copy.counts.total()} of {source.path} and {answers} answers'
-            )
-        refused = sum(bool(entry.reason) for entry in journal.entries)
-        lost = (*source.lost, *copy.refused)
-        left_out = (*others.described, *source.left_out)
-        total = sum(others.counts.values())
-        outcome = Outcome(len(journal.entries), refused, lost, left_out, total)
-        writer.set_custom_data(OUTCOME_KEY, json.dumps(asdict(outcome)))
+    remove_assembled(output)
+    bag = output / _ASSEMBLED / output.name
+    with Writer(bag, version=9, storage_plugin=STORAGES[storage]) as writer:
+        _write(source, output, topics, journal, writer)
+    outcome = Outcome(
+        images=len(journal.entries),
+        refused=sum(bool(entry.reason) for entry in journal.entries),
+        lost=tuple(source.lost),
+        left_out=tuple(source.left_out),
+    )
+    own = {TASK_KEY: origin, OUTCOME_KEY: json.dumps(asdict(outcome))}
+    _set_custom_data(bag / METADATA, source.metadata.custom | own)
     for file in sorted(bag.iterdir(), key=lambda file: file.name == METADATA):
-        # The metadata last: it says which files are the bag.
-        file.replace(target / file.name)
+        # The metadata last: they say that the bag is finished.
+        file.replace(output / file.name)
     return outcome
 
 
-def finished(target: Path) -> Outcome | None:
+def finished(output: Path) -> Outcome | None:
     """Return what became of a bag, None if it is not finished.
 
     Raises
@@ -117,82 +113,121 @@ def finished(target: Path) -> Outcome | None:
     ValueError
         If it is finished, but its data are not there any more.
     """
-    done = custom_data(target).get(OUTCOME_KEY)
+    done = custom_data(output).get(OUTCOME_KEY)
     if done is None:
         return None
     try:
         fields = json.loads(done)
-        for name in ('lost', 'left_out'):
-            fields[name] = tuple(fields[name])
-        outcome = Outcome(**fields)
-        with Source(target) as made:
+        outcome = Outcome(**{name: _frozen(value) for name, value in fields.items()})
+        with Source(output) as made:
             counts: Counter[str] = Counter()
             for item in made.connections:
                 counts[item.topic] += item.msgcount
             made.check_counts(counts)
             lost = '; '.join(made.lost)
-        if outcome.others:
-            check_others(target / OTHER_MESSAGES, outcome.others)
-    except MALFORMED as error:
-        lost = str(error) if isinstance(error, ValueError) else reason_of(error)
+    except (TypeError, ValueError) as error:
+        lost = str(error)
     if lost:
         raise ValueError(
-            f'{target} was finished and is damaged: {lost}; accepted is another name, or '
+            f'{output} was finished and is damaged: {lost}; accepted is another name, or '
             'to remove it'
         )
     return outcome
 
 
-def remove_assembled(target: Path) -> None:
+def custom_data(output: Path) -> dict[str, str]:
+    """Return what is in the metadata of a bag besides its contents; empty if it is no bag."""
+    try:
+        return read_metadata(output).custom
+    except ValueError:
+        return {}
+
+
+def remove_assembled(output: Path) -> None:
     """Remove what is left of an assembly that was broken off."""
-    shutil.rmtree(target / _ASSEMBLED, ignore_errors=True)
+    shutil.rmtree(output / _ASSEMBLED, ignore_errors=True)
 
 
-def check_entry(source: Source, target: Path, entry: Entry, topic: str, timestamp: int) -> None:
+def check_entry(source: Source, output: Path, entry: Entry, topic: str, timestamp: int) -> None:
     """Refuse an image that is not the one that was answered."""
     if (entry.topic, entry.timestamp) != (topic, timestamp):
         raise ValueError(
-            f'{source.path} is not the bag that {target} was begun with: {topic} at {timestamp} '
+            f'{source.path} is not the bag that {output} was begun with: {topic} at {timestamp} '
             f'ns is read where {entry.topic} at {entry.timestamp} ns was'
         )
 
 
+def _set_custom_data(path: Path, custom: dict[str, str]) -> None:
+    """Add custom data to the metadata of a bag.
+
+    They are written as JSON that is YAML, too. What rosbags writes does not always read back: its
+    YAML breaks long lines within the backslashes of a text.
+    """
+    content = YAML(typ='safe').load(path.read_text(encoding='utf-8'))
+    content['rosbag2_bagfile_information']['custom_data'] = custom
+    text = json.dumps(content, indent=1, ensure_ascii=False)  # YAML joins no surrogates
+    escaped = _UNPRINTABLE.sub(lambda found: f'\\u{ord(found[0]):04x}', text)
+    path.write_text(escaped, encoding='utf-8')
+
+
+def _frozen(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value
+
+
 def _write(
     source: Source,
-    target: Path,
+    output: Path,
     topics: Mapping[str, AnswerTopics],
     journal: Journal,
-    writer: BagWriter,
-    copy: Copy,
-) -> int:
-    """Write all messages of a source with the answers, and return the number of answers."""
-    store = typestore()
-    connections = {
-        name: writer.add_connection(name, kind, typestore=store)
+    writer: Writer,
+) -> None:
+    """Write all messages of a source with the answers."""
+    copies = {
+        (item.id, id(item.owner)): _added(writer, item, source) for item in source.connections
+    }
+    answers = {
+        name: writer.add_connection(name, kind, typestore=typestore())
         for to in topics.values()
         for name, kind in to.types.items()
     }
-    entries: Iterator[tuple[Entry, list[Output]]] = journal.answers()
-    read: Counter[str] = Counter()
-    answers = images_read = 0
+    answered = journal.outputs()
+    images = 0
     for connection, timestamp, data in source.messages():
-        copy.write(connection, timestamp, data)
-        read[connection.topic] += 1
-        if connection.topic in topics and is_ros(connection):
-            images_read += 1
-            entry, outputs = next(entries, (None, []))
-            if entry is None:
-                break
-            check_entry(source, target, entry, connection.topic, timestamp)
-            answers += len(outputs)
-            for name, message in outputs:
-                writer.write(connections[name], timestamp, message)
-    expected = len(journal.entries)
-    if images_read != expected:
+        writer.write(copies[connection.id, id(connection.owner)], timestamp, data)
+        if connection.topic not in topics:
+            continue
+        images += 1
+        entry, outputs = next(answered, (None, []))
+        if entry is None:
+            break
+        check_entry(source, output, entry, connection.topic, timestamp)
+        for name, message in outputs:
+            writer.write(answers[name], timestamp, message)
+    if images != len(journal.entries):
         lost = '; '.join(source.lost) or 'no damage was found'
         raise ValueError(
-            f'{source.path}: {expected} images were answered, {images_read} can be read now; '
-            f'{target} keeps the answers: {lost}'
+            f'{source.path}: {len(journal.entries)} images were answered, {images} can be read '
+            f'now; {output} keeps the answers: {lost}'
         )
-    source.check_counts(read)
-    return answers
+
+
+def _added(writer: Writer, item: Connection, source: Source) -> Connection:
+    """Return the topic of a writer that equals the given one; add it if it is missing."""
+    assert isinstance(item.ext, ConnectionExtRosbag2)
+    for known in writer.connections:
+        if (known.topic, known.msgtype, known.ext) == (item.topic, item.msgtype, item.ext):
+            return known
+    definition, digest = item.msgdef.data, item.digest
+    with suppress(Exception):
+        # Types that are not accepted are copied with the hash of unknown types.
+        store = source.stores.of(item)
+        if item.msgdef.format == MessageDefinitionFormat.NONE:
+            definition, _ = store.generate_msgdef(item.msgtype, ros_version=2)
+        digest = digest or store.hash_rihs01(item.msgtype)
+    return writer.add_connection(
+        item.topic,
+        item.msgtype,
+        msgdef=definition,
+        rihs01=digest or UNKNOWN_HASH,
+        offered_qos_profiles=item.ext.offered_qos_profiles,
+    )

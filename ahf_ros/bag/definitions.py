@@ -2,22 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rosbags.interfaces import (
     Connection,
     ConnectionExtRosbag1,
+    ConnectionExtRosbag2,
     MessageDefinition,
     MessageDefinitionFormat,
+    Qos,
+    QosDurability,
+    QosHistory,
+    QosLiveliness,
+    QosReliability,
+    QosTime,
 )
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
-from rosbags.typesys.store import Typestore
 
 import ahf_ros
 from ahf_ros.interchange.target_messages import MessageTypes
+from ahf_ros.text import reason_of
+
+if TYPE_CHECKING:
+    from rosbags.typesys.store import Typestore
 
 CODED_TARGETS = 'ahf_ros/msg/CodedTargetArray'
 COMPRESSED_IMAGE = 'sensor_msgs/msg/CompressedImage'
@@ -28,6 +39,20 @@ LONGEST_DEFINITION = 2**17
 
 _NAMES = ('CodedTarget', 'CodedTargetArray', 'FilterState')
 _IDL_SEPARATOR = '=' * 80 + '\n'
+_HEADER = 'std_msgs/msg/Header'
+_RENAMED = {'tf/msg/tfMessage': 'tf2_msgs/msg/TFMessage'}  # from ROS 1 to ROS 2
+_FOREVER = QosTime(2**31 - 1, 2**32 - 1)
+_LATCHED = Qos(
+    history=QosHistory.UNKNOWN,
+    depth=0,
+    reliability=QosReliability.RELIABLE,
+    durability=QosDurability.TRANSIENT_LOCAL,
+    deadline=_FOREVER,
+    lifespan=_FOREVER,
+    liveliness=QosLiveliness.AUTOMATIC,
+    liveliness_lease_duration=_FOREVER,
+    avoid_ros_namespace_conventions=False,
+)
 
 
 def definition_folder() -> Path:
@@ -70,15 +95,14 @@ def message_types(store: Typestore) -> MessageTypes:
 class TypeStores:
     """Types of recorded messages, from the bag if it defines them, otherwise from ROS 2 Jazzy.
 
-    Each connection has its own types, so a damaged or different definition affects no other.
+    Each topic has its own types, so a damaged or different definition affects no other.
     """
 
     def __init__(self) -> None:
-        self.default = typestore()
         self._stores: dict[tuple[str, MessageDefinition], Typestore] = {}
 
     def of(self, item: Connection) -> Typestore:
-        """Return the types of a connection.
+        """Return the types of a topic.
 
         Raises
         ------
@@ -88,19 +112,19 @@ class TypeStores:
         key = (item.msgtype, item.msgdef)
         if key not in self._stores:
             try:
-                self._stores[key] = self._defined(item)
+                self._stores[key] = _defined(item)
             except Exception as error:
                 # With bad definitions, the parser may raise anything.
-                if item.msgtype in self.default.fielddefs and not _is_ros1(item):
-                    return self.default
-                raise ValueError(
-                    f'{item.topic}: the definition of {item.msgtype} is not accepted: '
-                    f'{type(error).__name__}: {error}'
-                ) from error
+                if item.msgtype not in typestore().fielddefs:
+                    raise ValueError(
+                        f'{item.topic}: the definition of {item.msgtype} is not accepted: '
+                        f'{reason_of(error)}'
+                    ) from error
+                self._stores[key] = typestore()
         return self._stores[key]
 
     def deserialize(self, item: Connection, data: bytes) -> Any:
-        """Return a message of a connection.
+        """Return a message of a topic.
 
         Raises
         ------
@@ -109,39 +133,49 @@ class TypeStores:
         """
         store = self.of(item)
         try:
-            if _is_ros1(item):
-                return store.deserialize_ros1(data, item.msgtype)
             return store.deserialize_cdr(data, item.msgtype)
         except Exception as error:
             # With damaged data, the generated code may raise anything.
-            raise ValueError(
-                f'the message is no {item.msgtype}: {type(error).__name__}: {error}'
-            ) from error
-
-    def _defined(self, item: Connection) -> Typestore:
-        if item.msgdef.format == MessageDefinitionFormat.NONE:
-            if item.msgtype not in self.default.fielddefs:
-                raise ValueError('neither the bag nor ROS 2 Jazzy defines it')
-            return self.default
-        store = get_typestore(Stores.EMPTY)
-        store.register(_types(item))
-        return store
+            raise ValueError(f'the message is no {item.msgtype}: {reason_of(error)}') from error
 
 
-def _is_ros1(item: Connection) -> bool:
-    return isinstance(item.ext, ConnectionExtRosbag1)
+def as_ros2(item: Connection) -> tuple[Connection, Callable[[bytes], bytes]]:
+    """Return a topic of ROS 1 as one of ROS 2, and what converts its messages.
+
+    Only the header differs: in ROS 2 it has no number. A definition that is not accepted raises
+    anything.
+    """
+    assert isinstance(item.ext, ConnectionExtRosbag1)
+    name = _RENAMED.get(item.msgtype, item.msgtype)
+    types = get_types_from_msg(item.msgdef.data, name)
+    types[_HEADER] = typestore().fielddefs[_HEADER]
+    store = get_typestore(Stores.EMPTY)
+    store.register(types)
+    text, _ = store.generate_msgdef(name, ros_version=2)
+    converted = item._replace(
+        msgtype=name,
+        msgdef=MessageDefinition(MessageDefinitionFormat.MSG, text),
+        digest=store.hash_rihs01(name),
+        ext=ConnectionExtRosbag2('cdr', [_LATCHED] if item.ext.latching else []),
+    )
+    return converted, lambda data: bytes(store.ros1_to_cdr(data, name))
 
 
-def _types(item: Connection) -> dict[str, Any]:
-    """Return the types in the definition of a connection."""
+def _defined(item: Connection) -> Typestore:
+    """Return the types in the definition of a topic."""
     text = item.msgdef.data
     if len(text) > LONGEST_DEFINITION:
         raise ValueError(f'it has {len(text)} characters, accepted are {LONGEST_DEFINITION}')
-    if item.msgdef.format == MessageDefinitionFormat.MSG:
-        return get_types_from_msg(text, item.msgtype)
-    if not text.startswith(f'{_IDL_SEPARATOR}IDL: '):
-        return get_types_from_idl(text)
+    if item.msgdef.format == MessageDefinitionFormat.NONE:
+        raise ValueError('neither the bag nor ROS 2 Jazzy defines it')
     types: dict[str, Any] = {}
-    for part in text.split(_IDL_SEPARATOR)[1:]:
-        types.update(get_types_from_idl(part.split('\n', 1)[1]))
-    return types
+    if item.msgdef.format == MessageDefinitionFormat.MSG:
+        types = get_types_from_msg(text, item.msgtype)
+    elif text.startswith(f'{_IDL_SEPARATOR}IDL: '):
+        for part in text.split(_IDL_SEPARATOR)[1:]:
+            types.update(get_types_from_idl(part.split('\n', 1)[1]))
+    else:
+        types = get_types_from_idl(text)
+    store = get_typestore(Stores.EMPTY)
+    store.register(types)
+    return store

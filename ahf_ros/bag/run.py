@@ -1,6 +1,6 @@
 """Identification of all images of a bag, into a copy of the bag with the results.
 
-First, the results of all images are written to a journal in the place of the new bag
+First, the results of all images are written to a journal in the folder of the new bag
 (`ahf_ros.bag.journal`). Then the bag is written in one pass, at the speed of the disk, and
 replaces the journal. A run that was killed continues where it stopped.
 """
@@ -11,7 +11,7 @@ import json
 import re
 import sqlite3
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import suppress
+from contextlib import closing
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -19,19 +19,19 @@ from typing import Any
 from rosbags.rosbag2 import WriterError
 
 from ahf_ros import ending
+from ahf_ros.bag import journal as journals
 from ahf_ros.bag.answering import Answering, AnswerTopics
 from ahf_ros.bag.assembly import (
     TASK_KEY,
     Outcome,
     assemble,
     check_entry,
+    custom_data,
     finished,
     remove_assembled,
 )
-from ahf_ros.bag.folder import MALFORMED
-from ahf_ros.bag.journal import PROGRESS, Entry, Journal, begin, custom_data, remove_parts
-from ahf_ros.bag.records import Message, seconds
-from ahf_ros.bag.source import Source
+from ahf_ros.bag.journal import Entry, Journal
+from ahf_ros.bag.source import Message, Source, seconds
 from ahf_ros.interchange.files import locked
 from ahf_ros.session_settings import IdentificationSettings, StackSettings
 from ahf_ros.settings.parameter import parameters
@@ -43,10 +43,16 @@ Report = Callable[[int, int, str], None]
 """Called after each image with the number of finished images, the number of all images or 0 if
 unknown, and what there is to say about this image or its stack, empty if there is nothing."""
 
-_FORMAT = 2  # version of the journal and of the data stored in a bag
+_FORMAT = 3  # version of the journal and of the data stored in a bag
 _TOPIC_NAME = re.compile(r'/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*', re.ASCII)
+_ADDRESS = re.compile('[?#%]')  # rosbags opens SQLite files by an address
 _OF_STACKS = tuple(item.name for item in parameters(StackSettings))
-_IRRELEVANT = ('source', 'target', 'threads', 'patience')  # settings that do not change the bag
+_IRRELEVANT = (
+    'source',
+    'output',
+    'threads',
+    'lock_timeout',
+)  # settings that do not change the bag
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,33 +63,33 @@ class BagTask:
     ----------
     source : Path
         The bag with the images.
-    target : Path
+    output : Path
         The bag to write.
     topics : tuple of str
         Topics of the images; all if empty.
     output_topic : str
         Topic of the results; without a leading slash, relative to the topic of the images.
     storage : str
-        One of `ahf_ros.bag.writing.STORAGES`.
+        One of `ahf_ros.bag.assembly.STORAGES`.
     debug_images : bool
         Whether to write annotated images, as JPEG.
     identification : IdentificationSettings
         Settings of the identification.
     stacking : StackSettings
         Which images are identified together.
-    patience : float
+    lock_timeout : float
         Time to wait for another process that writes the bag, s.
     """
 
     source: Path
-    target: Path
+    output: Path
     topics: tuple[str, ...] = ()
     output_topic: str = 'coded_targets'
     storage: str = 'mcap'
     debug_images: bool = False
     identification: IdentificationSettings = field(default_factory=IdentificationSettings)
     stacking: StackSettings = field(default_factory=StackSettings)
-    patience: float = 0.0
+    lock_timeout: float = 0.0
 
 
 def answer_bag(task: BagTask, report: Report) -> Outcome:
@@ -104,29 +110,36 @@ def answer_bag(task: BagTask, report: Report) -> Outcome:
     Raises
     ------
     ValueError
-        If the bag cannot be read or lacks a topic, or if the target exists and is not from the
+        If the bag cannot be read or lacks a topic, or if the output exists and is not from the
         same task.
     """
+    if task.storage == 'sqlite3' and _ADDRESS.search(str(task.output)):
+        raise ValueError(
+            f'output is {task.output}, accepted with storage sqlite3 is a path without ?, # and %'
+        )
     with Source(task.source) as source:
         topics = _answer_topics(task, source)
         origin = _origin(task, source, topics)
-        if not task.target.exists():
-            types = {name: kind for to in topics.values() for name, kind in to.types.items()}
-            begin(task.target, types, json.dumps(origin))
-        with locked(task.target, task.patience):
-            _check_target(task.target, origin)
-            outcome = finished(task.target) or _made(task, source, topics, report)
-            _tidy(task.target)
+        task.output.mkdir(parents=True, exist_ok=True)
+        with locked(task.output, task.lock_timeout):
+            _begin(task.output, origin)
+            outcome = finished(task.output) or _made(task, source, topics, origin, report)
+            remove_assembled(task.output)
+            journals.remove(task.output)
     return outcome
 
 
 def _made(
-    task: BagTask, source: Source, topics: dict[str, AnswerTopics], report: Report
+    task: BagTask,
+    source: Source,
+    topics: dict[str, AnswerTopics],
+    origin: dict[str, Any],
+    report: Report,
 ) -> Outcome:
-    """Write the journal, then the bag."""
-    journal = Journal(task.target)
-    _answer_images(task, source, topics, journal, report)
-    return assemble(source, task.target, topics, journal, task.storage)
+    """Complete the journal, then write the bag."""
+    with closing(Journal(task.output)) as journal:
+        _answer_images(task, source, topics, journal, report)
+        return assemble(source, task.output, topics, journal, task.storage, json.dumps(origin))
 
 
 def _answer_topics(task: BagTask, source: Source) -> dict[str, AnswerTopics]:
@@ -148,11 +161,10 @@ def _answer_topics(task: BagTask, source: Source) -> dict[str, AnswerTopics]:
         targets = name if name.startswith('/') else f'{image}/{name}'
         debug_image = f'{targets}/debug_image/compressed' if task.debug_images else ''
         topics[image] = AnswerTopics(targets, debug_image)
-    taken = {item.topic for item in source.connections} | {PROGRESS}
+    taken = {item.topic for item in source.connections}
     for name in (name for to in topics.values() for name in to.types):
         if name in taken:
-            has = f'{task.source} has' if name != PROGRESS else 'ahf bag needs'
-            raise ValueError(f'{has} a topic {name}, accepted is another output_topic')
+            raise ValueError(f'{task.source} has a topic {name}, accepted is another output_topic')
     return topics
 
 
@@ -172,17 +184,21 @@ def _flat(values: dict[str, Any]) -> dict[str, Any]:
     return flat
 
 
-def _check_target(target: Path, origin: dict[str, Any]) -> None:
-    """Raise a ValueError unless a bag was begun with the same task."""
-    before: dict[str, Any] = {}
-    with suppress(*MALFORMED):
-        before = dict(json.loads(custom_data(target).get(TASK_KEY, '{}')))
-    if not before:
-        raise ValueError(f'{target} exists, accepted is a new name or a bag that was begun here')
+def _begin(output: Path, origin: dict[str, Any]) -> None:
+    """Begin a bag, or raise a ValueError unless it was begun with the same task."""
+    begun = journals.begun_with(output) or custom_data(output).get(TASK_KEY)
+    if begun is None:
+        if any(not it.name.startswith(journals.NAME) for it in output.iterdir()):
+            raise ValueError(
+                f'{output} exists, accepted is a new name or a bag that was begun here'
+            )
+        journals.begin(output, json.dumps(origin))
+        return
+    before = json.loads(begun)
     for name in before | origin:
         if before.get(name) != origin.get(name):
             raise ValueError(
-                f'{target} was begun with {name} {before.get(name)!r}, now it is '
+                f'{output} was begun with {name} {before.get(name)!r}, now it is '
                 f'{origin.get(name)!r}; accepted is the same value, or another name for the bag'
             )
 
@@ -199,15 +215,15 @@ def _answer_images(
     total = sum(item.msgcount for item in source.connections if item.topic in topics)
     earlier = list(journal.entries)
     for number, (message, last) in enumerate(_with_last(source.messages(topics))):
-        connection, timestamp, data = message
         if number < len(earlier):
             entry = earlier[number]
-            check_entry(source, task.target, entry, connection.topic, timestamp)
-            answering.resume(entry, connection, data)
+            connection, timestamp, _ = message
+            check_entry(source, task.output, entry, connection.topic, timestamp)
+            answering.resume(entry, message)
         else:
-            entry, answers = answering.answer(connection, timestamp, data, last)
+            entry, outputs = answering.answer(message, last)
             ending.check()  # the answer may be that of a program that was ended
-            journal.append(entry, answers)
+            journal.append(entry, outputs)
         report(number + 1, total, _remark(entry))
 
 
@@ -226,9 +242,3 @@ def _remark(entry: Entry) -> str:
     """Return what there is to say about an image; empty if there is nothing."""
     said = '; '.join(filter(None, (entry.reason, entry.note)))
     return f'{entry.topic} at {seconds(entry.timestamp)} s: {said}' if said else ''
-
-
-def _tidy(target: Path) -> None:
-    """Remove the temporary files of a finished bag."""
-    remove_assembled(target)
-    remove_parts(target)

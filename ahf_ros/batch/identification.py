@@ -27,9 +27,9 @@ from ahf_ros.interchange.files import read_bytes
 from ahf_ros.interchange.image_files import read_noted_image, write_image
 from ahf_ros.interchange.target_json import to_json
 from ahf_ros.interchange.urls import is_url
-from ahf_ros.sequence import identify_parts
 from ahf_ros.session import create_identifier
 from ahf_ros.session_settings import IdentificationSettings
+from ahf_ros.stream import identify_parts
 from ahf_ros.target import Identification
 from ahf_ros.text import reason_of
 

@@ -39,7 +39,7 @@ STORAGE = Parameter(
     'storage', 'mcap', 'Storage format of the output bag.', choices=('mcap', 'sqlite3')
 )
 
-_PATIENCE = 2 * STUCK  # s; a process outlives its killed worker of a cluster, at most by STUCK
+_LOCK_TIMEOUT = 2 * STUCK  # s; a process outlives its killed worker of a cluster, at most by STUCK
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -52,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='Bags: ROS 2 folders, .db3 or .mcap files, or ROS 1 .bag files.',
     )
     parser.add_argument(
-        'target',
+        'output',
         type=Path,
         metavar='OUT',
         help='Output bag, a folder; for several bags, the folder for their output bags. An '
@@ -111,32 +111,32 @@ def _tasks(options: argparse.Namespace) -> list[BagTask]:
         from ahf_ros.bag.run import BagTask
     except ModuleNotFoundError as error:
         raise ValueError(
-            f'{error.name} is not installed, bags need it: pip install rosbags'
+            f'{error.name} is not installed, bags need it: pip install rosbags mcap'
         ) from error
 
     jobs = min(options.jobs, len(options.bags))
     settings = settings_from(options, IdentificationSettings)
     settings = shared_settings(settings, jobs, options.scheduler)
-    targets = [options.target]
+    outputs = [options.output]
     if len(options.bags) > 1:
-        targets = [options.target / bag.stem for bag in options.bags]
-        if len(set(targets)) < len(targets):
+        outputs = [options.output / bag.stem for bag in options.bags]
+        if len(set(outputs)) < len(outputs):
             raise ValueError(
                 'OUT would hold several bags of the same name, accepted are different names'
             )
     return [
         BagTask(
             source=source.absolute() if options.scheduler else source,
-            target=target.absolute() if options.scheduler else target,
+            output=output.absolute() if options.scheduler else output,
             topics=tuple(options.topic),
             output_topic=options.output_topic,
             storage=options.storage,
             debug_images=options.debug_images,
             identification=settings,
             stacking=settings_from(options, StackSettings),
-            patience=_PATIENCE if options.scheduler else 0.0,
+            lock_timeout=_LOCK_TIMEOUT if options.scheduler else 0.0,
         )
-        for source, target in zip(options.bags, targets, strict=True)
+        for source, output in zip(options.bags, outputs, strict=True)
     ]
 
 
@@ -144,7 +144,9 @@ def _outcomes(
     tasks: Sequence[BagTask], jobs: int, scheduler: str, report: Any
 ) -> Iterator[tuple[BagTask, Outcome | ValueError]]:
     """Yield the outcome of each bag, or the error that ended it, as soon as it is known."""
-    engine = create_engine('bag', _attempt, min(jobs, len(tasks)), scheduler, _told_by, report)
+    engine = create_engine(
+        'bag', _attempt, min(jobs, len(tasks)), scheduler, _with_machine, report
+    )
     with closing(engine):
         for item in finished_tasks(engine, tasks):
             outcome = item.result
@@ -153,7 +155,7 @@ def _outcomes(
             yield item.task, outcome
 
 
-def _told_by(outcome: Outcome | ValueError, machine: str) -> Outcome | ValueError:
+def _with_machine(outcome: Outcome | ValueError, machine: str) -> Outcome | ValueError:
     if isinstance(outcome, ValueError):
         return ValueError(f'{outcome} (on {machine})')
     return outcome
@@ -168,7 +170,7 @@ def _attempt(task: BagTask, report: Any) -> Outcome | ValueError:
     except ValueError as error:
         return error
     except WRITING_ERRORS as error:
-        return ValueError(f'{task.target} cannot be written: {error}')
+        return ValueError(f'{task.output} cannot be written: {error}')
 
 
 def _progress() -> Progress:
@@ -191,14 +193,14 @@ def _report(task: BagTask, outcome: Outcome | ValueError) -> None:
         print(f'ahf bag: {outcome}', file=sys.stderr)
         return
     refused = f', {outcome.refused} of them not accepted' if outcome.refused else ''
-    print(f'{task.target}: {outcome.images} images answered{refused}', file=sys.stderr)
+    print(f'{task.output}: {outcome.images} images answered{refused}', file=sys.stderr)
     for lost in outcome.lost:
         print(f'ahf bag: {task.source}: missing: {lost}', file=sys.stderr)
     for left_out in outcome.left_out:
         print(f'ahf bag: {task.source}: left out: {left_out}', file=sys.stderr)
     if outcome.refused or outcome.lost:
         print(
-            f'ahf bag: {task.target}: what was not accepted or is missing is not tried again; '
+            f'ahf bag: {task.output}: what was not accepted or is missing is not tried again; '
             'to do so, remove this bag or name another one',
             file=sys.stderr,
         )

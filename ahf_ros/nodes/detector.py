@@ -38,7 +38,7 @@ from ahf_ros.nodes.topics import (
 from ahf_ros.nodes.waiting import Take, WaitingMessages
 from ahf_ros.nodes.watch import Watch
 from ahf_ros.nodes.worker import Worker
-from ahf_ros.sequence import Gathered
+from ahf_ros.stream import Gathered
 from ahf_ros.text import printable, reason_of
 
 Result = TypeVar('Result')

@@ -23,8 +23,8 @@ from ahf_ros.interchange.image_messages import decode_compressed, decode_image
 from ahf_ros.interchange.target_messages import coded_target_array
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.settings import LOSSLESS, DetectorNodeSettings
-from ahf_ros.sequence import identify_parts
 from ahf_ros.session import create_identifier
+from ahf_ros.stream import identify_parts
 from ahf_ros.target import Identification
 
 ImageMessage: TypeAlias = Image | CompressedImage

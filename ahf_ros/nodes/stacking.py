@@ -20,7 +20,7 @@ from ahf_ros.nodes.pipeline import ImageAnswer, ImageMessage, Pipeline, Refused,
 from ahf_ros.nodes.process import ProcessNode
 from ahf_ros.nodes.settings import DetectorNodeSettings
 from ahf_ros.nodes.waiting import Take
-from ahf_ros.sequence import Gathered, Window
+from ahf_ros.stream import Gathered, Window
 
 LOG_PERIOD = 5.0
 """Minimum time between two log lines of the same kind about stacks, s."""

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ pytest.importorskip('rosbags', reason='rosbags is not installed')
 
 from rosbags import rosbag2
 
-from ahf_ros.bag import assembly, run
+from ahf_ros.bag import assembly, journal, run
 from ahf_ros.bag.definitions import COMPRESSED_IMAGE, IMAGE, typestore
 from ahf_ros.cli import main
 from support import bags
@@ -172,42 +173,52 @@ def test_several_bags_at_once(recording: Path, answered: Path, tmp_path: Path) -
         assert bags.read(folder / name) == bags.read(answered)
 
 
-def test_killed_readable_and_finished_the_same(
-    recording: Path, answered: Path, tmp_path: Path
-) -> None:
+def unfinished(target: Path) -> list[tuple[str, bytes]]:
+    """Return what an unfinished run has answered so far."""
+    if not journal.begun_with(target):
+        return []
+    with closing(journal.Journal(target)) as answered:
+        return [output for _, outputs in answered.outputs() for output in outputs]
+
+
+def test_killed_and_finished_the_same(recording: Path, answered: Path, tmp_path: Path) -> None:
     target = tmp_path / 'out'
     command = [sys.executable, '-c', UNFINISHED, 'bag', str(recording), str(target)]
-    complete = bags.read(answered)
-    answers = [it for it in complete if 'coded_targets' in it[0]]
+    answers = [(it[0], it[2]) for it in bags.read(answered) if 'coded_targets' in it[0]]
     for least in (3, 12):
         process = subprocess.Popen([*command, *SEARCH, '--debug-images'], cwd=ROOT)
         limit = time.monotonic() + PATIENCE
-        while not target.exists() or len(bags.read(target)) < least:
+        while len(unfinished(target)) < least:
             assert time.monotonic() < limit and process.poll() is None, 'it answers no more'
             time.sleep(0.005)
         process.send_signal(signal.SIGKILL)
         process.wait()
-        found = [it for it in bags.read(target) if 'ahf_bag' not in it[0]]
+        found = unfinished(target)
         assert found == answers[: len(found)]
     assert status(recording, target, *SEARCH, '--debug-images') == 0
     assert contents(target) == contents(answered)
 
 
-def test_a_kill_while_the_bag_is_assembled(
-    recording: Path, answered: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ('module', 'name'),
+    [(journal, 'begin'), (assembly, '_write'), (Path, 'replace'), (journal, 'remove')],
+    ids=['at the beginning', 'copying', 'moving', 'at the end'],
+)
+def test_a_kill_besides_the_answers(
+    recording: Path,
+    answered: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    module: Any,
+    name: str,
 ) -> None:
     def killed(*_: Any) -> None:
         raise KeyboardInterrupt
 
     target = tmp_path / 'out'
     with monkeypatch.context() as patch:
-        patch.setattr(assembly.Copy, 'write', killed)
+        patch.setattr(module, name, killed)
         assert status(recording, target, *SEARCH, '--debug-images') == 130
-    assert len(bags.answers(target)) == 6
-    with monkeypatch.context() as patch:
-        patch.setattr(run, '_tidy', killed)
-        assert status(recording, target, *SEARCH, '--debug-images') == 130
-    assert bags.read(target) == bags.read(answered)
     assert status(recording, target, *SEARCH, '--debug-images') == 0
     assert contents(target) == contents(answered)
 
@@ -239,23 +250,36 @@ def cut(path: Path, share: float) -> None:
     path.write_bytes(content[: int(share * len(content))])
 
 
-@pytest.mark.parametrize('storage', ['mcap', 'sqlite3', 'ros1'])
+@pytest.mark.parametrize(('storage', 'file'), [('mcap', 'in.mcap'), ('sqlite3', 'in.db3')])
 def test_a_bag_that_is_cut_is_answered_up_to_there(
-    images: list[np.ndarray], tmp_path: Path, capfd: pytest.CaptureFixture[str], storage: str
+    images: list[np.ndarray],
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    storage: str,
+    file: str,
 ) -> None:
     many = images * 10  # several chunks
-    if storage == 'ros1':
-        source = bags.write_ros1(tmp_path / 'in.bag', bags.recorded(bags.ros1(), many))
-        cut(source, 0.5)
-    else:
-        source = bags.write_ros2(tmp_path / 'in', bags.recorded(typestore(), many), storage)
-        cut(next(it for it in source.iterdir() if it.suffix != '.yaml'), 0.5)
+    source = bags.write_ros2(tmp_path / 'in', bags.recorded(typestore(), many), storage)
+    cut(source / file, 0.5)
     for _ in range(2):
         assert status(source, tmp_path / 'out', '--detector', 'traditional') == 1
-        assert f'{source}: missing: ' in capfd.readouterr().err
+        errors = capfd.readouterr().err
+        assert f'{source}: missing: {file}: nothing after ' in errors
+        assert f'{source}: missing: /image: ' in errors
     times = [time for time, _ in bags.answers(tmp_path / 'out')]
     assert 20 <= len(times) <= 30
     assert times == [(1 + number) * 10**8 for number in range(len(times))]
+
+
+def test_a_bag_of_ros1_that_is_cut_is_refused(
+    images: list[np.ndarray], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    source = bags.write_ros1(tmp_path / 'in.bag', bags.recorded(bags.ros1(), images))
+    cut(source, 0.5)
+    assert status(source, tmp_path / 'out') == 1
+    reason = f'{source} is not a bag that can be read: in.bag cannot be read: '
+    assert reason in capfd.readouterr().err
+    assert not (tmp_path / 'out').exists()
 
 
 def test_a_bag_without_metadata_is_read(

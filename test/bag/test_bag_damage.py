@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import json
+import os
+import sqlite3
 from collections import Counter
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -11,11 +15,15 @@ import pytest
 
 pytest.importorskip('rosbags', reason='rosbags is not installed')
 
-from backports import zstd
-from rosbags import rosbag2
+import zstandard
+from mcap.writer import Writer
+from rosbags import rosbag1, rosbag2
+from rosbags.interfaces import QosDurability
+from ruamel.yaml import YAML
 
 from ahf_ros.bag.assembly import finished
-from ahf_ros.bag.definitions import IMAGE, typestore
+from ahf_ros.bag.definitions import IMAGE, LONGEST_DEFINITION, typestore
+from ahf_ros.bag.journal import Journal
 from ahf_ros.bag.source import Source
 from ahf_ros.cli import main
 from support import bags, mcap
@@ -61,6 +69,14 @@ NOTES = (
 )
 
 
+def recorded(folder: Path, images: list[np.ndarray], storage: str = 'mcap') -> Path:
+    return bags.write_ros2(folder / 'in', bags.recorded(typestore(), images), storage)
+
+
+def image_records(images: list[np.ndarray]) -> list[bytes]:
+    return [*IMAGES, mcap.message(1, 10, serialized(images)[0])]
+
+
 def counts(path: Path) -> Counter[str]:
     return Counter(topic for topic, _, _ in bags.read(path))
 
@@ -102,7 +118,7 @@ def test_no_page_that_is_zeroed_loses_anything_in_silence(
     assert ends[1] > 0
 
 
-def test_a_damage_in_a_message_that_is_no_image_is_named(
+def test_a_damage_ends_the_bag_there_and_is_named(
     images: list[np.ndarray], tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     one, two, three = serialized(images)
@@ -114,9 +130,23 @@ def test_a_damage_in_a_message_that_is_no_image_is_named(
     source = file.write(tmp_path / 'in.mcap')
     assert status(source, tmp_path / 'out') == 1
     errors = capfd.readouterr().err
-    assert '3 images answered' in errors
-    assert '/image, /notes at 0.000000003 s: the checksum of a chunk is wrong' in errors
-    assert counts(tmp_path / 'out') == {'/image': 3, '/image/coded_targets': 3}
+    assert '1 images answered' in errors
+    assert 'missing: in.mcap: nothing after 0.000000001 s can be read: CRCValid' in errors
+    assert counts(tmp_path / 'out') == {'/image': 1, '/image/coded_targets': 1}
+
+
+def test_a_damaged_file_does_not_end_the_next_one(
+    images: list[np.ndarray], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    one, two, _ = serialized(images)
+    source = tmp_path / 'in'
+    source.mkdir()
+    cut = mcap.McapFile([*IMAGES, mcap.message(1, 1, one)]).write(source / 'in_0.mcap')
+    cut.write_bytes(cut.read_bytes()[:-50])
+    mcap.McapFile([*IMAGES, mcap.message(1, 5, two)]).write(source / 'in_1.mcap')
+    assert status(source, tmp_path / 'out') == 1
+    assert 'missing: in_0.mcap: nothing after 0.000000001 s' in capfd.readouterr().err
+    assert counts(tmp_path / 'out') == {'/image': 2, '/image/coded_targets': 2}
 
 
 def test_messages_without_an_index_may_be_out_of_order(
@@ -129,9 +159,7 @@ def test_messages_without_an_index_may_be_out_of_order(
     file.records += [mcap.message(1, 150, three)]
     source = file.write(tmp_path / 'in.mcap')
     assert status(source, tmp_path / 'out') == 0
-    made = [(topic, time) for topic, time, _ in bags.read(tmp_path / 'out')]
-    assert [time for _, time in made] == [95, 100, 100, 150, 150, 195, 200, 200]
-    assert Counter(topic for topic, _ in made)['/image/coded_targets'] == 3
+    assert counts(tmp_path / 'out') == {'/image': 3, '/image/coded_targets': 3, '/notes': 2}
 
 
 def test_what_nobody_asked_about_is_copied_as_bytes(
@@ -163,23 +191,28 @@ def test_what_a_copy_does_not_have_is_named(
     images: list[np.ndarray], tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     one, *_ = serialized(images)
-    file = mcap.McapFile([*IMAGES, mcap.message(1, 10, one, sequence=7, published=9)])
+    file = mcap.McapFile([*IMAGES, mcap.message(1, 10, one)])
     file.records += [mcap.attachment('calibration.txt', b'f = 35'), mcap.metadata('rig')]
     assert status(file.write(tmp_path / 'in.mcap'), tmp_path / 'out') == 0
     errors = capfd.readouterr().err
-    for name in ("attachment 'calibration.txt'", "metadata 'rig'", 'publish times and sequence'):
+    for name in ("attachment 'calibration.txt'", "metadata 'rig'"):
         assert f'left out: {name}' in errors
 
 
 def test_custom_data_are_kept(images: list[np.ndarray], tmp_path: Path) -> None:
     store = typestore()
+    name = ('Zoë\t"\\" ' * 30) + '\x85\x7f\ufeff'
     with rosbag2.Writer(tmp_path / 'in', version=9) as writer:
-        writer.set_custom_data('operator', 'me')
         item = writer.add_connection('/image', IMAGE, typestore=store)
         writer.write(item, 5, serialized(images)[0])
+    metadata = tmp_path / 'in' / 'metadata.yaml'
+    content = YAML(typ='safe').load(metadata)
+    content['rosbag2_bagfile_information']['custom_data'] = {'operator': name}
+    with metadata.open('w', encoding='utf-8') as file:
+        json.dump(content, file)
     assert status(tmp_path / 'in', tmp_path / 'out') == 0
     with Source(tmp_path / 'out') as made:
-        assert made.metadata.custom['operator'] == 'me'
+        assert made.metadata.custom['operator'] == name
 
 
 @pytest.mark.parametrize('storage', ['mcap', 'sqlite3'])
@@ -203,32 +236,30 @@ def test_messages_of_a_cut_bag_are_decompressed(
 def test_bombs_are_named_before_they_are_allocated(
     images: list[np.ndarray], tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    zeros = zstd.ZstdCompressor()
+    compressor = zstandard.ZstdCompressor().compressobj()
     part = bytes(2**20)
-    bomb = b''.join([*(zeros.compress(part) for _ in range(600)), zeros.flush()])
+    bomb = b''.join([*(compressor.compress(part) for _ in range(600)), compressor.flush()])
     one, *_ = serialized(images)
-    file = mcap.McapFile([*IMAGES, mcap.message(1, 4, bomb), mcap.message(1, 5, one)])
-    file.records.append(bytes(mcap.chunk(b'x', 6, 6)))
     huge = bytearray(mcap.chunk(bytes(10), 7, 7, compressed=True))
     huge[9 + 16 : 9 + 24] = (2**40).to_bytes(8, 'little')
-    file.records.append(bytes(huge))
+    file = mcap.McapFile([*IMAGES, mcap.message(1, 4, bomb), mcap.message(1, 5, one), bytes(huge)])
     assert status(file.write(tmp_path / 'in.mcap'), tmp_path / 'out') == 1
     errors = capfd.readouterr().err
-    assert '/image at 0.000000004 s: zstd data of more than 536870912 bytes' in errors
-    assert f'a chunk has {2**40} bytes, accepted are at most 536870912' in errors
+    assert 'missing: /image: 1 message cannot be converted: ZstdError: ' in errors
+    assert 'missing: in.mcap: nothing after 0.000000005 s can be read: ' in errors
     assert counts(tmp_path / 'out') == {'/image': 1, '/image/coded_targets': 1}
 
 
 @pytest.mark.parametrize('storage', ['mcap', 'sqlite3'])
 def test_names_may_have_any_letters(
-    images: list[np.ndarray], tmp_path: Path, storage: str
+    images: list[np.ndarray], tmp_path: Path, storage: str, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    messages = bags.recorded(typestore(), images)
-    source = bags.write_ros2(tmp_path / 'plain', messages, storage)
     name = 'what? 100%25 #1'
-    source = source.rename(tmp_path / name)
+    source = recorded(tmp_path, images, storage).rename(tmp_path / name)
     target = tmp_path / f'{name} out'
-    assert status(source, target, '--storage', storage) == 0
+    assert status(source, target, '--storage', 'sqlite3') == 1
+    assert 'accepted with storage sqlite3 is a path without ?, # and %' in capfd.readouterr().err
+    assert status(source, target) == 0
     with Source(target) as made:
         assert sum(it.topic == '/image/coded_targets' for it, _, _ in made.messages()) == COUNT
 
@@ -248,14 +279,6 @@ def test_a_finished_bag_without_its_data_is_not_done(
     assert f'{target} was finished and is damaged: ' in capfd.readouterr().err
 
 
-def test_a_topic_that_is_called_like_the_progress_is_refused(
-    images: list[np.ndarray], tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    source = bags.write_ros2(tmp_path / 'in', bags.recorded(typestore(), images))
-    assert status(source, tmp_path / 'out', '--output-topic', '/ahf_bag/progress') == 1
-    assert 'ahf bag needs a topic /ahf_bag/progress, accepted is another' in capfd.readouterr().err
-
-
 def test_a_bag_that_shrinks_while_it_is_answered_keeps_its_answers(
     images: list[np.ndarray],
     tmp_path: Path,
@@ -273,7 +296,8 @@ def test_a_bag_that_shrinks_while_it_is_answered_keeps_its_answers(
         patch.setattr(Source, 'messages', short)
         assert status(source, tmp_path / 'out') == 1
     assert f'{COUNT} images were answered, {COUNT - 1} can be read now' in capfd.readouterr().err
-    assert len(bags.answers(tmp_path / 'out')) == COUNT
+    with closing(Journal(tmp_path / 'out')) as journal:
+        assert sum(len(outputs) for _, outputs in journal.outputs()) == COUNT
     assert status(source, tmp_path / 'out') == 0
     assert counts(tmp_path / 'out')['/image/coded_targets'] == COUNT
 
@@ -281,11 +305,9 @@ def test_a_bag_that_shrinks_while_it_is_answered_keeps_its_answers(
 def test_messages_of_ros1_that_ros2_cannot_hold_are_named(
     images: list[np.ndarray], tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    from rosbags import rosbag1
-
     store = bags.ros1()
     with rosbag1.Writer(tmp_path / 'in.bag') as writer:
-        item = writer.add_connection('/image', IMAGE, typestore=store)
+        item = writer.add_connection('/image', IMAGE, typestore=store, latching=1)
         message = bags.image(store, images[0], 10**9)
         writer.write(item, 10**9, bytes(store.serialize_ros1(message, IMAGE)))
         notes = writer.add_connection('/notes', bags.STRING, typestore=store)
@@ -296,6 +318,159 @@ def test_messages_of_ros1_that_ros2_cannot_hold_are_named(
         writer.write(held, 10**9 + 2, b'1234')
     assert status(tmp_path / 'in.bag', tmp_path / 'out') == 1
     errors = capfd.readouterr().err
-    assert 'missing: /notes: 1 messages cannot be converted: ' in errors
-    assert 'missing: /held: 1 messages cannot be converted: ' in errors
+    assert 'missing: /notes: 1 message cannot be converted: ' in errors
+    assert 'missing: /held: 1 message cannot be converted: ' in errors
     assert counts(tmp_path / 'out') == {'/image': 1, '/image/coded_targets': 1}
+    with Source(tmp_path / 'out') as made:
+        (image,) = (it for it in made.connections if it.topic == '/image')
+        assert [it.durability for it in image.ext.offered_qos_profiles] == [
+            QosDurability.TRANSIENT_LOCAL
+        ]
+
+
+def test_tf_of_old_bags_has_its_name_in_ros2(images: list[np.ndarray], tmp_path: Path) -> None:
+    store = bags.ros1()
+    definition = 'std_msgs/Header[] transforms'
+    with rosbag1.Writer(tmp_path / 'in.bag') as writer:
+        item = writer.add_connection('/image', IMAGE, typestore=store)
+        message = bags.image(store, images[0], 10**9)
+        writer.write(item, 10**9, bytes(store.serialize_ros1(message, IMAGE)))
+        tf = writer.add_connection('/tf', 'tf/msg/tfMessage', msgdef=definition, md5sum='0' * 32)
+        writer.write(tf, 10**9, bytes(4))
+    assert status(tmp_path / 'in.bag', tmp_path / 'out') == 0
+    with rosbag2.Reader(tmp_path / 'out') as made:
+        assert made.topics['/tf'].msgtype == 'tf2_msgs/msg/TFMessage'
+
+
+@pytest.mark.parametrize(
+    ('statement', 'reason', 'copied'),
+    [
+        ('UPDATE messages SET timestamp = -5 WHERE id < 3', '-5 ns is not a time', 4),
+        ('UPDATE messages SET data = 5000000000 WHERE id = 1', 'is of type int, accepted are', 5),
+        ("UPDATE messages SET data = 'text' WHERE id = 1", 'is of type str, accepted are', 5),
+        ("UPDATE topics SET name = x'ff00' WHERE name = '/notes'", "b'\\xff\\x00': 3 messages", 3),
+        ('UPDATE messages SET topic_id = 9 WHERE id = 1', 'in.db3: 5 of 6 messages were read', 5),
+        ('UPDATE messages SET id = -7 WHERE id = 1', '', 6),
+    ],
+)
+def test_rows_of_any_content_are_read_or_named(
+    images: list[np.ndarray],
+    tmp_path: Path,
+    statement: str,
+    reason: str,
+    copied: int,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    source = recorded(tmp_path, images, 'sqlite3')
+    with closing(sqlite3.connect(source / 'in.db3')) as database, database:
+        database.execute(statement)
+    assert status(source, tmp_path / 'out') == bool(reason)
+    assert reason in capfd.readouterr().err
+    topics = [topic for topic, _, _ in bags.read(tmp_path / 'out')]
+    assert sum(topic in ('/image', '/notes') for topic in topics) == copied
+
+
+def test_a_journal_of_sqlite_that_was_not_merged_is_named(
+    images: list[np.ndarray], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    source = recorded(tmp_path, images, 'sqlite3')
+    (source / 'in.db3-wal').write_bytes(b'more')
+    assert status(source, tmp_path / 'out') == 1
+    assert 'missing: in.db3-wal was not merged into in.db3' in capfd.readouterr().err
+
+
+def test_a_file_that_is_none_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / 'in').mkdir()
+    os.mkfifo(tmp_path / 'in' / 'a.mcap')
+    assert status(tmp_path / 'in', tmp_path / 'out') == 1
+    assert 'a.mcap cannot be read: it is not a regular file' in capfd.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ('metadata', 'reason'),
+    [
+        ('[' * 5000, 'RecursionError'),
+        ('rosbag2_bagfile_information: {topics_with_message_count: [{topic_metadata: '
+         '{name: /image}, message_count: .inf}]}', 'OverflowError'),
+    ],
+)  # fmt: skip
+def test_metadata_of_any_content_are_named(
+    images: list[np.ndarray],
+    tmp_path: Path,
+    metadata: str,
+    reason: str,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    source = recorded(tmp_path, images)
+    (source / 'metadata.yaml').write_text(metadata)
+    assert status(source, tmp_path / 'out') == 1
+    assert f'metadata.yaml: {reason}' in capfd.readouterr().err
+    assert len(bags.answers(tmp_path / 'out')) == COUNT
+
+
+def test_channels_of_other_kinds_are_named_as_left_out(
+    images: list[np.ndarray], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    source = tmp_path / 'in.mcap'
+    with source.open('wb') as file:
+        writer = Writer(file)
+        writer.start('ros2')
+        schema = writer.register_schema(IMAGE, 'ros2msg', definition(IMAGE).encode())
+        other = writer.register_schema('foxglove.Log', 'protobuf', b'\xff\x00\xfe')
+        image = writer.register_channel('/image', 'cdr', schema)
+        log = writer.register_channel('/log', 'protobuf', other)
+        plain = writer.register_channel('/image', 'json', 0)
+        for time, data in enumerate(serialized(images)):
+            writer.add_message(image, log_time=time, data=data, publish_time=time)
+            writer.add_message(log, log_time=time, data=b'x', publish_time=time)
+        writer.add_message(plain, log_time=9, data=b'{}', publish_time=9)
+        writer.finish()
+    assert status(source, tmp_path / 'out') == 0
+    errors = capfd.readouterr().err
+    assert 'left out: /log: 3 messages serialized as protobuf' in errors
+    assert 'left out: /image: 1 message serialized as json' in errors
+    assert counts(tmp_path / 'out') == {'/image': 3, '/image/coded_targets': 3}
+
+
+def test_a_file_that_the_metadata_do_not_list_is_named(
+    images: list[np.ndarray], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    source = recorded(tmp_path, images)
+    mcap.McapFile().write(source / 'more.mcap')
+    assert status(source, tmp_path / 'out') == 0
+    named = 'left out: more.mcap, which metadata.yaml does not list'
+    assert named in capfd.readouterr().err
+
+
+def test_messages_of_ros1_in_mcap_are_named(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    records = [mcap.schema(1, IMAGE, 'ros1msg', ''), mcap.channel(1, 1, '/image', 'ros1')]
+    source = mcap.McapFile(records, 'ros1').write(tmp_path / 'in.mcap')
+    assert status(source, tmp_path / 'out') == 1
+    assert 'in.mcap has no images' in (errors := capfd.readouterr().err)
+    assert '/image is serialized as ros1' in errors
+
+
+def test_what_takes_long_to_parse_is_copied_unparsed(
+    images: list[np.ndarray], tmp_path: Path
+) -> None:
+    definition = '\n'.join(f'uint8 x{number}' for number in range(LONGEST_DEFINITION // 9))
+    records = [
+        *image_records(images),
+        mcap.schema(2, 'far/msg/Long', 'ros2msg', definition),
+        mcap.channel(2, 2, '/long'),
+        mcap.message(2, 5, b'12'),
+    ]
+    assert len(definition) > LONGEST_DEFINITION
+    assert status(mcap.McapFile(records).write(tmp_path / 'in.mcap'), tmp_path / 'out') == 0
+    assert ('/long', 5, b'12') in bags.read(tmp_path / 'out')
+
+
+def test_more_topics_than_can_be_written_in_time_are_refused(
+    images: list[np.ndarray], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    channels = [mcap.channel(number, 0, f'/t{number}') for number in range(2, 2002)]
+    source = mcap.McapFile([*image_records(images), *channels]).write(tmp_path / 'in.mcap')
+    assert status(source, tmp_path / 'out') == 1
+    assert 'has 2001 topics, accepted are at most 2000' in capfd.readouterr().err

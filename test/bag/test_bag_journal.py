@@ -1,58 +1,51 @@
 from __future__ import annotations
 
+from contextlib import closing
 from pathlib import Path
 
 import pytest
 
 pytest.importorskip('rosbags', reason='rosbags is not installed')
 
-from ahf_ros.bag.definitions import CODED_TARGETS
-from ahf_ros.bag.journal import MERGED, Entry, Journal, begin, custom_data
+from ahf_ros.bag.journal import NAME, Entry, Journal, begin, begun_with, remove
 from ahf_ros.filtering.identifier import Memory
-from support import bags
 
 ENTRIES = [
-    Entry('/image', 10**18 + number, Memory((1 + number / 3, 0.13), (number, 54)), '')
-    for number in range(2 * MERGED + 3)
+    Entry('/image', 10**18 + number, Memory((1 + number / 3, 0.13), (number, 54)))
+    for number in range(12)
 ]
-REFUSED = Entry('/image', 7, Memory(), 'no image')
+REFUSED = Entry('/image', 7, Memory(), 'no image', 'a note')
 
 
-def test_everything_is_there_after_every_image(tmp_path: Path) -> None:
-    folder = tmp_path / 'new' / 'bag'
-    begin(folder, {'/targets': CODED_TARGETS}, 'told')
-    assert bags.read(folder) == []
-    for count, entry in enumerate(ENTRIES, start=1):
-        journal = Journal(folder)  # as after a kill
-        assert journal.entries == ENTRIES[: count - 1]
-        journal.append(entry, [('/targets', bytes([count, 1])), ('/targets', bytes([count, 2]))])
-        read = [data for topic, _, data in bags.read(folder) if topic == '/targets']
-        assert read == [bytes([number, part]) for number in range(1, count + 1) for part in (1, 2)]
-    assert custom_data(folder) == {'ahf_ros': 'told'}
-    parts = [path for path in folder.iterdir() if path.suffix == '.db3']
-    assert len(parts) == 1 + 2 + 3  # none, ten each, one each
+def test_everything_is_there_after_every_image_in_the_order_of_the_answers(tmp_path: Path) -> None:
+    assert begun_with(tmp_path) == ''
+    begin(tmp_path, 'told')
+    answered = []
+    for number, entry in enumerate((*ENTRIES[::-1], REFUSED)):
+        outputs = [] if entry.reason else [('/b', bytes([number])), ('/a', b'')]
+        with closing(Journal(tmp_path)) as journal:  # as after a kill
+            assert list(journal.outputs()) == answered
+            journal.append(entry, outputs)
+            answered.append((entry, outputs))
+            assert journal.entries == [entry for entry, _ in answered]
+    assert begun_with(tmp_path) == 'told'
+    remove(tmp_path)
+    assert list(tmp_path.iterdir()) == []
 
 
-def test_images_come_back_in_the_order_in_which_they_were_answered(tmp_path: Path) -> None:
-    folder = tmp_path / 'bag'
-    begin(folder, {'/targets': CODED_TARGETS}, '')
-    journal = Journal(folder)
-    expected = []
-    for entry in (ENTRIES[1], REFUSED, ENTRIES[0]):
-        answers = [] if entry.reason else [('/targets', b'some')]
-        journal.append(entry, answers)
-        expected.append((entry, answers))
-    assert list(Journal(folder).answers()) == expected
+def test_an_image_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
+    begin(tmp_path, '')
+    with closing(Journal(tmp_path)) as journal:
+        journal.append(ENTRIES[0], [('/a', b'some')])
+        with pytest.raises(TypeError):
+            journal.append(ENTRIES[1], [('/a', b'some'), None])  # type: ignore[list-item]
+        assert list(journal.outputs()) == [(ENTRIES[0], [('/a', b'some')])]
+    with closing(Journal(tmp_path)) as journal:
+        assert journal.entries == ENTRIES[:1]
 
 
-def test_what_was_broken_off_does_not_count(tmp_path: Path) -> None:
-    folder = tmp_path / 'bag'
-    begin(folder, {'/targets': CODED_TARGETS}, '')
-    Journal(folder).append(ENTRIES[0], [('/targets', b'some')])
-    before = bags.read(folder)
-    for name in ('new.part.db3', '000000001-1.part.db3', 'metadata.new'):
-        (folder / name).write_bytes(b'half')
-    assert bags.read(folder) == before
-    assert Journal(folder).entries == ENTRIES[:1]
-    Journal(folder).append(ENTRIES[1], [])
-    assert Journal(folder).entries == ENTRIES[:2]
+def test_a_journal_that_was_not_begun_is_none(tmp_path: Path) -> None:
+    (tmp_path / NAME).touch()
+    assert begun_with(tmp_path) == ''
+    begin(tmp_path, 'told')
+    assert begun_with(tmp_path) == 'told'

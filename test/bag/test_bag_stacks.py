@@ -55,9 +55,9 @@ def test_a_sliding_window_answers_every_image_once_it_is_full(recording, tmp_pat
     stacking = StackSettings(stack=4, stack_window=SLIDING)
     task = BagTask(recording, tmp_path / 'out', identification=SETTINGS, stacking=stacking)
     answer_bag(task, lambda *_: None)
-    assert stamps(task.target) == [4, 5, 6, 7]
+    assert stamps(task.output) == [4, 5, 6, 7]
     truth = [target.id for target in render(SCENE).targets]
-    assert ids(task.target) == [truth] * 4
+    assert ids(task.output) == [truth] * 4
 
 
 def test_a_run_that_was_broken_off_continues_within_a_stack(recording, tmp_path):
@@ -75,7 +75,7 @@ def test_a_run_that_was_broken_off_continues_within_a_stack(recording, tmp_path)
         answer_bag(tasks[1], broken_off)
     for task in tasks:
         answer_bag(task, lambda *_: None)
-    whole, broken = (bags.read(task.target) for task in tasks)
+    whole, broken = (bags.read(task.output) for task in tasks)
     assert whole == broken
 
 
@@ -101,7 +101,7 @@ def test_what_does_not_belong_together_is_said_and_answered(phases, tmp_path):
         stacking=StackSettings(stack=3),
     )
     outcome = answer_bag(task, lambda done, total, remark: said.append(remark))
-    assert stamps(task.target) == [20, 30, 10]
+    assert stamps(task.output) == [20, 30, 10]
     assert (outcome.images, outcome.refused) == (5, 1)
     assert said[:2] == ['', '']
     assert '2 of 3 images: the next image is 400 x 280 px, mono8, these are 400 x 300' in said[2]

@@ -1,4 +1,4 @@
-"""Which images of a sequence are identified together."""
+"""A sequence of images that is identified in order."""
 
 from __future__ import annotations
 
@@ -7,14 +7,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ahf_ros.sequence import (
+from ahf_ros.detectors import create_detector
+from ahf_ros.detectors.contract import Unavailable
+from ahf_ros.session import create_identifier
+from ahf_ros.session_settings import IdentificationSettings
+from ahf_ros.stream import (
     SLIDING,
+    Answer,
+    Frame,
+    Kind,
+    Remark,
     StackSettings,
+    Stream,
     Window,
     identify_parts,
     unmoved_parts,
 )
-from ahf_ros.session import create_identifier
 from ahf_ros.synthetic.scene import SceneSettings, render
 
 SCENE = SceneSettings(
@@ -118,3 +126,76 @@ def test_images_of_another_type_are_a_part_of_their_own():
 def test_bad_settings_are_named(values, message):
     with pytest.raises(ValueError, match=message):
         StackSettings(**values)
+
+
+class Searched:
+    """A detector that finds nothing, or fails as it is told."""
+
+    name = family = 'searched'
+
+    def __init__(self, error: Exception | None = None) -> None:
+        self.error = error
+
+    def __call__(self, image):
+        if self.error:
+            raise self.error
+        return []
+
+
+def said(events) -> list[tuple[str, int, bool] | Kind]:
+    return [
+        it.kind if isinstance(it, Remark) else (''.join(it.items), it.fresh, it.stack.shape[1] > 0)
+        for it in events
+    ]
+
+
+def frame(name: str, width: int = 40, stamp: int = 0) -> Frame[str]:
+    image = np.tile(np.arange(width, dtype=np.uint8), (30, 1))
+    return Frame(item=name, image=image, kind=f'{width} px', stamp=stamp)
+
+
+def test_a_stream_answers_and_says_why_it_does_not():
+    stream = Stream(IdentificationSettings(), StackSettings(stack=3), Searched())
+    events = [said(stream.add(lambda it=it: frame(*it))) for it in (('a',), ('b',), ('c', 50))]
+    assert events == [[], [], [Kind.INCOMPLETE, ('ab', 2, True)]]
+    assert said(stream.add(lambda: {}['no image'])) == [Kind.REFUSED]
+    assert said(stream.end('no image follows')) == [Kind.INCOMPLETE, ('c', 1, True)]
+    assert said(stream.end('no image follows')) == []
+
+
+@pytest.mark.parametrize(
+    ('error', 'text'),
+    [(ValueError('bad\x00'), 'bad\\x00'), (MemoryError('large'), 'MemoryError: large')],
+)
+def test_what_a_detector_raises_is_why_an_image_is_refused(error, text):
+    stream = Stream(IdentificationSettings(), StackSettings(), Searched(error))
+    (remark,) = stream.add(lambda: frame('a'))
+    assert remark == Remark(Kind.REFUSED, text)
+
+
+def test_a_detector_that_cannot_be_used_refuses_no_image():
+    stream = Stream(IdentificationSettings(), StackSettings(), Searched(Unavailable('gone')))
+    with pytest.raises(Unavailable, match='gone'):
+        list(stream.add(lambda: frame('a')))
+
+
+def test_a_stream_that_is_resumed_goes_on_as_if_it_had_not_ended():
+    settings = IdentificationSettings(expected_targets=4)
+    stacking = StackSettings(stack=3, stack_window=SLIDING)
+    frames = [Frame(str(it), render(SCENE, it).image, 'mono8', it) for it in range(4)]
+
+    def made() -> Stream[str]:
+        return Stream(settings, stacking, create_detector('ring'), timed=False)
+
+    whole, broken = made(), made()
+    answers: list[Answer[str]] = []
+    for number, it in enumerate(frames):
+        answers = [event for event in whole.add(lambda it=it: it) if isinstance(event, Answer)]
+        if number < 3:
+            broken.resume(whole.memory, lambda it=it: it)
+    (resumed,) = broken.add(lambda: frames[3])
+    (answer,) = answers
+    assert answer.items == resumed.items == ('1', '2', '3')
+    assert answer.identification == resumed.identification
+    assert answer.identification.filter.duration == 0.0
+    assert whole.memory == broken.memory

@@ -1,0 +1,421 @@
+"""A sequence of images identified in order: as stacks, with reasons for what is refused.
+
+Images come one by one. A `Stream` identifies the images of one camera. Its `Window` gathers them
+to stacks; `unmoved_parts` splits a stack where it turns out that the scene moved, or that images
+cannot be combined.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from enum import Enum, auto
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from ahf_ros.detectors.contract import Detector, Unavailable
+from ahf_ros.filtering.identifier import Identifier, Memory
+from ahf_ros.imaging.image import check_image
+from ahf_ros.imaging.movement import displacement, find_edges
+from ahf_ros.imaging.stack import ImageStack, unlike
+from ahf_ros.session import create_identifier
+from ahf_ros.session_settings import SLIDING, IdentificationSettings, StackSettings
+from ahf_ros.target import Identification
+from ahf_ros.text import printable, reason_of
+
+Item = TypeVar('Item')
+
+_LONGEST_REASON = 2000  # characters
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame(Generic[Item]):
+    """A decoded image of a stream.
+
+    Attributes
+    ----------
+    item
+        What stands for the image in its answer, such as its header or its path.
+    image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
+    kind : hashable
+        Its size and encoding; another one begins a new stack.
+    stamp : int
+        Its time, ns; an earlier one than before begins a new stack.
+    """
+
+    item: Item
+    image: np.ndarray
+    kind: Hashable
+    stamp: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Answer(Generic[Item]):
+    """The identification of an image, or of consecutive images of a stack.
+
+    Attributes
+    ----------
+    items : tuple
+        What stands for the images, in order.
+    fresh : int
+        How many of the last ones are answered for the first time.
+    stack : ImageStack
+        The images.
+    identification : Identification
+    """
+
+    items: tuple[Item, ...]
+    fresh: int
+    stack: ImageStack
+    identification: Identification
+
+    @property
+    def image(self) -> np.ndarray:
+        """The image or combination of images in which the targets were identified."""
+        return self.stack.combined(self.identification.combination)
+
+
+class Kind(Enum):
+    """What a `Remark` is about."""
+
+    INCOMPLETE = auto()
+    """A stack has fewer images than were asked for."""
+    SPLIT = auto()
+    """The images of a stack cannot be identified together."""
+    REFUSED = auto()
+    """An image or a stack is not accepted."""
+
+
+@dataclass(frozen=True, slots=True)
+class Remark:
+    """What there is to say about an image or a stack.
+
+    Attributes
+    ----------
+    kind : Kind
+    text : str
+        Printable.
+    """
+
+    kind: Kind
+    text: str
+
+
+class Stream(Generic[Item]):
+    """Identifies the images of one camera in their order.
+
+    Each image begins with the filter that worked for the one before.
+
+    Parameters
+    ----------
+    settings : IdentificationSettings
+    stacking : StackSettings
+        Which images are identified together.
+    detector : Detector
+    timed : bool
+        Whether identifications have their duration; without it equal images have equal results.
+    interrupt : callable, optional
+        As for `Identifier`.
+
+    Examples
+    --------
+    >>> from ahf_ros import SceneSettings, create_detector, render
+    >>> settings = IdentificationSettings(expected_targets=3)
+    >>> stream = Stream(settings, StackSettings(), create_detector('ring'))
+    >>> image = render(SceneSettings(width=320, height=240, targets=3, dot_radius=8)).image
+    >>> for name, pixels in {'good': image, 'bad': image[:0]}.items():
+    ...     for said in stream.add(lambda: Frame(name, pixels, 'mono8', 0)):
+    ...         print(said.text if isinstance(said, Remark) else said.identification.count)
+    3
+    image is 320 x 0 px, accepted is at least 16 x 16 px
+    """
+
+    def __init__(
+        self,
+        settings: IdentificationSettings,
+        stacking: StackSettings,
+        detector: Detector,
+        *,
+        timed: bool = True,
+        interrupt: Callable[[], None] | None = None,
+    ) -> None:
+        self._identifier = create_identifier(settings, detector, interrupt=interrupt)
+        self._stacking = stacking
+        self._timed = timed
+        self._window: Window[Frame[Item]] = Window(stacking)
+
+    @property
+    def memory(self) -> Memory:
+        """What the images so far leave to the next one."""
+        return self._identifier.memory
+
+    def resume(self, memory: Memory, read: Callable[[], Frame[Item]]) -> None:
+        """Go on as if an image had just been answered.
+
+        Parameters
+        ----------
+        memory : Memory
+            What the image left.
+        read : callable
+            As for `add`; called if the image may belong to an unfinished stack.
+        """
+        self._identifier.memory = memory
+        if self._stacking.stack > 1:
+            list(self._gathered(read))
+
+    def add(self, read: Callable[[], Frame[Item]]) -> Iterator[Answer[Item] | Remark]:
+        """Add an image, and yield what there is to say and the answers to what is complete.
+
+        Parameters
+        ----------
+        read : callable
+            Returns the image; what it raises is why the image is refused.
+
+        Raises
+        ------
+        Unavailable
+            If the detector cannot be used: that is not the fault of the image.
+        """
+        for gathered in self._gathered(read):
+            if isinstance(gathered, Remark):
+                yield gathered
+            else:
+                yield from self._answers(gathered)
+
+    def end(self, why: str) -> Iterator[Answer[Item] | Remark]:
+        """End the stack, and yield its answers as `add` does."""
+        for gathered in self._window.end(why):
+            yield from self._answers(gathered)
+
+    def _gathered(
+        self, read: Callable[[], Frame[Item]]
+    ) -> Iterator[Gathered[Frame[Item]] | Remark]:
+        """Add an image to the window and yield the stacks that this completes."""
+        try:
+            frame = read()
+            if self._stacking.stack > 1:
+                check_image(frame.image)
+        except Exception as error:
+            yield refusal(error)
+            return
+        yield from self._window.add(frame, frame.kind, frame.stamp)
+
+    def _answers(self, gathered: Gathered[Frame[Item]]) -> Iterator[Answer[Item] | Remark]:
+        """Identify the targets of a stack."""
+        if gathered.reason:
+            yield Remark(Kind.INCOMPLETE, f'a stack of {gathered.reason}')
+        items = tuple(frame.item for frame in gathered.items)
+        images = [frame.image for frame in gathered.items]
+        old = len(items) - gathered.fresh
+        try:
+            for part, stack, found in identify_parts(
+                self._identifier, images, self._stacking, fresh=gathered.fresh
+            ):
+                if part.split:
+                    yield Remark(Kind.SPLIT, f'a stack is split: {part.split}')
+                if not self._timed:
+                    found = replace(found, filter=replace(found.filter, duration=0.0))
+                start, stop = part.images.start, part.images.stop
+                yield Answer(
+                    items=items[start:stop],
+                    fresh=stop - max(start, old),
+                    stack=stack,
+                    identification=found,
+                )
+        except Exception as error:
+            yield refusal(error)
+
+
+def refusal(error: Exception) -> Remark:
+    """Return why an image is refused.
+
+    Raises
+    ------
+    Unavailable
+        If the error is one: that is not the fault of the image, another run may find the detector.
+    """
+    if isinstance(error, Unavailable):
+        raise error
+    is_named = isinstance(error, ValueError)
+    return Remark(
+        kind=Kind.REFUSED,
+        text=printable(str(error), _LONGEST_REASON) if is_named else reason_of(error),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Gathered(Generic[Item]):
+    """Images that are identified together.
+
+    Attributes
+    ----------
+    items : tuple
+        In the order in which they came.
+    fresh : int
+        How many of the last ones have not been answered before.
+    reason : str
+        Why there are fewer than a stack has; empty if there are not.
+    """
+
+    items: tuple[Item, ...]
+    fresh: int
+    reason: str = ''
+
+
+class Window(Generic[Item]):
+    """Gathers the images of a stream to stacks.
+
+    Parameters
+    ----------
+    settings : StackSettings
+
+    Examples
+    --------
+    >>> window = Window(StackSettings(stack=2))
+    >>> [stack.items for name in 'abcd' for stack in window.add(name, 'mono8', 0)]
+    [('a', 'b'), ('c', 'd')]
+    """
+
+    def __init__(self, settings: StackSettings) -> None:
+        self._size = settings.stack
+        self._sliding = settings.stack_window == SLIDING
+        self._items: list[Item] = []
+        self._fresh = 0
+        self._last: tuple[Hashable, int] = (None, 0)
+
+    @property
+    def fresh(self) -> int:
+        """Number of images that wait for an answer."""
+        return self._fresh
+
+    def add(self, item: Item, kind: Hashable, stamp: int) -> list[Gathered[Item]]:
+        """Add an image and return the stacks that this completes or ends.
+
+        Parameters
+        ----------
+        item
+            The image, or what stands for it.
+        kind : hashable
+            Its size and encoding; another one begins a new stack.
+        stamp : int
+            Its time, ns; an earlier one than before begins a new stack.
+        """
+        ended: list[Gathered[Item]] = []
+        before, time = self._last
+        if self._items and self._size > 1:
+            if kind != before:
+                ended = self.end(f'the next image is {kind}, these are {before}')
+            elif stamp < time:
+                ended = self.end(
+                    f'the stamp of the next image is {(time - stamp) / 1e9:.9g} s earlier'
+                )
+        self._last = kind, stamp
+        self._items = [*self._items, item][-self._size :]
+        self._fresh += 1
+        if len(self._items) < self._size:
+            return ended
+        full = Gathered(tuple(self._items), self._fresh)
+        self._fresh = 0
+        if not self._sliding:
+            self._items = []
+        return [*ended, full]
+
+    def end(self, why: str) -> list[Gathered[Item]]:
+        """Begin a new stack, and return what there is of the old one, if it was not answered."""
+        items, fresh = tuple(self._items), self._fresh
+        self._items, self._fresh = [], 0
+        if not fresh:
+            return []
+        return [Gathered(items, fresh, f'{len(items)} of {self._size} images: {why}')]
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """Consecutive images of a stack that are identified together.
+
+    Attributes
+    ----------
+    images : range
+        Their indices in the stack.
+    split : str
+        Why the stack was split before the first of them; empty at its beginning.
+    """
+
+    images: range
+    split: str = ''
+
+
+def unmoved_parts(images: Sequence[np.ndarray], look_for_movement: bool = True) -> list[Part]:
+    """Return the parts of a stack that can be combined and in which nothing moved.
+
+    Parameters
+    ----------
+    images : sequence of ndarray of uint8, uint16, float32 or float64, shape (height, width)
+        In the order in which they were taken.
+    look_for_movement : bool
+        False if only size and pixel type count.
+
+    Examples
+    --------
+    >>> images = [np.zeros((20, 30), np.uint8), np.zeros((20, 40), np.uint8)]
+    >>> [part.images for part in unmoved_parts(images)]
+    [range(0, 1), range(1, 2)]
+    """
+    parts: list[Part] = []
+    begin, split = 0, ''
+    edges = None
+    for index in range(1, len(images)):
+        why = unlike(images[begin], images[index])
+        if why:
+            why = f'image {index + 1} of the stack {why}'
+        elif look_for_movement:
+            edges = edges or find_edges(images[begin])
+            if moved := displacement(edges, images[index]):
+                why = f'the scene moved by {moved} before image {index + 1} of the stack'
+        if why:
+            parts.append(Part(range(begin, index), split))
+            begin, split, edges = index, why, None
+    return [*parts, Part(range(begin, len(images)), split)]
+
+
+def identify_parts(
+    identifier: Identifier,
+    images: Sequence[np.ndarray],
+    settings: StackSettings,
+    expected_targets: int | None = None,
+    fresh: int | None = None,
+) -> Iterator[tuple[Part, ImageStack, Identification]]:
+    """Yield the parts of a stack with their images and identifications.
+
+    Parameters
+    ----------
+    identifier : Identifier
+    images : sequence of ndarray of uint8, uint16, float32 or float64, shape (height, width)
+        In the order in which they were taken; one image is identified as it is.
+    settings : StackSettings
+    expected_targets : int, optional
+        N, as for `Identifier.identify`.
+    fresh : int, optional
+        How many of the last images were not identified before; parts without them are left out.
+        All where None.
+
+    Raises
+    ------
+    ValueError
+        As `Identifier.identify` does.
+
+    Examples
+    --------
+    >>> from ahf_ros import SceneSettings, create_identifier, render
+    >>> scene = SceneSettings(width=320, height=240, targets=3, dot_radius=8, phases=2)
+    >>> images = [render(scene, phase).image for phase in range(2)]
+    >>> found = identify_parts(create_identifier(), images, StackSettings(stack=2))
+    >>> [(part.images, found.count) for part, _, found in found]
+    [(range(0, 2), 3)]
+    """
+    first_fresh = 0 if fresh is None else len(images) - fresh
+    for part in unmoved_parts(images, settings.stack_movement):
+        if part.images.stop > first_fresh:
+            stack = ImageStack(tuple(images[index] for index in part.images))
+            yield part, stack, identifier.identify(stack, expected_targets)
