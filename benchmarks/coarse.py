@@ -10,7 +10,6 @@ import time
 from collections import defaultdict
 from itertools import product
 
-import ahf_ros.blas  # noqa: F401  before numpy
 from ahf_ros.detectors import DETECTOR_NAMES, create_detector
 from ahf_ros.evaluation import score
 from ahf_ros.filtering.settings import EXTENDED, PUBLISHED

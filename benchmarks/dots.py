@@ -23,7 +23,6 @@ import numpy as np
 from rich.console import Console
 from rich.progress import track
 
-import ahf_ros.blas  # noqa: F401  before numpy
 from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.session import identify
 from ahf_ros.synthetic.scene import SceneSettings, render

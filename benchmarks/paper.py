@@ -25,8 +25,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import ahf_ros.blas  # noqa: F401  before numpy
-
 # isort: split
 import cv2
 import numpy as np

@@ -20,7 +20,6 @@ import numpy as np
 from rich.console import Console
 from rich.progress import track
 
-import ahf_ros.blas  # noqa: F401  before numpy
 from ahf_ros.detectors import create_detector
 from ahf_ros.features.frame import affine_frames, circle_points, project
 from ahf_ros.features.sampling import sample

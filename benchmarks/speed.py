@@ -24,7 +24,6 @@ from typing import Any
 
 import numpy as np
 
-import ahf_ros.blas  # noqa: F401  before numpy
 from ahf_ros.detectors import Drafter, create_detector
 from ahf_ros.filtering.genes import genes_of
 from ahf_ros.filtering.genetic import search

@@ -21,7 +21,6 @@ import numpy as np
 from rich.console import Console
 from rich.progress import track
 
-import ahf_ros.blas  # noqa: F401  before numpy
 from ahf_ros.sequence import identify_parts
 from ahf_ros.session import create_identifier
 from ahf_ros.session_settings import StackSettings

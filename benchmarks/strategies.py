@@ -19,7 +19,6 @@ import numpy as np
 from rich.console import Console
 from rich.progress import track
 
-import ahf_ros.blas  # noqa: F401  before numpy
 from ahf_ros.detectors import DETECTOR_NAMES, Drafter, create_detector
 from ahf_ros.filtering.chromosome import Gene, Values
 from ahf_ros.filtering.genes import tuned

@@ -16,8 +16,6 @@ from pathlib import Path
 from typing import IO, Any
 from unittest import mock
 
-import ahf_ros.blas  # noqa: F401  before numpy, as in processes that are ours
-
 PATIENCE = 180.0
 """Time after which something that does not happen is a failure, s; machines may be slow."""
 

@@ -46,11 +46,21 @@ ROSDEP = {
     'rich': 'python3-rich',
     'rosbags': 'python3-rosbags-pip',
     'ruamel': 'python3-ruamel.yaml',
+    'threadpoolctl': 'python3-sklearn',
     'yaml': 'python3-yaml',
 }
-"""Keys of rosdep of what is not a ROS package; rosbags brings lz4 and backports.zstd."""
+"""Keys of rosdep of what is not a ROS package; rosbags brings lz4 and backports.zstd, scikit-learn
+threadpoolctl."""
 
-NOT_IN_ROSDEP = {'Metashape', 'distributed', 'fsspec', 'pypdfium2', 'selenium', 'watchdog'}
+NOT_IN_ROSDEP = {
+    'Metashape',
+    'distributed',
+    'fsspec',
+    'pandas',
+    'pypdfium2',
+    'selenium',
+    'watchdog',
+}
 """What tests skip without, extras, and what is only in the console of other software."""
 
 TO_RUN, TO_TEST = ('depend', 'exec_depend'), ('depend', 'exec_depend', 'test_depend')

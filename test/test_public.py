@@ -40,7 +40,7 @@ def test_type_checkers_are_told_the_same_names() -> None:
 
 
 def test_nothing_is_imported_before_it_is_used() -> None:
-    """The variables of `ahf_ros.blas` have to be set before numpy is imported."""
+    """Type checkers and commands that compute nothing import `ahf_ros` in no time."""
     program = "import sys, ahf_ros; assert not {'numpy', 'cv2'} & set(sys.modules)"
     subprocess.run([sys.executable, '-c', program], check=True)
 

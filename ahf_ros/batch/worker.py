@@ -19,7 +19,6 @@ from multiprocessing.connection import Connection
 from types import FrameType
 from typing import Any
 
-import ahf_ros.blas  # noqa: F401  before numpy
 from ahf_ros import ending
 from ahf_ros.batch.engine import Job
 from ahf_ros.text import reason_of

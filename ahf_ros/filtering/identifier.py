@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from ahf_ros.blas import one_blas_thread
 from ahf_ros.edge_shift import median_edge_shift
 from ahf_ros.filtering.choice import Choice, choose
 from ahf_ros.filtering.fusion import fused
@@ -150,6 +151,7 @@ class Identifier:
         """Forget what worked for earlier images."""
         self.memory = Memory()
 
+    @one_blas_thread()
     def identify(
         self, image: np.ndarray | ImageStack, expected_targets: int | None = None
     ) -> Identification:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from ahf_ros.blas import one_blas_thread
 from ahf_ros.synthetic.camera import Camera, Sensor, tilted_camera
 from ahf_ros.synthetic.covers import card_cover
 from ahf_ros.synthetic.designs import designs
@@ -54,6 +55,7 @@ class Rendering:
         return tuple(map(TrueTarget.of, self.targets))
 
 
+@one_blas_thread()
 def render(settings: SceneSettings, phase: int = 0) -> Rendering:
     """Return the photograph of a scene; equal arguments give equal images.
 

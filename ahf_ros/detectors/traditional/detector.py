@@ -21,6 +21,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes.ring import Family, family
 from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import DetectorSettings
@@ -62,6 +63,7 @@ class TraditionalDetector:
         """Family of the codes."""
         return self.settings.family
 
+    @one_blas_thread()
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image; see `Detector`.
 
@@ -71,10 +73,12 @@ class TraditionalDetector:
         """
         return self._identify(image, fine=True)
 
+    @one_blas_thread()
     def draft(self, image: np.ndarray) -> list[Target]:
         """Identify in less than half of the time, with centres to about a pixel."""
         return self._identify(image, fine=False)
 
+    @one_blas_thread()
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
         """Return targets with their centres in an image; see `refine_centres`."""
         return refine_centres(image, targets, family(self.family), self.settings.polarities)
