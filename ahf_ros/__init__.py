@@ -95,12 +95,16 @@ _MODULES = {
 
 def __getattr__(name: str) -> Any:
     """Import a public name, see PEP 562."""
-    if name not in _MODULES:
+    if name == '__version__':
+        value = import_module(f'{__name__}.release').release()
+    elif name in _MODULES:
+        value = getattr(import_module(f'{__name__}.{_MODULES[name]}'), name)
+    else:
         raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
-    value = getattr(import_module(f'{__name__}.{_MODULES[name]}'), name)
     globals()[name] = value
     return value
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    """Return what is for users."""
+    return sorted([*__all__, '__version__'])

@@ -195,4 +195,4 @@ def identify_parts(
     for part in unmoved_parts(images, settings.stack_movement):
         if part.images.stop > first_fresh:
             stack = ImageStack(tuple(images[index] for index in part.images))
-            yield part, stack, identifier.identify(stack, expected_targets)
+            yield part, stack, identifier.identify(stack, expected_targets=expected_targets)

@@ -39,12 +39,12 @@ def main() -> None:
         for seed in options.seeds:
             scene = SceneSettings(light=light, ambient=ambient, seed=seed)
             rendering = render(scene)
-            truth = rendering.truth
+            truth = rendering.targets
             right['without'] += score(truth, detector(rendering.image)).right
             for name, (genes, coarse) in zip(names, ways, strict=True):
                 settings = {'expected_targets': scene.targets, 'search': genes, 'coarse': coarse}
                 started = time.perf_counter()
-                found = identify(rendering.image, detector, **settings)
+                found = identify(rendering.image, detector=detector, **settings)
                 duration[name] += time.perf_counter() - started
                 figures = score(truth, found.targets)
                 right[name] += figures.right

@@ -149,7 +149,7 @@ def measure(options: argparse.Namespace) -> Iterator[Row]:
         cell = Row(row, light)
         for seed in options.seeds:
             rendering = photograph(options, row, light, seed)
-            truth = rendering.truth
+            truth = rendering.targets
             cell.add(rendering.image, truth, run(rendering.image, options.family, len(truth)))
         yield cell
 

@@ -181,7 +181,7 @@ def measure(seeds: Sequence[int]) -> Iterator[Agreement]:
     ring = create_detector('ring')
     for name, settings in track(list(scenes(seeds)), 'scenes', console=Console(stderr=True)):
         shown = [render(it) for it in settings]
-        truth = [{it.id: np.array([it.x, it.y]) for it in one.truth} for one in shown]
+        truth = [{it.id: np.array([it.x, it.y]) for it in one.targets} for one in shown]
         images = [(one.image, ring(one.image), of) for one, of in zip(shown, truth, strict=True)]
         yield agreement(name, images)
     aicon = create_detector('ring', family='aicon14')

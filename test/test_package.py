@@ -61,7 +61,8 @@ NOT_IN_ROSDEP = {
     'selenium',
     'watchdog',
 }
-"""What tests skip without, extras, and what is only in the console of other software."""
+"""What tests skip without, extras, what only type checkers import, and what is only in the console
+of other software."""
 
 TO_RUN, TO_TEST = ('depend', 'exec_depend'), ('depend', 'exec_depend', 'test_depend')
 OWN = {'ahf_ros', 'benchmarks', 'paper_plots', 'support'}

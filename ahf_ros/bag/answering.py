@@ -91,12 +91,12 @@ class Answering:
         settings: IdentificationSettings,
         stacking: StackSettings,
     ) -> None:
-        detector = create_detector(settings.detector, settings.detection)
+        detector = create_detector(settings.detector, settings=settings.detection)
         self._source = source
         self._topics = topics
         self._family = detector.family
         self._identifiers = {
-            topic: create_identifier(settings, detector, interrupt=ending.check)
+            topic: create_identifier(detector=detector, settings=settings, interrupt=ending.check)
             for topic in topics
         }
         self._stacking = stacking

@@ -76,7 +76,7 @@ def try_filter(task: CandidateTask, report: Report = no_report) -> list[Target]:
 def _trials(task: ImageTask, files: tuple[str, ...], halved: bool) -> Trials:
     """Return trials of the images, whose logarithm is kept for the next filter."""
     stack = ImageStack(tuple(read_checked(path, task)[0] for path in task.paths))
-    identifier = create_identifier(task.settings, detector_of(task.settings))
+    identifier = create_identifier(detector=detector_of(task.settings), settings=task.settings)
     trials = identifier.trials_of(stack)
     return trials.reduced() if halved else trials
 

@@ -68,7 +68,8 @@ def _run(options: argparse.Namespace, output: TextIO) -> int:
     except ValueError as error:
         print(f'ahf identify: {error}', file=sys.stderr)
         return 1
-    create_identifier(settings, detector_of(settings))  # refuses what does not fit together
+    # Refuses what does not fit together.
+    create_identifier(detector=detector_of(settings), settings=settings)
     quiet = options.quiet
     failed = bool(problems)
     measured: list[MeasuredImage] = []

@@ -88,7 +88,8 @@ def run(options: argparse.Namespace) -> int:
 def _run(options: argparse.Namespace, output: TextIO) -> int:
     settings = settings_from(options, IdentificationSettings)
     _check_overlay(options)
-    create_identifier(settings, detector_of(settings))  # refuses what does not fit together
+    # Refuses what does not fit together.
+    create_identifier(detector=detector_of(settings), settings=settings)
     jobs = options.jobs or available_cores()
     shared = shared_settings(settings, jobs, options.scheduler)
 

@@ -107,7 +107,7 @@ class Drafter(Protocol):
 
 
 @runtime_checkable
-class Discerning(Protocol):
+class EarlyStopping(Protocol):
     """A detector that identifies in an image as received nearly all that any filter shows it.
 
     AHF gives up early where filters show it no more.

@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from ahf_ros.blas import one_blas_thread
+from ahf_ros.deprecation import deprecated_arguments
 from ahf_ros.edge_shift import median_edge_shift
 from ahf_ros.filtering.choice import Choice, choose
 from ahf_ros.filtering.fusion import fused
@@ -112,8 +113,8 @@ class Identifier:
     Examples
     --------
     >>> from ahf_ros import Identifier, SceneSettings, create_detector, render
-    >>> rendering = render(SceneSettings(width=320, height=240, targets=3, dot_radius=8))
-    >>> Identifier(create_detector('ring')).identify(rendering.image, 3).count
+    >>> scene = render(SceneSettings(width=320, height=240, targets=3, dot_radius=8))
+    >>> Identifier(create_detector('ring')).identify(scene.image, expected_targets=3).count
     3
     """
 
@@ -151,9 +152,10 @@ class Identifier:
         """Forget what worked for earlier images."""
         self.memory = Memory()
 
+    @deprecated_arguments(positions=('expected_targets',))
     @one_blas_thread()
     def identify(
-        self, image: np.ndarray | ImageStack, expected_targets: int | None = None
+        self, image: np.ndarray | ImageStack, *, expected_targets: int | None = None
     ) -> Identification:
         """Identify the targets of one image or stack; call it from one thread at a time.
 

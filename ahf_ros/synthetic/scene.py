@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass
 
 import cv2
@@ -51,7 +52,8 @@ class Rendering:
 
     @property
     def truth(self) -> tuple[TrueTarget, ...]:
-        """IDs and centres of the targets, for `ahf_ros.evaluation`."""
+        """IDs and centres of `targets`; deprecated, evaluations take a scene or its `targets`."""
+        warnings.warn('Rendering.truth is Rendering.targets now', DeprecationWarning, stacklevel=2)
         return tuple(map(TrueTarget.of, self.targets))
 
 

@@ -24,7 +24,7 @@ def detector(tmp_path, script: str, words: str = '', timeout: float = 600.0):
     path.write_text(script)
     command = f'{sys.executable} {path} {words}'
     settings = DetectorSettings(command=command, detector_timeout=timeout)
-    return create_detector('command', settings)
+    return create_detector('command', settings=settings)
 
 
 def printing(text: str) -> str:
@@ -121,13 +121,13 @@ def _runs(pid: int) -> bool:
 )
 def test_a_command_that_is_none(command, message):
     with pytest.raises(ValueError, match=message):
-        create_detector('command', DetectorSettings(command=command))
+        create_detector('command', settings=DetectorSettings(command=command))
 
 
 def test_a_program_that_is_not_there(tmp_path):
     settings = DetectorSettings(command=str(tmp_path / 'nothing'))
     with pytest.raises(ValueError, match='cannot be started: No such file'):
-        create_detector('command', settings)(IMAGE)
+        create_detector('command', settings=settings)(IMAGE)
 
 
 def test_several_threads_at_once_and_no_file_left(tmp_path, monkeypatch):

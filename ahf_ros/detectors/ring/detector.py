@@ -59,7 +59,7 @@ class RingDetector:
 
     @property
     def patience(self) -> int:
-        """Filters tried in vain after which a search ends; see `Discerning`."""
+        """Filters tried in vain after which a search ends; see `EarlyStopping`."""
         return 2
 
     @property
