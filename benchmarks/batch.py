@@ -206,7 +206,7 @@ def compare_searches(jobs: int, rounds: int) -> None:
         folder = Path(name, 'images')
         scene = SceneSettings(light='stripe', ambient=0.04, seed=SEED)
         write_image(folder / 'hard.png', render(scene).image)
-        long = ('--detector', 'traditional', '--expected', 55, '--max-evaluations', 60)
+        long = ('--detector', 'traditional', '--expected-targets', 55, '--max-evaluations', 60)
         variants: dict[str, tuple[object, ...]] = {
             'one thread': ('--threads', 1),
             f'{jobs} threads': ('--threads', jobs),

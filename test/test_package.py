@@ -59,6 +59,7 @@ NOT_IN_ROSDEP = {
     'pandas',
     'pypdfium2',
     'selenium',
+    'typing_extensions',
     'watchdog',
 }
 """What tests skip without, extras, what only type checkers import, and what is only in the console

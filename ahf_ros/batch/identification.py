@@ -67,7 +67,7 @@ def identify_images(
     detector = detector_of(task.settings)
     files = tuple(file_fingerprint(located(path, task)) for path in task.paths)
     images = _read(task, messages)
-    if len(images) < task.minimum:
+    if task.minimum > 1 and len(images) < task.minimum:
         text = f'{task.paths[0]}: {len(images)} of {task.minimum} images of a stack'
         messages.append(Message(text, Level.WARNING))
     overlays = dict(zip(task.paths, task.overlays, strict=False))

@@ -99,7 +99,7 @@ def test_json_tells_the_truth(folder, results):
 def test_an_unknown_number_is_estimated_where_that_is_asked_for(folder, capsys):
     command = ('identify', folder / 'normal_0.3_4.png', '--detector', 'traditional', '--json')
     found = []
-    for more in ((), ('--estimate-expected',), ('--estimate-expected', '--expected', 6)):
+    for more in ((), ('--estimate-expected',), ('--estimate-expected', '--expected-targets', 6)):
         assert status(*command, *more) == 0
         found.append(json.loads(capsys.readouterr().out))
     assert [(it['expected'], it['estimated']) for it in found] == [
@@ -116,7 +116,7 @@ def test_without_json_standard_output_stays_empty(folder):
     head, *lines, hint = done.stderr.splitlines()
     assert '6 identified, no filter' in head
     assert len(lines) == 6
-    assert 'with --expected N, AHF searches' in hint
+    assert 'with --expected-targets N, AHF searches' in hint
 
 
 def tiff_with_unknown_tag(image: np.ndarray) -> bytes:
@@ -202,7 +202,15 @@ def test_stripes_need_the_filter_and_a_search_repeats_itself(tmp_path, capsys):
     search = ('--seed', 3, '--population', 10)
     found = []
     for more in (('--no-ahf',), search, (*search, '--threads', 1)):
-        command = ('identify', image, '--detector', 'traditional', '--expected', 6, '--json')
+        command = (
+            'identify',
+            image,
+            '--detector',
+            'traditional',
+            '--expected-targets',
+            6,
+            '--json',
+        )
         assert status(*command, *more) == 0
         found.append(json.loads(capsys.readouterr().out))
     plain, first, second = found
@@ -216,7 +224,7 @@ def test_stripes_need_the_filter_and_a_search_repeats_itself(tmp_path, capsys):
 
 def test_a_search_that_ended_early_says_so(folder, capsys):
     image = folder / 'normal_0.3_4.png'
-    command = ('identify', image, '--expected', 7, '--max-radius', 40, '--json')
+    command = ('identify', image, '--expected-targets', 7, '--max-radius', 40, '--json')
     assert status(*command) == 0
     found, said = capsys.readouterr()
     assert json.loads(found)['filter']['evaluations'] == 3
@@ -243,8 +251,11 @@ def test_files_that_cannot_be_read_do_not_stop_the_others(folder, tmp_path):
 @pytest.mark.parametrize(
     ('arguments', 'message'),
     [
-        (['--expected', -1], "expected_targets is '-1', accepted is an integer from 0 to 100000"),
-        (['--expected', '9' * 400], "expected_targets is '999"),
+        (
+            ['--expected-targets', -1],
+            "expected_targets is '-1', accepted is an integer from 0 to 100000",
+        ),
+        (['--expected-targets', '9' * 400], "expected_targets is '999"),
         (['--population', 1], "population is '1', accepted is an integer from 2 to"),
         (['--family', 'ring'], "family is 'ring', accepted is one of metashape12, metashape14"),
         (['--detector', 'magic'], "detector is 'magic', accepted is one of"),

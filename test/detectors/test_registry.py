@@ -190,8 +190,12 @@ class MyDetector:
 )
 def test_a_detector_of_another_package_may_fail_and_hang(tmp_path, monkeypatch, gray, words):
     registry = added(tmp_path, monkeypatch, f'package_that_fails_{gray}', FAILING)
-    patient = registry['create_detector']('mine', settings=DetectorSettings(detector_timeout=600.0))
-    impatient = registry['create_detector']('mine', settings=DetectorSettings(detector_timeout=0.2))
+    patient = registry['create_detector'](
+        'mine', settings=DetectorSettings(detector_timeout=600.0)
+    )
+    impatient = registry['create_detector'](
+        'mine', settings=DetectorSettings(detector_timeout=0.2)
+    )
     image = np.full((20, 20), gray, np.uint8)
     image[0] = 0
     with pytest.raises(ValueError) as raised:
