@@ -87,6 +87,22 @@ class DottedTarget(Target):
 
 
 @dataclass(frozen=True, slots=True)
+class SquareMarker(Target):
+    """One identified square marker.
+
+    Its centre is the intersection of its diagonals, which is the image of the physical centre in
+    any view. Its ellipse is the inscribed one, its code is its ID.
+
+    Attributes
+    ----------
+    corners : tuple of 4 tuples of 2 float
+        Corners, px, clockwise from the top left corner of the upright marker.
+    """
+
+    corners: tuple[tuple[float, float], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class UndecodedTarget(Target):
     """A dot with the ID `UNDECODED`, and why it has no other.
 

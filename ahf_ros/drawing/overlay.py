@@ -28,14 +28,23 @@ from ahf_ros.drawing.strokes import (
     cross_out,
     draw_ellipse,
     draw_plus,
+    draw_polygon,
     text_size,
     write,
 )
 from ahf_ros.imaging.image import stretched_to_8_bit
-from ahf_ros.target import UNDECODED, DottedTarget, Identification, Target, UndecodedTarget
+from ahf_ros.target import (
+    UNDECODED,
+    DottedTarget,
+    Identification,
+    SquareMarker,
+    Target,
+    UndecodedTarget,
+)
 
 _LETTERS = 0.0105  # height, of the diagonal: legible when all of the image is on a screen
 _SMALLEST_LETTERS = 15.0  # px
+_SIDE_POINTS = 9  # at which the outline of a square is sampled
 _MOST_NAMED = 12  # IDs that the summary names at most
 
 
@@ -122,7 +131,9 @@ def _marked(
         if look.text:
             named = several and target.id != UNDECODED
             text = f'{look.text} {target.family}' if named else look.text
-            labels.append(Label(text, target.x, target.y, _radius(target), look.colour))
+            labels.append(
+                Label(text, target.x, target.y, _radius(target), look.colour, _outline(target))
+            )
     return canvas, labels
 
 
@@ -180,14 +191,27 @@ def _radius(target: Target) -> float:
     return relative_reach(target.family) * target.semi_major
 
 
+def _outline(target: Target) -> np.ndarray:
+    """Return points on the sides of a square, px, shape (k, 2); none for other targets."""
+    if isinstance(target, SquareMarker) and target.corners:
+        corners = np.array(target.corners)
+        along = np.linspace(0, 1, _SIDE_POINTS)[:, None, None]
+        return (corners + along * (np.roll(corners, -1, axis=0) - corners)).reshape(-1, 2)
+    return np.empty((0, 2))
+
+
 def _ellipses(target: Target) -> tuple[Sequence[Ellipse], Sequence[Ellipse]]:
     """Return the ellipses that all targets of the family have, and those that are the code."""
     if isinstance(target, DottedTarget):
         return target.dots[: target.template_dots], target.dots[target.template_dots :]
+    if isinstance(target, SquareMarker) and target.corners:
+        return (), ()
     return ((target.x, target.y, target.semi_major, target.semi_minor, target.angle),), ()
 
 
 def _draw_target(canvas: np.ndarray, target: Target, look: _Look, unit: int) -> None:
+    if isinstance(target, SquareMarker) and target.corners:
+        draw_polygon(canvas, target.corners, look.colour, unit)
     template, decoding = _ellipses(target)
     for ellipse in template:
         draw_ellipse(canvas, ellipse, look.colour, unit, look.dashed)

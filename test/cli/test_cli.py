@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import struct
 import subprocess
 import sys
@@ -117,6 +118,42 @@ def test_without_json_standard_output_stays_empty(folder):
     assert '6 identified, no filter' in head
     assert len(lines) == 6
     assert 'with --expected-targets N, AHF searches' in hint
+
+
+def test_what_was_looked_for_is_said_where_nothing_is_found(folder, tmp_path):
+    image = tmp_path / 'empty.png'
+    write_image(image, np.full((60, 80), 120, np.uint8))
+    for options, hint in (
+        ((), 'targets of metashape12 were looked for; --family names others'),
+        (('--expected-targets', 6, '--max-evaluations', 1), 'targets of metashape12 were looked'),
+        (('--family', 'auto'), '--family auto looks for rings only, metashape12, .*; other famil'),
+    ):
+        told = ahf('identify', image, *options).stderr.splitlines()
+        assert re.match(hint, told[-1])
+    found = ahf('identify', image, folder / 'normal_0.3_4.png', '--expected-ids', '1-600')
+    assert 'looked for' not in found.stderr
+    assert 'N is not given' not in found.stderr
+    assert ahf('identify', image, '--quiet').stderr == ''
+
+
+def test_the_former_name_of_the_number_of_targets_works_and_says_so(folder, capsys):
+    command = ('identify', folder / 'normal_0.3_4.png', '--json')
+    results = []
+    for option in ('--expected-targets', '--expected'):
+        assert status(*command, option, 6) == 0
+        printed = capsys.readouterr()
+        results.append(json.loads(printed.out)['expected'])
+        said = 'identify: --expected is called --expected-targets now' in printed.err
+        assert said == (option == '--expected')
+    assert results == [6, 6]
+
+
+def test_a_missing_file_is_no_stack(tmp_path):
+    done = ahf('identify', tmp_path / 'missing.png')
+    assert done.returncode == 1
+    assert 'missing.png cannot be read: No such file or directory' in done.stderr
+    assert 'stack' not in done.stderr
+    assert 'N is not given' not in done.stderr
 
 
 def tiff_with_unknown_tag(image: np.ndarray) -> bytes:

@@ -69,7 +69,7 @@ def test_images_are_turned_as_opencv_turns_them(tmp_path: Path, orientation: int
     stored = np.random.default_rng(0).integers(0, 255, (40, 64), np.uint8)
     path.write_bytes(oriented_jpeg(stored, orientation))
     upright = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_GRAYSCALE)
-    assert np.array_equal(read_image(path, turned=True), upright)
+    assert np.array_equal(read_image(path, upright=True), upright)
     assert np.array_equal(as_oriented(read_image(path), orientation), upright)
 
 
