@@ -122,7 +122,7 @@ def test_without_json_standard_output_stays_empty(folder):
 
 def test_what_was_looked_for_is_said_where_nothing_is_found(folder, tmp_path):
     image = tmp_path / 'empty.png'
-    write_image(image, np.full((60, 80), 120, np.uint8))
+    write_image(image, np.tile(np.arange(80, dtype=np.uint8), (60, 1)))
     for options, hint in (
         ((), 'targets of metashape12 were looked for; --family names others'),
         (('--expected-targets', 6, '--max-evaluations', 1), 'targets of metashape12 were looked'),
