@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-LONGEST = 300
+MAXIMUM_LENGTH = 300
 """Number of characters of a foreign text that are passed on."""
 
 
-def printable(text: str, longest: int = LONGEST) -> str:
+def printable(text: str, longest: int = MAXIMUM_LENGTH) -> str:
     r"""Return a text with everything escaped that a log or a message may not hold.
 
     Parameters

@@ -12,7 +12,7 @@ from ahf_ros.codes.gsi import PointFamily, value_of
 
 _REFERENCE_LABEL = re.compile(r'CODE(\d+)')
 _DOT_LABEL = re.compile(r'NUGGET(\d+)_(\w+)')
-_FARTHEST = 0.1  # of a template dot from the design, in the spread of the template
+_MAXIMUM_DISTANCE = 0.1  # of a template dot from the design, in the spread of the template
 _DECIMALS = 3  # of learnt coordinates: exports have as many
 
 
@@ -158,12 +158,13 @@ def _measured(number: int, dots: dict[str, np.ndarray], base: PointFamily) -> Me
     errors = [np.hypot(*(fit[0] - design)[of_template].T).max() for fit in fits]
     side = int(np.argmin(errors))
     spread = np.hypot(*(base.template - base.template.mean(axis=0)).T).max()
-    if errors[side] > _FARTHEST * spread:
+    if errors[side] > _MAXIMUM_DISTANCE * spread:
         raise ValueError(
             f'differs from the template by up to {errors[side]:.2f} {base.unit}'.rstrip()
         )
     laid, _ = fits[side]
-    near = np.hypot(*(laid - design).T) < _FARTHEST * spread  # not so where a position is new
+    # A position that is new is farther away.
+    near = np.hypot(*(laid - design).T) < _MAXIMUM_DISTANCE * spread
     laid, scale = _laid(sides[side], design, near)
     count = len(base.template)
     return MeasuredTarget(

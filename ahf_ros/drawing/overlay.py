@@ -43,9 +43,9 @@ from ahf_ros.target import (
 )
 
 _LETTERS = 0.0105  # height, of the diagonal: legible when all of the image is on a screen
-_SMALLEST_LETTERS = 15.0  # px
+_MINIMUM_LETTERS = 15.0  # px
 _SIDE_POINTS = 9  # at which the outline of a square is sampled
-_MOST_NAMED = 12  # IDs that the summary names at most
+_MAXIMUM_NAMED = 12  # IDs that the summary names at most
 
 
 def draw(image: np.ndarray, identification: Identification) -> np.ndarray:
@@ -145,8 +145,8 @@ def summary(identification: Identification) -> str:
         words += f' of {estimated}{identification.expected}'
     found = {target.id for target in identification.targets}
     if missed := [str(it) for it in identification.expected_ids if it not in found]:
-        more = len(missed) - _MOST_NAMED
-        words += f', missed {" ".join(missed[:_MOST_NAMED])}'
+        more = len(missed) - _MAXIMUM_NAMED
+        words += f', missed {" ".join(missed[:_MAXIMUM_NAMED])}'
         words += f' and {more} others' if more > 0 else ''
     if identification.mirrored:
         words += ', mirrored'
@@ -227,7 +227,7 @@ def _draw_labels(
 ) -> None:
     """Write the labels, in letters of one height."""
     shape: tuple[int, int] = canvas.shape[:2]
-    height = max(_SMALLEST_LETTERS * unit, _LETTERS * math.hypot(*shape))
+    height = max(_MINIMUM_LETTERS * unit, _LETTERS * math.hypot(*shape))
     scale = min(height, shape[0]) / FONT_HEIGHT
     sizes = [text_size(label.text, scale, unit) for label in labels]
     places = place_labels(labels, sizes, shape, 3.0 * unit, taken)

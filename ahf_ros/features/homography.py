@@ -11,7 +11,7 @@ from ahf_ros.features.frame import project
 _ROUNDS = 3  # of linear solutions: the division by the depth is that of the one before
 _PERSPECTIVE = 0.08  # usual change of depth from the centre of an object to its edge, relative
 _WEAK = 1e-9  # weight of a prior that only makes matrices invertible
-_SMALLEST_DEPTH = 0.2  # in that of the centre
+_MINIMUM_DEPTH = 0.2  # in that of the centre
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +72,7 @@ def fit_homographies(
         )
         solution = np.linalg.solve(normal, right[..., None])[..., 0]
         depth = 1 + (scaled * solution[:, None, 6:]).sum(axis=2)
-        depth = np.maximum(depth, _SMALLEST_DEPTH)
+        depth = np.maximum(depth, _MINIMUM_DEPTH)
     elements = np.concatenate([solution, np.ones((count, 1))], axis=1).reshape(-1, 3, 3)
     elements[:, :, :2] /= reach
     back = np.zeros((count, 3, 3))

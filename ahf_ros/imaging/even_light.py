@@ -28,7 +28,7 @@ _SURROUNDINGS = 2.0  # tiles, by which it is smoothed
 _PAPER = 4.0  # power of the brightness with which points count: paper, and hardly ink
 _RELIABLE = 100.0  # points of a bin that count as much as what all points show
 _EVERY = 2  # rows and columns of which one is looked at, for the table; at random, unlike light
-_BRIGHTEST = 99.9  # percentile that stays within the range
+_MAXIMUM_PERCENTILE = 99.9  # percentile that stays within the range
 
 
 def even_light(images: Iterable[np.ndarray]) -> np.ndarray:
@@ -66,7 +66,7 @@ def even_light(images: Iterable[np.ndarray]) -> np.ndarray:
     excess *= alike
     result: np.ndarray = cv2.exp(cv2.subtract(logarithm, excess, logarithm), logarithm)
     result -= np.float32(_FLOOR)
-    result /= np.float32(max(float(np.percentile(result[::5, ::5], _BRIGHTEST)), 1.0))
+    result /= np.float32(max(float(np.percentile(result[::5, ::5], _MAXIMUM_PERCENTILE)), 1.0))
     return np.clip(result, 0, 1, out=result)
 
 

@@ -8,7 +8,7 @@ from contextlib import suppress
 ARENAS = 2
 """Number of memory arenas that the threads of a node share; glibc would give each its own."""
 
-LARGEST = 32 * 2**20
+MAXIMUM_KEPT = 32 * 2**20
 """Size from which on memory is taken from the system each time, bytes; the maximum of glibc."""
 
 KEPT = 256 * 2**20
@@ -28,5 +28,5 @@ def reuse_memory() -> None:
     with suppress(AttributeError):  # where malloc is not that of glibc
         mallopt = ctypes.CDLL(None).mallopt
         mallopt(_M_ARENA_MAX, ARENAS)
-        mallopt(_M_MMAP_THRESHOLD, LARGEST)
+        mallopt(_M_MMAP_THRESHOLD, MAXIMUM_KEPT)
         mallopt(_M_TRIM_THRESHOLD, KEPT)

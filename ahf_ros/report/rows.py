@@ -20,7 +20,7 @@ from ahf_ros.target import (
     count_codes,
 )
 
-MOST_UNREAD = 300
+MAXIMUM_UNREAD = 300
 """Number of dots of an image without any likely code word that are shown."""
 
 
@@ -77,7 +77,7 @@ def row(
         'search': _search(result),
         'targets': [_target(target, families) for target in decoded],
         'dots': [_dots(target) for target in decoded if isinstance(target, DottedTarget)],
-        'undecoded': [_undecoded(target) for target in [*likely, *unread[:MOST_UNREAD]]],
+        'undecoded': [_undecoded(target) for target in [*likely, *unread[:MAXIMUM_UNREAD]]],
         'truth': judged,
     }
 

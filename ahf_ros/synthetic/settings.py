@@ -14,7 +14,7 @@ from ahf_ros.synthetic.patterns import LIGHT_NAMES
 CARD_WIDTH = math.cos(math.pi / 8)
 """Width of an eight-sided card, as a share of the distance of its corners."""
 
-_LARGEST_SHIFT = 0.35  # of edges, in dot radii: nearly half a sector of the finest ring codes
+_MAXIMUM_SHIFT = 0.35  # of edges, in dot radii: nearly half a sector of the finest ring codes
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,8 +154,8 @@ class SceneSettings:
             )
         ratios = size_ratios(self.sizes)
         smallest = self.dot_radius * (1 - self.radius_spread) * min(ratios)
-        if abs(self.edge_shift) > _LARGEST_SHIFT * smallest:
-            most = _LARGEST_SHIFT * smallest
+        if abs(self.edge_shift) > _MAXIMUM_SHIFT * smallest:
+            most = _MAXIMUM_SHIFT * smallest
             raise ValueError(
                 f'edge_shift is {self.edge_shift!r}, accepted is a number from {-most:.3g} to '
                 f'{most:.3g} with dots of {smallest:.3g} px'

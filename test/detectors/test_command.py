@@ -98,7 +98,7 @@ def test_a_program_that_hangs_is_ended_with_all_that_it_started(tmp_path, monkey
 
 
 def test_a_program_that_writes_without_end_is_ended(tmp_path, monkeypatch):
-    monkeypatch.setattr(program, 'LARGEST_OUTPUT', 2**20)
+    monkeypatch.setattr(program, 'MAXIMUM_OUTPUT', 2**20)
     script = 'import os\nwhile True:\n    os.write(1, bytes(2**16))\n'
     with pytest.raises(ValueError, match='bytes, accepted are at most 1048576'):
         detector(tmp_path, script)(IMAGE)
