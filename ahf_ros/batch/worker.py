@@ -23,10 +23,10 @@ from ahf_ros import ending
 from ahf_ros.batch.engine import Job
 from ahf_ros.text import reason_of
 
-STUCK = 10 * ending.GRACE
+SHUTDOWN_TIMEOUT = 10 * ending.GRACE
 """Time after which a worker is taken to be stuck at its end, s."""
 
-GONE = (EOFError, OSError)
+PIPE_CLOSED = (EOFError, OSError)
 """What the pipe of a process that has ended raises."""
 
 
@@ -50,7 +50,7 @@ def main(tasks: int, answers: int, alive: int) -> None:
     """
     _heed_signals(alive)
     received, sent = Connection(tasks, writable=False), Connection(answers, readable=False)
-    with suppress(*GONE):
+    with suppress(*PIPE_CLOSED):
         sys.path[:] = received.recv()
         job, threads = received.recv()
         _prepare(threads)
@@ -71,7 +71,7 @@ def _result_of(job: Job, task: Any, sent: Connection) -> tuple[Kind, Any]:
 
 
 def _report(sent: Connection, *report: Any) -> None:
-    with suppress(*GONE):  # this process is about to end
+    with suppress(*PIPE_CLOSED):  # this process is about to end
         sent.send((Kind.REPORT, report))
 
 
@@ -88,7 +88,7 @@ def _watch(alive: int) -> None:
     """End this process once nobody holds the other end of a pipe."""
     os.read(alive, 1)
     _end()
-    time.sleep(STUCK)
+    time.sleep(SHUTDOWN_TIMEOUT)
     os._exit(1)
 
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from ahf_ros.batch.engine import GivenUp, finished_tasks
-from ahf_ros.batch.worker import STUCK
+from ahf_ros.batch.engine import TaskFailed, finished_tasks
+from ahf_ros.batch.worker import SHUTDOWN_TIMEOUT
 from ahf_ros.cli.engine_options import add_scheduler_argument
 from ahf_ros.cli.engines import create_engine, shared_settings
 from ahf_ros.cli.options import (
@@ -39,7 +39,8 @@ STORAGE = Parameter(
     'storage', 'mcap', 'Storage format of the output bag.', choices=('mcap', 'sqlite3')
 )
 
-_PATIENCE = 2 * STUCK  # s; a process outlives its killed worker of a cluster, at most by STUCK
+# A process outlives its killed worker of a cluster by at most `SHUTDOWN_TIMEOUT`.
+_LOCK_TIMEOUT = 2 * SHUTDOWN_TIMEOUT  # s
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -134,7 +135,7 @@ def _tasks(options: argparse.Namespace) -> list[BagTask]:
             debug_images=options.debug_images,
             identification=settings,
             stacking=settings_from(options, StackSettings),
-            patience=_PATIENCE if options.scheduler else 0.0,
+            patience=_LOCK_TIMEOUT if options.scheduler else 0.0,
         )
         for source, target in zip(options.bags, targets, strict=True)
     ]
@@ -144,16 +145,18 @@ def _outcomes(
     tasks: Sequence[BagTask], jobs: int, scheduler: str, report: Any
 ) -> Iterator[tuple[BagTask, Outcome | ValueError]]:
     """Yield the outcome of each bag, or the error that ended it, as soon as it is known."""
-    engine = create_engine('bag', _attempt, min(jobs, len(tasks)), scheduler, _told_by, report)
+    engine = create_engine(
+        'bag', _attempt, min(jobs, len(tasks)), scheduler, _with_machine, report
+    )
     with closing(engine):
         for item in finished_tasks(engine, tasks):
             outcome = item.result
-            if isinstance(outcome, GivenUp):
+            if isinstance(outcome, TaskFailed):
                 outcome = ValueError(f'{item.task.source}: {outcome.reason}')
             yield item.task, outcome
 
 
-def _told_by(outcome: Outcome | ValueError, machine: str) -> Outcome | ValueError:
+def _with_machine(outcome: Outcome | ValueError, machine: str) -> Outcome | ValueError:
     if isinstance(outcome, ValueError):
         return ValueError(f'{outcome} (on {machine})')
     return outcome

@@ -18,7 +18,7 @@ from ahf_ros.batch.plan import make_plan
 from ahf_ros.batch.results_file import ResultsFile, Unwritable
 from ahf_ros.batch.run import kept_outcomes_in_order, outcomes_in_order
 from ahf_ros.batch.search import SpreadSearch, try_filter
-from ahf_ros.batch.task import ImageOutcome, ImageTask, told_by
+from ahf_ros.batch.task import ImageOutcome, ImageTask, with_machine
 from ahf_ros.cli import inputs
 from ahf_ros.cli.engines import create_engine, shared_settings
 from ahf_ros.cli.export import control_from, write_exports
@@ -149,7 +149,7 @@ def _tasks(
 
 def _engine(options: argparse.Namespace, jobs: int) -> Engine:
     if not options.spread:
-        return create_engine('identify', identify_images, jobs, options.scheduler, told_by)
+        return create_engine('identify', identify_images, jobs, options.scheduler, with_machine)
     count = options.jobs or available_cores()
     engine = create_engine(
         'identify', try_filter, count, options.scheduler, lambda it, _: it, isolated=True

@@ -12,7 +12,7 @@ from ahf_ros.batch.arrivals import Alarm, Arrivals
 from ahf_ros.batch.engine import available_cores
 from ahf_ros.batch.identification import detector_of, identify_images
 from ahf_ros.batch.results_file import ResultsFile, Unwritable
-from ahf_ros.batch.task import ImageTask, told_by
+from ahf_ros.batch.task import ImageTask, with_machine
 from ahf_ros.batch.watch import watch
 from ahf_ros.cli.engines import create_engine, shared_settings
 from ahf_ros.cli.identify_options import add_output_options, add_processing_options
@@ -104,7 +104,7 @@ def _run(options: argparse.Namespace, output: TextIO) -> int:
         print(f'ahf watch: {text}', file=sys.stderr)
 
     engine = create_engine(
-        'watch', identify_images, jobs, options.scheduler, told_by, isolated=True
+        'watch', identify_images, jobs, options.scheduler, with_machine, isolated=True
     )
     arrivals = Arrivals(options.folder, SUFFIXES, options.recursive, options.settling)
     try:
