@@ -34,7 +34,7 @@ RIGHT = 'right'
 """Report with the ID of its target; at most one per target."""
 
 WRONG = 'wrong'
-"""Report with another ID than that of its target."""
+"""Report with another ID than its target has."""
 
 FOUND = 'found'
 """Report without an ID, of a target that no other report has."""
@@ -74,7 +74,7 @@ class Score:
     right : int
         d, the number of these with the right ID.
     wrong : int
-        Number of reports with another ID than that of their target.
+        Number of reports with another ID than their target has.
     false_positives : int
         Number of reports without a target, or of one that was reported already.
     errors : tuple of (float, float)

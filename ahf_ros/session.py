@@ -49,7 +49,7 @@ def create_identifier(
     detector : str or callable, optional
         Name of a detector, or a detector of your own: any function from an 8-bit image to a list
         of `Target`. If it is also a `Refiner`, a `Drafter` or `EarlyStopping`, that is used.
-        That of the settings where None.
+        Where None, the detector of the settings.
     settings : IdentificationSettings, optional
         The defaults where None.
     interrupt : callable, optional
@@ -158,7 +158,7 @@ def _mirrored_id(target: Target) -> int | None:
 
 
 def _check_family(detector: DetectorFunction, settings: DetectorSettings) -> None:
-    """Refuse to count targets of another family than that of the detector."""
+    """Refuse to count targets of another family than the detector's."""
     if isinstance(detector, Detector) and detector.family != settings.family:
         raise ValueError(
             f'family is {settings.family!r}, accepted with estimate_expected is that of the '

@@ -179,7 +179,7 @@ class FilterState:
     Attributes
     ----------
     applied : bool
-        False if the result is that of the unfiltered image; the filter is then the identity.
+        False if the result comes from the unfiltered image; the filter is then the identity.
     gamma_high, gamma_low : float
         Gains of the high and the low frequencies, dimensionless.
     cutoff : float

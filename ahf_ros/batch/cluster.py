@@ -61,7 +61,7 @@ class DaskEngine:
     say : callable, optional
         Called with lines for people: workers that are refused, a scheduler that is away.
     located : callable, optional
-        From a result and the name of the machine that it comes from to a result that tells of it.
+        From a result and the name of the machine that it comes from to a result that names it.
 
     Raises
     ------
@@ -149,7 +149,7 @@ class DaskEngine:
         return running and self._client.scheduler_comm is self._connection
 
     def _look(self) -> None:
-        """Look at the workers, and tell if there are none."""
+        """Look at the workers, and say if there are none."""
         self._looked = time.monotonic()
         with suppress(*CONNECTION_ERRORS):
             self._threads = dict(self._client.nthreads())

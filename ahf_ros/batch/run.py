@@ -78,7 +78,7 @@ def outcomes(
 
 
 def outcome_of(task: ImageTask, result: ImageOutcome | TaskFailed) -> ImageOutcome:
-    """Return the outcome of a task; that of one that is given up is a problem."""
+    """Return the outcome of a task; it is a problem if the task was given up."""
     if isinstance(result, TaskFailed):
         return ImageOutcome(messages=(Message(f'{task.name}: {result.reason}', Level.PROBLEM),))
     return result

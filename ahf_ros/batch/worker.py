@@ -107,7 +107,7 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
 
 
 def _prepare(threads: int) -> None:
-    """Let what detectors of others print go to standard error, and limit threads."""
+    """Send what other detectors print to standard error, and limit threads."""
     if sys.stdout and sys.stderr:  # otherwise other files may have their numbers
         os.dup2(2, 1)
     sys.stdout = sys.stderr

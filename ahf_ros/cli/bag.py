@@ -166,7 +166,7 @@ def _attempt(task: BagTask, report: Any) -> Outcome | ValueError:
     from ahf_ros.bag.run import WRITING_ERRORS, answer_bag
 
     try:
-        with redirect_stdout(sys.stderr):  # what detectors of others print
+        with redirect_stdout(sys.stderr):  # what other detectors print
             return answer_bag(task, report)
     except ValueError as error:
         return error

@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Render the images and add their truth to that of the folder.
+    """Render the images and add their truth to the truth of the folder.
 
     Returns
     -------

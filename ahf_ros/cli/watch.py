@@ -81,7 +81,7 @@ def run(options: argparse.Namespace) -> int:
         If options contradict each other.
     """
     output = sys.stdout
-    with redirect_stdout(sys.stderr):  # what detectors of others print is not JSON
+    with redirect_stdout(sys.stderr):  # what other detectors print is not JSON
         return _run(options, output)
 
 

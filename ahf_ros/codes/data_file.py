@@ -110,7 +110,7 @@ def read_data_file(path: str | Path) -> Entry:
     Parameters
     ----------
     path : str or Path
-        JSON or YAML, of which JSON is a part.
+        A YAML or JSON file.
 
     Raises
     ------

@@ -28,7 +28,7 @@ AUTO = 'auto'
 """Stands for all families of `LISTED`."""
 
 LISTED = KINDS['ring']
-"""The families of which several may be given, separated by commas: they are read together."""
+"""Families that may be given together, separated by commas: they are read together."""
 
 ACCEPTED = (
     f'one of {", ".join(FAMILY_NAMES)}; several of {", ".join(LISTED)}, separated by commas; or '
@@ -166,7 +166,7 @@ def mirrored_number(name: str, code: int) -> int | None:
 
 
 def _suggested(name: str) -> str:
-    """Return what is accepted in the place of a name that is like that of a family."""
+    """Return what is accepted in the place of a name that is like the name of a family."""
     names = get_close_matches(name.lower(), FAMILY_NAMES, 1, _ALIKE)
     return f'{names[0]}, which is most like it, or another family' if names else ''
 

@@ -40,7 +40,7 @@ class MeasuredTarget:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Learnt:
-    """What a point list tells of a family.
+    """What a point list says about a family.
 
     Attributes
     ----------
@@ -62,9 +62,9 @@ class Learnt:
 def learn_family(points: Mapping[str, np.ndarray], base: PointFamily, name: str) -> Learnt:
     """Learn a family from the coordinates of the dots of its targets.
 
-    Each target is laid into its plane and turned so that its template lies on that of a design
-    known in rough. The names of the dots say which is which, so that front and back cannot be
-    mistaken.
+    Each target is laid into its plane and turned so that its template lies on the template of
+    a design known in rough. The names of the dots say which is which, so that front and back
+    cannot be mistaken.
 
     Parameters
     ----------

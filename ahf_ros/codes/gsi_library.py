@@ -261,7 +261,7 @@ def _code_dots(
     numbers = [item.integer(*_POSITION_NUMBERS) for item in entry.list(accepted, lengths=(dots,))]
     for number in numbers:
         if number not in positions:
-            entry.refuse(f'{accepted}, of which {number} is none')
+            entry.refuse(f'{accepted}; {number} is none')
     if len(set(numbers)) < dots:
         entry.refuse(accepted)
     for first, second in combinations(numbers, 2):

@@ -1,4 +1,4 @@
-"""Overlays: one look tells what was found from what is doubtful and what was missed."""
+"""Overlays: what was found, what is doubtful and what was missed, at one look."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def overlay(
 ) -> np.ndarray:
     """Return an image in colour with the dot, the centre and the ID of every target.
 
-    Decoded targets have a solid outline. That of doubtful ones is dashed, and their ID has a
+    Decoded targets have a solid outline. Doubtful ones have a dashed one, and their ID has a
     question mark. Missed ones are crossed out. The family is beside the ID if there are targets of
     several families.
 

@@ -22,7 +22,7 @@ def read_image(path: str | Path, *, upright: bool = False) -> np.ndarray:
 
     Colour is converted to gray and transparency is ignored. The orientation that a camera notes
     in the file is not applied unless that is asked for: the pixels are those of the sensor.
-    `read_noted_image` tells of it.
+    `read_noted_image` names it.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def decode_bytes(encoded: bytes, name: str) -> np.ndarray:
     Raises
     ------
     ValueError
-        If `encoded` is empty, not an image or too large, which its header tells.
+        If `encoded` is empty, not an image, or too large by its header.
     """
     return _decoded(bytes(encoded), name)[0]
 

@@ -136,7 +136,7 @@ def read_results(path: str | Path) -> dict[str, tuple[Target, ...]]:
     Parameters
     ----------
     path : str or Path
-        A JSON object a line with 'image' and 'targets', of which 'id', 'x' and 'y' are required;
+        A JSON object a line with 'image' and 'targets'; these need 'id', 'x' and 'y';
         empty lines are ignored. With a list 'images', the targets are those of each of them. '-'
         stands for standard input.
 

@@ -36,7 +36,7 @@ SCENE: dict[str, Any] = {'width': 1600, 'height': 1066, 'targets': 12}
 """What is rendered: few enough targets to see each of them in a picture of the whole."""
 
 NAMESPACE = '/demo'
-"""Namespace of all nodes, apart from the topics of others."""
+"""Namespace of all nodes, so that they use no topic of other programs."""
 
 RATE = 1.0
 """Images per second."""

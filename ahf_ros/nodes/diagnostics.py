@@ -68,7 +68,7 @@ class Tally:
     ----------
     received, answered, dropped, rejected, backwards : int
         Images that arrived; that were answered; that were replaced by a newer one before their
-        turn; that were not accepted; whose stamp is earlier than that of the image before.
+        turn; that were not accepted; whose stamp is earlier than the stamp before.
     reason : str
         Why the last rejected image was rejected.
     mistaken : str

@@ -28,7 +28,7 @@ class ManagedNode(ProcessNode, LifecycleNodeMixin):
     """
 
     def __init__(self, name: str) -> None:
-        # Not that of the mixin, which makes the services of a managed node.
+        # Not the mixin's, which makes the services of a managed node.
         ProcessNode.__init__(self, name)
         self._managed = False
 

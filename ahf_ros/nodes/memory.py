@@ -25,7 +25,7 @@ def reuse_memory() -> None:
     from the system, which clears it page by page: for an image of 10.6 MP, that took two thirds of
     the time between the middleware and the node, and a tenth of the identification.
     """
-    with suppress(AttributeError):  # where malloc is not that of glibc
+    with suppress(AttributeError):  # where malloc is not glibc's
         mallopt = ctypes.CDLL(None).mallopt
         mallopt(_M_ARENA_MAX, ARENAS)
         mallopt(_M_MMAP_THRESHOLD, MAXIMUM_KEPT)

@@ -138,7 +138,7 @@ class Pipeline:
         message : Image or CompressedImage
             The image.
         expected : int, optional
-            N; that of the settings where None.
+            N; where None, the N of the settings.
         speculation : Speculation, optional
             Of the same image, with the N of the settings; used if it is right.
 

@@ -170,8 +170,8 @@ def run(make_node: Callable[[], ProcessNode], arguments: list[str] | None = None
     Returns
     -------
     int
-        Exit status: that of the node, 0 after a signal, 1 if the node cannot start with these
-        arguments, with the reason on stderr.
+        Exit status of the node: 0 after a signal, 1 if it cannot start with these arguments,
+        with the reason on stderr.
     """
     reuse_memory()
     arrived = signalled()

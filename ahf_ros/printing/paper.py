@@ -62,7 +62,7 @@ class LabelSheet:
     left, top : float
         From the edges of the page to the first label.
     pitch_x, pitch_y : float
-        From the centre of one label to that of the next one.
+        From the centre of one label to the next one's.
     """
 
     page: Page

@@ -95,7 +95,7 @@ def fitted(image: np.ndarray, limit: int) -> Picture:
 def _best_of(image: np.ndarray, probe: Picture, limit: int) -> Picture | None:
     """Return the picture of the best quality that fits; None if none does.
 
-    `probe` is the picture of medium quality, which tells which others may fit.
+    `probe` is the picture of medium quality, which shows what sizes may fit.
     """
     size = len(probe.content)
     for quality in _QUALITIES:

@@ -216,4 +216,4 @@ def test_more_dots_than_are_looked_at_are_said_and_the_roundest_stay(monkeypatch
     assert messages == []
     monkeypatch.setattr('ahf_ros.features.outlines.MAXIMUM_OUTLINES', 30)
     assert len(whole_outlines(edges, 4.0, 20.0).frames) == 30
-    assert messages == ['100 whole ellipses, of which the 30 best are looked at']
+    assert messages == ['100 whole ellipses; the 30 best are looked at']

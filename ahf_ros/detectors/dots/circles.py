@@ -1,6 +1,6 @@
 """Frames of rings of dots, from the edges of disc and border.
 
-Circles of three radii tell the image of the physical centre from the centres of their ellipses.
+Circles of three radii separate the image of the physical centre from the centres of ellipses.
 """
 
 from __future__ import annotations

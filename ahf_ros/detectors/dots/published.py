@@ -4,7 +4,7 @@ This is the identification of [1]_: Otsu's threshold in overlapping blocks; a da
 bright one in a dark one; least-squares ellipses of the inner and the outer circle; the ring
 between them unrolled into a rectangle, where a place that is dark with bright outside (01) has a
 dot, one that is bright (11) has none, and others are no target's. It has no defence against uneven
-light, which makes it a fair test of a filter. The centre is that of the ellipse of the outer
+light, which makes it a fair test of a filter. The centre is the centre of the ellipse of the outer
 circle, with the perspective bias in it.
 
 References
@@ -32,7 +32,7 @@ from ahf_ros.imaging.image import check_image, stretched_to_8_bit
 from ahf_ros.target import UNDECODED, Target, sorted_targets
 
 _MINIMUM_POINTS = 5  # points of a contour, which an ellipse takes
-_MAXIMUM_MISFIT = 0.2  # between the area of a contour and that of its ellipse, relative
+_MAXIMUM_MISFIT = 0.2  # between the areas of a contour and of its ellipse, relative
 _MAXIMUM_RADIUS = 60.0  # radius of a disc that blocks of the threshold are made for, px
 _RATIO = 1.35  # of the radii of the two circles over the printed one, at the most, or below it
 _MAXIMUM_DISTANCE = 0.4  # of their centres, radii of the disc

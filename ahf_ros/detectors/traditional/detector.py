@@ -6,8 +6,8 @@ the coded band read by its grey gradient in the affine frame of that ellipse. It
 against uneven light, which makes it a fair test of a filter.
 
 Beyond the paper, the edges of dot and band are measured at sub-pixel accuracy, and together give
-the image of the physical centre of a decoded target; that of an undecoded one is the centre of its
-ellipse, with the perspective bias in it (0.03 px for a dot of 20 px radius at 45 degrees).
+the image of the physical centre of a decoded target. The centre of an undecoded one is the centre
+of its ellipse, with the perspective bias in it (0.03 px for a dot of 20 px radius at 45 degrees).
 
 References
 ----------
