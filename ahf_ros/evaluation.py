@@ -1,6 +1,6 @@
 """Evaluation of identifications against the truth: C, R, D, wrong IDs, false positives, RMSE.
 
-The counts are those of the paper [1]_. An image shows N targets, n are reported, I of these are
+The counts follow the paper [1]_. An image shows N targets, n are reported, I of these are
 there, and d of these have the right ID;
 
     C = I / n,    R = I / N,    D = d / N.

@@ -358,7 +358,7 @@ class Identification:
 
 
 def sorted_targets(targets: Iterable[Target]) -> list[Target]:
-    """Return targets by ascending ID, those of one ID by family, from top to bottom, from left."""
+    """Return targets by ascending ID, then by family, from top to bottom, from left."""
     return sorted(targets, key=lambda target: (target.id, target.family, target.y, target.x))
 
 

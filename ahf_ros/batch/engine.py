@@ -117,7 +117,7 @@ def finished_tasks(
             following = next(waiting, None)
         ending.check()  # before it waits
         found = engine.wait()
-        ending.check()  # the result may be that of a program that was ended
+        ending.check()  # the result may come from a program that was ended
         if found is not None:
             yield Finished(found[0], running.pop(found[0]), found[1])
 

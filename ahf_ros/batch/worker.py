@@ -56,7 +56,7 @@ def main(tasks: int, answers: int, alive: int) -> None:
         _prepare(threads)
         while True:
             result = _result_of(job, received.recv(), sent)
-            ending.check()  # the result may be that of a program that was ended
+            ending.check()  # the result may come from a program that was ended
             sent.send(result)
 
 

@@ -33,7 +33,7 @@ JOBS = Parameter('jobs', 1, 'Number of bags processed at the same time.', minimu
 OUTPUT_TOPIC = Parameter(
     'output_topic',
     'coded_targets',
-    'Topic of the answers, relative to that of the images unless it begins with a slash.',
+    'Topic of the answers, relative to the topic of the images unless it begins with a slash.',
 )
 STORAGE = Parameter(
     'storage', 'mcap', 'Storage format of the output bag.', choices=('mcap', 'sqlite3')

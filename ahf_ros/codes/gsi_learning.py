@@ -45,7 +45,7 @@ class Learnt:
     Attributes
     ----------
     family : PointFamily
-        The design in the unit of the coordinates; its codes are those of the base alone.
+        The design in the unit of the coordinates; its codes are the base's alone.
     codes : dict of int to int
         Values by ID, of all the targets that are complete.
     targets : tuple of MeasuredTarget

@@ -70,7 +70,7 @@ class _Entry:
     families: tuple[str, ...]
     estimate: str = ''
     several: bool = False  # families at a time
-    own_ids: bool = False  # rather than those of the families
+    own_ids: bool = False  # rather than the families'
 
     def reads(self, families: tuple[str, ...]) -> bool:
         return set(families) <= set(self.families) and (self.several or len(families) == 1)
@@ -109,7 +109,7 @@ _ADDED: dict[str, EntryPoint] = {
 }
 
 DETECTOR_NAMES = (*_ENTRIES, *sorted(_ADDED))
-"""The names of all detectors, those of this package first."""
+"""The names of all detectors; this package's come first."""
 
 DETECTOR = Parameter(
     'detector',

@@ -55,7 +55,7 @@ class _Shape(NamedTuple):
 _TINY = _Shape(1.0, 1, 1, 0.6, 1)  # whose edges are the least exact
 _SMALL = _Shape(1.0, 1, 1, 1.4, 1)
 _LARGE = _Shape(1.0, 1, 2, 1.4, 1)
-_OBLIQUE = _Shape(0.5, 6, 2, 1.2, 2)  # finds those of 0.3 to 0.7, up to 70 degrees
+_OBLIQUE = _Shape(0.5, 6, 2, 1.2, 2)  # finds shapes of 0.3 to 0.7, up to 70 degrees
 _RANGES = {  # by semi-major axes, px
     (3.4, 5.8): (_SMALL,),  # out of focus, as others are found on the level below
     (5.8, MAXIMUM_RADIUS): (_LARGE, _OBLIQUE),

@@ -1,7 +1,7 @@
 """Evidence for and against dots at given places, from the steps of ln I round them.
 
 Where there is a dot, the logarithm of the image has the same step along all rays, wherever the
-light falls. Where there is none, it has no step, or that of an edge of light, which crosses the
+light falls. Where there is none, it has no step, or a step of an edge of light, which crosses the
 circle on two sides and in opposite directions.
 """
 

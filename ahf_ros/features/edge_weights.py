@@ -24,7 +24,7 @@ _MINIMUM_BRIGHT = 1.0  # gray value that ratios are taken to
 
 @dataclass(frozen=True, slots=True)
 class EdgeWeights:
-    """How much the edges of k targets at m points each look like those of the targets.
+    """How much the edges of k targets at m points each look like edges of targets.
 
     Attributes
     ----------

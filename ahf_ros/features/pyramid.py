@@ -36,7 +36,7 @@ class ImagePyramid:
     logs : tuple of ndarray of int16
         LOG_SCALE ln(I + LOG_OFFSET) of each level, the image as received first.
     edges : tuple of LogEdges
-        Of each level from the first half on: `edges[i]` are those of `logs[i + 1]`.
+        Of each level from the first half on: `edges[i]` belongs to `logs[i + 1]`.
     """
 
     gray: np.ndarray

@@ -136,7 +136,7 @@ class Identifier:
         self.last_search: SearchResult | None = None
         self.memory = Memory()
         self.elsewhere: Elsewhere | None = None
-        # Without a refinement, centres are those of the detector.
+        # Without a refinement, the detector gives the centres.
         draft = draft if draft and refine else detector
         self._detector = _interruptible(detector, interrupt)
         self._draft = _interruptible(draft, interrupt)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 _PRINTED = 0.25
-"""Gray value of ink divided by that of paper to which black is lifted."""
+"""Ratio of the gray values of ink and paper to which black is lifted."""
 
 
 def black_lift(contrast: np.ndarray, bright: np.ndarray) -> np.ndarray:
@@ -20,7 +20,7 @@ def black_lift(contrast: np.ndarray, bright: np.ndarray) -> np.ndarray:
     Parameters
     ----------
     contrast : ndarray of float64, shape (...)
-        Gray value of ink divided by that of paper. From 0.2 on, black stays as it is.
+        Ratio of the gray values of ink and paper. From 0.2 on, black stays as it is.
     bright : ndarray of float64, shape (...)
         Gray value of paper.
 

@@ -73,7 +73,7 @@ def measured(normals: np.ndarray, found: np.ndarray) -> Displacement | None:
 def direction_weights(normals: np.ndarray) -> np.ndarray:
     """Return weights of edges, 1 on average, with which all directions count alike.
 
-    Directions with many times more edges than others are those of stripes of light. They and their
+    Directions with many times more edges than others are stripes of light. They and their
     neighbours are left out where enough edges remain.
 
     Parameters

@@ -210,7 +210,7 @@ def _partners(
 
 
 def _alike(steps: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Return whether two steps may be those of one edge."""
+    """Return whether two steps may belong to one edge."""
     return (steps > others / _SIMILAR) & (steps < others * _SIMILAR)
 
 

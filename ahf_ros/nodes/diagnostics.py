@@ -167,7 +167,7 @@ class Tally:
 
 
 class Diagnostics:
-    """Turns a tally into one status per period, whose rate and level are those of the period."""
+    """Turns a tally into one status per period, with the rate and the level of the period."""
 
     def __init__(self, name: str, tally: Tally) -> None:
         self._name = name

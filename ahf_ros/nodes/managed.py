@@ -1,6 +1,6 @@
 """Nodes that may be managed: others configure, activate, deactivate and clean them up.
 
-The states and their services are those of ROS 2 (design.ros2.org/articles/node_lifecycle.html).
+The states and their services follow ROS 2 (design.ros2.org/articles/node_lifecycle.html).
 """
 
 from __future__ import annotations

@@ -165,7 +165,7 @@ def run(make_node: Callable[[], ProcessNode], arguments: list[str] | None = None
     make_node : callable
         Returns the node; called when rclpy is initialised.
     arguments : list of str, optional
-        Command line arguments; those of the process where None.
+        Command line arguments; where None, `sys.argv` has them.
 
     Returns
     -------

@@ -31,7 +31,7 @@ _REPEATED = 1 / 3  # of the time limit, after which a service that is new is ask
 class ServiceDetector:
     """Identify targets by a service of type `ahf_ros/srv/Identify`.
 
-    Call it from other threads than those of the node's executor, which deliver the responses.
+    Do not call it from threads of the node's executor, which deliver the responses.
 
     Parameters
     ----------

@@ -14,7 +14,7 @@ THUMBNAIL_SIDES = 132, 88
 
 _THUMBNAIL_BYTES = 3000
 _SIZES = {88: 1.75, 80: 1.4, 70: 1.15, 58: 1.0, 46: 0.85, 34: 0.7, 24: 0.58}
-"""About how many bytes a quality takes, in those of the medium one."""
+"""About how many bytes a quality takes, as a fraction of the medium one."""
 
 _QUALITIES = tuple(_SIZES)
 _MIDDLE = 58

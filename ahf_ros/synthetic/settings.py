@@ -63,7 +63,7 @@ class SceneSettings:
     )
     wall: float = parameter(
         1.0,
-        "Reflectance of the wall as a fraction of that of the targets' ground; below 1, every "
+        "Reflectance of the wall as a fraction of the targets' ground; below 1, every "
         'target is on an eight-sided card.',
         minimum=0.05,
         maximum=1.0,

@@ -26,7 +26,7 @@ def border_steps(
     code: DotFamily,
     scales: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Return the mean step at the edges of disc and border, in that of the disc.
+    """Return the mean step at the edges of disc and border, in steps of the disc.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def border_steps(
         1 for dark targets, -1 for bright ones.
     code : DotFamily
     scales : ndarray of float, shape (n,), optional
-        Radii that the discs may have instead, in those of the frames.
+        Radii that the discs may have instead, in radii of the frames.
 
     Returns
     -------

@@ -21,7 +21,7 @@ _SPREAD = (0.7, 0.45)  # standard deviation of their ln below and above, as blur
 _LIMIT = 12.0  # evidence that one place may give
 _MINIMUM_STEP = 0.12  # step of ln of a disc
 _MINIMUM_SHARE = 0.6  # step of a dot, in the one that the blur leaves it
-_MAXIMUM_SHARE = 1.1  # step of a dot, in that of the disc
+_MAXIMUM_SHARE = 1.1  # step of a dot, in steps of the disc
 _ASIDE = 1.2  # distance of samples from the edges of dots, blurs
 
 
@@ -40,9 +40,9 @@ class Readings(ArrayRecord):
     phase : ndarray of float64, shape (k,)
         Direction of the first place in the frame, rad clockwise from +x.
     radius : ndarray of float64, shape (k,)
-        Of the small dots, in that of the disc.
+        Of the small dots, in radii of the disc.
     seen : ndarray of float64, shape (k,)
-        Mean step of ln I at disc and border, in that of the disc.
+        Mean step of ln I at disc and border, in steps of the disc.
     height : ndarray of float64, shape (k,)
         Step of the dot that is seen best, in the one that the blur leaves it.
     inside : ndarray of bool, shape (k,)
@@ -118,7 +118,7 @@ def read_rings(log: np.ndarray, fit: Fit, code: DotFamily) -> Readings:
 
 
 def _radii(code: DotFamily) -> np.ndarray:
-    """Return the radii that small dots may have, in those of the disc."""
+    """Return the radii that small dots may have, in radii of the disc."""
     room = min(code.dot_circle - 1, code.ground_radius - code.dot_circle)
     widest = _FULLEST * min(room, code.dot_circle * np.sin(np.pi / code.bits))
     return np.append(code.dot_radius * _SHRUNK, np.minimum(code.dot_radius * _GROWN, widest))

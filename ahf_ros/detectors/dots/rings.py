@@ -58,7 +58,7 @@ class Rings(ArrayRecord):
     edge_shift : ndarray of float64, shape (k,)
         Of the edges of disc and border, as in `Fit`, px.
     radius : ndarray of float64, shape (k,)
-        Of the small dots as seen, in that of the disc.
+        Of the small dots as seen, in radii of the disc.
     target_features, word_features : ndarray of float64, shape (k, n) and (k, m)
         As `confidence` weighs them.
     """
@@ -191,7 +191,7 @@ def ellipses(
     phase : float
         Direction of that place in the frame, rad clockwise from +x.
     radius : float
-        Of the small dots, in that of the disc.
+        Of the small dots, in radii of the disc.
     code : DotFamily
     """
     which = np.flatnonzero(word >> np.arange(code.bits) & 1)

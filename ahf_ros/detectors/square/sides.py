@@ -156,7 +156,7 @@ def _edge_shift(
     blur : ndarray of float64, shape (k,)
         Of the edges, standard deviation in px.
     contrast : ndarray of float64, shape (k,)
-        Gray value of ink divided by that of paper.
+        Ratio of the gray values of ink and paper.
     """
     along = np.add.outer(np.arange(1, cells - 1), _IN_CELL).ravel() / cells
     side = np.stack([along, np.full(along.size, 1 / cells)], axis=1) - 0.5

@@ -20,7 +20,7 @@ _SLACK = 2.0  # radius of a contour over the largest of a dot, px
 
 
 def masks(gray: np.ndarray, polarities: Sequence[int]) -> Iterator[tuple[int, np.ndarray]]:
-    """Yield 1 and the mask of the dark pixels of an image, -1 and that of the bright ones.
+    """Yield 1 and the mask of the dark pixels of an image, then -1 and of the bright ones.
 
     The threshold is Bernsen's, halfway between the extremes of the neighbourhood.
 
@@ -51,7 +51,7 @@ def masks(gray: np.ndarray, polarities: Sequence[int]) -> Iterator[tuple[int, np
 
 
 def blob_frames(mask: np.ndarray, min_radius: float, max_radius: float) -> np.ndarray:
-    """Return the frames of the blobs whose perimeter, roundness and ellipse are those of a dot.
+    """Return the frames of the blobs with the perimeter, roundness and ellipse of a dot.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Traditional identification: threshold, contours, gates, ellipse fit, grey gradient of the band.
 
 This is the identification "TI" that the paper [1]_ uses beside Agisoft Metashape: an adaptive
-threshold, contours whose perimeter and roundness are those of a dot, a least-squares ellipse, and
+threshold, contours with the perimeter and roundness of a dot, a least-squares ellipse, and
 the coded band read by its grey gradient in the affine frame of that ellipse. It has no defence
 against uneven light, which makes it a fair test of a filter.
 
@@ -139,7 +139,7 @@ def _identify_dots(
 def _fit_decoded(
     gray: np.ndarray, fit: Fit, readings: BandReadings, decoded: np.ndarray, code: Family
 ) -> Fit:
-    """Return fits of dots, those of decoded targets with their bands."""
+    """Return fits of dots, of decoded targets with their bands."""
     read, dots = readings.select(decoded), fit.select(decoded)
     circles = target_circles(read.words, read.starts, dots.polarity, _SAMPLES, code)
     joint = fit_circles(gray, dots.frames, circles, reach=REACH, projective=True)
