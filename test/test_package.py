@@ -160,6 +160,24 @@ def test_package_xml_names_what_is_imported(
     assert {ROSDEP.get(it, it) for it in foreign} - declared == set()
 
 
+def test_the_maintainer_is_not_of_a_host_that_may_be_somebodys() -> None:
+    root = ElementTree.parse(ROOT / 'package.xml').getroot()
+    people = [*root.iter('maintainer'), *root.iter('author')]
+    assert [person.get('email') for person in people] == ['maintainers@example.org'] * 2
+
+
+def test_the_demo_installs_only_what_it_needs(tmp_path: Path) -> None:
+    if not shutil.which('make'):
+        pytest.skip('make is not installed')
+    command = ['make', '--dry-run', '--silent', f'VENV={tmp_path / "new"}']
+    told = [
+        subprocess.check_output([*command, target], cwd=ROOT, text=True)
+        for target in ('demo', 'lint')
+    ]
+    assert [text.count('pip install') for text in told] == [1, 2]
+    assert ['ahf_ros[test' in text for text in told] == [False, True]
+
+
 def test_ros2_run_finds_every_program() -> None:
     text = (ROOT / 'CMakeLists.txt').read_text()
     (programs,) = re.findall(r'install\(PROGRAMS([^)]*)DESTINATION lib/\$\{PROJECT_NAME\}', text)
