@@ -30,7 +30,7 @@ REQUIREMENTS = [
     'rich>=12',
     'rosbags>=0.11.7,<0.12',  # ahf_ros.bag uses more of it than its public API
     'ruamel.yaml',
-    'threadpoolctl>=3',
+    'threadpoolctl>=3.5',  # it knows the OpenBLAS of numpy's wheels
 ]
 SITE = Path(f'lib/python{sys.version_info[0]}.{sys.version_info[1]}/site-packages')
 

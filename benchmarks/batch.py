@@ -43,7 +43,7 @@ TARGET = 10_000
 """Number of images that costs are extended to."""
 
 NAP = 0.1
-"""Time of a task of which the overhead is measured, s."""
+"""Time of a task whose overhead is measured, s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +59,7 @@ class Cost:
 
 
 def photographs(folder: Path, count: int) -> list[Path]:
-    """Return images of 10.6 MP, of which only the first are different files."""
+    """Return images of 10.6 MP; only the first are different files."""
     originals = []
     for number in range(min(PHOTOGRAPHS, count)):
         path = folder / f'original_{number}.jpg'

@@ -68,7 +68,7 @@ class NodeProcess:
         command += ['--ros-args', *arguments]
         self.awaited = False
         self.output = self.log = ''
-        # Not pipes, which hold up a process of which nobody reads the log.
+        # Not pipes, which hold up a process whose log nobody reads.
         self._written = [tempfile.TemporaryFile('w+') for _ in range(2)]  # noqa: SIM115
         self.process = subprocess.Popen(
             command,

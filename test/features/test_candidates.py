@@ -28,7 +28,7 @@ def drawn(dots: list[tuple[float, float, float]], paper: int = 200, ink: int = 3
 
 
 def stripes(image: np.ndarray, period: int, shadow: float) -> np.ndarray:
-    """Return an image of which every other half period lies in the shadow."""
+    """Return an image; every other half period lies in the shadow."""
     lit = np.arange(image.shape[1]) % period < period / 2
     return np.rint(image * np.where(lit, 1, shadow)).astype(np.uint8)
 

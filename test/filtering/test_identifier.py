@@ -522,7 +522,7 @@ def test_there_are_no_drafts_without_a_refinement_or_a_filter():
 
 
 class Blocks(Dots):
-    """The same on paper with dots of two pixels by two, of which half an image shows one each."""
+    """The same on paper with dots of two pixels by two; each half of the image shows one."""
 
     def __call__(self, image):
         with self.lock:
