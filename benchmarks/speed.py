@@ -134,7 +134,7 @@ def main() -> None:
     duration, (count, evaluations) = seconds(lambda: published(recipe, image, detector, expected))
     other = f'published, traditional: {count} in {evaluations} identifications'
     for name in ('traditional', 'ring'):
-        run = partial(identify, image, name, expected_targets=expected)
+        run = partial(identify, image, detector=name, expected_targets=expected)
         times = [seconds(run) for _ in range(3)]
         result = times[0][1]
         words = f'AHF, {name}: {result.count} in {result.filter.evaluations}'

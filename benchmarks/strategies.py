@@ -21,7 +21,7 @@ from rich.progress import track
 
 from ahf_ros.detectors import DETECTOR_NAMES, Drafter, create_detector
 from ahf_ros.filtering.chromosome import Gene, Values
-from ahf_ros.filtering.genes import tuned
+from ahf_ros.filtering.genes import genes_of, tuned
 from ahf_ros.filtering.genetic import search
 from ahf_ros.filtering.homomorphic import HomomorphicFilter
 from ahf_ros.filtering.settings import EXTENDED, PUBLISHED, GeneticSettings, TuningSettings
@@ -134,7 +134,7 @@ def main() -> None:
         for light, ambient in LIGHTS:
             scene = Scene(options.detector, light, ambient)
             for tuning, (name, strategy) in product((PUBLISHED, EXTENDED), STRATEGIES.items()):
-                genes = TuningSettings(search=tuning).genes
+                genes = genes_of(TuningSettings(search=tuning))
                 best = np.zeros((options.seeds, len(TRIED)))
                 console = Console(stderr=True)
                 for seed in track(range(options.seeds), f'{light} {tuning}', console=console):

@@ -154,5 +154,5 @@ def test_a_program_behind_the_adaptive_filter(tmp_path):
         'seen = image[0, :3].tolist() != [0, 1, 2]\n'
         'print(json.dumps({"targets": [{"id": 1, "x": 0, "y": 0}] if seen else []}))\n'
     )
-    found = identify(IMAGE, detector(tmp_path, script), expected_targets=1)
+    found = identify(IMAGE, detector=detector(tmp_path, script), expected_targets=1)
     assert found.count == 1 and found.filter.applied

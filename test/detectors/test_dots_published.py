@@ -45,7 +45,7 @@ def test_all_targets_are_identified_in_even_light(changes: dict) -> None:
 def test_stripes_defeat_it_and_ahf_brings_the_targets_back() -> None:
     shown = render(scene(light='stripe'))
     without = score(shown, published()(shown.image))
-    found = identify(shown.image, published(), expected_targets=6)
+    found = identify(shown.image, detector=published(), expected_targets=6)
     assert found.filter.applied
     assert score(shown, found.targets).right >= max(3 * without.right, 4)
 
