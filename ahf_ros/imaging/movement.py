@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from ahf_ros.blas import one_blas_thread
 from ahf_ros.imaging.coincidence import (
     MINIMUM_EDGES,
     PEAK,
@@ -111,6 +112,7 @@ def find_edges(image: np.ndarray) -> Edges:
     return Edges(*at, normals, steps, places, size.shape, gradients, coarse)
 
 
+@one_blas_thread()
 def displacement(edges: Edges, image: np.ndarray) -> Displacement | None:
     """Return by how much a scene moved, None where nothing shows that it did.
 
