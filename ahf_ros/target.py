@@ -79,6 +79,13 @@ class DottedTarget(Target):
         Number of the former.
     polarity : int
         1 for dark dots on bright ground, -1 for bright ones on dark.
+
+    Examples
+    --------
+    >>> dots = ((10.0, 20.0, 3.0, 3.0, 0.0), (22.0, 20.0, 2.0, 2.0, 0.0))
+    >>> target = DottedTarget(7, 19, 10.0, 20.0, 3.0, 3.0, dots=dots, template_dots=1)
+    >>> len(target.dots) - target.template_dots
+    1
     """
 
     dots: tuple[tuple[float, float, float, float, float], ...] = ()
@@ -97,6 +104,12 @@ class SquareMarker(Target):
     ----------
     corners : tuple of 4 tuples of 2 float
         Corners, px, clockwise from the top left corner of the upright marker.
+
+    Examples
+    --------
+    >>> corners = ((5.0, 5.0), (15.0, 5.0), (15.0, 15.0), (5.0, 15.0))
+    >>> SquareMarker(3, 3, 10.0, 10.0, 5.0, 5.0, corners=corners).corners[0]
+    (5.0, 5.0)
     """
 
     corners: tuple[tuple[float, float], ...] = ()
