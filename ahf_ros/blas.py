@@ -48,5 +48,11 @@ def one_blas_thread() -> Iterator[None]:
 
 @cache
 def _libraries() -> ThreadpoolController:
-    """Return the BLAS libraries that are loaded, found once: it takes 2 ms, a limit 10 us."""
-    return ThreadpoolController().select(user_api='blas')
+    """Return the BLAS libraries of numpy and its like, found once: it takes 2 ms, a limit 10 us.
+
+    OpenCV's own takes no time. Where both are limited in a process that was forked, the process
+    crashes at its end.
+    """
+    loaded = ThreadpoolController().select(user_api='blas')
+    paths = [library['filepath'] for library in loaded.info()]
+    return loaded.select(filepath=[path for path in paths if 'opencv' not in path])
