@@ -22,8 +22,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
-from ahf_ros.batch.connection import AWAY, connect, refused_workers
-from ahf_ros.batch.engine import TRIES, GivenUp, Job, Report, no_report
+from ahf_ros.batch.connection import CONNECTION_ERRORS, connect, refused_workers
+from ahf_ros.batch.engine import TRIES, Job, Report, TaskFailed, no_report
 from ahf_ros.batch.remote import guarded_perform
 from ahf_ros.release import release
 from ahf_ros.text import reason_of
@@ -47,7 +47,7 @@ class _Begun:
     workers: frozenset[str]  # that may process it; all if empty
 
 
-class Cluster:
+class DaskEngine:
     """The engine that processes tasks on the workers of a scheduler.
 
     Parameters
@@ -61,7 +61,7 @@ class Cluster:
     say : callable, optional
         Called with lines for people: workers that are refused, a scheduler that is away.
     located : callable, optional
-        From a result and the name of the machine that it comes from to a result that tells of it.
+        From a result and the name of the machine that it comes from to a result that names it.
 
     Raises
     ------
@@ -122,7 +122,7 @@ class Cluster:
 
     def close(self) -> None:
         """Let go of what still runs."""
-        with suppress(*AWAY):
+        with suppress(*CONNECTION_ERRORS):
             self._client.close(timeout=_LOOK)
 
     def _connect(self) -> None:
@@ -149,9 +149,9 @@ class Cluster:
         return running and self._client.scheduler_comm is self._connection
 
     def _look(self) -> None:
-        """Look at the workers, and tell if there are none."""
+        """Look at the workers, and say if there are none."""
         self._looked = time.monotonic()
-        with suppress(*AWAY):
+        with suppress(*CONNECTION_ERRORS):
             self._threads = dict(self._client.nthreads())
         deserted = not self._good()
         if deserted and not self._deserted:
@@ -208,7 +208,7 @@ class Cluster:
             if begun.tries < TRIES and type(error).__name__ != 'KilledWorker':
                 self._begin(_Begun(begun.number, begun.task, begun.tries + 1, frozenset()))
             else:
-                self._results.append((begun.number, GivenUp(f'given up: {reason_of(error)}')))
+                self._results.append((begun.number, TaskFailed(f'given up: {reason_of(error)}')))
         else:  # cancelled, because the scheduler is away
             self._waiting.append(begun)
 
@@ -249,7 +249,7 @@ class Cluster:
             try:
                 self._connect()
                 break
-            except (ValueError, *AWAY):  # not there yet, or away again meanwhile
+            except (ValueError, *CONNECTION_ERRORS):  # not there yet, or away again meanwhile
                 if time.monotonic() > limit:
                     raise
                 time.sleep(_AGAIN)

@@ -1,4 +1,4 @@
-"""Fingerprints of settings and files, which tell whether a result is still the one of today."""
+"""Fingerprints of settings and files, which show whether a result is still valid."""
 
 from __future__ import annotations
 

@@ -163,7 +163,7 @@ class ResultsFile:
             copyfile(self.path, previous)
 
     def put_in_order(self, tasks: Iterable[ImageTask]) -> None:
-        """Put the results of tasks into their order, behind those of others."""
+        """Put the results of tasks into their order, behind all other results."""
         wanted = [task.paths for task in tasks if task.paths in self._entries]
         named = set(wanted)
         order = [paths for paths in self._entries if paths not in named]

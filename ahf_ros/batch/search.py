@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ahf_ros.batch.engine import Engine, GivenUp, Here, Report, no_report
+from ahf_ros.batch.engine import Engine, Report, SerialEngine, TaskFailed, no_report
 from ahf_ros.batch.fingerprints import file_fingerprint
 from ahf_ros.batch.identification import detector_of, identify_images, located, read_checked
 from ahf_ros.batch.task import ImageOutcome, ImageTask
@@ -76,7 +76,7 @@ def try_filter(task: CandidateTask, report: Report = no_report) -> list[Target]:
 def _trials(task: ImageTask, files: tuple[str, ...], halved: bool) -> Trials:
     """Return trials of the images, whose logarithm is kept for the next filter."""
     stack = ImageStack(tuple(read_checked(path, task)[0] for path in task.paths))
-    identifier = create_identifier(task.settings, detector_of(task.settings))
+    identifier = create_identifier(detector=detector_of(task.settings), settings=task.settings)
     trials = identifier.trials_of(stack)
     return trials.reduced() if halved else trials
 
@@ -117,7 +117,7 @@ class Tries:
             future: Future[Any] = Future()
             self._asked.put((CandidateTask(part, fingerprints, halved, values), future))
             result = future.result()
-            if isinstance(result, GivenUp):
+            if isinstance(result, TaskFailed):
                 raise ValueError(f'a filter of the search: {result.reason}')
             targets: list[Target] = result
             return targets
@@ -168,7 +168,7 @@ class SpreadSearch:
     def __init__(self, engine: Engine) -> None:
         self._engine = engine
         self._tries = Tries(engine)
-        self._here = Here(self._identified)
+        self._here = SerialEngine(self._identified)
 
     def submit(self, number: int, task: Any) -> None:
         """Keep the task until the result is asked for."""

@@ -90,7 +90,7 @@ def _next(
 
 
 def _taken(arrivals: Arrivals, alarm: Alarm, say: Callable[[str], None]) -> list[str]:
-    """Return what has arrived, and tell of a folder that goes away and comes back."""
+    """Return what has arrived, and say when the folder goes away and comes back."""
     before = arrivals.away
     paths = arrivals.take()
     if arrivals.away and not before:

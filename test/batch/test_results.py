@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ahf_ros.batch.engine import Here, Report
+from ahf_ros.batch.engine import Report, SerialEngine
 from ahf_ros.batch.fingerprints import file_fingerprint
 from ahf_ros.batch.plan import make_plan
 from ahf_ros.batch.results_file import PREVIOUS, ResultsFile, Unwritable
@@ -44,7 +44,7 @@ class Run:
             plan = make_plan(tasks, results)
             self.notes = plan.notes
             self.images = []
-            for outcome in kept_outcomes_in_order(Here(self.job), plan, results):
+            for outcome in kept_outcomes_in_order(SerialEngine(self.job), plan, results):
                 self.images += [record['image'] for record in outcome.records]
                 if stop and len(self.images) == stop:
                     break

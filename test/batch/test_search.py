@@ -30,7 +30,7 @@ def test_a_search_by_workers_is_that_of_one_thread(
     for phase, path in enumerate(images):
         write_image(path, render(SCENE, phase).image)
     command = ['identify', *map(str, images), '--stack', '2', '--detector', 'traditional']
-    command += ['--expected', '5', '--population', '4', '--max-evaluations', '6', '--json']
+    command += ['--expected-targets', '5', '--population', '4', '--max-evaluations', '6', '--json']
     found = []
     for more in (['--threads', '1'], ['--spread', '--jobs', '2']):
         assert main([*command, *more, '--coarse']) == 0
