@@ -22,7 +22,7 @@ from ahf_ros.nodes.inputs import Input
 from ahf_ros.nodes.managed import ACTIVE, ManagedNode
 from ahf_ros.nodes.parameters import ParameterSettings
 from ahf_ros.nodes.pipeline import ImageJob, ImageMessage, Pipeline, Refused
-from ahf_ros.nodes.process import run
+from ahf_ros.nodes.process import LOG_PERIOD, run
 from ahf_ros.nodes.requests import Requests
 from ahf_ros.nodes.service_detector import ServiceDetector
 from ahf_ros.nodes.settings import LOSSLESS, SERVICE, DetectorNodeSettings
@@ -44,9 +44,6 @@ Result = TypeVar('Result')
 
 DIAGNOSTICS_PERIOD = 1.0
 """Period of /diagnostics, s."""
-
-LOG_PERIOD = 5.0
-"""Minimum time between two log lines of the same kind about images, s."""
 
 
 class DetectorNode(ManagedNode):

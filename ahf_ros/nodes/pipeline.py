@@ -188,7 +188,9 @@ class Pipeline:
         except Exception:
             # In its turn, the image is identified again, and what is wrong is reported.
             return None
-        return Speculation(before, identifier.memory, stack, identification)
+        return Speculation(
+            before=before, after=identifier.memory, stack=stack, identification=identification
+        )
 
     def answers(
         self, images: Sequence[tuple[Header, np.ndarray]], fresh: int
@@ -230,7 +232,7 @@ class Pipeline:
             identification = replace(identification, filter=used)
         family, shape = self._detector.family, stack.shape
         sent = coded_target_array(identification, family, shape, header, msg)
-        return ImageAnswer(stack, identification, sent)
+        return ImageAnswer(stack=stack, identification=identification, message=sent)
 
     def filtered(self, answer: ImageAnswer) -> np.ndarray:
         """Return the filtered image in which the targets of an answer were identified."""

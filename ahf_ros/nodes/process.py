@@ -36,6 +36,9 @@ from ahf_ros.nodes.qos import PUBLISHER, declare_qos, qos_profile
 from ahf_ros.nodes.signals import signalled
 from ahf_ros.text import reason_of
 
+LOG_PERIOD = 5.0
+"""Minimum time between two log lines of the same kind about messages, s."""
+
 FOLLOW_PERIOD = 1.0
 """Time between two looks at what publishers offer, s."""
 
