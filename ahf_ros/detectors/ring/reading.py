@@ -82,28 +82,28 @@ def _read_part(gray: np.ndarray, dots: Fit, family: Family, prior: Prior) -> Hyp
     edges = edge_evidence(polar, 1 - growth, growth, family.band)
     words = decode(edges, _overhang(growth, family), family, prior.expected)
     read = np.flatnonzero(_mean_odds(words, edges.weight) > _HOPEFUL)
-    growth = growth[read]
+    growth, words = growth[read], words.select(read)
     printed = dots.select(read)
     printed = replace(printed, frames=frame.scaled(printed.frames, 1 - growth))
-    # In the frame of the printed dot, the same growth is a larger share.
-    words = _with_levels(
+    some = np.flatnonzero(_doubtful(words, edges.select(read)))
+    of_levels = _words(
         gray,
-        printed,
-        polar.select(read),
-        edges.select(read),
-        growth / (1 - growth),
-        words.select(read),
+        printed.select(some),
+        polar.select(read[some]),
+        edges.select(read[some]),
+        # In the frame of the printed dot, the same growth is a larger share.
+        growth[some] / (1 - growth[some]),
         family,
         prior.expected,
     )
+    words = words.replaced(some, of_levels)
     good = _mean_odds(words, edges.weight[read]) > _HOPEFUL
     read, printed, words = read[good], printed.select(good), words.select(good)
     fit = _joint_fit(gray, printed, words, _FIRST_PER_SECTOR, 1, family)
     growth = fit.polarity * fit.edge_shift / fit.size
     polar = polar_images(gray, fit, family.band, family.bits * PER_SECTOR)
     edges = edge_evidence(polar, np.ones(len(read)), growth, family.band)
-    words = decode(edges, _overhang(growth, family), family, prior.expected)
-    words = _with_levels(gray, fit, polar, edges, growth, words, family, prior.expected)
+    words = _words(gray, fit, polar, edges, growth, family, prior.expected)
     good = _mean_odds(words, edges.weight) > _HOPEFUL
     read, fit, words = read[good], fit.select(good), words.select(good)
     fit = _joint_fit(gray, fit, words, PER_SECTOR, 2, family)
@@ -142,17 +142,23 @@ def best_growth(
     return growth
 
 
-def _with_levels(
+def _doubtful(words: Words, edges: Evidence) -> np.ndarray:
+    """Return whether words by edges alone are too doubtful to begin a joint fit, shape (k,)."""
+    doubtful: np.ndarray = (words.margin < _CLEAR) | (words.coded < -_DOUBT)
+    doubtful |= words.hidden.any(axis=1) | edges.covered.any(axis=(1, 2))
+    return doubtful | (_mean_odds(words, edges.weight) < _PLENTY)
+
+
+def _words(
     gray: np.ndarray,
     targets: Fit,
     polar: PolarImages,
     edges: Evidence,
     growth: np.ndarray,
-    words: Words,
     family: Family,
     expected: frozenset[int],
 ) -> Words:
-    """Return words by edges, and by levels as well where edges leave a doubt.
+    """Return the words of targets by all evidence.
 
     Parameters
     ----------
@@ -163,18 +169,11 @@ def _with_levels(
         As they are seen there.
     growth : ndarray of float64, shape (k,)
         Of ink, dot radii.
-    words : Words
-        By edges alone.
     family, expected
         As for `decode`.
     """
-    doubt = (words.margin < _CLEAR) | (words.coded < -_DOUBT) | words.hidden.any(axis=1)
-    doubt |= edges.covered.any(axis=(1, 2))
-    doubtful = np.flatnonzero(doubt | (_mean_odds(words, edges.weight) < _PLENTY))
-    if not doubtful.size:
-        return words
-    targets, polar = targets.select(doubtful), polar.select(doubtful)
-    edges = edges.select(doubtful)
+    if not len(targets.frames):
+        return Words.none(0, family.bits * PER_SECTOR)
     inner, outer = family.band
     radii = np.concatenate(
         [
@@ -189,9 +188,8 @@ def _with_levels(
     levels = lifted(levels, polar.lift.astype(np.float32)[:, None, None])
     light = predicted_light(gray, targets.frames, polar.lift, angles, radii, family.band)
     evidence = edges.plus(level_evidence(polar, levels, *light, radii, family.band))
-    read = decode(evidence, _overhang(growth[doubtful], family), family, expected)
-    read = replace(read, hidden=read.hidden | ~polar.visible.any(axis=1))
-    return words.replaced(doubtful, read)
+    words = decode(evidence, _overhang(growth, family), family, expected)
+    return replace(words, hidden=words.hidden | ~polar.visible.any(axis=1))
 
 
 def _mean_odds(words: Words, weight: np.ndarray) -> np.ndarray:
