@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from functools import lru_cache
@@ -20,7 +20,6 @@ from ahf_ros.batch.task import ImageOutcome, ImageTask, Level, Message
 from ahf_ros.detectors import Detector, DetectorSettings, create_detector
 from ahf_ros.drawing.overlay import draw, summary
 from ahf_ros.edge_shift import edge_shift_remark
-from ahf_ros.filtering.trials import Elsewhere
 from ahf_ros.imaging.image import check_image
 from ahf_ros.imaging.stack import ImageStack
 from ahf_ros.interchange.files import read_bytes
@@ -33,13 +32,8 @@ from ahf_ros.stream import identify_parts
 from ahf_ros.target import Identification
 from ahf_ros.text import reason_of
 
-Spread = Callable[[ImageTask, Mapping[str, np.ndarray]], Elsewhere]
-"""From a task and its images by their paths to what tries filters on them."""
 
-
-def identify_images(
-    task: ImageTask, report: Report = no_report, spread: Spread | None = None
-) -> ImageOutcome:
+def identify_images(task: ImageTask, report: Report = no_report) -> ImageOutcome:
     """Identify the targets in the images of a task, and draw its overlays.
 
     What is wrong with an image or a file is a message of the outcome.
@@ -49,8 +43,6 @@ def identify_images(
     task : ImageTask
     report : callable, optional
         Not called; a job of an engine has it.
-    spread : callable, optional
-        Gives what tries filters in the place of this process.
 
     Raises
     ------
@@ -65,20 +57,20 @@ def identify_images(
     messages: list[Message] = []
     records: list[dict[str, Any]] = []
     detector = detector_of(task.settings)
-    files = tuple(file_fingerprint(located(path, task)) for path in task.paths)
+    files = tuple(file_fingerprint(_located(path, task)) for path in task.paths)
     images = _read(task, messages)
     if len(images) < task.minimum:
         text = f'{task.paths[0]}: {len(images)} of {task.minimum} images of a stack'
         messages.append(Message(text, Level.WARNING))
     overlays = dict(zip(task.paths, task.overlays, strict=False))
     with _reported(', '.join(images), messages):
-        for found in _identified(images, detector, task, spread):
+        for found in _identified(images, detector, task):
             records.append(_record(found, detector, task))
             messages += _messages(found)
             if overlays:
                 shown = found.stack.combined(found.identification.combination)
                 drawn = draw(shown, found.identification)
-                write_image(located(overlays[found.paths[0]], task), drawn)
+                write_image(_located(overlays[found.paths[0]], task), drawn)
     return ImageOutcome(tuple(records), tuple(messages), files)
 
 
@@ -105,7 +97,7 @@ class _Found:
     in_vain: int  # filters in a row that showed no more, after which a search ended early
 
 
-def located(path: str, task: ImageTask) -> str:
+def _located(path: str, task: ImageTask) -> str:
     """Return a path from the folder of the task."""
     return str(Path(task.folder, path)) if task.folder and not is_url(path) else path
 
@@ -126,13 +118,13 @@ def _read(task: ImageTask, messages: list[Message]) -> dict[str, np.ndarray]:
     images: dict[str, np.ndarray] = {}
     for path in task.paths:
         with _reported(path, messages):
-            images[path], note = read_checked(path, task)
+            images[path], note = _read_checked(path, task)
             if note:
                 messages.append(Message(note))
     return images
 
 
-def read_checked(path: str, task: ImageTask) -> tuple[np.ndarray, str]:
+def _read_checked(path: str, task: ImageTask) -> tuple[np.ndarray, str]:
     """Return an image of a task and what there is to say about it.
 
     Raises
@@ -140,7 +132,7 @@ def read_checked(path: str, task: ImageTask) -> tuple[np.ndarray, str]:
     ValueError
         If it cannot be read or is not accepted.
     """
-    image, note = read_noted_image(located(path, task), turned=task.upright)
+    image, note = read_noted_image(_located(path, task), turned=task.upright)
     try:
         check_image(image)
     except ValueError as error:
@@ -149,7 +141,7 @@ def read_checked(path: str, task: ImageTask) -> tuple[np.ndarray, str]:
 
 
 def _identified(
-    images: dict[str, np.ndarray], detector: Detector, task: ImageTask, spread: Spread | None
+    images: dict[str, np.ndarray], detector: Detector, task: ImageTask
 ) -> Iterator[_Found]:
     """Yield what was identified in each part of a stack."""
     paths = tuple(images)
@@ -157,7 +149,6 @@ def _identified(
         return
     try:
         identifier = create_identifier(task.settings, detector, interrupt=ending.check)
-        identifier.elsewhere = spread(task, images) if spread else None
         for part, stack, found in identify_parts(identifier, list(images.values()), task.stacking):
             of = paths[part.images.start : part.images.stop]
             search = identifier.last_search

@@ -17,7 +17,6 @@ from ahf_ros.batch.identification import detector_of, identify_images
 from ahf_ros.batch.plan import make_plan
 from ahf_ros.batch.results_file import ResultsFile, Unwritable
 from ahf_ros.batch.run import kept_outcomes_in_order, outcomes_in_order
-from ahf_ros.batch.search import SpreadSearch, try_filter
 from ahf_ros.batch.task import ImageOutcome, ImageTask, told_by
 from ahf_ros.cli import inputs
 from ahf_ros.cli.engines import create_engine, shared_settings
@@ -72,7 +71,8 @@ def _run(options: argparse.Namespace, output: TextIO) -> int:
     quiet = options.quiet
     failed = bool(problems)
     measured: list[MeasuredImage] = []
-    with closing(_engine(options, jobs)) as engine:
+    engine = create_engine('identify', identify_images, jobs, options.scheduler, told_by)
+    with closing(engine):
         try:
             for outcome in _with_progress(_outcomes(engine, tasks, options), len(tasks), quiet):
                 print_outcome('identify', outcome, output if options.json else None, quiet)
@@ -102,7 +102,7 @@ def _tasks(
     """Return the number of processes, and a task for each image or stack."""
     groups = stacked(paths, options.stack_by, options.stack)
     jobs = options.jobs or (available_cores() if len(groups) >= _WORTH_PROCESSES else 1)
-    jobs = min(jobs, 1 if options.spread else len(groups))
+    jobs = min(jobs, len(groups))
     settings = shared_settings(settings, jobs, options.scheduler)
     stacking = StackSettings(stack=options.stack, stack_movement=options.stack_movement)
     overlays = _overlay_paths(paths, options.overlay)
@@ -119,16 +119,6 @@ def _tasks(
         )
         for group in groups
     ]
-
-
-def _engine(options: argparse.Namespace, jobs: int) -> Engine:
-    if not options.spread:
-        return create_engine('identify', identify_images, jobs, options.scheduler, told_by)
-    count = options.jobs or available_cores()
-    engine = create_engine(
-        'identify', try_filter, count, options.scheduler, lambda it, _: it, isolated=True
-    )
-    return SpreadSearch(engine)
 
 
 def _outcomes(

@@ -1,9 +1,8 @@
-"""The search of one image by workers."""
+"""The identification of the images of a task."""
 
 from __future__ import annotations
 
 import itertools
-import json
 import signal
 from pathlib import Path
 
@@ -12,34 +11,14 @@ import pytest
 from ahf_ros import ending
 from ahf_ros.batch.identification import identify_images
 from ahf_ros.batch.task import ImageTask
-from ahf_ros.cli import main
 from ahf_ros.interchange.image_files import write_image
 from ahf_ros.session_settings import IdentificationSettings
 from ahf_ros.settings.nested import updated
 from ahf_ros.synthetic.scene import SceneSettings, render
 
 SCENE = SceneSettings(
-    width=320, height=240, targets=3, dot_radius=10, light='stripe', ambient=0.04, seed=2, phases=2
+    width=320, height=240, targets=3, dot_radius=10, light='stripe', ambient=0.04, seed=2
 )
-
-
-def test_a_search_by_workers_is_that_of_one_thread(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    images = [tmp_path / f'{phase}.png' for phase in range(2)]
-    for phase, path in enumerate(images):
-        write_image(path, render(SCENE, phase).image)
-    command = ['identify', *map(str, images), '--stack', '2', '--detector', 'traditional']
-    command += ['--expected', '5', '--population', '4', '--max-evaluations', '6', '--json']
-    found = []
-    for more in (['--threads', '1'], ['--spread', '--jobs', '2']):
-        assert main([*command, *more, '--coarse']) == 0
-        found.append({**json.loads(capsys.readouterr().out), 'elapsed_s': 0})
-    assert found[0] == found[1]
-    assert found[0]['filter']['evaluations'] > 6
-    images[1].write_bytes(b'not an image')
-    assert main([*command, '--spread', '--jobs', '1']) == 1
-    assert '1.png is not an image' in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
