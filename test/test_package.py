@@ -48,7 +48,7 @@ ROSDEP = {
 }
 """Keys of rosdep of what is not a ROS package; mcap-ros2-support brings mcap and zstandard."""
 
-NOT_IN_ROSDEP = {'Metashape', 'distributed', 'fsspec', 'pypdfium2', 'selenium', 'watchdog'}
+NOT_IN_ROSDEP = {'Metashape', 'distributed', 'fsspec', 'pypdfium2', 'selenium'}
 """What tests skip without, extras, and what is only in the console of other software."""
 
 TO_RUN, TO_TEST = ('depend', 'exec_depend'), ('depend', 'exec_depend', 'test_depend')

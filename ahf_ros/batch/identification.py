@@ -10,12 +10,11 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 
 from ahf_ros import ending
 from ahf_ros.batch.engine import Report, no_report
-from ahf_ros.batch.fingerprints import file_fingerprint
+from ahf_ros.batch.results import file_fingerprint
 from ahf_ros.batch.task import ImageOutcome, ImageTask, Level, Message
 from ahf_ros.detectors import Detector, DetectorSettings, create_detector
 from ahf_ros.drawing.overlay import draw, summary
@@ -28,9 +27,8 @@ from ahf_ros.interchange.target_json import to_json
 from ahf_ros.interchange.urls import is_url
 from ahf_ros.session import create_identifier
 from ahf_ros.session_settings import IdentificationSettings
-from ahf_ros.stream import identify_parts
+from ahf_ros.stream import identify_parts, refusal
 from ahf_ros.target import Identification
-from ahf_ros.text import reason_of
 
 
 def identify_images(task: ImageTask, report: Report = no_report) -> ImageOutcome:
@@ -104,13 +102,13 @@ def _located(path: str, task: ImageTask) -> str:
 
 @contextmanager
 def _reported(name: str, messages: list[Message]) -> Iterator[None]:
-    """Leave what is wrong with images in the messages."""
+    """Leave what is wrong with images in the messages: the next ones may be better."""
     try:
         yield
-    except ValueError as error:
-        messages.append(Message(str(error), Level.PROBLEM))
-    except (MemoryError, cv2.error) as error:  # the other images may be smaller
-        messages.append(Message(f'{name}: {reason_of(error)}', Level.PROBLEM))
+    except Exception as error:
+        reason = refusal(error).text
+        text = reason if isinstance(error, ValueError) else f'{name}: {reason}'
+        messages.append(Message(text, Level.PROBLEM))
 
 
 def _read(task: ImageTask, messages: list[Message]) -> dict[str, np.ndarray]:

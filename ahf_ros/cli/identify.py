@@ -14,8 +14,7 @@ from rich.progress import Progress
 
 from ahf_ros.batch.engine import Engine, available_cores
 from ahf_ros.batch.identification import detector_of, identify_images
-from ahf_ros.batch.plan import make_plan
-from ahf_ros.batch.results_file import ResultsFile, Unwritable
+from ahf_ros.batch.results import Results, Unwritable
 from ahf_ros.batch.run import kept_outcomes_in_order, outcomes_in_order
 from ahf_ros.batch.task import ImageOutcome, ImageTask, told_by
 from ahf_ros.cli import inputs
@@ -128,11 +127,13 @@ def _outcomes(
     if not options.output:
         yield from outcomes_in_order(engine, tasks)
         return
-    with closing(ResultsFile(options.output)) as results:
-        plan = make_plan(tasks, results)
-        for note in plan.notes if not options.quiet else ():
-            print(note, file=sys.stderr)
-        yield from kept_outcomes_in_order(engine, plan, results)
+
+    def say(text: str) -> None:
+        if not options.quiet:
+            print(text, file=sys.stderr)
+
+    with closing(Results(options.output)) as results:
+        yield from kept_outcomes_in_order(engine, tasks, results, say)
 
 
 def _overlay_paths(images: Sequence[str], folder: Path | None) -> dict[str, str]:

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from ahf_ros import ending
+from ahf_ros.batch import identification
 from ahf_ros.batch.identification import identify_images
 from ahf_ros.batch.task import ImageTask
 from ahf_ros.interchange.image_files import write_image
@@ -44,3 +45,18 @@ def test_a_search_ends_with_its_process(
     with pytest.raises(ends):
         identify_images(ImageTask((str(tmp_path / 'image.png'),), settings))
     assert len(passed) <= 2
+
+
+def test_an_error_of_a_detector_costs_its_image_only(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_image(tmp_path / 'image.png', render(SCENE).image)
+    task = ImageTask((str(tmp_path / 'image.png'),))
+
+    def failing(*_: object) -> None:
+        raise ZeroDivisionError('of a detector')
+
+    monkeypatch.setattr(identification, 'identify_parts', failing)
+    outcome = identify_images(task)
+    assert outcome.failed and outcome.records == ()
+    assert outcome.messages[0].text == f'{task.name}: ZeroDivisionError: of a detector'
