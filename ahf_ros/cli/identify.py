@@ -12,7 +12,7 @@ from typing import TextIO
 from rich.console import Console
 from rich.progress import Progress
 
-from ahf_ros.batch.engine import Engine, available_cores
+from ahf_ros.batch.engine import Engine, EngineLost, available_cores
 from ahf_ros.batch.identification import detector_of, identify_images
 from ahf_ros.batch.results import Results, Unwritable
 from ahf_ros.batch.run import kept_outcomes_in_order, outcomes_in_order
@@ -78,7 +78,7 @@ def _run(options: argparse.Namespace, output: TextIO) -> int:
                 failed |= outcome.failed
                 if options.export:
                     measured += [measured_image(it, it['image']) for it in outcome.records]
-        except Unwritable as error:
+        except (EngineLost, Unwritable) as error:
             print(f'ahf identify: {error}', file=sys.stderr)
             return 1
     if not (settings.expected_targets or settings.estimate_expected or quiet):

@@ -8,7 +8,7 @@ from contextlib import closing, redirect_stdout
 from pathlib import Path
 from typing import TextIO
 
-from ahf_ros.batch.engine import available_cores
+from ahf_ros.batch.engine import EngineLost, available_cores
 from ahf_ros.batch.identification import detector_of, identify_images
 from ahf_ros.batch.results import Results, Unwritable
 from ahf_ros.batch.task import ImageTask, told_by
@@ -37,7 +37,7 @@ SETTLING = Parameter(
 )
 INTERVAL = Parameter(
     'interval',
-    0.5,
+    1.0,
     'Time between two looks at the folder, s.',
     minimum=0.1,
     maximum=3600.0,
@@ -109,7 +109,7 @@ def _run(options: argparse.Namespace, output: TextIO) -> int:
         with closing(Results(options.output)) as results, closing(engine):
             for outcome in watch(engine, arrivals, results, task_of, options.interval, say):
                 print_outcome('watch', outcome, output if options.json else None, options.quiet)
-    except Unwritable as error:
+    except (EngineLost, Unwritable) as error:
         say(str(error))
     return 1
 
