@@ -3,14 +3,18 @@
 # make test    every check: ruff, mypy, the import rules, the site, the tests; then the tests that
 #              need no ROS with the oldest versions and without the processor's vector units
 # make site    the documentation as a site, build/site/index.html
-# All set up .venv first; nothing is installed outside it. DISTRIBUTION=kilted takes the wheels of
-# ROS 2 Kilted instead of Jazzy, into .venv-kilted. make --jobs=2 test uses two cores.
+# All set up .venv first, with what they need; nothing is installed outside it.
+# DISTRIBUTION=kilted takes the wheels of ROS 2 Kilted instead of Jazzy, into .venv-kilted.
+# make --jobs=2 test uses two cores.
 
 PYTHON ?= python3
 DISTRIBUTION ?= jazzy
 VENV ?= .venv$(if $(filter-out jazzy,$(DISTRIBUTION)),-$(DISTRIBUTION))
 BIN := $(VENV)/bin
+INSTALLED := $(VENV)/installed
 READY := $(VENV)/ready
+QUIET := --quiet --disable-pip-version-check
+PIP := $(BIN)/python -m pip install $(QUIET)
 export AHF_ROS_DISTRIBUTION := $(DISTRIBUTION)
 
 # The site is built and reports are opened in a browser once, on Jazzy.
@@ -29,7 +33,7 @@ unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 	test-kilted browser clean
 .DELETE_ON_ERROR:
 
-demo: $(READY)
+demo: $(INSTALLED)
 	$(BIN)/ahf_demo $(DEMO)
 
 # The longest first, so that two cores end at the same time.
@@ -84,15 +88,20 @@ clean:
 	rm -rf .venv* build
 
 # The modules are used where they are; only the interfaces are generated and compiled.
-$(READY): pyproject.toml setup.py distributions.ini package.xml CMakeLists.txt \
+$(INSTALLED): pyproject.toml setup.py distributions.ini package.xml CMakeLists.txt \
 		$(wildcard msg/*.msg srv/*.srv)
 	@$(PYTHON) scripts/prerequisites.py
 	@echo 'Setting up $(VENV): ROS 2 from PyPI, and the messages compiled; takes 1 to 3 minutes.'
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[$(EXTRAS)]'
+	$(PIP) --editable .
+	touch $@
+
+# What only checks need.
+$(READY): $(INSTALLED)
+	$(PIP) 'ahf_ros[$(EXTRAS)]'
 	touch $@
 
 $(OLDEST)/ready: test/oldest.txt
 	$(OLDEST_PYTHON) -m venv $(OLDEST)
-	$(OLDEST)/bin/python -m pip install --quiet --disable-pip-version-check --requirement $<
+	$(OLDEST)/bin/python -m pip install $(QUIET) --requirement $<
 	touch $@

@@ -29,6 +29,7 @@ REQUIREMENTS = [
     'rich>=12',
     'rosbags>=0.11.7',
     'ruamel.yaml',
+    'threadpoolctl>=3.5',  # it knows the OpenBLAS of numpy's wheels
     'zstandard',
 ]
 SITE = Path(f'lib/python{sys.version_info[0]}.{sys.version_info[1]}/site-packages')

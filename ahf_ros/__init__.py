@@ -26,9 +26,11 @@ if TYPE_CHECKING:
     from ahf_ros.synthetic.scene import SceneSettings, render
     from ahf_ros.target import (
         UNDECODED,
+        DottedTarget,
         FilterState,
         Identification,
         SearchTrace,
+        SquareMarker,
         Target,
         TrueTarget,
         UndecodedTarget,
@@ -45,6 +47,7 @@ __all__ = [
     'AdaptiveSettings',
     'Detector',
     'DetectorSettings',
+    'DottedTarget',
     'FilterState',
     'Identification',
     'IdentificationSettings',
@@ -52,6 +55,7 @@ __all__ = [
     'ImageStack',
     'SceneSettings',
     'SearchTrace',
+    'SquareMarker',
     'Target',
     'TrueTarget',
     'UndecodedTarget',
@@ -72,6 +76,7 @@ _MODULES = {
     'AdaptiveSettings': 'filtering.settings',
     'Detector': 'detectors',
     'DetectorSettings': 'detectors',
+    'DottedTarget': 'target',
     'FilterState': 'target',
     'Identification': 'target',
     'IdentificationSettings': 'session_settings',
@@ -79,6 +84,7 @@ _MODULES = {
     'ImageStack': 'imaging.stack',
     'SceneSettings': 'synthetic.scene',
     'SearchTrace': 'target',
+    'SquareMarker': 'target',
     'Target': 'target',
     'TrueTarget': 'target',
     'UndecodedTarget': 'target',
@@ -95,12 +101,16 @@ _MODULES = {
 
 def __getattr__(name: str) -> Any:
     """Import a public name, see PEP 562."""
-    if name not in _MODULES:
+    if name == '__version__':
+        value = import_module(f'{__name__}.release').release()
+    elif name in _MODULES:
+        value = getattr(import_module(f'{__name__}.{_MODULES[name]}'), name)
+    else:
         raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
-    value = getattr(import_module(f'{__name__}.{_MODULES[name]}'), name)
     globals()[name] = value
     return value
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    """Return what is for users."""
+    return sorted([*__all__, '__version__'])

@@ -1,4 +1,4 @@
-"""The edge shift of an image, from that of its targets, and what it means.
+"""The edge shift of an image, from its targets, and what it means.
 
 Dark areas are larger than in the print where ink has spread, and smaller where there was too much
 light or the image is blurred.

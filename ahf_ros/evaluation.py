@@ -1,6 +1,6 @@
 """Evaluation of identifications against the truth: C, R, D, wrong IDs, false positives, RMSE.
 
-The counts are those of the paper [1]_. An image shows N targets, n are reported, I of these are
+The counts follow the paper [1]_. An image shows N targets, n are reported, I of these are
 there, and d of these have the right ID;
 
     C = I / n,    R = I / N,    D = d / N.
@@ -15,10 +15,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from ahf_ros.target import UNDECODED, Target, TrueTarget, Truth
+from ahf_ros.deprecation import deprecated_arguments
+from ahf_ros.target import UNDECODED, Target, TrueTarget, Truth, WithTargets
 from ahf_ros.text import printable
 
 TOLERANCE = 5.0
@@ -32,7 +34,7 @@ RIGHT = 'right'
 """Report with the ID of its target; at most one per target."""
 
 WRONG = 'wrong'
-"""Report with another ID than that of its target."""
+"""Report with another ID than its target has."""
 
 FOUND = 'found'
 """Report without an ID, of a target that no other report has."""
@@ -72,7 +74,7 @@ class Score:
     right : int
         d, the number of these with the right ID.
     wrong : int
-        Number of reports with another ID than that of their target.
+        Number of reports with another ID than their target has.
     false_positives : int
         Number of reports without a target, or of one that was reported already.
     errors : tuple of (float, float)
@@ -112,7 +114,10 @@ class Score:
 
 
 def judge(
-    truth: Sequence[TrueTarget], reported: Sequence[Target], tolerance: float = TOLERANCE
+    truth: WithTargets | Iterable[TrueTarget | Target],
+    reported: WithTargets | Iterable[Target],
+    *,
+    tolerance: float = TOLERANCE,
 ) -> tuple[Verdict, ...]:
     """Judge each report.
 
@@ -121,9 +126,9 @@ def judge(
 
     Parameters
     ----------
-    truth : sequence of TrueTarget
+    truth : Rendering, or iterable of TrueTarget or Target
         The targets that the image shows.
-    reported : sequence of Target
+    reported : Identification, or iterable of Target
         The targets that were identified.
     tolerance : float
         Maximum distance of a report from its target, px.
@@ -140,6 +145,7 @@ def judge(
     """
     if not tolerance > 0:
         raise ValueError(f'tolerance is {tolerance!r}, accepted is a number above 0')
+    truth, reported = _true_targets(truth), _targets(reported)
     pairs = _pairs(truth, reported, tolerance)
     verdicts: dict[int, Verdict] = {}
     taken: set[int] = set()
@@ -157,8 +163,12 @@ def judge(
     return tuple(verdicts.get(report, Verdict(FALSE)) for report in range(len(reported)))
 
 
+@deprecated_arguments(positions=('tolerance',))
 def score(
-    truth: Sequence[TrueTarget], reported: Sequence[Target], tolerance: float = TOLERANCE
+    truth: WithTargets | Iterable[TrueTarget | Target],
+    reported: WithTargets | Iterable[Target],
+    *,
+    tolerance: float = TOLERANCE,
 ) -> Score:
     """Return the figures of one image.
 
@@ -174,7 +184,8 @@ def score(
     >>> figures.right, figures.expected, figures.wrong, figures.false_positives
     (1, 2, 0, 0)
     """
-    verdicts = judge(truth, reported, tolerance)
+    truth, reported = _true_targets(truth), _targets(reported)
+    verdicts = judge(truth, reported, tolerance=tolerance)
     kinds = [verdict.kind for verdict in verdicts]
     met = [verdict.target for verdict in verdicts]
     ignored = [
@@ -235,7 +246,10 @@ def evaluate(
     0.0
     """
     names = dict.fromkeys([*truth, *results])
-    return {name: score(truth.get(name, ()), results.get(name, ()), tolerance) for name in names}
+    return {
+        name: score(truth.get(name, ()), results.get(name, ()), tolerance=tolerance)
+        for name in names
+    }
 
 
 def table(scores: Mapping[str, Score]) -> str:
@@ -254,6 +268,17 @@ def table(scores: Mapping[str, Score]) -> str:
     return '\n'.join(
         '  '.join([row[0].ljust(widths[0]), *map(str.rjust, row[1:], widths[1:])]) for row in rows
     )
+
+
+def _true_targets(
+    truth: WithTargets | Iterable[TrueTarget | Target],
+) -> tuple[TrueTarget, ...]:
+    """Return the truth of a scene, or of targets."""
+    return tuple(it if isinstance(it, TrueTarget) else TrueTarget.of(it) for it in _targets(truth))
+
+
+def _targets(shown: Any) -> tuple[Any, ...]:
+    return tuple(getattr(shown, 'targets', shown))
 
 
 def _row(name: str, item: Score) -> tuple[str, ...]:

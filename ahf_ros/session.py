@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ahf_ros.codes.families import mirrored_number
+from ahf_ros.deprecation import deprecated_arguments
 from ahf_ros.detectors import (
     Detector,
     DetectorSettings,
-    Discerning,
     Drafter,
+    EarlyStopping,
     Expecting,
     Refiner,
     check_expected_ids,
@@ -25,28 +26,37 @@ from ahf_ros.imaging.stack import ImageStack
 from ahf_ros.session_settings import IdentificationSettings
 from ahf_ros.settings.nested import updated
 from ahf_ros.target import Identification, Target
+from ahf_ros.text import shown
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from ahf_ros.options import IdentificationOptions
 
 
+@deprecated_arguments(positions=('settings', 'detector'))
 def create_identifier(
-    settings: IdentificationSettings | None = None,
-    detector: str | DetectorFunction | None = None,
     *,
+    detector: str | DetectorFunction | None = None,
+    settings: IdentificationSettings | None = None,
     interrupt: Callable[[], None] | None = None,
-    **values: Any,
+    **options: Unpack[IdentificationOptions],
 ) -> Identifier:
     """Return what identifies one image after the other.
 
     Parameters
     ----------
-    settings : IdentificationSettings, optional
-        The defaults where None.
     detector : str or callable, optional
         Name of a detector, or a detector of your own: any function from an 8-bit image to a list
-        of `Target`. If it is also a `Refiner`, a `Drafter` or `Discerning`, that is used.
+        of `Target`. If it is also a `Refiner`, a `Drafter` or `EarlyStopping`, that is used.
+        Where None, the detector of the settings.
+    settings : IdentificationSettings, optional
+        The defaults where None.
     interrupt : callable, optional
         As for `Identifier`.
-    **values
-        Parameters that differ from `settings`, such as `family`, `expected_targets`, `threads`.
+    **options
+        Parameters that differ from `settings`, such as `family`, `expected_targets`, `threads`;
+        `ahf_ros.options` lists them.
 
     Raises
     ------
@@ -61,10 +71,12 @@ def create_identifier(
     >>> identifier.identify(render(scene).image).count
     3
     """
+    _check_kinds(detector, settings)
+    values = dict(options)
     if isinstance(detector, str):
-        values, detector = values | {'detector': detector}, None
+        values['detector'], detector = detector, None
     settings = updated(settings or IdentificationSettings(), values)
-    used = detector or create_detector(settings.detector, settings.detection)
+    used = detector or create_detector(settings.detector, settings=settings.detection)
     listed = settings.adaptive.listed
     if isinstance(used, Detector) and listed:
         check_expected_ids(listed, used.name, settings.detection)
@@ -81,17 +93,19 @@ def create_identifier(
         draft=used.draft if isinstance(used, Drafter) else None,
         estimate=estimate,
         interrupt=interrupt,
-        patience=used.patience if isinstance(used, Discerning) else 0,
+        patience=used.patience if isinstance(used, EarlyStopping) else 0,
         mirrored=_mirrored_id,
         name=f'detector {used.name!r}' if isinstance(used, Detector) else 'detector',
     )
 
 
+@deprecated_arguments(positions=('detector', 'settings'))
 def identify(
     image: np.ndarray | ImageStack,
+    *,
     detector: str | DetectorFunction | None = None,
     settings: IdentificationSettings | None = None,
-    **values: Any,
+    **options: Unpack[IdentificationOptions],
 ) -> Identification:
     """Identify the coded targets of one image, or of several images of an unmoved scene.
 
@@ -99,7 +113,7 @@ def identify(
     ----------
     image : ndarray of uint8, uint16, float32 or float64, shape (height, width), or ImageStack
         Gray values, increasing with light.
-    detector, settings, **values
+    detector, settings, **options
         As for `create_identifier`.
 
     Returns
@@ -114,12 +128,28 @@ def identify(
     Examples
     --------
     >>> from ahf_ros import SceneSettings, identify, render
-    >>> rendering = render(SceneSettings(width=320, height=240, targets=3, dot_radius=8))
-    >>> found = identify(rendering.image, expected_targets=3)
-    >>> [it.id for it in found.targets] == [it.id for it in rendering.targets]
+    >>> scene = render(SceneSettings(width=320, height=240, targets=3, dot_radius=8))
+    >>> found = identify(scene.image, expected_targets=3)
+    >>> [target.id for target in found] == [target.id for target in scene.targets]
     True
     """
-    return create_identifier(settings, detector, **values).identify(image)
+    return create_identifier(detector=detector, settings=settings, **options).identify(image)
+
+
+def _check_kinds(detector: object, settings: object) -> None:
+    """Refuse what is neither a detector nor settings of an identification."""
+    if not (detector is None or isinstance(detector, str) or callable(detector)):
+        raise ValueError(
+            f'detector is {shown(detector)}, accepted is the name of a detector or a function '
+            'from an image to targets; settings are given as '
+            'settings=IdentificationSettings(...), or one by one, such as family=...'
+        )
+    if not (settings is None or isinstance(settings, IdentificationSettings)):
+        raise ValueError(
+            f'settings is {shown(settings)}, accepted is an IdentificationSettings; a detector is '
+            'given as detector=..., and DetectorSettings as '
+            'settings=IdentificationSettings(detection=...)'
+        )
 
 
 def _mirrored_id(target: Target) -> int | None:
@@ -128,7 +158,7 @@ def _mirrored_id(target: Target) -> int | None:
 
 
 def _check_family(detector: DetectorFunction, settings: DetectorSettings) -> None:
-    """Refuse to count targets of another family than that of the detector."""
+    """Refuse to count targets of another family than the detector's."""
     if isinstance(detector, Detector) and detector.family != settings.family:
         raise ValueError(
             f'family is {settings.family!r}, accepted with estimate_expected is that of the '

@@ -140,7 +140,9 @@ class Stream(Generic[Item]):
         timed: bool = True,
         interrupt: Callable[[], None] | None = None,
     ) -> None:
-        self._identifier = create_identifier(settings, detector, interrupt=interrupt)
+        self._identifier = create_identifier(
+            detector=detector, settings=settings, interrupt=interrupt
+        )
         self._stacking = stacking
         self._timed = timed
         self._window: Window[Frame[Item]] = Window(stacking)
@@ -418,4 +420,4 @@ def identify_parts(
     for part in unmoved_parts(images, settings.stack_movement):
         if part.images.stop > first_fresh:
             stack = ImageStack(tuple(images[index] for index in part.images))
-            yield part, stack, identifier.identify(stack, expected_targets)
+            yield part, stack, identifier.identify(stack, expected_targets=expected_targets)

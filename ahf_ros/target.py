@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING, Any, Protocol, overload
+
+if TYPE_CHECKING:
+    import numpy as np
 
 UNDECODED = -1
 """ID of a target whose code word could not be read for certain."""
@@ -75,11 +79,40 @@ class DottedTarget(Target):
         Number of the former.
     polarity : int
         1 for dark dots on bright ground, -1 for bright ones on dark.
+
+    Examples
+    --------
+    >>> dots = ((10.0, 20.0, 3.0, 3.0, 0.0), (22.0, 20.0, 2.0, 2.0, 0.0))
+    >>> target = DottedTarget(7, 19, 10.0, 20.0, 3.0, 3.0, dots=dots, template_dots=1)
+    >>> len(target.dots) - target.template_dots
+    1
     """
 
     dots: tuple[tuple[float, float, float, float, float], ...] = ()
     template_dots: int = 0
     polarity: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class SquareMarker(Target):
+    """One identified square marker.
+
+    Its centre is the intersection of its diagonals, which is the image of the physical centre in
+    any view. Its ellipse is the inscribed one, its code is its ID.
+
+    Attributes
+    ----------
+    corners : tuple of 4 tuples of 2 float
+        Corners, px, clockwise from the top left corner of the upright marker.
+
+    Examples
+    --------
+    >>> corners = ((5.0, 5.0), (15.0, 5.0), (15.0, 15.0), (5.0, 15.0))
+    >>> SquareMarker(3, 3, 10.0, 10.0, 5.0, 5.0, corners=corners).corners[0]
+    (5.0, 5.0)
+    """
+
+    corners: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,6 +172,15 @@ class TrueTarget:
         return cls(target.id, target.x, target.y)
 
 
+class WithTargets(Protocol):
+    """What shows targets: an `Identification`, or a scene whose targets are known."""
+
+    @property
+    def targets(self) -> Sequence[Target]:
+        """The targets."""
+        ...
+
+
 Truth = Mapping[str, Sequence[TrueTarget]]
 """The targets of each image, by file name without folders."""
 
@@ -150,7 +192,7 @@ class FilterState:
     Attributes
     ----------
     applied : bool
-        False if the result is that of the unfiltered image; the filter is then the identity.
+        False if the result comes from the unfiltered image; the filter is then the identity.
     gamma_high, gamma_low : float
         Gains of the high and the low frequencies, dimensionless.
     cutoff : float
@@ -213,7 +255,7 @@ class SearchTrace:
 
 @dataclass(frozen=True, slots=True)
 class Identification:
-    """The targets that were identified in one image.
+    """The targets that were identified in one image: a sequence of them, and how they were found.
 
     Attributes
     ----------
@@ -241,8 +283,11 @@ class Identification:
     Examples
     --------
     >>> target = Target(id=7, code=19, x=10.5, y=20.0, semi_major=8.0, semi_minor=7.5)
-    >>> Identification((target,), expected=2).count
-    1
+    >>> found = Identification((target,), expected=2)
+    >>> found.count, len(found), found[0].id, [target.x for target in found]
+    (1, 1, 7, [10.5])
+    >>> found.ids, found.centres, found.covariances.shape
+    (array([7]), array([[10.5, 20. ]]), (1, 2, 2))
     """
 
     targets: tuple[Target, ...]
@@ -255,14 +300,78 @@ class Identification:
     search: SearchTrace | None = None
     edge_shift: float | None = None
 
+    def __len__(self) -> int:
+        """Return the number of targets, undecoded ones included."""
+        return len(self.targets)
+
+    def __iter__(self) -> Iterator[Target]:
+        """Iterate over the targets."""
+        return iter(self.targets)
+
+    @overload
+    def __getitem__(self, index: int) -> Target: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Target, ...]: ...
+
+    def __getitem__(self, index: int | slice) -> Target | tuple[Target, ...]:
+        """Return a target, or several."""
+        return self.targets[index]
+
     @property
     def count(self) -> int:
         """n, the number of distinct targets identified, by family and ID."""
         return count_codes(self.targets)
 
+    @property
+    def ids(self) -> np.ndarray:
+        """IDs of the targets, an array of int64 of shape (n,)."""
+        import numpy as np
+
+        return np.array([target.id for target in self], np.int64)
+
+    @property
+    def centres(self) -> np.ndarray:
+        """Centres of the targets, px, an array of float64 of shape (n, 2): x and y."""
+        import numpy as np
+
+        return np.array([(target.x, target.y) for target in self], float).reshape(-1, 2)
+
+    @property
+    def covariances(self) -> np.ndarray:
+        """Covariances of the centres, px^2, an array of float64 of shape (n, 2, 2)."""
+        import numpy as np
+
+        return np.array([target.covariance for target in self], float).reshape(-1, 2, 2)
+
+    def to_dataframe(self) -> Any:
+        """Return the targets as a `pandas.DataFrame`, a row each.
+
+        Its columns are the fields of `Target`; the covariance has three, `covariance_xx`,
+        `covariance_xy` and `covariance_yy`.
+
+        Raises
+        ------
+        ModuleNotFoundError
+            If pandas is not installed.
+        """
+        try:
+            import pandas
+        except ModuleNotFoundError as error:
+            raise ModuleNotFoundError(
+                'pandas is not installed, to_dataframe needs it: pip install pandas'
+            ) from error
+        plain = [it.name for it in fields(Target) if it.name != 'covariance']
+        table: dict[str, Any] = {
+            name: [getattr(target, name) for target in self] for name in plain
+        }
+        for row, column, name in ((0, 0, 'xx'), (0, 1, 'xy'), (1, 1, 'yy')):
+            table[f'covariance_{name}'] = self.covariances[:, row, column]
+        return pandas.DataFrame(table)
+
 
 def sorted_targets(targets: Iterable[Target]) -> list[Target]:
-    """Return targets by ascending ID, those of one ID by family, from top to bottom, from left."""
+    """Return targets by ascending ID, then by family, from top to bottom, from left."""
     return sorted(targets, key=lambda target: (target.id, target.family, target.y, target.x))
 
 

@@ -21,7 +21,7 @@ MAXIMUM_LENGTH = 100_000
 """Maximum number of targets in a result."""
 
 MAXIMUM_ID = 2**31 - 1
-"""Maximum ID, that of the message."""
+"""Maximum ID, as in the message."""
 
 MAXIMUM_LENGTH_PX = 65536.0
 """Maximum size of a coordinate or a semi-axis, px: twice the side of the largest image."""
@@ -96,7 +96,7 @@ def checked_target(target: Any, name: str) -> Target:
 
 
 def _only_adds_fields(kind: type[Target]) -> bool:
-    """Return whether the fields of a target of this class are read as those of any other."""
+    """Return whether the fields of a target of this class are read as of any other."""
     own = kind.__mro__[: kind.__mro__.index(Target)]
     same = all(item.name not in vars(base) for base in own for item in fields(Target))
     return same and kind.__getattribute__ is Target.__getattribute__
@@ -166,7 +166,7 @@ def _covariance(value: Any, name: str) -> tuple[float, ...]:
 
 
 def _listed(value: Any) -> list[Any]:
-    """Return the first elements of a list or those of an array, empty for anything else."""
+    """Return the first elements of a list or an array; empty for anything else."""
     if isinstance(value, np.ndarray):
         return value.ravel().tolist() if value.size == 4 else []
     return list(islice(value, 5)) if isinstance(value, (list, tuple)) else []

@@ -1,12 +1,12 @@
-"""Text of others, made fit for logs, terminals, JSON and messages."""
+"""Untrusted text, made fit for logs, terminals, JSON and messages."""
 
 from __future__ import annotations
 
-LONGEST = 300
+MAXIMUM_LENGTH = 300
 """Number of characters of a foreign text that are passed on."""
 
 
-def printable(text: str, longest: int = LONGEST) -> str:
+def printable(text: str, longest: int = MAXIMUM_LENGTH) -> str:
     r"""Return a text with everything escaped that a log or a message may not hold.
 
     Parameters
@@ -29,7 +29,7 @@ def shown(value: object) -> str:
     """Return the representation of any object, printable and of bounded length."""
     try:
         return printable(repr(value))
-    except Exception:  # what an object of others raises when it is asked what it is
+    except Exception:  # an object may raise anything when it describes itself
         return f'a {type(value).__name__}'
 
 
@@ -37,7 +37,7 @@ def reason_of(error: BaseException) -> str:
     """Return the type and the text of any exception, printable and of bounded length."""
     try:
         text = str(error)
-    except Exception:  # an exception of others may have no text
+    except Exception:  # an exception may have no text
         text = ''
     return printable(f'{type(error).__name__}: {text}')
 

@@ -2,7 +2,7 @@
 
 Every area tries as many inputs as its option says, always the same ones, and counts as failed
 whatever does neither succeed nor name what is wrong. At the end, the tests run that concern kills,
-signals, programs, limits and files of others. The whole takes half an hour.
+signals, programs, limits and foreign files. The whole takes half an hour.
 
     python -m benchmarks.attack [--bags 10000] [--results 10000] [--messages 10000]
                                 [--images 10000] [--no-tests]
@@ -115,7 +115,7 @@ _BAD = st.one_of(
 
 @st.composite
 def targets(draw: st.DrawFn) -> Target:
-    """Draw a target of which none, one or two fields may be anything."""
+    """Draw a target; none, one or two of its fields may be anything."""
     bad = draw(st.lists(st.sampled_from(list(_GOOD)), max_size=2))
     return Target(**{name: draw(_BAD if name in bad else it) for name, it in _GOOD.items()})
 

@@ -29,7 +29,7 @@ import numpy as np
 
 from ahf_ros.batch.engine import Engine, finished_tasks
 from ahf_ros.batch.identification import identify_images
-from ahf_ros.batch.processes import Processes
+from ahf_ros.batch.processes import ProcessEngine
 from ahf_ros.batch.task import ImageTask
 from ahf_ros.interchange.image_files import write_image
 from ahf_ros.synthetic.scene import SceneSettings, render
@@ -42,7 +42,7 @@ TARGET = 10_000
 """Number of images that costs are extended to."""
 
 NAP = 0.1
-"""Time of a task of which the overhead is measured, s."""
+"""Time of a task whose overhead is measured, s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,7 @@ class Cost:
 
 
 def photographs(folder: Path, count: int) -> list[Path]:
-    """Return images of 10.6 MP, of which only the first are different files."""
+    """Return images of 10.6 MP; only the first are different files."""
     originals = []
     for number in range(min(PHOTOGRAPHS, count)):
         path = folder / f'original_{number}.jpg'
@@ -154,7 +154,7 @@ def start_workers(rounds: int) -> None:
     times = []
     for _ in range(rounds):
         began = time.perf_counter()
-        with closing(Processes(identify_images, 1)) as engine:
+        with closing(ProcessEngine(identify_images, 1)) as engine:
             list(finished_tasks(engine, [ImageTask(('missing.png',))]))
             times.append(time.perf_counter() - began)
     print(f'start of a worker: {statistics.median(times):.2f} s, at most {max(times):.2f} s')
@@ -170,7 +170,7 @@ def overhead(engine: Engine, count: int, workers: int) -> float:
 
 def measure_cluster(tiny: int, workers: int = 2) -> None:
     """Print what a scheduler adds to tasks, and its memory under very many small ones."""
-    from ahf_ros.batch.cluster import Cluster
+    from ahf_ros.batch.cluster import DaskEngine
     from support.cluster import LocalCluster
 
     with tempfile.TemporaryDirectory() as name, LocalCluster(Path(name)) as local:
@@ -178,9 +178,9 @@ def measure_cluster(tiny: int, workers: int = 2) -> None:
         for number in range(workers):
             local.worker(str(number))
         local.wait_for_workers(workers)
-        with closing(Processes(sleep, workers)) as processes:
+        with closing(ProcessEngine(sleep, workers)) as processes:
             print(f'processes: {overhead(processes, 200, workers):.1%} over {NAP} s a task')
-        with closing(Cluster(sleep, local.address)) as cluster:
+        with closing(DaskEngine(sleep, local.address)) as cluster:
             print(f'dask: {overhead(cluster, 200, workers):.1%} over {NAP} s a task')
         image = Path(name, 'tiny.png')
         write_image(image, render(SceneSettings(width=64, height=48, targets=0)).image)
@@ -188,7 +188,7 @@ def measure_cluster(tiny: int, workers: int = 2) -> None:
             with (
                 ProcessTree(scheduler.pid) as tree,
                 ProcessTree(os.getpid()) as own,
-                closing(Cluster(identify_images, local.address)) as cluster,
+                closing(DaskEngine(identify_images, local.address)) as cluster,
             ):
                 began = time.perf_counter()
                 done = sum(1 for _ in finished_tasks(cluster, _tiny_tasks(image, count)))

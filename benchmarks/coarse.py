@@ -10,7 +10,6 @@ import time
 from collections import defaultdict
 from itertools import product
 
-import ahf_ros.blas  # noqa: F401  before numpy
 from ahf_ros.detectors import DETECTOR_NAMES, create_detector
 from ahf_ros.evaluation import score
 from ahf_ros.filtering.settings import EXTENDED, PUBLISHED
@@ -40,12 +39,12 @@ def main() -> None:
         for seed in options.seeds:
             scene = SceneSettings(light=light, ambient=ambient, seed=seed)
             rendering = render(scene)
-            truth = rendering.truth
+            truth = rendering.targets
             right['without'] += score(truth, detector(rendering.image)).right
             for name, (genes, coarse) in zip(names, ways, strict=True):
                 settings = {'expected_targets': scene.targets, 'search': genes, 'coarse': coarse}
                 started = time.perf_counter()
-                found = identify(rendering.image, detector, **settings)
+                found = identify(rendering.image, detector=detector, **settings)
                 duration[name] += time.perf_counter() - started
                 figures = score(truth, found.targets)
                 right[name] += figures.right

@@ -16,7 +16,7 @@ import numpy as np
 from ahf_ros.codes.ring import FAMILY_NAMES, family
 from ahf_ros.synthetic.patterns import LIGHT_NAMES, benchmark_lights
 from ahf_ros.synthetic.scene import SceneSettings, render
-from ahf_ros.target import TrueTarget
+from ahf_ros.target import Target, TrueTarget
 from benchmarks import occluders
 from benchmarks.disturbed import blurred, compressed, noisy
 from benchmarks.exposure import Exposure
@@ -52,7 +52,7 @@ class Scene(NamedTuple):
 
     condition: str
     image: np.ndarray
-    truth: Sequence[TrueTarget]
+    truth: Sequence[TrueTarget | Target]
     family: str
     others: bool = False
 
@@ -61,7 +61,7 @@ def scenes(seed: int) -> Iterator[Scene]:
     """Yield scenes under every condition."""
     for settings in lit(seed):
         rendering = render(settings)
-        yield Scene('light', rendering.image, rendering.truth, settings.family)
+        yield Scene('light', rendering.image, rendering.targets, settings.family)
     yield from disturbed(seed)
     yield from strange(seed)
 

@@ -85,13 +85,16 @@ def searched(seeds: Sequence[int], name: str) -> list[str]:
     jobs = [(light, ambient, seed) for light, ambient in SEARCHED for seed in seeds]
     for light, ambient, seed in progress(jobs):
         scene = render(SceneSettings(light=light, ambient=ambient, seed=seed))
-        truth = scene.truth
+        truth = scene.targets
         plain = score(truth, detector(scene.image))
         cells = [f'{light} {ambient:g}', str(len(truth)), str(plain.right)]
         times = []
         for expected in (len(truth), 0):
             found = identify(
-                scene.image, detector, expected_targets=expected, estimate_expected=True
+                scene.image,
+                detector=detector,
+                expected_targets=expected,
+                estimate_expected=True,
             )
             figures = score(truth, found.targets)
             cells += [figures.right, figures.wrong + figures.false_positives]

@@ -109,7 +109,7 @@ class Count:
 
 def detector(name: str, target_family: str) -> Detector:
     """Return a detector of targets of a family."""
-    return create_detector(name, DetectorSettings(family=target_family))
+    return create_detector(name, settings=DetectorSettings(family=target_family))
 
 
 def counted(detect: Callable[[np.ndarray], list[Target]], scenes: Iterator[Scene]) -> Count:

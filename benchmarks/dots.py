@@ -23,7 +23,6 @@ import numpy as np
 from rich.console import Console
 from rich.progress import track
 
-import ahf_ros.blas  # noqa: F401  before numpy
 from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.session import identify
 from ahf_ros.synthetic.scene import SceneSettings, render
@@ -88,11 +87,13 @@ def scene_rows(seeds: Sequence[int], methods: Sequence[tuple[str, bool]]) -> lis
         rows = {method: Row(group, name) for method in methods}
         for seed in seeds:
             rendering = render(replace(scene, seed=seed))
-            truth = rendering.truth
+            truth = rendering.targets
             for (detector, with_ahf), row in rows.items():
                 expected = len(truth) if with_ahf else 0
                 found = identify(
-                    rendering.image, create_detector(detector, FAMILY), expected_targets=expected
+                    rendering.image,
+                    detector=create_detector(detector, settings=FAMILY),
+                    expected_targets=expected,
                 )
                 row.add(rendering.image, truth, (found.targets, found.filter.duration))
         records += [
@@ -123,7 +124,7 @@ def scene_table(records: Sequence[dict[str, Any]]) -> Iterator[str]:
 
 def reports(images: Callable[[int], np.ndarray], count: int) -> dict[str, int]:
     """Return the number of targets reported in images without any, by detector."""
-    detectors = [create_detector(name, FAMILY) for name in ('dots', 'dots_published')]
+    detectors = [create_detector(name, settings=FAMILY) for name in ('dots', 'dots_published')]
     found = {detector.name: 0 for detector in detectors}
     seeds = range(FIRST_TEXTURE, FIRST_TEXTURE + count)
     for seed in track(seeds, images.__name__, console=Console(stderr=True)):

@@ -40,7 +40,7 @@ SIDES = st.sampled_from([*range(12, 50), 1, 15, 16])
 
 @st.composite
 def wild_images(draw: st.DrawFn) -> Fields:
-    """Draw an Image of which no field knows the others."""
+    """Draw an Image whose fields know nothing of each other."""
     return {
         'encoding': draw(st.one_of(st.sampled_from([*ENCODINGS, *UNKNOWN]), st.text(max_size=9))),
         'height': draw(ANY_SIZE),

@@ -66,7 +66,7 @@ def rendered(settings: SceneSettings) -> Callable[[int], Scene]:
 
     def make(seed: int) -> Scene:
         rendering = render(replace(settings, seed=seed))
-        return rendering.image, rendering.truth
+        return rendering.image, rendering.targets
 
     return make
 
@@ -150,7 +150,7 @@ TABLES = {
 def timed(detector: Detector, image: np.ndarray, expected: int = 0) -> tuple[Any, float]:
     """Return what is identified, driven by AHF where a number is expected, and the time, s."""
     started = time.perf_counter()
-    found = identify(image, detector, expected_targets=expected).targets
+    found = identify(image, detector=detector, expected_targets=expected).targets
     return found, time.perf_counter() - started
 
 
@@ -185,9 +185,7 @@ def speed(seed: int, rounds: int = 3) -> list[dict[str, Any]]:
                 started = time.process_time()
                 found = detector(rendering.image)
                 of_one.append(time.process_time() - started)
-        right = [
-            score(rendering.truth, detector(rendering.image)).right for detector, rendering in runs
-        ]
+        right = [score(rendering, detector(rendering.image)).right for detector, rendering in runs]
         own, other = (min(of_one[1:]) for of_one in times)
         rows.append({'name': light, 'right': right, 'gsi': own, 'ring': other})
         del found

@@ -39,7 +39,7 @@ from benchmarks.reliability import NEAR, reliability_table, run
 BASE = SceneSettings(
     family='gsi', width=1600, height=1200, targets=6, dot_radius=5.0, focal_length=6.0
 )
-"""A scene, of which others differ."""
+"""A scene; the others differ from it."""
 
 COVERED = 2
 """Targets of a scene that lack a decoding dot."""

@@ -80,7 +80,7 @@ class Row:
     seconds: list[float] = field(default_factory=list)
     contours: list[float] = field(default_factory=list)
 
-    def add(self, image: np.ndarray, truth: Sequence[TrueTarget], seen: Seen) -> None:
+    def add(self, image: np.ndarray, truth: Sequence[TrueTarget | Target], seen: Seen) -> None:
         """Add what was identified in one image."""
         targets, seconds = seen
         self.scores.append(score(truth, targets))
@@ -146,9 +146,9 @@ def with_detector(options: argparse.Namespace) -> Identify:
     """Return identification by a detector of the package, driven by AHF or not."""
 
     def run(image: np.ndarray, family: str, expected: int) -> Seen:
-        detector = create_detector(options.detector, DetectorSettings(family=family))
+        detector = create_detector(options.detector, settings=DetectorSettings(family=family))
         detector(image[:400, :400])  # tables that are made once are not timed
-        found = identify(image, detector, expected_targets=expected if options.ahf else 0)
+        found = identify(image, detector=detector, expected_targets=expected if options.ahf else 0)
         return found.targets, found.filter.duration
 
     return run
@@ -160,14 +160,16 @@ def with_command(options: argparse.Namespace) -> Identify:
     def run(image: np.ndarray, family: str, expected: int) -> Seen:
         command = options.command.replace('{family}', family).replace('{expected}', str(expected))
         settings = DetectorSettings(command=command, detector_timeout=PATIENCE)
-        detector = create_detector('command', settings)
+        detector = create_detector('command', settings=settings)
         started = time.perf_counter()
         return detector(image), time.perf_counter() - started
 
     return run
 
 
-def normalised_squares(truth: Sequence[TrueTarget], targets: Sequence[Target]) -> list[float]:
+def normalised_squares(
+    truth: Sequence[TrueTarget | Target], targets: Sequence[Target]
+) -> list[float]:
     """Return e C^-1 e of the errors e of the right targets that have a covariance C."""
     squares = []
     for verdict, target in zip(judge(truth, targets), targets, strict=True):
@@ -195,7 +197,7 @@ def synthetic_rows(options: argparse.Namespace, run: Identify) -> list[Row]:
     jobs = [(row, replace(scene, seed=seed)) for row, scene in rows for seed in options.seeds]
     for row, scene in track(jobs, 'scenes', console=Console(stderr=True)):
         rendering = render(scene)
-        truth = rendering.truth
+        truth = rendering.targets
         row.add(rendering.image, truth, run(rendering.image, scene.family, len(truth)))
     return [row for row, _ in rows]
 

@@ -26,7 +26,6 @@ from typing import Any
 from rich.console import Console
 from rich.progress import track
 
-import ahf_ros.blas  # noqa: F401  before numpy
 from ahf_ros.codes.families import FAMILY_NAMES
 from ahf_ros.detectors import DETECTOR_NAMES
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
@@ -150,7 +149,7 @@ def measure(options: argparse.Namespace) -> Iterator[Row]:
         cell = Row(row, light)
         for seed in options.seeds:
             rendering = photograph(options, row, light, seed)
-            truth = rendering.truth
+            truth = rendering.targets
             cell.add(rendering.image, truth, run(rendering.image, options.family, len(truth)))
         yield cell
 

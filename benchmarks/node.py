@@ -1,6 +1,6 @@
 """What a node costs beside the identification: images of 10.6 MP from another process.
 
-First an image at a time is sent and its answer waited for. The node tells how long an answer took
+First an image at a time is sent and its answer waited for. The node says how long an answer took
 it from the message in to the message out (`latency` on /diagnostics, in ms), the answer how long
 the identification took (`filter.duration`): the difference is the node's own time, and what is
 left of the time from sending to answer is that of the transport there and back. Then images are

@@ -14,7 +14,7 @@ from benchmarks.exposure import GAMMA, INK, WHITE, Cell, Glare, Occluder
 
 _LABEL = 3.8  # radius of the paper that another target is printed on, dot radii
 _DIRTY = 3.8  # radius of the area that dirt lies in, dot radii
-_DARKEST, _BRIGHTEST = 40.0, 235.0  # gray values of dirt, beyond those of ink and of paper
+_DARKEST, _MAXIMUM_LEVEL = 40.0, 235.0  # gray values of dirt, beyond those of ink and of paper
 
 
 def over_sectors(count: float, gray: float, *, whole: bool = False) -> Occluder:
@@ -130,7 +130,7 @@ def _dirt(
     for _ in range(count):
         distance = draw(cell, generator)
         share = _share(np.float32(generator.uniform(*widths) / 2) - distance, cell)
-        gray[share > 0] = generator.uniform(_DARKEST, _BRIGHTEST)
+        gray[share > 0] = generator.uniform(_DARKEST, _MAXIMUM_LEVEL)
         np.maximum(covered, share, out=covered)
     return covered, gray
 

@@ -25,8 +25,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import ahf_ros.blas  # noqa: F401  before numpy
-
 # isort: split
 import cv2
 import numpy as np
@@ -114,7 +112,7 @@ class Method:
             refine=detector.refine,
             draft=partial(counted, draft),
         )
-        return identifier.identify(image, expected), tried
+        return identifier.identify(image, expected_targets=expected), tried
 
 
 METHODS = (
@@ -146,7 +144,7 @@ def run_scene(scene: SceneSettings, most: int) -> list[dict[str, Any]]:
         if family not in renderings:
             renderings[family] = render(replace(scene, family=family))
         rendering = renderings[family]
-        truth = rendering.truth
+        truth = rendering.targets
         method.identify(rendering.image[:400, :400], 0, most)  # tables that are made once
         started = time.process_time()
         found, tried = method.identify(rendering.image, len(truth), most)
@@ -171,7 +169,7 @@ def run_scene(scene: SceneSettings, most: int) -> list[dict[str, Any]]:
 
 
 def error_vectors(
-    truth: Sequence[TrueTarget], targets: Sequence[Target]
+    truth: Sequence[TrueTarget | Target], targets: Sequence[Target]
 ) -> list[tuple[float, float, float, float]]:
     """Return the places of the targets identified right, and their errors, px."""
     return [

@@ -20,7 +20,6 @@ import numpy as np
 from rich.console import Console
 from rich.progress import track
 
-import ahf_ros.blas  # noqa: F401  before numpy
 from ahf_ros.detectors import create_detector
 from ahf_ros.features.frame import affine_frames, circle_points, project
 from ahf_ros.features.sampling import sample
@@ -38,8 +37,8 @@ HOLE = 0.05
 LIGHTS = (('normal', 0.3), ('stripe', 0.3), ('stripe', 0.12), ('lattice', 0.12))
 
 _ROUNDS = 12
-_LARGEST_STEP = 0.5  # of a centre in a round, px
-_FARTHEST = 0.15  # of a hole from the centre of its target, radii of the dot
+_MAXIMUM_STEP = 0.5  # of a centre in a round, px
+_MAXIMUM_DISTANCE = 0.15  # of a hole from the centre of its target, radii of the dot
 _CLEAR = 8.0  # height of a hole, in its standard deviation, for it to count as seen
 _SHARE = 0.05  # the same, in the gray value beside the dot
 _SOFTNESS = (0.3, 9.0)  # variance of the blur, px^2
@@ -109,13 +108,13 @@ def hole_centre(
         residual = (window - ground - height * bump).ravel()
         normal = design.T @ design + 1e-9 * np.eye(5)
         step = np.linalg.solve(normal, design.T @ residual)
-        centre = centre + np.clip(step[:2], -_LARGEST_STEP, _LARGEST_STEP)
+        centre = centre + np.clip(step[:2], -_MAXIMUM_STEP, _MAXIMUM_STEP)
         softness = float(np.clip(softness + np.clip(step[2], -0.5, 0.5), *_SOFTNESS))
     noise = max(float(residual @ residual) / (residual.size - 5), 0.3**2)
     covariance = noise * np.linalg.inv(normal)
     moved = np.hypot(centre[0] + column - target.x, centre[1] + row - target.y)
     clear = polarity * height > max(_CLEAR * np.sqrt(covariance[3, 3]), _SHARE * gray.max())
-    if not clear or moved > max(1.0, _FARTHEST * target.semi_minor):
+    if not clear or moved > max(1.0, _MAXIMUM_DISTANCE * target.semi_minor):
         return None
     return centre + np.array([column, row]), covariance[:2, :2]
 
@@ -182,7 +181,7 @@ def measure(seeds: Sequence[int]) -> Iterator[Agreement]:
     ring = create_detector('ring')
     for name, settings in track(list(scenes(seeds)), 'scenes', console=Console(stderr=True)):
         shown = [render(it) for it in settings]
-        truth = [{it.id: np.array([it.x, it.y]) for it in one.truth} for one in shown]
+        truth = [{it.id: np.array([it.x, it.y]) for it in one.targets} for one in shown]
         images = [(one.image, ring(one.image), of) for one, of in zip(shown, truth, strict=True)]
         yield agreement(name, images)
     aicon = create_detector('ring', family='aicon14')

@@ -18,7 +18,7 @@ NEIGHBOURHOOD = 40.0
 
 _REDUCTION = 8  # of the image in which a wide blur is computed
 _PERCENTILES = (0.1, 99.5)  # that become black and white, as in the homomorphic filter
-_LEAST_DEVIATION = 2.0  # gray values, for the local normalisation to divide by
+_MINIMUM_DEVIATION = 2.0  # gray values, for the local normalisation to divide by
 
 
 def contrast_limited_equalisation(image: np.ndarray) -> np.ndarray:
@@ -37,7 +37,7 @@ def local_normalisation(image: np.ndarray) -> np.ndarray:
     light = image.astype(np.float32)
     mean = _blurred(light, NEIGHBOURHOOD)
     variance = _blurred(light * light, NEIGHBOURHOOD) - mean * mean
-    return _stretched((light - mean) / np.sqrt(np.maximum(variance, _LEAST_DEVIATION**2)))
+    return _stretched((light - mean) / np.sqrt(np.maximum(variance, _MINIMUM_DEVIATION**2)))
 
 
 PREPROCESSORS: dict[str, Callable[[np.ndarray], np.ndarray]] = {

@@ -31,7 +31,7 @@ RADII = {'ring': '1mm', 'gsi': '0.5mm', 'dots': '1.25mm', 'aruco': '1.5mm', 'apr
 """Radius of the dots of each kind of families."""
 
 LARGER = {('metashape20', 'bright'): '1.5mm'}
-"""The radius of others: at 8 px, `ring` left 542 of these 26013 targets undecoded, none wrong."""
+"""The radius of other targets: at 8 px, `ring` left 542 of these 26013 undecoded, none wrong."""
 
 HEAD = """# Printed targets
 

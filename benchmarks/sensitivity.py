@@ -116,7 +116,7 @@ def constants() -> Iterator[tuple[str, float]]:
 
 
 def modules() -> list[str]:
-    """Return the modules in the rooms of `ring` that it imports, as a new process tells."""
+    """Return the modules in the rooms of `ring` that it imports, as a new process reports."""
     names = 'import sys, ahf_ros.detectors.ring.detector; print(*sorted(sys.modules))'
     done = subprocess.run(
         [sys.executable, '-c', names], cwd=ROOT, check=True, capture_output=True, text=True

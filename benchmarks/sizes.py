@@ -17,7 +17,6 @@ from typing import Any
 from rich.console import Console
 from rich.progress import track
 
-import ahf_ros.blas  # noqa: F401  before numpy
 from ahf_ros.detectors import create_detector
 from ahf_ros.evaluation import RIGHT, judge, score
 from benchmarks.filter import machine

@@ -94,7 +94,7 @@ class Frame:
 
 
 def look(process: int, images: int) -> Look:
-    """Return the size of a process, as Linux tells it."""
+    """Return the size of a process, as Linux reports it."""
     folder = Path('/proc') / str(process)
     told = dict(line.split(':', 1) for line in (folder / 'status').read_text().splitlines())
     memory, peak = (int(told[name].split()[0]) / 1024 for name in ('VmRSS', 'VmHWM'))

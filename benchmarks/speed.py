@@ -24,7 +24,6 @@ from typing import Any
 
 import numpy as np
 
-import ahf_ros.blas  # noqa: F401  before numpy
 from ahf_ros.detectors import Drafter, create_detector
 from ahf_ros.filtering.genes import genes_of
 from ahf_ros.filtering.genetic import search
@@ -135,7 +134,7 @@ def main() -> None:
     duration, (count, evaluations) = seconds(lambda: published(recipe, image, detector, expected))
     other = f'published, traditional: {count} in {evaluations} identifications'
     for name in ('traditional', 'ring'):
-        run = partial(identify, image, name, expected_targets=expected)
+        run = partial(identify, image, detector=name, expected_targets=expected)
         times = [seconds(run) for _ in range(3)]
         result = times[0][1]
         words = f'AHF, {name}: {result.count} in {result.filter.evaluations}'

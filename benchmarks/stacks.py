@@ -21,7 +21,6 @@ import numpy as np
 from rich.console import Console
 from rich.progress import track
 
-import ahf_ros.blas  # noqa: F401  before numpy
 from ahf_ros.session import create_identifier
 from ahf_ros.session_settings import StackSettings
 from ahf_ros.stream import identify_parts
@@ -56,7 +55,7 @@ def measure(options: argparse.Namespace) -> Iterator[dict[str, Any]]:
             shown = [render(scene, phase) for phase in range(options.phases)]
             for column, of in zip(COLUMNS, (shown[:1], shown, [render(base)]), strict=True):
                 found, seconds = identified([it.image for it in of], options.targets)
-                rows[column].add(of[0].image, of[0].truth, (found[-1].targets, seconds))
+                rows[column].add(of[0].image, of[0].targets, (found[-1].targets, seconds))
                 if len(of) > 1:
                     parts += len(found)
                     chosen[found[-1].combination] += 1

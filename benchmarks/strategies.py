@@ -19,10 +19,9 @@ import numpy as np
 from rich.console import Console
 from rich.progress import track
 
-import ahf_ros.blas  # noqa: F401  before numpy
 from ahf_ros.detectors import DETECTOR_NAMES, Drafter, create_detector
 from ahf_ros.filtering.chromosome import Gene, Values
-from ahf_ros.filtering.genes import tuned
+from ahf_ros.filtering.genes import genes_of, tuned
 from ahf_ros.filtering.genetic import search
 from ahf_ros.filtering.homomorphic import HomomorphicFilter
 from ahf_ros.filtering.settings import EXTENDED, PUBLISHED, GeneticSettings, TuningSettings
@@ -38,7 +37,7 @@ LIGHTS = (
     ('lattice', 0.12),
 )
 TRIED = (1, 5, 10, 25, 50, 100)
-MOST = max(TRIED)
+MAXIMUM_FILTERS = max(TRIED)
 
 
 class Scene:
@@ -73,7 +72,7 @@ def genetic(
     population: int = GeneticSettings().population,
 ) -> list[int]:
     """Try filters as the genetic search does."""
-    settings = GeneticSettings(population=population, max_evaluations=MOST)
+    settings = GeneticSettings(population=population, max_evaluations=MAXIMUM_FILTERS)
     result = search(scene.discrepancy, genes, settings, generator, executor=executor)
     return [scene.known[values] for values in result.tried]
 
@@ -89,7 +88,7 @@ def on_a_grid(
     scene: Scene, genes: tuple[Gene, ...], generator: np.random.Generator, executor: Executor
 ) -> list[int]:
     """Try a grid, ten by ten where there are two genes, in random order."""
-    steps = round(MOST ** (1 / len(genes)))
+    steps = round(MAXIMUM_FILTERS ** (1 / len(genes)))
     points = [[_part(gene, (step + 0.5) / steps) for step in range(steps)] for gene in genes]
     grid = list(product(*points))
     return tried(scene, (grid[place] for place in generator.permutation(len(grid))), executor)
@@ -98,7 +97,7 @@ def on_a_grid(
 def tried(scene: Scene, filters: Iterator[Values], executor: Executor) -> list[int]:
     """Return |N - n| of one filter after the other, up to the first that shows N targets."""
     found: list[int] = []
-    chosen = list(islice(dict.fromkeys(filters), MOST))
+    chosen = list(islice(dict.fromkeys(filters), MAXIMUM_FILTERS))
     for start in range(0, len(chosen), 10):
         found += executor.map(scene.discrepancy, chosen[start : start + 10])
         if 0 in found:
@@ -107,7 +106,7 @@ def tried(scene: Scene, filters: Iterator[Values], executor: Executor) -> list[i
 
 
 def _drawn(genes: tuple[Gene, ...], generator: np.random.Generator) -> Iterator[Values]:
-    for _ in range(2 * MOST):
+    for _ in range(2 * MAXIMUM_FILTERS):
         yield tuple(gene.value(int(generator.integers(gene.count))) for gene in genes)
 
 
@@ -135,7 +134,7 @@ def main() -> None:
         for light, ambient in LIGHTS:
             scene = Scene(options.detector, light, ambient)
             for tuning, (name, strategy) in product((PUBLISHED, EXTENDED), STRATEGIES.items()):
-                genes = TuningSettings(search=tuning).genes
+                genes = genes_of(TuningSettings(search=tuning))
                 best = np.zeros((options.seeds, len(TRIED)))
                 console = Console(stderr=True)
                 for seed in track(range(options.seeds), f'{light} {tuning}', console=console):

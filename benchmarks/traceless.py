@@ -81,7 +81,7 @@ def shares(code: Family, cover: Occluder, count: int, seed: int) -> tuple[float,
 
 
 def far_apart(code: Family, sectors: int, seed: int) -> tuple[int, ...]:
-    """Return IDs of which no two can look alike, up to a number of sectors of each covered.
+    """Return IDs that cannot look alike, up to a number of sectors of each covered.
 
     Parameters
     ----------

@@ -13,7 +13,7 @@ from pathlib import Path
 
 OURS = ('ahf-ros', 'pip')
 UNKNOWN = 'not stated'
-_LONGEST = 60  # characters; longer ones are the text of a licence
+_MAXIMUM_LENGTH = 60  # characters; longer ones are the text of a licence
 
 HEAD = """# Licences
 
@@ -40,7 +40,7 @@ def licence(item: Distribution) -> str:
     """Return the licence that a package states in its metadata, or in package.xml of ROS."""
     about = item.metadata
     stated = about.get('License-Expression') or about.get('License') or ''
-    if stated.strip() and len(stated) <= _LONGEST and '\n' not in stated:
+    if stated.strip() and len(stated) <= _MAXIMUM_LENGTH and '\n' not in stated:
         return stated.strip()
     classified = [
         line.split(' :: ')[-1]

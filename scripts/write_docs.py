@@ -166,7 +166,7 @@ def right_and_wrong(of: dict[str, Any]) -> str:
 
 
 def table(rows: list[tuple[str, ...]]) -> str:
-    """Return rows, the first of which is the head, as Markdown."""
+    """Return rows as Markdown; the first one is the head."""
     head, *body = (f'| {" | ".join(row)} |\n' for row in rows)
     return head + '|---' * len(rows[0]) + '|\n' + ''.join(body)
 

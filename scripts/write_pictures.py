@@ -15,7 +15,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-import ahf_ros.blas  # noqa: F401  before numpy
 from ahf_ros import ImageStack, SceneSettings, create_detector, create_identifier, render
 from ahf_ros.codes.designs import printed_design, proportions
 from ahf_ros.codes.families import numbers_of

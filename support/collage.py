@@ -56,11 +56,11 @@ def collage(radii: Sequence[float], family: str = 'metashape12', **settings: Any
             **settings,
         )
         shown = render(scene)
-        while shown.truth[0].id in {target.id for target in truth}:
+        while shown.targets[0].id in {target.id for target in truth}:
             scene = replace(scene, seed=scene.seed + 1)
             shown = render(scene)
         pieces.append((left, top, shown.image))
-        (target,) = shown.truth
+        (target,) = map(TrueTarget.of, shown.targets)
         truth.append(replace(target, x=target.x + left, y=target.y + top))
         seed = scene.seed + 1
         if not left:

@@ -1,7 +1,7 @@
 """What a launch file starts, without launch, which is on no package index.
 
-A stand-in for launch tells which processes a launch file describes, with which arguments. What it
-cannot tell is whether launch accepts the file: a test asks launch itself where it is installed.
+A stand-in for launch lists the processes that a launch file describes, with their arguments. It
+does not know whether launch accepts the file: a test asks launch itself where it is installed.
 """
 
 from __future__ import annotations

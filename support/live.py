@@ -16,8 +16,6 @@ from pathlib import Path
 from typing import IO, Any
 from unittest import mock
 
-import ahf_ros.blas  # noqa: F401  before numpy, as in processes that are ours
-
 PATIENCE = 180.0
 """Time after which something that does not happen is a failure, s; machines may be slow."""
 
@@ -70,7 +68,7 @@ class NodeProcess:
         command += ['--ros-args', *arguments]
         self.awaited = False
         self.output = self.log = ''
-        # Not pipes, which hold up a process of which nobody reads the log.
+        # Not pipes, which hold up a process whose log nobody reads.
         self._written = [tempfile.TemporaryFile('w+') for _ in range(2)]  # noqa: SIM115
         self.process = subprocess.Popen(
             command,

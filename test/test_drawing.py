@@ -15,7 +15,14 @@ from ahf_ros.drawing.colours import (
 from ahf_ros.drawing.labels import Label, place_labels
 from ahf_ros.drawing.overlay import draw, overlay, summary
 from ahf_ros.drawing.tiles import Tile, side_by_side
-from ahf_ros.target import UNDECODED, FilterState, Identification, Target, UndecodedTarget
+from ahf_ros.target import (
+    UNDECODED,
+    FilterState,
+    Identification,
+    SquareMarker,
+    Target,
+    UndecodedTarget,
+)
 
 GRAY = np.full((240, 320), 120, np.uint8)
 
@@ -81,6 +88,19 @@ def test_labels_hide_no_target_and_no_other_label() -> None:
             assert np.hypot(across, down) > 20
         for other in boxes[:index]:
             assert other[0] > right or other[2] < left or other[1] > bottom or other[3] < top
+
+
+def test_squares_are_drawn_as_squares_with_their_number_beside_them() -> None:
+    turned = [(160.0, 20.0), (260.0, 120.0), (160.0, 220.0), (60.0, 120.0)]
+    marker = SquareMarker(7, 7, 160.0, 120.0, 71.0, 71.0, corners=tuple(turned))
+    drawn = shown(overlay(GRAY, [marker]), DECODED_COLOUR)
+    assert all(drawn[round(y), round(x)] for x, y in turned)
+    assert not drawn[120 - 71, 160]  # the inscribed circle
+    sides = [(210.0, 70.0), (210.0, 170.0), (110.0, 70.0), (110.0, 170.0)]
+    outline = np.array([*turned, *sides])
+    label = Label('7', 160.0, 120.0, 100.0, DECODED_COLOUR, outline)
+    ((left, bottom),) = place_labels([label], [(18.0, 11.0)], (240, 320), 2.0)
+    assert np.hypot(left - 210.0, bottom - 70.0) < 8.0
 
 
 def test_pictures_side_by_side_have_their_text_above_them():

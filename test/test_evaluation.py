@@ -154,7 +154,7 @@ def test_names_of_images_are_printable():
 @pytest.mark.parametrize('tolerance', [0, -1, math.nan])
 def test_a_tolerance_that_makes_no_sense_is_refused(tolerance):
     with pytest.raises(ValueError, match=r'tolerance is .*, accepted is a number above 0'):
-        judge(TRUTH, [], tolerance)
+        judge(TRUTH, [], tolerance=tolerance)
 
 
 def test_verdicts_name_the_target():

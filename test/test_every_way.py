@@ -87,7 +87,7 @@ def image(case: Case) -> np.ndarray:
 def by_library(case: Case) -> Answer:
     if case.detector == MINE:
         detector = my_detector()
-        return answer(detector.family, identify(image(case), detector).targets)
+        return answer(detector.family, identify(image(case), detector=detector).targets)
     found = identify(image(case), **case.settings)
     assert found.filter.applied == (case.light == 'stripe')
     made = create_detector(case.detector, family=case.family, command=case.command)

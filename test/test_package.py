@@ -43,13 +43,24 @@ ROSDEP = {
     'rich': 'python3-rich',
     'rosbags': 'python3-rosbags-pip',
     'ruamel': 'python3-ruamel.yaml',
+    'threadpoolctl': 'python3-sklearn',
     'yaml': 'python3-yaml',
     'zstandard': 'mcap-ros2-support',
 }
-"""Keys of rosdep of what is not a ROS package; mcap-ros2-support brings mcap and zstandard."""
+"""Keys of rosdep of what is not a ROS package; mcap-ros2-support brings mcap and zstandard,
+scikit-learn threadpoolctl."""
 
-NOT_IN_ROSDEP = {'Metashape', 'distributed', 'fsspec', 'pypdfium2', 'selenium'}
-"""What tests skip without, extras, and what is only in the console of other software."""
+NOT_IN_ROSDEP = {
+    'Metashape',
+    'distributed',
+    'fsspec',
+    'pandas',
+    'pypdfium2',
+    'selenium',
+    'typing_extensions',
+}
+"""What tests skip without, extras, what only type checkers import, and what is only in the console
+of other software."""
 
 TO_RUN, TO_TEST = ('depend', 'exec_depend'), ('depend', 'exec_depend', 'test_depend')
 OWN = {'ahf_ros', 'benchmarks', 'paper_plots', 'support'}
@@ -144,6 +155,24 @@ def test_package_xml_names_what_is_imported(
     foreign = {it for it in names if not it.startswith('test_')}
     assert len(foreign) > 5
     assert {ROSDEP.get(it, it) for it in foreign} - declared == set()
+
+
+def test_the_maintainer_is_not_of_a_host_that_may_be_somebodys() -> None:
+    root = ElementTree.parse(ROOT / 'package.xml').getroot()
+    people = [*root.iter('maintainer'), *root.iter('author')]
+    assert [person.get('email') for person in people] == ['maintainers@example.org'] * 2
+
+
+def test_the_demo_installs_only_what_it_needs(tmp_path: Path) -> None:
+    if not shutil.which('make'):
+        pytest.skip('make is not installed')
+    command = ['make', '--dry-run', '--silent', f'VENV={tmp_path / "new"}']
+    told = [
+        subprocess.check_output([*command, target], cwd=ROOT, text=True)
+        for target in ('demo', 'lint')
+    ]
+    assert [text.count('pip install') for text in told] == [1, 2]
+    assert ['ahf_ros[test' in text for text in told] == [False, True]
 
 
 def test_ros2_run_finds_every_program() -> None:

@@ -56,14 +56,14 @@ def test_values_are_settings_by_name_and_may_change_others() -> None:
 
 
 def test_any_function_is_a_detector() -> None:
-    found = identify(IMAGE, lambda image: [target(2), target(1)], expected_targets=2)
+    found = identify(IMAGE, detector=lambda image: [target(2), target(1)], expected_targets=2)
     assert [it.id for it in found.targets] == [1, 2]
     assert (found.expected, found.filter.applied) == (2, False)
 
 
 def test_what_a_detector_can_do_more_is_used() -> None:
     detector = Filtered()
-    found = identify(IMAGE, detector, expected_targets=1, threads=1)
+    found = identify(IMAGE, detector=detector, expected_targets=1, threads=1)
     assert found.filter.applied
     assert [it.x for it in found.targets] == [7.5]
     assert detector.drafts == found.filter.evaluations - 1
@@ -72,7 +72,7 @@ def test_what_a_detector_can_do_more_is_used() -> None:
 def test_another_number_may_be_expected_of_one_image() -> None:
     identifier = create_identifier(detector=Filtered(), expected_targets=0, threads=1)
     assert identifier.identify(IMAGE).targets == ()
-    assert identifier.identify(IMAGE, 1).expected == 1
+    assert identifier.identify(IMAGE, expected_targets=1).expected == 1
     assert identifier.identify(IMAGE).expected == 0
 
 

@@ -73,7 +73,7 @@ class Answering:
         settings: IdentificationSettings,
         stacking: StackSettings,
     ) -> None:
-        detector = create_detector(settings.detector, settings.detection)
+        detector = create_detector(settings.detector, settings=settings.detection)
         self._source = source
         self._topics = topics
         self._family = detector.family

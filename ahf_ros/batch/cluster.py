@@ -22,8 +22,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
-from ahf_ros.batch.connection import AWAY, connect, refused_workers
-from ahf_ros.batch.engine import TRIES, EngineLost, GivenUp, Job, Report, no_report
+from ahf_ros.batch.connection import CONNECTION_ERRORS, connect, refused_workers
+from ahf_ros.batch.engine import TRIES, EngineLost, Job, Report, TaskFailed, no_report
 from ahf_ros.batch.remote import guarded_perform
 from ahf_ros.release import release
 from ahf_ros.text import reason_of
@@ -43,7 +43,7 @@ class _Begun:
     workers: frozenset[str]  # that may process it; all if empty
 
 
-class Cluster:
+class DaskEngine:
     """The engine that processes tasks on the workers of a scheduler.
 
     Parameters
@@ -57,7 +57,7 @@ class Cluster:
     say : callable, optional
         Called with lines for people: workers that are refused or missing.
     located : callable, optional
-        From a result and the name of the machine that it comes from to a result that tells of it.
+        From a result and the name of the machine that it comes from to a result that names it.
 
     Raises
     ------
@@ -118,7 +118,7 @@ class Cluster:
 
     def close(self) -> None:
         """Let go of what still runs."""
-        with suppress(*AWAY):
+        with suppress(*CONNECTION_ERRORS):
             self._client.close(timeout=_LOOK)
 
     def _connect(self) -> None:
@@ -148,9 +148,9 @@ class Cluster:
         return EngineLost(f'the scheduler {self._address} is away; the same command goes on')
 
     def _look(self) -> None:
-        """Look at the workers, and tell if there are none."""
+        """Look at the workers, and say if there are none."""
         self._looked = time.monotonic()
-        with suppress(*AWAY):
+        with suppress(*CONNECTION_ERRORS):
             self._threads = dict(self._client.nthreads())
         deserted = not self._good()
         if deserted and not self._deserted:
@@ -209,7 +209,7 @@ class Cluster:
             if begun.tries < TRIES and type(error).__name__ != 'KilledWorker':
                 self._begin(_Begun(begun.number, begun.task, begun.tries + 1, frozenset()))
             else:
-                self._results.append((begun.number, GivenUp(f'given up: {reason_of(error)}')))
+                self._results.append((begun.number, TaskFailed(f'given up: {reason_of(error)}')))
         else:  # cancelled
             raise self._lost()
 

@@ -11,7 +11,7 @@ from ahf_ros.batch.remote import guarded_perform
 from ahf_ros.release import release
 from ahf_ros.text import reason_of
 
-AWAY = (OSError, asyncio.TimeoutError, asyncio.CancelledError, RuntimeError)
+CONNECTION_ERRORS = (OSError, asyncio.TimeoutError, asyncio.CancelledError, RuntimeError)
 """What calls of a client raise whose scheduler is away."""
 
 _CONNECT = 10.0  # s in which a scheduler has to answer
@@ -91,7 +91,7 @@ def check_version(client: Any, address: str) -> None:
 
 def _is_news(record: logging.LogRecord) -> bool:
     """Return whether a record is about anything but a connection that is lost or closed."""
-    return not (record.exc_info and isinstance(record.exc_info[1], AWAY))
+    return not (record.exc_info and isinstance(record.exc_info[1], CONNECTION_ERRORS))
 
 
 def _python(version: str) -> str:

@@ -31,7 +31,7 @@ Job = Callable[[Any, Report], Any]
 
 
 @dataclass(frozen=True, slots=True)
-class GivenUp:
+class TaskFailed:
     """Result of a task whose process died each time.
 
     Attributes
@@ -60,7 +60,7 @@ class Engine(Protocol):
         ...
 
     def wait(self, timeout: float | None = None) -> tuple[int, Any] | None:
-        """Return the number of a task that is finished, and its result or `GivenUp`.
+        """Return the number of a task that is finished, and its result or `TaskFailed`.
 
         Parameters
         ----------
@@ -91,7 +91,7 @@ class Finished(Generic[Task, Result]):
 def finished_tasks(
     engine: Engine, tasks: Iterable[Task], ahead: int = AHEAD
 ) -> Iterator[Finished[Task, Any]]:
-    """Yield tasks with their results or `GivenUp`, each as soon as it is finished.
+    """Yield tasks with their results or `TaskFailed`, each as soon as it is finished.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def finished_tasks(
 
     Examples
     --------
-    >>> engine = Here(lambda task, report: task**2)
+    >>> engine = SerialEngine(lambda task, report: task**2)
     >>> [it.result for it in finished_tasks(engine, [1, 2, 3])]
     [1, 4, 9]
     """
@@ -121,7 +121,7 @@ def finished_tasks(
             following = next(waiting, None)
         ending.check()  # before it waits
         found = engine.wait()
-        ending.check()  # the result may be that of a program that was ended
+        ending.check()  # the result may come from a program that was ended
         if found is not None:
             yield Finished(found[0], running.pop(found[0]), found[1])
 
@@ -158,7 +158,7 @@ def no_report(*_: Any) -> None:
     """Take a report for which nobody waits."""
 
 
-class Here:
+class SerialEngine:
     """The engine that processes tasks in this process, one after the other.
 
     Parameters

@@ -57,7 +57,7 @@ def identify_images(task: ImageTask, report: Report = no_report) -> ImageOutcome
     detector = detector_of(task.settings)
     files = tuple(file_fingerprint(_located(path, task)) for path in task.paths)
     images = _read(task, messages)
-    if len(images) < task.minimum:
+    if task.minimum > 1 and len(images) < task.minimum:
         text = f'{task.paths[0]}: {len(images)} of {task.minimum} images of a stack'
         messages.append(Message(text, Level.WARNING))
     overlays = dict(zip(task.paths, task.overlays, strict=False))
@@ -81,7 +81,7 @@ def detector_of(settings: IdentificationSettings) -> Detector:
 
 @lru_cache(maxsize=4)
 def _detector(name: str, settings: DetectorSettings, digest: bytes) -> Detector:
-    return create_detector(name, settings)
+    return create_detector(name, settings=settings)
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +130,7 @@ def _read_checked(path: str, task: ImageTask) -> tuple[np.ndarray, str]:
     ValueError
         If it cannot be read or is not accepted.
     """
-    image, note = read_noted_image(_located(path, task), turned=task.upright)
+    image, note = read_noted_image(_located(path, task), upright=task.upright)
     try:
         check_image(image)
     except ValueError as error:
@@ -146,7 +146,9 @@ def _identified(
     if not paths:
         return
     try:
-        identifier = create_identifier(task.settings, detector, interrupt=ending.check)
+        identifier = create_identifier(
+            detector=detector, settings=task.settings, interrupt=ending.check
+        )
         for part, stack, found in identify_parts(identifier, list(images.values()), task.stacking):
             of = paths[part.images.start : part.images.stop]
             search = identifier.last_search

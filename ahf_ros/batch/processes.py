@@ -18,8 +18,8 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any
 
-from ahf_ros.batch.engine import TRIES, GivenUp, Job, Report, no_report
-from ahf_ros.batch.worker import GONE, STUCK, Kind
+from ahf_ros.batch.engine import TRIES, Job, Report, TaskFailed, no_report
+from ahf_ros.batch.worker import PIPE_CLOSED, SHUTDOWN_TIMEOUT, Kind
 
 _PACKAGE = str(Path(__file__).parents[2])
 _BEGIN = (
@@ -49,7 +49,7 @@ class _Worker:
             pipe.close()
 
 
-class Processes:
+class ProcessEngine:
     """The engine that processes tasks in worker processes.
 
     Workers are started as they are needed. They end with this process, however it ends. What they
@@ -95,7 +95,7 @@ class Processes:
                 number = worker.number
                 try:
                     kind, content = worker.answers.recv()
-                except GONE:
+                except PIPE_CLOSED:
                     if given_up := self._replaced(worker):
                         return number, given_up
                     continue
@@ -111,7 +111,7 @@ class Processes:
         """End all workers."""
         for worker in self._workers:
             worker.close()  # so it ends
-        limit = time.monotonic() + STUCK
+        limit = time.monotonic() + SHUTDOWN_TIMEOUT
         for worker in self._workers:
             with suppress(subprocess.TimeoutExpired):
                 worker.process.wait(max(limit - time.monotonic(), 0))
@@ -123,27 +123,27 @@ class Processes:
         idle = [worker for worker in self._workers if not worker.busy]
         while idle:
             worker = idle.pop()
-            with suppress(*GONE):  # killed while it had nothing to do
+            with suppress(*PIPE_CLOSED):  # killed while it had nothing to do
                 worker.tasks.send(task)
                 break
             self._remove(worker)
         else:
             worker = _start()
             self._workers.append(worker)
-            with suppress(*GONE):  # `wait` finds that it has died
+            with suppress(*PIPE_CLOSED):  # `wait` finds that it has died
                 worker.tasks.send(sys.path)
                 worker.tasks.send((self._job, self._threads))
                 worker.tasks.send(task)
         worker.number, worker.task, worker.tries = number, task, tries
 
-    def _replaced(self, worker: _Worker) -> GivenUp | None:
+    def _replaced(self, worker: _Worker) -> TaskFailed | None:
         """Hand the task of a worker that died to another one, or give it up."""
         self._remove(worker)
         if worker.tries < TRIES:
             self._hand_over(worker.number, worker.task, worker.tries + 1)
             return None
         how = _how_ended(worker.process.returncode)
-        return GivenUp(f'given up, {TRIES} processes that worked on it died, the last {how}')
+        return TaskFailed(f'given up, {TRIES} processes that worked on it died, the last {how}')
 
     def _remove(self, worker: _Worker) -> None:
         self._workers.remove(worker)

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from typing import Any
 
 from ahf_ros.batch.engine import Job
-from ahf_ros.batch.processes import Processes
+from ahf_ros.batch.processes import ProcessEngine
 
 _engines = threading.local()
 
@@ -32,7 +32,7 @@ def perform(content: bytes, topic: str) -> tuple[str, Any]:
     -------
     machine : str
     outcome : bytes or ValueError
-        What the job returns or `GivenUp`, pickled; or what it raises.
+        What the job returns or `TaskFailed`, pickled; or what it raises.
     """
     from distributed import get_worker
 
@@ -50,14 +50,14 @@ def perform(content: bytes, topic: str) -> tuple[str, Any]:
     return f'{socket.gethostname()}, {worker.address}', outcome
 
 
-def _engine_of(job: Job) -> Processes:
+def _engine_of(job: Job) -> ProcessEngine:
     """Return the engine of this thread, whose process has the imports of its last task."""
-    before: tuple[Job, Processes] | None = getattr(_engines, 'last', None)
+    before: tuple[Job, ProcessEngine] | None = getattr(_engines, 'last', None)
     if before and before[0] == job:
         return before[1]
     if before:
         before[1].close()
-    engine = Processes(job, 1)
+    engine = ProcessEngine(job, 1)
     _engines.last = job, engine
     return engine
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
-from ahf_ros.batch.engine import Engine, Finished, GivenUp, finished_tasks, in_order
+from ahf_ros.batch.engine import Engine, Finished, TaskFailed, finished_tasks, in_order
 from ahf_ros.batch.results import Results
 from ahf_ros.batch.task import ImageOutcome, ImageTask, Level, Message
 
@@ -20,10 +20,11 @@ def outcomes_in_order(engine: Engine, tasks: Iterable[ImageTask]) -> Iterator[Im
 
     Examples
     --------
-    >>> from ahf_ros.batch.engine import Here
+    >>> from ahf_ros.batch.engine import SerialEngine
     >>> from ahf_ros.batch.identification import identify_images
     >>> tasks = [ImageTask((name,)) for name in ('a.png', 'b.png')]
-    >>> [it.messages[0].text[:20] for it in outcomes_in_order(Here(identify_images), tasks)]
+    >>> outcomes = outcomes_in_order(SerialEngine(identify_images), tasks)
+    >>> [it.messages[0].text[:20] for it in outcomes]
     ['a.png cannot be read', 'b.png cannot be read']
     """
     for item in in_order(finished_tasks(engine, tasks)):
@@ -71,8 +72,8 @@ def kept_outcomes_in_order(
     results.put_in_order(tasks)
 
 
-def outcome_of(task: ImageTask, result: ImageOutcome | GivenUp) -> ImageOutcome:
-    """Return the outcome of a task; that of one that is given up is a problem."""
-    if isinstance(result, GivenUp):
+def outcome_of(task: ImageTask, result: ImageOutcome | TaskFailed) -> ImageOutcome:
+    """Return the outcome of a task; it is a problem if the task was given up."""
+    if isinstance(result, TaskFailed):
         return ImageOutcome(messages=(Message(f'{task.name}: {result.reason}', Level.PROBLEM),))
     return result

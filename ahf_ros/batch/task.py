@@ -102,13 +102,13 @@ class ImageOutcome:
         return any(message.level == Level.PROBLEM for message in self.messages)
 
 
-def told_by(outcome: ImageOutcome, machine: str) -> ImageOutcome:
+def with_machine(outcome: ImageOutcome, machine: str) -> ImageOutcome:
     """Return an outcome whose problems say on which machine they came up.
 
     Examples
     --------
     >>> lost = ImageOutcome(messages=(Message('a.png cannot be read', Level.PROBLEM),))
-    >>> told_by(lost, 'node7').messages[0].text
+    >>> with_machine(lost, 'node7').messages[0].text
     'a.png cannot be read (on node7)'
     """
     messages = (

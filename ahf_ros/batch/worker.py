@@ -19,15 +19,14 @@ from multiprocessing.connection import Connection
 from types import FrameType
 from typing import Any
 
-import ahf_ros.blas  # noqa: F401  before numpy
 from ahf_ros import ending
 from ahf_ros.batch.engine import Job
 from ahf_ros.text import reason_of
 
-STUCK = 10 * ending.GRACE
+SHUTDOWN_TIMEOUT = 10 * ending.GRACE
 """Time after which a worker is taken to be stuck at its end, s."""
 
-GONE = (EOFError, OSError)
+PIPE_CLOSED = (EOFError, OSError)
 """What the pipe of a process that has ended raises."""
 
 
@@ -51,13 +50,13 @@ def main(tasks: int, answers: int, alive: int) -> None:
     """
     _heed_signals(alive)
     received, sent = Connection(tasks, writable=False), Connection(answers, readable=False)
-    with suppress(*GONE):
+    with suppress(*PIPE_CLOSED):
         sys.path[:] = received.recv()
         job, threads = received.recv()
         _prepare(threads)
         while True:
             result = _result_of(job, received.recv(), sent)
-            ending.check()  # the result may be that of a program that was ended
+            ending.check()  # the result may come from a program that was ended
             sent.send(result)
 
 
@@ -72,7 +71,7 @@ def _result_of(job: Job, task: Any, sent: Connection) -> tuple[Kind, Any]:
 
 
 def _report(sent: Connection, *report: Any) -> None:
-    with suppress(*GONE):  # this process is about to end
+    with suppress(*PIPE_CLOSED):  # this process is about to end
         sent.send((Kind.REPORT, report))
 
 
@@ -89,7 +88,7 @@ def _watch(alive: int) -> None:
     """End this process once nobody holds the other end of a pipe."""
     os.read(alive, 1)
     _end()
-    time.sleep(STUCK)
+    time.sleep(SHUTDOWN_TIMEOUT)
     os._exit(1)
 
 
@@ -108,7 +107,7 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
 
 
 def _prepare(threads: int) -> None:
-    """Let what detectors of others print go to standard error, and limit threads."""
+    """Send what other detectors print to standard error, and limit threads."""
     if sys.stdout and sys.stderr:  # otherwise other files may have their numbers
         os.dup2(2, 1)
     sys.stdout = sys.stderr

@@ -22,7 +22,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Parameters
     ----------
     arguments : sequence of str, optional
-        Arguments after the name of the program; those of the process where None.
+        Arguments after the name of the program; where None, `sys.argv` has them.
 
     Returns
     -------

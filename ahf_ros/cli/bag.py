@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from ahf_ros.batch.engine import EngineLost, GivenUp, finished_tasks
-from ahf_ros.batch.worker import STUCK
+from ahf_ros.batch.engine import EngineLost, TaskFailed, finished_tasks
+from ahf_ros.batch.worker import SHUTDOWN_TIMEOUT
 from ahf_ros.cli.engine_options import add_scheduler_argument
 from ahf_ros.cli.engines import create_engine, shared_settings
 from ahf_ros.cli.options import (
@@ -33,13 +33,14 @@ JOBS = Parameter('jobs', 1, 'Number of bags processed at the same time.', minimu
 OUTPUT_TOPIC = Parameter(
     'output_topic',
     'coded_targets',
-    'Topic of the answers, relative to that of the images unless it begins with a slash.',
+    'Topic of the answers, relative to the topic of the images unless it begins with a slash.',
 )
 STORAGE = Parameter(
     'storage', 'mcap', 'Storage format of the output bag.', choices=('mcap', 'sqlite3')
 )
 
-_LOCK_TIMEOUT = 2 * STUCK  # s; a process outlives its killed worker of a cluster, at most by STUCK
+# A process outlives its killed worker of a cluster by at most `SHUTDOWN_TIMEOUT`.
+_LOCK_TIMEOUT = 2 * SHUTDOWN_TIMEOUT  # s
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -154,7 +155,7 @@ def _outcomes(
     with closing(engine):
         for item in finished_tasks(engine, tasks):
             outcome = item.result
-            if isinstance(outcome, GivenUp):
+            if isinstance(outcome, TaskFailed):
                 outcome = ValueError(f'{item.task.source}: {outcome.reason}')
             yield item.task, outcome
 
@@ -169,7 +170,7 @@ def _attempt(task: BagTask, report: Any) -> Outcome | ValueError:
     from ahf_ros.bag.run import WRITING_ERRORS, answer_bag
 
     try:
-        with redirect_stdout(sys.stderr):  # what detectors of others print
+        with redirect_stdout(sys.stderr):  # what other detectors print
             return answer_bag(task, report)
     except ValueError as error:
         return error

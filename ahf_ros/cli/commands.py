@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from importlib import import_module
 from types import ModuleType
 
-import ahf_ros.blas  # noqa: F401  before numpy
 from ahf_ros.release import release
 
 COMMANDS = {

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from ahf_ros.batch.engine import Engine, Here, Job, Report, available_cores, no_report
-from ahf_ros.batch.processes import Processes
+from ahf_ros.batch.engine import Engine, Job, Report, SerialEngine, available_cores, no_report
+from ahf_ros.batch.processes import ProcessEngine
 from ahf_ros.session_settings import IdentificationSettings
 from ahf_ros.settings.nested import updated
 
@@ -65,7 +65,7 @@ def create_engine(
     scheduler : str
         Address of the scheduler of a cluster; empty for this machine.
     located : callable
-        As for `ahf_ros.batch.cluster.Cluster`.
+        As for `ahf_ros.batch.cluster.DaskEngine`.
     report : callable, optional
         Called with the number of the task before what the job reports.
     isolated : bool
@@ -77,12 +77,12 @@ def create_engine(
         If the cluster cannot be used.
     """
     if scheduler:
-        from ahf_ros.batch.cluster import Cluster
+        from ahf_ros.batch.cluster import DaskEngine
 
         def say(text: str) -> None:
             print(f'ahf {command}: {text}', file=sys.stderr)
 
-        return Cluster(job, scheduler, report, say, located)
+        return DaskEngine(job, scheduler, report, say, located)
     if jobs > 1 or isolated:
-        return Processes(job, jobs, report, threads_each(jobs))
-    return Here(job, report)
+        return ProcessEngine(job, jobs, report, threads_each(jobs))
+    return SerialEngine(job, report)

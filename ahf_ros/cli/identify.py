@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, redirect_stdout
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 from rich.console import Console
 from rich.progress import Progress
@@ -16,7 +16,7 @@ from ahf_ros.batch.engine import Engine, EngineLost, available_cores
 from ahf_ros.batch.identification import detector_of, identify_images
 from ahf_ros.batch.results import Results, Unwritable
 from ahf_ros.batch.run import kept_outcomes_in_order, outcomes_in_order
-from ahf_ros.batch.task import ImageOutcome, ImageTask, told_by
+from ahf_ros.batch.task import ImageOutcome, ImageTask, with_machine
 from ahf_ros.cli import inputs
 from ahf_ros.cli.engines import create_engine, shared_settings
 from ahf_ros.cli.export import control_from, write_exports
@@ -24,9 +24,11 @@ from ahf_ros.cli.export_options import check_control
 from ahf_ros.cli.options import settings_from
 from ahf_ros.cli.outcomes import overlay_path, print_outcome
 from ahf_ros.cli.stacks import stacked
+from ahf_ros.codes.families import AUTO, LISTED
 from ahf_ros.interchange.export.measured_images import MeasuredImage, measured_image
 from ahf_ros.session import create_identifier
 from ahf_ros.session_settings import IdentificationSettings, StackSettings
+from ahf_ros.target import UNDECODED
 
 
 def run(options: argparse.Namespace) -> int:
@@ -43,7 +45,7 @@ def run(options: argparse.Namespace) -> int:
         If options contradict each other.
     """
     output = sys.stdout
-    with redirect_stdout(sys.stderr):  # what detectors of others print is not JSON
+    with redirect_stdout(sys.stderr):  # what other detectors print is not JSON
         return _run(options, output)
 
 
@@ -66,31 +68,55 @@ def _run(options: argparse.Namespace, output: TextIO) -> int:
     except ValueError as error:
         print(f'ahf identify: {error}', file=sys.stderr)
         return 1
-    create_identifier(settings, detector_of(settings))  # refuses what does not fit together
+    # Refuses what does not fit together.
+    create_identifier(detector=detector_of(settings), settings=settings)
     quiet = options.quiet
     failed = bool(problems)
+    results = identified = 0
     measured: list[MeasuredImage] = []
-    engine = create_engine('identify', identify_images, jobs, options.scheduler, told_by)
+    engine = create_engine('identify', identify_images, jobs, options.scheduler, with_machine)
     with closing(engine):
         try:
             for outcome in _with_progress(_outcomes(engine, tasks, options), len(tasks), quiet):
                 print_outcome('identify', outcome, output if options.json else None, quiet)
                 failed |= outcome.failed
+                results += len(outcome.records)
+                identified += sum(_decoded(record) for record in outcome.records)
                 if options.export:
                     measured += [measured_image(it, it['image']) for it in outcome.records]
         except (EngineLost, Unwritable) as error:
             print(f'ahf identify: {error}', file=sys.stderr)
             return 1
-    if not (settings.expected_targets or settings.estimate_expected or quiet):
-        print(_WITHOUT_N, file=sys.stderr)
+    if results and not quiet:
+        print(_hint(settings, identified), end='', file=sys.stderr)
     failed |= bool(write_exports('identify', options.export, measured, control, quiet))
     return int(failed)
 
 
 _WITHOUT_N = (
-    'N is not given, so that no filter was searched for: with --expected N, AHF searches for a '
-    'filter wherever an image shows fewer than N targets'
+    'N is not given, so that no filter was searched for: with --expected-targets N, AHF searches '
+    'for a filter wherever an image shows fewer than N targets\n'
 )
+
+
+def _decoded(record: Mapping[str, Any]) -> int:
+    return sum(target['id'] != UNDECODED for target in record['targets'])
+
+
+def _hint(settings: IdentificationSettings, identified: int) -> str:
+    """Return a line that says what may help, empty if nothing does."""
+    family = settings.detection.family
+    if not identified and family == AUTO:
+        return (
+            f'--family {AUTO} looks for rings only, {", ".join(LISTED)}; other families have to '
+            'be named\n'
+        )
+    if not identified:
+        return f'targets of {family} were looked for; --family names others\n'
+    if settings.expected_targets or settings.adaptive.listed or settings.estimate_expected:
+        return ''
+    return _WITHOUT_N
+
 
 _WORTH_PROCESSES = 4  # images; fewer are identified before processes have started
 

@@ -44,8 +44,8 @@ def add_processing_options(parser: Group) -> None:
     parser.add_argument(
         '--upright',
         action='store_true',
-        help='Turn images as their orientation says. Coordinates are then those of the upright '
-        'image, otherwise those of the pixels as they are stored.',
+        help='Turn images as their orientation says. Coordinates then count in the upright '
+        'image, otherwise in the pixels as they are stored.',
     )
     add_option(parser, JOBS)
     add_scheduler_argument(parser)

@@ -24,7 +24,7 @@ def image_paths(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
     Returns
     -------
     paths : list of str
-        In the order of the arguments; those of a folder or a pattern are sorted by name.
+        In the order of the arguments, and sorted by name within a folder or a pattern.
     problems : list of str
         One for each argument that names no image.
 

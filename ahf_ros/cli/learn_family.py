@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default='',
         metavar='FILE',
         help='Data file with the design in rough, for positions and codes that the points do not '
-        'show. Default: that of GSI.',
+        'show. Default: the family of GSI.',
     )
     parser.add_argument('--name', help='Name of the family. Default: the name of the data file.')
     parser.add_argument('--unit', default='mm', help='Unit of the coordinates. Default: mm.')

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Callable
 from typing import Any, TypeVar
 
@@ -15,8 +16,8 @@ from ahf_ros.settings.parameter import Parameter, parameters
 Settings = TypeVar('Settings')
 
 _METAVARS = {int: 'N', float: 'X', str: 'TEXT'}
-_SHORT = {'expected_targets': '--expected'}
-
+_FORMER = {'expected_targets': '--expected'}
+"""Options that had another name in the release before."""
 
 Group = argparse._ArgumentGroup | argparse.ArgumentParser
 """What takes options: a parser, or a group of its options."""
@@ -67,9 +68,31 @@ def add_option(parser: Group, item: Parameter, **changes: Any) -> None:
         arguments |= {'action': argparse.BooleanOptionalAction}
     else:
         arguments |= {'type': _converter(item), 'metavar': _METAVARS[type(item.default)]}
-    names = [_SHORT[item.name]] if item.name in _SHORT else []
-    names.append(f'--{item.name.replace("_", "-")}')
-    parser.add_argument(*names, dest=item.name, **(arguments | changes))
+    name = f'--{item.name.replace("_", "-")}'
+    parser.add_argument(name, dest=item.name, **(arguments | changes))
+    if former := _FORMER.get(item.name):
+        hidden = {'default': argparse.SUPPRESS, 'help': argparse.SUPPRESS}
+        parser.add_argument(
+            former, dest=item.name, action=_Former, const=name, **(arguments | changes | hidden)
+        )
+
+
+class _Former(argparse.Action):
+    """Stores the value of an option that is called `const` now, and says so."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: Any,
+        option_string: str | None = None,
+    ) -> None:
+        print(
+            f'{parser.prog}: {option_string} is called {self.const} now; the former name goes '
+            'with the next release',
+            file=sys.stderr,
+        )
+        setattr(namespace, self.dest, values)
 
 
 def settings_from(options: argparse.Namespace, settings: type[Settings]) -> Settings:

@@ -15,6 +15,7 @@ from ahf_ros.interchange.truth_files import read_truth, write_truth
 from ahf_ros.settings.nested import flat_parameters
 from ahf_ros.settings.parameter import Parameter
 from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.target import TrueTarget
 
 COUNT = Parameter(
     'count', 1, 'Number of images for each light, with consecutive seeds.', minimum=1
@@ -39,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Render the images and add their truth to that of the folder.
+    """Render the images and add their truth to the truth of the folder.
 
     Returns
     -------
@@ -61,7 +62,7 @@ def run(options: argparse.Namespace) -> int:
             name = f'{scene.light}_{scene.ambient:g}_{scene.seed}'
             name += f'_{phase}.png' if scene.phases > 1 else '.png'
             write_image(options.folder / name, rendering.image)
-            truth[name] = rendering.truth
+            truth[name] = tuple(map(TrueTarget.of, rendering.targets))
             write_truth(truth_path, truth)
             text = f'{options.folder / name}: {len(rendering.targets)} targets'
             print(text, file=sys.stderr)

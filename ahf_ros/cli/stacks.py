@@ -1,4 +1,4 @@
-"""Image files that are identified together: consecutive ones, those of a folder or of a name."""
+"""Image files that are identified together: consecutive, of one folder, or of similar names."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from typing import TextIO
 from ahf_ros.batch.engine import EngineLost, available_cores
 from ahf_ros.batch.identification import detector_of, identify_images
 from ahf_ros.batch.results import Results, Unwritable
-from ahf_ros.batch.task import ImageTask, told_by
+from ahf_ros.batch.task import ImageTask, with_machine
 from ahf_ros.batch.watch import Arrivals, watch
 from ahf_ros.cli.engines import create_engine, shared_settings
 from ahf_ros.cli.identify_options import add_output_options, add_processing_options
@@ -80,14 +80,15 @@ def run(options: argparse.Namespace) -> int:
         If options contradict each other.
     """
     output = sys.stdout
-    with redirect_stdout(sys.stderr):  # what detectors of others print is not JSON
+    with redirect_stdout(sys.stderr):  # what other detectors print is not JSON
         return _run(options, output)
 
 
 def _run(options: argparse.Namespace, output: TextIO) -> int:
     settings = settings_from(options, IdentificationSettings)
     _check_overlay(options)
-    create_identifier(settings, detector_of(settings))  # refuses what does not fit together
+    # Refuses what does not fit together.
+    create_identifier(detector=detector_of(settings), settings=settings)
     jobs = options.jobs or available_cores()
     shared = shared_settings(settings, jobs, options.scheduler)
 
@@ -102,7 +103,7 @@ def _run(options: argparse.Namespace, output: TextIO) -> int:
         print(f'ahf watch: {text}', file=sys.stderr)
 
     engine = create_engine(
-        'watch', identify_images, jobs, options.scheduler, told_by, isolated=True
+        'watch', identify_images, jobs, options.scheduler, with_machine, isolated=True
     )
     arrivals = Arrivals(options.folder, SUFFIXES, options.recursive, options.settling)
     try:

@@ -12,7 +12,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
-_LARGEST_FILE = 4_000_000  # bytes; ten thousand codes need a tenth of it
+_MAXIMUM_BYTES = 4_000_000  # bytes; ten thousand codes need a tenth of it
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +110,7 @@ def read_data_file(path: str | Path) -> Entry:
     Parameters
     ----------
     path : str or Path
-        JSON or YAML, of which JSON is a part.
+        A YAML or JSON file.
 
     Raises
     ------
@@ -122,12 +122,12 @@ def read_data_file(path: str | Path) -> Entry:
         raise ValueError(f'{source} cannot be read: it is not a regular file')
     try:
         with Path(path).open('rb') as stream:
-            content = stream.read(_LARGEST_FILE + 1)
+            content = stream.read(_MAXIMUM_BYTES + 1)
         text = content.decode()
     except (OSError, UnicodeDecodeError) as error:
         raise ValueError(f'{source} cannot be read: {error}') from error
-    if len(content) > _LARGEST_FILE:
-        raise ValueError(f'{source} is larger than {_LARGEST_FILE} bytes')
+    if len(content) > _MAXIMUM_BYTES:
+        raise ValueError(f'{source} is larger than {_MAXIMUM_BYTES} bytes')
     try:
         value = YAML(typ='rt', pure=True).load(text)
     except MarkedYAMLError as error:

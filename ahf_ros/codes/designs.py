@@ -22,7 +22,7 @@ HALF_SIDE = 2.4
 """Half the side of a square marker, in radii of the dot of a ring target of the same size."""
 
 _QUIET_ZONE = 4.2  # of ring targets and square markers: 3.5 for the widest band, a fifth more
-_MARGIN = 1.0  # about the outermost dot or border of others, in radii of the dot
+_MARGIN = 1.0  # about the outermost dot or border of the other families, in radii of the dot
 
 Point = tuple[float, float]
 
@@ -129,7 +129,7 @@ def relative_reach(name: str) -> float:
     Parameters
     ----------
     name : str
-        A family. Of one that the package does not know, the radius is that of the ellipse.
+        A family. A target of a family that is not known ends with its ellipse.
 
     Examples
     --------

@@ -7,6 +7,7 @@ anything. Therefore the codes, which take numpy and OpenCV, are imported where t
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
 from itertools import combinations
 
 from ahf_ros.codes.names import APRILTAG_NAMES, ARUCO_NAMES, RING_NAMES, SQUARE_NAMES
@@ -27,15 +28,16 @@ AUTO = 'auto'
 """Stands for all families of `LISTED`."""
 
 LISTED = KINDS['ring']
-"""The families of which several may be given, separated by commas: they are read together."""
+"""Families that may be given together, separated by commas: they are read together."""
 
 ACCEPTED = (
     f'one of {", ".join(FAMILY_NAMES)}; several of {", ".join(LISTED)}, separated by commas; or '
-    f'{AUTO} for all of these'
+    f'{AUTO} for all of these, which are rings, and no others'
 )
 """Description of what `family` accepts."""
 
 _SHOWN = 10  # IDs in an error
+_ALIKE = 0.65  # share of letters of a name that is suggested; tag36h11 and apriltag_36h11: 0.73
 
 
 def families_in(text: str) -> tuple[str, ...]:
@@ -71,7 +73,7 @@ def families_in(text: str) -> tuple[str, ...]:
     for name in names:
         if name not in FAMILY_NAMES:
             where = f'{shown}, which names {name!r}' if len(names) > 1 else shown
-            raise ValueError(f'{where}, accepted is {ACCEPTED}')
+            raise ValueError(f'{where}, accepted is {_suggested(name) or ACCEPTED}')
     if len(names) > 1:
         _check_list(names, shown)
     return names
@@ -161,6 +163,12 @@ def mirrored_number(name: str, code: int) -> int | None:
         return None
     family = ring.family(name)
     return family.number(ring.mirrored(code, family.bits))
+
+
+def _suggested(name: str) -> str:
+    """Return what is accepted in the place of a name that is like the name of a family."""
+    names = get_close_matches(name.lower(), FAMILY_NAMES, 1, _ALIKE)
+    return f'{names[0]}, which is most like it, or another family' if names else ''
 
 
 def _check_list(names: Sequence[str], shown: str) -> None:

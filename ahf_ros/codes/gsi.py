@@ -1,4 +1,4 @@
-"""Point-distributed targets, of which those of GSI are one family.
+"""Point-distributed targets, such as GSI's.
 
 A target is a template of dots, the same on every target, and a few decoding dots on numbered
 positions. The value of a code is the sum of 2^position of its decoding dots. Lengths are in the
@@ -27,7 +27,7 @@ class Rule:
     minimum_distance : float
         Between the centres of any two of them.
     groups : tuple of frozenset of int
-        Sets of positions, of each of which a code has at least one.
+        Sets of positions; a code has at least one of each set.
     first_own_number : int or None
         ID of the first code that the rule allows; None where only listed codes are codes. It is
         above the IDs of all listed codes, so that none can be taken for its vendor's.

@@ -12,7 +12,7 @@ from ahf_ros.codes.gsi import PointFamily, value_of
 
 _REFERENCE_LABEL = re.compile(r'CODE(\d+)')
 _DOT_LABEL = re.compile(r'NUGGET(\d+)_(\w+)')
-_FARTHEST = 0.1  # of a template dot from the design, in the spread of the template
+_MAXIMUM_DISTANCE = 0.1  # of a template dot from the design, in the spread of the template
 _DECIMALS = 3  # of learnt coordinates: exports have as many
 
 
@@ -40,12 +40,12 @@ class MeasuredTarget:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Learnt:
-    """What a point list tells of a family.
+    """What a point list says about a family.
 
     Attributes
     ----------
     family : PointFamily
-        The design in the unit of the coordinates; its codes are those of the base alone.
+        The design in the unit of the coordinates; its codes are the base's alone.
     codes : dict of int to int
         Values by ID, of all the targets that are complete.
     targets : tuple of MeasuredTarget
@@ -62,9 +62,9 @@ class Learnt:
 def learn_family(points: Mapping[str, np.ndarray], base: PointFamily, name: str) -> Learnt:
     """Learn a family from the coordinates of the dots of its targets.
 
-    Each target is laid into its plane and turned so that its template lies on that of a design
-    known in rough. The names of the dots say which is which, so that front and back cannot be
-    mistaken.
+    Each target is laid into its plane and turned so that its template lies on the template of
+    a design known in rough. The names of the dots say which is which, so that front and back
+    cannot be mistaken.
 
     Parameters
     ----------
@@ -158,12 +158,13 @@ def _measured(number: int, dots: dict[str, np.ndarray], base: PointFamily) -> Me
     errors = [np.hypot(*(fit[0] - design)[of_template].T).max() for fit in fits]
     side = int(np.argmin(errors))
     spread = np.hypot(*(base.template - base.template.mean(axis=0)).T).max()
-    if errors[side] > _FARTHEST * spread:
+    if errors[side] > _MAXIMUM_DISTANCE * spread:
         raise ValueError(
             f'differs from the template by up to {errors[side]:.2f} {base.unit}'.rstrip()
         )
     laid, _ = fits[side]
-    near = np.hypot(*(laid - design).T) < _FARTHEST * spread  # not so where a position is new
+    # A position that is new is farther away.
+    near = np.hypot(*(laid - design).T) < _MAXIMUM_DISTANCE * spread
     laid, scale = _laid(sides[side], design, near)
     count = len(base.template)
     return MeasuredTarget(

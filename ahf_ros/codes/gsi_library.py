@@ -18,8 +18,8 @@ GSI_LIBRARY = Path(__file__).with_name('gsi.json')
 """Template, positions and known numbers of GSI's targets."""
 
 _POSITION_NUMBERS = (0, 31)  # a code of the messages has 32 bits
-_MOST_CODES = 200_000  # that a rule may be tried on
-_LARGEST_NUMBER = 2**31 - 1
+_MAXIMUM_CODES = 200_000  # that a rule may be tried on
+_MAXIMUM_NUMBER = 2**31 - 1
 
 
 @lru_cache(maxsize=8)
@@ -204,7 +204,7 @@ def _codes(
     rule = _rule(fields['rule'], positions)
     known: dict[int, int] = {}
     for key, entry in fields['codes'].items() if 'codes' in fields else ():
-        if not key.isdecimal() or not 0 <= int(key) <= _LARGEST_NUMBER:
+        if not key.isdecimal() or not 0 <= int(key) <= _MAXIMUM_NUMBER:
             entry.refuse('a list of positions with an ID of at least 0 as its name')
         value = value_of(_code_dots(entry, rule.dots, positions))
         if value in known:
@@ -244,9 +244,9 @@ def _rule(entry: Entry, positions: dict[int, tuple[float, float, float]]) -> Rul
             group.refuse(accepted)
         groups.append(frozenset(numbers))
     if 'first_own_number' in fields:
-        first = fields['first_own_number'].integer(0, _LARGEST_NUMBER - _MOST_CODES)
-        if comb(len(positions), dots) > _MOST_CODES:
-            entry.refuse(f'a rule of at most {_MOST_CODES} combinations of positions')
+        first = fields['first_own_number'].integer(0, _MAXIMUM_NUMBER - _MAXIMUM_CODES)
+        if comb(len(positions), dots) > _MAXIMUM_CODES:
+            entry.refuse(f'a rule of at most {_MAXIMUM_CODES} combinations of positions')
         widest = 2 * max(radius for *_, radius in positions.values())
         if least < widest and dots > 1:
             entry.refuse(f'a minimum_distance of at least {widest:g}, so that no dots overlap')
@@ -261,7 +261,7 @@ def _code_dots(
     numbers = [item.integer(*_POSITION_NUMBERS) for item in entry.list(accepted, lengths=(dots,))]
     for number in numbers:
         if number not in positions:
-            entry.refuse(f'{accepted}, of which {number} is none')
+            entry.refuse(f'{accepted}; {number} is none')
     if len(set(numbers)) < dots:
         entry.refuse(accepted)
     for first, second in combinations(numbers, 2):

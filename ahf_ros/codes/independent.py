@@ -13,7 +13,7 @@ _TABU = 10  # steps for which what was exchanged stays out
 def independent_set(
     conflicts: np.ndarray, count: int, generator: np.random.Generator, thorough: bool = True
 ) -> np.ndarray:
-    """Return a set of which no two are in conflict, of `count` elements where one is found.
+    """Return a set without two elements in conflict, of `count` elements where one is found.
 
     The search starts with elements of few conflicts and then exchanges one element for another
     one, until there is room for more (Andrade, Resende & Werneck, J. Heuristics 2012, 18, 525).

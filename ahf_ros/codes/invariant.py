@@ -70,7 +70,7 @@ def area_cross_ratio(pivot: Any, points: Any) -> np.ndarray:
 
 
 def template_invariant(points: Any) -> np.ndarray:
-    """Return the P2-invariant of five template points of which three are collinear.
+    """Return the P2-invariant of five template points, three of them collinear.
 
     It is the larger one of those at the two points that are not on the line; the others have
     none.

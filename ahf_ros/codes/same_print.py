@@ -1,7 +1,7 @@
 """Code words of different ring families whose targets have the same print.
 
 A word all of whose runs are a multiple of some angle may be a word of other numbers of sectors,
-too: 000111000111 of 12 bit is 0000111100001111 of 16. Nothing in an image of the target tells
+too: 000111000111 of 12 bit is 0000111100001111 of 16. Nothing in an image of the target shows
 which one is meant.
 """
 
@@ -27,7 +27,7 @@ def words_of_print(name: str, word: int) -> dict[str, int]:
     Returns
     -------
     dict of str to int
-        By the name of the family, that of `name` included.
+        By the name of the family; `name` is included.
 
     Examples
     --------

@@ -1,7 +1,7 @@
 """Targets that are hard to confuse: words far apart, which no cover turns into each other.
 
 Something in one colour over a part of a band or of a ring of dots, as dark as ink or as bright as
-the ground, can turn one word into another. No detector can tell such a target from the other one.
+the ground, can turn one word into another. No detector sees a difference then.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def select_ids(name: str, ids: Sequence[int], count: int, file: str = '') -> lis
     name : str
         One of `ahf_ros.codes.families.FAMILY_NAMES`.
     ids : sequence of int
-        Different IDs of the family, of which some are selected.
+        Different IDs of the family to select from.
     count : int
         Number of IDs to select, at least 1.
     file : str

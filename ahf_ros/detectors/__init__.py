@@ -12,23 +12,27 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
 from pkgutil import resolve_name
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ahf_ros.codes.families import FAMILY_NAMES, KINDS, check_numbers, families_in
+from ahf_ros.deprecation import deprecated_arguments
 from ahf_ros.detectors.contract import (
     Detector,
     DetectorSettings,
-    Discerning,
     Drafter,
+    EarlyStopping,
     Expecting,
     Refiner,
 )
 from ahf_ros.settings.nested import updated
 from ahf_ros.settings.parameter import Parameter
-from ahf_ros.text import printable, reason_of
+from ahf_ros.text import printable, reason_of, shown
 
 if TYPE_CHECKING:
     import numpy as np
+    from typing_extensions import Unpack
+
+    from ahf_ros.options import DetectorOptions
 
 __all__ = [
     'AUTO',
@@ -38,8 +42,8 @@ __all__ = [
     'GROUP',
     'Detector',
     'DetectorSettings',
-    'Discerning',
     'Drafter',
+    'EarlyStopping',
     'Expecting',
     'Refiner',
     'check_expected_ids',
@@ -66,7 +70,7 @@ class _Entry:
     families: tuple[str, ...]
     estimate: str = ''
     several: bool = False  # families at a time
-    own_ids: bool = False  # rather than those of the families
+    own_ids: bool = False  # rather than the families'
 
     def reads(self, families: tuple[str, ...]) -> bool:
         return set(families) <= set(self.families) and (self.several or len(families) == 1)
@@ -105,7 +109,7 @@ _ADDED: dict[str, EntryPoint] = {
 }
 
 DETECTOR_NAMES = (*_ENTRIES, *sorted(_ADDED))
-"""The names of all detectors, those of this package first."""
+"""The names of all detectors; this package's come first."""
 
 DETECTOR = Parameter(
     'detector',
@@ -116,8 +120,12 @@ DETECTOR = Parameter(
 """The choice of a detector."""
 
 
+@deprecated_arguments(positions=('settings',))
 def create_detector(
-    name: str = AUTO, settings: DetectorSettings | None = None, **values: Any
+    name: str = AUTO,
+    *,
+    settings: DetectorSettings | None = None,
+    **options: Unpack[DetectorOptions],
 ) -> Detector:
     """Return a detector.
 
@@ -127,7 +135,7 @@ def create_detector(
         One of `DETECTOR_NAMES`, or 'auto' for the detector of the family.
     settings : DetectorSettings, optional
         What the targets look like; the defaults where None.
-    **values
+    **options
         Fields of `DetectorSettings` that differ from `settings`.
 
     Raises
@@ -143,7 +151,9 @@ def create_detector(
     >>> create_detector(family='metashape20').name
     'ring'
     """
-    settings = updated(settings or DetectorSettings(), values)
+    if not (settings is None or isinstance(settings, DetectorSettings)):
+        raise ValueError(f'settings is {shown(settings)}, accepted is a DetectorSettings')
+    settings = updated(settings or DetectorSettings(), options)
     name = detector_name(name, settings.family)
     if name in _ENTRIES:
         return _ENTRIES[name].create(settings)

@@ -66,7 +66,7 @@ def best_targets(targets: Sequence[_Target], reach: float = 0.0) -> list[_Target
     ----------
     targets : sequence of Target
     reach : float
-        Radius of a target, in that of its dot; no other lies in it. Only IDs count where it is 0.
+        Radius of a target, in radii of its dot; no other lies in it. Only IDs count where it is 0.
     """
     order = sorted(targets, key=lambda it: (it.id == UNDECODED, -it.confidence, it.y, it.x))
     x, y, minor = np.array([(it.x, it.y, it.semi_minor) for it in order]).reshape(-1, 3).T

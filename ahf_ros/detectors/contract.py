@@ -1,4 +1,4 @@
-"""What a detector is, and what detectors share: settings, and the head of those of one family."""
+"""What a detector is, and what detectors share: settings, and a base class for one family."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ class Drafter(Protocol):
 
 
 @runtime_checkable
-class Discerning(Protocol):
+class EarlyStopping(Protocol):
     """A detector that identifies in an image as received nearly all that any filter shows it.
 
     AHF gives up early where filters show it no more.
@@ -179,7 +179,7 @@ class DetectorSettings:
     )
     min_radius: float = parameter(
         0.0,
-        'Minimum radius of a dot, px; 0: that of the family, 2 for point-distributed targets, 2.5 '
+        'Minimum radius of a dot, px; 0: as for the family, 2 for point-distributed targets, 2.5 '
         'for rings of dots and 4 for others.',
         minimum=0.0,
         maximum=1e4,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -13,7 +13,8 @@ from ahf_ros.drawing.colours import Colour
 Box = tuple[float, float, float, float]
 """Left, upper, right and lower border, px."""
 
-_SINE = math.sqrt(0.5)  # of the direction from a target to its label
+_CORNERS = np.array([(1.0, -1.0), (1.0, 1.0), (-1.0, -1.0), (-1.0, 1.0)])  # where labels may be
+_CIRCLE = math.sqrt(0.5)  # of the radius, what a circle reaches in both directions of a corner
 _OUTSIDE = 1e3  # cost of a label that is partly outside, against one that hides a target
 
 
@@ -29,6 +30,8 @@ class Label:
     radius : float
         Of the circle that holds the target, px.
     colour : tuple of 3 int
+    outline : ndarray of float64, shape (k, 2)
+        Points on the outline of the target, px; empty where it is round.
     """
 
     text: str
@@ -36,6 +39,7 @@ class Label:
     y: float
     radius: float
     colour: Colour
+    outline: np.ndarray = field(default_factory=lambda: np.empty((0, 2)))
 
 
 def place_labels(
@@ -87,12 +91,14 @@ def place_labels(
 
 def _boxes(label: Label, size: tuple[float, float], gap: float) -> np.ndarray:
     """Return left, top, right and bottom of the four places of a label."""
-    width, height = size
-    distance = _SINE * label.radius + gap
-    right, left = label.x + distance, label.x - distance - width
-    upper, lower = label.y - distance - height, label.y + distance
-    corners = [(right, upper), (right, lower), (left, upper), (left, lower)]
-    return np.array([(x, y, x + width, y + height) for x, y in corners])
+    centre = np.array([label.x, label.y])
+    offsets = _CORNERS[:, None] * (label.outline - centre)
+    reach = offsets.min(axis=2).max(axis=1, initial=0.0) + gap  # of the line
+    if not len(label.outline):
+        reach = np.full(4, _CIRCLE * label.radius)
+    near = centre + _CORNERS * (reach + gap)[:, None]  # the corner of the box beside the target
+    far = near + _CORNERS * size
+    return np.hstack([np.minimum(near, far), np.maximum(near, far)])
 
 
 def _hidden(box: np.ndarray, circles: np.ndarray) -> int:

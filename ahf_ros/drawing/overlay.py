@@ -1,4 +1,4 @@
-"""Overlays: one look tells what was found from what is doubtful and what was missed."""
+"""Overlays: what was found, what is doubtful and what was missed, at one look."""
 
 from __future__ import annotations
 
@@ -28,15 +28,24 @@ from ahf_ros.drawing.strokes import (
     cross_out,
     draw_ellipse,
     draw_plus,
+    draw_polygon,
     text_size,
     write,
 )
 from ahf_ros.imaging.image import stretched_to_8_bit
-from ahf_ros.target import UNDECODED, DottedTarget, Identification, Target, UndecodedTarget
+from ahf_ros.target import (
+    UNDECODED,
+    DottedTarget,
+    Identification,
+    SquareMarker,
+    Target,
+    UndecodedTarget,
+)
 
 _LETTERS = 0.0105  # height, of the diagonal: legible when all of the image is on a screen
-_SMALLEST_LETTERS = 15.0  # px
-_MOST_NAMED = 12  # IDs that the summary names at most
+_MINIMUM_LETTERS = 15.0  # px
+_SIDE_POINTS = 9  # at which the outline of a square is sampled
+_MAXIMUM_NAMED = 12  # IDs that the summary names at most
 
 
 def draw(image: np.ndarray, identification: Identification) -> np.ndarray:
@@ -74,7 +83,7 @@ def overlay(
 ) -> np.ndarray:
     """Return an image in colour with the dot, the centre and the ID of every target.
 
-    Decoded targets have a solid outline. That of doubtful ones is dashed, and their ID has a
+    Decoded targets have a solid outline. Doubtful ones have a dashed one, and their ID has a
     question mark. Missed ones are crossed out. The family is beside the ID if there are targets of
     several families.
 
@@ -122,7 +131,9 @@ def _marked(
         if look.text:
             named = several and target.id != UNDECODED
             text = f'{look.text} {target.family}' if named else look.text
-            labels.append(Label(text, target.x, target.y, _radius(target), look.colour))
+            labels.append(
+                Label(text, target.x, target.y, _radius(target), look.colour, _outline(target))
+            )
     return canvas, labels
 
 
@@ -134,8 +145,8 @@ def summary(identification: Identification) -> str:
         words += f' of {estimated}{identification.expected}'
     found = {target.id for target in identification.targets}
     if missed := [str(it) for it in identification.expected_ids if it not in found]:
-        more = len(missed) - _MOST_NAMED
-        words += f', missed {" ".join(missed[:_MOST_NAMED])}'
+        more = len(missed) - _MAXIMUM_NAMED
+        words += f', missed {" ".join(missed[:_MAXIMUM_NAMED])}'
         words += f' and {more} others' if more > 0 else ''
     if identification.mirrored:
         words += ', mirrored'
@@ -180,14 +191,27 @@ def _radius(target: Target) -> float:
     return relative_reach(target.family) * target.semi_major
 
 
+def _outline(target: Target) -> np.ndarray:
+    """Return points on the sides of a square, px, shape (k, 2); none for other targets."""
+    if isinstance(target, SquareMarker) and target.corners:
+        corners = np.array(target.corners)
+        along = np.linspace(0, 1, _SIDE_POINTS)[:, None, None]
+        return (corners + along * (np.roll(corners, -1, axis=0) - corners)).reshape(-1, 2)
+    return np.empty((0, 2))
+
+
 def _ellipses(target: Target) -> tuple[Sequence[Ellipse], Sequence[Ellipse]]:
     """Return the ellipses that all targets of the family have, and those that are the code."""
     if isinstance(target, DottedTarget):
         return target.dots[: target.template_dots], target.dots[target.template_dots :]
+    if isinstance(target, SquareMarker) and target.corners:
+        return (), ()
     return ((target.x, target.y, target.semi_major, target.semi_minor, target.angle),), ()
 
 
 def _draw_target(canvas: np.ndarray, target: Target, look: _Look, unit: int) -> None:
+    if isinstance(target, SquareMarker) and target.corners:
+        draw_polygon(canvas, target.corners, look.colour, unit)
     template, decoding = _ellipses(target)
     for ellipse in template:
         draw_ellipse(canvas, ellipse, look.colour, unit, look.dashed)
@@ -203,7 +227,7 @@ def _draw_labels(
 ) -> None:
     """Write the labels, in letters of one height."""
     shape: tuple[int, int] = canvas.shape[:2]
-    height = max(_SMALLEST_LETTERS * unit, _LETTERS * math.hypot(*shape))
+    height = max(_MINIMUM_LETTERS * unit, _LETTERS * math.hypot(*shape))
     scale = min(height, shape[0]) / FONT_HEIGHT
     sizes = [text_size(label.text, scale, unit) for label in labels]
     places = place_labels(labels, sizes, shape, 3.0 * unit, taken)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import cv2
 import numpy as np
@@ -31,6 +32,15 @@ def draw_ellipse(
     for shade, width in ((OUTLINE_COLOUR, 3 * unit), (colour, unit)):
         for start, end in arcs:
             cv2.ellipse(canvas, centre, axes, angle, start, end, shade, width, cv2.LINE_AA, _SHIFT)
+
+
+def draw_polygon(
+    canvas: np.ndarray, corners: Sequence[tuple[float, float]], colour: Colour, unit: int
+) -> None:
+    """Draw a closed polygon, `unit` px wide."""
+    points = [np.array([(_fixed(x), _fixed(y)) for x, y in corners], np.int32)]
+    for shade, width in ((OUTLINE_COLOUR, 3 * unit), (colour, unit)):
+        cv2.polylines(canvas, points, True, shade, width, cv2.LINE_AA, _SHIFT)
 
 
 def draw_plus(

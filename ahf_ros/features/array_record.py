@@ -31,7 +31,7 @@ class ArrayRecord:
         return type(self)(*(getattr(self, item.name)[which] for item in fields(self)))
 
     def replaced(self: _Record, which: np.ndarray, rows: _Record) -> _Record:
-        """Return a copy in which the rows of an index array or a mask are those of `rows`."""
+        """Return a copy whose rows in an index array or a mask are replaced by `rows`."""
         columns = []
         for item in fields(self):
             column = getattr(self, item.name).copy()

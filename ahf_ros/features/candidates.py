@@ -21,7 +21,7 @@ import numpy as np
 from ahf_ros.features import frame
 from ahf_ros.features.dots import best
 from ahf_ros.features.log_edges import LogEdges, mask_of
-from ahf_ros.features.pyramid import LARGEST_RADIUS
+from ahf_ros.features.pyramid import MAXIMUM_RADIUS
 from ahf_ros.features.votes import NO_PEAKS, Peaks, find_peaks, highest
 
 MAXIMUM_CANDIDATES = 6000
@@ -52,18 +52,18 @@ class _Shape(NamedTuple):
     every: int
 
 
-_SMALLEST = _Shape(1.0, 1, 1, 0.6, 1)  # whose edges are the least exact
+_TINY = _Shape(1.0, 1, 1, 0.6, 1)  # whose edges are the least exact
 _SMALL = _Shape(1.0, 1, 1, 1.4, 1)
 _LARGE = _Shape(1.0, 1, 2, 1.4, 1)
-_OBLIQUE = _Shape(0.5, 6, 2, 1.2, 2)  # finds those of 0.3 to 0.7, up to 70 degrees
+_OBLIQUE = _Shape(0.5, 6, 2, 1.2, 2)  # finds shapes of 0.3 to 0.7, up to 70 degrees
 _RANGES = {  # by semi-major axes, px
     (3.4, 5.8): (_SMALL,),  # out of focus, as others are found on the level below
-    (5.8, LARGEST_RADIUS): (_LARGE, _OBLIQUE),
+    (5.8, MAXIMUM_RADIUS): (_LARGE, _OBLIQUE),
 }
 _FIRST_RANGES = {  # of the first level
-    (2.0, 3.4): (_SMALLEST,),
+    (2.0, 3.4): (_TINY,),
     (3.4, 5.8): (_SMALL, _OBLIQUE),
-    (5.8, LARGEST_RADIUS): (_LARGE, _OBLIQUE),
+    (5.8, MAXIMUM_RADIUS): (_LARGE, _OBLIQUE),
 }
 _STEP = 0.8  # of the radii voted for, in cells
 _FLAT = 0.75  # sine of the angle between an edge of an ellipse and its major axis, at the most

@@ -33,7 +33,7 @@ _MINIMUM_GAIN = 0.2  # where many errors lie beyond the turning point of the wei
 _MAXIMUM_CHANGE = 0.3  # of a frame in one measurement, dot radii
 _LIGHT_REACH = 0.3  # standard deviation of the window in which the light is even, dot radii
 _LIGHT_PRIOR = 5.0  # px of whole edges that say as much of the slope as the prior, none, does
-_SHARPENED = 0.03  # slope of all edges that makes those of single ones doubtful, 1/px
+_SHARPENED = 0.03  # slope of all edges that makes single slopes doubtful, 1/px
 _OF_COMMON, _OF_SIZE = 1.1, 4.5  # of the variance of whole targets, as rendered scenes have it
 _SYSTEMATIC = 0.001  # standard deviation of what pixels and interpolation do to a centre, px
 _NO_WEIGHT = 1e-9  # instead of a sum of no weights
@@ -49,7 +49,7 @@ class Fit(ArrayRecord):
     polarity : ndarray of int, shape (k,)
         1 for a dark target on bright ground, -1 for a bright one on dark.
     contrast : ndarray of float64, shape (k,)
-        Usual gray value of the dark side of an edge over that of the bright side.
+        Usual gray value of the dark side of an edge, divided by the bright side's.
     bright : ndarray of float64, shape (k,)
         Usual gray value of the bright side.
     share : ndarray of float64, shape (k,)
@@ -61,7 +61,7 @@ class Fit(ArrayRecord):
     blur : ndarray of float64, shape (k,)
         Of the edges, standard deviation in px.
     edge_shift : ndarray of float64, shape (k,)
-        By how much what is dark has grown on all edges, px; 0 where one circle does not tell.
+        By how much what is dark has grown on all edges, px; 0 for a single circle.
     """
 
     frames: np.ndarray
@@ -159,7 +159,7 @@ def fit_circles(
         Distance from an expected edge within which edges are measured, dot radii.
     projective : bool
         Whether the circles have different radii, so that they determine the common centre.
-        Otherwise the centre is that of the ellipse.
+        Otherwise it is the centre of the ellipse.
     rounds : int
         Number of measurements.
     blur : ndarray of float64, shape (k,), optional
@@ -285,7 +285,7 @@ def _light(edges: Edges, weights: np.ndarray, circles: Circles, window: np.ndarr
 
 
 def _window(circles: Circles) -> np.ndarray:
-    """Return the weights by which points see the light of others on the same circle, (m, m)."""
+    """Return the weights of the light at other points of the same circle, (m, m)."""
     angles, radii = (np.asarray(of, float).tobytes() for of in (circles.angles, circles.radii))
     return _window_of(angles, radii)
 

@@ -19,7 +19,7 @@ class Circles:
     angles, radii : ndarray of float64, shape (m,)
         In the frame, rad and dot radii.
     group : ndarray of int, shape (m,)
-        0 on the dot, whose scale is that of the frame. Circles of the same group from 1 on share
+        0 on the dot, which has the scale of the frame. Circles of the same group from 1 on share
         a scale relative to the dot that is known about as well as a print is.
     polarity : ndarray of int, shape (k, m)
         1 where the outside is brighter, -1 where it is darker, 0 where there is no edge. The

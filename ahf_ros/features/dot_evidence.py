@@ -1,7 +1,7 @@
 """Evidence for and against dots at given places, from the steps of ln I round them.
 
 Where there is a dot, the logarithm of the image has the same step along all rays, wherever the
-light falls. Where there is none, it has no step, or that of an edge of light, which crosses the
+light falls. Where there is none, it has no step, or a step of an edge of light, which crosses the
 circle on two sides and in opposite directions.
 """
 
@@ -23,7 +23,7 @@ _DOT_SPREAD = (0.3, 0.6)  # standard deviation of steps below and above the usua
 _EMPTY_SPREAD = 0.22  # the same of steps where there is no dot
 _FLOOR = 0.12  # share of rays that edges of light disturb
 _RANGE = 3.0  # of such steps
-_CORRELATION = 2.5  # distance on the circle from where on rays tell something new, px
+_CORRELATION = 2.5  # distance on the circle at which rays are independent, px
 _PART = 400_000  # samples at a time, which bounds the memory
 
 
@@ -97,14 +97,14 @@ def _sides(
 def dot_evidence(
     steps: np.ndarray, frames: np.ndarray, noise: float | np.ndarray = 0.0
 ) -> np.ndarray:
-    """Return ln of the likelihood of a dot over that of none.
+    """Return ln of the likelihood of a dot divided by the likelihood of none.
 
     Parameters
     ----------
     steps : ndarray of float64, shape (..., m)
         From the dot to its ground, in the usual step of such dots.
     frames : ndarray of float64, shape (..., 3, 3)
-        Of the dots; rays round a small dot tell less than so many independent ones.
+        Of the dots; rays round a small dot count less than so many independent ones.
     noise : float or ndarray of float64, shape (..., m)
         Standard deviation of the steps by noise, in the unit of `steps`.
 

@@ -36,7 +36,7 @@ class Dots(ArrayRecord):
 
 
 NO_DOTS = Dots(np.zeros((0, 3, 3)), np.zeros(0, int), np.zeros(0))
-"""The record of none."""
+"""An empty record."""
 
 
 def distinct(dots: Dots) -> Dots:
@@ -74,5 +74,5 @@ def best(indices: np.ndarray, ranks: np.ndarray, limit: int, what: str) -> np.nd
     """
     if len(indices) <= limit:
         return indices
-    _LOG.warning('%d %s, of which the %d best are looked at', len(indices), what, limit)
+    _LOG.warning('%d %s; the %d best are looked at', len(indices), what, limit)
     return np.sort(indices[np.argsort(ranks, kind='stable')[:limit]])

@@ -24,7 +24,7 @@ _MINIMUM_BRIGHT = 1.0  # gray value that ratios are taken to
 
 @dataclass(frozen=True, slots=True)
 class EdgeWeights:
-    """How much the edges of k targets at m points each look like those of the targets.
+    """How much the edges of k targets at m points each look like edges of targets.
 
     Attributes
     ----------
@@ -33,7 +33,7 @@ class EdgeWeights:
     weights : ndarray of float64, shape (k, m)
         0 to 1, by the ratio of the levels beside it and by how much it is a step.
     contrast : ndarray of float64, shape (k,)
-        Usual gray value of the dark side of an edge over that of the bright side.
+        Usual gray value of the dark side of an edge, divided by the bright side's.
     """
 
     seen: np.ndarray
@@ -42,7 +42,7 @@ class EdgeWeights:
 
 
 def weigh_edges(edges: Edges) -> EdgeWeights:
-    """Tell edges of targets from those of light, each target by its own usual edge."""
+    """Separate edges of targets from edges of light, by the usual edge of each target."""
     dark, bright = np.maximum(edges.dark, 0), np.maximum(edges.bright, 0)
     step = np.log((bright + LOG_OFFSET) / (dark + LOG_OFFSET))
     usual = median(step, edges.visible)[:, None]

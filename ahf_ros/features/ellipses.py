@@ -18,7 +18,8 @@ from ahf_ros.features.sampling import sample_circles
 _RAYS, _FEW_RAYS = 32, 24  # about an ellipse that is refined, and about a candidate
 _ANGLES, _FEW_ANGLES = (2 * np.pi * np.arange(rays) / rays for rays in (_RAYS, _FEW_RAYS))
 _BINS = 22  # of the radius, in equal ratios
-_NEAREST, _FARTHEST = 0.4, 1.35  # radii sampled, in the smallest and the largest of the range
+_MINIMUM_RADIUS = 0.4  # radius sampled, in the smallest one of the range
+_MAXIMUM_RADIUS = 1.35  # the same, in the largest one
 _WIDTH = 1.5  # from the middle of an ellipse to where its weights end, bins
 _SHAPES = ((1.0, 1), (0.75, 4), (0.55, 6), (0.4, 8))  # aspect, number of directions
 _BESIDE, _SIDES = 0.4, 6  # distance of circles beside a candidate in their radius, directions
@@ -151,7 +152,7 @@ def _templates(low: float, high: float) -> tuple[np.ndarray, np.ndarray, np.ndar
     ellipses : ndarray of float64, shape (n, 5)
         Centres, seen from the candidate, semi-axes and directions.
     """
-    radii = np.geomspace(_NEAREST * low, _FARTHEST * high, _BINS)
+    radii = np.geomspace(_MINIMUM_RADIUS * low, _MAXIMUM_RADIUS * high, _BINS)
     ratio = np.log(radii[1] / radii[0])
     middle = radii[1:-1]
     outlines, ellipses = [], []

@@ -95,7 +95,7 @@ def project(frames: np.ndarray, points: np.ndarray) -> np.ndarray:
     ----------
     frames : ndarray of float64, shape (k, 3, 3)
     points : ndarray of float, shape (..., 2) of up to three axes, or (k, m, n, 2)
-        The same points for every frame, or those of each.
+        The same points for every frame, or others for each.
 
     Returns
     -------

@@ -8,10 +8,10 @@ import numpy as np
 
 from ahf_ros.features.frame import project
 
-_ROUNDS = 3  # of linear solutions: the division by the depth is that of the one before
+_ROUNDS = 3  # of linear solutions: each divides by the depth of the one before
 _PERSPECTIVE = 0.08  # usual change of depth from the centre of an object to its edge, relative
 _WEAK = 1e-9  # weight of a prior that only makes matrices invertible
-_SMALLEST_DEPTH = 0.2  # in that of the centre
+_MINIMUM_DEPTH = 0.2  # as a fraction of the centre's depth
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,7 @@ class HomographyFit:
 def fit_homographies(
     points: np.ndarray, images: np.ndarray, weights: np.ndarray, reach: float
 ) -> HomographyFit:
-    """Fit homographies to the images of points, with little perspective where they do not tell.
+    """Fit homographies to the images of points, with little perspective where they do not show it.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def fit_homographies(
         )
         solution = np.linalg.solve(normal, right[..., None])[..., 0]
         depth = 1 + (scaled * solution[:, None, 6:]).sum(axis=2)
-        depth = np.maximum(depth, _SMALLEST_DEPTH)
+        depth = np.maximum(depth, _MINIMUM_DEPTH)
     elements = np.concatenate([solution, np.ones((count, 1))], axis=1).reshape(-1, 3, 3)
     elements[:, :, :2] /= reach
     back = np.zeros((count, 3, 3))

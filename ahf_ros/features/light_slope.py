@@ -64,7 +64,7 @@ def unevenness(errors: np.ndarray, weights: np.ndarray) -> np.ndarray:
 def common_slope(slopes: np.ndarray, polarity: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """Return the mean slope towards the bright side of edges, shape (k, 1), all others (k, m).
 
-    It is not the light's: the blur is another than that of the fitted step, or edges were
+    It is not the light's: the blur is not the fitted step's, or edges were
     sharpened.
     """
     total = np.maximum(weights.sum(axis=1), _NO_WEIGHT)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-_LARGEST = 30.0  # log-odds, beyond which a probability changes no more
+_MAXIMUM_ODDS = 30.0  # log-odds, beyond which a probability changes no more
 
 
 def logistic(features: np.ndarray, weights: np.ndarray) -> np.ndarray:
@@ -27,7 +27,7 @@ def logistic(features: np.ndarray, weights: np.ndarray) -> np.ndarray:
     >>> logistic(np.array([[2.0]]), np.array([-2.0, 1.0]))
     array([0.5])
     """
-    odds = np.clip(weights[0] + features @ weights[1:], -_LARGEST, _LARGEST)
+    odds = np.clip(weights[0] + features @ weights[1:], -_MAXIMUM_ODDS, _MAXIMUM_ODDS)
     probabilities: np.ndarray = 1 / (1 + np.exp(-odds))
     return probabilities
 

@@ -11,7 +11,7 @@ import numpy as np
 def pairs_within(
     points: np.ndarray, reach: np.ndarray, part: int
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Yield the ordered pairs of points of which the second is within reach of the first.
+    """Yield the ordered pairs of points where the second is within reach of the first.
 
     Parameters
     ----------

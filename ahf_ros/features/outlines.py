@@ -15,7 +15,7 @@ MAXIMUM_OUTLINES = 20_000
 _MAXIMUM_SPREAD = 0.15  # of the radius, of the points of a whole ellipse
 _MINIMUM_AGREEMENT = 0.7  # mean of the signs of their gradients along the outward direction
 _MINIMUM_LENGTH = 0.6  # of an outline, in circumferences of the smallest circle, in edge pixels
-_MAXIMUM_LENGTH = 1.1  # the same, in those of the largest
+_MAXIMUM_LENGTH = 1.1  # the same, in circumferences of the largest
 _MINIMUM_MINOR = 1.0  # px
 _DEGENERATE = 1e-6  # px^4, smallest determinant of a covariance, of a line
 

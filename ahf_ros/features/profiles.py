@@ -70,7 +70,7 @@ class Edges:
     sensitivity : ndarray of float64
         How far a slope of the light moves the offset outwards, px^2.
     softness : ndarray of float64
-        Blur of the edge less that of the step, standard deviations in px.
+        Blur of the edge minus the blur of the step, standard deviations in px.
     residual : ndarray of float64
         Root mean square of what step, slope and blur do not explain, gray values.
     scale : ndarray of float64

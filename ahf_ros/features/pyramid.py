@@ -15,7 +15,7 @@ import numpy as np
 from ahf_ros.features.log_edges import LOG_SCALE, LogEdges, find_edges
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
-LARGEST_RADIUS = 11.2
+MAXIMUM_RADIUS = 11.2
 """Largest radius of a dot that is voted for on one level, px; larger ones take a higher level."""
 
 _OCTAVE_LEVELS = 3  # of the halves in which the dots of an octave are voted for
@@ -36,7 +36,7 @@ class ImagePyramid:
     logs : tuple of ndarray of int16
         LOG_SCALE ln(I + LOG_OFFSET) of each level, the image as received first.
     edges : tuple of LogEdges
-        Of each level from the first half on: `edges[i]` are those of `logs[i + 1]`.
+        Of each level from the first half on: `edges[i]` belongs to `logs[i + 1]`.
     """
 
     gray: np.ndarray
@@ -76,7 +76,7 @@ def image_pyramid(gray: np.ndarray, max_radius: float) -> ImagePyramid:
         than the image.
     """
     largest = min(max_radius, max(gray.shape) / 2)
-    levels = max(1, ceil(log2(largest / LARGEST_RADIUS)))
+    levels = max(1, ceil(log2(largest / MAXIMUM_RADIUS)))
     images = halved(gray, levels)
     logs = tuple(log_image(level) for level in images)
     edges = tuple(find_edges(log) for log in logs[1:])
@@ -95,7 +95,7 @@ def octaves(pyramid: ImagePyramid, min_radius: float, max_radius: float) -> Iter
     min_radius, max_radius : float
         Bounds of the radius, px of the image.
     """
-    largest = LARGEST_RADIUS * 2**_OCTAVE_LEVELS
+    largest = MAXIMUM_RADIUS * 2**_OCTAVE_LEVELS
     for level in range(max(1, len(pyramid.edges) - _OCTAVE_LEVELS + 1)):
         smallest = largest / 2 * _ABOVE if level else 0.0
         low, high = (

@@ -1,6 +1,6 @@
 """Robust statistics: medians, and weights that outliers lose.
 
-The weight of Cauchy, 1 / (1 + r^2), and that of Geman and McClure [1]_, 1 / (1 + r^2)^2, which
+Cauchy's weight is 1 / (1 + r^2), Geman and McClure's [1]_ is 1 / (1 + r^2)^2, which
 leaves less to outliers.
 
 References

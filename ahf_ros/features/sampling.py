@@ -78,7 +78,7 @@ def sample_circles(
     angles : ndarray of float, shape (m,)
         From +x towards +y, rad.
     radii : ndarray of float, shape (n,) or (k, n)
-        The same for every frame, or those of each, dot radii.
+        The same for every frame, or others for each, dot radii.
 
     Returns
     -------

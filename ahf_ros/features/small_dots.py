@@ -27,8 +27,8 @@ _BLUR = 0.15  # px^2, variance that blur adds to a dot that is cut off at half o
 _MINIMUM_MINOR = 0.6  # px
 _MINIMUM_PIXELS = 4
 _FILLED = (0.7, 1.35)  # pixels of a dot over the area of its ellipse
-_TILE = 32  # side of the tiles of which empty ones are left out, px
-_MOST_TILES = 0.3  # of the image; where there are more, it is looked at as a whole
+_TILE = 32  # side of a tile, px; empty tiles are left out
+_MAXIMUM_TILES = 0.3  # of the image; where there are more, it is looked at as a whole
 
 
 def small_dots(
@@ -157,7 +157,7 @@ def _parts(
     tiles = cv2.dilate((highest >= least).astype(np.uint8), np.ones((3, 3), np.uint8))
     count, labels, stats, _ = cv2.connectedComponentsWithStats(tiles)
     extents = stats[1:, cv2.CC_STAT_WIDTH] * stats[1:, cv2.CC_STAT_HEIGHT]
-    if extents.sum() > _MOST_TILES * tiles.size:
+    if extents.sum() > _MAXIMUM_TILES * tiles.size:
         yield 0, 0, height, None
         return
     for number in range(1, count):

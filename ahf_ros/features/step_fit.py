@@ -39,7 +39,7 @@ def fit_steps(values: np.ndarray, groups: np.ndarray) -> np.ndarray:
     ----------
     values : ndarray of float32, shape (n, samples)
     groups : ndarray of int, shape (n,)
-        Ascending; the number of a half width, and that of a blur times the number of half widths.
+        Ascending; index of the half width, plus index of the blur times the count of half widths.
 
     Returns
     -------

@@ -35,7 +35,7 @@ received, hardly any other filter does."""
 
 
 def genes_of(settings: TuningSettings) -> tuple[Gene, ...]:
-    """Return the genes of the gains and, if extended, those of cut-off and exponent in octaves.
+    """Return the genes of the gains and, if extended, of cut-off and exponent in octaves.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def genes_of(settings: TuningSettings) -> tuple[Gene, ...]:
 
 
 def with_combination(genes: tuple[Gene, ...], count: int) -> tuple[Gene, ...]:
-    """Return the genes of an image, or those of a stack with a number of combinations."""
+    """Return the genes of an image, or of a stack with a number of combinations."""
     return genes if count == 1 else (*genes, Gene('combination', 0.0, count - 1.0, 1.0))
 
 

@@ -23,6 +23,8 @@ from typing import Any
 
 import numpy as np
 
+from ahf_ros.blas import one_blas_thread
+from ahf_ros.deprecation import deprecated_arguments
 from ahf_ros.edge_shift import median_edge_shift
 from ahf_ros.filtering.choice import Choice, choose
 from ahf_ros.filtering.fusion import fused
@@ -46,7 +48,7 @@ Estimate = Callable[[np.ndarray], int]
 
 @dataclass(frozen=True, slots=True)
 class Memory:
-    """What an identification leaves to that of the next image.
+    """What an identification leaves to the next one.
 
     Attributes
     ----------
@@ -90,7 +92,7 @@ class Identifier:
     interrupt : callable, optional
         Called before each identification; what it raises ends `identify`.
     patience : int
-        Patience of a search where that of the settings is 0; without fusion, which lives on many
+        Patience of a search where the settings have 0; without fusion, which lives on many
         filters. 0 for no limit.
     mirrored : callable, optional
         From a target to the ID that it has in a mirror, None if that is unknown.
@@ -109,8 +111,8 @@ class Identifier:
     Examples
     --------
     >>> from ahf_ros import Identifier, SceneSettings, create_detector, render
-    >>> rendering = render(SceneSettings(width=320, height=240, targets=3, dot_radius=8))
-    >>> Identifier(create_detector('ring')).identify(rendering.image, 3).count
+    >>> scene = render(SceneSettings(width=320, height=240, targets=3, dot_radius=8))
+    >>> Identifier(create_detector('ring')).identify(scene.image, expected_targets=3).count
     3
     """
 
@@ -147,8 +149,10 @@ class Identifier:
         """Forget what worked for earlier images."""
         self.memory = Memory()
 
+    @deprecated_arguments(positions=('expected_targets',))
+    @one_blas_thread()
     def identify(
-        self, image: np.ndarray | ImageStack, expected_targets: int | None = None
+        self, image: np.ndarray | ImageStack, *, expected_targets: int | None = None
     ) -> Identification:
         """Identify the targets of one image or stack; call it from one thread at a time.
 
@@ -158,16 +162,16 @@ class Identifier:
             The image as received, or several of one unmoved scene. Without N, only the most
             promising combination of a stack is looked at.
         expected_targets : int, optional
-            N, the number of coded targets in this image; that of the identifier where None. Where
-            it is 0, N is estimated; without an estimate, no filter is tried. An estimate is never
-            below n of the image as received. Where the settings list the IDs, N is their number
-            in any case; targets with other IDs are left out, and no filter is chosen for them or
-            against them.
+            N, the number of coded targets in this image; where None, the N of the identifier.
+            Where it is 0, N is estimated; without an estimate, no filter is tried. An estimate is
+            never below n of the image as received. Where the settings list the IDs, N is their
+            number in any case; targets with other IDs are left out, and no filter is chosen for
+            them or against them.
 
         Returns
         -------
         Identification
-            The result with the smallest `|N - n|`; of equally good ones that of the image as
+            The result with the smallest `|N - n|`; of equally good ones the one from the image as
             received, then the first. With `fusion`, and after a search, what this filter and the
             others show together, see `ahf_ros.filtering.fusion`. The evaluations of its filter
             state are the identifications that led to it; threads may have begun others when the

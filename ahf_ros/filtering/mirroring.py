@@ -1,7 +1,7 @@
 """Whether an image is mirrored, from the IDs that it should show.
 
 Every word of a family of ring codes is another word of the family in a mirror, so that a mirrored
-image shows as many targets as the original. Only IDs that are expected can tell.
+image shows as many targets as the original. This is known only where IDs are expected.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from ahf_ros.target import UNDECODED, Target
 MirroredId = Callable[[Target], int | None]
 """From a target to the ID that it has in a mirror, None if that is unknown."""
 
-_FEWEST = 3  # targets that tell; with fewer, chance does
+_MINIMUM_TARGETS = 3  # targets; fewer may have such IDs by chance
 
 
 def is_mirrored(
@@ -36,7 +36,7 @@ def is_mirrored(
     True
     """
     decoded = {target.key: target for target in targets if target.id != UNDECODED}.values()
-    if not expected or len(decoded) < _FEWEST:
+    if not expected or len(decoded) < _MINIMUM_TARGETS:
         return False
     direct = sum(target.id in expected for target in decoded)
     reflected = sum(mirrored(target) in expected for target in decoded)

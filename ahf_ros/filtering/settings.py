@@ -155,7 +155,7 @@ class GeneticSettings:
 class AdaptiveSettings:
     """Whether a filter is searched for, and how.
 
-    The default of `max_evaluations` bounds the cost of an image of which no filter shows all N
+    The default of `max_evaluations` bounds the cost of an image where no filter shows all N
     targets. With the extended genes, 50 filters find what 100 of the published search do
     (`benchmarks/strategies.py`).
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 _PRINTED = 0.25
-"""Gray value of ink over that of paper to which black is lifted."""
+"""Ratio of the gray values of ink and paper to which black is lifted."""
 
 
 def black_lift(contrast: np.ndarray, bright: np.ndarray) -> np.ndarray:
@@ -20,7 +20,7 @@ def black_lift(contrast: np.ndarray, bright: np.ndarray) -> np.ndarray:
     Parameters
     ----------
     contrast : ndarray of float64, shape (...)
-        Gray value of ink over that of paper. From 0.2 on, black stays as it is.
+        Ratio of the gray values of ink and paper. From 0.2 on, black stays as it is.
     bright : ndarray of float64, shape (...)
         Gray value of paper.
 
@@ -47,7 +47,7 @@ def lifted(values: np.ndarray, lift: np.ndarray) -> np.ndarray:
     values : ndarray of float, shape (...)
         Gray values from 0 to 255.
     lift : ndarray of float
-        See `black_lift`; its shape is broadcast to that of `values`.
+        See `black_lift`; broadcast to the shape of `values`.
     """
     moved: np.ndarray = lift + (1 - lift / 255) * values
     return moved

@@ -22,7 +22,7 @@ _BINS = 4  # per px, of displacements along a normal
 _NEAR = 0.75  # px, a displacement that is refined
 _RING = 1.25  # px, distance from a peak at which it has fallen
 _STEPS = 8  # of the robust fit
-_DIRECTIONS = 12  # of normals, each of which counts as much: light has few, prints have many
+_DIRECTIONS = 12  # of normals, which count alike: light has few, prints have many
 _STRIPED = 2.5  # ratio of edges in a direction to the median of all directions
 _ENOUGH = 120  # edges of other directions
 _UNEVEN = 0.1  # px, systematic error where no edge of the first image coincides
@@ -73,7 +73,7 @@ def measured(normals: np.ndarray, found: np.ndarray) -> Displacement | None:
 def direction_weights(normals: np.ndarray) -> np.ndarray:
     """Return weights of edges, 1 on average, with which all directions count alike.
 
-    Directions with many times more edges than others are those of stripes of light. They and their
+    Directions with many times more edges than others are stripes of light. They and their
     neighbours are left out where enough edges remain.
 
     Parameters

@@ -16,19 +16,19 @@ from collections.abc import Iterable
 import cv2
 import numpy as np
 
-_BLUR = 1.0  # px, of the images of which ratios are taken, against noise
+_BLUR = 1.0  # px, of the images before their ratio is taken, against noise
 _RANKS = 3  # images that ratios are taken of: the brightest ones of each point
 _BINS = 24  # of each ratio, from 0 to 1
 _SPREAD = 0.7  # bins, by which the table is smoothed
 _FLOOR = 2 / 255  # of the range; added to gray values, about what noise adds
 _ALIKE = (0.35, 0.65)  # ratio of the second image to the first, from which light is evened
-_ENOUGH = 0.1  # share of points in full light of one image that tell how bright full light is
-_TILE = 64  # px, side of the parts of which the mean brightness is the surroundings'
+_ENOUGH = 0.1  # share of points in full light of one image, to measure how bright it is
+_TILE = 64  # px, side of the parts whose mean brightness is the surroundings'
 _SURROUNDINGS = 2.0  # tiles, by which it is smoothed
 _PAPER = 4.0  # power of the brightness with which points count: paper, and hardly ink
 _RELIABLE = 100.0  # points of a bin that count as much as what all points show
-_EVERY = 2  # rows and columns of which one is looked at, for the table; at random, unlike light
-_BRIGHTEST = 99.9  # percentile that stays within the range
+_EVERY = 2  # rows and columns; one of them goes into the table, at random, unlike light
+_MAXIMUM_PERCENTILE = 99.9  # percentile that stays within the range
 
 
 def even_light(images: Iterable[np.ndarray]) -> np.ndarray:
@@ -66,7 +66,7 @@ def even_light(images: Iterable[np.ndarray]) -> np.ndarray:
     excess *= alike
     result: np.ndarray = cv2.exp(cv2.subtract(logarithm, excess, logarithm), logarithm)
     result -= np.float32(_FLOOR)
-    result /= np.float32(max(float(np.percentile(result[::5, ::5], _BRIGHTEST)), 1.0))
+    result /= np.float32(max(float(np.percentile(result[::5, ::5], _MAXIMUM_PERCENTILE)), 1.0))
     return np.clip(result, 0, 1, out=result)
 
 

@@ -1,4 +1,4 @@
-"""Parts of an image whose contrast is faint, stretched to that of a print.
+"""Parts of an image whose contrast is faint, stretched to the contrast of a print.
 
 Haze, gloss, washed-out paper and the gamma of a camera add much the same gray to ink and paper.
 What remains of their contrast may be too small a ratio to be looked at, and yet be many times the
@@ -17,7 +17,7 @@ import numpy as np
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
 TILE = 64
-"""Side of the tiles of which the contrast is measured, px."""
+"""Side of the tiles whose contrast is measured, px."""
 
 INK, PAPER = 55.0, 220.0
 """Gray values to which the darkest and the brightest of the neighbourhood are stretched."""

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from ahf_ros.blas import one_blas_thread
 from ahf_ros.imaging.coincidence import (
     MINIMUM_EDGES,
     PEAK,
@@ -43,7 +44,7 @@ _MAXIMUM_EDGES = 20_000  # evenly distributed ones are enough
 _SIMILAR = 1.5  # ratio of two steps that may be the same edge
 _FAR_EDGES = 4000  # are enough to look for a displacement of whole pixels
 _COARSE = 4  # times smaller image, in which larger displacements are looked for
-_SMALLEST = 100  # px, side of such an image
+_MINIMUM_SIDE = 100  # px, side of such an image
 _SHORT = 2.0  # px in it, a displacement that the whole image would show
 _APART = 3.0  # px, between two peaks
 _TILES = 4  # along each side, that are looked at one by one
@@ -106,11 +107,12 @@ def find_edges(image: np.ndarray) -> Edges:
     places, steps = _vertex(*profiles.T)
     good = np.abs(places) < 1
     x, y, normals, steps, places = (of[good] for of in (x, y, normals, steps, places))
-    coarse = find_edges(_reduced(image)) if min(size.shape) >= _COARSE * _SMALLEST else None
+    coarse = find_edges(_reduced(image)) if min(size.shape) >= _COARSE * _MINIMUM_SIDE else None
     at = x.astype(np.float32), y.astype(np.float32)
     return Edges(*at, normals, steps, places, size.shape, gradients, coarse)
 
 
+@one_blas_thread()
 def displacement(edges: Edges, image: np.ndarray) -> Displacement | None:
     """Return by how much a scene moved, None where nothing shows that it did.
 
@@ -210,7 +212,7 @@ def _partners(
 
 
 def _alike(steps: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Return whether two steps may be those of one edge."""
+    """Return whether two steps may belong to one edge."""
     return (steps > others / _SIMILAR) & (steps < others * _SIMILAR)
 
 

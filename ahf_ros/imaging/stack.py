@@ -1,7 +1,7 @@
 """Several images of one unmoved scene, combined into one.
 
 Where a projector lights the scene with one pattern after the other, most points are lit in some
-of the images. A combination shows the scene in a light that is more even than that of any image
+of the images. A combination shows the scene in a light that is more even than in any image
 of the stack.
 """
 
@@ -145,7 +145,7 @@ def _mean_gray(images: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def _quotient(images: Sequence[np.ndarray]) -> np.ndarray:
-    """Return 1 - darkest / largest, which tells what shines from what is lit."""
+    """Return 1 - darkest / largest, which separates what shines from what is lit."""
     floor = np.float32(_FLOOR)
     return 1 - (_smallest(images) + floor) / (_largest(images) + floor)
 

@@ -45,9 +45,9 @@ class Calibration:
     binning : tuple of 2 int
         Columns and rows of the sensor that make a pixel.
     matrix, projection : ndarray, shape (3, 3)
-        Camera matrix of the sensor, and that of the rectified image.
+        Camera matrices of the sensor and of the rectified image.
     rotation : ndarray, shape (3, 3)
-        From the frame of the camera to that of the rectified image.
+        From the frame of the camera to the frame of the rectified image.
     model : str
         One of `MODELS`.
     distortion : ndarray
@@ -152,7 +152,7 @@ def undistorted(camera: Calibration, points: np.ndarray) -> np.ndarray:
     The inverse of the distortion is exact: `cv2.undistortPoints` stops after five iterations,
     0.05 px away at the edge of an ordinary image.
 
-    This is the image that `image_proc` calls `image_rect`: that of a camera without distortion,
+    This is the image that `image_proc` calls `image_rect`: without distortion,
     with the rotation `r` and the projection `p` of the message. Binned pixels are taken to be
     means, so that the centre of the first one is the centre of all pixels in it.
 

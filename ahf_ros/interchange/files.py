@@ -36,13 +36,13 @@ def file_errors(path: str | Path, action: str) -> Iterator[None]:
 
 
 @contextmanager
-def locked(folder: str | Path, patience: float = 0.0) -> Iterator[None]:
+def locked(folder: str | Path, lock_timeout: float = 0.0) -> Iterator[None]:
     """Lock a folder against other processes, until this process ends at the latest.
 
     Parameters
     ----------
     folder : str or Path
-    patience : float
+    lock_timeout : float
         Time to wait for another process that has locked it, s.
 
     Raises
@@ -51,7 +51,7 @@ def locked(folder: str | Path, patience: float = 0.0) -> Iterator[None]:
         If another process has locked it.
     """
     descriptor = os.open(folder, os.O_RDONLY)
-    limit = time.monotonic() + patience
+    limit = time.monotonic() + lock_timeout
     try:
         while True:
             try:

@@ -7,26 +7,28 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from ahf_ros.deprecation import deprecated_arguments
 from ahf_ros.imaging.image import check_size
 from ahf_ros.interchange.files import read_bytes, write_whole
-from ahf_ros.interchange.image_headers import UPRIGHT, read_header, upright
+from ahf_ros.interchange.image_headers import UPRIGHT, read_header, without_orientation
 
 SUFFIXES = ('.bmp', '.jpeg', '.jpg', '.png', '.tif', '.tiff')
 """Endings of the image files that are tested; others are tried."""
 
 
-def read_image(path: str | Path, *, turned: bool = False) -> np.ndarray:
+@deprecated_arguments(names={'turned': 'upright'})
+def read_image(path: str | Path, *, upright: bool = False) -> np.ndarray:
     """Return the image in a file as gray values.
 
     Colour is converted to gray and transparency is ignored. The orientation that a camera notes
     in the file is not applied unless that is asked for: the pixels are those of the sensor.
-    `read_noted_image` tells of it.
+    `read_noted_image` names it.
 
     Parameters
     ----------
     path : str or Path
         A PNG, JPEG, TIFF or BMP file, or another that OpenCV reads.
-    turned : bool
+    upright : bool
         Whether to turn the image upright, as its orientation says.
 
     Returns
@@ -47,15 +49,15 @@ def read_image(path: str | Path, *, turned: bool = False) -> np.ndarray:
     >>> image.shape, image.dtype, int(image[-1, -1])
     ((20, 20), dtype('uint16'), 399)
     """
-    return read_noted_image(path, turned=turned)[0]
+    return read_noted_image(path, upright=upright)[0]
 
 
-def read_noted_image(path: str | Path, *, turned: bool = False) -> tuple[np.ndarray, str]:
+def read_noted_image(path: str | Path, *, upright: bool = False) -> tuple[np.ndarray, str]:
     """Return the image in a file as `read_image` does, and what there is to say about it.
 
     Parameters
     ----------
-    path, turned
+    path, upright
         As for `read_image`.
 
     Returns
@@ -72,7 +74,7 @@ def read_noted_image(path: str | Path, *, turned: bool = False) -> tuple[np.ndar
     image, orientation = _decoded(read_bytes(path), str(path))
     if orientation == UPRIGHT:
         return image, ''
-    if turned:
+    if upright:
         image = as_oriented(image, orientation)
         done, of = 'is applied', 'the upright image'
     else:
@@ -118,7 +120,7 @@ def decode_bytes(encoded: bytes, name: str) -> np.ndarray:
     Raises
     ------
     ValueError
-        If `encoded` is empty, not an image or too large, which its header tells.
+        If `encoded` is empty, not an image, or too large by its header.
     """
     return _decoded(bytes(encoded), name)[0]
 
@@ -131,7 +133,7 @@ def _decoded(content: bytes, name: str) -> tuple[np.ndarray, int]:
     check_size(header.width, header.height, name)
     flags = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
     try:
-        image = cv2.imdecode(np.frombuffer(upright(content, header), np.uint8), flags)
+        image = cv2.imdecode(np.frombuffer(without_orientation(content, header), np.uint8), flags)
     except cv2.error as error:  # for instance if the header says that the image is too large
         raise ValueError(f'{name} cannot be decoded: {error.err}') from error
     if image is None:

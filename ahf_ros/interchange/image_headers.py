@@ -61,7 +61,7 @@ def read_header(content: bytes) -> ImageHeader:
     return ImageHeader()
 
 
-def upright(content: bytes, header: ImageHeader) -> bytes:
+def without_orientation(content: bytes, header: ImageHeader) -> bytes:
     """Return a TIFF file whose pixels are decoded as they are stored; others as they are.
 
     OpenCV applies the orientation of a TIFF file whatever its flags say.

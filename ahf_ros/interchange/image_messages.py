@@ -1,7 +1,7 @@
 """Image messages as gray images, from ROS or from a bag, copied only if necessary.
 
-The encodings are those of sensor_msgs/image_encodings.hpp that hold an image. Values keep their
-range: those of a 12-bit camera or of a float scanner are not scaled before the logarithm.
+The encodings of sensor_msgs/image_encodings.hpp that hold an image are read. Values keep their
+range: a 12-bit camera's or a float scanner's are not scaled before the logarithm.
 """
 
 from __future__ import annotations

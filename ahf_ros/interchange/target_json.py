@@ -11,7 +11,7 @@ from typing import Any
 
 from ahf_ros.interchange.fields import checked_file_name
 from ahf_ros.interchange.files import RESULTS_FILE, read_text
-from ahf_ros.target import DottedTarget, Identification, Target, UndecodedTarget
+from ahf_ros.target import DottedTarget, Identification, SquareMarker, Target, UndecodedTarget
 from ahf_ros.target_check import (
     MAXIMUM_ID,
     MAXIMUM_LENGTH_PX,
@@ -38,7 +38,7 @@ _ABSENT = {
 REASONS = ('unread', 'uncertain', 'contested')
 """Why a target is not decoded, see `ahf_ros.target.UndecodedTarget`."""
 
-_MOST_DOTS = 1000  # of one target
+_MAXIMUM_DOTS = 1000  # of one target
 
 
 def to_json(
@@ -112,7 +112,7 @@ def targets_from_json(content: Any, name: str) -> list[Target]:
     ----------
     content : dict
         Has the list 'targets'. Each of them has 'id', 'x' and 'y' and may have the other fields
-        of `Target`, and those of `DottedTarget` or of `UndecodedTarget`.
+        of `Target`, and those of `DottedTarget`, of `SquareMarker` or of `UndecodedTarget`.
     name : str
         What errors call the object.
 
@@ -136,7 +136,7 @@ def read_results(path: str | Path) -> dict[str, tuple[Target, ...]]:
     Parameters
     ----------
     path : str or Path
-        A JSON object a line with 'image' and 'targets', of which 'id', 'x' and 'y' are required;
+        A JSON object a line with 'image' and 'targets'; these need 'id', 'x' and 'y';
         empty lines are ignored. With a list 'images', the targets are those of each of them. '-'
         stands for standard input.
 
@@ -216,10 +216,13 @@ def _targets(items: list[Any], name: str) -> Iterator[Target]:
 
 
 def _of_its_kind(target: Target, item: dict[str, Any], name: str) -> Target:
-    """Return a target with the fields of dotted or undecoded ones, if an object has them."""
+    """Return a target with the fields of dotted, square or undecoded ones, if it has them."""
     known = {field.name: getattr(target, field.name) for field in _FIELDS}
     if item.get('dots'):
         return DottedTarget(**known, **_dots(item, name))
+    if item.get('corners'):
+        corners = tuple((x, y) for x, y in _rows(item, 'corners', 2, 4, name))
+        return SquareMarker(**known, corners=corners)
     if 'reason' not in item:
         return target
     if item['reason'] not in REASONS:
@@ -232,15 +235,25 @@ def _of_its_kind(target: Target, item: dict[str, Any], name: str) -> Target:
 
 
 def _dots(item: dict[str, Any], name: str) -> dict[str, Any]:
-    rows = item['dots']
-    if not isinstance(rows, list) or len(rows) > _MOST_DOTS:
-        raise ValueError(f'{name}: dots is {shown(rows)}, accepted are at most {_MOST_DOTS} rows')
-    dots = []
-    for row in rows:
-        if not isinstance(row, list) or len(row) != 5:
-            raise ValueError(f'{name}: dots has {shown(row)}, accepted are rows of 5 numbers')
-        limit = MAXIMUM_LENGTH_PX
-        dots.append(tuple(checked_number(it, f'{name}: dots', -limit, limit) for it in row))
+    dots = _rows(item, 'dots', 5, _MAXIMUM_DOTS, name)
     count = checked_integer(item.get('template_dots', 0), f'{name}: template_dots', 0, len(dots))
     polarity = checked_integer(item.get('polarity', 1), f'{name}: polarity', -1, 1)
     return {'dots': tuple(dots), 'template_dots': count, 'polarity': polarity}
+
+
+def _rows(
+    item: dict[str, Any], field: str, width: int, most: int, name: str
+) -> list[tuple[float, ...]]:
+    """Return the rows of numbers in a field."""
+    rows = item[field]
+    if not isinstance(rows, list) or len(rows) > most:
+        raise ValueError(f'{name}: {field} is {shown(rows)}, accepted are at most {most} rows')
+    checked = []
+    for row in rows:
+        if not isinstance(row, list) or len(row) != width:
+            raise ValueError(
+                f'{name}: {field} has {shown(row)}, accepted are rows of {width} numbers'
+            )
+        limit = MAXIMUM_LENGTH_PX
+        checked.append(tuple(checked_number(it, f'{name}: {field}', -limit, limit) for it in row))
+    return checked

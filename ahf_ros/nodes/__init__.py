@@ -1,3 +1,1 @@
 """The ROS 2 nodes: messages, parameters and threads; the work is done by the rooms below."""
-
-import ahf_ros.blas  # noqa: F401  before numpy

@@ -126,7 +126,7 @@ class Comparison(ProcessNode):
 
 
 def tile(title: str, image: np.ndarray, answer: Identification, truth: tuple[Target, ...]) -> Tile:
-    """Return the overlay of an answer that tells right, wrong and missed targets apart.
+    """Return the overlay of an answer; right, wrong and missed targets have different colours.
 
     Parameters
     ----------

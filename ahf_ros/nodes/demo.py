@@ -36,7 +36,7 @@ SCENE: dict[str, Any] = {'width': 1600, 'height': 1066, 'targets': 12}
 """What is rendered: few enough targets to see each of them in a picture of the whole."""
 
 NAMESPACE = '/demo'
-"""Namespace of all nodes, apart from the topics of others."""
+"""Namespace of all nodes, so that they use no topic of other programs."""
 
 RATE = 1.0
 """Images per second."""
@@ -105,7 +105,7 @@ class Demo(Comparison):
         self._processes = processes
         self._camera = self.create_client(SetParameters, 'illumination/set_parameters')
         nodes = 'illumination', *(f'{space}/detector' for space in titles)
-        self._strangers = {
+        self._undiscovered = {
             node: self.create_client(GetParameters, f'{node}/get_parameters') for node in nodes
         }
         self._waiting = True
@@ -136,14 +136,14 @@ class Demo(Comparison):
         What a node sends to a subscription that it does not know yet gets lost. Once it has
         answered a client, it knows the subscriptions that are older.
         """
-        for node, client in tuple(self._strangers.items()):
+        for node, client in tuple(self._undiscovered.items()):
             if client.service_is_ready():
                 asked = client.call_async(GetParameters.Request())
                 asked.add_done_callback(partial(self._meet, node))
-        return not self._strangers
+        return not self._undiscovered
 
     def _meet(self, node: str, _: Future) -> None:
-        self._strangers.pop(node, None)
+        self._undiscovered.pop(node, None)
 
 
 def shared_memory_profile() -> Path:

@@ -12,7 +12,7 @@ def target_detections(answer: CodedTargetArray, types: ModuleType) -> object:
     """Return the targets of an answer as detections, in their order.
 
     The box of a detection is that around the ellipse of the central dot, turned with it. The
-    class of an object is the family of its code, and its ID is that of the target. A target that
+    class of an object is the family of its code, and its ID is the ID of the target. A target that
     was not decoded has no hypothesis and an empty ID.
 
     Parameters

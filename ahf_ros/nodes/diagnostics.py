@@ -68,7 +68,7 @@ class Tally:
     ----------
     received, answered, dropped, rejected, backwards : int
         Images that arrived; that were answered; that were replaced by a newer one before their
-        turn; that were not accepted; whose stamp is earlier than that of the image before.
+        turn; that were not accepted; whose stamp is earlier than the stamp before.
     reason : str
         Why the last rejected image was rejected.
     mistaken : str
@@ -167,7 +167,7 @@ class Tally:
 
 
 class Diagnostics:
-    """Turns a tally into one status per period, whose rate and level are those of the period."""
+    """Turns a tally into one status per period, with the rate and the level of the period."""
 
     def __init__(self, name: str, tally: Tally) -> None:
         self._name = name

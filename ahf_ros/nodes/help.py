@@ -54,7 +54,7 @@ def help_text(node: str) -> str:
 
 
 def _columns(rows: Iterable[tuple[str, str]]) -> list[str]:
-    """Return the lines of a table of two columns, the second of which is wrapped."""
+    """Return the lines of a table of two columns; the second one is wrapped."""
     rows = list(rows)
     width = max(len(first) for first, _ in rows) + 4
     lines = []

@@ -25,7 +25,7 @@ from ahf_ros.nodes.qos import (
 
 
 class Input:
-    """A subscription whose quality of service follows that of the publishers.
+    """A subscription whose quality of service follows the publishers.
 
     Parameters
     ----------

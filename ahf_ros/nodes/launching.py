@@ -74,7 +74,7 @@ def detector(given: Mapping[str, str], names: Iterable[str], driver: Driver | No
     Parameters
     ----------
     given : mapping of str to str
-        Values of the launch arguments by their names, with those of launch files that include
+        Values of the launch arguments by their names, also of launch files that include
         this one.
     names : iterable of str
         Parameters that are arguments, as for `arguments`; others are left alone.

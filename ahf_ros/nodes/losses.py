@@ -15,7 +15,7 @@ SENDERS = 100
 class Losses:
     """Counts gaps in the numbers of the messages of each publisher.
 
-    Up to Jazzy, rclpy does not tell which publisher a message is from. The gaps are then counted
+    Up to Jazzy, rclpy does not say which publisher a message is from. The gaps are then counted
     while there is one publisher, and the same one before and after the gap.
 
     Parameters
@@ -54,7 +54,7 @@ class Losses:
         Parameters
         ----------
         information : mapping of str to value
-            What rclpy tells about the message.
+            What rclpy knows about the message.
         """
         number, sent = information.get(NUMBER) or 0, information.get(SENT) or 0
         if not number:

@@ -1,6 +1,6 @@
 """Nodes that may be managed: others configure, activate, deactivate and clean them up.
 
-The states and their services are those of ROS 2 (design.ros2.org/articles/node_lifecycle.html).
+The states and their services follow ROS 2 (design.ros2.org/articles/node_lifecycle.html).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class ManagedNode(ProcessNode, LifecycleNodeMixin):
     """
 
     def __init__(self, name: str) -> None:
-        # Not that of the mixin, which makes the services of a managed node.
+        # Not the mixin's, which makes the services of a managed node.
         ProcessNode.__init__(self, name)
         self._managed = False
 

@@ -8,7 +8,7 @@ from contextlib import suppress
 ARENAS = 2
 """Number of memory arenas that the threads of a node share; glibc would give each its own."""
 
-LARGEST = 32 * 2**20
+MAXIMUM_KEPT = 32 * 2**20
 """Size from which on memory is taken from the system each time, bytes; the maximum of glibc."""
 
 KEPT = 256 * 2**20
@@ -25,8 +25,8 @@ def reuse_memory() -> None:
     from the system, which clears it page by page: for an image of 10.6 MP, that took two thirds of
     the time between the middleware and the node, and a tenth of the identification.
     """
-    with suppress(AttributeError):  # where malloc is not that of glibc
+    with suppress(AttributeError):  # where malloc is not glibc's
         mallopt = ctypes.CDLL(None).mallopt
         mallopt(_M_ARENA_MAX, ARENAS)
-        mallopt(_M_MMAP_THRESHOLD, LARGEST)
+        mallopt(_M_MMAP_THRESHOLD, MAXIMUM_KEPT)
         mallopt(_M_TRIM_THRESHOLD, KEPT)

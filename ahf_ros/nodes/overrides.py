@@ -13,7 +13,7 @@ import yaml
 
 from ahf_ros.text import printable, shown
 
-LONGEST = 2000
+MAXIMUM_LENGTH = 2000
 """Maximum length of a list of unknown parameters."""
 
 _PARAMETERS = 'ros__parameters'
@@ -43,7 +43,7 @@ def unknown_parameters(given: Iterable[str], known: Collection[str]) -> Iterator
         else:
             unlike.append(name)
     if unlike:
-        names = printable(', '.join(unlike), LONGEST)
+        names = printable(', '.join(unlike), MAXIMUM_LENGTH)
         yield f'no parameter is named {names}; is that a parameter of another node?'
 
 

@@ -115,13 +115,15 @@ class Pipeline:
         self.settings = settings
         identification = settings.identification
         self._detector = detector or create_detector(
-            identification.detector, identification.detection
+            identification.detector, settings=identification.detection
         )
         self._stopping = stopping
         self.ahead = (identification.adaptive.threads or os.cpu_count() or 1) > 1
         # No method of this object: with a cycle of references, it would stay in memory for long.
         interrupt = partial(_check_running, stopping)
-        self._identifier = create_identifier(identification, self._detector, interrupt=interrupt)
+        self._identifier = create_identifier(
+            detector=self._detector, settings=identification, interrupt=interrupt
+        )
 
     def answer(
         self,
@@ -136,7 +138,7 @@ class Pipeline:
         message : Image or CompressedImage
             The image.
         expected : int, optional
-            N; that of the settings where None.
+            N; where None, the N of the settings.
         speculation : Speculation, optional
             Of the same image, with the N of the settings; used if it is right.
 
@@ -152,7 +154,7 @@ class Pipeline:
             identifier.memory = speculation.after
             return self._answer(speculation.stack, speculation.identification, header)
         stack = ImageStack((decoded(message),))
-        return self._answer(stack, identifier.identify(stack, expected), header)
+        return self._answer(stack, identifier.identify(stack, expected_targets=expected), header)
 
     def holds(self, speculation: Speculation | None) -> bool:
         """Return whether there is a speculation that is right so far."""
@@ -176,7 +178,7 @@ class Pipeline:
         """
         interrupt = partial(_once, count(), self._stopping)
         identifier = create_identifier(
-            self.settings.identification, self._detector, interrupt=interrupt
+            detector=self._detector, settings=self.settings.identification, interrupt=interrupt
         )
         identifier.memory = before = self._identifier.memory
         try:

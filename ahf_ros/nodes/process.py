@@ -165,13 +165,13 @@ def run(make_node: Callable[[], ProcessNode], arguments: list[str] | None = None
     make_node : callable
         Returns the node; called when rclpy is initialised.
     arguments : list of str, optional
-        Command line arguments; those of the process where None.
+        Command line arguments; where None, `sys.argv` has them.
 
     Returns
     -------
     int
-        Exit status: that of the node, 0 after a signal, 1 if the node cannot start with these
-        arguments, with the reason on stderr.
+        Exit status of the node: 0 after a signal, 1 if it cannot start with these arguments,
+        with the reason on stderr.
     """
     reuse_memory()
     arrived = signalled()

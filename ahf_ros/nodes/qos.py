@@ -19,7 +19,7 @@ PUBLISHER, SUBSCRIPTION, LOSSLESS_SUBSCRIPTION = (
 """Ends of a topic, as `qos_overrides` call them."""
 
 BEST_AVAILABLE = 'best_available'
-"""The policy that follows those of the publishers."""
+"""The policy that follows the publishers."""
 
 MAXIMUM_DEPTH = 100_000
 """Maximum number of messages that a topic keeps."""

@@ -12,7 +12,7 @@ from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.parameters import ParameterSettings
 from ahf_ros.nodes.process import ProcessNode, run
 from ahf_ros.nodes.settings import ScoreboardSettings
-from ahf_ros.target import Identification, Target, TrueTarget
+from ahf_ros.target import Identification, Target
 
 KEPT = 1000
 """Number of truths that wait for the answer to their image."""
@@ -65,7 +65,7 @@ class Scoreboard(ProcessNode):
 
 def line(found: Identification, truth: Sequence[Target]) -> str:
     """Return in words how well the targets of an image were identified, and how."""
-    figures = score([TrueTarget.of(target) for target in truth], found.targets)
+    figures = score(truth, found)
     words = [
         f'{figures.right} of {figures.expected} right',
         f'{figures.wrong} wrong',

@@ -24,14 +24,14 @@ from ahf_ros.target_check import checked_targets
 from ahf_ros.text import printable
 
 _POLL = 0.2  # interval between checks that the service still exists, s
-_GONE = 3.0  # time that discovery may take, s
+_DISCOVERY = 3.0  # time that discovery may take, s
 _REPEATED = 1 / 3  # of the time limit, after which a service that is new is asked again
 
 
 class ServiceDetector:
     """Identify targets by a service of type `ahf_ros/srv/Identify`.
 
-    Call it from other threads than those of the node's executor, which deliver the responses.
+    Do not call it from threads of the node's executor, which deliver the responses.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ class ServiceDetector:
             If the node stops first.
         """
         # A request that is sent before the service is discovered gets lost.
-        if not self._client.wait_for_service(min(_GONE, self.timeout)):
+        if not self._client.wait_for_service(min(_DISCOVERY, self.timeout)):
             raise self._absent()
         response = self._asked(Identify.Request(image=image_message(image, Header())))
         if not response.success:
@@ -120,7 +120,7 @@ class ServiceDetector:
         self, answers: queue.SimpleQueue[Future], ask: Callable[[], None]
     ) -> Identify.Response:
         start = seen = time.monotonic()
-        patience = self.timeout
+        limit = self.timeout
         repeated = self._known
         while True:
             with suppress(queue.Empty):
@@ -132,12 +132,10 @@ class ServiceDetector:
             now = time.monotonic()
             if self._client.service_is_ready():
                 seen = now
-            elif now - seen > min(_GONE, patience):
+            elif now - seen > min(_DISCOVERY, limit):
                 raise self._absent()
-            if now - start > patience:
-                raise ValueError(
-                    f'{self._named} took longer than detector_timeout, {patience:g} s'
-                )
-            if not repeated and now - start > _REPEATED * patience:
+            if now - start > limit:
+                raise ValueError(f'{self._named} took longer than detector_timeout, {limit:g} s')
+            if not repeated and now - start > _REPEATED * limit:
                 repeated = True
                 ask()

@@ -205,7 +205,7 @@ class DetectorNodeSettings:
                 'is True, given when the node starts'
             )
         if self.identification.detector != SERVICE:
-            create_identifier(self.identification)
+            create_identifier(settings=self.identification)
         elif not self.service:
             raise ValueError("service is '', accepted is the name of a ROS service")
 

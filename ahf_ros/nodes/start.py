@@ -25,7 +25,7 @@ def start(node: str, arguments: list[str] | None = None) -> int:
     ----------
     node : str
     arguments : list of str, optional
-        Command line arguments; those of the process where None.
+        Command line arguments; where None, `sys.argv` has them.
     """
     signalled()
     if node != 'demo' and _help_wanted(sys.argv[1:] if arguments is None else arguments):

@@ -10,7 +10,7 @@ from ahf_ros.text import shown
 _UNITS = {'mm': 1.0, 'cm': 10.0, 'm': 1000.0, 'in': 25.4, 'pt': 25.4 / 72}
 _NUMBER = r'\s*(\d+\.?\d*|\.\d+)\s*'
 
-LONGEST_PAGE = 5000.0
+MAXIMUM_PAGE = 5000.0
 """Side of a page, mm; a PDF may have 14,400 points, which is 5080 mm."""
 
 PAGES = {
@@ -62,7 +62,7 @@ class LabelSheet:
     left, top : float
         From the edges of the page to the first label.
     pitch_x, pitch_y : float
-        From the centre of one label to that of the next one.
+        From the centre of one label to the next one's.
     """
 
     page: Page
@@ -112,10 +112,10 @@ def length_in(field: str, text: str) -> float:
     """
     found = re.fullmatch(f'{_NUMBER}({"|".join(_UNITS)})?\\s*', text)
     length = float(found[1]) * _UNITS[found[2] or 'mm'] if found else 0.0
-    if not 0 < length <= LONGEST_PAGE:
+    if not 0 < length <= MAXIMUM_PAGE:
         raise ValueError(
             f'{field} is {shown(text)}, accepted is a length such as 4mm, 0.4cm or 0.25in, of at '
-            f'most {LONGEST_PAGE:g} mm'
+            f'most {MAXIMUM_PAGE:g} mm'
         )
     return length
 

@@ -12,7 +12,7 @@ from ahf_ros.printing.drawing import Drawing, Ink, Text
 
 _POINT = 25.4 / 72  # mm
 _VERSION = 1, 6  # the first one with PrintScaling
-_WIDEST = math.pi / 4  # of a Bezier curve: it is within 5e-6 of the radius of its arc
+_MAXIMUM_EXTENT = math.pi / 4  # of a Bezier curve: it is within 5e-6 of the radius of its arc
 
 
 def pdf_bytes(pages: Iterable[Drawing], title: str) -> bytes:
@@ -80,7 +80,7 @@ def _path(canvas: Any, ink: Ink) -> Any:
 
 def _bezier(arc: Arc) -> list[tuple[float, float]]:
     """Return the start of an arc, then two control points and the end of each Bezier curve."""
-    count = math.ceil(abs(arc.extent) / _WIDEST - 1e-9)
+    count = math.ceil(abs(arc.extent) / _MAXIMUM_EXTENT - 1e-9)
     step = arc.extent / count
     handle = 4 / 3 * math.tan(step / 4)
     points = []

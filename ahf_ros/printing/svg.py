@@ -9,7 +9,7 @@ from ahf_ros.codes.designs import Arc
 from ahf_ros.printing.drawing import Drawing, Ink, Text
 
 _SPACE = 'http://www.w3.org/2000/svg'
-_WIDEST = 2 * math.pi / 3  # of one arc command, which cannot be a whole circle
+_MAXIMUM_EXTENT = 2 * math.pi / 3  # of one arc command, which cannot be a whole circle
 
 
 def svg_bytes(page: Drawing, title: str) -> bytes:
@@ -68,7 +68,7 @@ def _path(ink: Ink, height: float) -> str:
                 commands.append(command + place(*part))
                 command = 'L'
                 continue
-            count = math.ceil(abs(part.extent) / _WIDEST)
+            count = math.ceil(abs(part.extent) / _MAXIMUM_EXTENT)
             angles = [part.start + part.extent * index / count for index in range(count + 1)]
             points = [
                 place(

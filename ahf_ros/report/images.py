@@ -106,7 +106,7 @@ def shown_image(result: ImageResult, folders: Sequence[Path] = ()) -> ShownImage
 
 def _read(name: str, result: ImageResult, folders: Sequence[Path]) -> np.ndarray:
     path = find_image(name, result.source, folders)
-    image = read_image(path, turned=result.upright)
+    image = read_image(path, upright=result.upright)
     size = image.shape[::-1]
     if result.width and size != (result.width, result.height):
         raise ValueError(

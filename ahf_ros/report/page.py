@@ -29,8 +29,8 @@ PAGE = Path(__file__).parent / 'page'
 SCRIPTS = ('data', 'table', 'viewer', 'plots', 'details', 'overview', 'main')
 """Scripts of the page, in their order."""
 
-_LARGEST_PICTURE = 4_000_000  # bytes
-_SMALLEST_PICTURE = 2_000
+_MAXIMUM_PICTURE = 4_000_000  # bytes
+_MINIMUM_PICTURE = 2_000
 _FILTERED_WEIGHT = 0.6  # of the bytes of an original
 _MARKUP = 600  # bytes around the pictures of an image
 _THUMBNAIL = 4_000  # bytes of its text
@@ -218,7 +218,7 @@ def _limits(available: int, weights: Sequence[float]) -> tuple[int, ...]:
         return ()
     texts = available - len(weights) * (_MARKUP + _THUMBNAIL)
     share = texts * 3 / 4 / sum(weights)  # base64 makes four bytes of three
-    share = min(max(share, _SMALLEST_PICTURE), _LARGEST_PICTURE)
+    share = min(max(share, _MINIMUM_PICTURE), _MAXIMUM_PICTURE)
     return tuple(int(share * weight) for weight in weights)
 
 

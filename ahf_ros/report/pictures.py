@@ -14,16 +14,16 @@ THUMBNAIL_SIDES = 132, 88
 
 _THUMBNAIL_BYTES = 3000
 _SIZES = {88: 1.75, 80: 1.4, 70: 1.15, 58: 1.0, 46: 0.85, 34: 0.7, 24: 0.58}
-"""About how many bytes a quality takes, in those of the medium one."""
+"""About how many bytes a quality takes, as a fraction of the medium one."""
 
 _QUALITIES = tuple(_SIZES)
 _MIDDLE = 58
 _BITS = 1.1  # of a picture at first, per pixel; photographs of targets need 0.3 to 1.5
 _AIMED = 1.2  # times the bytes of the medium quality: the one above it
 _REDUCED = 0.85  # the same for a picture that has to be smaller; it keeps more pixels
-_LARGEST_STEP = 6.0  # from one size to the next, in pixels
-_LARGEST_WEBP = 2_000_000  # px; it takes 0.6 s per million
-_SMALLEST = 16  # px, the longer side
+_MAXIMUM_STEP = 6.0  # from one size to the next, in pixels
+_MAXIMUM_WEBP = 2_000_000  # px; it takes 0.6 s per million
+_MINIMUM_SIDE = 16  # px, the longer side
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,20 +82,20 @@ def fitted(image: np.ndarray, limit: int) -> Picture:
         probe = _encoded(reduced, _MIDDLE)
         room = limit / len(probe.content)
         if growing and scale < 1.0 and room > _SIZES[_QUALITIES[0]]:
-            pixels *= min(room / _AIMED, _LARGEST_STEP)
+            pixels *= min(room / _AIMED, _MAXIMUM_STEP)
             continue
         if picture := _best_of(reduced, probe, limit):
             return picture
-        if max(reduced.shape) <= _SMALLEST:
+        if max(reduced.shape) <= _MINIMUM_SIDE:
             return _encoded(reduced, _QUALITIES[-1])
         growing = False
-        pixels = min(pixels, image.size) * min(max(room / _REDUCED, 1 / _LARGEST_STEP), 0.8)
+        pixels = min(pixels, image.size) * min(max(room / _REDUCED, 1 / _MAXIMUM_STEP), 0.8)
 
 
 def _best_of(image: np.ndarray, probe: Picture, limit: int) -> Picture | None:
     """Return the picture of the best quality that fits; None if none does.
 
-    `probe` is the picture of medium quality, which tells which others may fit.
+    `probe` is the picture of medium quality, which shows what sizes may fit.
     """
     size = len(probe.content)
     for quality in _QUALITIES:
@@ -117,7 +117,7 @@ def _resized(image: np.ndarray, scale: float) -> np.ndarray:
 
 def _encoded(image: np.ndarray, quality: int) -> Picture:
     height, width = image.shape
-    if image.size <= _LARGEST_WEBP and cv2.haveImageWriter('.webp'):
+    if image.size <= _MAXIMUM_WEBP and cv2.haveImageWriter('.webp'):
         _, content = cv2.imencode('.webp', image, [cv2.IMWRITE_WEBP_QUALITY, quality])
         return Picture(content.tobytes(), 'image/webp', width, height)
     _, content = cv2.imencode('.jpg', image, [cv2.IMWRITE_JPEG_QUALITY, quality])

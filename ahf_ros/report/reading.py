@@ -15,7 +15,7 @@ ENDINGS = ('.json', '.jsonl')
 
 
 def result_files(paths: Sequence[str | Path]) -> tuple[list[Path], list[str]]:
-    """Return the files with results, those of folders included, and what is wrong with others.
+    """Return the files with results, also in folders, and what is wrong with others.
 
     Parameters
     ----------

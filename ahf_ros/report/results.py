@@ -13,8 +13,8 @@ from ahf_ros.target_check import MAXIMUM_ID, checked_integer, checked_number
 from ahf_ros.text import shown
 
 _MAPPING = ('log_offset', 'black_percentile', 'white_percentile')
-_LARGEST_SIDE = 65536  # px
-_MOST_FILTERS = 100_000  # of a search
+_MAXIMUM_SIDE = 65536  # px
+_MAXIMUM_FILTERS = 100_000  # of a search
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,8 +107,8 @@ def result_from_json(content: Any, source: Path, where: str) -> ImageResult:
         image=record.text('image', required=True),
         source=source,
         targets=targets,
-        width=record.integer('width', _LARGEST_SIDE),
-        height=record.integer('height', _LARGEST_SIDE),
+        width=record.integer('width', _MAXIMUM_SIDE),
+        height=record.integer('height', _MAXIMUM_SIDE),
         upright=record.flag('upright'),
         family=record.text('family'),
         detector=record.text('detector'),
@@ -191,7 +191,7 @@ class _Record:
 
     def numbers(self, name: str) -> tuple[float, ...]:
         values = self.content.get(name) or []
-        if not isinstance(values, list) or len(values) > _MOST_FILTERS:
+        if not isinstance(values, list) or len(values) > _MAXIMUM_FILTERS:
             raise ValueError(f'{self.where}: {name} is {shown(values)}, accepted is a list')
         called = f'{self.where}: {name}'
         return tuple(checked_number(it, called, -math.inf, math.inf) for it in values)

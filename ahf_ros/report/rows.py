@@ -14,13 +14,14 @@ from ahf_ros.report.results import ImageResult
 from ahf_ros.target import (
     UNDECODED,
     DottedTarget,
+    SquareMarker,
     Target,
     TrueTarget,
     UndecodedTarget,
     count_codes,
 )
 
-MOST_UNREAD = 300
+MAXIMUM_UNREAD = 300
 """Number of dots of an image without any likely code word that are shown."""
 
 
@@ -77,7 +78,8 @@ def row(
         'search': _search(result),
         'targets': [_target(target, families) for target in decoded],
         'dots': [_dots(target) for target in decoded if isinstance(target, DottedTarget)],
-        'undecoded': [_undecoded(target) for target in [*likely, *unread[:MOST_UNREAD]]],
+        'squares': [_square(target) for target in decoded if isinstance(target, SquareMarker)],
+        'undecoded': [_undecoded(target) for target in [*likely, *unread[:MAXIMUM_UNREAD]]],
         'truth': judged,
     }
 
@@ -124,6 +126,11 @@ def _dots(target: DottedTarget) -> dict[str, Any]:
         for dot in target.dots
     ]
     return {'id': target.id, 'template': target.template_dots, 'ellipses': ellipses}
+
+
+def _square(target: SquareMarker) -> dict[str, Any]:
+    corners = [[round(x, 2), round(y, 2)] for x, y in target.corners]
+    return {'id': target.id, 'corners': corners}
 
 
 def _filter(result: ImageResult) -> dict[str, Any] | None:

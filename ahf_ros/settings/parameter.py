@@ -30,7 +30,7 @@ class Parameter:
     name : str
         Name of the field and of the ROS parameter.
     default : bool, int, float or str
-        Default, whose type is that of the parameter.
+        Default; the parameter has its type.
     description : str
         One sentence, with the unit if there is one.
     minimum, maximum : float or None

@@ -165,7 +165,7 @@ def turned(pattern: Pattern, scale: float, turn: float) -> Pattern:
     pattern : Pattern
         Its edges get softer with the scale, too.
     scale : float
-        Size of the new pattern over that of the old one.
+        Size of the new pattern divided by the old one's.
     turn : float
         Angle from +u towards +v, rad.
     """

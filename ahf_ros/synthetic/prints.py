@@ -64,7 +64,7 @@ def print_mark(
     camera : Camera
         Camera that sees the mark.
     change : float
-        Reflectance of the ink minus that of the ground.
+        Reflectance of the ink minus the ground's.
     blur : float
         Standard deviation of the blur of the lens, px.
     """

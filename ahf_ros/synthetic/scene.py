@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
+from ahf_ros.blas import one_blas_thread
 from ahf_ros.synthetic.camera import Camera, Sensor, tilted_camera
 from ahf_ros.synthetic.covers import card_cover
 from ahf_ros.synthetic.designs import designs
@@ -50,10 +52,12 @@ class Rendering:
 
     @property
     def truth(self) -> tuple[TrueTarget, ...]:
-        """IDs and centres of the targets, for `ahf_ros.evaluation`."""
+        """IDs and centres of `targets`; deprecated, evaluations take a scene or its `targets`."""
+        warnings.warn('Rendering.truth is Rendering.targets now', DeprecationWarning, stacklevel=2)
         return tuple(map(TrueTarget.of, self.targets))
 
 
+@one_blas_thread()
 def render(settings: SceneSettings, phase: int = 0) -> Rendering:
     """Return the photograph of a scene; equal arguments give equal images.
 

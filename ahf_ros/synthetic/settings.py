@@ -14,7 +14,7 @@ from ahf_ros.synthetic.patterns import LIGHT_NAMES
 CARD_WIDTH = math.cos(math.pi / 8)
 """Width of an eight-sided card, as a share of the distance of its corners."""
 
-_LARGEST_SHIFT = 0.35  # of edges, in dot radii: nearly half a sector of the finest ring codes
+_MAXIMUM_SHIFT = 0.35  # of edges, in dot radii: nearly half a sector of the finest ring codes
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,7 @@ class SceneSettings:
     )
     wall: float = parameter(
         1.0,
-        "Reflectance of the wall as a fraction of that of the targets' ground; below 1, every "
+        "Reflectance of the wall as a fraction of the targets' ground; below 1, every "
         'target is on an eight-sided card.',
         minimum=0.05,
         maximum=1.0,
@@ -154,8 +154,8 @@ class SceneSettings:
             )
         ratios = size_ratios(self.sizes)
         smallest = self.dot_radius * (1 - self.radius_spread) * min(ratios)
-        if abs(self.edge_shift) > _LARGEST_SHIFT * smallest:
-            most = _LARGEST_SHIFT * smallest
+        if abs(self.edge_shift) > _MAXIMUM_SHIFT * smallest:
+            most = _MAXIMUM_SHIFT * smallest
             raise ValueError(
                 f'edge_shift is {self.edge_shift!r}, accepted is a number from {-most:.3g} to '
                 f'{most:.3g} with dots of {smallest:.3g} px'

@@ -3,7 +3,7 @@
 It follows the Metashape Python Reference (Chunk.addPhotos, Chunk.detectMarkers, Marker.label,
 Marker.projections). Run it with the Python that Metashape is installed in:
 
-    ahf identify *.jpg --expected 54 --detector command \
+    ahf identify *.jpg --expected-targets 54 --detector command \
         --command 'python metashape_detector.py' --detector-timeout 300
 """
 

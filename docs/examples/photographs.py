@@ -21,13 +21,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description='Identify the targets in photographs.')
     parser.add_argument('photographs', type=Path, help='a folder')
     parser.add_argument('--family', default='metashape12')
-    parser.add_argument('--expected', type=int, default=0, help='targets in each; 0: unknown')
+    parser.add_argument(
+        '--expected-targets', type=int, default=0, help='targets in each; 0: unknown'
+    )
     parser.add_argument('--output', type=Path, default=Path('results'))
     options = parser.parse_args(arguments)
     options.output.mkdir(parents=True, exist_ok=True)
 
     # One identifier for all: it starts with the filter that worked for the photograph before.
-    identifier = create_identifier(family=options.family, expected_targets=options.expected)
+    identifier = create_identifier(
+        family=options.family, expected_targets=options.expected_targets
+    )
     seen: Counter[int] = Counter()
     with (options.output / 'targets.csv').open('w', newline='') as file:
         table = csv.writer(file)
@@ -37,12 +41,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 continue
             image = read_image(str(path))
             found = identifier.identify(image)
-            for target in found.targets:
+            for target in found:
                 x, y = f'{target.x:.3f}', f'{target.y:.3f}'
                 table.writerow((path.name, target.id, x, y, f'{target.confidence:.3f}'))
-            seen.update(target.id for target in found.targets)
+            seen.update(target.id for target in found)
             write_image(options.output / f'{path.stem}_targets.jpg', draw(image, found))
-            print(f'{path.name}: {len(found.targets)} targets')
+            print(f'{path.name}: {len(found)} targets')
 
     # A point in space takes two rays, and a third one to check them.
     weak = sorted(number for number, count in seen.items() if count < 3)

@@ -20,8 +20,8 @@ pytest.importorskip('rosbags', reason='rosbags is not installed')
 
 from ahf_ros.bag.definitions import typestore
 from ahf_ros.batch import connection
-from ahf_ros.batch.cluster import Cluster
-from ahf_ros.batch.engine import EngineLost, GivenUp, finished_tasks
+from ahf_ros.batch.cluster import DaskEngine
+from ahf_ros.batch.engine import EngineLost, TaskFailed, finished_tasks
 from ahf_ros.batch.remote import guarded_perform
 from ahf_ros.cli import main
 from ahf_ros.interchange.image_files import write_image
@@ -62,7 +62,7 @@ def test_nothing_is_lost_and_nothing_twice(
         first, _ = local.worker('first'), local.worker('second')
         local.worker('foreign', PYTHONPATH=str(tmp_path / 'foreign'))
         local.wait_for_workers(3)
-        engine = Cluster(
+        engine = DaskEngine(
             do_as_told, local.address, lambda *it: reports.append(it), said.append,
             lambda result, machine: (result, machine),
         )  # fmt: skip
@@ -78,7 +78,7 @@ def test_nothing_is_lost_and_nothing_twice(
                     lose_one(engine._client)
         assert sorted(results) == list(range(len(tasks)))
         assert results[0] != os.getpid() and isinstance(results[1], int)
-        assert isinstance(results[2], GivenUp) and 'by SIGKILL' in results[2].reason
+        assert isinstance(results[2], TaskFailed) and 'by SIGKILL' in results[2].reason
         assert [results[number + 3] for number in range(60)] == [it**2 for it in range(60)]
         told = {(number, f'{what} {value}') for number, (what, value) in enumerate(tasks)}
         assert set(reports) <= told and len(reports) > 30
@@ -112,7 +112,7 @@ def test_nothing_is_lost_and_nothing_twice(
             assert f'ahf bag: {source}: /' in told and 'constant' in told
             assert len(bags.answers(tmp_path / 'out' / source.name)) == 1
 
-        with closing(Cluster(do_as_told, local.address)) as engine:
+        with closing(DaskEngine(do_as_told, local.address)) as engine:
             finished = finished_tasks(engine, [('square', number) for number in range(60)])
             assert next(finished).result == 0
             scheduler.kill()

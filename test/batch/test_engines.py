@@ -11,8 +11,15 @@ from typing import Any
 import pytest
 
 from ahf_ros.batch import engine
-from ahf_ros.batch.engine import EngineLost, Finished, GivenUp, Here, finished_tasks, in_order
-from ahf_ros.batch.processes import Processes
+from ahf_ros.batch.engine import (
+    EngineLost,
+    Finished,
+    SerialEngine,
+    TaskFailed,
+    finished_tasks,
+    in_order,
+)
+from ahf_ros.batch.processes import ProcessEngine
 from ahf_ros.cli import main
 from support.jobs import do_as_told
 
@@ -60,13 +67,13 @@ def test_workers_that_die_cost_their_task_one_more_try_and_nothing_else(tmp_path
         ('die', 0),
         *(('square', number) for number in range(20)),
     ]
-    engine = Processes(do_as_told, 2, report=lambda *report: reports.append(report))
+    engine = ProcessEngine(do_as_told, 2, report=lambda *report: reports.append(report))
     with closing(engine):
         results = {it.number: it.result for it in finished_tasks(engine, tasks)}
     assert sorted(results) == list(range(len(tasks)))
     assert results[0] != os.getpid()
     assert isinstance(results[1], int)
-    assert isinstance(results[2], GivenUp)
+    assert isinstance(results[2], TaskFailed)
     assert results[2].reason == (
         'given up, 2 processes that worked on it died, the last by SIGKILL'
     )
@@ -74,7 +81,7 @@ def test_workers_that_die_cost_their_task_one_more_try_and_nothing_else(tmp_path
     assert sorted(reports)[2:] == [(number + 3, f'square {number}') for number in range(20)]
 
 
-@pytest.mark.parametrize('engine', [Here(do_as_told), Processes(do_as_told, 1)])
+@pytest.mark.parametrize('engine', [SerialEngine(do_as_told), ProcessEngine(do_as_told, 1)])
 def test_what_a_job_raises_ends_the_batch(engine: Any) -> None:
     found: list[Finished[Any, Any]] = []
     with closing(engine), pytest.raises(ValueError, match='it is not accepted'):

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ahf_ros.batch.engine import Here, Report
+from ahf_ros.batch.engine import Report, SerialEngine
 from ahf_ros.batch.results import PREVIOUS, Results, Unwritable, file_fingerprint
 from ahf_ros.batch.run import kept_outcomes_in_order
 from ahf_ros.batch.task import ImageOutcome, ImageTask, Level, Message
@@ -41,7 +41,7 @@ class Run:
         self.images: list[str] = []
         results = Results(folder)
         try:
-            engine = Here(self.job)
+            engine = SerialEngine(self.job)
             for outcome in kept_outcomes_in_order(engine, tasks, results, self.notes.append):
                 self.images += [record['image'] for record in outcome.records]
                 if stop and len(self.images) == stop:

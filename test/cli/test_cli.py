@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import struct
 import subprocess
 import sys
@@ -99,7 +100,7 @@ def test_json_tells_the_truth(folder, results):
 def test_an_unknown_number_is_estimated_where_that_is_asked_for(folder, capsys):
     command = ('identify', folder / 'normal_0.3_4.png', '--detector', 'traditional', '--json')
     found = []
-    for more in ((), ('--estimate-expected',), ('--estimate-expected', '--expected', 6)):
+    for more in ((), ('--estimate-expected',), ('--estimate-expected', '--expected-targets', 6)):
         assert status(*command, *more) == 0
         found.append(json.loads(capsys.readouterr().out))
     assert [(it['expected'], it['estimated']) for it in found] == [
@@ -116,7 +117,43 @@ def test_without_json_standard_output_stays_empty(folder):
     head, *lines, hint = done.stderr.splitlines()
     assert '6 identified, no filter' in head
     assert len(lines) == 6
-    assert 'with --expected N, AHF searches' in hint
+    assert 'with --expected-targets N, AHF searches' in hint
+
+
+def test_what_was_looked_for_is_said_where_nothing_is_found(folder, tmp_path):
+    image = tmp_path / 'empty.png'
+    write_image(image, np.tile(np.arange(80, dtype=np.uint8), (60, 1)))
+    for options, hint in (
+        ((), 'targets of metashape12 were looked for; --family names others'),
+        (('--expected-targets', 6, '--max-evaluations', 1), 'targets of metashape12 were looked'),
+        (('--family', 'auto'), '--family auto looks for rings only, metashape12, .*; other famil'),
+    ):
+        told = ahf('identify', image, *options).stderr.splitlines()
+        assert re.match(hint, told[-1])
+    found = ahf('identify', image, folder / 'normal_0.3_4.png', '--expected-ids', '1-600')
+    assert 'looked for' not in found.stderr
+    assert 'N is not given' not in found.stderr
+    assert ahf('identify', image, '--quiet').stderr == ''
+
+
+def test_the_former_name_of_the_number_of_targets_works_and_says_so(folder, capsys):
+    command = ('identify', folder / 'normal_0.3_4.png', '--json')
+    results = []
+    for option in ('--expected-targets', '--expected'):
+        assert status(*command, option, 6) == 0
+        printed = capsys.readouterr()
+        results.append(json.loads(printed.out)['expected'])
+        said = 'identify: --expected is called --expected-targets now' in printed.err
+        assert said == (option == '--expected')
+    assert results == [6, 6]
+
+
+def test_a_missing_file_is_no_stack(tmp_path):
+    done = ahf('identify', tmp_path / 'missing.png')
+    assert done.returncode == 1
+    assert 'missing.png cannot be read: No such file or directory' in done.stderr
+    assert 'stack' not in done.stderr
+    assert 'N is not given' not in done.stderr
 
 
 def tiff_with_unknown_tag(image: np.ndarray) -> bytes:
@@ -202,7 +239,15 @@ def test_stripes_need_the_filter_and_a_search_repeats_itself(tmp_path, capsys):
     search = ('--seed', 3, '--population', 10)
     found = []
     for more in (('--no-ahf',), search, (*search, '--threads', 1)):
-        command = ('identify', image, '--detector', 'traditional', '--expected', 6, '--json')
+        command = (
+            'identify',
+            image,
+            '--detector',
+            'traditional',
+            '--expected-targets',
+            6,
+            '--json',
+        )
         assert status(*command, *more) == 0
         found.append(json.loads(capsys.readouterr().out))
     plain, first, second = found
@@ -216,7 +261,7 @@ def test_stripes_need_the_filter_and_a_search_repeats_itself(tmp_path, capsys):
 
 def test_a_search_that_ended_early_says_so(folder, capsys):
     image = folder / 'normal_0.3_4.png'
-    command = ('identify', image, '--expected', 7, '--max-radius', 40, '--json')
+    command = ('identify', image, '--expected-targets', 7, '--max-radius', 40, '--json')
     assert status(*command) == 0
     found, said = capsys.readouterr()
     assert json.loads(found)['filter']['evaluations'] == 3
@@ -243,8 +288,11 @@ def test_files_that_cannot_be_read_do_not_stop_the_others(folder, tmp_path):
 @pytest.mark.parametrize(
     ('arguments', 'message'),
     [
-        (['--expected', -1], "expected_targets is '-1', accepted is an integer from 0 to 100000"),
-        (['--expected', '9' * 400], "expected_targets is '999"),
+        (
+            ['--expected-targets', -1],
+            "expected_targets is '-1', accepted is an integer from 0 to 100000",
+        ),
+        (['--expected-targets', '9' * 400], "expected_targets is '999"),
         (['--population', 1], "population is '1', accepted is an integer from 2 to"),
         (['--family', 'ring'], "family is 'ring', accepted is one of metashape12, metashape14"),
         (['--detector', 'magic'], "detector is 'magic', accepted is one of"),

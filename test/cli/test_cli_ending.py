@@ -136,7 +136,7 @@ def test_a_signal_ends_the_command_and_its_files(
     command, mark = slow_command(tmp_path)
     (tmp_path / 'scratch').mkdir()
     process = start(
-        'identify', *(tmp_path / name for name in images), '--jobs', 2, '--expected', 3,
+        'identify', *(tmp_path / name for name in images), '--jobs', 2, '--expected-targets', 3,
         '--detector', 'command', '--command', command, '--detector-timeout', 600,
         stderr=subprocess.PIPE, env={**os.environ, 'TMPDIR': str(tmp_path / 'scratch')},
     )  # fmt: skip
@@ -162,7 +162,7 @@ def test_a_signal_does_not_wait_for_a_detector_of_another_package(
     packages.write_package(tmp_path, 'hanging', packages.SLOW.format(fast=fast, mark=str(mark)))
     write_image(tmp_path / 'image.png', np.tile(np.arange(40, dtype=np.uint8), (30, 1)))
     process = start(
-        'identify', tmp_path / 'image.png', '--detector', 'mine', '--expected', 3,
+        'identify', tmp_path / 'image.png', '--detector', 'mine', '--expected-targets', 3,
         '--detector-timeout', 600, stderr=subprocess.PIPE,
         env={**os.environ, 'PYTHONPATH': f'{ROOT}{os.pathsep}{tmp_path}'},
     )  # fmt: skip

@@ -55,7 +55,7 @@ def test_what_names_no_image_is_told_and_the_rest_goes_on(folder: Path) -> None:
 
 
 def oriented_jpeg(image: np.ndarray, orientation: int) -> bytes:
-    """Return a JPEG file whose Exif header tells an orientation."""
+    """Return a JPEG file whose Exif header has an orientation."""
     entry = bytes([1, 0x12, 0, 3, 0, 0, 0, 1, 0, orientation, 0, 0])
     exif = b'Exif\0\0MM\0*\0\0\0\x08\0\x01' + entry + bytes(4)
     content = cv2.imencode('.jpg', image, [cv2.IMWRITE_JPEG_QUALITY, 100])[1].tobytes()
@@ -69,7 +69,7 @@ def test_images_are_turned_as_opencv_turns_them(tmp_path: Path, orientation: int
     stored = np.random.default_rng(0).integers(0, 255, (40, 64), np.uint8)
     path.write_bytes(oriented_jpeg(stored, orientation))
     upright = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_GRAYSCALE)
-    assert np.array_equal(read_image(path, turned=True), upright)
+    assert np.array_equal(read_image(path, upright=True), upright)
     assert np.array_equal(as_oriented(read_image(path), orientation), upright)
 
 

@@ -40,7 +40,7 @@ def test_phases_are_one_scene_in_light_that_moves(folder):
 
 def test_every_stack_is_one_result_that_names_its_images(folder):
     paths = [str(folder / name) for name in NAMES]
-    done = ahf('identify', *paths, '--stack', 4, '--expected', 4, '--json')
+    done = ahf('identify', *paths, '--stack', 4, '--expected-targets', 4, '--json')
     assert done.returncode == 0, done.stderr
     results = [json.loads(line) for line in done.stdout.splitlines()]
     assert [result['images'] for result in results] == [paths[:4], paths[4:]]
@@ -55,7 +55,7 @@ def test_every_stack_is_one_result_that_names_its_images(folder):
 
 def test_names_and_folders_say_what_belongs_together(folder):
     paths = [str(folder / name) for name in reversed(NAMES)]
-    done = ahf('identify', *paths, '--stack-by', r'(.*)_\d', '--expected', 4, '--json')
+    done = ahf('identify', *paths, '--stack-by', r'(.*)_\d', '--expected-targets', 4, '--json')
     results = [json.loads(line) for line in done.stdout.splitlines()]
     assert [result['images'] for result in results] == [paths[:4], paths[4:]]
     assert [len(result['targets']) for result in results] == [4, 4]

@@ -26,6 +26,11 @@ def test_families_keep_their_order():
     ('text', 'message'),
     [
         ('', r"family is '', accepted is one of metashape12, .*; several of .*; or auto for all"),
+        (
+            'tag36h11',
+            r"family is 'tag36h11', accepted is apriltag_36h11, which is most like",
+        ),
+        ('DICT_4X4_50', r"'DICT_4X4_50', accepted is aruco_4x4_50, which is most like it"),
         (',', r"family is ',', which names '', accepted is one of"),
         ('metashape12,', r"which names '', accepted is one of"),
         ('metashape12,ring12', r"'metashape12,ring12', which names 'ring12', accepted is one of"),

@@ -34,7 +34,7 @@ def test_black_ink_is_read(family: str, polarity: str, dot_radius: float, target
             seed=7,
         )
     )
-    figures = score(shown.truth, create_detector(family=family)(shown.image))
+    figures = score(shown, create_detector(family=family)(shown.image))
     assert figures.right >= targets - 1
     assert figures.wrong == figures.false_positives == 0
 

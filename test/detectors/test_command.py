@@ -24,7 +24,7 @@ def detector(tmp_path, script: str, words: str = '', timeout: float = 600.0):
     path.write_text(script)
     command = f'{sys.executable} {path} {words}'
     settings = DetectorSettings(command=command, detector_timeout=timeout)
-    return create_detector('command', settings)
+    return create_detector('command', settings=settings)
 
 
 def printing(text: str) -> str:
@@ -98,7 +98,7 @@ def test_a_program_that_hangs_is_ended_with_all_that_it_started(tmp_path, monkey
 
 
 def test_a_program_that_writes_without_end_is_ended(tmp_path, monkeypatch):
-    monkeypatch.setattr(program, 'LARGEST_OUTPUT', 2**20)
+    monkeypatch.setattr(program, 'MAXIMUM_OUTPUT', 2**20)
     script = 'import os\nwhile True:\n    os.write(1, bytes(2**16))\n'
     with pytest.raises(ValueError, match='bytes, accepted are at most 1048576'):
         detector(tmp_path, script)(IMAGE)
@@ -121,13 +121,13 @@ def _runs(pid: int) -> bool:
 )
 def test_a_command_that_is_none(command, message):
     with pytest.raises(ValueError, match=message):
-        create_detector('command', DetectorSettings(command=command))
+        create_detector('command', settings=DetectorSettings(command=command))
 
 
 def test_a_program_that_is_not_there(tmp_path):
     settings = DetectorSettings(command=str(tmp_path / 'nothing'))
     with pytest.raises(ValueError, match='cannot be started: No such file'):
-        create_detector('command', settings)(IMAGE)
+        create_detector('command', settings=settings)(IMAGE)
 
 
 def test_several_threads_at_once_and_no_file_left(tmp_path, monkeypatch):
@@ -154,5 +154,5 @@ def test_a_program_behind_the_adaptive_filter(tmp_path):
         'seen = image[0, :3].tolist() != [0, 1, 2]\n'
         'print(json.dumps({"targets": [{"id": 1, "x": 0, "y": 0}] if seen else []}))\n'
     )
-    found = identify(IMAGE, detector(tmp_path, script), expected_targets=1)
+    found = identify(IMAGE, detector=detector(tmp_path, script), expected_targets=1)
     assert found.count == 1 and found.filter.applied

@@ -55,7 +55,7 @@ def errors(shown: Rendering, targets: list) -> np.ndarray:
 def test_targets_are_identified_and_placed(changes: dict, bound: float) -> None:
     shown = rendering(**changes)
     found = create_detector(family='dots')(shown.image)
-    figures = score(shown.truth, found)
+    figures = score(shown, found)
     assert figures.right == len(shown.targets)
     assert figures.wrong == figures.false_positives == 0
     assert np.sqrt((errors(shown, found) ** 2).mean()) < bound
@@ -96,7 +96,7 @@ def test_edges_that_moved_and_dots_of_other_radii_are_read(
     )
     assert ellipse_axes(certain.frames)[0] == pytest.approx(14.0, rel=0.01)
     reported = create_detector(family='dots')(shown.image)
-    figures = score(shown.truth, reported)
+    figures = score(shown, reported)
     assert (figures.right, figures.wrong, figures.false_positives) == (6, 0, 0)
     assert all(target.edge_shift == pytest.approx(shift, abs=0.1) for target in reported)
 
@@ -150,7 +150,7 @@ def test_a_design_of_ones_own_is_printed_and_identified(tmp_path: Path) -> None:
     scene = SceneSettings(**SIZE, family_file=str(path), seed=5)
     shown = render(scene)
     found = create_detector(family='dots', family_file=str(path))(shown.image)
-    figures = score(shown.truth, found)
+    figures = score(shown, found)
     assert (figures.right, figures.wrong, figures.false_positives) == (6, 0, 0)
 
 

@@ -35,7 +35,7 @@ def test_all_targets_are_identified_in_even_light(changes: dict) -> None:
     bias = 0.2 if 'tilt' in changes else 0.0  # of the ellipse, under perspective
     shown = render(scene(**changes))
     found = published()(shown.image)
-    figures = score(shown.truth, found)
+    figures = score(shown, found)
     assert (figures.right, figures.wrong, figures.false_positives) == (6, 0, 0)
     assert figures.rmse is not None and figures.rmse[2] < 0.15 + bias
     codes = {target.id: target.code for target in shown.targets}
@@ -44,10 +44,10 @@ def test_all_targets_are_identified_in_even_light(changes: dict) -> None:
 
 def test_stripes_defeat_it_and_ahf_brings_the_targets_back() -> None:
     shown = render(scene(light='stripe'))
-    without = score(shown.truth, published()(shown.image))
-    found = identify(shown.image, published(), expected_targets=6)
+    without = score(shown, published()(shown.image))
+    found = identify(shown.image, detector=published(), expected_targets=6)
     assert found.filter.applied
-    assert score(shown.truth, found.targets).right >= max(3 * without.right, 4)
+    assert score(shown, found.targets).right >= max(3 * without.right, 4)
 
 
 def test_a_place_that_is_neither_dot_nor_ground_leaves_a_ring_undecoded() -> None:

@@ -26,7 +26,7 @@ def sheet(name: str = 'metashape12', bright: bool = False) -> Sheet:
 
 
 def scored(image: np.ndarray, truth: list[TrueTarget], name: str = 'metashape12') -> Score:
-    return score(truth, create_detector('ring', DetectorSettings(family=name))(image))
+    return score(truth, create_detector('ring', settings=DetectorSettings(family=name))(image))
 
 
 @pytest.mark.parametrize('bright', [False, True], ids=['dark', 'bright'])

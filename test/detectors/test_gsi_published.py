@@ -74,7 +74,9 @@ def test_a_filter_that_ahf_finds_makes_up_for_uneven_light() -> None:
     )
     detector = create_detector('gsi_published', family='gsi')
     assert score(shown.truth, detector(shown.image)).right == 0
-    found = identify(shown.image, detector, expected_targets=1, population=8, max_evaluations=24)
+    found = identify(
+        shown.image, detector=detector, expected_targets=1, population=8, max_evaluations=24
+    )
     assert found.filter.applied
     assert score(shown.truth, found.targets).right == 1
 

@@ -27,7 +27,7 @@ def reported(exposure, name='metashape12', read_as=None):
     """Return the targets identified on a sheet, and how many of them are right."""
     numbers = random_numbers(name, COUNT, 31)[0]
     sheet = target_sheet(name, numbers, 31)
-    detect = create_detector('ring', DetectorSettings(family=read_as or name))
+    detect = create_detector('ring', settings=DetectorSettings(family=read_as or name))
     targets = detect(sheet.photograph(exposure))
     kinds = [verdict.kind for verdict in judge(sheet.truth, targets)]
     return targets, kinds.count(RIGHT)

@@ -131,8 +131,10 @@ def test_a_filter_leaves_no_trace_in_the_places(name):
 
     settings = AdaptiveSettings(threads=1, genetic=GeneticSettings(max_evaluations=8))
     detector = Filtered(DetectorSettings())
-    result = Identifier(detector, settings, refine=detector.refine).identify(image, 6)
-    unrefined = Identifier(detector, settings).identify(image, 6)
+    result = Identifier(detector, settings, refine=detector.refine).identify(
+        image, expected_targets=6
+    )
+    unrefined = Identifier(detector, settings).identify(image, expected_targets=6)
     assert result.filter.applied
     assert result.count == unrefined.count >= 4
     before, after = (distances(of.targets, SCENE) for of in (unrefined, result))

@@ -17,8 +17,8 @@ from ahf_ros.detectors import (
     FAMILY_NAMES,
     Detector,
     DetectorSettings,
-    Discerning,
     Drafter,
+    EarlyStopping,
     Refiner,
     create_detector,
     detector_name,
@@ -104,7 +104,7 @@ def test_only_detectors_that_hardly_need_a_filter_have_a_patience(name):
     kind = name.partition('_')[0]
     family = kind if kind in ('gsi', 'dots') else 'metashape12'
     made = create_detector(name, family=family, command='program')
-    assert isinstance(made, Discerning) == (name in ('ring', 'gsi', 'dots'))
+    assert isinstance(made, EarlyStopping) == (name in ('ring', 'gsi', 'dots'))
 
 
 def test_an_unknown_detector_is_refused_by_name():
@@ -114,7 +114,7 @@ def test_an_unknown_detector_is_refused_by_name():
 
 def test_settings_reach_the_detector():
     settings = DetectorSettings(family='aicon14')
-    assert create_detector('traditional', settings).settings == settings
+    assert create_detector('traditional', settings=settings).settings == settings
 
 
 @pytest.mark.parametrize(
@@ -145,12 +145,12 @@ def added(tmp_path, monkeypatch, module: str, body: str):
 def test_a_detector_of_another_package(tmp_path, monkeypatch):
     registry = added(tmp_path, monkeypatch, 'package_with_detector', EXAMPLE.read_text())
     assert registry['DETECTOR_NAMES'] == (*DETECTOR_NAMES, 'mine')
-    detector = registry['create_detector']('mine', DetectorSettings(min_radius=5.0))
+    detector = registry['create_detector']('mine', settings=DetectorSettings(min_radius=5.0))
     image = np.full((100, 120), 200, np.uint8)
     cv2.circle(image, (40, 50), 8, 20, -1)
     (target,) = detector(image)
     assert (target.x, target.y) == pytest.approx((40, 50), abs=0.1)
-    assert identify(image, detector, expected_targets=1).count == 1
+    assert identify(image, detector=detector, expected_targets=1).count == 1
 
 
 def test_a_detector_of_another_package_that_cannot_be_imported(tmp_path, monkeypatch):
@@ -190,12 +190,16 @@ class MyDetector:
 )
 def test_a_detector_of_another_package_may_fail_and_hang(tmp_path, monkeypatch, gray, words):
     registry = added(tmp_path, monkeypatch, f'package_that_fails_{gray}', FAILING)
-    patient = registry['create_detector']('mine', DetectorSettings(detector_timeout=600.0))
-    impatient = registry['create_detector']('mine', DetectorSettings(detector_timeout=0.2))
+    patient = registry['create_detector'](
+        'mine', settings=DetectorSettings(detector_timeout=600.0)
+    )
+    impatient = registry['create_detector'](
+        'mine', settings=DetectorSettings(detector_timeout=0.2)
+    )
     image = np.full((20, 20), gray, np.uint8)
     image[0] = 0
     with pytest.raises(ValueError) as raised:
-        identify(image, impatient if gray == 1 else patient, expected_targets=0)
+        identify(image, detector=impatient if gray == 1 else patient, expected_targets=0)
     assert str(raised.value) == words
     with pytest.raises(ValueError, match="detector 'mine' failed: RuntimeError: no GPU"):
         patient.refine(image, [])
@@ -293,11 +297,11 @@ def test_a_search_ends_when_a_detector_hangs_in_it(tmp_path, monkeypatch):
     body = FAILING.replace('image.max() == 1', 'image.max() > 100')
     registry = added(tmp_path, monkeypatch, 'package_that_hangs', body)
     patient, impatient = (
-        registry['create_detector']('mine', DetectorSettings(detector_timeout=limit))
+        registry['create_detector']('mine', settings=DetectorSettings(detector_timeout=limit))
         for limit in (600.0, 0.2)
     )
     image = np.full((20, 20), 60, np.uint8)
     image[0] = 0
-    assert identify(image, patient, expected_targets=0).targets == ()
+    assert identify(image, detector=patient, expected_targets=0).targets == ()
     with pytest.raises(ValueError, match='took longer than detector_timeout'):
-        identify(image, impatient, expected_targets=5)
+        identify(image, detector=impatient, expected_targets=5)

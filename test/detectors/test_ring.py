@@ -24,11 +24,11 @@ rendered = lru_cache(render)
 
 
 def identified(image: np.ndarray, **settings: object) -> list[Target]:
-    return create_detector('ring', DetectorSettings(**settings))(image)
+    return create_detector('ring', settings=DetectorSettings(**settings))(image)
 
 
 def scored(rendering: Rendering, targets: list[Target]) -> Score:
-    return score(rendering.truth, targets)
+    return score(rendering, targets)
 
 
 def errors_of(figures: Score) -> list[float]:

@@ -31,8 +31,8 @@ def detector(request):
 @pytest.mark.parametrize(('name', 'maximum_error'), [('ring', 0.03), ('traditional', 0.05)])
 def test_all_targets_of_every_family(name, maximum_error, family, polarity):
     rendering = rendered(replace(SMALL, family=family, polarity=polarity))
-    identified = create_detector(name, DetectorSettings(family=family))(rendering.image)
-    figures = score(rendering.truth, identified)
+    identified = create_detector(name, settings=DetectorSettings(family=family))(rendering.image)
+    figures = score(rendering, identified)
     assert (figures.right, figures.wrong, figures.false_positives) == (6, 0, 0)
     assert np.linalg.norm(figures.errors, axis=1).max() < maximum_error
 

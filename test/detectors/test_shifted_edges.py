@@ -31,7 +31,7 @@ def seen(
     )
     rendering = render(scene)
     targets = create_detector('ring')(rendering.image)
-    return score(rendering.truth, targets), targets
+    return score(rendering, targets), targets
 
 
 def rms(figures: Score) -> float:

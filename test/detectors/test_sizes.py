@@ -11,7 +11,7 @@ from ahf_ros.evaluation import score
 from support.collage import Collage, collage
 from support.square_markers import needs_square_markers
 
-LARGEST_ERROR = 0.05
+MAXIMUM_ERROR = 0.05
 """Of a centre of any size, px."""
 
 
@@ -19,7 +19,7 @@ def check(shown: Collage, family: str, **settings: object) -> None:
     """Assert that all targets are identified, with good centres, and nothing else."""
     figures = score(shown.truth, create_detector(family=family, **settings)(shown.image))
     assert (figures.right, figures.wrong, figures.false_positives) == (len(shown.truth), 0, 0)
-    assert np.abs(figures.errors).max() < LARGEST_ERROR
+    assert np.abs(figures.errors).max() < MAXIMUM_ERROR
 
 
 def test_dots_of_4_to_300_px_in_one_image():

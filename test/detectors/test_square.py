@@ -21,7 +21,7 @@ SCENE = SceneSettings(
 
 
 def scored(rendering: Rendering, targets):
-    return score(rendering.truth, targets)
+    return score(rendering, targets)
 
 
 @pytest.mark.parametrize(
@@ -71,7 +71,9 @@ def test_the_filter_finds_markers_that_stripes_hide():
     rendering = render(replace(SCENE, light='stripe', ambient=0.12))
     detector = create_detector(family=SCENE.family)
     without = scored(rendering, detector(rendering.image))
-    identification = identify(rendering.image, detector, expected_targets=6, max_evaluations=40)
+    identification = identify(
+        rendering.image, detector=detector, expected_targets=6, max_evaluations=40
+    )
     found = scored(rendering, identification.targets)
     assert found.right >= 2 * max(without.right, 1)
     assert (found.wrong, found.false_positives) == (0, 0)
@@ -81,7 +83,7 @@ def test_the_filter_finds_markers_that_stripes_hide():
 def test_places_are_those_of_the_image_as_received(light):
     rendering = render(replace(SCENE, light=light, ambient=0.3))
     detector = create_detector(family=SCENE.family)
-    found = identify(rendering.image, detector, expected_targets=6)
+    found = identify(rendering.image, detector=detector, expected_targets=6)
     figures = scored(rendering, found.targets)
     assert (figures.right, figures.wrong, figures.false_positives) == (6, 0, 0)
     assert figures.rmse[2] < 0.08

@@ -24,11 +24,11 @@ rendered = lru_cache(render)
 
 
 def identified(image: np.ndarray, **settings: object) -> list[Target]:
-    return create_detector('traditional', DetectorSettings(**settings))(image)
+    return create_detector('traditional', settings=DetectorSettings(**settings))(image)
 
 
 def scored(rendering: Rendering, targets: list[Target]) -> Score:
-    return score(rendering.truth, targets)
+    return score(rendering, targets)
 
 
 @pytest.mark.parametrize('polarity', ['dark', 'bright'])

@@ -28,7 +28,7 @@ def drawn(dots: list[tuple[float, float, float]], paper: int = 200, ink: int = 3
 
 
 def stripes(image: np.ndarray, period: int, shadow: float) -> np.ndarray:
-    """Return an image of which every other half period lies in the shadow."""
+    """Return an image; every other half period lies in the shadow."""
     lit = np.arange(image.shape[1]) % period < period / 2
     return np.rint(image * np.where(lit, 1, shadow)).astype(np.uint8)
 
@@ -216,4 +216,4 @@ def test_more_dots_than_are_looked_at_are_said_and_the_roundest_stay(monkeypatch
     assert messages == []
     monkeypatch.setattr('ahf_ros.features.outlines.MAXIMUM_OUTLINES', 30)
     assert len(whole_outlines(edges, 4.0, 20.0).frames) == 30
-    assert messages == ['100 whole ellipses, of which the 30 best are looked at']
+    assert messages == ['100 whole ellipses; the 30 best are looked at']

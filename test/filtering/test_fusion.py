@@ -67,7 +67,7 @@ def test_a_search_that_finds_no_filter_for_all_shows_what_several_do():
 
     def identify(**changes):
         settings = AdaptiveSettings(genetic=GeneticSettings(max_evaluations=30), **changes)
-        return Identifier(detector, settings).identify(image, 4)
+        return Identifier(detector, settings).identify(image, expected_targets=4)
 
     single = identify()
     assert single.count == 3

@@ -27,7 +27,7 @@ SHORT = AdaptiveSettings(genetic=GeneticSettings(max_evaluations=30))
 
 
 def identify(image, detector, expected, settings=None, **parts):
-    return Identifier(detector, settings, **parts).identify(image, expected)
+    return Identifier(detector, settings, **parts).identify(image, expected_targets=expected)
 
 
 def dotted(fall_off):
@@ -144,7 +144,7 @@ def test_the_image_as_received_wins_a_tie():
 def test_a_search_in_vain_ends_with_the_patience_of_the_detector(threads):
     settings = AdaptiveSettings(threads=threads)
     identifier = Identifier(lambda image: [target(1)], settings, patience=2)
-    assert identifier.identify(DIM, 5).filter.evaluations == 3
+    assert identifier.identify(DIM, expected_targets=5).filter.evaluations == 3
     assert identifier.last_search.reason == 'patience'
     assert identifier.last_search.tried == FIRST[:2]
 
@@ -155,7 +155,7 @@ def test_a_search_in_vain_ends_with_the_patience_of_the_detector(threads):
 )
 def test_fusion_and_the_settings_come_before_the_patience_of_the_detector(settings):
     identifier = Identifier(lambda image: [target(1)], settings, patience=2)
-    assert identifier.identify(DIM, 5).filter.evaluations == 51
+    assert identifier.identify(DIM, expected_targets=5).filter.evaluations == 51
 
 
 def test_a_filter_that_shows_more_keeps_a_search_going():
@@ -165,7 +165,7 @@ def test_a_filter_that_shows_more_keeps_a_search_going():
         AdaptiveSettings(threads=1),
         patience=2,
     )
-    result = identifier.identify(DIM, 9)
+    result = identifier.identify(DIM, expected_targets=9)
     assert (result.count, result.filter.evaluations) == (4, 5)
 
 
@@ -226,10 +226,10 @@ def test_an_estimate_of_none_filters_nothing():
 def test_a_steady_stream_is_estimated_once_and_not_searched_again(surplus):
     detector, estimate = Dots(), Estimate(COUNT + surplus)
     identifier = Identifier(detector, SHORT, estimate=estimate)
-    first = identifier.identify(DIM, 0)
+    first = identifier.identify(DIM, expected_targets=0)
     assert first.filter.applied
     calls = detector.calls
-    second = identifier.identify(DIM, 0)
+    second = identifier.identify(DIM, expected_targets=0)
     assert (detector.calls - calls, estimate.calls) == (1, 1)
     assert (second.targets, second.expected) == (first.targets, COUNT + surplus)
     assert (second.filter.evaluations, identifier.last_search) == (1, None)
@@ -241,10 +241,10 @@ def test_other_results_are_estimated_again():
     fewer = DIM.copy()
     fewer[:40, :40] = DIM[0, :40]
     for image, calls in ((DIM, 1), (fewer, 2), (fewer, 2)):
-        identifier.identify(image, 0)
+        identifier.identify(image, expected_targets=0)
         assert estimate.calls == calls
     identifier.reset()
-    identifier.identify(fewer, 0)
+    identifier.identify(fewer, expected_targets=0)
     assert estimate.calls == 3
 
 
@@ -292,10 +292,10 @@ def test_centres_from_the_8_bit_version_of_an_image_are_refined():
 def test_a_stream_begins_with_the_filter_that_worked_last():
     detector = Dots()
     identifier = Identifier(detector)
-    first = identifier.identify(DIM, COUNT)
+    first = identifier.identify(DIM, expected_targets=COUNT)
     assert identifier.last_search.reason == 'found'
     detector.calls = 0
-    second = identifier.identify(DIM, COUNT)
+    second = identifier.identify(DIM, expected_targets=COUNT)
     assert second.targets == first.targets
     assert (second.filter.evaluations, second.filter.generations, detector.calls) == (1, 0, 1)
     assert second.filter.gamma_low == first.filter.gamma_low
@@ -304,9 +304,9 @@ def test_a_stream_begins_with_the_filter_that_worked_last():
 
 def test_reset_forgets_what_worked():
     identifier = Identifier(Dots())
-    first = identifier.identify(DIM, COUNT)
+    first = identifier.identify(DIM, expected_targets=COUNT)
     identifier.reset()
-    again = identifier.identify(DIM, COUNT)
+    again = identifier.identify(DIM, expected_targets=COUNT)
     assert again.filter.evaluations == first.filter.evaluations > 1
     assert again.targets == first.targets
 
@@ -317,19 +317,19 @@ def test_a_filter_that_no_longer_works_is_given_up():
 
     even = True
     identifier = Identifier(detector, SHORT)
-    assert identifier.identify(DIM, COUNT).filter.applied
+    assert identifier.identify(DIM, expected_targets=COUNT).filter.applied
     even = False
-    result = identifier.identify(BRIGHT, COUNT)
+    result = identifier.identify(BRIGHT, expected_targets=COUNT)
     assert (result.count, result.filter.applied, result.filter.evaluations) == (COUNT, False, 2)
-    assert identifier.identify(BRIGHT, COUNT).filter.evaluations == 1
+    assert identifier.identify(BRIGHT, expected_targets=COUNT).filter.evaluations == 1
 
 
 def test_a_search_begins_with_the_filter_that_worked_last_and_does_not_repeat_it():
     detector = Dots()
     identifier = Identifier(detector, replace(SHORT, threads=1))
-    identifier.identify(DIM, COUNT)
+    identifier.identify(DIM, expected_targets=COUNT)
     detector.images.clear()
-    result = identifier.identify(DIM, COUNT + 1)
+    result = identifier.identify(DIM, expected_targets=COUNT + 1)
     assert result.count == COUNT
     assert len(detector.images) == result.filter.evaluations == 31
     shown = {image.tobytes() for image in detector.images if image is not DIM}
@@ -340,7 +340,7 @@ def test_the_clock_measures_the_duration_and_limits_the_search():
     seconds = iter(range(1000))
     settings = AdaptiveSettings(genetic=GeneticSettings(max_duration=5.0), threads=1)
     identifier = Identifier(lambda image: [], settings, clock=lambda: float(next(seconds)))
-    result = identifier.identify(DIM, COUNT)
+    result = identifier.identify(DIM, expected_targets=COUNT)
     assert identifier.last_search.reason == 'duration'
     assert result.filter.evaluations == 6
     assert result.filter.duration == 7.0
@@ -522,7 +522,7 @@ def test_there_are_no_drafts_without_a_refinement_or_a_filter():
 
 
 class Blocks(Dots):
-    """The same on paper with dots of two pixels by two, of which half an image shows one each."""
+    """The same on paper with dots of two pixels by two; each half of the image shows one."""
 
     def __call__(self, image):
         with self.lock:

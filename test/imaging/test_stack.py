@@ -12,7 +12,7 @@ REFLECTANCE = np.tile(np.array([10, 200], np.uint8), (20, 16))
 
 
 def lit(phase: int, kind: type = np.uint8, white: int = 255) -> np.ndarray:
-    """Return a print of which every other pair of columns is lit."""
+    """Return a print; every other pair of columns is lit."""
     light = np.where((np.arange(32) // 2 + phase) % 2, 1.0, 0.1)
     return np.rint(REFLECTANCE * light * (white / 255)).astype(kind)
 

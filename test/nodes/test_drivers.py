@@ -31,7 +31,7 @@ from support.live import PATIENCE, ros_environment
 
 # Small enough for best effort, which loses messages of more than half a megabyte.
 SCENE = SceneSettings(width=200, height=150, targets=2, dot_radius=8.0, seed=4)
-LARGEST_ERROR = 0.2e-3  # m
+MAXIMUM_ERROR = 0.2e-3  # m
 NARROWER = 24  # px, with a disparity offset
 AGAIN = 1.0  # s, after which lost messages are sent again
 
@@ -193,4 +193,4 @@ def test_every_driver_has_positions_with_the_rig(graph: Any, detectors: subproce
         points = read(scanner.found[0])
         assert points['id'].tolist() == [it.id for it in rendering.targets], scanner.name
         errors = np.stack([points[axis] for axis in 'xyz'], axis=1) - true
-        assert np.linalg.norm(errors, axis=1).max() < LARGEST_ERROR, scanner.name
+        assert np.linalg.norm(errors, axis=1).max() < MAXIMUM_ERROR, scanner.name

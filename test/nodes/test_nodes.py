@@ -35,7 +35,7 @@ from support.detector import DetectorProcess
 
 CONFIG = Path(__file__).parents[2] / 'config' / 'detector.yaml'
 SCENE = {'width': 1000, 'height': 700, 'targets': 6}
-LARGEST_ERROR = 0.1  # px
+MAXIMUM_ERROR = 0.1  # px
 PATIENT = {'image_timeout': 0}
 """Nothing is said of images that a busy machine has not sent yet."""
 ENDLESS = (
@@ -89,7 +89,7 @@ def assert_true(answer: CodedTargetArray, truth: CodedTargetArray) -> None:
     """Assert that an answer holds the targets of the truth, at the right places."""
     assert [it.id for it in answer.targets] == [it.id for it in truth.targets]
     for found, true in zip(answer.targets, truth.targets, strict=True):
-        assert math.hypot(found.x - true.x, found.y - true.y) < LARGEST_ERROR
+        assert math.hypot(found.x - true.x, found.y - true.y) < MAXIMUM_ERROR
         assert found.code == true.code
         assert found.semi_major == pytest.approx(true.semi_major, abs=0.5)
 
@@ -135,7 +135,7 @@ def test_the_scoreboard_compares_with_the_truth(graph: Any) -> None:
     for number, line in enumerate(lines, start=1):
         assert line.startswith(f'image {number}: 6 of 6 right, 0 wrong, 0 false, 0 missed, ')
         assert '; no filter, 1 trial, ' in line
-        assert 0 < float(re.search(r'RMSE (.*) px', line).group(1)) < LARGEST_ERROR
+        assert 0 < float(re.search(r'RMSE (.*) px', line).group(1)) < MAXIMUM_ERROR
     for process in (detector, camera):
         assert process.end() == (0, '')
 

@@ -26,7 +26,7 @@ from support.detector import DetectorProcess
 
 SCENE = SceneSettings(width=640, height=480, targets=6, dot_radius=10.0, tilt=30.0, seed=3)
 DISTANCE = 800.0  # mm, of the middle of the wall
-LARGEST_ERROR = 0.2  # mm, of which a tenth of a pixel is most
+MAXIMUM_ERROR = 0.2  # mm, of which a tenth of a pixel is most
 DOT_WITHOUT_POINTS, WITHOUT_POINTS = 0, 5  # places of targets in the truth
 CLOUD_FRAME = 'scanner_optical_frame'
 
@@ -142,7 +142,7 @@ def assert_true(message: PointCloud2, rendering: Rendering, camera: Camera) -> N
     true = in_space(camera, pixels)
     errors = np.linalg.norm(np.stack([points[name] for name in 'xyz'], axis=1) - true, axis=1)
     known = np.arange(len(pixels)) != WITHOUT_POINTS
-    assert errors[known].max() < LARGEST_ERROR
+    assert errors[known].max() < MAXIMUM_ERROR
     assert np.isnan(errors[WITHOUT_POINTS])
     assert points['deviation'][known] == pytest.approx(0.05, rel=0.3)
     assert points['confidence'].min() > 0.5

@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from ahf_ros.cli import main
+from ahf_ros.target import SquareMarker
 from support.browser import opened
 from support.results import record, save_image, save_lines, searched, target, undecoded
 
@@ -179,6 +180,19 @@ def test_people_find_and_look_at_images(browser: Any, folder: Path) -> None:
     use.press('?')
     assert use.one('#help').is_displayed()
     assert [it for it in browser.get_log('browser') if it['level'] in ('SEVERE', 'WARNING')] == []
+
+
+def test_squares_are_drawn_as_squares(tmp_path: Path) -> None:
+    corners = ((10.0, 10.0), (30.0, 10.0), (30.0, 30.0), (10.0, 30.0))
+    square = SquareMarker(5, 5, 20.0, 20.0, 10.0, 10.0, family='aruco_4x4_50', corners=corners)
+    image = save_image(tmp_path / 'a.png')
+    save_lines(tmp_path / 'results.jsonl', record(image, square))
+    assert report(tmp_path / 'results.jsonl', '-o', tmp_path / 'a.html') == 0
+    with opened() as browser:
+        browser.get((tmp_path / 'a.html').as_uri())
+        drawn = browser.find_elements('css selector', '.mark polygon.line')
+        assert [it.get_attribute('points') for it in drawn] == ['10,10 30,10 30,30 10,30']
+        assert browser.find_elements('css selector', '.mark ellipse') == []
 
 
 def test_every_control_has_a_name(page: Path) -> None:

@@ -19,7 +19,7 @@ from ahf_ros.report.pictures import fitted, thumbnail
 from ahf_ros.report.reading import read_results
 from ahf_ros.report.results import ImageResult, result_from_json
 from ahf_ros.report.rows import families_of, row
-from ahf_ros.target import TrueTarget
+from ahf_ros.target import SquareMarker, TrueTarget
 from support.results import record, save_image, save_lines, searched, target, undecoded
 
 
@@ -124,6 +124,14 @@ def test_a_row_tells_what_is_missed_and_what_is_doubtful() -> None:
     assert judged['truth']['wrong'] == [1]
     assert judged['truth']['missed'] == [[8, 100.0, 100.0]]
     assert judged['truth']['errors'] == [[0, -0.5, 0.0]]
+
+
+def test_a_row_has_the_corners_of_squares() -> None:
+    corners = ((10.0, 10.0), (30.126, 10.0), (30.0, 30.0), (10.0, 30.0))
+    square = SquareMarker(5, 5, 20.0, 20.0, 10.0, 10.0, family='aruco_4x4_50', corners=corners)
+    shown = row(result(record('a.png', target(7), square)), ['aruco_4x4_50', 'metashape12'], 0.95)
+    drawn = [[10.0, 10.0], [30.13, 10.0], [30.0, 30.0], [10.0, 30.0]]
+    assert shown['squares'] == [{'id': 5, 'corners': drawn}]
 
 
 def test_a_row_tells_what_is_wrong_with_the_edges() -> None:

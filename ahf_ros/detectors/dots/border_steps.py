@@ -14,7 +14,7 @@ from ahf_ros.features.sampling import sample
 
 _RAYS = 20
 _ANGLES = 2 * np.pi * np.arange(_RAYS) / _RAYS
-_FAINTEST = 0.12  # step of ln of a disc
+_MINIMUM_STEP = 0.12  # step of ln of a disc
 _EDGE_SIDES = 5  # radii between which the edges lie
 _PART = 2_000_000  # samples at a time, which bounds the memory
 
@@ -26,7 +26,7 @@ def border_steps(
     code: DotFamily,
     scales: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Return the mean step at the edges of disc and border, in that of the disc.
+    """Return the mean step at the edges of disc and border, in steps of the disc.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def border_steps(
         1 for dark targets, -1 for bright ones.
     code : DotFamily
     scales : ndarray of float, shape (n,), optional
-        Radii that the discs may have instead, in those of the frames.
+        Radii that the discs may have instead, in radii of the frames.
 
     Returns
     -------
@@ -79,6 +79,6 @@ def _mean_steps(values: np.ndarray, polarity: np.ndarray, count: int) -> np.ndar
     values = values.reshape(len(values), _RAYS, count, _EDGE_SIDES).astype(np.float32)
     steps = values[..., [1, 2, 4]] - values[..., [0, 3, 3]]
     steps *= (polarity / LOG_SCALE)[:, None, None, None]
-    usual = np.maximum(np.median(steps[..., 0], axis=1), _FAINTEST)
+    usual = np.maximum(np.median(steps[..., 0], axis=1), _MINIMUM_STEP)
     means: np.ndarray = np.clip(steps / usual[:, None, :, None], -1, 1).mean(axis=(1, 3))
     return means.astype(np.float64)

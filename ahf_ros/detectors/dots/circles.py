@@ -1,6 +1,6 @@
 """Frames of rings of dots, from the edges of disc and border.
 
-Circles of three radii tell the image of the physical centre from the centres of their ellipses.
+Circles of three radii separate the image of the physical centre from the centres of ellipses.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from ahf_ros.features.soft_edges import fit_circles_of_any_blur
 
 _RAYS = 40  # round each circle
 _REACH = 0.3  # how far from a circle its edge is looked for, radii of the disc: half the border
-_SHORTEST_REACH = 1.35  # the same of small discs, px: what a profile needs
+_MINIMUM_REACH = 1.35  # the same of small discs, px: what a profile needs
 
 
 def fit_targets(
@@ -33,7 +33,7 @@ def fit_targets(
         1 for dark targets, -1 for bright ones.
     code : DotFamily
     """
-    reach = np.maximum(_REACH, _SHORTEST_REACH / mean_radii(frames))[:, None]
+    reach = np.maximum(_REACH, _MINIMUM_REACH / mean_radii(frames))[:, None]
     circles = target_circles(polarity, code)
     return fit_circles_of_any_blur(gray, frames, circles, reach=reach, projective=True, rounds=3)
 

@@ -19,7 +19,7 @@ WEIGHTS = Path(__file__).with_name('fitted_weights.json')
 """The data file of the weights."""
 
 MAXIMUM_SHARE = 0.85
-"""Of the steps at disc and border, and of their edges; that of a target in good light."""
+"""Of the steps at disc and border, and of their edges, for a target in good light."""
 
 _MAXIMUM_HEIGHT = 0.5  # beyond which it says no more, of a dot, in the one that the blur leaves it
 _MINIMUM_DOUBT = -6.0  # below which it says no more, ln of the odds that a place misleads
@@ -27,7 +27,7 @@ _OF_TARGET, _OF_WORD = read_weights(WEIGHTS, 'dots_confidence', 'target', 'word'
 
 
 def target_features(readings: Readings, fit: Fit) -> np.ndarray:
-    """Return what tells targets from other things.
+    """Return what separates targets from other things.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def target_features(readings: Readings, fit: Fit) -> np.ndarray:
 
 
 def word_features(readings: Readings, fit: Fit) -> np.ndarray:
-    """Return what tells right words from wrong ones.
+    """Return what separates right words from wrong ones.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def word_probability(features: np.ndarray) -> np.ndarray:
     """Return the probabilities that the words of targets are right, shape (k,).
 
     They are at most those that no place misleads. The regression alone makes good edges outweigh
-    a place that tells little, which they do not: half of the wrong IDs came from that.
+    a place that shows little, which they do not: half of the wrong IDs came from that.
     """
     not_misled = 1 / (1 + np.exp(features[:, 0]))
     return np.minimum(logistic(features, _OF_WORD), not_misled)

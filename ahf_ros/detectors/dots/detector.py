@@ -12,6 +12,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes.dots import DotFamily, dot_family
 from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import DetectorSettings, FamilyDetector
@@ -46,6 +47,7 @@ class DotsDetector(FamilyDetector):
         """Printed design of the family."""
         return dot_family(self.settings.family_file)
 
+    @one_blas_thread()
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image; see `Detector`."""
         check_image(image)
@@ -54,6 +56,7 @@ class DotsDetector(FamilyDetector):
         found = targets_of_octaves(pyramid, self.settings.radii, self._identify, self.refine)
         return sorted_targets(best_targets(found, code.border_radius))
 
+    @one_blas_thread()
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
         """Return targets with their places in an image; see `refined`."""
         check_image(image)

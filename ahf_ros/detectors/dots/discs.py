@@ -21,7 +21,7 @@ from ahf_ros.features.log_edges import LOG_SCALE
 from ahf_ros.features.pyramid import ImagePyramid
 from ahf_ros.features.small_dots import small_dots
 
-_SCALES = np.geomspace(0.76, 1.32, 11)  # of the radius that a disc has, in that of its candidate
+_SCALES = np.geomspace(0.76, 1.32, 11)  # of the radius of a disc, in radii of its candidate
 _MINIMUM_SHARE = 0.55  # of the steps of ln at disc and border; lattices of light reach 0.54
 _MARGIN = 0.3  # about the border of a known target, disc radii
 _SMALL = 12.0  # largest radius of discs that are looked for as blobs of the whole image, px
@@ -138,7 +138,7 @@ def judged(pyramid: ImagePyramid, dots: Dots, code: DotFamily) -> Dots:
     Returns
     -------
     Dots
-        No two of them the same; their share is that of the expected steps.
+        No two of them the same; their share is the share of the expected steps.
     """
     scores = border_steps(pyramid.logs[0], dots.frames, dots.polarity, code, _SCALES)
     smooth = scores.copy()

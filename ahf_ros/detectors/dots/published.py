@@ -4,7 +4,7 @@ This is the identification of [1]_: Otsu's threshold in overlapping blocks; a da
 bright one in a dark one; least-squares ellipses of the inner and the outer circle; the ring
 between them unrolled into a rectangle, where a place that is dark with bright outside (01) has a
 dot, one that is bright (11) has none, and others are no target's. It has no defence against uneven
-light, which makes it a fair test of a filter. The centre is that of the ellipse of the outer
+light, which makes it a fair test of a filter. The centre is the centre of the ellipse of the outer
 circle, with the perspective bias in it.
 
 References
@@ -31,9 +31,9 @@ from ahf_ros.features.sampling import sample, within
 from ahf_ros.imaging.image import check_image, stretched_to_8_bit
 from ahf_ros.target import UNDECODED, Target, sorted_targets
 
-_SHORTEST = 5  # points of a contour, which an ellipse takes
-_MAXIMUM_MISFIT = 0.2  # between the area of a contour and that of its ellipse, relative
-_LARGEST = 60.0  # radius of a disc that blocks of the threshold are made for, px
+_MINIMUM_POINTS = 5  # points of a contour, which an ellipse takes
+_MAXIMUM_MISFIT = 0.2  # between the areas of a contour and of its ellipse, relative
+_MAXIMUM_RADIUS = 60.0  # radius of a disc that blocks of the threshold are made for, px
 _RATIO = 1.35  # of the radii of the two circles over the printed one, at the most, or below it
 _MAXIMUM_DISTANCE = 0.4  # of their centres, radii of the disc
 _DIRECTIONS = 24  # of the development, for a place
@@ -72,7 +72,7 @@ class PublishedDotsDetector(FamilyDetector):
         settings, code = self.settings, self.design
         gray = stretched_to_8_bit(image)
         smallest, largest = settings.radii
-        usual = np.sqrt(smallest * max(smallest, min(largest, _LARGEST)))
+        usual = np.sqrt(smallest * max(smallest, min(largest, _MAXIMUM_RADIUS)))
         side = 2 * code.border_radius * usual
         height = gray.astype(np.float32) - local_otsu(gray, round(side))
         targets: list[Target] = []
@@ -130,7 +130,7 @@ def _ellipse(contour: np.ndarray, shift: float) -> tuple[float, ...] | None:
 
     Contours run through the centres of pixels, `shift` px inside of the edge.
     """
-    if len(contour) < _SHORTEST:
+    if len(contour) < _MINIMUM_POINTS:
         return None
     (x, y), (width, height), angle = cv2.fitEllipse(contour)
     area = cv2.contourArea(contour)

@@ -19,9 +19,9 @@ _GROWN = np.array([1.2, 1.45])  # the same, as far as there is room for them
 _FULLEST = 0.9  # share of this room
 _SPREAD = (0.7, 0.45)  # standard deviation of their ln below and above, as blur looks like growth
 _LIMIT = 12.0  # evidence that one place may give
-_FAINTEST = 0.12  # step of ln of a disc
-_FAINTEST_SHARE = 0.6  # step of a dot, in the one that the blur leaves it
-_BRIGHTEST = 1.1  # step of a dot, in that of the disc
+_MINIMUM_STEP = 0.12  # step of ln of a disc
+_MINIMUM_SHARE = 0.6  # step of a dot, in the one that the blur leaves it
+_MAXIMUM_SHARE = 1.1  # step of a dot, in steps of the disc
 _ASIDE = 1.2  # distance of samples from the edges of dots, blurs
 
 
@@ -40,9 +40,9 @@ class Readings(ArrayRecord):
     phase : ndarray of float64, shape (k,)
         Direction of the first place in the frame, rad clockwise from +x.
     radius : ndarray of float64, shape (k,)
-        Of the small dots, in that of the disc.
+        Of the small dots, in radii of the disc.
     seen : ndarray of float64, shape (k,)
-        Mean step of ln I at disc and border, in that of the disc.
+        Mean step of ln I at disc and border, in steps of the disc.
     height : ndarray of float64, shape (k,)
         Step of the dot that is seen best, in the one that the blur leaves it.
     inside : ndarray of bool, shape (k,)
@@ -72,7 +72,7 @@ def read_rings(log: np.ndarray, fit: Fit, code: DotFamily) -> Readings:
     """
     count, bits, polarity = len(fit.frames), code.bits, fit.polarity
     disc, _ = circle_steps(log, fit.frames)
-    usual = np.maximum(np.median(disc * polarity[:, None], axis=1), _FAINTEST)
+    usual = np.maximum(np.median(disc * polarity[:, None], axis=1), _MINIMUM_STEP)
     phases = 2 * np.pi / bits * np.arange(_PHASES) / _PHASES
     points = dot_points((phases[:, None] - 2 * np.pi * np.arange(bits) / bits).ravel(), code)
     aside = np.repeat(np.maximum(PIXELS_ASIDE, _ASIDE * fit.blur), _PHASES * bits)
@@ -97,7 +97,7 @@ def read_rings(log: np.ndarray, fit: Fit, code: DotFamily) -> Readings:
     size = np.sqrt(np.abs(np.linalg.det(small[:, 0, 0, :2, :2])))
     faintest = 1 - np.exp(-0.5 * (size / fit.blur) ** 2)
     highest = middle.max(axis=(1, 2))
-    height = np.clip(highest, _FAINTEST_SHARE * faintest, _BRIGHTEST)
+    height = np.clip(highest, _MINIMUM_SHARE * faintest, _MAXIMUM_SHARE)
     steps /= height[:, None, None, None]
     evidence = dot_evidence(steps, small)
     # Between the places nothing is seen; the right phase is the one that sees most of the dots.
@@ -118,7 +118,7 @@ def read_rings(log: np.ndarray, fit: Fit, code: DotFamily) -> Readings:
 
 
 def _radii(code: DotFamily) -> np.ndarray:
-    """Return the radii that small dots may have, in those of the disc."""
+    """Return the radii that small dots may have, in radii of the disc."""
     room = min(code.dot_circle - 1, code.ground_radius - code.dot_circle)
     widest = _FULLEST * min(room, code.dot_circle * np.sin(np.pi / code.bits))
     return np.append(code.dot_radius * _SHRUNK, np.minimum(code.dot_radius * _GROWN, widest))

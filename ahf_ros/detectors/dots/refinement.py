@@ -14,7 +14,7 @@ from ahf_ros.features.frame import affine_frames, ellipse_axes
 from ahf_ros.target import DottedTarget, Target
 
 _PLAUSIBLE = 0.5  # share of the edges of disc and border
-_FARTHEST, _FARTHEST_SHARE = 1.0, 0.2  # that a centre is moved: px, radii
+_MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE = 1.0, 0.2  # that a centre is moved: px, radii
 
 
 def refined(gray: np.ndarray, targets: Sequence[Target], code: DotFamily) -> list[Target]:
@@ -37,7 +37,7 @@ def refined(gray: np.ndarray, targets: Sequence[Target], code: DotFamily) -> lis
     polarity = np.array([target.polarity for target in dotted])
     fit = fit_targets(gray.astype(np.float32, copy=False), start, polarity, code)
     moved = np.hypot(*(fit.frames[:, :2, 2] - start[:, :2, 2]).T)
-    reach = np.maximum(_FARTHEST, _FARTHEST_SHARE * ellipse_axes(start)[1])
+    reach = np.maximum(_MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE * ellipse_axes(start)[1])
     good = (fit.share >= _PLAUSIBLE) & (moved <= reach)
     changes = fit.frames @ np.linalg.inv(start)
     places = ellipse_fields(fit.frames, fit.covariance, fit.edge_shift)

@@ -16,7 +16,7 @@ STRAIGHT = 8.0
 
 _TILE = 64  # side, px of the image at half its size
 _MINIMUM_EDGES = 20  # of four tiles, px; disc and border of the smallest target have twice as many
-_MOST = 0.7  # share of the image, beyond which all of it is one region
+_MAXIMUM_SHARE = 0.7  # share of the image, beyond which all of it is one region
 
 
 def open_regions(edges: LogEdges, outlines: np.ndarray) -> list[tuple[slice, slice]]:
@@ -44,7 +44,7 @@ def open_regions(edges: LogEdges, outlines: np.ndarray) -> list[tuple[slice, sli
     wide = cv2.dilate((of_four >= _MINIMUM_EDGES).astype(np.uint8), np.ones((3, 3), np.uint8))
     contours, _ = cv2.findContours(wide, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     boxes = [cv2.boundingRect(contour) for contour in contours]
-    if sum(across * tall for _, _, across, tall in boxes) > _MOST * rows * columns:
+    if sum(across * tall for _, _, across, tall in boxes) > _MAXIMUM_SHARE * rows * columns:
         return [(slice(0, height), slice(0, width))]
     return [
         (

@@ -38,7 +38,7 @@ _PLAUSIBLE = 0.4  # share of the edges of disc and border, for the ring to be re
 _MISSING = 0.1  # share of the steps that are missing where there are edges, beyond the blur's
 _OF_BLUR = 2.0  # share of the steps that blur hides, in its radii of the disc
 _BETWEEN = 2.0  # evidence for a dot halfway between places, where targets have none
-_FAINTEST = 0.85  # contrast of a disc, dark over bright
+_MAXIMUM_CONTRAST = 0.85  # contrast of a disc, dark over bright
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,7 @@ class Rings(ArrayRecord):
     edge_shift : ndarray of float64, shape (k,)
         Of the edges of disc and border, as in `Fit`, px.
     radius : ndarray of float64, shape (k,)
-        Of the small dots as seen, in that of the disc.
+        Of the small dots as seen, in radii of the disc.
     target_features, word_features : ndarray of float64, shape (k, n) and (k, m)
         As `confidence` weighs them.
     """
@@ -109,7 +109,7 @@ def read_discs(pyramid: ImagePyramid, discs: Dots, code: DotFamily) -> Rings:
 
 def _read_part(pyramid: ImagePyramid, discs: Dots, code: DotFamily) -> Rings:
     fit = fit_targets(pyramid.gray, discs.frames, discs.polarity, code)
-    fit = fit.select((fit.share >= _PLAUSIBLE) & (fit.contrast <= _FAINTEST))
+    fit = fit.select((fit.share >= _PLAUSIBLE) & (fit.contrast <= _MAXIMUM_CONTRAST))
     readings = read_rings(pyramid.logs[0], fit, code)
     # Circles of other radii can have their edges within reach, but not the steps.
     missing = fit.share - readings.seen - _OF_BLUR * fit.blur / fit.size
@@ -191,7 +191,7 @@ def ellipses(
     phase : float
         Direction of that place in the frame, rad clockwise from +x.
     radius : float
-        Of the small dots, in that of the disc.
+        Of the small dots, in radii of the disc.
     code : DotFamily
     """
     which = np.flatnonzero(word >> np.arange(code.bits) & 1)

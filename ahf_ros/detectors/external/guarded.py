@@ -40,7 +40,7 @@ class GuardedDetector:
     family: str
 
     def __call__(self, image: np.ndarray) -> list[Target]:
-        """Identify the targets of one image, of which the detector gets a copy; see `Detector`.
+        """Identify the targets of one image; the detector gets a copy of it. See `Detector`.
 
         Raises
         ------
@@ -146,6 +146,6 @@ def guarded(detector: Detector, timeout: float) -> GuardedDetector:
             return GuardedRefiner(detector, timeout, name, family)
     except ValueError:
         raise
-    except Exception as error:  # attributes of others may raise anything
+    except Exception as error:  # attributes of a foreign object may raise anything
         raise ValueError(f'name or family cannot be read: {reason_of(error)}') from error
     return GuardedDetector(detector, timeout, name, family)

@@ -13,9 +13,9 @@ from typing import IO, Any
 
 from ahf_ros import ending
 from ahf_ros.detectors.contract import Unavailable
-from ahf_ros.text import LONGEST, printable
+from ahf_ros.text import MAXIMUM_LENGTH, printable
 
-LARGEST_OUTPUT = 64 * 2**20
+MAXIMUM_OUTPUT = 64 * 2**20
 """Bytes that a program may write to standard output or standard error."""
 
 _running: set[subprocess.Popen[Any]] = set()
@@ -53,7 +53,7 @@ def output_of(words: list[str], folder: Path, timeout: float, name: str) -> str:
     Unavailable
         If the program cannot be started.
     ValueError
-        If it takes longer, writes more than `LARGEST_OUTPUT`, ends with another status than 0, or
+        If it takes longer, writes more than `MAXIMUM_OUTPUT`, ends with another status than 0, or
         this process ends.
     """
     output, errors = folder / 'output', folder / 'errors'
@@ -107,8 +107,8 @@ def _awaited(
                     f'{name} took longer than detector_timeout, {timeout:g} s'
                 ) from error
         size = max(file.stat().st_size for file in files)
-        if size > LARGEST_OUTPUT:
-            raise ValueError(f'{name} wrote {size} bytes, accepted are at most {LARGEST_OUTPUT}')
+        if size > MAXIMUM_OUTPUT:
+            raise ValueError(f'{name} wrote {size} bytes, accepted are at most {MAXIMUM_OUTPUT}')
         if status is not None:
             return status
 
@@ -116,7 +116,7 @@ def _awaited(
 def _tail(path: Path) -> bytes:
     """Return the last bytes of a file."""
     with path.open('rb') as file:
-        file.seek(max(path.stat().st_size - LONGEST, 0))
+        file.seek(max(path.stat().st_size - MAXIMUM_LENGTH, 0))
         return file.read()
 
 

@@ -16,6 +16,7 @@ from typing import Any, ClassVar
 import cv2
 import numpy as np
 
+from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes.gsi import PointFamily
 from ahf_ros.codes.gsi_library import point_family
 from ahf_ros.detectors.claims import best_targets
@@ -71,6 +72,7 @@ class GsiDetector(FamilyDetector):
         """Printed design of the family."""
         return point_family(self.settings.family_file)
 
+    @one_blas_thread()
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image; see `Detector`."""
         check_image(image)
@@ -91,6 +93,7 @@ class GsiDetector(FamilyDetector):
             targets += uncoded(octave.pyramid.gray, dots, targets, settings)
         return targets
 
+    @one_blas_thread()
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
         """Return targets with their places in an image; see `Refiner`.
 

@@ -20,7 +20,7 @@ from ahf_ros.detectors.ring.fitted_weights import fitted_weights
 if TYPE_CHECKING:
     from ahf_ros.detectors.ring.hypotheses import Hypotheses
 
-CERTAIN = 0.84
+CERTAIN = 0.75
 """Confidence from which words are reported."""
 
 _INTERCEPT, _WEIGHTS = fitted_weights('confidence', 'intercept', 'weights')

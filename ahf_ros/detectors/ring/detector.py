@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np
 
+from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes.ring import family
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.ring.explained import NOTHING, WHOLE, Explained
@@ -58,7 +59,7 @@ class RingDetector:
 
     @property
     def patience(self) -> int:
-        """Filters tried in vain after which a search ends; see `Discerning`."""
+        """Filters tried in vain after which a search ends; see `EarlyStopping`."""
         return 2
 
     @property
@@ -66,11 +67,13 @@ class RingDetector:
         """Family of the codes, or several as the settings list them."""
         return self.settings.family
 
+    @one_blas_thread()
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image; see `Detector`."""
         check_image(image)
         return report(find_hypotheses(as_gray(image), self.settings, self.expected), self.settings)
 
+    @one_blas_thread()
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
         """Return targets with their centres in an image; see `refine_centres`."""
         code = family(self.settings.families[0])

@@ -208,7 +208,7 @@ def _step_evidence(
     step = level - beside
     limit = polar.glare[:, None, None]
     glare, white = ground >= limit, np.minimum(*ground.swapaxes(0, 1))[:, None] >= SATURATED
-    flat = np.where(white & np.isfinite(limit), np.float32(_WHITE), np.float32(_FLAT))
+    flat = np.where(white & (limit <= SATURATED), np.float32(_WHITE), np.float32(_FLAT))
     flat = _normal(step, np.sqrt(flat**2 + noise**2 + of_ground**2))
     more = (step - mark) * np.sign(mark)
     expected = of_ground * _gain(ground, ink)

@@ -39,6 +39,7 @@ _UNLIKE = 4.0  # standard deviations of ground, from which a level is unlike the
 _COVERED = 0.34  # share of the angles whose ground is darker, from which that is light
 _WHITE_OUT = 0.6  # share of the ground that is saturated, from which that is no glare
 _LIGHT_EDGE = 0.3  # of ln, of an edge of light
+_NO_GLARE = 256.0  # more than any gray value
 _COVERS_EDGES, _GLARE_EDGES = 0.3, 0.03  # shares of ground, more than edges of these have
 
 
@@ -67,7 +68,8 @@ class PolarImages(ArrayRecord):
     noise : ndarray of float64, shape (k,)
         Of gray values.
     shade, glare : ndarray of float32, shape (k,)
-        Gray values of ground up to which something covers it, and from which glare lies on it.
+        Gray values of ground up to which something covers it, and from which glare lies on it;
+        infinite where white is paper.
     """
 
     gray: np.ndarray
@@ -224,9 +226,10 @@ def _usual_levels(
     light = (darker > _COVERED) | (edges > _COVERS_EDGES)
     shade = np.where(light, 0, np.exp(usual - width) - LOG_OFFSET)
     white = (ground >= SATURATED).mean(axis=(1, 2))
-    light = (edges > _GLARE_EDGES) | (white > _WHITE_OUT)
     glare = np.minimum(np.exp(usual + width) - LOG_OFFSET, SATURATED)
-    return shade.astype(np.float32), np.where(light, np.inf, glare).astype(np.float32)
+    glare = np.where(edges > _GLARE_EDGES, _NO_GLARE, glare)
+    glare = np.where(white > _WHITE_OUT, np.inf, glare)
+    return shade.astype(np.float32), glare.astype(np.float32)
 
 
 def _visible(

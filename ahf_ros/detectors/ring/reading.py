@@ -169,6 +169,7 @@ def _with_levels(
         As for `decode`.
     """
     doubt = (words.margin < _CLEAR) | (words.coded < -_DOUBT) | words.hidden.any(axis=1)
+    doubt |= edges.covered.any(axis=(1, 2))
     doubtful = np.flatnonzero(doubt | (_mean_odds(words, edges.weight) < _PLENTY))
     if not doubtful.size:
         return words

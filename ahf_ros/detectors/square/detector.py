@@ -18,31 +18,13 @@ from ahf_ros.detectors.square.sides import centres, fit_sides
 from ahf_ros.features.frame import reduced
 from ahf_ros.features.pyramid import halved
 from ahf_ros.imaging.image import as_gray, check_image
-from ahf_ros.target import Target, sorted_targets
+from ahf_ros.target import SquareMarker, Target, sorted_targets
 
 _DRAFT_DEVIATION = 0.3  # standard deviation of a centre from corners of contours, px
 _MINIMUM_SHARE = 0.3  # of the edges on each side, for a fit to be accepted
 _BORDER = 2  # cells of a marker that are its border
 _CELL = 2.5  # smallest cell of a marker that is looked for, px
 _LARGE = 120.0  # side of a marker whose contour gives its corners to about two pixels, px
-
-Corners = tuple[tuple[float, float], ...]
-
-
-@dataclass(frozen=True, slots=True)
-class SquareMarker(Target):
-    """One identified square marker.
-
-    Its centre is the intersection of its diagonals, which is the image of the physical centre in
-    any view. Its ellipse is the inscribed one, its code is its ID.
-
-    Attributes
-    ----------
-    corners : tuple of 4 tuples of 2 float
-        Corners, px, clockwise from the top left corner of the upright marker.
-    """
-
-    corners: Corners = ()
 
 
 @dataclass(frozen=True, slots=True)

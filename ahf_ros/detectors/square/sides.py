@@ -5,7 +5,8 @@ like edges of light lose their weight, and a line is fitted to the rest. A corne
 intersection of the lines of two neighbouring sides, so that light near a corner does not move it.
 
 Where ink or light has grown, all edges have moved by one length. White cells beside the border
-show its inner edge, which has moved the other way: that tells how far, and lines are moved back.
+show its inner edge, which has moved the other way. From both follows the length, by which lines
+are moved back.
 """
 
 from __future__ import annotations
@@ -44,12 +45,12 @@ _LIGHT_REACH = 1.5  # standard deviation of the window that smooths the light, p
 _LIGHT_PRIOR = 1.0  # weight of the prior, a slope of zero, in profiles
 _WEAK_PRIOR = 1e-3  # of the position of a side, in gray values^2 / px^2
 _DIFFERENCE = 1e-3  # step of numerical derivatives, px
-_FEWEST = 3.0  # independent edges of a side, two of which its line takes
+_MINIMUM_EDGES = 3.0  # independent edges of a side; its line takes two
 _NO_WEIGHT = 1e-9  # instead of a sum of no weights
 _THROUGH = 0.25  # of what cells behind the border do to a centre, px, by (blur / cell)^2
 _IN_CELL = (0.35, 0.5, 0.65)  # where the inner edge of the border is measured, in each cell
-_FEWEST_INNER = 6  # such edges, of which the usual one tells the shift of all edges
-_THICK = 4.0  # width of a border of which both edges can be told, blurs
+_MINIMUM_INNER_EDGES = 6  # such edges; the usual one has the shift of all edges
+_THICK = 4.0  # width of a border whose two edges can be separated, blurs
 _SYSTEMATIC = 0.003  # standard deviation of the effects of lens distortion and pixels, px
 
 
@@ -155,7 +156,7 @@ def _edge_shift(
     blur : ndarray of float64, shape (k,)
         Of the edges, standard deviation in px.
     contrast : ndarray of float64, shape (k,)
-        Gray value of ink over that of paper.
+        Ratio of the gray values of ink and paper.
     """
     along = np.add.outer(np.arange(1, cells - 1), _IN_CELL).ravel() / cells
     side = np.stack([along, np.full(along.size, 1 / cells)], axis=1) - 0.5
@@ -184,7 +185,7 @@ def _edge_shift(
     thick = cell.reshape(each).min(axis=1, initial=np.inf) > _THICK * blur
     # The outer sides, whose places these are relative to, have moved outwards by it.
     shift = -median(edges.offset, seen, np.nan) / (2 - 2 / cells)
-    return np.where(thick & (seen.sum(axis=1) >= _FEWEST_INNER), shift, np.nan)
+    return np.where(thick & (seen.sum(axis=1) >= _MINIMUM_INNER_EDGES), shift, np.nan)
 
 
 def _slopes(edges: Edges, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -273,7 +274,7 @@ def _fit_lines(
     influence = (robust[..., None] * basis) @ inverse
     together = np.maximum(CORRELATION / spacing, 1.0)
     squares = np.maximum((robust**2 * together).sum(axis=2), _NO_WEIGHT)
-    count = np.maximum(robust.sum(axis=2) ** 2 / squares, _FEWEST)
+    count = np.maximum(robust.sum(axis=2) ** 2 / squares, _MINIMUM_EDGES)
     common = common_errors((robust * errors).reshape(flat), np.zeros(len(along)))
     shared = common.reshape(*count.shape)
     growth = together * (_OF_COMMON * shared**2 * count / (count - 2))[..., None]

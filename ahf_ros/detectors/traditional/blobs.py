@@ -13,14 +13,14 @@ _WINDOW = 80  # side of the square in which the threshold lies between the extre
 _MINIMUM_CONTRAST = 20  # difference of those for there to be anything, gray values of 8 bit
 _REDUCTION = 4  # of the image in which the extremes are looked for
 _MINIMUM_ROUNDNESS = 0.4  # 4 pi area / perimeter^2; a circle at 70 degrees has 0.67, at 78 0.45
-_MAXIMUM_MISFIT = 0.12  # between the area of a contour and that of its ellipse, relative
+_MAXIMUM_MISFIT = 0.12  # between the areas of a contour and of its ellipse, relative
 _MINIMUM_PERIMETER = 5.0  # points of a contour, which an ellipse takes
 _CHORD = 2.0  # points of a contour in a radius of the smallest dot, also at steep views
 _SLACK = 2.0  # radius of a contour over the largest of a dot, px
 
 
 def masks(gray: np.ndarray, polarities: Sequence[int]) -> Iterator[tuple[int, np.ndarray]]:
-    """Yield 1 and the mask of the dark pixels of an image, -1 and that of the bright ones.
+    """Yield 1 and the mask of the dark pixels of an image, then -1 and of the bright ones.
 
     The threshold is Bernsen's, halfway between the extremes of the neighbourhood.
 
@@ -51,7 +51,7 @@ def masks(gray: np.ndarray, polarities: Sequence[int]) -> Iterator[tuple[int, np
 
 
 def blob_frames(mask: np.ndarray, min_radius: float, max_radius: float) -> np.ndarray:
-    """Return the frames of the blobs whose perimeter, roundness and ellipse are those of a dot.
+    """Return the frames of the blobs with the perimeter, roundness and ellipse of a dot.
 
     Parameters
     ----------

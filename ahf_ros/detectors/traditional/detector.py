@@ -1,13 +1,13 @@
 """Traditional identification: threshold, contours, gates, ellipse fit, grey gradient of the band.
 
 This is the identification "TI" that the paper [1]_ uses beside Agisoft Metashape: an adaptive
-threshold, contours whose perimeter and roundness are those of a dot, a least-squares ellipse, and
+threshold, contours with the perimeter and roundness of a dot, a least-squares ellipse, and
 the coded band read by its grey gradient in the affine frame of that ellipse. It has no defence
 against uneven light, which makes it a fair test of a filter.
 
 Beyond the paper, the edges of dot and band are measured at sub-pixel accuracy, and together give
-the image of the physical centre of a decoded target; that of an undecoded one is the centre of its
-ellipse, with the perspective bias in it (0.03 px for a dot of 20 px radius at 45 degrees).
+the image of the physical centre of a decoded target. The centre of an undecoded one is the centre
+of its ellipse, with the perspective bias in it (0.03 px for a dot of 20 px radius at 45 degrees).
 
 References
 ----------
@@ -21,6 +21,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes.ring import Family, family
 from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import DetectorSettings
@@ -62,6 +63,7 @@ class TraditionalDetector:
         """Family of the codes."""
         return self.settings.family
 
+    @one_blas_thread()
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image; see `Detector`.
 
@@ -71,10 +73,12 @@ class TraditionalDetector:
         """
         return self._identify(image, fine=True)
 
+    @one_blas_thread()
     def draft(self, image: np.ndarray) -> list[Target]:
         """Identify in less than half of the time, with centres to about a pixel."""
         return self._identify(image, fine=False)
 
+    @one_blas_thread()
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
         """Return targets with their centres in an image; see `refine_centres`."""
         return refine_centres(image, targets, family(self.family), self.settings.polarities)
@@ -135,7 +139,7 @@ def _identify_dots(
 def _fit_decoded(
     gray: np.ndarray, fit: Fit, readings: BandReadings, decoded: np.ndarray, code: Family
 ) -> Fit:
-    """Return fits of dots, those of decoded targets with their bands."""
+    """Return fits of dots, of decoded targets with their bands."""
     read, dots = readings.select(decoded), fit.select(decoded)
     circles = target_circles(read.words, read.starts, dots.polarity, _SAMPLES, code)
     joint = fit_circles(gray, dots.frames, circles, reach=REACH, projective=True)

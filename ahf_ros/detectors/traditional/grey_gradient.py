@@ -17,7 +17,7 @@ _GAP_DEPTHS = (0.4, 0.6)  # shares of the width of the gap, where it is read
 _BAND_DEPTHS = (0.3, 0.5, 0.7)  # shares of the width of the band, where it is read
 _MARGIN = 0.5  # distance from the band at which the margin of a target is read, dot radii
 _DOT_PERCENTILE, _GROUND_PERCENTILE = 10, 90  # of the readings, the dot being the larger
-# The level of the dot is 1, that of the ground 0. They part below a half, because the gap shows
+# The dot has the level 1, the ground 0. They part below a half, because the gap shows
 # the ground in all directions, the darkest included, but the dot shows its colour in one place.
 _LEVEL = 0.4
 _STEEPNESS = 4.0  # of the profile about that level
@@ -42,7 +42,7 @@ class BandReadings(ArrayRecord):
         Where the sector of the lowest bit starts, rad counter-clockwise from +x of the frame.
     certainty : ndarray of float64, shape (k,)
         Probability that the word is right if the target is one, sectors being two gray values
-        with normal errors; 0 where gap, band or margin are not those of a target.
+        with normal errors; 0 where gap, band or margin do not look like a target's.
     """
 
     surrounded: np.ndarray
@@ -101,7 +101,7 @@ def _sectors(profiles: np.ndarray, bits: int) -> tuple[np.ndarray, ...]:
     Parameters
     ----------
     profiles : ndarray, shape (n, _SAMPLES * bits)
-        0 where the band has the colour of the ground, 1 where that of the dot.
+        0 where the band has the colour of the ground, 1 where it has the dot's.
     bits : int
         Number of sectors.
 

@@ -107,7 +107,7 @@ class Export:
         Returns
         -------
         tuple of Path
-            The files, each of which is complete; existing ones are replaced.
+            The files; each is complete, and existing ones are replaced.
 
         Raises
         ------

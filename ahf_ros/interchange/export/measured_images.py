@@ -45,7 +45,7 @@ def read_measured_images(path: str | Path) -> tuple[MeasuredImage, ...]:
     Parameters
     ----------
     path : str or Path
-        A JSON object a line with 'image', 'width', 'height' and 'targets', of which 'id', 'x' and
+        A JSON object a line with 'image', 'width', 'height' and 'targets', whose 'id', 'x' and
         'y' are required. A stack is measured once, in its first image. '-' stands for standard
         input.
 

@@ -64,11 +64,13 @@ function undecodedOf([x, y, major, minor, angle, confidence, reason, likely]) {
 function marksOf(record) {
   const wrong = new Set(record.truth ? record.truth.wrong : []);
   const dots = new Map(record.dots.map((item) => [item.id, item]));
+  const squares = new Map(record.squares.map((item) => [item.id, item.corners]));
   const marks = record.targets.map((row, index) => {
     const target = targetOf(row, index);
     target.kind = wrong.has(index) ? 'wrong'
       : target.confidence < about.doubtfulBelow ? 'doubtful' : 'found';
     target.dots = dots.get(target.id);
+    target.corners = squares.get(target.id);
     return target;
   });
   for (const row of record.undecoded) {

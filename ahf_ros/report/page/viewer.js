@@ -91,7 +91,7 @@ function notePicture() {
   }
 }
 
-/** Return the drawing of a mark; lengths that are not those of the target follow the zoom. */
+/** Return the drawing of a mark; lengths that do not belong to the target follow the zoom. */
 function drawMark(mark, width, height) {
   const group = draw('g', { class: `mark is-${mark.kind}` });
   mark.groups.push(group);
@@ -101,15 +101,7 @@ function drawMark(mark, width, height) {
     for (const name of ['halo', 'line']) cross.append(draw('path', { class: `${name} cross`, d: 'M-8-8L8 8M8-8L-8 8' }));
     group.append(cross);
   } else {
-    const template = mark.dots ? mark.dots.ellipses : [[mark.x, mark.y, mark.major, mark.minor, mark.angle]];
-    template.forEach((ellipse, index) => {
-      const code = mark.dots && index >= mark.dots.template ? ' code' : '';
-      group.append(drawEllipse(ellipse, 'halo'), drawEllipse(ellipse, `line${code}`));
-    });
-    const reach = about.reach[mark.family] || 1;
-    if (reach > 1 && !mark.dots) {
-      group.append(drawEllipse([mark.x, mark.y, reach * mark.major, reach * mark.minor, mark.angle], 'reach'));
-    }
+    drawOutlines(group, mark);
     const arm = 0.35 * mark.minor;
     if (mark.kind !== 'unread') {
       group.append(draw('path', { class: 'line', d: `M${mark.x - arm} ${mark.y}h${2 * arm}m${-arm} ${-arm}v${2 * arm}` }));
@@ -118,6 +110,23 @@ function drawMark(mark, width, height) {
   group.append(...drawTexts(mark, width, height));
   group.addEventListener('click', () => choose(mark));
   return group;
+}
+
+/** Draw the square of a marker, or the dots of a target and the circle that holds it. */
+function drawOutlines(group, mark) {
+  if (mark.corners) {
+    for (const name of ['halo', 'line']) group.append(draw('polygon', { class: name, points: mark.corners.join(' ') }));
+    return;
+  }
+  const template = mark.dots ? mark.dots.ellipses : [[mark.x, mark.y, mark.major, mark.minor, mark.angle]];
+  template.forEach((ellipse, index) => {
+    const code = mark.dots && index >= mark.dots.template ? ' code' : '';
+    group.append(drawEllipse(ellipse, 'halo'), drawEllipse(ellipse, `line${code}`));
+  });
+  const reach = about.reach[mark.family] || 1;
+  if (reach > 1 && !mark.dots) {
+    group.append(drawEllipse([mark.x, mark.y, reach * mark.major, reach * mark.minor, mark.angle], 'reach'));
+  }
 }
 
 function drawEllipse([x, y, major, minor, angle], name) {

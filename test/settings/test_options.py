@@ -1,0 +1,14 @@
+"""The types of keyword arguments follow the settings."""
+
+from __future__ import annotations
+
+import runpy
+
+from support import ROOT
+
+
+def test_the_types_of_options_are_current() -> None:
+    script = runpy.run_path(str(ROOT / 'scripts' / 'write_options.py'))
+    assert (ROOT / 'ahf_ros' / 'options.py').read_text() == script['text'](), (
+        'run scripts/write_options.py'
+    )
