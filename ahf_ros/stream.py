@@ -239,11 +239,14 @@ def refusal(error: Exception) -> Remark:
     """
     if isinstance(error, Unavailable):
         raise error
-    is_named = isinstance(error, ValueError)
-    return Remark(
-        kind=Kind.REFUSED,
-        text=printable(str(error), _LONGEST_REASON) if is_named else reason_of(error),
-    )
+    return Remark(kind=Kind.REFUSED, text=why_refused(error))
+
+
+def why_refused(error: Exception) -> str:
+    """Return in printable words why an image is refused that raises an error."""
+    if isinstance(error, ValueError):
+        return printable(str(error), _LONGEST_REASON)
+    return reason_of(error)
 
 
 @dataclass(frozen=True, slots=True)

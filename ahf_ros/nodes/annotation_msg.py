@@ -1,8 +1,8 @@
-"""Identified targets as annotations that a viewer draws over the image.
+"""Outlines of identified targets that a viewer draws over the image.
 
 The message for this in ROS 2 is visualization_msgs/ImageMarker. A viewer shows one marker per
-topic, and markers have lines but no text. So all outlines and IDs are lines of one marker, with up
-to seven lines per digit. foxglove_msgs has text but is not part of ROS 2 nor of its wheels.
+topic, so that all outlines are lines of one marker. Markers have no text: IDs are drawn into the
+debug image.
 """
 
 from __future__ import annotations
@@ -22,35 +22,10 @@ CORNER = 0.5
 """Offset of coordinates, px: in viewers, (0, 0) is the corner of the first pixel."""
 
 _SIDES = 24  # of the outline of a dot
-_MINIMUM_DIGIT = 12.0  # height at a line width of 1, px
-_DIGIT = 0.9  # height of a digit, in radii of the dot
-_ADVANCE = 0.8  # distance from digit to digit, in heights
-_STROKES = {  # x, y of both ends of the seven lines of a digit, in heights
-    'a': ((0.0, -1.0), (0.5, -1.0)),
-    'b': ((0.5, -1.0), (0.5, -0.5)),
-    'c': ((0.5, -0.5), (0.5, 0.0)),
-    'd': ((0.5, 0.0), (0.0, 0.0)),
-    'e': ((0.0, 0.0), (0.0, -0.5)),
-    'f': ((0.0, -0.5), (0.0, -1.0)),
-    'g': ((0.0, -0.5), (0.5, -0.5)),
-}
-_DIGITS = {
-    '0': 'abcdef',
-    '1': 'bc',
-    '2': 'abged',
-    '3': 'abgcd',
-    '4': 'fgbc',
-    '5': 'afgcd',
-    '6': 'afgedc',
-    '7': 'abc',
-    '8': 'abcdefg',
-    '9': 'abcdfg',
-    '-': 'g',
-}
 
 
 def target_annotations(answer: CodedTargetArray) -> ImageMarker:
-    """Return the outlines of dots and the IDs of targets as lines of one marker.
+    """Return the outlines of dots as lines of one marker.
 
     Parameters
     ----------
@@ -68,7 +43,7 @@ def target_annotations(answer: CodedTargetArray) -> ImageMarker:
     )
     points, colours = [], []
     for target in answer.targets:
-        lines = np.concatenate((_outline(target), _letters(target, width))) + CORNER
+        lines = _outline(target) + CORNER
         points += [Point(x=x, y=y) for x, y in lines.reshape(-1, 2).tolist()]
         colours += [ColorRGBA(**target_colour(target))] * len(lines)
     marker.points = points
@@ -79,11 +54,6 @@ def target_annotations(answer: CodedTargetArray) -> ImageMarker:
 def target_colour(target: CodedTarget) -> dict[str, float]:
     """Return the red, green, blue and opacity of a target, 0 to 1."""
     return _rgba(DOUBTFUL_COLOUR if target.id == UNDECODED else DECODED_COLOUR)
-
-
-def target_name(target: CodedTarget) -> str:
-    """Return the label of a target: its ID, or a question mark."""
-    return '?' if target.id == UNDECODED else str(target.id)
 
 
 def _rgba(colour: tuple[int, int, int]) -> dict[str, float]:
@@ -105,16 +75,3 @@ def _outline(target: CodedTarget) -> np.ndarray:
         axis=1,
     )
     return np.stack((corners[:-1], corners[1:]), axis=1)
-
-
-def _letters(target: CodedTarget, width: float) -> np.ndarray:
-    """Return the lines of an ID above and to the right of its dot, shape (n, 2, 2)."""
-    if target.id == UNDECODED:
-        return np.empty((0, 2, 2))
-    height = max(_MINIMUM_DIGIT * width, _DIGIT * target.semi_major)
-    name = str(target.id)
-    lines = np.array([_STROKES[line] for digit in name for line in _DIGITS[digit]])
-    counts = [len(_DIGITS[digit]) for digit in name]
-    lines[:, :, 0] += _ADVANCE * np.repeat(np.arange(len(name)), counts)[:, None]
-    offset = 0.8 * target.semi_major + 2 * width
-    return lines * height + (target.x + offset, target.y - offset)

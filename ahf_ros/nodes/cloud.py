@@ -17,15 +17,12 @@ from ahf_ros.nodes.diagnostics import CloudTally
 from ahf_ros.nodes.inputs import Input
 from ahf_ros.nodes.matching import Matcher, Waiting
 from ahf_ros.nodes.point_msg import target_labels, target_points
-from ahf_ros.nodes.process import ProcessNode
+from ahf_ros.nodes.process import LOG_PERIOD, ProcessNode
 from ahf_ros.nodes.settings import LOSSLESS, DetectorNodeSettings
 from ahf_ros.nodes.topics import ANSWERS_KEPT, POINTS, TARGET_LABELS, TARGET_POINTS
 
 ANSWERS = 100
 """Maximum number of answers waiting for the cloud of their image."""
-
-LOG_PERIOD = 5.0
-"""Minimum time between two log lines about refused clouds, s."""
 
 CLOUD, ANSWER = 0, 1
 """Sides of the matcher."""

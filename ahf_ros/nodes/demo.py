@@ -10,20 +10,30 @@ import subprocess
 import sys
 import time
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
-from rcl_interfaces.srv import GetParameters, SetParameters
-from rclpy.parameter import Parameter
-from rclpy.task import Future
+from sensor_msgs.msg import Image
 
-from ahf_ros.nodes.comparison import Comparison
-from ahf_ros.nodes.process import run
+from ahf_ros.drawing.colours import DECODED_COLOUR, MISSED_COLOUR, TEXT_COLOUR, WRONG_COLOUR
+from ahf_ros.drawing.overlay import overlay
+from ahf_ros.drawing.tiles import Tile, side_by_side
+from ahf_ros.evaluation import FALSE, RIGHT, WRONG, judge
+from ahf_ros.interchange.image_files import write_image
+from ahf_ros.interchange.image_messages import decode_image
+from ahf_ros.interchange.target_messages import identification_from
+from ahf_ros.msg import CodedTargetArray
+from ahf_ros.nodes.process import ProcessNode, run
+from ahf_ros.nodes.scoreboard import line, method
 from ahf_ros.nodes.settings import IlluminationNodeSettings
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
 from ahf_ros.synthetic.scene import SceneSettings
+from ahf_ros.target import Identification, Target, TrueTarget
 
 DETECTORS: dict[str, tuple[str, dict[str, Any]]] = {
     'traditional': ('traditional', {'detector': 'traditional', 'ahf': False}),
@@ -38,11 +48,8 @@ SCENE: dict[str, Any] = {'width': 1600, 'height': 1066, 'targets': 12}
 NAMESPACE = '/demo'
 """Namespace of all nodes, so that they use no topic of other programs."""
 
-RATE = 1.0
-"""Images per second."""
-
-WAITING_RATE = 0.001
-"""Images per second until all nodes are connected: the first image would be 1000 s away."""
+WIDTH = 800
+"""Width of one of the images side by side, px."""
 
 PATIENCE = 180.0
 """Longest time without an answer, s."""
@@ -51,99 +58,156 @@ SHUTDOWN = 20.0
 """Time that a node is given to end, s."""
 
 
-class Processes:
-    """Nodes of this package in processes of their own, which end with the context."""
+class Demo(ProcessNode):
+    """Waits until every detector has identified the scene, then says and shows what they saw.
 
-    def __init__(self) -> None:
-        self._started: list[subprocess.Popen] = []
+    The scene is published over and over again, and the first answer of each detector counts. So
+    nothing depends on which images a detector has no time for.
 
-    def __enter__(self) -> Processes:
-        """Return itself."""
-        return self
+    Parameters
+    ----------
+    processes : list of subprocess.Popen
+        The detectors.
+    camera : callable
+        Starts the camera; called when all detectors are connected.
+    origin : str
+        Title of the image as received.
+    picture : Path
+        Where to write the picture.
+    """
 
-    def __exit__(self, *_: object) -> None:
-        """End all nodes, in an orderly way if they can."""
-        for process in self._started:
+    def __init__(
+        self,
+        processes: list[subprocess.Popen],
+        camera: Callable[[], None],
+        origin: str,
+        picture: Path,
+    ) -> None:
+        super().__init__('demo')
+        self._processes = processes
+        self._camera: Callable[[], None] | None = camera
+        self._origin = origin
+        self._picture = picture
+        self._truth: tuple[Target, ...] | None = None
+        self._images: dict[str, np.ndarray] = {}
+        self._answers: dict[str, Identification] = {}
+        self._changed = time.monotonic()
+        self.subscribe(CodedTargetArray, 'ground_truth', self._keep_truth)
+        self.subscribe(Image, 'image', partial(self._keep_image, ''))
+        outputs = []
+        for space in DETECTORS:
+            # With the latest answer only, the first one may not be seen.
+            outputs += [
+                self.subscribe(
+                    CodedTargetArray,
+                    f'{space}/coded_targets',
+                    partial(self._keep_answer, space),
+                    lossless=True,
+                ),
+                self.subscribe(
+                    Image, f'{space}/detector/filtered_image', partial(self._keep_image, space)
+                ),
+            ]
+        self._outputs = outputs
+        self.create_timer(0.2, self._look)
+
+    def _keep_truth(self, message: CodedTargetArray) -> None:
+        self._truth = identification_from(message).targets
+
+    def _keep_image(self, space: str, message: Image) -> None:
+        if space not in self._images:
+            self._images[space] = decode_image(message)
+
+    def _keep_answer(self, space: str, message: CodedTargetArray) -> None:
+        if space not in self._answers:
+            self._answers[space] = identification_from(message)
+            self._changed = time.monotonic()
+
+    def _look(self) -> None:
+        """Start the camera, and end when all is there, or when nothing more will come."""
+        if self._camera and all(it.publishers() for it in self._outputs):
+            self._camera()
+            self._camera = None
+        reason = ''
+        if len(self._images) > len(DETECTORS) == len(self._answers) and self._truth is not None:
+            self._show(self._truth)
+        elif any(process.poll() is not None for process in self._processes):
+            reason = 'a node has ended'
+        elif time.monotonic() - self._changed > PATIENCE:
+            reason = f'no image was answered for {PATIENCE:.0f} s'
+        else:
+            return
+        if reason:
+            print(reason, file=sys.stderr)
+        if not self.ended.done():
+            self.ended.set_result(1 if reason else 0)
+
+    def _show(self, truth: tuple[Target, ...]) -> None:
+        """Print a line for each detector, and write a picture of two columns."""
+        width = max(len(title) for title, _ in DETECTORS.values())
+        tiles = [Tile(self._images[''], self._origin, [(f'{len(truth)} targets', TEXT_COLOUR)])]
+        for space, (title, _) in DETECTORS.items():
+            answer = self._answers[space]
+            print(f'  {title:{width}}  {line(answer, truth)}', flush=True)
+            tiles.append(tile(f'{title}: {method(answer)}', self._images[space], answer, truth))
+        write_image(self._picture, side_by_side([tiles[:2], tiles[2:]], WIDTH))
+        print(f'  {self._picture}', flush=True)
+
+
+def tile(title: str, image: np.ndarray, answer: Identification, truth: tuple[Target, ...]) -> Tile:
+    """Return the overlay of an answer; right, wrong and missed targets have different colours.
+
+    Parameters
+    ----------
+    title : str
+        Line above it.
+    image : ndarray, shape (height, width)
+        The image in which the targets were identified, filtered or not.
+    answer : Identification
+        What was identified.
+    truth : tuple of Target
+        What the image shows.
+    """
+    verdicts = judge([TrueTarget.of(target) for target in truth], answer.targets)
+    wrong = [
+        target
+        for verdict, target in zip(verdicts, answer.targets, strict=True)
+        if verdict.kind in (WRONG, FALSE)
+    ]
+    met = {verdict.target for verdict in verdicts}
+    missed = [target for target in truth if TrueTarget.of(target) not in met]
+    remarks = [
+        (f'{sum(verdict.kind == RIGHT for verdict in verdicts)} right', DECODED_COLOUR),
+        (f'{len(wrong)} wrong', WRONG_COLOUR),
+        (f'{len(missed)} missed', MISSED_COLOUR),
+    ]
+    unit = max(1, image.shape[1] // WIDTH)
+    return Tile(overlay(image, answer.targets, wrong, missed, unit), title, remarks)
+
+
+@contextmanager
+def processes() -> Iterator[list[subprocess.Popen]]:
+    """Give a list for processes, and end them with the context, in an orderly way if they can."""
+    started: list[subprocess.Popen] = []
+    try:
+        yield started
+    finally:
+        for process in started:
             process.send_signal(signal.SIGINT)
-        for process in self._started:
+        for process in started:
             try:
                 process.wait(SHUTDOWN)
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
 
-    def start(self, node: str, space: str, **parameters: object) -> None:
-        """Start a node in a namespace."""
-        given = [word for name, value in parameters.items() for word in ('-p', f'{name}:={value}')]
-        names = ('-r', f'__ns:={space}', '-r', f'image:={NAMESPACE}/image')
-        ros = ('--ros-args', '--log-level', 'warn', *names, *given)
-        # rclpy warns of responses that get lost; their requests are repeated.
-        unwarned = '-W', 'ignore:failed to send response'
-        command = (sys.executable, *unwarned, '-m', 'ahf_ros.nodes', node, *ros)
-        self._started.append(subprocess.Popen(command))
 
-    def any_ended(self) -> bool:
-        """Return whether a node has ended."""
-        return any(process.poll() is not None for process in self._started)
-
-
-class Demo(Comparison):
-    """A comparison that ends when another node has ended, or does nothing.
-
-    Parameters
-    ----------
-    processes : Processes
-        The detectors and the camera, which waits to be told that all are connected.
-    options : argparse.Namespace
-        The options of the command line.
-    """
-
-    def __init__(self, processes: Processes, options: argparse.Namespace) -> None:
-        titles = {space: title for space, (title, _) in DETECTORS.items()}
-        origin = f'{options.light}, ambient light {options.ambient:g}'
-        super().__init__(titles, options.images, options.output, origin)
-        self._processes = processes
-        self._camera = self.create_client(SetParameters, 'illumination/set_parameters')
-        nodes = 'illumination', *(f'{space}/detector' for space in titles)
-        self._undiscovered = {
-            node: self.create_client(GetParameters, f'{node}/get_parameters') for node in nodes
-        }
-        self._waiting = True
-        self._seen = 0
-        self._changed = time.monotonic()
-        self.create_timer(0.2, self._watch)
-
-    def _watch(self) -> None:
-        ready = self._waiting and self._camera.service_is_ready() and self.connected()
-        if ready and self._known():
-            self._waiting = False
-            rate = Parameter('rate', value=RATE).to_parameter_msg()
-            self._camera.call_async(SetParameters.Request(parameters=[rate]))
-        if self.answered != self._seen:
-            self._seen, self._changed = self.answered, time.monotonic()
-        reason = None
-        if self._processes.any_ended():
-            reason = 'a node has ended'
-        elif time.monotonic() - self._changed > PATIENCE:
-            reason = f'no image was answered for {PATIENCE:.0f} s'
-        if reason and not self.ended.done():
-            print(reason, file=sys.stderr)
-            self.ended.set_result(1)
-
-    def _known(self) -> bool:
-        """Return whether all nodes know this one, and ask those that may not.
-
-        What a node sends to a subscription that it does not know yet gets lost. Once it has
-        answered a client, it knows the subscriptions that are older.
-        """
-        for node, client in tuple(self._undiscovered.items()):
-            if client.service_is_ready():
-                asked = client.call_async(GetParameters.Request())
-                asked.add_done_callback(partial(self._meet, node))
-        return not self._undiscovered
-
-    def _meet(self, node: str, _: Future) -> None:
-        self._undiscovered.pop(node, None)
+def start(node: str, space: str, **parameters: object) -> subprocess.Popen:
+    """Start a node of this package in a namespace."""
+    given = [word for name, value in parameters.items() for word in ('-p', f'{name}:={value}')]
+    names = ('-r', f'__ns:={space}', '-r', f'image:={NAMESPACE}/image')
+    ros = ('--ros-args', '--log-level', 'warn', *names, *given)
+    return subprocess.Popen((sys.executable, '-m', 'ahf_ros.nodes', node, *ros))
 
 
 def shared_memory_profile() -> Path:
@@ -178,22 +242,29 @@ def main(arguments: list[str] | None = None) -> int:
     made = parser()
     options = made.parse_args(arguments)
     scene = {name: getattr(options, name) for name in ('light', 'ambient', 'seed')}
+    picture = Path(options.output, 'image_1.jpg')
     try:
-        IlluminationNodeSettings(frames=options.images, scene=SceneSettings(**SCENE, **scene))
-        Path(options.output).mkdir(parents=True, exist_ok=True)
+        IlluminationNodeSettings(scene=SceneSettings(**SCENE, **scene))
+        picture.parent.mkdir(parents=True, exist_ok=True)
     except (ValueError, OSError) as error:
         made.error(str(error))
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     os.environ.setdefault(profile_variable(), str(shared_memory_profile()))
     print(f'{SCENE["targets"]} targets under {options.light}, being rendered ...', flush=True)
-    with Processes() as processes:
+    with processes() as started:
         for space, (_, parameters) in DETECTORS.items():
             # The camera waits until all are connected, so that no image for long is no fault.
             common = {'expected_targets': SCENE['targets'], 'image_timeout': 0.0}
-            processes.start('detector', f'{NAMESPACE}/{space}', **common, **parameters)
-        frames = {'frames': options.images, 'rate': WAITING_RATE}
-        processes.start('illumination', NAMESPACE, **frames, **SCENE, **scene)
-        return run(partial(Demo, processes, options), ['--ros-args', '-r', f'__ns:={NAMESPACE}'])
+            started.append(start('detector', f'{NAMESPACE}/{space}', **common, **parameters))
+
+        def camera() -> None:
+            started.append(start('illumination', NAMESPACE, frames=1, **SCENE, **scene))
+
+        origin = f'{options.light}, ambient light {options.ambient:g}'
+        return run(
+            partial(Demo, started, camera, origin, picture),
+            ['--ros-args', '-r', f'__ns:={NAMESPACE}'],
+        )
 
 
 def parser() -> argparse.ArgumentParser:
@@ -211,7 +282,6 @@ def parser() -> argparse.ArgumentParser:
         default=scene.ambient,
         help='ambient light as a share of the projected light',
     )
-    made.add_argument('--images', type=int, default=1, help='number of different images')
-    made.add_argument('--seed', type=int, default=scene.seed, help='seed of the first image')
-    made.add_argument('--output', default='demo', help='folder for pictures')
+    made.add_argument('--seed', type=int, default=scene.seed, help='seed of the image')
+    made.add_argument('--output', default='demo', help='folder for the picture')
     return made

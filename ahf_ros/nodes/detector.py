@@ -16,14 +16,13 @@ from rclpy.clock import Clock, ClockType
 from std_msgs.msg import Header
 
 from ahf_ros import ending
-from ahf_ros.nodes.ahead import ImageJob
 from ahf_ros.nodes.answers import Answers
 from ahf_ros.nodes.diagnostics import Diagnostics, Tally
 from ahf_ros.nodes.inputs import Input
 from ahf_ros.nodes.managed import ACTIVE, ManagedNode
 from ahf_ros.nodes.parameters import ParameterSettings
-from ahf_ros.nodes.pipeline import ImageMessage, Pipeline, Refused
-from ahf_ros.nodes.process import run
+from ahf_ros.nodes.pipeline import ImageJob, ImageMessage, Pipeline, Refused
+from ahf_ros.nodes.process import LOG_PERIOD, run
 from ahf_ros.nodes.requests import Requests
 from ahf_ros.nodes.service_detector import ServiceDetector
 from ahf_ros.nodes.settings import LOSSLESS, SERVICE, DetectorNodeSettings
@@ -38,18 +37,13 @@ from ahf_ros.nodes.topics import (
 from ahf_ros.nodes.waiting import Take, WaitingMessages
 from ahf_ros.nodes.watch import Watch
 from ahf_ros.nodes.worker import Worker
-from ahf_ros.stream import Gathered
-from ahf_ros.text import printable, reason_of
+from ahf_ros.stream import Gathered, why_refused
+from ahf_ros.text import printable
 
 Result = TypeVar('Result')
 
 DIAGNOSTICS_PERIOD = 1.0
 """Period of /diagnostics, s."""
-
-_REASON = 2000  # characters of why an image is refused
-
-LOG_PERIOD = 5.0
-"""Minimum time between two log lines of the same kind about images, s."""
 
 
 class DetectorNode(ManagedNode):
@@ -237,13 +231,12 @@ class DetectorNode(ManagedNode):
             return job()
         except Refused:
             raise
-        except ValueError as error:
-            reason = printable(str(error), _REASON)
         except Exception as error:
             # No image may end the node, whatever it does to a detector.
-            reason = reason_of(error)
-            lines = traceback.format_exc().splitlines()
-            self.get_logger().error('\n'.join(map(printable, lines)))
+            reason = why_refused(error)
+            if not isinstance(error, ValueError):
+                lines = traceback.format_exc().splitlines()
+                self.get_logger().error('\n'.join(map(printable, lines)))
         self._tally.rejected += 1
         self._tally.reason = reason
         self.get_logger().warning(f'image refused: {reason}', throttle_duration_sec=LOG_PERIOD)

@@ -106,9 +106,11 @@ def scene_messages(rendering: Rendering) -> SceneMessages:
     settings = rendering.settings
     truth = Identification(rendering.targets, expected=len(rendering.targets))
     return SceneMessages(
-        image_message(rendering.image, Header()),
-        camera_info(rendering),
-        coded_target_array(truth, settings.family, rendering.image.shape, Header(), msg),
+        image=image_message(rendering.image, Header()),
+        camera_info=camera_info(rendering),
+        ground_truth=coded_target_array(
+            truth, settings.family, rendering.image.shape, Header(), msg
+        ),
     )
 
 

@@ -134,7 +134,7 @@ NODES: Mapping[str, NodeInterface] = MappingProxyType(
                     PUBLISHED,
                     '~/annotations',
                     'visualization_msgs/ImageMarker',
-                    'outlines and IDs to lay over the image; only while somebody subscribes',
+                    'outlines to lay over the image; only while somebody subscribes',
                 ),
                 Interface(
                     PUBLISHED,

@@ -1,4 +1,8 @@
-"""Messages lost in transport, counted from the numbers that publishers give them."""
+"""Messages lost in transport, counted from the numbers that publishers give them.
+
+The event `message_lost` of ROS 2 is not enough. Under Fast DDS on Jazzy, it was silent when newer
+messages replaced 188 of 200 in the queue of a reliable subscription; the numbers showed them all.
+"""
 
 from __future__ import annotations
 

@@ -23,6 +23,7 @@ from ahf_ros.interchange.image_messages import decode_compressed, decode_image
 from ahf_ros.interchange.target_messages import coded_target_array
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.settings import LOSSLESS, DetectorNodeSettings
+from ahf_ros.nodes.waiting import Take
 from ahf_ros.session import create_identifier
 from ahf_ros.stream import identify_parts
 from ahf_ros.target import Identification
@@ -187,7 +188,9 @@ class Pipeline:
         except Exception:
             # In its turn, the image is identified again, and what is wrong is reported.
             return None
-        return Speculation(before, identifier.memory, stack, identification)
+        return Speculation(
+            before=before, after=identifier.memory, stack=stack, identification=identification
+        )
 
     def answers(
         self, images: Sequence[tuple[Header, np.ndarray]], fresh: int
@@ -229,7 +232,7 @@ class Pipeline:
             identification = replace(identification, filter=used)
         family, shape = self._detector.family, stack.shape
         sent = coded_target_array(identification, family, shape, header, msg)
-        return ImageAnswer(stack, identification, sent)
+        return ImageAnswer(stack=stack, identification=identification, message=sent)
 
     def filtered(self, answer: ImageAnswer) -> np.ndarray:
         """Return the filtered image in which the targets of an answer were identified."""
@@ -244,6 +247,56 @@ class Pipeline:
     def reset(self) -> None:
         """Forget what worked for earlier images."""
         self._identifier.reset()
+
+
+class ImageJob:
+    """An image that waits for its answer, which may be prepared while the one before is answered.
+
+    Parameters
+    ----------
+    take : callable
+        Returns the message; called once.
+    pipeline : Pipeline
+        Makes the answer.
+    """
+
+    def __init__(self, take: Take, pipeline: Pipeline) -> None:
+        self._take = take
+        self._pipeline = pipeline
+        self._lock = threading.Lock()
+        self._begun = False
+        self._message: ImageMessage | None = None
+        self._speculation: Speculation | None = None
+
+    def prepare(self) -> None:
+        """Identify the targets of the image, unless it is its turn already."""
+        with self._lock:
+            if not self._begun:
+                self._message = self._take()
+                self._speculation = self._pipeline.speculation(self._message)
+
+    def outdated(self) -> bool:
+        """Return whether the image has been prepared in vain; waits for a preparation."""
+        with self._lock:
+            self._begun = True
+        prepared = self._message is not None
+        return prepared and not self._pipeline.holds(self._speculation)
+
+    def answer(self) -> ImageAnswer:
+        """Return the answer, in its turn.
+
+        Raises
+        ------
+        ValueError
+            If the image is not accepted.
+        Refused
+            If the node stops first.
+        """
+        with self._lock:
+            self._begun = True
+        message, self._message = self._message or self._take(), None
+        speculation, self._speculation = self._speculation, None
+        return self._pipeline.answer(message, speculation=speculation)
 
 
 def decoded(message: ImageMessage) -> np.ndarray:

@@ -13,7 +13,8 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from ahf_ros.localisation import Positions
 from ahf_ros.msg import CodedTarget
-from ahf_ros.nodes.annotation_msg import target_colour, target_name
+from ahf_ros.nodes.annotation_msg import target_colour
+from ahf_ros.target import UNDECODED
 
 POINT_FIELDS = {
     'x': PointField.FLOAT32,
@@ -87,7 +88,7 @@ def target_labels(targets: Sequence[CodedTarget], found: Positions, header: Head
                 pose=Pose(position=Point(x=x, y=y, z=z)),
                 scale=Vector3(z=height),
                 color=ColorRGBA(**target_colour(target)),
-                text=target_name(target),
+                text='?' if target.id == UNDECODED else str(target.id),
             )
         )
     return MarkerArray(markers=markers)

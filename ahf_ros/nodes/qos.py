@@ -1,4 +1,9 @@
-"""Quality of service of topics: what users override, and what publishers offer."""
+"""Quality of service of topics: what users override, and what publishers offer.
+
+`BEST_AVAILABLE` of ROS 2 decides once, when a subscription is made. On Jazzy, one made before its
+publisher received none of 10 best-effort messages, nor any after a replay had changed to best
+effort. `QoSOverridingOptions` of rclpy accepts a depth of 0 and does not say what it accepts.
+"""
 
 from __future__ import annotations
 

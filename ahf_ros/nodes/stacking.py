@@ -17,13 +17,10 @@ from ahf_ros.imaging.image import check_image
 from ahf_ros.interchange.image_messages import nanoseconds
 from ahf_ros.nodes.diagnostics import Tally
 from ahf_ros.nodes.pipeline import ImageAnswer, ImageMessage, Pipeline, Refused, decoded
-from ahf_ros.nodes.process import ProcessNode
+from ahf_ros.nodes.process import LOG_PERIOD, ProcessNode
 from ahf_ros.nodes.settings import DetectorNodeSettings
 from ahf_ros.nodes.waiting import Take
 from ahf_ros.stream import Gathered, Window
-
-LOG_PERIOD = 5.0
-"""Minimum time between two log lines of the same kind about stacks, s."""
 
 PERIOD = 0.05
 """Time between two looks at whether a stack is overdue, s."""

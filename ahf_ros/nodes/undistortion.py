@@ -18,15 +18,12 @@ from ahf_ros.interchange.undistorted_targets import undistorted_targets
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.diagnostics import Tally
 from ahf_ros.nodes.inputs import Input
-from ahf_ros.nodes.process import ProcessNode
+from ahf_ros.nodes.process import LOG_PERIOD, ProcessNode
 from ahf_ros.nodes.topics import ANSWERS_KEPT, UNDISTORTED, camera_info_topic
 from ahf_ros.target import Identification
 
 CHANGES = 1000
 """Maximum number of different calibrations that are remembered."""
-
-LOG_PERIOD = 5.0
-"""Minimum time between two log lines about calibrations that cannot be used, s."""
 
 
 class _Change(NamedTuple):

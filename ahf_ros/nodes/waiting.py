@@ -33,8 +33,9 @@ class _Segment:
 class WaitingMessages:
     """Messages that wait, in bounded memory and without loss.
 
-    The middleware keeps what a node does not take, without a bound that ROS 2 could set. So the
-    node takes every message at once, and those that exceed its memory wait in files.
+    The middleware keeps what a node does not take, without a bound that ROS 2 could set: a process
+    that was slow to take 60 images of 10 MB grew by 490 MB. So the node takes every message at
+    once, and those that exceed its memory wait in files.
     """
 
     def __init__(self) -> None:

@@ -67,7 +67,7 @@ def test_the_demo_ends_when_a_node_does(tmp_path: Path) -> None:
     ) as process:
         children = Path(f'/proc/{process.pid}/task/{process.pid}/children')
         limit = time.monotonic() + PATIENCE
-        while len(nodes := children.read_text().split()) < 4 and time.monotonic() < limit:
+        while len(nodes := children.read_text().split()) < 3 and time.monotonic() < limit:
             time.sleep(0.05)
         os.kill(int(nodes[0]), signal.SIGKILL)
         assert 'a node has ended' in process.communicate(timeout=PATIENCE)[1]
@@ -75,7 +75,7 @@ def test_the_demo_ends_when_a_node_does(tmp_path: Path) -> None:
     assert not any(Path(f'/proc/{node}').exists() for node in nodes)
 
 
-@pytest.mark.parametrize(('option', 'field'), [('--ambient', 'ambient'), ('--images', 'frames')])
+@pytest.mark.parametrize(('option', 'field'), [('--ambient', 'ambient'), ('--seed', 'seed')])
 def test_bad_options_of_the_demo_are_named(option: str, field: str) -> None:
     done = demo(option, '-1')
     assert done.returncode == 2
@@ -91,7 +91,7 @@ def test_a_folder_that_cannot_be_made_is_named(tmp_path: Path) -> None:
 
 
 def test_a_tile_tells_right_wrong_and_missed_targets_apart() -> None:
-    from ahf_ros.nodes.comparison import tile
+    from ahf_ros.nodes.demo import tile
 
     places = {7: 60.0, 8: 160.0, 9: 260.0}
     truth = tuple(Target(number, 0, x, 120.0, 20.0, 12.0) for number, x in places.items())

@@ -17,8 +17,8 @@ from std_msgs.msg import Header
 
 from ahf_ros.interchange.target_messages import identification_from
 from ahf_ros.nodes import pipeline
-from ahf_ros.nodes.ahead import ImageJob
 from ahf_ros.nodes.image_msg import image_message
+from ahf_ros.nodes.pipeline import ImageJob
 from ahf_ros.nodes.settings import DetectorNodeSettings
 from ahf_ros.settings.nested import assemble
 from ahf_ros.synthetic.scene import SceneSettings, render

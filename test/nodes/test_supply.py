@@ -11,7 +11,7 @@ pytest.importorskip('rclpy', reason='ROS 2 is not installed')
 
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
-from ahf_ros.nodes.supply import nearest, other_types, silence
+from ahf_ros.nodes.watch import nearest, other_types, silence
 
 IMAGE, COMPRESSED = 'sensor_msgs/msg/Image', 'sensor_msgs/msg/CompressedImage'
 WEAK = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
