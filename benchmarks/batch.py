@@ -4,7 +4,6 @@
     python -m benchmarks.batch growth [--counts 100 300 1000] cost of an image, and of 10,000
     python -m benchmarks.batch start                          start of a worker
     python -m benchmarks.batch cluster [--tiny 10000]         what dask.distributed adds
-    python -m benchmarks.batch search [--jobs 2]              one image by threads and processes
 
 `jobs` and `growth` render four photographs of 10.6 MP and identify copies of them, links of other
 names. Each process reads its files whole, so the operating system has them in memory after the
@@ -200,27 +199,6 @@ def measure_cluster(tiny: int, workers: int = 2) -> None:
             )
 
 
-def compare_searches(jobs: int, rounds: int) -> None:
-    """Print the time of one long search by one thread, by threads and by processes."""
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name, 'images')
-        scene = SceneSettings(light='stripe', ambient=0.04, seed=SEED)
-        write_image(folder / 'hard.png', render(scene).image)
-        long = ('--detector', 'traditional', '--expected-targets', 55, '--max-evaluations', 60)
-        variants: dict[str, tuple[object, ...]] = {
-            'one thread': ('--threads', 1),
-            f'{jobs} threads': ('--threads', jobs),
-            f'{jobs} processes': ('--spread', '--jobs', jobs),
-        }
-        best: dict[str, float] = {}
-        for _ in range(rounds):
-            for variant, options in variants.items():
-                elapsed = cost(folder, *long, *options).elapsed
-                best[variant] = min(elapsed, best.get(variant, elapsed))
-    for variant, elapsed in best.items():
-        print(f'{variant}: {elapsed:.1f} s, {best["one thread"] / elapsed:.2f} times one thread')
-
-
 def _tiny_tasks(image: Path, count: int) -> Iterable[ImageTask]:
     return (ImageTask((str(image),)) for _ in range(count))
 
@@ -228,7 +206,7 @@ def _tiny_tasks(image: Path, count: int) -> Iterable[ImageTask]:
 def main() -> None:
     """Measure and print what the command line names."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument('what', choices=('jobs', 'growth', 'start', 'cluster', 'search'))
+    parser.add_argument('what', choices=('jobs', 'growth', 'start', 'cluster'))
     parser.add_argument('--images', type=int, default=200)
     parser.add_argument('--rounds', type=int, default=3)
     parser.add_argument('--counts', type=int, nargs='+', default=[100, 300, 1000])
@@ -241,8 +219,6 @@ def main() -> None:
         grow(options.counts, options.jobs)
     elif options.what == 'start':
         start_workers(options.rounds)
-    elif options.what == 'search':
-        compare_searches(options.jobs, options.rounds)
     else:
         measure_cluster(options.tiny)
 

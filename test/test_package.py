@@ -58,7 +58,6 @@ NOT_IN_ROSDEP = {
     'pypdfium2',
     'selenium',
     'typing_extensions',
-    'watchdog',
 }
 """What tests skip without, extras, what only type checkers import, and what is only in the console
 of other software."""

@@ -1,7 +1,7 @@
 """The engine of many machines: workers of a scheduler of dask.distributed [1]_.
 
-The engine keeps what it has submitted until it has the result. So it survives workers that die,
-and the scheduler itself: whatever is lost with it is submitted again once it is back.
+The engine keeps what it has submitted until it has the result, so it survives workers that die. It
+ends with the scheduler.
 
 References
 ----------
@@ -23,15 +23,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from ahf_ros.batch.connection import CONNECTION_ERRORS, connect, refused_workers
-from ahf_ros.batch.engine import TRIES, Job, Report, TaskFailed, no_report
+from ahf_ros.batch.engine import TRIES, EngineLost, Job, Report, TaskFailed, no_report
 from ahf_ros.batch.remote import guarded_perform
 from ahf_ros.release import release
 from ahf_ros.text import reason_of
 
-PATIENCE = 300.0
-"""Time that a scheduler may be away, s."""
-
-_AGAIN = 0.5  # s between two attempts to reach a scheduler
 _LOOK = 2.0  # s between two looks at the workers
 _WAIT = 0.1  # s after which waiting is interrupted
 _AT_A_TIME = 2  # tasks for each thread of a worker: one that it works on and one that waits
@@ -59,7 +55,7 @@ class DaskEngine:
     report : callable, optional
         Called with the number of the task before what the job reports.
     say : callable, optional
-        Called with lines for people: workers that are refused, a scheduler that is away.
+        Called with lines for people: workers that are refused or missing.
     located : callable, optional
         From a result and the name of the machine that it comes from to a result that names it.
 
@@ -148,6 +144,9 @@ class DaskEngine:
         running: bool = self._client.status == 'running'
         return running and self._client.scheduler_comm is self._connection
 
+    def _lost(self) -> EngineLost:
+        return EngineLost(f'the scheduler {self._address} is away; the same command goes on')
+
     def _look(self) -> None:
         """Look at the workers, and say if there are none."""
         self._looked = time.monotonic()
@@ -167,9 +166,11 @@ class DaskEngine:
             self._say(f'worker {worker} is refused: it {reason}')
 
     def _begin(self, begun: _Begun) -> None:
-        """Submit a task, or keep it while there is no scheduler or no worker that may have it."""
+        """Submit a task, or keep it while there is no worker that may have it."""
+        if not self._connected():
+            raise self._lost()
         workers = self._good() if self._refused else frozenset()
-        if not self._connected() or (self._refused and not workers):
+        if self._refused and not workers:
             self._waiting.append(begun)
             return
         self._submissions += 1
@@ -209,14 +210,14 @@ class DaskEngine:
                 self._begin(_Begun(begun.number, begun.task, begun.tries + 1, frozenset()))
             else:
                 self._results.append((begun.number, TaskFailed(f'given up: {reason_of(error)}')))
-        else:  # cancelled, because the scheduler is away
-            self._waiting.append(begun)
+        else:  # cancelled
+            raise self._lost()
 
     def _keep_up(self) -> None:
-        """Connect again if need be, look at the workers, and submit what waits."""
+        """Look at scheduler and workers, and submit what waits."""
         if not self._connected():
-            self._return()
-        elif time.monotonic() - self._looked > _LOOK:
+            raise self._lost()
+        if time.monotonic() - self._looked > _LOOK:
             self._look()
             self._fetch_again()
             for key, begun in list(self._begun.items()):
@@ -237,23 +238,6 @@ class DaskEngine:
         for key in again:
             self._completed.add(late[key])
         self._late = late.keys() - again
-
-    def _return(self) -> None:
-        """Wait for the scheduler, and keep what it had for submission."""
-        self._say(f'{self._address} is away, waiting for it')
-        self.close()
-        self._waiting += self._begun.values()
-        self._begun.clear()
-        limit = time.monotonic() + PATIENCE
-        while True:
-            try:
-                self._connect()
-                break
-            except (ValueError, *CONNECTION_ERRORS):  # not there yet, or away again meanwhile
-                if time.monotonic() > limit:
-                    raise
-                time.sleep(_AGAIN)
-        self._say(f'{self._address} is back')
 
     def _deliver_reports(self) -> None:
         while not self._reports.empty():

@@ -43,6 +43,10 @@ class TaskFailed:
     reason: str
 
 
+class EngineLost(RuntimeError):
+    """An engine cannot go on; what it has not finished is left to another run."""
+
+
 class Engine(Protocol):
     """Processes several tasks at a time, in any order."""
 

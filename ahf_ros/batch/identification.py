@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 
 from ahf_ros import ending
 from ahf_ros.batch.engine import Report, no_report
-from ahf_ros.batch.fingerprints import file_fingerprint
+from ahf_ros.batch.results import file_fingerprint
 from ahf_ros.batch.task import ImageOutcome, ImageTask, Level, Message
 from ahf_ros.detectors import Detector, DetectorSettings, create_detector
 from ahf_ros.drawing.overlay import draw, summary
 from ahf_ros.edge_shift import edge_shift_remark
-from ahf_ros.filtering.trials import Elsewhere
 from ahf_ros.imaging.image import check_image
 from ahf_ros.imaging.stack import ImageStack
 from ahf_ros.interchange.files import read_bytes
@@ -29,17 +27,11 @@ from ahf_ros.interchange.target_json import to_json
 from ahf_ros.interchange.urls import is_url
 from ahf_ros.session import create_identifier
 from ahf_ros.session_settings import IdentificationSettings
-from ahf_ros.stream import identify_parts
+from ahf_ros.stream import identify_parts, refusal
 from ahf_ros.target import Identification
-from ahf_ros.text import reason_of
-
-Spread = Callable[[ImageTask, Mapping[str, np.ndarray]], Elsewhere]
-"""From a task and its images by their paths to what tries filters on them."""
 
 
-def identify_images(
-    task: ImageTask, report: Report = no_report, spread: Spread | None = None
-) -> ImageOutcome:
+def identify_images(task: ImageTask, report: Report = no_report) -> ImageOutcome:
     """Identify the targets in the images of a task, and draw its overlays.
 
     What is wrong with an image or a file is a message of the outcome.
@@ -49,8 +41,6 @@ def identify_images(
     task : ImageTask
     report : callable, optional
         Not called; a job of an engine has it.
-    spread : callable, optional
-        Gives what tries filters in the place of this process.
 
     Raises
     ------
@@ -65,20 +55,20 @@ def identify_images(
     messages: list[Message] = []
     records: list[dict[str, Any]] = []
     detector = detector_of(task.settings)
-    files = tuple(file_fingerprint(located(path, task)) for path in task.paths)
+    files = tuple(file_fingerprint(_located(path, task)) for path in task.paths)
     images = _read(task, messages)
     if task.minimum > 1 and len(images) < task.minimum:
         text = f'{task.paths[0]}: {len(images)} of {task.minimum} images of a stack'
         messages.append(Message(text, Level.WARNING))
     overlays = dict(zip(task.paths, task.overlays, strict=False))
     with _reported(', '.join(images), messages):
-        for found in _identified(images, detector, task, spread):
+        for found in _identified(images, detector, task):
             records.append(_record(found, detector, task))
             messages += _messages(found)
             if overlays:
                 shown = found.stack.combined(found.identification.combination)
                 drawn = draw(shown, found.identification)
-                write_image(located(overlays[found.paths[0]], task), drawn)
+                write_image(_located(overlays[found.paths[0]], task), drawn)
     return ImageOutcome(tuple(records), tuple(messages), files)
 
 
@@ -105,20 +95,20 @@ class _Found:
     in_vain: int  # filters in a row that showed no more, after which a search ended early
 
 
-def located(path: str, task: ImageTask) -> str:
+def _located(path: str, task: ImageTask) -> str:
     """Return a path from the folder of the task."""
     return str(Path(task.folder, path)) if task.folder and not is_url(path) else path
 
 
 @contextmanager
 def _reported(name: str, messages: list[Message]) -> Iterator[None]:
-    """Leave what is wrong with images in the messages."""
+    """Leave what is wrong with images in the messages: the next ones may be better."""
     try:
         yield
-    except ValueError as error:
-        messages.append(Message(str(error), Level.PROBLEM))
-    except (MemoryError, cv2.error) as error:  # the other images may be smaller
-        messages.append(Message(f'{name}: {reason_of(error)}', Level.PROBLEM))
+    except Exception as error:
+        reason = refusal(error).text
+        text = reason if isinstance(error, ValueError) else f'{name}: {reason}'
+        messages.append(Message(text, Level.PROBLEM))
 
 
 def _read(task: ImageTask, messages: list[Message]) -> dict[str, np.ndarray]:
@@ -126,13 +116,13 @@ def _read(task: ImageTask, messages: list[Message]) -> dict[str, np.ndarray]:
     images: dict[str, np.ndarray] = {}
     for path in task.paths:
         with _reported(path, messages):
-            images[path], note = read_checked(path, task)
+            images[path], note = _read_checked(path, task)
             if note:
                 messages.append(Message(note))
     return images
 
 
-def read_checked(path: str, task: ImageTask) -> tuple[np.ndarray, str]:
+def _read_checked(path: str, task: ImageTask) -> tuple[np.ndarray, str]:
     """Return an image of a task and what there is to say about it.
 
     Raises
@@ -140,7 +130,7 @@ def read_checked(path: str, task: ImageTask) -> tuple[np.ndarray, str]:
     ValueError
         If it cannot be read or is not accepted.
     """
-    image, note = read_noted_image(located(path, task), upright=task.upright)
+    image, note = read_noted_image(_located(path, task), upright=task.upright)
     try:
         check_image(image)
     except ValueError as error:
@@ -149,7 +139,7 @@ def read_checked(path: str, task: ImageTask) -> tuple[np.ndarray, str]:
 
 
 def _identified(
-    images: dict[str, np.ndarray], detector: Detector, task: ImageTask, spread: Spread | None
+    images: dict[str, np.ndarray], detector: Detector, task: ImageTask
 ) -> Iterator[_Found]:
     """Yield what was identified in each part of a stack."""
     paths = tuple(images)
@@ -159,7 +149,6 @@ def _identified(
         identifier = create_identifier(
             detector=detector, settings=task.settings, interrupt=ending.check
         )
-        identifier.elsewhere = spread(task, images) if spread else None
         for part, stack, found in identify_parts(identifier, list(images.values()), task.stacking):
             of = paths[part.images.start : part.images.stop]
             search = identifier.last_search

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from ahf_ros.batch.engine import Engine, Finished, TaskFailed, finished_tasks, in_order
-from ahf_ros.batch.plan import Plan
-from ahf_ros.batch.results_file import ResultsFile
+from ahf_ros.batch.results import Results
 from ahf_ros.batch.task import ImageOutcome, ImageTask, Level, Message
 
 
@@ -28,53 +27,49 @@ def outcomes_in_order(engine: Engine, tasks: Iterable[ImageTask]) -> Iterator[Im
     >>> [it.messages[0].text[:20] for it in outcomes]
     ['a.png cannot be read', 'b.png cannot be read']
     """
-    return (item.result for item in in_order(outcomes(engine, tasks)))
+    for item in in_order(finished_tasks(engine, tasks)):
+        yield outcome_of(item.task, item.result)
 
 
 def kept_outcomes_in_order(
-    engine: Engine, plan: Plan, results: ResultsFile
+    engine: Engine, tasks: Sequence[ImageTask], results: Results, say: Callable[[str], None]
 ) -> Iterator[ImageOutcome]:
-    """Yield the outcomes of a plan in the order of its tasks, and put the results into it.
+    """Yield the outcomes of tasks in their order, of which those with a result are not done again.
 
     Parameters
     ----------
     engine : Engine
-    plan : Plan
-        Made by `results`.
-    results : ResultsFile
-        Gets each result as soon as it is known. What it has already has no messages.
+    tasks : sequence of ImageTask
+    results : Results
+        Gets each result as soon as it is known, and their order at the end. What it has already
+        has no messages.
+    say : callable
+        Called with lines for people: what is done, and what is done again.
 
     Raises
     ------
     Unwritable
         If the results cannot be written.
     """
-    pending = {task.paths for task in plan.pending}
-    following = in_order(recorded(outcomes(engine, plan.pending), results))
-    for task in plan.tasks:
-        if task.paths in pending:
-            pending.remove(task.paths)
+
+    def recorded() -> Iterator[Finished[ImageTask, ImageOutcome]]:
+        for item in finished_tasks(engine, pending):
+            outcome = outcome_of(item.task, item.result)
+            results.append(item.task, outcome)
+            yield Finished(number=item.number, task=item.task, result=outcome)
+
+    pending, notes = results.pending(tasks)
+    for note in notes:
+        say(f'{results.path}: {note}')
+    following = in_order(recorded())
+    undone = {task.paths for task in pending}
+    for task in tasks:
+        if task.paths in undone:
+            undone.remove(task.paths)
             yield next(following).result
         else:
             yield ImageOutcome(results.records(task))
-    results.put_in_order(plan.tasks)
-
-
-def recorded(
-    finished: Iterable[Finished[ImageTask, ImageOutcome]], results: ResultsFile
-) -> Iterator[Finished[ImageTask, ImageOutcome]]:
-    """Yield finished tasks once their results are written."""
-    for item in finished:
-        results.append(item.task, item.result)
-        yield item
-
-
-def outcomes(
-    engine: Engine, tasks: Iterable[ImageTask]
-) -> Iterator[Finished[ImageTask, ImageOutcome]]:
-    """Yield tasks with their outcomes as they are ready; one that is given up has a problem."""
-    for item in finished_tasks(engine, tasks):
-        yield Finished(item.number, item.task, outcome_of(item.task, item.result))
+    results.put_in_order(tasks)
 
 
 def outcome_of(task: ImageTask, result: ImageOutcome | TaskFailed) -> ImageOutcome:

@@ -89,7 +89,7 @@ class ImageOutcome:
         In the order in which they came up.
     files : tuple of str
         Fingerprint of each file of the task before it was read, see
-        `ahf_ros.batch.fingerprints`.
+        `ahf_ros.batch.results.file_fingerprint`.
     """
 
     records: tuple[dict[str, Any], ...] = ()

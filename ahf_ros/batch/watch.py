@@ -2,26 +2,125 @@
 
 from __future__ import annotations
 
+import os
 import time
-from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass
+from pathlib import Path
 
 from ahf_ros import ending
-from ahf_ros.batch.arrivals import Alarm, Arrivals
 from ahf_ros.batch.engine import Engine
-from ahf_ros.batch.plan import make_plan, out_of_date
-from ahf_ros.batch.results_file import ResultsFile
+from ahf_ros.batch.results import Results, file_fingerprint
 from ahf_ros.batch.run import outcome_of
 from ahf_ros.batch.task import ImageOutcome, ImageTask, Message
 
-_BUSY = 0.2  # s after which waiting for a result is interrupted
+_BUSY = 0.2  # s after which waiting is interrupted
+_EMPTY = '0 '  # how the fingerprint of an empty file begins
+
+
+@dataclass(slots=True)
+class _Seen:
+    """A file as it was when it was looked at, since when, and whether it was taken."""
+
+    fingerprint: str
+    since: float
+    taken: bool = False
+
+
+class Arrivals:
+    """The files of a folder, as they arrive: each is taken once it has stopped changing.
+
+    Parameters
+    ----------
+    folder : Path
+    suffixes : collection of str
+        Endings of the files, in small letters. Files whose name begins with a dot are left out.
+    recursive : bool
+        Whether files of folders in the folder are looked at, too.
+    settling : float
+        Time for which a file has to be unchanged, s.
+    clock : callable, optional
+        Time in s.
+
+    Attributes
+    ----------
+    away : str
+        Why the folder cannot be read; empty if it can.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     arrivals = Arrivals(Path(folder), ('.png',), False, 0.0)
+    ...     _ = Path(folder, 'a.png').write_bytes(b'image')
+    ...     [Path(path).name for path in arrivals.take()], arrivals.take()
+    (['a.png'], [])
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        suffixes: Collection[str],
+        recursive: bool,
+        settling: float,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.away = ''
+        self._folder = folder
+        self._suffixes = tuple(suffixes)
+        self._recursive = recursive
+        self._settling = settling
+        self._clock = clock
+        self._seen: dict[str, _Seen] = {}
+
+    def take(self) -> list[str]:
+        """Return the files that are there, unchanged for long enough, and not taken as they are.
+
+        They are sorted by name. A file that changes afterwards is taken again.
+        """
+        try:
+            paths = sorted(self._paths())
+        except OSError as error:
+            self.away = error.strerror or str(error)
+            return []
+        self.away = ''
+        now = self._clock()
+        before, self._seen = self._seen, {}
+        for path in paths:
+            fingerprint = file_fingerprint(path)
+            if fingerprint and not fingerprint.startswith(_EMPTY):
+                seen = before.get(path)
+                same = seen is not None and seen.fingerprint == fingerprint
+                self._seen[path] = seen if seen and same else _Seen(fingerprint, now)
+        ready = [
+            path
+            for path, seen in self._seen.items()
+            if not seen.taken and now - seen.since >= self._settling
+        ]
+        for path in ready:
+            self._seen[path].taken = True
+        return ready
+
+    @property
+    def settling(self) -> bool:
+        """Whether there are files that may still change."""
+        return any(not seen.taken for seen in self._seen.values())
+
+    def _paths(self) -> Iterator[str]:
+        with os.scandir(self._folder):
+            pass  # raises an OSError if the folder is away, which `walk` keeps to itself
+        for folder, folders, names in os.walk(self._folder):
+            if not self._recursive:
+                folders.clear()
+            for name in names:
+                if name.lower().endswith(self._suffixes) and not name.startswith('.'):
+                    yield str(Path(folder, name))
 
 
 def watch(
     engine: Engine,
     arrivals: Arrivals,
-    alarm: Alarm,
-    results: ResultsFile,
+    results: Results,
     task_of: Callable[[str], ImageTask],
     interval: float,
     say: Callable[[str], None],
@@ -33,15 +132,14 @@ def watch(
     engine : Engine
         Its job is `ahf_ros.batch.identification.identify_images`.
     arrivals : Arrivals
-    alarm : Alarm
-    results : ResultsFile
+    results : Results
         What it has already is not done again.
     task_of : callable
         From the path of an image to its task.
     interval : float
-        Time between two looks at the folder where nothing happens, s.
+        Time between two looks at the folder, s.
     say : callable
-        Called with lines for people.
+        Called with what there is to say about the folder.
 
     Raises
     ------
@@ -49,23 +147,26 @@ def watch(
         If the results cannot be written.
     """
     running: dict[int, ImageTask] = {}
-    waiting: deque[ImageTask] = deque()
+    waiting: list[ImageTask] = []
     begun = 0
     looked = -interval
     while True:
-        now = time.monotonic()
-        if not running or now - looked >= interval:
-            looked = now
-            plan = make_plan(list(map(task_of, _taken(arrivals, alarm, say))), results)
-            if plan.notes:
-                yield ImageOutcome(messages=tuple(map(Message, plan.notes)))
-            waiting += plan.pending
-        while len(running) < engine.capacity and (task := _next(waiting, running, results)):
-            running[begun] = task
-            engine.submit(begun, task)
-            begun += 1
+        if not running or time.monotonic() - looked >= interval:
+            looked = time.monotonic()
+            pending, notes = results.pending(list(map(task_of, _taken(arrivals, say))))
+            if notes:
+                texts = (f'{results.path}: {note}' for note in notes)
+                yield ImageOutcome(messages=tuple(map(Message, texts)))
+            waiting += pending
+        for task in list(waiting):
+            if len(running) < engine.capacity and task not in running.values():
+                waiting.remove(task)
+                if not results.has(task):
+                    running[begun] = task
+                    engine.submit(begun, task)
+                    begun += 1
         if not running:
-            alarm.wait(min(interval, _BUSY) if arrivals.settling else interval)
+            time.sleep(min(interval, _BUSY) if arrivals.settling else interval)
             continue
         found = engine.wait(_BUSY)
         ending.check()
@@ -76,26 +177,12 @@ def watch(
             yield outcome
 
 
-def _next(
-    waiting: deque[ImageTask], running: Mapping[int, ImageTask], results: ResultsFile
-) -> ImageTask | None:
-    """Return a task that still has to be done and whose image is not being identified."""
-    for _ in range(len(waiting)):
-        task = waiting.popleft()
-        if any(task.paths == other.paths for other in running.values()):
-            waiting.append(task)
-        elif out_of_date(task, results) is not None:
-            return task
-    return None
-
-
-def _taken(arrivals: Arrivals, alarm: Alarm, say: Callable[[str], None]) -> list[str]:
-    """Return what has arrived, and say when the folder goes away and comes back."""
+def _taken(arrivals: Arrivals, say: Callable[[str], None]) -> list[str]:
+    """Return what has arrived, and tell of a folder that goes away and comes back."""
     before = arrivals.away
     paths = arrivals.take()
     if arrivals.away and not before:
         say(f'the folder cannot be read, waiting for it: {arrivals.away}')
     if before and not arrivals.away:
         say('the folder is back')
-        alarm.set()
     return paths

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from ahf_ros.batch.engine import TaskFailed, finished_tasks
+from ahf_ros.batch.engine import EngineLost, TaskFailed, finished_tasks
 from ahf_ros.batch.worker import SHUTDOWN_TIMEOUT
 from ahf_ros.cli.engine_options import add_scheduler_argument
 from ahf_ros.cli.engines import create_engine, shared_settings
@@ -101,9 +101,13 @@ def run(options: argparse.Namespace) -> int:
             if remark:
                 print(f'ahf bag: {tasks[number].source}: {remark}', file=sys.stderr)
 
-        for task, outcome in _outcomes(tasks, options.jobs, options.scheduler, report):
-            _report(task, outcome)
-            failed |= isinstance(outcome, ValueError) or bool(outcome.refused or outcome.lost)
+        try:
+            for task, outcome in _outcomes(tasks, options.jobs, options.scheduler, report):
+                _report(task, outcome)
+                failed |= isinstance(outcome, ValueError) or bool(outcome.refused or outcome.lost)
+        except EngineLost as error:
+            print(f'ahf bag: {error}', file=sys.stderr)
+            failed = True
     return int(failed)
 
 

@@ -16,16 +16,6 @@ JOBS = Parameter(
 )
 
 
-def add_spread_argument(parser: Group) -> None:
-    """Give a parser the option that spreads a search."""
-    parser.add_argument(
-        '--spread',
-        action='store_true',
-        help='Identify one image after the other, and let the processes or the cluster try the '
-        'filters of its search, which is the same; for few images with long searches.',
-    )
-
-
 def add_scheduler_argument(parser: Group) -> None:
     """Give a parser the option that names a cluster."""
     parser.add_argument(

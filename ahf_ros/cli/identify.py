@@ -12,12 +12,10 @@ from typing import Any, TextIO
 from rich.console import Console
 from rich.progress import Progress
 
-from ahf_ros.batch.engine import Engine, available_cores
+from ahf_ros.batch.engine import Engine, EngineLost, available_cores
 from ahf_ros.batch.identification import detector_of, identify_images
-from ahf_ros.batch.plan import make_plan
-from ahf_ros.batch.results_file import ResultsFile, Unwritable
+from ahf_ros.batch.results import Results, Unwritable
 from ahf_ros.batch.run import kept_outcomes_in_order, outcomes_in_order
-from ahf_ros.batch.search import SpreadSearch, try_filter
 from ahf_ros.batch.task import ImageOutcome, ImageTask, with_machine
 from ahf_ros.cli import inputs
 from ahf_ros.cli.engines import create_engine, shared_settings
@@ -76,7 +74,8 @@ def _run(options: argparse.Namespace, output: TextIO) -> int:
     failed = bool(problems)
     results = identified = 0
     measured: list[MeasuredImage] = []
-    with closing(_engine(options, jobs)) as engine:
+    engine = create_engine('identify', identify_images, jobs, options.scheduler, with_machine)
+    with closing(engine):
         try:
             for outcome in _with_progress(_outcomes(engine, tasks, options), len(tasks), quiet):
                 print_outcome('identify', outcome, output if options.json else None, quiet)
@@ -85,7 +84,7 @@ def _run(options: argparse.Namespace, output: TextIO) -> int:
                 identified += sum(_decoded(record) for record in outcome.records)
                 if options.export:
                     measured += [measured_image(it, it['image']) for it in outcome.records]
-        except Unwritable as error:
+        except (EngineLost, Unwritable) as error:
             print(f'ahf identify: {error}', file=sys.stderr)
             return 1
     if results and not quiet:
@@ -128,7 +127,7 @@ def _tasks(
     """Return the number of processes, and a task for each image or stack."""
     groups = stacked(paths, options.stack_by, options.stack)
     jobs = options.jobs or (available_cores() if len(groups) >= _WORTH_PROCESSES else 1)
-    jobs = min(jobs, 1 if options.spread else len(groups))
+    jobs = min(jobs, len(groups))
     settings = shared_settings(settings, jobs, options.scheduler)
     stacking = StackSettings(stack=options.stack, stack_movement=options.stack_movement)
     overlays = _overlay_paths(paths, options.overlay)
@@ -147,16 +146,6 @@ def _tasks(
     ]
 
 
-def _engine(options: argparse.Namespace, jobs: int) -> Engine:
-    if not options.spread:
-        return create_engine('identify', identify_images, jobs, options.scheduler, with_machine)
-    count = options.jobs or available_cores()
-    engine = create_engine(
-        'identify', try_filter, count, options.scheduler, lambda it, _: it, isolated=True
-    )
-    return SpreadSearch(engine)
-
-
 def _outcomes(
     engine: Engine, tasks: Sequence[ImageTask], options: argparse.Namespace
 ) -> Iterator[ImageOutcome]:
@@ -164,11 +153,13 @@ def _outcomes(
     if not options.output:
         yield from outcomes_in_order(engine, tasks)
         return
-    with closing(ResultsFile(options.output)) as results:
-        plan = make_plan(tasks, results)
-        for note in plan.notes if not options.quiet else ():
-            print(note, file=sys.stderr)
-        yield from kept_outcomes_in_order(engine, plan, results)
+
+    def say(text: str) -> None:
+        if not options.quiet:
+            print(text, file=sys.stderr)
+
+    with closing(Results(options.output)) as results:
+        yield from kept_outcomes_in_order(engine, tasks, results, say)
 
 
 def _overlay_paths(images: Sequence[str], folder: Path | None) -> dict[str, str]:

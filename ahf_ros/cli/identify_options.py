@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ahf_ros.cli.engine_options import JOBS, add_scheduler_argument, add_spread_argument
+from ahf_ros.cli.engine_options import JOBS, add_scheduler_argument
 from ahf_ros.cli.export_options import add_export_arguments
 from ahf_ros.cli.options import Group, add_option, add_search_options, add_target_options
 from ahf_ros.cli.stacks import add_stack_arguments
@@ -23,7 +23,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Give a parser the arguments of the command."""
     parser.add_argument('images', nargs='+', metavar='IMAGE', help=IMAGES)
     add_processing_options(parser)
-    add_spread_argument(parser)
     add_target_options(parser)
     output = parser.add_argument_group('output')
     output.add_argument(

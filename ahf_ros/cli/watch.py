@@ -8,12 +8,11 @@ from contextlib import closing, redirect_stdout
 from pathlib import Path
 from typing import TextIO
 
-from ahf_ros.batch.arrivals import Alarm, Arrivals
-from ahf_ros.batch.engine import available_cores
+from ahf_ros.batch.engine import EngineLost, available_cores
 from ahf_ros.batch.identification import detector_of, identify_images
-from ahf_ros.batch.results_file import ResultsFile, Unwritable
+from ahf_ros.batch.results import Results, Unwritable
 from ahf_ros.batch.task import ImageTask, with_machine
-from ahf_ros.batch.watch import watch
+from ahf_ros.batch.watch import Arrivals, watch
 from ahf_ros.cli.engines import create_engine, shared_settings
 from ahf_ros.cli.identify_options import add_output_options, add_processing_options
 from ahf_ros.cli.options import (
@@ -38,8 +37,8 @@ SETTLING = Parameter(
 )
 INTERVAL = Parameter(
     'interval',
-    2.0,
-    'Time between two looks at the folder where the system reports no change, s.',
+    1.0,
+    'Time between two looks at the folder, s.',
     minimum=0.1,
     maximum=3600.0,
 )
@@ -108,19 +107,10 @@ def _run(options: argparse.Namespace, output: TextIO) -> int:
     )
     arrivals = Arrivals(options.folder, SUFFIXES, options.recursive, options.settling)
     try:
-        with (
-            closing(ResultsFile(options.output)) as results,
-            closing(Alarm(options.folder, options.recursive)) as alarm,
-            closing(engine),
-        ):
-            if not alarm.set():
-                say(
-                    'watchdog is not installed, so the folder is only looked at in intervals; pip '
-                    "install 'ahf_ros[watch]' makes it faster"
-                )
-            for outcome in watch(engine, arrivals, alarm, results, task_of, options.interval, say):
+        with closing(Results(options.output)) as results, closing(engine):
+            for outcome in watch(engine, arrivals, results, task_of, options.interval, say):
                 print_outcome('watch', outcome, output if options.json else None, options.quiet)
-    except Unwritable as error:
+    except (EngineLost, Unwritable) as error:
         say(str(error))
     return 1
 

@@ -33,7 +33,7 @@ from ahf_ros.filtering.genetic import SearchResult, Values
 from ahf_ros.filtering.mirroring import MirroredId, is_mirrored
 from ahf_ros.filtering.settings import AdaptiveSettings
 from ahf_ros.filtering.trace import trace_of
-from ahf_ros.filtering.trials import DetectorFunction, Elsewhere, Trials
+from ahf_ros.filtering.trials import DetectorFunction, Trials
 from ahf_ros.imaging.stack import ImageStack
 from ahf_ros.target import FilterState, Identification, Target, count_codes, sorted_targets
 from ahf_ros.target_check import checked_targets
@@ -107,8 +107,6 @@ class Identifier:
         The search for the last image; None if there was none.
     memory : Memory
         What earlier images leave to the next one; set it to continue from another identifier.
-    elsewhere : callable or None
-        Tries filters in the place of the detector, see `ahf_ros.filtering.trials.Elsewhere`.
 
     Examples
     --------
@@ -135,8 +133,7 @@ class Identifier:
     ) -> None:
         self.last_search: SearchResult | None = None
         self.memory = Memory()
-        self.elsewhere: Elsewhere | None = None
-        # Without a refinement, the detector gives the centres.
+        # Without a refinement, centres are those of the detector.
         draft = draft if draft and refine else detector
         self._detector = _interruptible(detector, interrupt)
         self._draft = _interruptible(draft, interrupt)
@@ -196,7 +193,14 @@ class Identifier:
         settings = self._settings
         expected = len(settings.listed) or given
         estimating = not expected and self._estimate is not None
-        trials = self.trials_of(stack)
+        trials = Trials(
+            stack,
+            self._detector,
+            self._draft,
+            settings.listed,
+            settings.filter,
+            self._name,
+        )
         threads = settings.threads or os.cpu_count() or 1
         with ThreadPoolExecutor(threads) if threads > 1 else nullcontext() as executor:
             choice = None
@@ -241,19 +245,6 @@ class Identifier:
             tuple(sorted(settings.listed)),
             trace_of(choice.search, trials, stack) if choice.search else None,
             median_edge_shift(ordered),
-        )
-
-    def trials_of(self, stack: ImageStack) -> Trials:
-        """Return what tries filters on a stack."""
-        settings = self._settings
-        return Trials(
-            stack,
-            self._detector,
-            self._draft,
-            settings.listed,
-            settings.filter,
-            self._name,
-            self.elsewhere,
         )
 
     def _steady(self, trials: Trials, executor: Executor | None) -> Choice | None:

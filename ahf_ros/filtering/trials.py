@@ -23,10 +23,6 @@ DetectorFunction = Callable[[np.ndarray], list[Target]]
 """From an 8-bit image, shape (height, width), to the targets in it. Called from several threads at
 once where several filters are tried at a time."""
 
-Elsewhere = Callable[[ImageStack, bool, Values], list[Target]]
-"""Does what `Trials.found` does in another process: from the images, whether they are halved, and
-values of the genes to the targets. Called from several threads at once."""
-
 CONFIRMED = 5
 """Number of filters of a reduced image that are tried on the whole one."""
 
@@ -51,8 +47,6 @@ class Trials:
     settings : FilterSettings
     name : str
         What errors call the detector.
-    elsewhere : callable, optional
-        Tries filters in the place of `draft`.
     halved : bool
         Whether all images are at half their size.
 
@@ -74,7 +68,6 @@ class Trials:
         listed: frozenset[int],
         settings: FilterSettings,
         name: str,
-        elsewhere: Elsewhere | None = None,
         halved: bool = False,
     ) -> None:
         self._stack = stack
@@ -90,7 +83,6 @@ class Trials:
         self._draft = draft
         self._settings = settings
         self._name = name
-        self._elsewhere = elsewhere
         self._halved = halved
         self._lock = Lock()
         self._images: dict[int, np.ndarray] = {}
@@ -124,7 +116,7 @@ class Trials:
     def count(self, values: Values | None, executor: Executor | None = None) -> int:
         """Return n through a filter."""
         if values not in self.targets:
-            found = checked_targets(self._found_anywhere(values, executor), self._name)
+            found = checked_targets(self._found(values, executor), self._name)
             wanted = self._listed | {UNDECODED}
             listed, others = found, []
             if self._listed:
@@ -136,19 +128,13 @@ class Trials:
     def reduced(self) -> Trials:
         """Return trials of all images at half their size."""
         draft, listed, settings = self._draft, self._listed, self._settings
-        elsewhere = self._elsewhere
-        return Trials(self._stack, draft, draft, listed, settings, self._name, elsewhere, True)
+        return Trials(self._stack, draft, draft, listed, settings, self._name, halved=True)
 
     def of(self, tried: Sequence[Values | None]) -> list[list[Target]]:
         """Return what each filter showed; one that is listed twice counts once."""
         return [self.targets[values] for values in dict.fromkeys(tried)]
 
-    def _found_anywhere(self, values: Values | None, executor: Executor | None) -> Any:
-        if self._elsewhere and values and self.parts(values)[1]:
-            return self._elsewhere(self._stack, self._halved, values)
-        return self.found(values, executor)
-
-    def found(self, values: Values | None, executor: Executor | None = None) -> Any:
+    def _found(self, values: Values | None, executor: Executor | None) -> Any:
         """Return what the detector finds through a filter, listed or not, without a check."""
         number, chosen = self.parts(values)
         image = self.image(values)

@@ -4,14 +4,23 @@ from __future__ import annotations
 
 import os
 from contextlib import closing
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from ahf_ros.batch import engine
-from ahf_ros.batch.engine import Finished, SerialEngine, TaskFailed, finished_tasks, in_order
+from ahf_ros.batch.engine import (
+    EngineLost,
+    Finished,
+    SerialEngine,
+    TaskFailed,
+    finished_tasks,
+    in_order,
+)
 from ahf_ros.batch.processes import ProcessEngine
+from ahf_ros.cli import main
 from support.jobs import do_as_told
 
 
@@ -87,3 +96,30 @@ def test_the_limit_of_a_container_counts(tmp_path: Path, monkeypatch: pytest.Mon
     for text, cores in (('max 100000', every), ('50000 100000', 1), ('9900000 100000', every)):
         (tmp_path / 'cpu.max').write_text(text)
         assert engine.available_cores() == cores
+
+
+class Lost(Backwards):
+    """An engine that cannot go on."""
+
+    def wait(self, timeout: float | None = None) -> tuple[int, Any]:
+        raise EngineLost('the scheduler is away')
+
+    def close(self) -> None:
+        self.held.clear()
+
+
+@pytest.mark.parametrize('command', ['identify', 'watch', 'bag'])
+def test_an_engine_that_is_lost_ends_the_command(
+    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
+    pytest.importorskip('rosbags', reason='rosbags is not installed')
+    (tmp_path / 'image.png').write_bytes(b'image')
+    options = {
+        'identify': [tmp_path / 'image.png'],
+        'watch': [tmp_path, '--output', tmp_path / 'results', '--settling', 0],
+        'bag': [tmp_path / 'in', tmp_path / 'out'],
+    }
+    module = import_module(f'ahf_ros.cli.{command}')
+    monkeypatch.setattr(module, 'create_engine', lambda *_, **__: Lost(1))
+    assert main([command, *map(str, options[command])]) == 1
+    assert f'ahf {command}: the scheduler is away' in capsys.readouterr().err

@@ -12,9 +12,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.batch.engine import Report, SerialEngine
-from ahf_ros.batch.fingerprints import file_fingerprint
-from ahf_ros.batch.plan import make_plan
-from ahf_ros.batch.results_file import PREVIOUS, ResultsFile, Unwritable
+from ahf_ros.batch.results import PREVIOUS, Results, Unwritable, file_fingerprint
 from ahf_ros.batch.run import kept_outcomes_in_order
 from ahf_ros.batch.task import ImageOutcome, ImageTask, Level, Message
 from ahf_ros.cli import main
@@ -39,12 +37,12 @@ class Run:
 
     def __init__(self, tasks: Sequence[ImageTask], folder: Path, stop: int = 0) -> None:
         self.done: list[str] = []
-        results = ResultsFile(folder)
+        self.notes: list[str] = []
+        self.images: list[str] = []
+        results = Results(folder)
         try:
-            plan = make_plan(tasks, results)
-            self.notes = plan.notes
-            self.images = []
-            for outcome in kept_outcomes_in_order(SerialEngine(self.job), plan, results):
+            engine = SerialEngine(self.job)
+            for outcome in kept_outcomes_in_order(engine, tasks, results, self.notes.append):
                 self.images += [record['image'] for record in outcome.records]
                 if stop and len(self.images) == stop:
                     break
@@ -84,20 +82,21 @@ def test_what_is_out_of_date_is_done_again_and_said(tmp_path: Path) -> None:
     Path(tasks[3].paths[0]).write_bytes(b'another image')
     again = Run(tasks, folder)
     assert again.done == ['1', '3']
-    assert 'made again because of files that could not be read' in again.notes[1]
-    assert again.notes[2].endswith(f'because of changed files: {tasks[3].paths[0]}')
+    names = f'{tasks[1].paths[0]}; {tasks[3].paths[0]}'
+    assert again.notes[1].endswith(f': 2 results are out of date and made again: {names}')
     assert not (folder / PREVIOUS).exists()
     Path(tasks[2].paths[0]).rename(tmp_path / 'away')
-    assert '1 of these are of files that cannot be seen from here' in Run(tasks, folder).notes[1]
+    assert Run(tasks, folder).done == ['1']
     (tmp_path / 'away').rename(tasks[2].paths[0])
     settings = IdentificationSettings(expected_targets=3)
     others = [replace(task, settings=settings) for task in tasks[:3]]
     again = Run(others, folder)
     assert again.done == ['0', '1', '2']
-    assert '3 of 3 results are made again because of other settings' in again.notes[0]
+    assert '3 results are out of date and made again' in again.notes[0]
+    assert 'settings or version are others, earlier results are kept in' in again.notes[1]
     assert len(read_results(folder / PREVIOUS)) == len(read_results(folder)) == 4
     drawn = [replace(task, overlays=(str(tmp_path / 'none.png'),)) for task in others[:1]]
-    assert 'because of missing overlays' in Run(drawn, folder).notes[0]
+    assert Run(drawn, folder).done == ['0']
 
 
 def test_a_stack_is_there_as_a_whole_or_not_at_all(tmp_path: Path) -> None:
@@ -115,9 +114,9 @@ def test_a_stack_is_there_as_a_whole_or_not_at_all(tmp_path: Path) -> None:
 
 def test_what_cannot_be_written_is_named(tmp_path: Path) -> None:
     tasks, folder = tasks_in(tmp_path, 2), tmp_path / 'results'
-    results = ResultsFile(folder)
+    results = Results(folder)
     with pytest.raises(Unwritable, match='results is being written by another process'):
-        ResultsFile(folder)
+        Results(folder)
     results.append(tasks[0], ImageOutcome(({'image': '0.png'},), files=('',)))
     size = results.path.stat().st_size
     with room_for(size + 9), pytest.raises(Unwritable, match=r'results\.jsonl cannot be written'):
@@ -126,9 +125,9 @@ def test_what_cannot_be_written_is_named(tmp_path: Path) -> None:
     assert results.path.stat().st_size == size
     (folder / RESULTS_FILE).write_text('{"image": "0.png", "targets": []}\n')
     with pytest.raises(Unwritable, match='lines that were not written with --output'):
-        ResultsFile(folder)
+        Results(folder)
     with pytest.raises(Unwritable, match=r'0\.png cannot be written: (File exists|Not a dir)'):
-        ResultsFile(Path(tasks[0].paths[0]))
+        Results(Path(tasks[0].paths[0]))
 
 
 def test_the_command_goes_on_with_the_same_output(

@@ -13,7 +13,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from ahf_ros.batch.arrivals import Arrivals
+from ahf_ros.batch.watch import Arrivals
 from ahf_ros.cli import main
 from ahf_ros.interchange.files import RESULTS_FILE
 

@@ -1,45 +1,25 @@
-"""The search of one image by workers."""
+"""The identification of the images of a task."""
 
 from __future__ import annotations
 
 import itertools
-import json
 import signal
 from pathlib import Path
 
 import pytest
 
 from ahf_ros import ending
+from ahf_ros.batch import identification
 from ahf_ros.batch.identification import identify_images
 from ahf_ros.batch.task import ImageTask
-from ahf_ros.cli import main
 from ahf_ros.interchange.image_files import write_image
 from ahf_ros.session_settings import IdentificationSettings
 from ahf_ros.settings.nested import updated
 from ahf_ros.synthetic.scene import SceneSettings, render
 
 SCENE = SceneSettings(
-    width=320, height=240, targets=3, dot_radius=10, light='stripe', ambient=0.04, seed=2, phases=2
+    width=320, height=240, targets=3, dot_radius=10, light='stripe', ambient=0.04, seed=2
 )
-
-
-def test_a_search_by_workers_is_that_of_one_thread(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    images = [tmp_path / f'{phase}.png' for phase in range(2)]
-    for phase, path in enumerate(images):
-        write_image(path, render(SCENE, phase).image)
-    command = ['identify', *map(str, images), '--stack', '2', '--detector', 'traditional']
-    command += ['--expected-targets', '5', '--population', '4', '--max-evaluations', '6', '--json']
-    found = []
-    for more in (['--threads', '1'], ['--spread', '--jobs', '2']):
-        assert main([*command, *more, '--coarse']) == 0
-        found.append({**json.loads(capsys.readouterr().out), 'elapsed_s': 0})
-    assert found[0] == found[1]
-    assert found[0]['filter']['evaluations'] > 6
-    images[1].write_bytes(b'not an image')
-    assert main([*command, '--spread', '--jobs', '1']) == 1
-    assert '1.png is not an image' in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -65,3 +45,18 @@ def test_a_search_ends_with_its_process(
     with pytest.raises(ends):
         identify_images(ImageTask((str(tmp_path / 'image.png'),), settings))
     assert len(passed) <= 2
+
+
+def test_an_error_of_a_detector_costs_its_image_only(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_image(tmp_path / 'image.png', render(SCENE).image)
+    task = ImageTask((str(tmp_path / 'image.png'),))
+
+    def failing(*_: object) -> None:
+        raise ZeroDivisionError('of a detector')
+
+    monkeypatch.setattr(identification, 'identify_parts', failing)
+    outcome = identify_images(task)
+    assert outcome.failed and outcome.records == ()
+    assert outcome.messages[0].text == f'{task.name}: ZeroDivisionError: of a detector'
