@@ -100,8 +100,13 @@ def _against_rivals(
     for some in (doubtful[:_FIRST], doubtful[_FIRST:]):
         if not some.size or not rivals:
             break
-        others = [_evidence(read_bands(gray, dots.select(some), code, prior)) for code in rivals]
-        contested = np.max(others, axis=0) > _CLEARLY * _evidence(found.select(some))
+        word = found.select(some)
+        others = [read_bands(gray, dots.select(some), code, prior) for code in rivals]
+        better = [
+            (_evidence(other) > _CLEARLY * _evidence(word)) & (other.coded > word.coded)
+            for other in others
+        ]
+        contested = np.any(better, axis=0)
         confidence[some[contested]] = 0.0
         if not contested.any():
             break

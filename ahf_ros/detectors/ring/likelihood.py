@@ -147,6 +147,9 @@ def edge_evidence(
     ground = np.stack([polar.at(inner - before), polar.at(outer + beside)], axis=1)
     inside = np.stack([polar.at(inner + beside), polar.at(outer - beside)], axis=1)
     paper, ink = _step_evidence(polar, inside, ground, edges)
+    # A soft mark makes the ground beside it darker.
+    away = np.stack([before, beside], axis=1) * (polar.size / polar.blur)[:, None]
+    tail = (0.5 * np.exp(-0.5 * away**2)).astype(np.float32)
     weight = weights(polar)
     share = weight[:, None, None] * polar.visible
     return Evidence(
@@ -155,7 +158,7 @@ def edge_evidence(
         weight=weight,
         dot=np.zeros_like(weight),
         lit=edges.astype(np.float32),
-        covered=_covered(polar, inside, ground, ink > paper),
+        covered=_covered(polar, inside, ground / (1 - tail[..., None]), ink > paper),
     )
 
 
