@@ -103,7 +103,9 @@ def _read_part(gray: np.ndarray, dots: Fit, family: Family, prior: Prior) -> Hyp
     growth = fit.polarity * fit.edge_shift / fit.size
     polar = polar_images(gray, fit, family.band, family.bits * PER_SECTOR)
     edges = edge_evidence(polar, np.ones(len(read)), growth, family.band)
+    of_edges = decode(edges, _overhang(growth, family), family, prior.expected)
     words = _words(gray, fit, polar, edges, growth, family, prior.expected)
+    words = _preferred(words, of_edges, ~_doubtful(of_edges, edges))
     good = _mean_odds(words, edges.weight) > _HOPEFUL
     read, fit, words = read[good], fit.select(good), words.select(good)
     fit = _joint_fit(gray, fit, words, PER_SECTOR, 2, family)
@@ -147,6 +149,25 @@ def _doubtful(words: Words, edges: Evidence) -> np.ndarray:
     doubtful: np.ndarray = (words.margin < _CLEAR) | (words.coded < -_DOUBT)
     doubtful |= words.hidden.any(axis=1) | edges.covered.any(axis=(1, 2))
     return doubtful | (_mean_odds(words, edges.weight) < _PLENTY)
+
+
+def _preferred(words: Words, of_edges: Words, clear: np.ndarray) -> Words:
+    """Return words by all evidence, but by edges alone where these are clear.
+
+    Under spots of light, levels are not known well enough to contradict all edges of a target. The
+    evidence against anything is that of both, so that targets and families compare.
+
+    Parameters
+    ----------
+    words, of_edges : Words
+        By all evidence, and by edges alone.
+    clear : ndarray of bool, shape (k,)
+        Whether edges alone leave no doubt.
+    """
+    which = np.flatnonzero(clear)
+    some, seen, marked = of_edges.select(which), words.seen[which], words.marked[which]
+    some = replace(some, seen=np.maximum(some.seen, seen), marked=np.maximum(some.marked, marked))
+    return words.replaced(which, some)
 
 
 def _words(
