@@ -89,7 +89,7 @@ def _against_rivals(
 ) -> Hypotheses:
     """Return hypotheses of dots, none certain where a family that is not read has more evidence.
 
-    Where arcs of any length explain a band better than its word, it may be one of theirs. If the
+    It has to agree better with arcs of any length as well. Where arcs of any length explain a band better than its word, it may be one of theirs. If the
     rivals contest none of the most doubtful words, they contest no other one.
     """
     coded = np.where(found.certain & (found.margin < _CLEAR), found.coded, 0.0)

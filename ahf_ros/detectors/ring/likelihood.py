@@ -19,6 +19,7 @@ import numpy as np
 
 from ahf_ros.detectors.ring.polar import (
     CORRELATION,
+    LIGHT_EDGE,
     SATURATED,
     PolarImages,
 )
@@ -32,13 +33,11 @@ _FLAT = 0.12  # deviation of steps of ln where there is no edge, but for noise
 _WHITE = 0.03  # the same of paper between ground that glare makes white
 _MARK, _MARK_TAIL = 0.18, 0.3  # of the step of a mark: towards less, where blur fills it, and more
 _PAPER_LEVEL, _INK_LEVEL = 0.05, 0.12  # of levels of paper and ink under predicted light
-_MEDIAN = 0.6745  # of the size of a normal deviate
 _ANY_STEP, _ANY_LEVEL = 0.2, 0.25  # densities of steps and levels of ln where anything lies
 _PLAIN = 0.35  # share of what lies about any dot that is as flat as ground
 _SURPRISES = (0.05, 0.5)  # smallest and largest probability of a level that nothing predicts
 _MARKED = 0.2  # share of what is dark that has marks, from which it is in shadow
 _UNLIKELY = 2.5  # standard deviations, from which a level was not predicted
-_LIGHT_EDGE = 0.3  # of ln, of an edge of light
 _LIGHT_EDGES = (0.02, 0.5)  # smallest and largest probability of one between two readings
 _ANGLES = 120  # at which large targets have all the evidence that readings can give
 _MAXIMUM_GROWTH = 0.3  # dot radii
@@ -185,7 +184,7 @@ def light_edges(
     start, width = radius + growth, inner - radius - growth
     near, far = (polar.logs(polar.at(start + part * width)) for part in (0.3, 0.75))
     noise = np.hypot(near[1], far[1])
-    many = (np.abs(near[0] - far[0]) > np.hypot(_LIGHT_EDGE, 2 * noise)).mean(axis=1)
+    many = (np.abs(near[0] - far[0]) > np.hypot(LIGHT_EDGE, 2 * noise)).mean(axis=1)
     return np.clip(many, *_LIGHT_EDGES)
 
 

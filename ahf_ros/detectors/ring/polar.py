@@ -19,6 +19,9 @@ CORRELATION = 2.5
 SATURATED = 253.0
 """Gray value from which a reading is white, whatever the light."""
 
+LIGHT_EDGE = 0.3
+"""Step of ln I from which it is an edge of light."""
+
 CIRCLES = 56
 """Of a polar image, which are then less than a tenth of a dot radius apart."""
 
@@ -38,7 +41,6 @@ _EVEN = 0.015  # deviation of ln of ground in even light
 _UNLIKE = 4.0  # standard deviations of ground, from which a level is unlike the rest
 _COVERED = 0.34  # share of the angles whose ground is darker, from which that is light
 _WHITE_OUT = 0.6  # share of the ground that is saturated, from which that is no glare
-_LIGHT_EDGE = 0.3  # of ln, of an edge of light
 _NO_GLARE = 256.0  # more than any gray value
 _COVERS_EDGES, _GLARE_EDGES = 0.3, 0.03  # shares of ground, more than edges of these have
 
@@ -222,7 +224,7 @@ def _usual_levels(
     dark = logs < (usual - width)[:, None, None]
     darker = (dark[..., ::2] | dark[..., 1::2]).mean(axis=(1, 2))
     across, along = logs[..., 1::2] - logs[..., ::2], (of_later - logs)[..., ::2]
-    edges = (np.maximum(np.abs(across), np.abs(along)) > _LIGHT_EDGE).mean(axis=(1, 2))
+    edges = (np.maximum(np.abs(across), np.abs(along)) > LIGHT_EDGE).mean(axis=(1, 2))
     light = (darker > _COVERED) | (edges > _COVERS_EDGES)
     shade = np.where(light, 0, np.exp(usual - width) - LOG_OFFSET)
     white = (ground >= SATURATED).mean(axis=(1, 2))

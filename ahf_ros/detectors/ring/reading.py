@@ -145,7 +145,7 @@ def best_growth(
 
 
 def _doubtful(words: Words, edges: Evidence) -> np.ndarray:
-    """Return whether words by edges alone are too doubtful to begin a joint fit, shape (k,)."""
+    """Return whether edges alone leave a doubt of their words, shape (k,)."""
     doubtful: np.ndarray = (words.margin < _CLEAR) | (words.coded < -_DOUBT)
     doubtful |= words.hidden.any(axis=1) | edges.covered.any(axis=(1, 2))
     return doubtful | (_mean_odds(words, edges.weight) < _PLENTY)
