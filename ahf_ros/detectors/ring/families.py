@@ -89,8 +89,9 @@ def _against_rivals(
 ) -> Hypotheses:
     """Return hypotheses of dots, none certain where a family that is not read has more evidence.
 
-    It has to agree better with arcs of any length as well. Where arcs of any length explain a band better than its word, it may be one of theirs. If the
-    rivals contest none of the most doubtful words, they contest no other one.
+    It has to agree better with arcs of any length as well. Where arcs of any length explain a band
+    better than its word, it may be one of theirs. If the rivals contest none of the most doubtful
+    words, they contest no other one.
     """
     coded = np.where(found.certain & (found.margin < _CLEAR), found.coded, 0.0)
     doubtful = np.argsort(coded, kind='stable')[: (coded < _DOUBTFUL).sum()]
