@@ -19,16 +19,21 @@ from ahf_ros.features.array_record import ArrayRecord
 
 _DOUBT = 5.0  # most that a reading says for or against a word
 _COVER = 6.0  # price of something that covers a stretch of the band
-_LIKE_PAPER = 8.5  # the same of something that looks like paper
-_USUAL, _IN_LIGHT = 0.05, 15.0  # probability of edges of light from which, times which it grows
+_LIKE_PAPER = 6.5  # the same of something that looks like paper
+_IN_LIGHT = 15.0  # times the probability of edges of light, by which that grows
 _MORE = 0.6  # of each further reading of that
 _COVERED = 0.1  # price of each further reading that something else covers
 _BORDER = 4.8  # price of a border of an arc of any length, at one of about 120 angles
 _RANKED = 1.2  # evidence of a reading that ranks words, which one cover must not settle
 _NEAR = 3  # angles on either side of the clearest one
 _DRAW = 5.0  # lead of a word that is not expected, which is as good as none
-_ROUNDING = 1e-5  # of sums of float32
-_NEVER = np.float32(-1e9)
+_NEVER = np.float32(-np.inf)
+
+CLEAR = 15.0
+"""Log odds of a word against the next ID that leave no doubt of it."""
+
+DOUBT = 3.0
+"""Log odds of arcs of any length against a word that leave one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,8 +158,7 @@ class _Angles(ArrayRecord):
     @property
     def like_paper(self) -> np.ndarray:
         """Price of something that looks like paper, float32, shape (k,)."""
-        more = np.maximum(self.lit - np.float32(_USUAL), 0)
-        return np.float32(_LIKE_PAPER) * (1 + np.float32(_IN_LIGHT) * more)
+        return np.float32(_LIKE_PAPER) * (1 + np.float32(_IN_LIGHT) * self.lit)
 
 
 def _doubted(evidence: Evidence) -> _Angles:
@@ -271,7 +275,9 @@ def _hidden(seen: np.ndarray, scores: np.ndarray, of: _Angles) -> np.ndarray:
         Of k bands.
     """
     hidden = np.zeros(seen.T.shape, bool)
-    some = np.flatnonzero(scores > seen.sum(axis=0) + _ROUNDING * np.abs(seen).sum(axis=0))
+    some = np.flatnonzero(
+        scores > seen.sum(axis=0) + len(seen) * np.finfo(seen.dtype).eps * np.abs(seen).sum(axis=0)
+    )
     if some.size:
         hidden[some] = _backtracked(seen[:, some], of.select(some))
     return hidden

@@ -55,14 +55,3 @@ class Explained(ArrayRecord):
     def outlines_in(self, level: int) -> np.ndarray:
         """Return the outlines with edges in the image that is halved `level` times, its px."""
         return frame.reduced(self.outlines[self.sizes > 2**level], level)
-
-
-_NO_FRAMES, _NO_SIZES = np.zeros((0, 3, 3)), np.zeros(0)
-NOTHING = Explained(
-    _NO_FRAMES,
-    frame.circle_outlines(_NO_FRAMES, _NO_SIZES),
-    _NO_SIZES,
-    np.zeros(0, bool),
-    _NO_SIZES,
-)
-"""The record of an image of which nothing is known."""

@@ -14,16 +14,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from ahf_ros.codes.ring import Family
-from ahf_ros.detectors.ring.likelihood import edge_evidence, growth_by
-from ahf_ros.detectors.ring.polar import PolarImages, polar_images
+from ahf_ros.detectors.ring.likelihood import HOPEFUL, edge_evidence, growth_by
+from ahf_ros.detectors.ring.polar import DOT, MARGIN, PolarImages, polar_images
 from ahf_ros.features.circle_fit import Fit
 
 _ANGLES, _CIRCLES = 64, 36
-_DOT, _BEYOND = np.array([0.3, 0.6]), np.array([0.3, 0.65])  # where levels are compared, dot radii
 _PHASES = 4  # of the sectors
 _SHIFTS = (-1.2, 0.0, 1.2)  # of edges, px; readings keep farther away from these than the error
 _COVER = 5.0  # price of a sector that is covered
-_HOPEFUL = 0.2  # bound of the mean evidence of a reading, from which a band is read
 _CAP = 3.0  # evidence of a reading against bare paper
 _ALIKE, _MOST = 0.15, 0.5  # difference of ln, and share of what is beyond, that show a hole
 
@@ -42,7 +40,7 @@ def may_be_targets(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> n
     for code in families:
         bits.setdefault(code.band, set()).add(code.bits)
     bounds = [_bound(gray, dots, band, of_band) for band, of_band in bits.items()]
-    return np.asarray(np.max(bounds, axis=0) > _HOPEFUL)
+    return np.asarray(np.max(bounds, axis=0) > HOPEFUL)
 
 
 def _bound(gray: np.ndarray, dots: Fit, band: tuple[float, float], bits: set[int]) -> np.ndarray:
@@ -67,7 +65,7 @@ def _holes(polar: PolarImages, band: tuple[float, float]) -> np.ndarray:
     one = np.ones(len(polar.size))
     inside, outside = (
         np.concatenate([polar.logs(polar.at(one * radius))[0] for radius in radii], axis=1)
-        for radii in (_DOT, band[1] + _BEYOND)
+        for radii in (DOT, band[1] + MARGIN)
     )
     alike = np.abs(outside - np.median(inside, axis=1, keepdims=True)) < _ALIKE
     return np.asarray((polar.polarity < 0) & (alike.mean(axis=1) > _MOST))
