@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ahf_ros.detectors.ring.fitted_weights import PATH
+from ahf_ros.detectors.ring.confidence import WEIGHTS
 from benchmarks.identification import FIRST_TEST_SEED
 from benchmarks.weights import write_weights
 
@@ -57,7 +57,7 @@ def run(
     description: str,
     fitted: Callable[[Sequence[int]], Mapping[str, np.ndarray]],
     reliability: Callable[[Sequence[int]], Iterator[str]],
-    path: Path = PATH,
+    path: Path = WEIGHTS,
 ) -> None:
     """Write weights with --fit, or print their reliability as Markdown.
 

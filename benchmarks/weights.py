@@ -10,14 +10,14 @@ from pathlib import Path
 
 import numpy as np
 
-from ahf_ros.detectors.ring.fitted_weights import PATH
+from ahf_ros.detectors.ring.confidence import WEIGHTS
 
 
 def write_weights(
     purpose: str,
     seeds: Sequence[int],
     weights: Mapping[str, np.ndarray],
-    path: Path = PATH,
+    path: Path = WEIGHTS,
 ) -> None:
     """Replace one set of a file, and say from which seeds and at which commit it was fitted.
 

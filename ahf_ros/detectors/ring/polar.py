@@ -26,6 +26,9 @@ LIGHT_EDGE = 0.3
 DOT, GAP, MARGIN = np.array([0.3, 0.6]), np.array([0.4, 0.65]), np.array([0.3, 0.6])
 """Where levels are read: dot radii, shares of the gap, and dot radii beyond the band."""
 
+PART = 256
+"""Targets at a time, which bounds the memory."""
+
 CIRCLES = 56
 """Of a polar image, which are then less than a tenth of a dot radius apart."""
 
@@ -35,7 +38,6 @@ _SMALL = 7.0  # radius of a dot whose levels tell more than its edge, px
 _PRINTED = 0.25  # usual contrast of prints, up to which the levels of larger dots count
 _LEVELS = (0.75, 1.4)  # where the levels of dot and gap are read, dot radii
 _MINIMUM_LEVEL = 1.0  # gray value that ratios are taken of
-_MINIMUM_CONTRAST = 0.02  # dark over bright, that bright marks are computed from
 _NOISE = (1.2, 40.0)  # smallest and largest noise, gray values
 _EVEN = 0.015  # deviation of ln of ground in even light
 _UNLIKE = 4.0  # standard deviations of ground, from which a level is unlike the rest
@@ -104,7 +106,7 @@ class PolarImages(ArrayRecord):
         polarity, contrast = (
             _along(of, paper).astype(np.float32) for of in (self.polarity, self.contrast)
         )
-        bright = paper / np.maximum(contrast, _MINIMUM_CONTRAST)
+        bright = paper / contrast
         bright = np.where(seen >= SATURATED, np.minimum(bright, seen), bright)
         return np.where(polarity > 0, contrast * paper, bright)
 
@@ -183,7 +185,7 @@ def _appearance(gray: np.ndarray, dots: Fit) -> tuple[np.ndarray, np.ndarray]:
     contrast = np.maximum(dots.contrast, by_levels)
     lift = black_lift(contrast, dots.bright)
     dark, bright = (lifted(of, lift) for of in (contrast * dots.bright, dots.bright))
-    return dark / np.maximum(bright, _MINIMUM_LEVEL), lift
+    return np.maximum(dark, _MINIMUM_LEVEL) / np.maximum(bright, _MINIMUM_LEVEL), lift
 
 
 def _later(gap: np.ndarray, apart: np.ndarray) -> np.ndarray:

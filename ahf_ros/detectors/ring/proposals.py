@@ -10,6 +10,7 @@ from ahf_ros.codes.ring import Family
 from ahf_ros.detectors.ring.circles import RAYS, REACH
 from ahf_ros.detectors.ring.explained import Explained
 from ahf_ros.detectors.ring.glance import may_be_targets
+from ahf_ros.detectors.ring.polar import PART
 from ahf_ros.features.circle_fit import NO_FITS, Fit, fit_dots
 from ahf_ros.features.dot_search import voted_dots, whole_dots
 from ahf_ros.features.dots import Dots
@@ -21,7 +22,6 @@ Proposal = Callable[[Octave, Sequence[int], Explained], Dots]
 
 _HOLDING = 22.0  # radius of a dot about which profiles hold the softest edge, px
 _FAINTEST = 0.8  # contrast of a dot, dark over bright, for its band to be read
-_PART = 256  # dots at a time, which bounds the memory
 
 
 def propose_whole(octave: Octave, polarities: Sequence[int], _explained: Explained) -> Dots:
@@ -55,8 +55,8 @@ def measure_dots(
         Whether dots that are no middles of targets are measured as well.
     """
     worth = [NO_FITS]
-    for start in range(0, len(dots.frames), _PART):
-        part = dots.select(slice(start, start + _PART))
+    for start in range(0, len(dots.frames), PART):
+        part = dots.select(slice(start, start + PART))
         fit = _fit(gray, part, covariances=keep_all)
         if not keep_all:
             fit = fit.select(may_be_targets(gray, fit, families))

@@ -24,7 +24,15 @@ from ahf_ros.detectors.ring.likelihood import (
     growth_by,
     level_evidence,
 )
-from ahf_ros.detectors.ring.polar import DOT, GAP, MARGIN, PolarImages, angles_of, polar_images
+from ahf_ros.detectors.ring.polar import (
+    DOT,
+    GAP,
+    MARGIN,
+    PART,
+    PolarImages,
+    angles_of,
+    polar_images,
+)
 from ahf_ros.detectors.ring.prior import NOTHING_KNOWN, Prior
 from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import Fit, fit_circles
@@ -36,7 +44,6 @@ PER_SECTOR = 10
 
 _SHIFTS = np.arange(-2.4, 2.41, 0.4)  # of edges, that are tried, px
 _DEPTHS = np.array([0.2, 0.4, 0.6, 0.8])  # of the band, where its levels are read
-_PART = 256  # dots at a time, which bounds the memory
 
 
 def read_bands(
@@ -60,8 +67,8 @@ def read_bands(
         One of each dot.
     """
     parts = [
-        _read_part(gray, dots.select(slice(start, start + _PART)), family, prior)
-        for start in range(0, max(len(dots.frames), 1), _PART)
+        _read_part(gray, dots.select(slice(start, start + PART)), family, prior)
+        for start in range(0, max(len(dots.frames), 1), PART)
     ]
     return Hypotheses.joined(parts)
 

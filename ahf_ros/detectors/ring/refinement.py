@@ -7,7 +7,7 @@ one side of an edge by those on the other. IDs may come from a filtered image, c
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,7 +19,6 @@ from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.prior import Prior
 from ahf_ros.detectors.ring.reading import read_bands
 from ahf_ros.features import frame
-from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.circle_fit import Fit, fit_dots
 from ahf_ros.features.ellipse_targets import ellipse_fields
 from ahf_ros.features.soft_edges import MINIMUM_SHARE
@@ -27,16 +26,6 @@ from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, Target
 
 _FARTHEST, _FARTHEST_SHARE = 1.0, 0.2  # that a centre is moved: px, or radii of its dot
-
-
-@dataclass(frozen=True, slots=True)
-class _Located(ArrayRecord):
-    """Frames, covariances of their centres, shares of the expected edges, and their shifts."""
-
-    frames: np.ndarray
-    covariance: np.ndarray
-    share: np.ndarray
-    shift: np.ndarray
 
 
 def refine_centres(
@@ -99,8 +88,8 @@ def _locate(
     family: Family,
     polarities: Sequence[int],
     expected: frozenset[int],
-) -> _Located:
-    """Return where targets are, by dot and band where the band agrees, else by the dot."""
+) -> Hypotheses:
+    """Return targets, by dot and band where the band agrees, else by the dot."""
     dots = _fit_either_polarity(gray, start, polarities)
     decoded = np.flatnonzero(
         [target.id != UNDECODED for target in targets] & (dots.share >= MINIMUM_SHARE)
@@ -111,8 +100,9 @@ def _locate(
     by_band, best = np.unique(which[order], return_index=True)
     rest = np.setdiff1d(np.arange(len(targets)), by_band)
     alone = fit_dots(gray, start[rest], dots.polarity[rest], rays=RAYS, reach=REACH)
-    located = _located(dots).replaced(rest, _located(alone))
-    return located.replaced(by_band, _located(hypotheses.select(order[best])))
+    located = Hypotheses.unread(dots, family)
+    located = located.replaced(rest, Hypotheses.unread(alone, family))
+    return located.replaced(by_band, hypotheses.select(order[best]))
 
 
 def _agreeing(
@@ -140,11 +130,6 @@ def _agreeing(
         parts.append(with_soft_edges(gray, read, agreed).select(agreed))
         of_parts.append(which[agreed])
     return Hypotheses.joined(parts), np.concatenate(of_parts)
-
-
-def _located(of: Fit | Hypotheses) -> _Located:
-    shift = of.shift if isinstance(of, Hypotheses) else np.full(len(of.frames), np.nan)
-    return _Located(of.frames, of.covariance, of.share, shift)
 
 
 def _fit_either_polarity(gray: np.ndarray, frames: np.ndarray, polarities: Sequence[int]) -> Fit:
