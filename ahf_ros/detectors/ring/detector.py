@@ -136,7 +136,11 @@ def read_image(
         part = octave.pyramid.gray
         for propose in proposals:
             dots = propose(octave, settings.polarities, explained)
-            fits = measure_dots(part, dots, families, keep_all=settings.report_undecoded)
+            fits, others = measure_dots(part, dots, families, keep_all=settings.report_undecoded)
+            others = at_full_size(
+                images[: octave.level + 1], Hypotheses.unread(others, families[0])
+            )
+            explained = Explained.joined([explained, Explained.by(others)])
             if not len(fits.frames):
                 continue
             if not explained.certain.any():

@@ -43,8 +43,8 @@ PROPOSALS: tuple[Proposal, ...] = (propose_whole, propose_voted)
 
 def measure_dots(
     gray: np.ndarray, dots: Dots, families: Sequence[Family], *, keep_all: bool = False
-) -> Fit:
-    """Return the fits of the dots whose bands are worth reading.
+) -> tuple[Fit, Fit]:
+    """Return the fits of the dots whose bands are worth reading, and those of the others.
 
     Parameters
     ----------
@@ -56,12 +56,14 @@ def measure_dots(
     keep_all : bool
         Whether dots that are no middles of targets are measured as well.
     """
-    worth = [NO_FITS]
+    worth, others = [NO_FITS], [NO_FITS]
     for start in range(0, len(dots.frames), _PART):
         part = dots.select(slice(start, start + _PART))
         fit = _fit(gray, part, covariances=keep_all)
         if not keep_all:
-            fit = fit.select(may_be_targets(gray, fit, families))
+            likely = may_be_targets(gray, fit, families)
+            others.append(fit.select(~likely))
+            fit = fit.select(likely)
         fit = _fit(gray, fit)
         # How soft an edge is shows only where a profile holds all of it.
         is_soft = (fit.blur > SOFT) & (fit.share >= _MINIMUM_SHARE) & (fit.size > _HOLDING)
@@ -70,7 +72,8 @@ def measure_dots(
             fit = fit.replaced(soft, _fit(gray, fit.select(soft), ROUNDS))
         worth.append(fit)
     fit = Fit.joined(worth)
-    return fit.select((fit.share >= _MINIMUM_SHARE) & (fit.contrast <= _FAINTEST))
+    good = (fit.share >= _MINIMUM_SHARE) & (fit.contrast <= _FAINTEST)
+    return fit.select(good), Fit.joined(others)
 
 
 def _fit(gray: np.ndarray, dots: Dots | Fit, rounds: int = 1, *, covariances: bool = True) -> Fit:
