@@ -17,11 +17,11 @@ from ahf_ros.detectors.ring.likelihood import edge_evidence, growth_by
 from ahf_ros.detectors.ring.polar import polar_images
 from ahf_ros.features.circle_fit import Fit
 
-_ANGLES, _CIRCLES = 64, 36
+_ANGLES, _CIRCLES = 32, 36
 _PHASES = 4  # of the sectors
 _SHIFTS = (-1.2, 0.0, 1.2)  # of edges, px; readings keep farther away from these than the error
 _COVER = 5.0  # price of a sector that is covered
-_HOPEFUL = 0.2  # bound of the mean evidence of a reading, from which a band is read
+_HOPEFUL = 0.1  # bound of the mean evidence of a reading, from which a band is read
 _CAP = 3.0  # evidence of a reading against bare paper
 
 
