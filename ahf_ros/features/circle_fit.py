@@ -23,6 +23,9 @@ from ahf_ros.features.light_slope import LightSlope, common_slope, smooth_slopes
 from ahf_ros.features.profiles import BLURS, USUAL_BLUR, Edges, measure_edges
 from ahf_ros.features.robust import geman_mcclure, geman_mcclure_gain, median, reweight, spread
 
+ENOUGH = 0.5
+"""Share of the expected edges from which a fit counts."""
+
 _NOISE = 1.0  # of gray values, of 255; the fit scales it to what it finds
 _MINIMUM_STEP = 1.0  # gray values, that the error of an edge is computed from
 _OUTLIER = 3.0  # times the usual distance from the circle that quarters the weight

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ahf_ros.features.array_record import ArrayRecord
+from ahf_ros.features.circle_fit import ENOUGH
 from ahf_ros.features.circles import dot_circles
 from ahf_ros.features.dots import Dots
 from ahf_ros.features.frame import ellipse_axes, mean_radii, project
@@ -23,7 +24,6 @@ from ahf_ros.imaging.black import black_lift
 _RAYS = 32  # about a dot
 _REACHES = ((2.3, 0.45), (1.1, 0.95), (0.5, 1.9))
 # Semi-minor axis of a dot, px, from where on its edge is looked for within a reach, dot radii.
-_MINIMUM_SHARE = 0.5  # of the edge of a dot, for its fit to count
 _FARTHEST, _FARTHEST_SHARE = 0.8, 0.25  # that the centre of a dot is moved: px, radii
 _UNMEASURED = 0.3  # standard deviation of a centre whose edge was not fitted, px
 _OUTLIER = 4.0  # standard deviations from which a dot loses its weight
@@ -107,7 +107,7 @@ def measure_dots(gray: np.ndarray, frames: np.ndarray, polarity: np.ndarray) -> 
         circles = dot_circles(polarity[which], _RAYS)
         fit = fit_circles_of_any_blur(gray, frames[which], circles, reach=reach, projective=False)
         moved = np.hypot(*(fit.frames[:, :2, 2] - frames[which, :2, 2]).T)
-        good = fit.share >= _MINIMUM_SHARE
+        good = fit.share >= ENOUGH
         found[which], fitted[which[good]] = good, fit.frames[good]
         good &= moved <= np.maximum(_FARTHEST, _FARTHEST_SHARE * minor[which])
         near[which] = good

@@ -10,19 +10,15 @@ from ahf_ros.codes.ring import Family
 from ahf_ros.detectors.ring.circles import REACH
 from ahf_ros.detectors.ring.explained import Explained
 from ahf_ros.detectors.ring.glance import may_be_targets
-from ahf_ros.features.circle_fit import NO_FITS, Fit, fit_dots
+from ahf_ros.features.circle_fit import ENOUGH, NO_FITS, Fit, fit_dots
 from ahf_ros.features.dot_search import voted_dots, whole_dots
 from ahf_ros.features.dots import Dots
 from ahf_ros.features.pyramid import Octave
-from ahf_ros.features.soft_edges import ROUNDS, SOFT
 
 Proposal = Callable[[Octave, Sequence[int], Explained], Dots]
 """From an octave, the polarities of dots and what is explained already to dots of the octave."""
 
 _RAYS = 24  # about a dot
-_MINIMUM_SHARE = 0.5  # of the edge of a dot, for its band to be read
-_HOLDING = 22.0  # radius of a dot about which profiles hold the softest edge, px
-_FAINTEST = 0.8  # contrast of a dot, dark over bright, for its band to be read
 _PART = 256  # dots at a time, which bounds the memory
 
 
@@ -64,19 +60,12 @@ def measure_dots(
             likely = may_be_targets(gray, fit, families)
             others.append(fit.select(~likely))
             fit = fit.select(likely)
-        fit = _fit(gray, fit)
-        # How soft an edge is shows only where a profile holds all of it.
-        is_soft = (fit.blur > SOFT) & (fit.share >= _MINIMUM_SHARE) & (fit.size > _HOLDING)
-        soft = np.flatnonzero(is_soft)
-        if soft.size:
-            fit = fit.replaced(soft, _fit(gray, fit.select(soft), ROUNDS))
-        worth.append(fit)
+        worth.append(_fit(gray, fit))
     fit = Fit.joined(worth)
-    good = (fit.share >= _MINIMUM_SHARE) & (fit.contrast <= _FAINTEST)
-    return fit.select(good), Fit.joined(others)
+    return fit.select(fit.share >= ENOUGH), Fit.joined(others)
 
 
-def _fit(gray: np.ndarray, dots: Dots | Fit, rounds: int = 1, *, covariances: bool = True) -> Fit:
+def _fit(gray: np.ndarray, dots: Dots | Fit, *, covariances: bool = True) -> Fit:
     """Return fits of dots, whose blur is that of an earlier fit or the usual one."""
     return fit_dots(
         gray,
@@ -84,7 +73,7 @@ def _fit(gray: np.ndarray, dots: Dots | Fit, rounds: int = 1, *, covariances: bo
         dots.polarity,
         rays=_RAYS,
         reach=REACH,
-        rounds=rounds,
+        rounds=1,
         blur=dots.blur if isinstance(dots, Fit) else None,
         covariances=covariances,
     )
