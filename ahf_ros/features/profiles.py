@@ -172,21 +172,8 @@ def measure_outlines(
     # On a curve, the blur and the chord between the two lines of a profile lie inside.
     inside = (blur[:, None] ** 2 + aside**2) / 2 * outlines.curvature
     steps[0] += np.where(which > 0, inside, 0.0).ravel()
-    offset, dark, bright, slope, sensitivity, softness, residual = (
-        of.reshape(which.shape) for of in steps
-    )
-    return Edges(
-        offset,
-        dark,
-        bright,
-        slope,
-        sensitivity,
-        softness,
-        residual,
-        outlines.scale,
-        outlines.spacing,
-        which > 0,
-    )
+    measured = steps.reshape(len(steps), *which.shape)
+    return Edges(*[*measured, outlines.scale, outlines.spacing, which > 0])
 
 
 def _profiles(
