@@ -17,7 +17,7 @@ from ahf_ros.detectors.ring.likelihood import edge_evidence, growth_by
 from ahf_ros.detectors.ring.polar import polar_images
 from ahf_ros.features.circle_fit import Fit
 
-_ANGLES, _CIRCLES = 32, 36
+_PER_SECTOR, _CIRCLES = 3, 36  # angles of the shortest sectors, and circles
 _PHASES = 4  # of the sectors
 _SHIFTS = (-1.2, 0.0, 1.2)  # of edges, px; readings keep farther away from these than the error
 _COVER = 5.0  # price of a sector that is covered
@@ -44,7 +44,8 @@ def may_be_targets(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> n
 
 def _bound(gray: np.ndarray, dots: Fit, band: tuple[float, float], bits: set[int]) -> np.ndarray:
     """Return a bound of the mean evidence of readings for words of some lengths, shape (k,)."""
-    polar = polar_images(gray, dots, band, _ANGLES, _CIRCLES)
+    angles = _PER_SECTOR * max(bits)
+    polar = polar_images(gray, dots, band, angles, _CIRCLES)
     best = np.full(len(dots.frames), -np.inf)
     for shift in _SHIFTS:
         growth = growth_by(shift, polar.size)
@@ -55,7 +56,7 @@ def _bound(gray: np.ndarray, dots: Fit, band: tuple[float, float], bits: set[int
             of_word = np.maximum(np.maximum(paper, ink), -_COVER).sum(axis=2)
             marked = _of_sectors(np.clip((edges.ink - edges.paper).sum(axis=1), -cap, cap), count)
             bound = np.minimum(of_word, np.maximum(marked, 0).sum(axis=2)).max(axis=1)
-            best = np.maximum(best, bound / (_ANGLES * edges.weight))
+            best = np.maximum(best, bound / (angles * edges.weight))
     return best
 
 
