@@ -23,6 +23,9 @@ from ahf_ros.features.light_slope import LightSlope, common_slope, smooth_slopes
 from ahf_ros.features.profiles import BLURS, USUAL_BLUR, Edges, measure_edges
 from ahf_ros.features.robust import geman_mcclure, geman_mcclure_gain, median, reweight, spread
 
+ENOUGH = 0.5
+"""Share of the expected edges from which a fit counts."""
+
 _NOISE = 1.0  # of gray values, of 255; the fit scales it to what it finds
 _MINIMUM_STEP = 1.0  # gray values, that the error of an edge is computed from
 _OUTLIER = 3.0  # times the usual distance from the circle that quarters the weight
@@ -80,17 +83,9 @@ class Fit(ArrayRecord):
         return frame.mean_radii(self.frames)
 
 
-_NONE = np.zeros(0)
+_NO_FRAMES, _NO_COVARIANCES = np.zeros((0, 3, 3)), np.zeros((0, 2, 2))
 NO_FITS = Fit(
-    frames=np.zeros((0, 3, 3)),
-    polarity=_NONE.astype(int),
-    contrast=_NONE,
-    bright=_NONE,
-    share=_NONE,
-    deviation=_NONE,
-    covariance=np.zeros((0, 2, 2)),
-    blur=_NONE,
-    edge_shift=_NONE,
+    *[_NO_FRAMES, np.zeros(0, int), *np.zeros((4, 0)), _NO_COVARIANCES, *np.zeros((2, 0))]
 )
 """An empty record."""
 
@@ -104,11 +99,9 @@ def fit_dots(
     reach: float,
     rounds: int = 2,
     blur: np.ndarray | None = None,
-    min_share: float = 0.0,
-    max_contrast: float = 1.0,
     covariances: bool = True,
 ) -> Fit:
-    """Fit the ellipses of dots, and drop those that their edges do not support.
+    """Fit the ellipses of dots.
 
     Parameters
     ----------
@@ -118,21 +111,17 @@ def fit_dots(
         1 for a dark dot, -1 for a bright one.
     rays : int
         Number of points about a dot.
-    min_share, max_contrast : float
-        Bounds of `Fit.share` and `Fit.contrast`.
     """
-    circles = dot_circles(polarity, rays)
-    fit = fit_circles(
+    return fit_circles(
         gray,
         frames,
-        circles,
+        dot_circles(polarity, rays),
         reach=reach,
         projective=False,
         rounds=rounds,
         blur=blur,
         covariances=covariances,
     )
-    return fit.select((fit.share >= min_share) & (fit.contrast <= max_contrast))
 
 
 def fit_circles(
@@ -298,6 +287,6 @@ def _window_of(angles: bytes, radii: bytes) -> np.ndarray:
     squares = 2 * (lengths**2 - points @ points.T)
     squares[lengths[:, None] != lengths] = np.inf
     window = np.exp(-0.5 * squares / _LIGHT_REACH**2)
-    window /= window.sum(axis=0)
+    window = (window / window.sum(axis=0)).astype(np.float32)
     window.flags.writeable = False
     return window

@@ -27,31 +27,6 @@ _CORRELATION = 2.5  # distance on the circle at which rays are independent, px
 _PART = 400_000  # samples at a time, which bounds the memory
 
 
-def circle_steps(
-    log: np.ndarray, frames: np.ndarray, aside: float | np.ndarray = PIXELS_ASIDE
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the steps of ln I from the inside of circles to their outside, along rays.
-
-    Parameters
-    ----------
-    log : ndarray of int16, shape (height, width)
-        LOG_SCALE ln(I + 8).
-    frames : ndarray of float64, shape (n, 3, 3)
-        Of the circles.
-    aside : float or ndarray of float, shape (n,)
-        Distance of the samples from the circle, px of the minor axis.
-
-    Returns
-    -------
-    steps : ndarray of float64, shape (n, m)
-        Positive where the outside is brighter.
-    inside : ndarray of bool, shape (n,)
-        Whether all of the circle lies in the image.
-    """
-    sides, inside = circle_sides(log, frames, aside)
-    return sides[..., 1] - sides[..., 0], inside
-
-
 def circle_sides(
     log: np.ndarray, frames: np.ndarray, aside: float | np.ndarray = PIXELS_ASIDE
 ) -> tuple[np.ndarray, np.ndarray]:

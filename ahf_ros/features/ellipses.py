@@ -62,23 +62,14 @@ def fit_ellipses(logs: Sequence[np.ndarray], candidates: Sequence[Candidates]) -
     Dots
         In px of the first level; only candidates that the edges support.
     """
-    started: dict[int, list[tuple[Dots, np.ndarray]]] = {}
+    found = [NO_DOTS]
     for some in candidates:
         level = 0 if some.level == 1 and some.radii[1] < _SMALL else some.level
         for start in range(0, len(some.points), _PART):
-            part = slice(start, start + _PART)
-            begun = _best_ellipses(logs[level], some, level, part)
-            started.setdefault(level, []).append(begun)
-    found = [NO_DOTS]
-    for level, parts in started.items():
-        dots = Dots.joined([of_part for of_part, _ in parts])
-        largest = np.concatenate([of_part for _, of_part in parts])
-        for start in range(0, len(dots.frames), _PART):
-            some_dots = dots.select(slice(start, start + _PART))
-            refined, kept = refine_ellipses(logs[level], some_dots.frames, some_dots.polarity)
-            major, _, _ = frame.ellipse_axes(refined.frames)
-            refined = refined.select(major < largest[start + kept])
-            found.append(replace(refined, frames=frame.enlarged(refined.frames, level)))
+            begun, largest = _best_ellipses(logs[level], some, level, slice(start, start + _PART))
+            dots, kept = refine_ellipses(logs[level], begun.frames, begun.polarity)
+            dots = dots.select(frame.ellipse_axes(dots.frames)[0] < largest[kept])
+            found.append(replace(dots, frames=frame.enlarged(dots.frames, level)))
     return Dots.joined(found)
 
 

@@ -13,8 +13,6 @@ separate t from p; with one, p is left alone and t carries the perspective bias.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 _CORNERS = 32  # of the polygon of an outline
@@ -110,57 +108,6 @@ def project(frames: np.ndarray, points: np.ndarray) -> np.ndarray:
     np.divide(across, scale, out=images[..., 0])
     np.divide(down, scale, out=images[..., 1])
     return images
-
-
-@dataclass(frozen=True, slots=True)
-class CircleGeometry:
-    """Where m points of circles are in the images of k targets, and how the circles run there.
-
-    Attributes
-    ----------
-    points : ndarray of float64, shape (k, m, 2)
-        px.
-    normals : ndarray of float64, shape (k, m, 2)
-        Unit vectors outwards.
-    scale : ndarray of float64, shape (k, m)
-        How far the circle moves along its normal where its radius grows, px a dot radius.
-    stretch : ndarray of float64, shape (k, m)
-        Length of the circle in the image, px a dot radius.
-    curvature : ndarray of float64, shape (k, m)
-        Of the circle's image, 1/px.
-    """
-
-    points: np.ndarray
-    normals: np.ndarray
-    scale: np.ndarray
-    stretch: np.ndarray
-    curvature: np.ndarray
-
-
-def circle_geometry(frames: np.ndarray, angles: np.ndarray, radii: np.ndarray) -> CircleGeometry:
-    """Return the geometry of points of circles.
-
-    Parameters
-    ----------
-    frames : ndarray of float64, shape (k, 3, 3)
-    angles, radii : ndarray of float, shape (m,)
-        Of the points, rad and dot radii.
-    """
-    radial = np.stack([np.cos(angles), np.sin(angles)])
-    tangential = np.stack([-radial[1], radial[0]])
-    images = frames[:, :, :2] @ (radii * radial) + frames[:, :, 2:]
-    depth = images[:, 2:]
-    points = images[:, :2] / depth
-    outwards, along = (
-        (moved[:, :2] - points * moved[:, 2:]) / depth
-        for moved in (frames[:, :, :2] @ radial, frames[:, :, :2] @ tangential)
-    )
-    stretch = np.hypot(along[:, 0], along[:, 1])
-    area = outwards[:, 0] * along[:, 1] - outwards[:, 1] * along[:, 0]
-    normals = np.stack([along[:, 1], -along[:, 0]], axis=2) / stretch[..., None]
-    return CircleGeometry(
-        points.transpose(0, 2, 1), normals, area / stretch, stretch, area / (radii * stretch**3)
-    )
 
 
 def displacement_basis(angles: np.ndarray, radii: np.ndarray) -> np.ndarray:

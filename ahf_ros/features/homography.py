@@ -82,36 +82,6 @@ def fit_homographies(
     return HomographyFit(back @ elements, of_centre * size[..., None] ** 2)
 
 
-def ellipse_centres(homographies: np.ndarray, points: np.ndarray, radii: np.ndarray) -> np.ndarray:
-    """Return the centres of the ellipses that circles are seen as.
-
-    Under perspective that is not the image of the centre of the circle.
-
-    Parameters
-    ----------
-    homographies : ndarray of float64, shape (k, 3, 3)
-    points : ndarray of float, shape (m, 2) or (k, m, 2)
-        Centres of the circles in the plane of the object.
-    radii : ndarray of float, shape (m,) or (k, m)
-
-    Returns
-    -------
-    ndarray of float64, shape (k, m, 2)
-        px.
-    """
-    count = len(homographies)
-    points = np.broadcast_to(points, (count, *points.shape[-2:]))
-    radii = np.broadcast_to(radii, points.shape[:2])
-    homogeneous = np.concatenate([points, np.ones((*points.shape[:2], 1))], axis=2)
-    images = homogeneous @ homographies.transpose(0, 2, 1)
-    slope = homographies[:, None, 2, :2]
-    # The pole of the line at infinity with respect to the dual conic of the image.
-    along = radii[..., None] ** 2 * (slope @ homographies[:, :, :2].transpose(0, 2, 1))
-    pole = images * images[..., 2:] - along
-    centres: np.ndarray = pole[..., :2] / pole[..., 2:]
-    return centres
-
-
 def local_frames(homographies: np.ndarray, points: np.ndarray, radii: np.ndarray) -> np.ndarray:
     """Return frames of circles in the plane of objects, see `ahf_ros.features.frame`.
 

@@ -42,7 +42,7 @@ class LightSlope:
 
     def influence(self, of_slopes: np.ndarray) -> np.ndarray:
         """Return what the errors do, given what the smoothed slopes do, shape (k, c, n) both."""
-        of_profiles = (of_slopes / self.totals[:, None]) @ self.window.T
+        of_profiles = (of_slopes / self.totals[:, None]).astype(self.window.dtype) @ self.window.T
         return of_profiles * (self.weights * self.errors)[:, None]
 
 
@@ -96,8 +96,8 @@ def smooth_slopes(
     usual = np.maximum(median(np.abs(slopes - middle), seen), _MINIMUM_USUAL)[:, None]
     robust = weights
     for _ in range(rounds):
-        totals = robust @ window + prior
-        smooth = (robust * slopes) @ window / totals
+        totals = robust.astype(window.dtype) @ window + prior
+        smooth = (robust * slopes).astype(window.dtype) @ window / totals
         errors = slopes - smooth
         used, robust = robust, cauchy(weights, errors / (_OUTLIER * usual))
     return LightSlope(smooth, errors, used, totals, window)

@@ -47,10 +47,6 @@ class LogEdges:
         names = ('x', 'y', 'unit_x', 'unit_y', 'strength')
         return replace(self, **{name: getattr(self, name)[which] for name in names})
 
-    def outside(self, polygons: Sequence[np.ndarray]) -> LogEdges:
-        """Return the edges that lie outside of polygons, each of shape (n, 2), px."""
-        return self.unmasked(mask_of(polygons, self.marked.shape))
-
     def unmasked(self, mask: np.ndarray) -> LogEdges:
         """Return the edges where a mask of the size of the image is 0."""
         return self.select(mask.ravel().take(self.y * np.intp(mask.shape[1]) + self.x) == 0)

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ahf_ros.features import frame
 from ahf_ros.features.circles import Circles
 from ahf_ros.features.sampling import sample_lines, within
 from ahf_ros.features.step_fit import ALONG, BLUR_STEP, HALF_WIDTHS, fit_steps
@@ -93,6 +92,30 @@ class Edges:
     visible: np.ndarray
 
 
+def edge_points(frames: np.ndarray, circles: Circles) -> OutlinePoints:
+    """Return where the circles of targets have edges, for frames (k, 3, 3)."""
+    radii = circles.radii
+    radial = np.stack([np.cos(circles.angles), np.sin(circles.angles)])
+    tangential = np.stack([-radial[1], radial[0]])
+    images = frames[:, :, :2] @ (radii * radial) + frames[:, :, 2:]
+    depth = images[:, 2:]
+    points = images[:, :2] / depth
+    outwards, along = (
+        (moved[:, :2] - points * moved[:, 2:]) / depth
+        for moved in (frames[:, :, :2] @ radial, frames[:, :, :2] @ tangential)
+    )
+    stretch = np.hypot(along[:, 0], along[:, 1])
+    area = outwards[:, 0] * along[:, 1] - outwards[:, 1] * along[:, 0]
+    return OutlinePoints(
+        points=points.transpose(0, 2, 1),
+        normals=np.stack([along[:, 1], -along[:, 0]], axis=2) / stretch[..., None],
+        polarity=circles.polarity,
+        scale=area / stretch,
+        spacing=circles.spacing * stretch,
+        curvature=area / (radii * stretch**3),
+    )
+
+
 def measure_edges(
     gray: np.ndarray,
     frames: np.ndarray,
@@ -113,16 +136,7 @@ def measure_edges(
     reach : float or ndarray of float, shape (k, 1)
         How far from a circle to look, dot radii.
     """
-    circle = frame.circle_geometry(frames, circles.angles, circles.radii)
-    points = OutlinePoints(
-        circle.points,
-        circle.normals,
-        circles.polarity,
-        circle.scale,
-        circles.spacing * circle.stretch,
-        circle.curvature,
-    )
-    return measure_outlines(gray, points, blur, reach)
+    return measure_outlines(gray, edge_points(frames, circles), blur, reach)
 
 
 def measure_outlines(
@@ -158,21 +172,8 @@ def measure_outlines(
     # On a curve, the blur and the chord between the two lines of a profile lie inside.
     inside = (blur[:, None] ** 2 + aside**2) / 2 * outlines.curvature
     steps[0] += np.where(which > 0, inside, 0.0).ravel()
-    offset, dark, bright, slope, sensitivity, softness, residual = (
-        of.reshape(which.shape) for of in steps
-    )
-    return Edges(
-        offset,
-        dark,
-        bright,
-        slope,
-        sensitivity,
-        softness,
-        residual,
-        outlines.scale,
-        outlines.spacing,
-        which > 0,
-    )
+    measured = steps.reshape(len(steps), *which.shape)
+    return Edges(*[*measured, outlines.scale, outlines.spacing, which > 0])
 
 
 def _profiles(

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ahf_ros.features.circle_fit import Fit, fit_circles
+from ahf_ros.features.circle_fit import ENOUGH, Fit, fit_circles
 from ahf_ros.features.circles import Circles
 
 SOFT = 1.0
@@ -18,9 +18,6 @@ SOFT = 1.0
 
 ROUNDS = 4
 """How often soft edges are measured."""
-
-MINIMUM_SHARE = 0.5
-"""Of the expected edges, for a fit to count."""
 
 
 def fit_circles_of_any_blur(
@@ -44,7 +41,7 @@ def fit_circles_of_any_blur(
     Fit
     """
     fit = fit_circles(gray, frames, circles, reach=reach, projective=projective, rounds=rounds)
-    soft = np.flatnonzero((fit.blur > SOFT) & (fit.share >= MINIMUM_SHARE))
+    soft = np.flatnonzero((fit.blur > SOFT) & (fit.share >= ENOUGH))
     if not soft.size:
         return fit
     first = fit.select(soft)
@@ -57,5 +54,5 @@ def fit_circles_of_any_blur(
         rounds=ROUNDS,
         blur=first.blur,
     )
-    good = again.share >= MINIMUM_SHARE
+    good = again.share >= ENOUGH
     return fit.replaced(soft[good], again.select(good))

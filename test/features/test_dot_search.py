@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.features import frame
-from ahf_ros.features.dot_search import propose_dots, voted_dots, whole_dots
+from ahf_ros.features.dot_search import voted_dots, whole_dots
 from ahf_ros.features.dots import Dots, distinct
 from ahf_ros.features.pyramid import image_pyramid
 from ahf_ros.synthetic.scene import SceneSettings, render
@@ -69,10 +69,10 @@ def test_votes_find_dots_whose_outlines_are_interrupted(light):
     ],
     ids=lambda view: ', '.join(map(str, view.values())),
 )
-def test_small_oblique_and_blurred_dots_are_proposed_by_one_call(view):
+def test_small_oblique_and_blurred_dots_are_found(view):
     few = {'width': 1200, 'height': 900, 'targets': 9}
     rendering = render(SceneSettings(**few, ambient=0.12, seed=4, **view))
-    dots = propose_dots(image_pyramid(rendering.image, 60.0), *SIZES, (1,))
+    dots = voted_dots(image_pyramid(rendering.image, 60.0), *SIZES, (1,))
     sizes = np.array([(it.semi_major * it.semi_minor) ** 0.5 for it in rendering.targets])
     assert (distances(dots, rendering) < 0.25 * sizes).all()
 

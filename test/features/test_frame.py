@@ -44,36 +44,6 @@ def test_each_frame_projects_points_of_its_own():
         assert images == pytest.approx(frame.project(own[None], of_frame)[0])
 
 
-def test_geometry_of_a_circle():
-    geometry = frame.circle_geometry(
-        frame.affine_frames([50], [40], [8], [8], [0]), ANGLES, np.full(24, 2.5)
-    )
-    normals = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
-    assert geometry.normals[0] == pytest.approx(normals)
-    assert geometry.points[0] == pytest.approx(np.array([50, 40]) + 20 * normals)
-    assert geometry.scale[0] == pytest.approx(np.full(24, 8.0))
-    assert geometry.stretch[0] == pytest.approx(np.full(24, 8.0))
-    assert geometry.curvature[0] == pytest.approx(np.full(24, 1 / 20))
-
-
-def test_geometry_of_an_oblique_circle_is_that_of_its_points():
-    step = 1e-4
-    before, at, after = (
-        frame.project(OBLIQUE, frame.circle_points(ANGLES + shift, np.ones(1)))[0, :, 0]
-        for shift in (-step, 0, step)
-    )
-    along, bend = (after - before) / (2 * step), (after - 2 * at + before) / step**2
-    speed = np.hypot(*along.T)
-    geometry = frame.circle_geometry(OBLIQUE, ANGLES, np.ones(24))
-    assert geometry.points[0] == pytest.approx(at)
-    assert geometry.stretch[0] == pytest.approx(speed, rel=1e-5)
-    curvature = (along[:, 0] * bend[:, 1] - along[:, 1] * bend[:, 0]) / speed**3
-    assert geometry.curvature[0] == pytest.approx(curvature, rel=1e-3)
-    wider = frame.project(OBLIQUE, frame.circle_points(ANGLES, np.array([1 + step])))[0, :, 0]
-    outwards = ((wider - at) * geometry.normals[0]).sum(axis=1) / step
-    assert geometry.scale[0] == pytest.approx(outwards, rel=1e-2)
-
-
 @pytest.mark.parametrize('unknown', range(7))
 def test_the_basis_says_how_circles_move(unknown):
     changes = np.zeros((1, 7))

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ahf_ros.detectors.gsi.refinement import ellipse_centres
 from ahf_ros.features.frame import ellipse_axes, project
-from ahf_ros.features.homography import ellipse_centres, fit_homographies, local_frames
+from ahf_ros.features.homography import fit_homographies, local_frames
 
 POINTS = np.array([[14.5, 14.5], [-0.5, -11.5], [-11.5, -11.5], [-11.5, -0.5], [0, 0], [3.5, 14]])
 

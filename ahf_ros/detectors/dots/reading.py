@@ -10,7 +10,7 @@ from ahf_ros.codes.dots import DotFamily
 from ahf_ros.detectors.dots.border_steps import border_steps
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.circle_fit import Fit
-from ahf_ros.features.dot_evidence import PIXELS_ASIDE, circle_steps, dot_evidence
+from ahf_ros.features.dot_evidence import PIXELS_ASIDE, circle_sides, dot_evidence
 from ahf_ros.features.homography import local_frames
 
 _PHASES = 12  # of the ring, in the angle from one place to the next
@@ -71,7 +71,7 @@ def read_rings(log: np.ndarray, fit: Fit, code: DotFamily) -> Readings:
     code : DotFamily
     """
     count, bits, polarity = len(fit.frames), code.bits, fit.polarity
-    disc, _ = circle_steps(log, fit.frames)
+    disc = np.diff(circle_sides(log, fit.frames)[0])[..., 0]
     usual = np.maximum(np.median(disc * polarity[:, None], axis=1), _MINIMUM_STEP)
     phases = 2 * np.pi / bits * np.arange(_PHASES) / _PHASES
     points = dot_points((phases[:, None] - 2 * np.pi * np.arange(bits) / bits).ravel(), code)
@@ -80,9 +80,9 @@ def read_rings(log: np.ndarray, fit: Fit, code: DotFamily) -> Readings:
     shape = (len(radii), count, _PHASES, bits)
     small = np.stack([local_frames(fit.frames, points, np.full(len(points), r)) for r in radii])
     single = small.reshape(len(radii), -1, 3, 3)
-    of_radii = [circle_steps(log, frames, aside) for frames in single]
+    of_radii = [circle_sides(log, frames, aside) for frames in single]
     inside = np.asarray(of_radii[-1][1].reshape(count, _PHASES * bits).all(axis=1))
-    steps = np.stack([of_one for of_one, _ in of_radii])
+    steps = np.diff([of_one for of_one, _ in of_radii])[..., 0]
     steps = steps.reshape(*shape, steps.shape[-1]) * polarity[:, None, None, None]
     steps /= usual[:, None, None, None]
     small = small.reshape(*shape, 3, 3)

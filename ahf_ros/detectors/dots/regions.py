@@ -9,7 +9,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from ahf_ros.features.log_edges import LogEdges
+from ahf_ros.features.log_edges import LogEdges, mask_of
 
 STRAIGHT = 8.0
 """Length of an edge that is no small dot's, px of the image at half its size."""
@@ -35,7 +35,7 @@ def open_regions(edges: LogEdges, outlines: np.ndarray) -> list[tuple[slice, sli
         Rows and columns of the image at half its size; regions may overlap.
     """
     height, width = edges.marked.shape
-    rest = edges.outside(list(outlines)).curved(STRAIGHT)
+    rest = edges.unmasked(mask_of(outlines, edges.marked.shape)).curved(STRAIGHT)
     rows, columns = -(-height // _TILE), -(-width // _TILE)
     of_tiles = np.bincount(
         rest.y // _TILE * columns + rest.x // _TILE, minlength=rows * columns

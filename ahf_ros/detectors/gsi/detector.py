@@ -35,17 +35,22 @@ from ahf_ros.detectors.gsi.hypotheses import (
 from ahf_ros.detectors.gsi.reading import read_codes
 from ahf_ros.detectors.gsi.refinement import dot_frames, measure_dots, place_targets, resized
 from ahf_ros.features import frame
-from ahf_ros.features.dot_search import whole_dots, with_other_dots
-from ahf_ros.features.dots import Dots
+from ahf_ros.features.dot_search import voted_dots, whole_dots
+from ahf_ros.features.dots import Dots, distinct
 from ahf_ros.features.ellipse_targets import ellipse_fields, targets_from_frames
 from ahf_ros.features.homography import local_frames
 from ahf_ros.features.large_targets import targets_of_octaves
+from ahf_ros.features.log_edges import LOG_SCALE
 from ahf_ros.features.pyramid import ImagePyramid, Octave, image_pyramid
+from ahf_ros.features.small_dots import small_dots
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, DottedTarget, Target, sorted_targets
 
 _FAMILY = 'gsi'  # whichever data file describes it
 _MARGIN = 0.5  # about the dots of certain targets, dot radii
+_WHOLE_MARGIN = 0.4  # about a dot whose outline is whole, dot radii
+_SMALL = 12.0  # radius up to which dots are looked for as blobs, px
+_SMALLER = 0.8  # of the smallest radius, of a blob whose edge is blurred
 _PROMISING = 0.85  # support of a hypothesis with another code than before, to be placed again
 _FARTHEST = 1.0  # that the reference point is moved by a refinement, px, or dot radii
 
@@ -153,9 +158,23 @@ def find_hypotheses(
         rest &= ~inside(whole.frames[:, :2, 2], frames)
         corners = frame.circle_outlines(frames, np.ones(len(frames))).reshape(-1, 2)
         explained.append(cv2.convexHull(corners.astype(np.float32))[:, 0])
-    dots = with_other_dots(pyramid, whole.select(rest), *kind, explained=explained)
-    dots = resized(pyramid.gray, dots)
+    dots = resized(pyramid.gray, _with_others(pyramid, whole.select(rest), settings, explained))
     return read_targets(pyramid, dots, code, certain, obvious=False), dots
+
+
+def _with_others(
+    pyramid: ImagePyramid, whole: Dots, settings: DetectorSettings, explained: list[np.ndarray]
+) -> Dots:
+    """Return dots with a whole outline, and those without one outside of explained outlines."""
+    outlines = frame.circle_outlines(whole.frames, np.full(len(whole.frames), 1 + _WHOLE_MARGIN))
+    minimum, maximum = settings.radii
+    known = [*outlines, *explained]
+    found = [whole, voted_dots(pyramid, minimum, maximum, settings.polarities, explained=known)]
+    if minimum < _SMALL:
+        radii = _SMALLER * minimum, min(maximum, _SMALL)
+        blobs = small_dots(pyramid.logs[0], *radii, settings.polarities, LOG_SCALE, explained)
+        found.append(blobs)
+    return distinct(Dots.joined(found))
 
 
 def read_targets(

@@ -17,12 +17,12 @@ from itertools import pairwise
 import numpy as np
 
 from ahf_ros.codes.gsi import PointFamily
+from ahf_ros.detectors.gsi.nearest_dots import NearestDots
 from ahf_ros.detectors.gsi.pairs import PART, Pairs, neighbours, radius_scales
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.dots import Dots
 from ahf_ros.features.homography import fit_homographies, local_frames
-from ahf_ros.features.nearest_dots import NearestDots
 from ahf_ros.features.robust import median
 
 _LENGTH_ERROR = (0.35, 0.7)  # of a distance in units of an ellipse: share of it, and dot radii

@@ -11,10 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ahf_ros.features.array_record import ArrayRecord
+from ahf_ros.features.circle_fit import ENOUGH
 from ahf_ros.features.circles import dot_circles
 from ahf_ros.features.dots import Dots
 from ahf_ros.features.frame import ellipse_axes, mean_radii, project
-from ahf_ros.features.homography import ellipse_centres, fit_homographies, local_frames
+from ahf_ros.features.homography import fit_homographies, local_frames
 from ahf_ros.features.robust import median
 from ahf_ros.features.sampling import sample_circles
 from ahf_ros.features.soft_edges import fit_circles_of_any_blur
@@ -23,7 +24,6 @@ from ahf_ros.imaging.black import black_lift
 _RAYS = 32  # about a dot
 _REACHES = ((2.3, 0.45), (1.1, 0.95), (0.5, 1.9))
 # Semi-minor axis of a dot, px, from where on its edge is looked for within a reach, dot radii.
-_MINIMUM_SHARE = 0.5  # of the edge of a dot, for its fit to count
 _FARTHEST, _FARTHEST_SHARE = 0.8, 0.25  # that the centre of a dot is moved: px, radii
 _UNMEASURED = 0.3  # standard deviation of a centre whose edge was not fitted, px
 _OUTLIER = 4.0  # standard deviations from which a dot loses its weight
@@ -107,7 +107,7 @@ def measure_dots(gray: np.ndarray, frames: np.ndarray, polarity: np.ndarray) -> 
         circles = dot_circles(polarity[which], _RAYS)
         fit = fit_circles_of_any_blur(gray, frames[which], circles, reach=reach, projective=False)
         moved = np.hypot(*(fit.frames[:, :2, 2] - frames[which, :2, 2]).T)
-        good = fit.share >= _MINIMUM_SHARE
+        good = fit.share >= ENOUGH
         found[which], fitted[which[good]] = good, fit.frames[good]
         good &= moved <= np.maximum(_FARTHEST, _FARTHEST_SHARE * minor[which])
         near[which] = good
@@ -205,3 +205,33 @@ def dot_frames(homographies: np.ndarray, places: np.ndarray, radii: np.ndarray) 
     frames = local_frames(homographies, places, radii)
     frames[..., :2, 2] = ellipse_centres(homographies, places, radii)
     return frames
+
+
+def ellipse_centres(homographies: np.ndarray, points: np.ndarray, radii: np.ndarray) -> np.ndarray:
+    """Return the centres of the ellipses that circles are seen as.
+
+    Under perspective that is not the image of the centre of the circle.
+
+    Parameters
+    ----------
+    homographies : ndarray of float64, shape (k, 3, 3)
+    points : ndarray of float, shape (m, 2) or (k, m, 2)
+        Centres of the circles in the plane of the object.
+    radii : ndarray of float, shape (m,) or (k, m)
+
+    Returns
+    -------
+    ndarray of float64, shape (k, m, 2)
+        px.
+    """
+    count = len(homographies)
+    points = np.broadcast_to(points, (count, *points.shape[-2:]))
+    radii = np.broadcast_to(radii, points.shape[:2])
+    homogeneous = np.concatenate([points, np.ones((*points.shape[:2], 1))], axis=2)
+    images = homogeneous @ homographies.transpose(0, 2, 1)
+    slope = homographies[:, None, 2, :2]
+    # The pole of the line at infinity with respect to the dual conic of the image.
+    along = radii[..., None] ** 2 * (slope @ homographies[:, :, :2].transpose(0, 2, 1))
+    pole = images * images[..., 2:] - along
+    centres: np.ndarray = pole[..., :2] / pole[..., 2:]
+    return centres

@@ -136,14 +136,17 @@ def read_image(
         part = octave.pyramid.gray
         for propose in proposals:
             dots = propose(octave, settings.polarities, explained)
-            fits = measure_dots(part, dots, families, keep_all=settings.report_undecoded)
+            fits, others = measure_dots(part, dots, families, keep_all=settings.report_undecoded)
+            halves = images[: octave.level + 1]
+            unread = at_full_size(halves, Hypotheses.unread(others, families[0]))
+            explained = Explained.joined([explained, Explained.by(unread)])
             if not len(fits.frames):
                 continue
             if not explained.certain.any():
                 families = by_clear_dots(part, fits, families)
             shifts = explained.shifts[explained.certain] / 2**octave.level
             read = read_families(part, fits, families, Prior.after(expected, shifts))
-            read = at_full_size(images[: octave.level + 1], read)
+            read = at_full_size(halves, read)
             explained = Explained.joined([explained, Explained.by(read)])
             found.append(read)
     return Hypotheses.joined(found)

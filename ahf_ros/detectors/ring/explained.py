@@ -10,7 +10,6 @@ from ahf_ros.detectors.ring.circles import REACH
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
-from ahf_ros.features.soft_edges import SOFT
 
 WHOLE = 0.9
 """Share of the edge of a dot that is explained, or reported, without a word."""
@@ -44,7 +43,7 @@ class Explained(ArrayRecord):
     def by(read: Hypotheses) -> Explained:
         """Return what hypotheses explain, those of a whole image."""
         certain = read.certain
-        explained = certain | ((read.share >= WHOLE) & (read.blur < SOFT))
+        explained = certain | (read.share >= WHOLE)
         read, certain = read.select(explained), certain[explained]
         _, minor, _ = frame.ellipse_axes(read.frames)
         radii = np.where(certain, read.reach / minor, 1.0) + REACH

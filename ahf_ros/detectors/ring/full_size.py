@@ -13,17 +13,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from ahf_ros.codes.ring import Family
 from ahf_ros.detectors.ring.circles import REACH, target_circles
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.reading import PER_SECTOR
 from ahf_ros.features import frame
-from ahf_ros.features.circle_fit import fit_circles
-from ahf_ros.features.profiles import USUAL_BLUR
-from ahf_ros.features.soft_edges import MINIMUM_SHARE, ROUNDS, SOFT
-
-_USUAL_ROUNDS = 2  # how often edges are measured that are not soft
-_FARTHEST, _FARTHEST_SOFT = 2.0, 0.4  # that a centre is moved in a larger image or the same, px
+from ahf_ros.features.circle_fit import ENOUGH
+from ahf_ros.features.soft_edges import SOFT, fit_circles_of_any_blur
 
 
 def at_full_size(images: Sequence[np.ndarray], read: Hypotheses) -> Hypotheses:
@@ -42,10 +37,10 @@ def at_full_size(images: Sequence[np.ndarray], read: Hypotheses) -> Hypotheses:
             read,
             frames=frame.enlarged(read.frames, 1),
             covariance=4 * read.covariance,
-            blur=_enlarged(read.blur),
+            blur=2 * read.blur,
             edge_shift=2 * read.edge_shift,
         )
-        read = _measured(image, read, read.certain, _FARTHEST)
+        read = _measured(image, read, read.certain)
     return read
 
 
@@ -60,50 +55,26 @@ def with_soft_edges(image: np.ndarray, read: Hypotheses, right: np.ndarray) -> H
     right : ndarray of bool, shape (k,)
         Whether their words are right.
     """
-    return _measured(image, read, right & (read.blur > SOFT), _FARTHEST_SOFT)
+    return _measured(image, read, right & (read.blur > SOFT))
 
 
-def _enlarged(blur: np.ndarray) -> np.ndarray:
-    """Return the blur of edges in the image whose half shows them with another blur."""
-    added = USUAL_BLUR**2  # by pixels and interpolation, in either
-    return np.sqrt(4 * np.maximum(blur**2 - added, 0) + added)
-
-
-def _measured(
-    image: np.ndarray, read: Hypotheses, which: np.ndarray, farthest: float
-) -> Hypotheses:
+def _measured(image: np.ndarray, read: Hypotheses, which: np.ndarray) -> Hypotheses:
     """Return hypotheses, some with frames from the edges of an image, if it shows them."""
     selected = np.flatnonzero(which)
-    if not selected.size:
-        return read
-    gray = image.astype(np.float32, copy=False)
-    soft = read.blur > SOFT
     for code in dict.fromkeys(read.families[selected]):
         of_code = selected[read.families[selected] == code]
-        for of_kind, rounds in ((~soft, _USUAL_ROUNDS), (soft, ROUNDS)):
-            some = of_code[of_kind[of_code]]
-            if some.size:
-                fitted = _fitted(gray, read.select(some), code, rounds, farthest)
-                read = read.replaced(some, fitted)
+        some = read.select(of_code)
+        circles = target_circles(some.words, some.starts, some.polarity, PER_SECTOR, code)
+        gray = image.astype(np.float32, copy=False)
+        fit = fit_circles_of_any_blur(gray, some.frames, circles, reach=REACH, projective=True)
+        fitted = replace(
+            some,
+            frames=fit.frames,
+            covariance=fit.covariance,
+            share=fit.share,
+            blur=fit.blur,
+            edge_shift=fit.edge_shift,
+        )
+        good = fit.share >= ENOUGH
+        read = read.replaced(of_code[good], fitted.select(good))
     return read
-
-
-def _fitted(
-    gray: np.ndarray, read: Hypotheses, code: Family, rounds: int, farthest: float
-) -> Hypotheses:
-    """Return hypotheses of one family with frames from the edges of an image, if it shows them."""
-    circles = target_circles(read.words, read.starts, read.polarity, PER_SECTOR, code)
-    fit = fit_circles(
-        gray, read.frames, circles, reach=REACH, projective=True, rounds=rounds, blur=read.blur
-    )
-    moved = np.hypot(*(fit.frames[:, :2, 2] - read.frames[:, :2, 2]).T)
-    good = (fit.share >= MINIMUM_SHARE) & (moved <= farthest)
-    better = replace(
-        read,
-        frames=fit.frames,
-        covariance=fit.covariance,
-        share=fit.share,
-        blur=fit.blur,
-        edge_shift=fit.edge_shift,
-    )
-    return read.replaced(good, better.select(good))

@@ -15,13 +15,14 @@ import numpy as np
 
 from ahf_ros.codes.ring import Family
 from ahf_ros.detectors.ring.decoding import COVER
-from ahf_ros.detectors.ring.likelihood import HOPEFUL, edge_evidence, growth_by
+from ahf_ros.detectors.ring.likelihood import edge_evidence, growth_by
 from ahf_ros.detectors.ring.polar import DOT, MARGIN, PolarImages, polar_images
 from ahf_ros.features.circle_fit import Fit
 
-_ANGLES, _CIRCLES = 64, 36
+_PER_SECTOR, _CIRCLES = 3, 36  # angles of the shortest sectors, and circles
 _PHASES = 4  # of the sectors
 _SHIFTS = (-1.2, 0.0, 1.2)  # of edges, px; readings keep farther away from these than the error
+_HOPEFUL = 0.1  # bound of the mean evidence of a reading, from which a band is read
 _CAP = 3.0  # evidence of a reading against bare paper
 _ALIKE, _MOST = 0.15, 0.5  # difference of ln, and share of what is beyond, that show a hole
 
@@ -40,12 +41,13 @@ def may_be_targets(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> n
     for code in families:
         bits.setdefault(code.band, set()).add(code.bits)
     bounds = [_bound(gray, dots, band, of_band) for band, of_band in bits.items()]
-    return np.asarray(np.max(bounds, axis=0) > HOPEFUL)
+    return np.asarray(np.max(bounds, axis=0) > _HOPEFUL)
 
 
 def _bound(gray: np.ndarray, dots: Fit, band: tuple[float, float], bits: set[int]) -> np.ndarray:
     """Return a bound of the mean evidence of readings for words of some lengths, shape (k,)."""
-    polar = polar_images(gray, dots, band, _ANGLES, _CIRCLES)
+    angles = _PER_SECTOR * max(bits)
+    polar = polar_images(gray, dots, band, angles, _CIRCLES)
     best = np.full(len(dots.frames), -np.inf)
     for shift in _SHIFTS:
         growth = growth_by(shift, polar.size)
@@ -56,7 +58,7 @@ def _bound(gray: np.ndarray, dots: Fit, band: tuple[float, float], bits: set[int
             of_word = np.maximum(np.maximum(paper, ink), -COVER).sum(axis=2)
             marked = _of_sectors(np.clip((edges.ink - edges.paper).sum(axis=1), -cap, cap), count)
             bound = np.minimum(of_word, np.maximum(marked, 0).sum(axis=2)).max(axis=1)
-            best = np.maximum(best, bound / (_ANGLES * edges.weight))
+            best = np.maximum(best, bound / (angles * edges.weight))
     return np.where(_holes(polar, band), -np.inf, best)
 
 

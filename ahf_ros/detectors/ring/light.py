@@ -24,8 +24,8 @@ _ASIDE = 0.18  # distance of ground from edges, dot radii
 _OVERLAP = 0.12  # share of the ground that a shift must compare
 _SHIFTS = 60  # best ones, that predict
 _ALIKE = 1.1  # ratio of differences of shifts that are as good as each other
-_EVEN = 1e-5  # smallest square of ln by which ground differs from itself
-_UNKNOWN = 0.03  # weight of ground below which a point is not predicted
+_UNKNOWN = 0.03  # weight of ground below which less than two of the shifts predict a point
+_ROUNDING = 1e-5  # square of ln by which whole gray values near 90 differ, without any noise
 _PART = 64  # targets at a time, which bounds the memory
 
 
@@ -73,10 +73,10 @@ def predicted_light(
         logs = (logs - middle) * ground
         first, second = (np.fft.rfft2(of, (_TRANSFORM,) * 2) for of in (logs, logs * logs))
         # Of the squares of differences between ground and shifted ground.
-        both = 2 * seen.conj() * second - 2 * np.abs(first) ** 2
-        differ = np.fft.irfft2(both, (_TRANSFORM,) * 2)
-        differ = (differ + _turned(differ)).reshape(len(logs), -1)[:, candidates] / 2
-        differ = np.maximum(differ / overlap, _EVEN) * order
+        # Opposite shifts compare the same pairs of points, which the real part says of both.
+        both = 2 * (seen.conj() * second).real - 2 * (first.real**2 + first.imag**2)
+        differ = np.fft.irfft2(both, (_TRANSFORM,) * 2).reshape(len(logs), -1)[:, candidates]
+        differ = np.maximum(differ / overlap, _ROUNDING) * order
         best = np.argpartition(differ, _SHIFTS, axis=1)[:, :_SHIFTS]
         of_best = np.take_along_axis(differ, best, axis=1)
         weight = 1 / (of_best + of_best.min(axis=1, keepdims=True) / 2)
@@ -118,11 +118,6 @@ def _geometry(
     candidates = (overlap > _OVERLAP * whole.sum()) & (away > 0) & (away <= _FARTHEST)
     which = np.flatnonzero(candidates)
     return points, whole, which, np.random.default_rng(0).uniform(1, _ALIKE, len(which))
-
-
-def _turned(of_shifts: np.ndarray) -> np.ndarray:
-    """Return what belongs to the opposite shifts, which compare the same pairs of points."""
-    return np.roll(of_shifts[:, ::-1, ::-1], 1, axis=(1, 2))
 
 
 def _places(

@@ -11,17 +11,13 @@ from ahf_ros.detectors.ring.circles import RAYS, REACH
 from ahf_ros.detectors.ring.explained import Explained
 from ahf_ros.detectors.ring.glance import may_be_targets
 from ahf_ros.detectors.ring.polar import PART
-from ahf_ros.features.circle_fit import NO_FITS, Fit, fit_dots
+from ahf_ros.features.circle_fit import ENOUGH, NO_FITS, Fit, fit_dots
 from ahf_ros.features.dot_search import voted_dots, whole_dots
 from ahf_ros.features.dots import Dots
 from ahf_ros.features.pyramid import Octave
-from ahf_ros.features.soft_edges import MINIMUM_SHARE, ROUNDS, SOFT
 
 Proposal = Callable[[Octave, Sequence[int], Explained], Dots]
 """From an octave, the polarities of dots and what is explained already to dots of the octave."""
-
-_HOLDING = 22.0  # radius of a dot about which profiles hold the softest edge, px
-_FAINTEST = 0.8  # contrast of a dot, dark over bright, for its band to be read
 
 
 def propose_whole(octave: Octave, polarities: Sequence[int], _explained: Explained) -> Dots:
@@ -41,8 +37,8 @@ PROPOSALS: tuple[Proposal, ...] = (propose_whole, propose_voted)
 
 def measure_dots(
     gray: np.ndarray, dots: Dots, families: Sequence[Family], *, keep_all: bool = False
-) -> Fit:
-    """Return the fits of the dots whose bands are worth reading.
+) -> tuple[Fit, Fit]:
+    """Return the fits of the dots whose bands are worth reading, and those of the others.
 
     Parameters
     ----------
@@ -54,24 +50,20 @@ def measure_dots(
     keep_all : bool
         Whether dots that are no middles of targets are measured as well.
     """
-    worth = [NO_FITS]
+    worth, others = [NO_FITS], [NO_FITS]
     for start in range(0, len(dots.frames), PART):
         part = dots.select(slice(start, start + PART))
         fit = _fit(gray, part, covariances=keep_all)
         if not keep_all:
-            fit = fit.select(may_be_targets(gray, fit, families))
-        fit = _fit(gray, fit)
-        # How soft an edge is shows only where a profile holds all of it.
-        is_soft = (fit.blur > SOFT) & (fit.share >= MINIMUM_SHARE) & (fit.size > _HOLDING)
-        soft = np.flatnonzero(is_soft)
-        if soft.size:
-            fit = fit.replaced(soft, _fit(gray, fit.select(soft), ROUNDS))
-        worth.append(fit)
+            likely = may_be_targets(gray, fit, families)
+            others.append(fit.select(~likely))
+            fit = fit.select(likely)
+        worth.append(_fit(gray, fit))
     fit = Fit.joined(worth)
-    return fit.select((fit.share >= MINIMUM_SHARE) & (fit.contrast <= _FAINTEST))
+    return fit.select(fit.share >= ENOUGH), Fit.joined(others)
 
 
-def _fit(gray: np.ndarray, dots: Dots | Fit, rounds: int = 1, *, covariances: bool = True) -> Fit:
+def _fit(gray: np.ndarray, dots: Dots | Fit, *, covariances: bool = True) -> Fit:
     """Return fits of dots, whose blur is that of an earlier fit or the usual one."""
     return fit_dots(
         gray,
@@ -79,7 +71,7 @@ def _fit(gray: np.ndarray, dots: Dots | Fit, rounds: int = 1, *, covariances: bo
         dots.polarity,
         rays=RAYS // 2,
         reach=REACH,
-        rounds=rounds,
+        rounds=1,
         blur=dots.blur if isinstance(dots, Fit) else None,
         covariances=covariances,
     )

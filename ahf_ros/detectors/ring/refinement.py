@@ -19,9 +19,8 @@ from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.prior import Prior
 from ahf_ros.detectors.ring.reading import read_bands
 from ahf_ros.features import frame
-from ahf_ros.features.circle_fit import Fit, fit_dots
+from ahf_ros.features.circle_fit import ENOUGH, Fit, fit_dots
 from ahf_ros.features.ellipse_targets import ellipse_fields
-from ahf_ros.features.soft_edges import MINIMUM_SHARE
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, Target
 
@@ -73,7 +72,7 @@ def refine_centres(
     located = _locate(gray, start, targets, family, polarities, expected)
     moved = np.hypot(*(located.frames[:, :2, 2] - start[:, :2, 2]).T)
     reach = np.maximum(_FARTHEST, _FARTHEST_SHARE * frame.ellipse_axes(start)[1])
-    good = (located.share >= MINIMUM_SHARE) & (moved <= reach)
+    good = (located.share >= ENOUGH) & (moved <= reach)
     places = ellipse_fields(located.frames, located.covariance, located.shift)
     return [
         replace(target, **place) if is_good else target
@@ -92,7 +91,7 @@ def _locate(
     """Return targets, by dot and band where the band agrees, else by the dot."""
     dots = _fit_either_polarity(gray, start, polarities)
     decoded = np.flatnonzero(
-        [target.id != UNDECODED for target in targets] & (dots.share >= MINIMUM_SHARE)
+        [target.id != UNDECODED for target in targets] & (dots.share >= ENOUGH)
     )
     hypotheses, which = _agreeing(gray, dots, decoded, targets, family, expected)
     # Of two hypotheses on one target, the one with the larger margin comes first.
@@ -126,7 +125,7 @@ def _agreeing(
         read = read_bands(gray, some, code, Prior(expected))
         which = of_family
         agreed = (read.words > 0) & (canonical(read.words, code)[0] == codes[which])
-        agreed &= read.share >= MINIMUM_SHARE
+        agreed &= read.share >= ENOUGH
         parts.append(with_soft_edges(gray, read, agreed).select(agreed))
         of_parts.append(which[agreed])
     return Hypotheses.joined(parts), np.concatenate(of_parts)

@@ -105,14 +105,8 @@ def _identify_dots(
     covariance = np.broadcast_to(_CONTOUR_ERROR**2 * np.eye(2), (len(frames), 2, 2))
     code = family(settings.family)
     if fine:
-        fit = fit_dots(
-            gray,
-            frames,
-            np.full(len(frames), polarity),
-            rays=_RAYS,
-            reach=REACH,
-            min_share=_MINIMUM_SHARE,
-        )
+        fit = fit_dots(gray, frames, np.full(len(frames), polarity), rays=_RAYS, reach=REACH)
+        fit = fit.select(fit.share >= _MINIMUM_SHARE)
         frames, covariance = fit.frames, fit.covariance
     if not len(frames):
         return []

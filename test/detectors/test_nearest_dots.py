@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ahf_ros.features.nearest_dots import NearestDots
+from ahf_ros.detectors.gsi.nearest_dots import NearestDots
 
 
 def test_the_map_knows_the_nearest_of_dots_that_are_apart() -> None:
