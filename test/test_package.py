@@ -48,7 +48,7 @@ ROSDEP = {
     'zstandard': 'mcap-ros2-support',
 }
 """Keys of rosdep of what is not a ROS package; mcap-ros2-support brings mcap and zstandard,
-scikit-learn threadpoolctl."""
+scikit-learn threadpoolctl, which has no key."""
 
 NOT_IN_ROSDEP = {
     'Metashape',
@@ -105,7 +105,7 @@ def test_everything_but_the_nodes_works_without_ros() -> None:
 
 
 def test_what_needs_no_ros_among_the_nodes_does_without() -> None:
-    names = ('ahf_ros.nodes.settings', 'ahf_ros.nodes.drivers', 'ahf_ros.nodes.help')
+    names = ('ahf_ros.nodes.settings', 'ahf_ros.nodes.drivers', 'ahf_ros.nodes.interfaces')
     command = [sys.executable, '-c', WITHOUT_ROS, *names]
     subprocess.run(command, cwd=ROOT, check=True)
 

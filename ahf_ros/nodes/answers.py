@@ -13,9 +13,7 @@ from visualization_msgs.msg import ImageMarker
 
 from ahf_ros.drawing.overlay import draw
 from ahf_ros.msg import CodedTargetArray
-from ahf_ros.nodes.annotation_msg import target_annotations
 from ahf_ros.nodes.cloud import TargetPoints
-from ahf_ros.nodes.detection_msg import target_detections
 from ahf_ros.nodes.diagnostics import CloudTally, Tally
 from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.nodes.inputs import Input
@@ -23,6 +21,7 @@ from ahf_ros.nodes.matching import Waiting
 from ahf_ros.nodes.pipeline import Pipeline
 from ahf_ros.nodes.process import ProcessNode
 from ahf_ros.nodes.settings import DetectorNodeSettings
+from ahf_ros.nodes.target_msg import target_annotations, target_detections
 from ahf_ros.nodes.topics import ANSWERS_KEPT, DETECTIONS
 from ahf_ros.nodes.undistortion import UndistortedTargets
 from ahf_ros.stream import Answer
