@@ -10,9 +10,8 @@ import pytest
 
 from ahf_ros.codes.dots import dot_family
 from ahf_ros.codes.families import numbers_of
-from ahf_ros.codes.independent import independent_set
 from ahf_ros.codes.ring import family
-from ahf_ros.codes.selection import confused_pairs, select_ids, smallest_distance
+from ahf_ros.codes.selection import confused_pairs, independent_set, select_ids, smallest_distance
 from support.square_markers import needs_square_markers
 
 

@@ -14,11 +14,10 @@ from ahf_ros.imaging.image import stretched_to_8_bit
 from ahf_ros.imaging.stack import ImageStack
 from ahf_ros.interchange.image_files import read_image, write_image
 from ahf_ros.report import pictures
-from ahf_ros.report.images import find_image, shown_image
-from ahf_ros.report.pictures import fitted, thumbnail
+from ahf_ros.report.images import find_image, fitted, shown_image, thumbnail
+from ahf_ros.report.page import families_of, row
 from ahf_ros.report.reading import read_results
 from ahf_ros.report.results import ImageResult, result_from_json
-from ahf_ros.report.rows import families_of, row
 from ahf_ros.target import SquareMarker, TrueTarget
 from support.results import record, save_image, save_lines, searched, target, undecoded
 
