@@ -146,8 +146,8 @@ def select_ids(name: str, ids: Sequence[int], count: int, file: str = '') -> lis
     Examples
     --------
     >>> ids = select_ids('metashape14', range(1, 562), 20)
-    >>> len(ids), smallest_distance('metashape14', ids)
-    (20, 4)
+    >>> len(ids)
+    20
     """
     generator = np.random.default_rng(0)
     pool = np.array(sorted(ids))
@@ -168,36 +168,6 @@ def select_ids(name: str, ids: Sequence[int], count: int, file: str = '') -> lis
         f'best is {count}, accepted is an integer from 1 to {largest}: no larger set of IDs of '
         f'{name} was found in which no target turns into another one by a cover'
     )
-
-
-def smallest_distance(name: str, ids: Sequence[int], file: str = '') -> int:
-    """Return the smallest Hamming distance between the words of any two IDs, over all rotations.
-
-    Parameters
-    ----------
-    name, ids, file
-        As for `select_ids`; at least two IDs.
-    """
-    distances = _distances(_orbits(name, np.asarray(ids), file))
-    return int(distances[np.triu_indices(len(ids), 1)].min())
-
-
-def confused_pairs(name: str, ids: Sequence[int], file: str = '') -> list[tuple[int, int]]:
-    """Return the pairs of IDs that a cover in one colour can turn into each other.
-
-    Parameters
-    ----------
-    name, ids, file
-        As for `select_ids`.
-
-    Examples
-    --------
-    >>> len(confused_pairs('metashape12', range(1, 162)))
-    1652
-    """
-    pool = np.asarray(ids)
-    pairs = np.argwhere(np.triu(_confused(name, pool, file)))
-    return [(int(pool[first]), int(pool[second])) for first, second in pairs]
 
 
 def _cyclic(name: str, file: str) -> CyclicFamily | None:

@@ -13,7 +13,7 @@ import pytest
 from ahf_ros.imaging.image import stretched_to_8_bit
 from ahf_ros.imaging.stack import ImageStack
 from ahf_ros.interchange.image_files import read_image, write_image
-from ahf_ros.report import pictures
+from ahf_ros.report import images
 from ahf_ros.report.images import find_image, fitted, shown_image, thumbnail
 from ahf_ros.report.page import families_of, row
 from ahf_ros.report.reading import read_results
@@ -103,7 +103,7 @@ def test_pictures_take_no_more_bytes_than_they_may(monkeypatch: pytest.MonkeyPat
     assert fitted(noise[:40, :50], 10).width <= 16
     small = thumbnail(noise)
     assert (small.width, small.height) == (117, 88)
-    monkeypatch.setattr(pictures.cv2, 'haveImageWriter', lambda _: False)
+    monkeypatch.setattr(images.cv2, 'haveImageWriter', lambda _: False)
     assert fitted(noise, 40_000).kind == 'image/jpeg'
 
 
