@@ -85,7 +85,7 @@ def family(name: str) -> Family:
         words = words[words & (words >> half) & ((1 << half) - 1) != 0]
     words.setflags(write=False)
     inner, outer = BAND_RADII[vendor]
-    return Family(name, bits, words, inner, outer)
+    return Family(name=name, bits=bits, words=words, band_inner=inner, band_outer=outer)
 
 
 def mirrored(word: int, bits: int) -> int:

@@ -132,7 +132,14 @@ def _marked(
             named = several and target.id != UNDECODED
             text = f'{look.text} {target.family}' if named else look.text
             labels.append(
-                Label(text, target.x, target.y, _radius(target), look.colour, _outline(target))
+                Label(
+                    text=text,
+                    x=target.x,
+                    y=target.y,
+                    radius=_radius(target),
+                    colour=look.colour,
+                    outline=_outline(target),
+                )
             )
     return canvas, labels
 

@@ -275,7 +275,16 @@ class _Objective:
         """Return the result of the search."""
         best, tried = self.best_discrepancy, tuple(self.known)
         found, count = tuple(self.known.values()), len(tried)
-        return SearchResult(self.best, best, count, history, tried, reason, self._in_vain, found)
+        return SearchResult(
+            values=self.best,
+            discrepancy=best,
+            evaluations=count,
+            history=history,
+            tried=tried,
+            reason=reason,
+            in_vain=self._in_vain,
+            discrepancies=found,
+        )
 
     def _learn(self, values: Values, result: float) -> None:
         if not result >= 0:

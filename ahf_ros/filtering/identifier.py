@@ -137,8 +137,22 @@ def choose(
         evaluations += len(tried)
     best = min(tried, key=discrepancy)
     if discrepancy(best) < discrepancy(plain):
-        return Choice(expected, best, best, evaluations, tried, result)
-    return Choice(expected, plain, kept, evaluations, tried, result)
+        return Choice(
+            expected=expected,
+            filter=best,
+            remembered=best,
+            evaluations=evaluations,
+            tried=tried,
+            search=result,
+        )
+    return Choice(
+        expected=expected,
+        filter=plain,
+        remembered=kept,
+        evaluations=evaluations,
+        tried=tried,
+        search=result,
+    )
 
 
 def _best_plain(trials: Trials, expected: int, executor: Executor | None) -> Values | None:
@@ -344,15 +358,15 @@ class Identifier:
         )
         name = stack.names[number]
         return Identification(
-            tuple(ordered),
-            choice.expected,
-            state,
-            estimating,
-            mirrored,
-            name,
-            tuple(sorted(settings.listed)),
-            trace_of(choice.search, trials, stack) if choice.search else None,
-            median_edge_shift(ordered),
+            targets=tuple(ordered),
+            expected=choice.expected,
+            filter=state,
+            estimated=estimating,
+            mirrored=mirrored,
+            combination=name,
+            expected_ids=tuple(sorted(settings.listed)),
+            search=trace_of(choice.search, trials, stack) if choice.search else None,
+            edge_shift=median_edge_shift(ordered),
         )
 
     def _steady(self, trials: Trials, executor: Executor | None) -> Choice | None:

@@ -255,7 +255,13 @@ class Sheets:
             lines = _cut_marks(self.layout, len(numbers))
             bars, words = self._bars()
             texts += [*words, *self._footer(page + 1)]
-            yield Drawing(paper.width, paper.height, tuple(inks), (*lines, *bars), tuple(texts))
+            yield Drawing(
+                width=paper.width,
+                height=paper.height,
+                inks=tuple(inks),
+                lines=(*lines, *bars),
+                texts=tuple(texts),
+            )
 
     def _ink(self, number: int, x: float, y: float) -> Ink:
         settings = self.settings
@@ -263,7 +269,9 @@ class Sheets:
         contours = design.contours
         if settings.polarity == 'bright':
             contours = (circle(settings.proportions.quiet_zone), *contours)
-        return Ink(f'{settings.family} {number}', x, y, settings.radius, contours)
+        return Ink(
+            name=f'{settings.family} {number}', x=x, y=y, scale=settings.radius, contours=contours
+        )
 
     def _bars(self) -> tuple[list[Line], list[Text]]:
         """Return a bar along the lower and one along the left edge, with their lengths."""

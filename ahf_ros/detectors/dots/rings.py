@@ -116,15 +116,15 @@ def _read_part(pyramid: ImagePyramid, discs: Dots, code: DotFamily) -> Rings:
     likely = (missing <= _MISSING) & (readings.between <= _BETWEEN) & readings.inside
     fit, readings = fit.select(likely), readings.select(likely)
     return Rings(
-        fit.frames,
-        fit.covariance,
-        fit.polarity,
-        readings.words,
-        readings.phase,
-        fit.edge_shift,
-        readings.radius,
-        target_features(readings, fit),
-        word_features(readings, fit),
+        frames=fit.frames,
+        covariance=fit.covariance,
+        polarity=fit.polarity,
+        words=readings.words,
+        phase=readings.phase,
+        edge_shift=fit.edge_shift,
+        radius=readings.radius,
+        target_features=target_features(readings, fit),
+        word_features=word_features(readings, fit),
     )
 
 

@@ -160,7 +160,7 @@ def neighbours(
     first, second, offset = (np.concatenate(column) for column in zip(*parts, strict=True))
     order = np.argsort(first, kind='stable')
     first, second, offset = first[order], second[order], offset[order]
-    return Pairs(first, second, offset, limit[first], error)
+    return Pairs(first=first, second=second, offset=offset, crowd=limit[first], error=error)
 
 
 @dataclass(frozen=True, slots=True)
@@ -241,7 +241,13 @@ def _triples(places: np.ndarray, reference: int, thorough: bool) -> list[tuple[i
 
 def _nothing(count: int) -> Templates:
     nobody = np.zeros((0, count), int)
-    return Templates(np.zeros((0, 3, 3)), nobody, np.zeros(0, int), np.zeros(0), np.zeros(0))
+    return Templates(
+        homographies=np.zeros((0, 3, 3)),
+        members=nobody,
+        polarity=np.zeros(0, int),
+        scale=np.zeros(0),
+        misfit=np.zeros(0),
+    )
 
 
 def _members(
@@ -384,7 +390,9 @@ def _fitted(dots: Dots, members: np.ndarray, family: PointFamily) -> Templates:
     smallest, largest = radius_scales(family)
     good &= (scale > smallest) & (scale < largest)
     signs = dots.polarity[members.max(axis=1)]
-    return Templates(fit.homographies, members, signs, scale, misfit).select(good)
+    return Templates(
+        homographies=fit.homographies, members=members, polarity=signs, scale=scale, misfit=misfit
+    ).select(good)
 
 
 def _mostly_empty(templates: Templates, nearest: NearestDots, family: PointFamily) -> np.ndarray:

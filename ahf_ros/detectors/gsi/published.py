@@ -290,6 +290,15 @@ def _undecoded(dots: np.ndarray) -> list[Target]:
     """Return the dots that belong to no target."""
     spread = (_CONTOUR_ERROR**2, 0.0, 0.0, _CONTOUR_ERROR**2)
     return [
-        Target(UNDECODED, 0, x, y, major, minor, angle, covariance=spread)
+        Target(
+            id=UNDECODED,
+            code=0,
+            x=x,
+            y=y,
+            semi_major=major,
+            semi_minor=minor,
+            angle=angle,
+            covariance=spread,
+        )
         for x, y, major, minor, angle in dots.tolist()
     ]

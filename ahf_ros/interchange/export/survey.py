@@ -159,7 +159,9 @@ def make_survey(
     if control is None:
         return Survey(photographs, known, {})
     points = _control_points(control.points, labels)
-    return Survey(photographs, known, points, control.crs, control.sigma)
+    return Survey(
+        photographs=photographs, labels=known, control=points, crs=control.crs, sigma=control.sigma
+    )
 
 
 def notes_on(control: Control, survey: Survey) -> list[str]:
@@ -219,7 +221,7 @@ def _photograph(
         xx, xy, _, yy = target.covariance
         known = (xx, xy, yy) if xx > 0 and yy > 0 else (UNKNOWN_VARIANCE, 0.0, UNKNOWN_VARIANCE)
         label, x, y = labels[target.key], target.x + origin, target.y + origin
-        marks[target.key] = Mark(label, x, y, known, target)
+        marks[target.key] = Mark(label=label, x=x, y=y, covariance=known, target=target)
     ordered = tuple(marks[key] for key in sorted(marks))
     return Photograph(image.path, image.width, image.height, ordered)
 
