@@ -16,8 +16,7 @@ from ahf_ros.interchange.image_files import read_image, write_image
 from ahf_ros.report import images
 from ahf_ros.report.images import find_image, fitted, shown_image, thumbnail
 from ahf_ros.report.page import families_of, row
-from ahf_ros.report.reading import read_results
-from ahf_ros.report.results import ImageResult, result_from_json
+from ahf_ros.report.results import ImageResult, read_results, result_from_json
 from ahf_ros.target import SquareMarker, TrueTarget
 from support.results import record, save_image, save_lines, searched, target, undecoded
 
