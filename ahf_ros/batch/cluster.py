@@ -127,7 +127,6 @@ class _Begun:
 
     number: int
     task: Any
-    tries: int
     workers: frozenset[str]  # that may process it; all if empty
 
 
@@ -186,7 +185,7 @@ class DaskEngine:
 
     def submit(self, number: int, task: Any) -> None:
         """Hand a task to the scheduler."""
-        self._begin(_Begun(number, task, 1, frozenset()))
+        self._begin(_Begun(number, task, frozenset()))
 
     def wait(self, timeout: float | None = None) -> tuple[int, Any] | None:
         """Return the next result, see `ahf_ros.batch.engine.Engine`."""
@@ -264,7 +263,7 @@ class DaskEngine:
         self._submissions += 1
         key = f'identify-{self._name}-{begun.number}-{self._submissions}'
         content = pickle.dumps((self._job, begun.number, begun.task))
-        self._begun[key] = _Begun(begun.number, begun.task, begun.tries, workers)
+        self._begun[key] = _Begun(begun.number, begun.task, workers)
         self._completed.add(
             self._client.submit(
                 self._perform,
@@ -273,6 +272,7 @@ class DaskEngine:
                 release(),
                 key=key,
                 pure=False,
+                retries=TRIES - 1,
                 workers=sorted(workers) or None,
             )
         )
@@ -293,11 +293,8 @@ class DaskEngine:
                 found = self._located(pickle.loads(outcome), machine)
                 self._results.append((begun.number, found))
         elif future.status == 'error':
-            error = result[1]
-            if begun.tries < TRIES and type(error).__name__ != 'KilledWorker':
-                self._begin(_Begun(begun.number, begun.task, begun.tries + 1, frozenset()))
-            else:
-                self._results.append((begun.number, TaskFailed(f'given up: {reason_of(error)}')))
+            failed = TaskFailed(f'given up: {reason_of(result[1])}')
+            self._results.append((begun.number, failed))
         else:  # cancelled
             raise self._lost()
 
