@@ -16,9 +16,8 @@ from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes.dots import DotFamily, dot_family
 from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import DetectorSettings, FamilyDetector
-from ahf_ros.detectors.dots.circles import fit_targets
 from ahf_ros.detectors.dots.discs import small_discs, voted_discs, whole_discs
-from ahf_ros.detectors.dots.rings import CERTAIN, Rings, read_discs, report
+from ahf_ros.detectors.dots.rings import CERTAIN, Rings, fit_targets, read_discs, report
 from ahf_ros.features.ellipse_targets import ellipse_fields
 from ahf_ros.features.frame import affine_frames, ellipse_axes
 from ahf_ros.features.large_targets import targets_of_octaves
