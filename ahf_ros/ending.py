@@ -7,11 +7,14 @@ expect. So `interrupt` waits for the end of an import, and loops that go on call
 
 from __future__ import annotations
 
+import os
+import select
 import signal
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from types import FrameType
 
 POLL = 0.02
@@ -142,3 +145,23 @@ def check() -> None:
     if _number == signal.SIGINT:
         raise KeyboardInterrupt
     raise SystemExit(128 + _number)
+
+
+@cache
+def signalled() -> int:
+    """Return a file descriptor that becomes readable after a signal that ends a node.
+
+    So a node shuts down in order, and a second signal does not interrupt that: a terminal and a
+    launch file both send one for the same Ctrl-C.
+    """
+    readable, written = os.pipe()
+    os.set_blocking(written, False)
+    signal.set_wakeup_fd(written)
+    for number in ending_signals():
+        signal.signal(number, lambda *_: None)
+    return readable
+
+
+def has_arrived() -> bool:
+    """Return whether there was a signal."""
+    return bool(select.select([signalled()], [], [], 0)[0])

@@ -8,9 +8,9 @@ cannot be combined.
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum, auto
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from ahf_ros.filtering.identifier import Identifier, Memory
 from ahf_ros.imaging.image import check_image
 from ahf_ros.imaging.movement import displacement, find_edges
 from ahf_ros.imaging.stack import ImageStack, unlike
+from ahf_ros.interchange.image_messages import decode_compressed, decode_image, nanoseconds
 from ahf_ros.session import create_identifier
 from ahf_ros.session_settings import SLIDING, IdentificationSettings, StackSettings
 from ahf_ros.target import Identification
@@ -48,6 +49,31 @@ class Frame(Generic[Item]):
     image: np.ndarray
     kind: Hashable
     stamp: int
+
+
+def message_frame(message: Any) -> Frame[Any]:
+    """Return the image of a message with its header.
+
+    Parameters
+    ----------
+    message : sensor_msgs.msg.Image or sensor_msgs.msg.CompressedImage
+        Of ROS or rosbags.
+
+    Raises
+    ------
+    ValueError
+        If the image is not accepted.
+    """
+    compressed = hasattr(message, 'format')
+    image = decode_compressed(message) if compressed else decode_image(message)
+    height, width = image.shape
+    coding = message.format if compressed else message.encoding
+    return Frame(
+        item=message.header,
+        image=image,
+        kind=f'{width} x {height} px, {coding}',
+        stamp=nanoseconds(message.header),
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,10 +122,13 @@ class Remark:
     kind : Kind
     text : str
         Printable.
+    error : Exception, optional
+        What an image or a stack is refused for.
     """
 
     kind: Kind
     text: str
+    error: Exception | None = field(default=None, compare=False)
 
 
 class Stream(Generic[Item]):
@@ -151,6 +180,39 @@ class Stream(Generic[Item]):
     def memory(self) -> Memory:
         """What the images so far leave to the next one."""
         return self._identifier.memory
+
+    @property
+    def waiting(self) -> int:
+        """Number of images that wait for the rest of their stack."""
+        return self._window.fresh
+
+    def forget(self) -> int:
+        """Begin a new stack without an answer to what waits; return the number of these images."""
+        waiting = self.waiting
+        self._window.end('')
+        return waiting
+
+    def reset(self) -> None:
+        """Forget what worked for earlier images."""
+        self._identifier.reset()
+
+    def identify(self, frame: Frame[Item], expected_targets: int | None = None) -> Answer[Item]:
+        """Identify the targets of an image that is in no stack.
+
+        Parameters
+        ----------
+        frame : Frame
+        expected_targets : int, optional
+            N, as for `Identifier.identify`.
+
+        Raises
+        ------
+        Exception
+            Whatever `Identifier.identify` raises.
+        """
+        stack = ImageStack((frame.image,))
+        found = self._identifier.identify(stack, expected_targets=expected_targets)
+        return self._answer((frame.item,), 1, stack, found)
 
     def resume(self, memory: Memory, read: Callable[[], Frame[Item]]) -> None:
         """Go on as if an image had just been answered.
@@ -216,17 +278,17 @@ class Stream(Generic[Item]):
             ):
                 if part.split:
                     yield Remark(Kind.SPLIT, f'a stack is split: {part.split}')
-                if not self._timed:
-                    found = replace(found, filter=replace(found.filter, duration=0.0))
                 start, stop = part.images.start, part.images.stop
-                yield Answer(
-                    items=items[start:stop],
-                    fresh=stop - max(start, old),
-                    stack=stack,
-                    identification=found,
-                )
+                yield self._answer(items[start:stop], stop - max(start, old), stack, found)
         except Exception as error:
             yield refusal(error)
+
+    def _answer(
+        self, items: tuple[Item, ...], fresh: int, stack: ImageStack, found: Identification
+    ) -> Answer[Item]:
+        if not self._timed:
+            found = replace(found, filter=replace(found.filter, duration=0.0))
+        return Answer(items=items, fresh=fresh, stack=stack, identification=found)
 
 
 def refusal(error: Exception) -> Remark:
@@ -239,14 +301,14 @@ def refusal(error: Exception) -> Remark:
     """
     if isinstance(error, Unavailable):
         raise error
-    return Remark(kind=Kind.REFUSED, text=why_refused(error))
+    return why_refused(error)
 
 
-def why_refused(error: Exception) -> str:
-    """Return in printable words why an image is refused that raises an error."""
-    if isinstance(error, ValueError):
-        return printable(str(error), _LONGEST_REASON)
-    return reason_of(error)
+def why_refused(error: Exception) -> Remark:
+    """Return in printable words why an image is refused that raises an error, whichever."""
+    expected = isinstance(error, ValueError)
+    text = printable(str(error), _LONGEST_REASON) if expected else reason_of(error)
+    return Remark(kind=Kind.REFUSED, text=text, error=error)
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,8 +12,7 @@ from ahf_ros.drawing.colours import (
     UNDECODED_COLOUR,
     WRONG_COLOUR,
 )
-from ahf_ros.drawing.labels import Label, place_labels
-from ahf_ros.drawing.overlay import draw, overlay, summary
+from ahf_ros.drawing.overlay import Label, draw, overlay, place_labels, summary
 from ahf_ros.drawing.tiles import Tile, side_by_side
 from ahf_ros.target import (
     UNDECODED,

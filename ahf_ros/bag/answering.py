@@ -12,7 +12,6 @@ from ahf_ros import ending
 from ahf_ros.bag.definitions import (
     CODED_TARGETS,
     COMPRESSED_IMAGE,
-    IMAGE,
     message_types,
     typestore,
 )
@@ -20,12 +19,9 @@ from ahf_ros.bag.journal import Entry, Output
 from ahf_ros.bag.source import Message, Source
 from ahf_ros.detectors import create_detector
 from ahf_ros.drawing.overlay import draw
-from ahf_ros.interchange.image_messages import decode_compressed, decode_image, nanoseconds
 from ahf_ros.interchange.target_messages import coded_target_array
 from ahf_ros.session_settings import IdentificationSettings, StackSettings
-from ahf_ros.stream import Answer, Frame, Kind, Remark, Stream, refusal
-
-DECODERS = {IMAGE: decode_image, COMPRESSED_IMAGE: decode_compressed}
+from ahf_ros.stream import Answer, Frame, Kind, Remark, Stream, message_frame, refusal
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,16 +123,7 @@ class Answering:
     def _frame(self, message: Message) -> Frame[Any]:
         """Return a decoded image with its header."""
         connection, _, data = message
-        received = self._source.stores.deserialize(connection, data)
-        image = DECODERS[connection.msgtype](received)
-        height, width = image.shape
-        coding = getattr(received, 'encoding', '') or received.format
-        return Frame(
-            item=received.header,
-            image=image,
-            kind=f'{width} x {height} px, {coding}',
-            stamp=nanoseconds(received.header),
-        )
+        return message_frame(self._source.stores.deserialize(connection, data))
 
     def _messages(self, topics: AnswerTopics, answer: Answer[Any]) -> list[Output]:
         """Return the messages about an image or a stack."""

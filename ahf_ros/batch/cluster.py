@@ -11,8 +11,11 @@ References
 
 from __future__ import annotations
 
+import asyncio
+import logging
 import math
 import pickle
+import platform
 import queue
 import time
 import uuid
@@ -22,15 +25,100 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
-from ahf_ros.batch.connection import CONNECTION_ERRORS, connect, refused_workers
 from ahf_ros.batch.engine import TRIES, EngineLost, Job, Report, TaskFailed, no_report
 from ahf_ros.batch.remote import guarded_perform
 from ahf_ros.release import release
 from ahf_ros.text import reason_of
 
+CONNECTION_ERRORS = (OSError, asyncio.TimeoutError, asyncio.CancelledError, RuntimeError)
+"""What calls of a client raise whose scheduler is away."""
+
+_CONNECT = 10.0  # s in which a scheduler has to answer
+
 _LOOK = 2.0  # s between two looks at the workers
 _WAIT = 0.1  # s after which waiting is interrupted
 _AT_A_TIME = 2  # tasks for each thread of a worker: one that it works on and one that waits
+
+
+def connect(address: str) -> Any:
+    """Return a client of a scheduler.
+
+    Parameters
+    ----------
+    address : str
+        Such as tcp://host:8786.
+
+    Raises
+    ------
+    ValueError
+        If distributed is not installed, no scheduler answers, or it has another version.
+    """
+    try:
+        import distributed
+    except ModuleNotFoundError as error:
+        raise ValueError(
+            f"{error.name} is not installed, clusters need it: pip install 'ahf_ros[cluster]'"
+        ) from error
+    # What it logs of a scheduler that is away is said in other words.
+    for name in list(logging.root.manager.loggerDict):
+        if name.partition('.')[0] == 'distributed':
+            logging.getLogger(name).setLevel(logging.CRITICAL)
+    logging.getLogger('tornado.application').addFilter(_is_news)
+    try:
+        client = distributed.Client(address, timeout=_CONNECT, set_as_default=False)
+    except Exception as error:  # a scheduler of another version may answer anything
+        raise ValueError(
+            f'scheduler is {address!r}, accepted is the address of a scheduler of '
+            f'dask.distributed {distributed.__version__} that answers: {reason_of(error)}'
+        ) from error
+    try:
+        check_version(client, address)
+    except BaseException:
+        client.close(timeout=1)
+        raise
+    return client
+
+
+def refused_workers(client: Any) -> dict[str, str]:
+    """Return the workers that cannot process tasks of this client, and why, by their address."""
+    mine = _python(platform.python_version())
+    refused = {}
+    for worker, found in client.get_versions()['workers'].items():
+        theirs = _python(found['host']['python'])
+        if theirs != mine:
+            refused[worker] = f'has Python {theirs}, accepted is {mine}'
+    fit = [worker for worker in client.nthreads() if worker not in refused]
+    if not fit:
+        return refused
+    answers = client.run(guarded_perform(), b'', '', release(), workers=fit, on_error='return')
+    for worker, answer in answers.items():
+        if isinstance(answer, BaseException):
+            refused[worker] = f'does not work: {reason_of(answer)}'
+        elif answer:
+            refused[worker] = answer[1][1]
+    return refused
+
+
+def check_version(client: Any, address: str) -> None:
+    """Refuse a scheduler of another version: pickled objects differ."""
+    try:
+        versions = client.get_versions()
+        mine, theirs = (versions[of]['packages']['distributed'] for of in ('client', 'scheduler'))
+    except Exception as error:
+        raise ValueError(f'scheduler {address} cannot be asked: {reason_of(error)}') from error
+    if mine != theirs:
+        raise ValueError(
+            f'scheduler {address} has dask.distributed {theirs}, accepted is {mine} as here'
+        )
+
+
+def _is_news(record: logging.LogRecord) -> bool:
+    """Return whether a record is about anything but a connection that is lost or closed."""
+    return not (record.exc_info and isinstance(record.exc_info[1], CONNECTION_ERRORS))
+
+
+def _python(version: str) -> str:
+    return '.'.join(version.split('.')[:2])
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +127,6 @@ class _Begun:
 
     number: int
     task: Any
-    tries: int
     workers: frozenset[str]  # that may process it; all if empty
 
 
@@ -98,7 +185,7 @@ class DaskEngine:
 
     def submit(self, number: int, task: Any) -> None:
         """Hand a task to the scheduler."""
-        self._begin(_Begun(number, task, 1, frozenset()))
+        self._begin(_Begun(number, task, frozenset()))
 
     def wait(self, timeout: float | None = None) -> tuple[int, Any] | None:
         """Return the next result, see `ahf_ros.batch.engine.Engine`."""
@@ -176,7 +263,7 @@ class DaskEngine:
         self._submissions += 1
         key = f'identify-{self._name}-{begun.number}-{self._submissions}'
         content = pickle.dumps((self._job, begun.number, begun.task))
-        self._begun[key] = _Begun(begun.number, begun.task, begun.tries, workers)
+        self._begun[key] = _Begun(begun.number, begun.task, workers)
         self._completed.add(
             self._client.submit(
                 self._perform,
@@ -185,6 +272,7 @@ class DaskEngine:
                 release(),
                 key=key,
                 pure=False,
+                retries=TRIES - 1,
                 workers=sorted(workers) or None,
             )
         )
@@ -205,11 +293,8 @@ class DaskEngine:
                 found = self._located(pickle.loads(outcome), machine)
                 self._results.append((begun.number, found))
         elif future.status == 'error':
-            error = result[1]
-            if begun.tries < TRIES and type(error).__name__ != 'KilledWorker':
-                self._begin(_Begun(begun.number, begun.task, begun.tries + 1, frozenset()))
-            else:
-                self._results.append((begun.number, TaskFailed(f'given up: {reason_of(error)}')))
+            failed = TaskFailed(f'given up: {reason_of(result[1])}')
+            self._results.append((begun.number, failed))
         else:  # cancelled
             raise self._lost()
 

@@ -153,7 +153,9 @@ def _identified(
             of = paths[part.images.start : part.images.stop]
             search = identifier.last_search
             in_vain = search.in_vain if search and search.reason == 'patience' else 0
-            yield _Found(of, stack, found, part.split, in_vain)
+            yield _Found(
+                paths=of, stack=stack, identification=found, split=part.split, in_vain=in_vain
+            )
     except ValueError as error:
         raise ValueError(f'{", ".join(paths)}: {error}') from error
 

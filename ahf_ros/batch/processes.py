@@ -1,7 +1,10 @@
 """The engine of one machine: worker processes, each with one task at a time.
 
 A worker that dies takes nothing along but its task, which another one tries once more. Each has
-pipes of its own to the process that started it, so no lock outlives a worker that is killed.
+pipes of its own to the process that started it, so no lock outlives a worker that is killed. It
+reads tasks from one and writes what becomes of them to another, and it ends when they are closed,
+at the latest when the process that started it is gone. With pebble 5.2, a worker whose parent was
+killed worked on, and a task whose worker had died was not tried again.
 """
 
 from __future__ import annotations
@@ -10,22 +13,120 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
+import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from enum import IntEnum
+from functools import partial
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
+from ahf_ros import ending
 from ahf_ros.batch.engine import TRIES, Job, Report, TaskFailed, no_report
-from ahf_ros.batch.worker import PIPE_CLOSED, SHUTDOWN_TIMEOUT, Kind
+from ahf_ros.text import reason_of
+
+SHUTDOWN_TIMEOUT = 10 * ending.GRACE
+"""Time after which a worker is taken to be stuck at its end, s."""
+
+PIPE_CLOSED = (EOFError, OSError)
+"""What the pipe of a process that has ended raises."""
 
 _PACKAGE = str(Path(__file__).parents[2])
 _BEGIN = (
     'import sys; sys.path.insert(0, sys.argv[1]); '
-    'from ahf_ros.batch.worker import main; main(*map(int, sys.argv[2:]))'
+    'from ahf_ros.batch.processes import work; work(*map(int, sys.argv[2:]))'
 )
+
+
+class Kind(IntEnum):
+    """What a worker sends."""
+
+    REPORT = 0
+    DONE = 1
+    RAISED = 2
+
+
+def work(tasks: int, answers: int, alive: int) -> None:
+    """Process tasks until there are no more.
+
+    Parameters
+    ----------
+    tasks, answers : int
+        File descriptors of the pipes.
+    alive : int
+        File descriptor of a pipe that is closed when the parent ends.
+    """
+    _heed_signals(alive)
+    received, sent = Connection(tasks, writable=False), Connection(answers, readable=False)
+    with suppress(*PIPE_CLOSED):
+        sys.path[:] = received.recv()
+        job, threads = received.recv()
+        _prepare(threads)
+        while True:
+            result = _result_of(job, received.recv(), sent)
+            ending.check()  # the result may come from a program that was ended
+            sent.send(result)
+
+
+def _result_of(job: Job, task: Any, sent: Connection) -> tuple[Kind, Any]:
+    try:
+        return Kind.DONE, job(task, partial(_report, sent))
+    except ValueError as error:
+        return Kind.RAISED, ValueError(str(error))
+    except Exception as error:
+        traceback.print_exc()  # which the exception of another process does not have
+        return Kind.RAISED, RuntimeError(reason_of(error))
+
+
+def _report(sent: Connection, *report: Any) -> None:
+    with suppress(*PIPE_CLOSED):  # this process is about to end
+        sent.send((Kind.REPORT, report))
+
+
+def _heed_signals(alive: int) -> None:
+    for number in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)  # the parent gets it, too, and ends
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
+    signal.signal(signal.SIGTERM, _end)
+    signal.signal(signal.SIGPROF, _interrupt)
+    threading.Thread(target=_watch, args=(alive,), daemon=True).start()
+
+
+def _watch(alive: int) -> None:
+    """End this process once nobody holds the other end of a pipe."""
+    os.read(alive, 1)
+    _end()
+    time.sleep(SHUTDOWN_TIMEOUT)
+    os._exit(1)
+
+
+def _end(*_: Any) -> None:
+    """Let the current task come to its end; interrupt it after some time of processors, then kill.
+
+    An exception is the second choice, because it might be lost, or leave temporary files behind.
+    """
+    ending.begin()
+    signal.setitimer(signal.ITIMER_PROF, ending.GRACE, ending.GRACE)
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    signal.signal(number, signal.SIG_DFL)  # the next one kills this process
+    ending.interrupt(frame)
+
+
+def _prepare(threads: int) -> None:
+    """Send what other detectors print to standard error, and limit threads."""
+    if sys.stdout and sys.stderr:  # otherwise other files may have their numbers
+        os.dup2(2, 1)
+    sys.stdout = sys.stderr
+    import cv2
+
+    cv2.setNumThreads(threads)
 
 
 @dataclass(slots=True, eq=False)

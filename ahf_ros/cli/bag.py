@@ -13,12 +13,12 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from ahf_ros.batch.engine import EngineLost, TaskFailed, finished_tasks
-from ahf_ros.batch.worker import SHUTDOWN_TIMEOUT
-from ahf_ros.cli.engine_options import add_scheduler_argument
+from ahf_ros.batch.processes import SHUTDOWN_TIMEOUT
 from ahf_ros.cli.engines import create_engine, shared_settings
 from ahf_ros.cli.options import (
     add_option,
     add_options,
+    add_scheduler_argument,
     add_search_options,
     add_target_options,
     settings_from,

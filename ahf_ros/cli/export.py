@@ -13,8 +13,13 @@ from ahf_ros.cli.export_options import (
     parsed_export,
 )
 from ahf_ros.interchange.export.formats import FORMATS, Export
-from ahf_ros.interchange.export.measured_images import MeasuredImage, read_measured_images
-from ahf_ros.interchange.export.survey import Control, make_survey, notes_on
+from ahf_ros.interchange.export.survey import (
+    Control,
+    MeasuredImage,
+    make_survey,
+    notes_on,
+    read_measured_images,
+)
 from ahf_ros.interchange.point_lists import read_point_list
 from ahf_ros.text import counted
 

@@ -1,4 +1,4 @@
-"""`ahf identify`: the coded targets in image files."""
+"""`ahf identify`: the coded targets in image files: files, folders, patterns and lists."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import argparse
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, redirect_stdout
+from glob import glob, has_magic
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -17,18 +18,21 @@ from ahf_ros.batch.identification import detector_of, identify_images
 from ahf_ros.batch.results import Results, Unwritable
 from ahf_ros.batch.run import kept_outcomes_in_order, outcomes_in_order
 from ahf_ros.batch.task import ImageOutcome, ImageTask, with_machine
-from ahf_ros.cli import inputs
 from ahf_ros.cli.engines import create_engine, shared_settings
 from ahf_ros.cli.export import control_from, write_exports
 from ahf_ros.cli.export_options import check_control
+from ahf_ros.cli.identify_options import stacked
 from ahf_ros.cli.options import settings_from
 from ahf_ros.cli.outcomes import overlay_path, print_outcome
-from ahf_ros.cli.stacks import stacked
 from ahf_ros.codes.families import AUTO, LISTED
-from ahf_ros.interchange.export.measured_images import MeasuredImage, measured_image
+from ahf_ros.interchange.export.survey import MeasuredImage, measured_image
+from ahf_ros.interchange.files import read_text
+from ahf_ros.interchange.image_files import SUFFIXES
+from ahf_ros.interchange.urls import is_url, urls_named
 from ahf_ros.session import create_identifier
 from ahf_ros.session_settings import IdentificationSettings, StackSettings
 from ahf_ros.target import UNDECODED
+from ahf_ros.text import shown
 
 
 def run(options: argparse.Namespace) -> int:
@@ -57,7 +61,7 @@ def _run(options: argparse.Namespace, output: TextIO) -> int:
             'upright is given with export, accepted is one of them: other software counts pixels '
             'as they are stored'
         )
-    paths, problems = inputs.image_paths(options.images)
+    paths, problems = image_paths(options.images)
     for problem in problems:
         print(f'ahf identify: {problem}', file=sys.stderr)
     jobs, tasks = _tasks(options, settings, paths)
@@ -187,3 +191,57 @@ def _with_progress(
         disable=not shown,
     ) as progress:
         yield from progress.track(outcomes, total=count, description='identify')
+
+
+def image_paths(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Return the image files that arguments name, and what is wrong with the others.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        As `ahf_ros.cli.identify_options.IMAGES` says. A file of the name comes first, whatever
+        characters are in it.
+
+    Returns
+    -------
+    paths : list of str
+        In the order of the arguments, and sorted by name within a folder or a pattern.
+    problems : list of str
+        One for each argument that names no image.
+
+    Examples
+    --------
+    >>> image_paths(['left.png', 'right.png'])
+    (['left.png', 'right.png'], [])
+    """
+    paths: list[str] = []
+    problems: list[str] = []
+    for argument in arguments:
+        try:
+            found = list(_named(argument))
+        except ValueError as error:
+            problems.append(str(error))
+            continue
+        if not found:
+            problems.append(f'{shown(argument)} names no image, accepted are files and folders')
+        paths += found
+    return paths, problems
+
+
+def _named(argument: str) -> Iterator[str]:
+    path = Path(argument)
+    if is_url(argument):
+        yield from urls_named(argument, SUFFIXES)
+    elif path.is_dir():
+        yield from sorted(str(file) for file in path.iterdir() if file.suffix.lower() in SUFFIXES)
+    elif path.exists():
+        yield argument
+    elif argument.startswith('@'):
+        for line in read_text(argument[1:]).splitlines():
+            if line.strip():
+                yield from _named(line.strip())
+    elif has_magic(argument):
+        found = glob(argument, recursive=True)  # noqa: PTH207  Path has none for absolute patterns
+        yield from sorted(found)
+    else:
+        yield argument  # whoever reads it says what is wrong

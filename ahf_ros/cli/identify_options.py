@@ -1,15 +1,28 @@
-"""The options of `ahf identify`, without what identifies: `--help` and mistakes come at once."""
+"""The options of `ahf identify`, and which images are a stack, without what identifies.
+
+So `--help` and mistakes come at once.
+"""
 
 from __future__ import annotations
 
 import argparse
+import re
+from collections.abc import Sequence
 from pathlib import Path
 
-from ahf_ros.cli.engine_options import JOBS, add_scheduler_argument
 from ahf_ros.cli.export_options import add_export_arguments
-from ahf_ros.cli.options import Group, add_option, add_search_options, add_target_options
-from ahf_ros.cli.stacks import add_stack_arguments
+from ahf_ros.cli.options import (
+    JOBS,
+    Group,
+    add_option,
+    add_scheduler_argument,
+    add_search_options,
+    add_target_options,
+)
 from ahf_ros.interchange.files import RESULTS_FILE
+from ahf_ros.session_settings import StackSettings
+from ahf_ros.settings.parameter import parameters
+from ahf_ros.text import shown
 
 IMAGES = (
     'Image files; folders, for their images; patterns in quotation marks, such as "day*/*.jpg" or '
@@ -17,6 +30,9 @@ IMAGES = (
     'of these, one a line.'
 )
 """What an argument may be."""
+
+FOLDER = 'folder'
+"""Images of one folder are one stack."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -65,3 +81,76 @@ def add_output_options(parser: Group) -> None:
     parser.add_argument(
         '--quiet', action='store_true', help='Print nothing on standard error but problems.'
     )
+
+
+def add_stack_arguments(parser: Group) -> None:
+    """Give a parser the options that say which images belong together."""
+    for item in parameters(StackSettings):
+        if item.name in ('stack', 'stack_movement'):
+            add_option(parser, item)
+    parser.add_argument(
+        '--stack-by',
+        default='',
+        metavar='REGEX',
+        help='Identify images together that are in one folder (folder), or in whose names the '
+        "groups of a regular expression match the same text, such as '(.*)_\\d+'; with --stack N, "
+        'N of them at a time.',
+    )
+
+
+def stacked(images: Sequence[str], by: str, size: int) -> list[list[str]]:
+    r"""Return the images of each stack, in the order of their first images.
+
+    Parameters
+    ----------
+    images : sequence of str
+        Paths, as the user gave them.
+    by : str
+        `FOLDER`, a regular expression with a group, which has to match a whole name without its
+        ending, or nothing.
+    size : int
+        Maximum number of images of a stack; 1 for no maximum where `by` groups them.
+
+    Raises
+    ------
+    ValueError
+        If `by` is no such expression or does not match a name.
+
+    Examples
+    --------
+    >>> stacked(['a_0.png', 'a_1.png', 'b_0.png'], r'(.*)_\d', 1)
+    [['a_0.png', 'a_1.png'], ['b_0.png']]
+    """
+    groups: dict[object, list[str]] = {}
+    for path in images:
+        groups.setdefault(_key(path, by), []).append(path)
+    stacks = []
+    for paths in groups.values():
+        step = len(paths) if by and size == 1 else size
+        stacks += [paths[first : first + step] for first in range(0, len(paths), step)]
+    return stacks
+
+
+def _key(path: str, by: str) -> object:
+    """Return what the images of one stack have in common."""
+    if not by:
+        return None
+    if by == FOLDER:
+        return Path(path).parent
+    try:
+        pattern = re.compile(by)
+    except (re.error, RecursionError) as error:
+        raise ValueError(
+            f'stack_by is {shown(by)}, accepted is folder or a regular expression: {error}'
+        ) from error
+    if not pattern.groups:
+        raise ValueError(
+            f'stack_by is {shown(by)}, accepted is folder or a regular expression with a group'
+        )
+    match = pattern.fullmatch(Path(path).stem)
+    if match is None:
+        raise ValueError(
+            f'stack_by is {shown(by)}, which does not match {shown(Path(path).stem)}; accepted is '
+            'an expression that matches the names of all images, without their endings'
+        )
+    return (Path(path).parent, *match.groups())

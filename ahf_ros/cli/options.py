@@ -1,4 +1,4 @@
-"""Command line options from settings."""
+"""Command line options: from settings, and those that say where tasks are processed."""
 
 from __future__ import annotations
 
@@ -21,6 +21,16 @@ _FORMER = {'expected_targets': '--expected'}
 
 Group = argparse._ArgumentGroup | argparse.ArgumentParser
 """What takes options: a parser, or a group of its options."""
+
+JOBS = Parameter(
+    'jobs',
+    0,
+    'Number of images or stacks that are identified at the same time, each in a process of its '
+    'own; 0: one per processor core, and none for fewer than 4 images, which are faster without. '
+    'The result is the same.',
+    minimum=0,
+    maximum=256,
+)
 
 
 def add_target_options(parser: argparse.ArgumentParser) -> None:
@@ -117,3 +127,14 @@ def _converter(item: Parameter) -> Callable[[str], Any]:
             raise argparse.ArgumentTypeError(str(error)) from error
 
     return convert
+
+
+def add_scheduler_argument(parser: Group) -> None:
+    """Give a parser the option that names a cluster."""
+    parser.add_argument(
+        '--scheduler',
+        default='',
+        metavar='ADDRESS',
+        help='Process on the workers of this scheduler of dask.distributed, such as '
+        'tcp://host:8786; files are read and written there.',
+    )

@@ -12,7 +12,7 @@ from rich.progress import Progress
 from ahf_ros.cli.options import add_options, settings_from
 from ahf_ros.interchange.truth_files import read_truth
 from ahf_ros.report.page import make_page, page_pictures, write_page
-from ahf_ros.report.reading import read_results
+from ahf_ros.report.results import read_results
 from ahf_ros.report.settings import ReportSettings
 
 

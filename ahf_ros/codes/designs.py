@@ -183,7 +183,7 @@ def printed_design(name: str, number: int, pinhole: float, file: str = '') -> Pr
 
 def circle(radius: float, x: float = 0.0, y: float = 0.0) -> Contour:
     """Return the outline of a circle."""
-    return (Arc(x, y, radius, 0.0, 2 * math.pi),)
+    return (Arc(x=x, y=y, radius=radius, start=0.0, extent=2 * math.pi),)
 
 
 def _band_contours(table: Family, word: int) -> list[Contour]:
@@ -194,8 +194,13 @@ def _band_contours(table: Family, word: int) -> list[Contour]:
     for first in np.flatnonzero(inked & ~np.roll(inked, 1)).tolist():
         count = int(np.argmin(np.roll(inked, -first)))
         start, extent = first * sector, count * sector
-        outer = Arc(0.0, 0.0, table.band_outer, start, extent)
-        contours.append((outer, Arc(0.0, 0.0, table.band_inner, start + extent, -extent)))
+        outer = Arc(x=0.0, y=0.0, radius=table.band_outer, start=start, extent=extent)
+        contours.append(
+            (
+                outer,
+                Arc(x=0.0, y=0.0, radius=table.band_inner, start=start + extent, extent=-extent),
+            )
+        )
     return contours
 
 

@@ -111,7 +111,16 @@ def parse_design(file: Entry) -> DotFamily:
     words = words[words == smallest_bracelet(words, bits)]
     words.setflags(write=False)
     source = fields['source'].text() if 'source' in fields else ''
-    return DotFamily(fields['family'].text(), bits, words, source, circle, radius, ground, border)
+    return DotFamily(
+        name=fields['family'].text(),
+        bits=bits,
+        words=words,
+        source=source,
+        dot_circle=circle,
+        dot_radius=radius,
+        ground_radius=ground,
+        border_radius=border,
+    )
 
 
 def smallest_bracelet(words: Any, bits: int) -> np.ndarray:

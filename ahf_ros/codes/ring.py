@@ -42,10 +42,6 @@ class Family(CyclicFamily):
         """Radii of the band, in radii of the dot."""
         return self.band_inner, self.band_outer
 
-    def with_band(self, inner: float, outer: float) -> Family:
-        """Return the same words on a band of other radii."""
-        return Family(self.name, self.bits, self.words, inner, outer)
-
 
 def sector_count(name: str) -> int:
     """Return the number of sectors of a family, without its words."""
@@ -89,7 +85,7 @@ def family(name: str) -> Family:
         words = words[words & (words >> half) & ((1 << half) - 1) != 0]
     words.setflags(write=False)
     inner, outer = BAND_RADII[vendor]
-    return Family(name, bits, words, inner, outer)
+    return Family(name=name, bits=bits, words=words, band_inner=inner, band_outer=outer)
 
 
 def mirrored(word: int, bits: int) -> int:

@@ -1,7 +1,8 @@
 """Targets that are hard to confuse: words far apart, which no cover turns into each other.
 
 Something in one colour over a part of a band or of a ring of dots, as dark as ink or as bright as
-the ground, can turn one word into another. No detector sees a difference then.
+the ground, can turn one word into another. No detector sees a difference then. Large sets without
+such conflicts are independent sets of a graph, found by local search.
 """
 
 from __future__ import annotations
@@ -13,14 +14,106 @@ import numpy as np
 from ahf_ros.codes.cyclic import CyclicFamily, mirrored_words, rotated_words
 from ahf_ros.codes.dots import dot_family
 from ahf_ros.codes.gsi_library import point_family
-from ahf_ros.codes.independent import independent_set
 from ahf_ros.codes.ring import FAMILY_NAMES, family
 from ahf_ros.codes.square import SQUARE_NAMES, dictionary
+
+_STARTS = 4
+_STEPS = 3000  # exchanges after each start
+_HOPELESS = 0.7  # share of `count`, below which exchanges are not tried
+_TABU = 10  # steps for which what was exchanged stays out
 
 MAXIMUM_WORDS = 2048
 """Number of words among which a set is looked for; of more, as many are drawn at random."""
 
 _BYTE = np.array([bin(byte).count('1') for byte in range(256)], np.uint8)
+
+
+def independent_set(
+    conflicts: np.ndarray, count: int, generator: np.random.Generator, thorough: bool = True
+) -> np.ndarray:
+    """Return a set without two elements in conflict, of `count` elements where one is found.
+
+    The search starts with elements of few conflicts and then exchanges one element for another
+    one, until there is room for more (Andrade, Resende & Werneck, J. Heuristics 2012, 18, 525).
+
+    Parameters
+    ----------
+    conflicts : ndarray of bool, shape (n, n)
+        Symmetric, false on the diagonal.
+    count : int
+        Number of elements that are enough.
+    generator : numpy.random.Generator
+        Decides where elements are equally good.
+    thorough : bool
+        Whether a set far from `count` is worth the exchanges, too.
+
+    Returns
+    -------
+    ndarray of int, shape (m,)
+        Indices, ascending; m is at most `count`, and less where no larger set was found.
+
+    Examples
+    --------
+    >>> ring = np.roll(np.eye(5, dtype=bool), 1, axis=1)
+    >>> independent_set(ring | ring.T, 3, np.random.default_rng(0)).size
+    2
+    """
+    best = np.empty(0, int)
+    for _ in range(_STARTS):
+        members = _greedy(conflicts, count, generator)
+        hopeless = not thorough and members.sum() < _HOPELESS * count
+        if not hopeless:
+            members = _exchanged(conflicts, members, count, generator)
+        best = max(best, np.flatnonzero(members)[:count], key=len)
+        if hopeless or best.size == count:
+            break
+    return best
+
+
+def _greedy(conflicts: np.ndarray, count: int, generator: np.random.Generator) -> np.ndarray:
+    """Return members, each one with the fewest conflicts with what was left then."""
+    degrees = conflicts.sum(axis=1).astype(np.int64)
+    ties = generator.random(len(degrees))
+    left = np.ones(len(degrees), bool)
+    members = np.zeros(len(degrees), bool)
+    while left.any() and members.sum() < count:
+        chosen = np.argmin(np.where(left, degrees + ties, np.inf))
+        members[chosen] = True
+        removed = left & conflicts[chosen]
+        removed[chosen] = True
+        left &= ~removed
+        degrees -= conflicts[removed].sum(axis=0)
+    return members
+
+
+def _exchanged(
+    conflicts: np.ndarray, members: np.ndarray, count: int, generator: np.random.Generator
+) -> np.ndarray:
+    """Return members after exchanges of one for one, each with what then fits in."""
+    members = members.copy()
+    best = members.copy()
+    against = conflicts[members].sum(axis=0).astype(np.int64)
+    barred = np.zeros(len(members), int)
+    for step in range(_STEPS):
+        if members.sum() > best.sum():
+            best = members.copy()
+        if best.sum() >= count:
+            break
+        outside = ~members & (barred <= step)
+        free = np.flatnonzero(outside & (against == 0))
+        single = free if free.size else np.flatnonzero(outside & (against == 1))
+        if not single.size:
+            single = np.flatnonzero(outside)
+        if not single.size:
+            break
+        added = generator.choice(single)
+        removed = np.flatnonzero(members & conflicts[added])
+        members[removed] = False
+        barred[removed] = step + 1 + _TABU
+        against -= conflicts[removed].sum(axis=0)
+        members[added] = True
+        against += conflicts[added]
+    return best
 
 
 def select_ids(name: str, ids: Sequence[int], count: int, file: str = '') -> list[int]:
@@ -53,8 +146,8 @@ def select_ids(name: str, ids: Sequence[int], count: int, file: str = '') -> lis
     Examples
     --------
     >>> ids = select_ids('metashape14', range(1, 562), 20)
-    >>> len(ids), smallest_distance('metashape14', ids)
-    (20, 4)
+    >>> len(ids)
+    20
     """
     generator = np.random.default_rng(0)
     pool = np.array(sorted(ids))
@@ -75,36 +168,6 @@ def select_ids(name: str, ids: Sequence[int], count: int, file: str = '') -> lis
         f'best is {count}, accepted is an integer from 1 to {largest}: no larger set of IDs of '
         f'{name} was found in which no target turns into another one by a cover'
     )
-
-
-def smallest_distance(name: str, ids: Sequence[int], file: str = '') -> int:
-    """Return the smallest Hamming distance between the words of any two IDs, over all rotations.
-
-    Parameters
-    ----------
-    name, ids, file
-        As for `select_ids`; at least two IDs.
-    """
-    distances = _distances(_orbits(name, np.asarray(ids), file))
-    return int(distances[np.triu_indices(len(ids), 1)].min())
-
-
-def confused_pairs(name: str, ids: Sequence[int], file: str = '') -> list[tuple[int, int]]:
-    """Return the pairs of IDs that a cover in one colour can turn into each other.
-
-    Parameters
-    ----------
-    name, ids, file
-        As for `select_ids`.
-
-    Examples
-    --------
-    >>> len(confused_pairs('metashape12', range(1, 162)))
-    1652
-    """
-    pool = np.asarray(ids)
-    pairs = np.argwhere(np.triu(_confused(name, pool, file)))
-    return [(int(pool[first]), int(pool[second])) for first, second in pairs]
 
 
 def _cyclic(name: str, file: str) -> CyclicFamily | None:

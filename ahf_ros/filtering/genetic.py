@@ -17,8 +17,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
-from concurrent.futures import Executor
+from collections.abc import Callable, Generator, Sequence
+from concurrent.futures import Executor, wait
 from contextlib import closing
 from dataclasses import dataclass
 
@@ -33,12 +33,55 @@ from ahf_ros.filtering.chromosome import (
     mutated,
     selected,
 )
-from ahf_ros.filtering.ordered import in_order
 from ahf_ros.filtering.settings import GeneticSettings
 
 DELTA = 1.0
 """delta of Eq. (10). With 1, a fitness of 1 is success. It does not affect the search, because
 tournaments only compare."""
+
+
+def in_order(
+    discrepancy: Callable[[Values], float], tried: Sequence[Values], executor: Executor | None
+) -> Generator[float, None, None]:
+    """Yield the discrepancies of values in their order.
+
+    Close the generator to cancel what has not begun and to wait for what has.
+
+    Parameters
+    ----------
+    discrepancy : callable
+        From one value per gene to a number; thread-safe if there is an executor.
+    tried : sequence of tuple of float
+        Values to evaluate. None behind one whose discrepancy is zero is begun.
+    executor : concurrent.futures.Executor or None
+        Threads; None evaluates one after the other.
+
+    Examples
+    --------
+    >>> list(in_order(sum, [(1.0, 2.0), (3.0, 4.0)], None))
+    [3.0, 7.0]
+    """
+    if executor is None:
+        yield from map(discrepancy, tried)
+        return
+    successes: list[int] = []
+
+    def evaluate(index: int, values: Values) -> float:
+        if successes and min(successes) < index:
+            return math.nan  # never read: the search ends before
+        result = discrepancy(values)
+        if result == 0:
+            successes.append(index)
+        return result
+
+    futures = [executor.submit(evaluate, *it) for it in enumerate(tried)]
+    try:
+        for future in futures:
+            yield future.result()
+    finally:
+        for future in futures:
+            future.cancel()
+        wait(futures)
 
 
 @dataclass(frozen=True, slots=True)
@@ -232,7 +275,16 @@ class _Objective:
         """Return the result of the search."""
         best, tried = self.best_discrepancy, tuple(self.known)
         found, count = tuple(self.known.values()), len(tried)
-        return SearchResult(self.best, best, count, history, tried, reason, self._in_vain, found)
+        return SearchResult(
+            values=self.best,
+            discrepancy=best,
+            evaluations=count,
+            history=history,
+            tried=tried,
+            reason=reason,
+            in_vain=self._in_vain,
+            discrepancies=found,
+        )
 
     def _learn(self, values: Values, result: float) -> None:
         if not result >= 0:

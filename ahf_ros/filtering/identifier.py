@@ -12,12 +12,14 @@ References
 
 from __future__ import annotations
 
+import math
 import os
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import nullcontext
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from numbers import Integral
 from typing import Any
 
@@ -26,16 +28,21 @@ import numpy as np
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.deprecation import deprecated_arguments
 from ahf_ros.edge_shift import median_edge_shift
-from ahf_ros.filtering.choice import Choice, choose
 from ahf_ros.filtering.fusion import fused
-from ahf_ros.filtering.genes import genes_of, tuned
-from ahf_ros.filtering.genetic import SearchResult, Values
+from ahf_ros.filtering.genes import first_filters, genes_of, tuned, with_combination
+from ahf_ros.filtering.genetic import SearchResult, Values, search
 from ahf_ros.filtering.mirroring import MirroredId, is_mirrored
 from ahf_ros.filtering.settings import AdaptiveSettings
-from ahf_ros.filtering.trace import trace_of
-from ahf_ros.filtering.trials import DetectorFunction, Trials
+from ahf_ros.filtering.trials import DetectorFunction, Trials, confirmed
 from ahf_ros.imaging.stack import ImageStack
-from ahf_ros.target import FilterState, Identification, Target, count_codes, sorted_targets
+from ahf_ros.target import (
+    FilterState,
+    Identification,
+    SearchTrace,
+    Target,
+    count_codes,
+    sorted_targets,
+)
 from ahf_ros.target_check import checked_targets
 
 Refinement = Callable[[np.ndarray, Sequence[Target]], Sequence[Target]]
@@ -44,6 +51,121 @@ measured in the image as received."""
 
 Estimate = Callable[[np.ndarray], int]
 """From the image as received to the number of coded targets that it seems to show."""
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """What was chosen for an image or stack, and how it was found.
+
+    Attributes
+    ----------
+    expected : int
+        N.
+    filter : tuple of float or None
+        What was chosen, see `Trials`.
+    remembered : tuple of float or None
+        What to try first for the next image.
+    evaluations : int
+        Number of identifications.
+    tried : tuple of tuple of float
+        What a search tried.
+    search : SearchResult or None
+        The search; None if there was none.
+    """
+
+    expected: int
+    filter: Values | None
+    remembered: Values | None
+    evaluations: int
+    tried: tuple[Values, ...] = ()
+    search: SearchResult | None = None
+
+
+def choose(
+    trials: Trials,
+    expected: int,
+    settings: AdaptiveSettings,
+    remembered: Values | None,
+    executor: Executor | None,
+    clock: Callable[[], float],
+) -> Choice:
+    """Return what shows n targets with the smallest |N - n|.
+
+    Parameters
+    ----------
+    trials : Trials
+    expected : int
+        N; 0 if it is unknown.
+    settings : AdaptiveSettings
+        A patience of 0 is no limit.
+    remembered : tuple of float or None
+        What worked for the image before.
+    executor : concurrent.futures.Executor or None
+        Threads of the search.
+    clock : callable
+        Time in s.
+    """
+    discrepancy = partial(trials.discrepancy, expected)
+    searching = settings.ahf and expected > 0
+    if searching and remembered and discrepancy(remembered, executor) == 0:
+        return Choice(expected, remembered, remembered, len(trials.targets))
+    plain = _best_plain(trials, expected, executor)
+    kept = None if plain == trials.plain[0] else plain
+    if not searching or discrepancy(plain) == 0:
+        return Choice(expected, plain, kept if searching else remembered, len(trials.targets))
+    searched = trials.reduced() if settings.coarse else trials
+    genes = with_combination(genes_of(settings.tuning), len(trials.plain))
+    initial = [remembered] if remembered and len(remembered) == len(genes) else []
+    reference = math.inf
+    if settings.genetic.patience:
+        initial += first_filters(genes, plain)
+        reference = searched.discrepancy(expected, plain, executor)
+    result = search(
+        partial(searched.discrepancy, expected),
+        genes,
+        settings.genetic,
+        np.random.default_rng(settings.genetic.seed),
+        initial=initial,
+        reference=reference,
+        executor=executor,
+        clock=clock,
+    )
+    evaluations = len(trials.plain) + result.evaluations
+    tried = result.tried
+    if searched is not trials:
+        tried = confirmed(expected, tried, searched, trials, executor)
+        evaluations += len(tried)
+    best = min(tried, key=discrepancy)
+    if discrepancy(best) < discrepancy(plain):
+        return Choice(
+            expected=expected,
+            filter=best,
+            remembered=best,
+            evaluations=evaluations,
+            tried=tried,
+            search=result,
+        )
+    return Choice(
+        expected=expected,
+        filter=plain,
+        remembered=kept,
+        evaluations=evaluations,
+        tried=tried,
+        search=result,
+    )
+
+
+def _best_plain(trials: Trials, expected: int, executor: Executor | None) -> Values | None:
+    """Return the first of the best without a filter; without N, the most promising one."""
+    best = trials.plain[0]
+    trials.count(best, executor)
+    for plain in trials.plain[1:] if expected else ():
+        fewest = trials.discrepancy(expected, best)
+        if fewest == 0:
+            break
+        if trials.discrepancy(expected, plain, executor) < fewest:
+            best = plain
+    return best
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,15 +358,15 @@ class Identifier:
         )
         name = stack.names[number]
         return Identification(
-            tuple(ordered),
-            choice.expected,
-            state,
-            estimating,
-            mirrored,
-            name,
-            tuple(sorted(settings.listed)),
-            trace_of(choice.search, trials, stack) if choice.search else None,
-            median_edge_shift(ordered),
+            targets=tuple(ordered),
+            expected=choice.expected,
+            filter=state,
+            estimated=estimating,
+            mirrored=mirrored,
+            combination=name,
+            expected_ids=tuple(sorted(settings.listed)),
+            search=trace_of(choice.search, trials, stack) if choice.search else None,
+            edge_shift=median_edge_shift(ordered),
         )
 
     def _steady(self, trials: Trials, executor: Executor | None) -> Choice | None:
@@ -293,3 +415,30 @@ def _with_patience(settings: AdaptiveSettings, patience: int) -> AdaptiveSetting
 def _check_count(name: str, count: Any) -> None:
     if isinstance(count, bool) or not isinstance(count, Integral) or count < 0:
         raise ValueError(f'{name} is {count!r}, accepted is an integer of at least 0')
+
+
+def trace_of(search: SearchResult, trials: Trials, stack: ImageStack) -> SearchTrace:
+    """Return the filters of a search and their discrepancies.
+
+    Parameters
+    ----------
+    search : SearchResult
+        A search on the images at half their size has the filters that act alike on the whole ones.
+    trials : Trials
+        Of the whole images.
+    stack : ImageStack
+        The images as received, or one.
+    """
+    parts = [trials.parts(values) for values in search.tried]
+    filters = [tuned(stack.shape, gains or (1.0, 1.0)) for _, gains in parts]
+    names = stack.names if len(trials.plain) > 1 else ()
+    return SearchTrace(
+        reason=search.reason,
+        discrepancies=tuple(int(discrepancy) for discrepancy in search.discrepancies),
+        gamma_high=tuple(it.gamma_high for it in filters),
+        gamma_low=tuple(it.gamma_low for it in filters),
+        cutoff=tuple(it.cutoff for it in filters),
+        attenuation=tuple(it.attenuation for it in filters),
+        generations=tuple(generation.evaluations for generation in search.history),
+        combinations=tuple(names[number] for number, _ in parts) if names else (),
+    )

@@ -1,6 +1,7 @@
 """What image files say of themselves before they are decoded: size and orientation.
 
-Formats: PNG 1.2, JPEG (ITU-T T.81), TIFF 6.0 and BigTIFF, Exif 2.3, BMP.
+Formats: PNG 1.2, JPEG (ITU-T T.81), TIFF 6.0 and BigTIFF, Exif 2.3, BMP. Pillow 13 does not open
+TIFF files of float64, and does not say where in a file the orientation is.
 """
 
 from __future__ import annotations

@@ -68,14 +68,16 @@ def identification_from(message: Any) -> Identification:
     """Return the identification that a CodedTargetArray carries."""
     shift = message.edge_shift
     return Identification(
-        tuple(
+        targets=tuple(
             Target(**_values(item) | {'covariance': tuple(item.covariance.tolist())})
             for item in message.targets
         ),
-        message.expected,
-        FilterState(**{it.name: getattr(message.filter, it.name) for it in fields(FilterState)}),
-        message.estimated,
-        message.mirrored,
+        expected=message.expected,
+        filter=FilterState(
+            **{it.name: getattr(message.filter, it.name) for it in fields(FilterState)}
+        ),
+        estimated=message.estimated,
+        mirrored=message.mirrored,
         edge_shift=None if math.isnan(shift) else shift,
     )
 

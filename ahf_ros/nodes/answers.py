@@ -8,22 +8,23 @@ from types import ModuleType
 
 from rclpy.publisher import Publisher
 from sensor_msgs.msg import Image
+from std_msgs.msg import Header
 from visualization_msgs.msg import ImageMarker
 
 from ahf_ros.drawing.overlay import draw
 from ahf_ros.msg import CodedTargetArray
-from ahf_ros.nodes.annotation_msg import target_annotations
 from ahf_ros.nodes.cloud import TargetPoints
-from ahf_ros.nodes.detection_msg import target_detections
 from ahf_ros.nodes.diagnostics import CloudTally, Tally
 from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.nodes.inputs import Input
 from ahf_ros.nodes.matching import Waiting
-from ahf_ros.nodes.pipeline import ImageAnswer, Pipeline
+from ahf_ros.nodes.pipeline import Pipeline
 from ahf_ros.nodes.process import ProcessNode
 from ahf_ros.nodes.settings import DetectorNodeSettings
+from ahf_ros.nodes.target_msg import target_annotations, target_detections
 from ahf_ros.nodes.topics import ANSWERS_KEPT, DETECTIONS
 from ahf_ros.nodes.undistortion import UndistortedTargets
+from ahf_ros.stream import Answer
 
 
 class Answers:
@@ -91,34 +92,34 @@ class Answers:
         if self._undistorted:
             self._undistorted.listen(wanted)
 
-    def publish(self, answer: ImageAnswer, pipeline: Pipeline, received: float) -> None:
+    def publish(self, answer: Answer[Header], pipeline: Pipeline, received: float) -> None:
         """Publish an answer.
 
         Parameters
         ----------
-        answer : ImageAnswer
+        answer : Answer of Header
         pipeline : Pipeline
             Made the answer.
         received : float
-            When its image arrived, s of the monotonic clock.
+            When its last image arrived, s of the monotonic clock.
         """
-        header = answer.message.header
-        self._targets.publish(answer.message)
-        self._tally.answered += answer.images
+        message, found = pipeline.message(answer), answer.identification
+        self._targets.publish(message)
+        self._tally.answered += answer.fresh
         self._tally.latency = time.monotonic() - received
-        self._tally.last = answer.identification
+        self._tally.last = found
         if clouds := self._clouds:
-            clouds.locate(answer.message)
+            clouds.locate(message)
         if self._detections and self._detecting:
             kinds, publisher = self._detections
-            publisher.publish(target_detections(answer.message, kinds))
+            publisher.publish(target_detections(message, kinds))
         if self._undistorted:
-            self._undistorted.publish(answer.message, answer.identification)
+            self._undistorted.publish(message, found)
         if self._annotations.get_subscription_count():
-            self._annotations.publish(target_annotations(answer.message))
+            self._annotations.publish(target_annotations(message))
         if self._debug_image.get_subscription_count():
-            drawn = draw(answer.image, answer.identification)
-            self._debug_image.publish(image_message(drawn, header))
+            drawn = draw(answer.image, found)
+            self._debug_image.publish(image_message(drawn, message.header))
         if self._filtered_image.get_subscription_count():
             filtered = pipeline.filtered(answer)
-            self._filtered_image.publish(image_message(filtered, header))
+            self._filtered_image.publish(image_message(filtered, message.header))

@@ -3,30 +3,29 @@
 from __future__ import annotations
 
 import threading
-import time
-import traceback
 from collections.abc import Callable
-from contextlib import suppress
+from concurrent.futures import CancelledError
 from functools import partial
-from typing import TypeVar
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.clock import Clock, ClockType
+from rclpy.qos import QoSProfile
 from std_msgs.msg import Header
+from std_srvs.srv import Trigger
 
 from ahf_ros import ending
 from ahf_ros.nodes.answers import Answers
 from ahf_ros.nodes.diagnostics import Diagnostics, Tally
+from ahf_ros.nodes.image_queue import ImageQueue
 from ahf_ros.nodes.inputs import Input
 from ahf_ros.nodes.managed import ACTIVE, ManagedNode
 from ahf_ros.nodes.parameters import ParameterSettings
-from ahf_ros.nodes.pipeline import ImageJob, ImageMessage, Pipeline, Refused
-from ahf_ros.nodes.process import LOG_PERIOD, run
-from ahf_ros.nodes.requests import Requests
+from ahf_ros.nodes.pipeline import STOPPING, Pipeline
+from ahf_ros.nodes.process import run
 from ahf_ros.nodes.service_detector import ServiceDetector
 from ahf_ros.nodes.settings import LOSSLESS, SERVICE, DetectorNodeSettings
-from ahf_ros.nodes.stacking import HeldImage, Stacks, answer_stack, image_kind
 from ahf_ros.nodes.topics import (
     IMAGE_TYPES,
     POINTS,
@@ -34,23 +33,22 @@ from ahf_ros.nodes.topics import (
     declare_topics,
     image_topic,
 )
-from ahf_ros.nodes.waiting import Take, WaitingMessages
 from ahf_ros.nodes.watch import Watch
 from ahf_ros.nodes.worker import Worker
-from ahf_ros.stream import Gathered, why_refused
-from ahf_ros.text import printable
-
-Result = TypeVar('Result')
+from ahf_ros.srv import Identify
 
 DIAGNOSTICS_PERIOD = 1.0
 """Period of /diagnostics, s."""
 
+REQUESTS_KEPT = 1000
+"""Requests to a service that may wait. The middleware drops more without an answer."""
+
 
 class DetectorNode(ManagedNode):
-    """Identifies the targets of the latest image, and of the next one in another thread.
+    """Identifies the targets of images, and answers parameters and services meanwhile.
 
-    Parameters and services are answered meanwhile. Every valid image gets an answer, unless a
-    newer one arrives before its turn. Invalid images are counted and logged.
+    Every valid image gets an answer, unless a newer one arrives before its turn. Invalid images
+    are counted and logged. Requests are answered one at a time, while the node is active.
     """
 
     def __init__(self) -> None:
@@ -58,7 +56,6 @@ class DetectorNode(ManagedNode):
         self.listen(False)
         self._stopping = threading.Event()
         self._worker = Worker()
-        self._waiting = WaitingMessages()
         self._tally = Tally()
         name = self.get_fully_qualified_name().lstrip('/')
         self._diagnostics = Diagnostics(f'{name}: identification', self._tally)
@@ -66,18 +63,23 @@ class DetectorNode(ManagedNode):
         self._watch = Watch(self, self._tally)
         declare_topics(self)
         self._answers = Answers(self, self._tally)
+        self._queue = ImageQueue(self, self._worker, self._answers, self._tally)
         self._diagnostic_array = self.publisher(DiagnosticArray, '/diagnostics', 10)
         # With use_sim_time, the node's clock stops when a replay stops.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(DIAGNOSTICS_PERIOD, self._publish_diagnostics, clock=steady)
         self._images: Input | None = None
         self._subscribed = ('', '')
-        self._stacks: Stacks | None = None
-        self._offered = 0  # images that the job answers that was offered last
         self._service: ServiceDetector | None = None
         self._settings = ParameterSettings(self, DetectorNodeSettings, self._renew)
         self._configured = False
-        Requests(self, self._worker, lambda: self._pipeline, self._attempt)
+        group, kept = MutuallyExclusiveCallbackGroup(), QoSProfile(depth=REQUESTS_KEPT)
+        for kind, service, answer in (
+            (Identify, '~/identify', self._identify),
+            (Trigger, '~/reset', self._reset),
+        ):
+            respond = partial(self._respond, answer)
+            self.create_service(kind, service, respond, qos_profile=kept, callback_group=group)
         self.begin(self._settings.on('managed'), self._settings.on('autostart'))
 
     def configure(self) -> None:
@@ -98,14 +100,11 @@ class DetectorNode(ManagedNode):
     def cleanup(self) -> None:
         """Give up detector, subscriptions and the images that wait."""
         self._configured = False
-        self._worker.discard()
-        self._waiting, self._offered = WaitingMessages(), 0
-        if stacks := self._stacks:
-            stacks.discard()
+        self._queue.discard()
         if self._images:
             self.unsubscribe(self._images)
         self._answers.close()
-        self._images = self._stacks = self._service = None
+        self._images = self._service = None
         self._subscribed = ('', '')
         if given_up := self._tally.give_up():
             self.get_logger().warning(f'{given_up} images that waited are given up')
@@ -135,8 +134,8 @@ class DetectorNode(ManagedNode):
             return
         settings = self._settings.current
         self._answers.renew(settings)
-        self._renew_stacks(settings)
-        self._pipeline = Pipeline(settings, self._stopping, self._service_detector(settings))
+        detector = self._service_detector(settings)
+        self._queue.renew(Pipeline(settings, self._stopping, detector))
         if self._subscribed != (settings.image_transport, settings.queue):
             self._subscribed = (settings.image_transport, settings.queue)
             if self._images:
@@ -144,19 +143,9 @@ class DetectorNode(ManagedNode):
             transport = settings.image_transport
             kind, topic = IMAGE_TYPES[transport], image_topic(self, transport)
             lossless = self._tally.lossless = settings.queue == LOSSLESS
-            # The callback may wait for room in the queue and must not block the others.
+            # The callback may write to the disk and must not block the others.
             group = MutuallyExclusiveCallbackGroup()
-            self._images = self.subscribe(kind, topic, self._on_image, group, lossless)
-
-    def _renew_stacks(self, settings: DetectorNodeSettings) -> None:
-        """Start or stop gathering images to stacks."""
-        if self._stacks and self._stacks.suits(settings):
-            return
-        stacks, self._stacks = self._stacks, None
-        if stacks:
-            stacks.close('parameters changed')
-        if settings.stacking.stack > 1:
-            self._stacks = Stacks(self, settings, self._on_stack)
+            self._images = self.subscribe(kind, topic, self._queue.put, group, lossless)
 
     def _service_detector(self, settings: DetectorNodeSettings) -> ServiceDetector | None:
         """Return the detector that calls a service, if the settings name it."""
@@ -169,78 +158,26 @@ class DetectorNode(ManagedNode):
             self._service = ServiceDetector(self, *wanted, self._stopping)
         return self._service
 
-    def _on_image(self, message: ImageMessage) -> None:
-        self._tally.received += 1
-        if backwards := self._tally.compare_stamps(message.header):
-            self.get_logger().warning(backwards, throttle_duration_sec=LOG_PERIOD)
-        if changed := self._tally.compare_kinds(image_kind(message)):
-            self.get_logger().warning(changed, throttle_duration_sec=LOG_PERIOD)
-        pipeline, received = self._pipeline, time.monotonic()
-        settings = pipeline.settings
-        take: Take = lambda: message  # noqa: E731
-        with suppress(Refused):
-            if settings.queue == LOSSLESS:
-                limit = settings.queue_memory * 2**20
-                take = self._attempt(partial(self._waiting.put, message, limit))
-            if stacks := self._stacks:
-                stacks.add(HeldImage(take), message)
-            else:
-                image = ImageJob(take, pipeline)
-                job = partial(self._process, image, pipeline, received)
-                self._submit(job, 1, image.prepare if pipeline.ahead else None)
-
-    def _on_stack(self, stack: Gathered[HeldImage]) -> None:
-        publish = partial(
-            self._answers.publish, pipeline=self._pipeline, received=time.monotonic()
-        )
-        job = partial(answer_stack, stack, self._pipeline, self._attempt, publish)
-        self._submit(partial(job, self._tally, self.get_logger()), stack.fresh)
-
-    def _submit(
-        self,
-        job: Callable[[], None],
-        images: int,
-        prepare: Callable[[], None] | None = None,
-    ) -> None:
-        """Let the worker do a job that answers a number of images."""
-        if self._pipeline.settings.queue == LOSSLESS:
-            self._worker.append(job, prepare)
-            return
-        if self._worker.offer(job, prepare):
-            self._tally.dropped += self._offered
-        self._offered = images
-
-    def _process(self, image: ImageJob, pipeline: Pipeline, received: float) -> None:
-        """Identify the targets of an image and publish the results."""
-        # In a lossless stream no image waits like this.
-        if self._worker.waiting and image.outdated():
-            self._tally.dropped += 1
-            return
-        with suppress(Refused):
-            self._attempt(lambda: self._answers.publish(image.answer(), pipeline, received))
-
-    def _attempt(self, job: Callable[[], Result]) -> Result:
-        """Return the result of a job on an image, or count and log its error.
-
-        Raises
-        ------
-        Refused
-            Whatever the job raises.
-        """
+    def _respond(self, answer: Callable[[Any, Any], None], request: Any, response: Any) -> Any:
+        """Answer a request while the node is active."""
+        if self.state != ACTIVE:
+            response.message = f'the node is {self.state}, accepted is {ACTIVE}'
+            return response
         try:
-            return job()
-        except Refused:
-            raise
-        except Exception as error:
-            # No image may end the node, whatever it does to a detector.
-            reason = why_refused(error)
-            if not isinstance(error, ValueError):
-                lines = traceback.format_exc().splitlines()
-                self.get_logger().error('\n'.join(map(printable, lines)))
-        self._tally.rejected += 1
-        self._tally.reason = reason
-        self.get_logger().warning(f'image refused: {reason}', throttle_duration_sec=LOG_PERIOD)
-        raise Refused(reason)
+            answer(request, response)
+            response.success = True
+        except ValueError as error:
+            response.message = str(error)
+        except CancelledError:
+            response.message = STOPPING
+        return response
+
+    def _identify(self, request: Identify.Request, response: Identify.Response) -> None:
+        job = partial(self._queue.identify, request.image, request.expected or None)
+        response.coded_targets = self._worker.call(job)
+
+    def _reset(self, request: Trigger.Request, response: Trigger.Response) -> None:
+        self._worker.call(self._queue.pipeline.stream.reset)
 
     def _publish_diagnostics(self) -> None:
         # Before the counts, so that these are no older than the stamp.

@@ -70,7 +70,7 @@ class IlluminationNode(ProcessNode):
         self._scenes = settings.scenes()
         self._rendered = []
         self._published = 0
-        self._worker.offer(partial(self._render, self._scenes, self._rendered))
+        self._worker.append(partial(self._render, self._scenes, self._rendered))
 
     def _render(
         self, scenes: list[tuple[SceneSettings, int]], rendered: list[SceneMessages]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator
+from difflib import get_close_matches
 from typing import Generic, TypeVar
 
 from rcl_interfaces.msg import (
@@ -12,17 +12,17 @@ from rcl_interfaces.msg import (
     ParameterDescriptor,
     SetParametersResult,
 )
-from rcl_interfaces.srv import SetParameters
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
-from rclpy.parameter_service import ParameterService
 
-from ahf_ros.nodes.overrides import unknown_parameters
 from ahf_ros.settings.nested import assemble, flat_parameters
 from ahf_ros.settings.parameter import Parameter
 from ahf_ros.text import printable
 
 Settings = TypeVar('Settings')
+
+MAXIMUM_LENGTH = 2000
+"""Maximum length of a list of unknown parameters."""
 
 
 class ParameterSettings(Generic[Settings]):
@@ -101,51 +101,30 @@ class ParameterSettings(Generic[Settings]):
             self._changed()
 
 
-class AnyOrderParameterService(ParameterService):
-    """Parameter services whose `set_parameters` does not depend on the order of the request.
-
-    Each parameter is set on its own, as ROS has it, and so does `ros2 param load`. One that does
-    not fit the values of the others is tried again after them: a minimum and a maximum that both
-    move past the other one are accepted, whichever comes first.
-    """
-
-    def _set_parameters_callback(
-        self, request: SetParameters.Request, response: SetParameters.Response
-    ) -> SetParameters.Response:
-        given = [RosParameter.from_parameter_msg(item) for item in request.parameters]
-        response.results = set_in_any_order(self._set_one, given)
-        return response
-
-    def _set_one(self, parameter: RosParameter) -> SetParametersResult:
-        node = self._get_node()
-        if not node.has_parameter(parameter.name):
-            (reason,) = unknown_parameters([parameter.name], node.get_parameters_by_prefix(''))
-            return SetParametersResult(successful=False, reason=reason)
-        return node.set_parameters_atomically([parameter])
-
-
-def set_in_any_order(
-    set_one: Callable[[RosParameter], SetParametersResult], given: Sequence[RosParameter]
-) -> list[SetParametersResult]:
-    """Set parameters one by one, and those that are refused again, as long as that helps.
+def unknown_parameters(given: Iterable[str], known: Collection[str]) -> Iterator[str]:
+    """Yield a message for each given parameter that the node does not have.
 
     Parameters
     ----------
-    set_one : callable
-        Sets a parameter and returns the result.
-    given : sequence of rclpy.parameter.Parameter
-        What to set. One that is given twice is not tried again, as the last value counts.
+    given : iterable of str
+        Names from the command line and from parameter files.
+    known : collection of str
+        Parameters of the node.
+
+    Examples
+    --------
+    >>> list(unknown_parameters(['expected_target', 'queue'], ['expected_targets', 'queue']))
+    ['no parameter is named expected_target; the nearest is expected_targets']
     """
-    results = [set_one(item) for item in given]
-    times = Counter(item.name for item in given)
-    refused = [place for place, item in enumerate(given) if times[item.name] == 1]
-    while True:
-        before = [place for place in refused if not results[place].successful]
-        for place in before:
-            results[place] = set_one(given[place])
-        refused = [place for place in before if not results[place].successful]
-        if len(refused) in (0, len(before)):
-            return results
+    unlike = []
+    for name in sorted(set(given) - set(known)):
+        if nearest := get_close_matches(name, known, n=1):
+            yield f'no parameter is named {printable(name)}; the nearest is {nearest[0]}'
+        else:
+            unlike.append(name)
+    if unlike:
+        names = printable(', '.join(unlike), MAXIMUM_LENGTH)
+        yield f'no parameter is named {names}; is that a parameter of another node?'
 
 
 def _check_quotes(item: Parameter, value: object) -> None:

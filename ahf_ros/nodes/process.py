@@ -23,18 +23,11 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from rclpy.utilities import remove_ros_args
 
-from ahf_ros.ending import ignore_ending
+from ahf_ros.ending import ignore_ending, signalled
 from ahf_ros.nodes.inputs import Input
-from ahf_ros.nodes.overrides import (
-    check_arguments,
-    foreign_parameters,
-    unknown_arguments,
-    unknown_parameters,
-)
-from ahf_ros.nodes.parameters import AnyOrderParameterService
+from ahf_ros.nodes.parameters import unknown_parameters
 from ahf_ros.nodes.qos import PUBLISHER, declare_qos, qos_profile
-from ahf_ros.nodes.signals import signalled
-from ahf_ros.text import reason_of
+from ahf_ros.text import reason_of, shown
 
 LOG_PERIOD = 5.0
 """Minimum time between two log lines of the same kind about messages, s."""
@@ -102,8 +95,7 @@ class ProcessNode(Node):
     """
 
     def __init__(self, name: str) -> None:
-        super().__init__(name, start_parameter_services=False)
-        self._parameter_service = AnyOrderParameterService(self)
+        super().__init__(name)
         self.ended = Ending()
         self._inputs: list[Input] = []
         self._listening = True
@@ -122,10 +114,12 @@ class ProcessNode(Node):
         arguments : sequence of str
             Command line arguments, without the name of the program.
         """
-        known = self.get_parameters_by_prefix('')
-        yield from unknown_parameters(self._parameter_overrides, known)
-        yield from foreign_parameters(arguments, self.get_fully_qualified_name())
-        yield from unknown_arguments(remove_ros_args(arguments), known)
+        yield from unknown_parameters(self._parameter_overrides, self.get_parameters_by_prefix(''))
+        if '--params-file' in arguments and not self._parameter_overrides:
+            yield f'the parameter file is for other nodes than {self.get_fully_qualified_name()}'
+        if unread := remove_ros_args(arguments):
+            meant = '--ros-args -p NAME:=VALUE sets a parameter'
+            yield f'arguments {shown(" ".join(unread))} have no effect; {meant}'
 
     def close(self) -> None:
         """End the threads of the node, while topics and the log still work."""
@@ -191,7 +185,6 @@ def run(make_node: Callable[[], ProcessNode], arguments: list[str] | None = None
     arrived = signalled()
     given = sys.argv[1:] if arguments is None else arguments
     try:
-        check_arguments(given)
         set_logger_level('rcl', LoggingSeverity.FATAL)  # its errors are raised as well
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
         if get_logger_effective_level('rcl') == LoggingSeverity.FATAL:

@@ -17,7 +17,7 @@ from std_msgs.msg import Header
 
 from ahf_ros.interchange.target_messages import identification_from
 from ahf_ros.nodes.image_msg import image_message
-from ahf_ros.nodes.pipeline import STOPPING, Refused
+from ahf_ros.nodes.pipeline import Stopping
 from ahf_ros.srv import Identify
 from ahf_ros.target import Target
 from ahf_ros.target_check import checked_targets
@@ -77,7 +77,7 @@ class ServiceDetector:
         ValueError
             If the service does not exist, disappears, exceeds its time limit or refuses the image;
             the message names the service.
-        Refused
+        Stopping
             If the node stops first.
         """
         # A request that is sent before the service is discovered gets lost.
@@ -128,7 +128,7 @@ class ServiceDetector:
                 self._known = True
                 return response
             if self._stopping.is_set():
-                raise Refused(STOPPING)
+                raise Stopping
             now = time.monotonic()
             if self._client.service_is_ready():
                 seen = now

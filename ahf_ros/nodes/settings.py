@@ -149,8 +149,8 @@ class DetectorNodeSettings:
     )
     queue: str = parameter(
         LATEST,
-        'latest: a waiting image is dropped when a newer one arrives; lossless: every image is '
-        'answered in order, and the duration in answers is 0.',
+        'latest: as many images wait as a stack has, and a newer one replaces the oldest; '
+        'lossless: every image is answered in order, and the duration in answers is 0.',
         choices=(LATEST, LOSSLESS),
     )
     queue_memory: int = parameter(

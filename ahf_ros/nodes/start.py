@@ -6,8 +6,7 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 
-from ahf_ros.ending import ignore_ending
-from ahf_ros.nodes.signals import has_arrived, signalled
+from ahf_ros.ending import has_arrived, ignore_ending, signalled
 
 NODES = {
     'demo': 'ahf_ros.nodes.demo',
@@ -29,7 +28,7 @@ def start(node: str, arguments: list[str] | None = None) -> int:
     """
     signalled()
     if node != 'demo' and _help_wanted(sys.argv[1:] if arguments is None else arguments):
-        from ahf_ros.nodes.help import help_text
+        from ahf_ros.nodes.interfaces import help_text
 
         print(help_text(node), end='')
         return 0

@@ -11,10 +11,9 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from sensor_msgs.msg import CameraInfo
 
 from ahf_ros import msg
-from ahf_ros.interchange.camera_info import Calibration, calibration
+from ahf_ros.interchange.camera_info import Calibration, calibration, undistorted_targets
 from ahf_ros.interchange.image_messages import nanoseconds
 from ahf_ros.interchange.target_messages import coded_target_array
-from ahf_ros.interchange.undistorted_targets import undistorted_targets
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.diagnostics import Tally
 from ahf_ros.nodes.inputs import Input

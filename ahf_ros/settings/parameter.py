@@ -130,7 +130,16 @@ def parameter(
     form: str = '',
 ) -> Any:
     """Return a dataclass field that carries a `Parameter`."""
-    item = Parameter('', default, description, minimum, maximum, tuple(choices), read_only, form)
+    item = Parameter(
+        name='',
+        default=default,
+        description=description,
+        minimum=minimum,
+        maximum=maximum,
+        choices=tuple(choices),
+        read_only=read_only,
+        form=form,
+    )
     return field(default=default, metadata={_KEY: item})
 
 

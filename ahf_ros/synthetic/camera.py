@@ -213,7 +213,9 @@ def tilted_camera(
     intrinsics = np.array(
         [[focal_length, 0, principal[0]], [0, focal_length, principal[1]], [0, 0, 1.0]]
     )
-    return Camera(width, height, intrinsics, distortion, pose)
+    return Camera(
+        width=width, height=height, intrinsics=intrinsics, distortion=distortion, pose=pose
+    )
 
 
 def _transform(homography: np.ndarray, points: np.ndarray) -> np.ndarray:

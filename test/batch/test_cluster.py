@@ -19,7 +19,7 @@ pytest.importorskip('distributed', reason='distributed is not installed')
 pytest.importorskip('rosbags', reason='rosbags is not installed')
 
 from ahf_ros.bag.definitions import typestore
-from ahf_ros.batch import connection
+from ahf_ros.batch import cluster
 from ahf_ros.batch.cluster import DaskEngine
 from ahf_ros.batch.engine import EngineLost, TaskFailed, finished_tasks
 from ahf_ros.batch.remote import guarded_perform
@@ -52,7 +52,7 @@ def test_nothing_is_lost_and_nothing_twice(
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
         (path.parent / '__init__.py').touch()
-    monkeypatch.setattr(connection, '_CONNECT', LIMIT)
+    monkeypatch.setattr(cluster, '_CONNECT', LIMIT)
     said: list[str] = []
     reports: list[tuple[int, str]] = []
     tasks = [('pid', 0), ('die once', str(tmp_path / 'mark')), ('die', 0)]
@@ -119,7 +119,7 @@ def test_nothing_is_lost_and_nothing_twice(
             with pytest.raises(EngineLost, match='is away; the same command goes on'):
                 list(finished)
     command = ['identify', 'a.png']
-    monkeypatch.setattr(connection, '_CONNECT', 0.3)
+    monkeypatch.setattr(cluster, '_CONNECT', 0.3)
     address = f'tcp://127.0.0.1:{free_port()}'
     assert main([*command, '--scheduler', address]) == 2
     assert f"scheduler is '{address}', accepted is the address" in capsys.readouterr().err
@@ -146,15 +146,15 @@ class OtherVersions:
 def test_other_versions_are_named() -> None:
     client = OtherVersions('2023.4', '3.1.4.final.0')
     with pytest.raises(ValueError, match=r'has dask\.distributed 2023\.4, accepted is 2026\.1'):
-        connection.check_version(client, 'tcp://b')
-    refused = connection.refused_workers(client)
+        cluster.check_version(client, 'tcp://b')
+    refused = cluster.refused_workers(client)
     assert refused['tcp://a'].startswith('has Python 3.1, accepted is 3.')
 
 
 def test_a_lost_connection_is_no_news_to_log() -> None:
     for error, news in ((ConnectionResetError('gone'), False), (ValueError('wrong'), True)):
         record = logging.makeLogRecord({'exc_info': (type(error), error, None)})
-        assert connection._is_news(record) == news
+        assert cluster._is_news(record) == news
 
 
 def test_a_worker_without_the_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

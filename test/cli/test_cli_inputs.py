@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.cli import main
-from ahf_ros.cli.inputs import image_paths
+from ahf_ros.cli.identify import image_paths
 from ahf_ros.interchange.image_files import as_oriented, read_image
 from ahf_ros.interchange.target_json import read_results
 from ahf_ros.synthetic.scene import SceneSettings, render

@@ -9,8 +9,7 @@ import pytest
 
 from ahf_ros.codes.dots import DOTS_DESIGN
 from ahf_ros.detectors import create_detector
-from ahf_ros.detectors.dots.local_otsu import local_otsu, otsu
-from ahf_ros.detectors.dots.published import PublishedDotsDetector
+from ahf_ros.detectors.dots.published import PublishedDotsDetector, local_otsu, otsu
 from ahf_ros.evaluation import score
 from ahf_ros.session import identify
 from ahf_ros.synthetic.scene import SceneSettings, render

@@ -10,7 +10,7 @@ import pytest
 
 from ahf_ros.codes.gsi_library import point_family
 from ahf_ros.detectors import create_detector
-from ahf_ros.detectors.gsi.published_decoding import decode
+from ahf_ros.detectors.gsi.published import decode
 from ahf_ros.evaluation import score
 from ahf_ros.session import identify
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render

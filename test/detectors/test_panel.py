@@ -16,8 +16,7 @@ from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.detectors.ring.counting import estimate_count
 from ahf_ros.evaluation import FALSE, evaluate, judge, total
 from ahf_ros.interchange.export.formats import FORMATS, Export
-from ahf_ros.interchange.export.measured_images import read_measured_images
-from ahf_ros.interchange.export.survey import Control
+from ahf_ros.interchange.export.survey import Control, read_measured_images
 from ahf_ros.interchange.image_files import read_image
 from ahf_ros.interchange.point_lists import read_point_list
 from ahf_ros.interchange.target_json import read_results

@@ -7,8 +7,12 @@ import cv2
 import numpy as np
 import pytest
 
-from ahf_ros.interchange.camera_info import Calibration, calibration, undistorted
-from ahf_ros.interchange.undistorted_targets import undistorted_targets
+from ahf_ros.interchange.camera_info import (
+    Calibration,
+    calibration,
+    undistorted,
+    undistorted_targets,
+)
 from ahf_ros.target import Target
 
 K = np.array([[1800.0, 0, 968], [0, 1790, 648], [0, 0, 1]])

@@ -16,8 +16,13 @@ import numpy as np
 import pytest
 
 from ahf_ros.interchange.export.formats import FORMATS, Export
-from ahf_ros.interchange.export.measured_images import MeasuredImage, read_measured_images
-from ahf_ros.interchange.export.survey import Control, make_survey, notes_on
+from ahf_ros.interchange.export.survey import (
+    Control,
+    MeasuredImage,
+    make_survey,
+    notes_on,
+    read_measured_images,
+)
 from ahf_ros.target import UNDECODED, Target
 from support.disk import room_for
 from support.exported import READERS

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from ahf_ros.nodes.losses import Losses
+from ahf_ros.nodes.inputs import Losses
 
 
 def told(number: int | None, sender: object = None) -> dict[str, object]:

@@ -281,31 +281,6 @@ def test_one_refused_parameter_of_a_list_leaves_the_others(
     assert (detector.get('seed'), detector.get('population')) == (7, before)
 
 
-def test_minimum_and_maximum_of_a_list_may_come_in_either_order(
-    graph: Any, detector: DetectorProcess
-) -> None:
-    names = 'min_radius', 'max_radius'
-    before = [detector.get(name) for name in names]
-    reasons: list[str] = []
-
-    def load(*pairs: tuple[str, Any]) -> list[bool]:
-        given = [Parameter(name, value=value).to_parameter_msg() for name, value in pairs]
-        request = SetParameters.Request(parameters=given)
-        found = graph.call(SetParameters, '/own/detector/set_parameters', request).results
-        reasons.extend(result.reason for result in found)
-        return [result.successful for result in found]
-
-    assert load(('min_radius', 10.0), ('max_radius', 20.0)) == [True, True]
-    up = load(('min_radius', 30.0), ('population', 1), ('max_radius', 40.0))
-    assert up == [True, False, True]
-    assert [detector.get(name) for name in names] == [30.0, 40.0]
-    assert load(('max_radius', 20.0), ('min_radius', 10.0)) == [True, True]
-    assert [detector.get(name) for name in names] == [10.0, 20.0]
-    assert load(('min_radius', 40.0), ('max_radius', 30.0), ('seeds', 1)) == [False, True, False]
-    assert reasons[-1] == 'no parameter is named seeds; the nearest is seed'
-    assert load(*zip(names, before, strict=True)) == [True, True]
-
-
 def test_images_for_those_who_look(
     graph: Any, detector: DetectorProcess, rendering: Rendering
 ) -> None:

@@ -63,9 +63,9 @@ def test_a_signal_during_the_imports_ends_in_order(node: str, number: str) -> No
     [
         (
             ['--params-file', '/nowhere'],
-            "params-file is '/nowhere', accepted is the name of a file",
+            "Couldn't parse params file: '--params-file /nowhere'",
         ),
-        (['-r', '__ns:=/bad-name'], "namespace is '/bad-name', accepted are names of letters"),
+        (['-r', '__ns:=/bad-name'], "Couldn't parse remap rule: '-r __ns:=/bad-name'"),
         (['-p', 'population'], "Couldn't parse parameter override rule: '-p population'"),
         (['-p', 'qos_overrides./image.subscription.reliability:=foo'], 'foo'),
         (

@@ -19,8 +19,8 @@ from std_msgs.msg import Header
 
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.image_msg import image_message
+from ahf_ros.nodes.image_queue import WaitingMessages
 from ahf_ros.nodes.interfaces import NODES
-from ahf_ros.nodes.waiting import WaitingMessages
 from ahf_ros.srv import Identify
 
 POLICY = Path(__file__).resolve().parents[2] / 'config' / 'security_policy.xml'

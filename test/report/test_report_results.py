@@ -13,12 +13,10 @@ import pytest
 from ahf_ros.imaging.image import stretched_to_8_bit
 from ahf_ros.imaging.stack import ImageStack
 from ahf_ros.interchange.image_files import read_image, write_image
-from ahf_ros.report import pictures
-from ahf_ros.report.images import find_image, shown_image
-from ahf_ros.report.pictures import fitted, thumbnail
-from ahf_ros.report.reading import read_results
-from ahf_ros.report.results import ImageResult, result_from_json
-from ahf_ros.report.rows import families_of, row
+from ahf_ros.report import images
+from ahf_ros.report.images import find_image, fitted, shown_image, thumbnail
+from ahf_ros.report.page import families_of, row
+from ahf_ros.report.results import ImageResult, read_results, result_from_json
 from ahf_ros.target import SquareMarker, TrueTarget
 from support.results import record, save_image, save_lines, searched, target, undecoded
 
@@ -104,7 +102,7 @@ def test_pictures_take_no_more_bytes_than_they_may(monkeypatch: pytest.MonkeyPat
     assert fitted(noise[:40, :50], 10).width <= 16
     small = thumbnail(noise)
     assert (small.width, small.height) == (117, 88)
-    monkeypatch.setattr(pictures.cv2, 'haveImageWriter', lambda _: False)
+    monkeypatch.setattr(images.cv2, 'haveImageWriter', lambda _: False)
     assert fitted(noise, 40_000).kind == 'image/jpeg'
 
 

@@ -1,25 +1,33 @@
 """Where the discs of rings of dots may be, judged by a glance at disc and border.
 
 Any dot may be a disc, and any circle one of the edges of a border. Most are not: of the steps of
-ln I at disc and border, as the design has them, only targets show nearly all.
+ln I at disc and border, as the design has them, only targets show nearly all. Discs are looked for
+where edges are left that no known target explains and that are not straight.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 
 from ahf_ros.codes.dots import DotFamily
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.dots.border_steps import border_steps
-from ahf_ros.detectors.dots.regions import STRAIGHT, open_regions
 from ahf_ros.features.dot_search import voted_dots, whole_dots
 from ahf_ros.features.dots import NO_DOTS, Dots, distinct
 from ahf_ros.features.frame import circle_outlines, ellipse_axes, enlarged
-from ahf_ros.features.log_edges import LOG_SCALE
+from ahf_ros.features.log_edges import LOG_SCALE, LogEdges, mask_of
 from ahf_ros.features.pyramid import ImagePyramid
 from ahf_ros.features.small_dots import small_dots
+
+STRAIGHT = 8.0
+"""Length of an edge that is no small dot's, px of the image at half its size."""
+
+_TILE = 64  # side, px of the image at half its size
+_MINIMUM_EDGES = 20  # of four tiles, px; disc and border of the smallest target have twice as many
+_MAXIMUM_SHARE = 0.7  # share of the image, beyond which all of it is one region
 
 _SCALES = np.geomspace(0.76, 1.32, 11)  # of the radius of a disc, in radii of its candidate
 _MINIMUM_SHARE = 0.55  # of the steps of ln at disc and border; lattices of light reach 0.54
@@ -27,6 +35,42 @@ _MARGIN = 0.3  # about the border of a known target, disc radii
 _SMALL = 12.0  # largest radius of discs that are looked for as blobs of the whole image, px
 _SMALLER = 0.8  # of the smallest radius, of a blob whose edge is blurred
 _TOLERANCE = 0.9  # the same, of a disc whose border has a whole outline
+
+
+def open_regions(edges: LogEdges, outlines: np.ndarray) -> list[tuple[slice, slice]]:
+    """Return the regions that hold edges which nothing explains.
+
+    Parameters
+    ----------
+    edges : LogEdges
+        Of the image at half its size.
+    outlines : ndarray of float, shape (k, m, 2)
+        Of what is known, px of the image at half its size.
+
+    Returns
+    -------
+    list of tuple of 2 slice
+        Rows and columns of the image at half its size; regions may overlap.
+    """
+    height, width = edges.marked.shape
+    rest = edges.unmasked(mask_of(outlines, edges.marked.shape)).curved(STRAIGHT)
+    rows, columns = -(-height // _TILE), -(-width // _TILE)
+    of_tiles = np.bincount(
+        rest.y // _TILE * columns + rest.x // _TILE, minlength=rows * columns
+    ).reshape(rows, columns)
+    of_four = 4 * cv2.blur(of_tiles.astype(np.float32), (2, 2), borderType=cv2.BORDER_CONSTANT)
+    wide = cv2.dilate((of_four >= _MINIMUM_EDGES).astype(np.uint8), np.ones((3, 3), np.uint8))
+    contours, _ = cv2.findContours(wide, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+    boxes = [cv2.boundingRect(contour) for contour in contours]
+    if sum(across * tall for _, _, across, tall in boxes) > _MAXIMUM_SHARE * rows * columns:
+        return [(slice(0, height), slice(0, width))]
+    return [
+        (
+            slice(_TILE * top, min(_TILE * (top + tall), height)),
+            slice(_TILE * left, min(_TILE * (left + across), width)),
+        )
+        for left, top, across, tall in boxes
+    ]
 
 
 def whole_discs(

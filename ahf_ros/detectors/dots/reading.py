@@ -106,14 +106,14 @@ def read_rings(log: np.ndarray, fit: Fit, code: DotFamily) -> Readings:
     between = np.clip(evidence[every, halfway].max(axis=1), -_LIMIT, _LIMIT)
     evidence = np.clip(evidence[every, best], -_LIMIT, _LIMIT)
     return Readings(
-        (evidence > 0) @ (1 << np.arange(bits, dtype=np.int64)),
-        evidence,
-        between,
-        phases[best],
-        radii[own],
-        border_steps(log, fit.frames, polarity, code)[:, 0],
-        highest / faintest,
-        inside,
+        words=(evidence > 0) @ (1 << np.arange(bits, dtype=np.int64)),
+        evidence=evidence,
+        between=between,
+        phase=phases[best],
+        radius=radii[own],
+        seen=border_steps(log, fit.frames, polarity, code)[:, 0],
+        height=highest / faintest,
+        inside=inside,
     )
 
 

@@ -1,4 +1,8 @@
-"""Rings of dots that may be targets, and which of them are reported."""
+"""Rings of dots that may be targets, in their frames, and which of them are reported.
+
+The edges of disc and border give the frames: circles of three radii separate the image of the
+physical centre from the centres of ellipses.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +14,6 @@ import numpy as np
 from ahf_ros.codes.dots import DotFamily
 from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import DetectorSettings
-from ahf_ros.detectors.dots.circles import fit_targets
 from ahf_ros.detectors.dots.confidence import (
     MAXIMUM_SHARE,
     target_features,
@@ -20,12 +23,19 @@ from ahf_ros.detectors.dots.confidence import (
 )
 from ahf_ros.detectors.dots.reading import dot_points, read_rings
 from ahf_ros.features.array_record import ArrayRecord
+from ahf_ros.features.circle_fit import Fit
+from ahf_ros.features.circles import Circles
 from ahf_ros.features.dots import Dots
 from ahf_ros.features.ellipse_targets import ellipse_fields
-from ahf_ros.features.frame import ellipse_axes
+from ahf_ros.features.frame import ellipse_axes, mean_radii
 from ahf_ros.features.homography import local_frames
 from ahf_ros.features.pyramid import ImagePyramid
+from ahf_ros.features.soft_edges import fit_circles_of_any_blur
 from ahf_ros.target import UNDECODED, DottedTarget
+
+_RAYS = 40  # round each circle
+_REACH = 0.3  # how far from a circle its edge is looked for, radii of the disc: half the border
+_MINIMUM_REACH = 1.35  # the same of small discs, px: what a profile needs
 
 FAMILY = 'dots'
 """Name of the family, whichever data file describes it."""
@@ -39,6 +49,43 @@ _MISSING = 0.1  # share of the steps that are missing where there are edges, bey
 _OF_BLUR = 2.0  # share of the steps that blur hides, in its radii of the disc
 _BETWEEN = 2.0  # evidence for a dot halfway between places, where targets have none
 _MAXIMUM_CONTRAST = 0.85  # contrast of a disc, dark over bright
+
+
+def fit_targets(
+    gray: np.ndarray, frames: np.ndarray, polarity: np.ndarray, code: DotFamily
+) -> Fit:
+    """Fit the edges of disc and border.
+
+    Parameters
+    ----------
+    gray : ndarray of float32, shape (height, width)
+        Gray values from 0 to 255.
+    frames : ndarray of float64, shape (k, 3, 3)
+        Of the discs, to about a pixel.
+    polarity : ndarray of int, shape (k,)
+        1 for dark targets, -1 for bright ones.
+    code : DotFamily
+    """
+    reach = np.maximum(_REACH, _MINIMUM_REACH / mean_radii(frames))[:, None]
+    circles = target_circles(polarity, code)
+    return fit_circles_of_any_blur(gray, frames, circles, reach=reach, projective=True, rounds=3)
+
+
+def target_circles(polarity: np.ndarray, code: DotFamily) -> Circles:
+    """Return the edges of disc and border.
+
+    Parameters
+    ----------
+    polarity : ndarray of int, shape (k,)
+        1 for dark targets, -1 for bright ones.
+    code : DotFamily
+    """
+    angles = 2 * np.pi * np.arange(_RAYS) / _RAYS
+    radii = np.array([1.0, code.ground_radius, code.border_radius])
+    signs = np.repeat([1, -1, 1], _RAYS)
+    group = np.repeat([0, 1, 1], _RAYS)
+    of_points = polarity[:, None] * signs
+    return Circles(np.tile(angles, 3), np.repeat(radii, _RAYS), group, of_points)
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,15 +163,15 @@ def _read_part(pyramid: ImagePyramid, discs: Dots, code: DotFamily) -> Rings:
     likely = (missing <= _MISSING) & (readings.between <= _BETWEEN) & readings.inside
     fit, readings = fit.select(likely), readings.select(likely)
     return Rings(
-        fit.frames,
-        fit.covariance,
-        fit.polarity,
-        readings.words,
-        readings.phase,
-        fit.edge_shift,
-        readings.radius,
-        target_features(readings, fit),
-        word_features(readings, fit),
+        frames=fit.frames,
+        covariance=fit.covariance,
+        polarity=fit.polarity,
+        words=readings.words,
+        phase=readings.phase,
+        edge_shift=fit.edge_shift,
+        radius=readings.radius,
+        target_features=target_features(readings, fit),
+        word_features=word_features(readings, fit),
     )
 
 

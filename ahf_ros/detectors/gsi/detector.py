@@ -246,12 +246,12 @@ def _placed(
     )
     readings = read_codes(evidence, placement.scale, code)
     return Hypotheses(
-        placement.homographies,
-        placement.covariance,
-        polarity,
-        placement.scale,
-        readings.words,
-        confidence_features(placement, readings, code),
+        homographies=placement.homographies,
+        covariance=placement.covariance,
+        polarity=polarity,
+        scale=placement.scale,
+        words=readings.words,
+        features=confidence_features(placement, readings, code),
     )
 
 

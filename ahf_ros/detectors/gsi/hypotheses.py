@@ -70,7 +70,14 @@ def no_hypotheses() -> Hypotheses:
     """Return the record of none."""
     nobody = np.zeros(0, int)
     nowhere, unmeasured = np.zeros((0, 3, 3)), np.zeros((0, 2, 2))
-    return Hypotheses(nowhere, unmeasured, nobody, np.zeros(0), nobody, np.zeros((0, FEATURES)))
+    return Hypotheses(
+        homographies=nowhere,
+        covariance=unmeasured,
+        polarity=nobody,
+        scale=np.zeros(0),
+        words=nobody,
+        features=np.zeros((0, FEATURES)),
+    )
 
 
 def plausible(

@@ -10,6 +10,10 @@ The six steps of Wang et al. [1]_:
 5. The P2-invariant tells which of these five belong to the template.
 6. An affine map from the template to the printed design puts the three other dots near positions.
 
+The tolerances of collinearity and of the invariant are ours: the paper says only that measured
+invariants lie within 0.03 of that of the design. The front of a print is seen, so that B and D are
+not exchanged.
+
 It has no defence against uneven light, which makes it a fair test of a filter. The centre of a
 target is that of the ellipse of its middle dot, with the perspective bias in it.
 
@@ -21,7 +25,8 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from itertools import combinations, product
+from typing import Any, ClassVar
 
 import cv2
 import numpy as np
@@ -30,9 +35,18 @@ from ahf_ros.codes.gsi import PointFamily
 from ahf_ros.codes.gsi_library import point_family
 from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import FamilyDetector
-from ahf_ros.detectors.gsi.published_decoding import LARGEST_BIAS, Decoded, check_family, decode
+from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, DottedTarget, Target, sorted_targets
+
+LARGEST_BIAS = 1.0
+"""Distance h of a dot from its position that is accepted, in the unit of the printed design, mm"""
+
+_DOTS = 8  # of a target
+_DISTANCE_RATIO = 2.5  # beta, of the longer half of the line of three dots to the shorter one
+_OFF_LINE = 0.05  # distance of the middle dot from the line, in the line's length
+_INVARIANT_ERROR = 0.1
+_PART = 1_000_000  # distances at a time, which bounds the memory
 
 _FAMILY = 'gsi'  # whichever data file describes it
 _THRESHOLD = 100  # gray value between dots and ground
@@ -41,6 +55,204 @@ _PERIMETER = (20.0, 500.0)  # px
 _MINIMUM_ROUNDNESS = 0.6  # 4 pi area / perimeter^2
 _MINIMUM_POINTS = 14  # of a contour: neighbours are at most 2^0.5 px apart
 _CONTOUR_ERROR = 0.2  # standard deviation of the centre of an ellipse, px
+
+
+def p2_invariant(ratio: Any) -> np.ndarray:
+    """Return J of cross ratios.
+
+    J = J2 / J1, with
+
+        J1 = (l^6 - 3 l^5 + 3 l^4 - l^3 + 3 l^2 - 3 l + 1) / (l^2 (l - 1)^2),
+        J2 = (2 l^6 - 6 l^5 + 9 l^4 - 8 l^3 + 9 l^2 - 6 l + 2) / (l^2 (l - 1)^2).
+
+    Parameters
+    ----------
+    ratio : array_like of float
+        Cross ratios l, of any order of their points.
+
+    Returns
+    -------
+    ndarray of float64, shape of `ratio`
+        From 2 to 14/5; NaN where l is not finite.
+
+    Examples
+    --------
+    >>> float(p2_invariant(2.0))
+    2.8
+    """
+    value = np.asarray(ratio, np.float64)
+    with np.errstate(all='ignore'):
+        # A cross ratio and its inverse have the same J; powers of the smaller do not overflow.
+        value = np.where(np.abs(value) > 1, 1 / value, value)
+    first = np.polyval([1, -3, 3, -1, 3, -3, 1], value)
+    second = np.polyval([2, -6, 9, -8, 9, -6, 2], value)
+    invariant: np.ndarray = second / first
+    return invariant
+
+
+def area_cross_ratio(pivot: Any, points: Any) -> np.ndarray:
+    """Return the cross ratio of the lines from a pivot to four points, by areas of triangles.
+
+    Parameters
+    ----------
+    pivot : array_like of float, shape (..., 2)
+    points : array_like of float, shape (..., 4, 2)
+
+    Returns
+    -------
+    ndarray of float64, shape (...)
+        Infinite or NaN where three of the points are collinear with the pivot.
+    """
+    arms = np.asarray(points, np.float64) - np.asarray(pivot, np.float64)[..., None, :]
+    one, two, three, four = np.moveaxis(arms, -2, 0)
+
+    def area(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        twice: np.ndarray = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+        return twice
+
+    with np.errstate(divide='ignore', invalid='ignore'):
+        ratio = area(one, three) * area(two, four) / (area(one, four) * area(two, three))
+    return np.asarray(ratio)
+
+
+def template_invariant(points: Any) -> np.ndarray:
+    """Return the P2-invariant of five template points, three of them collinear.
+
+    It is the larger one of those at the two points that are not on the line; the others have
+    none.
+
+    Parameters
+    ----------
+    points : array_like of float, shape (..., 5, 2)
+        A, B, C, D, E, with C, E, A on a line. Exchanging B and D changes nothing.
+
+    Returns
+    -------
+    ndarray of float64, shape (...)
+        2.474 for the printed design of GSI.
+    """
+    a, b, c, d, e = np.moveaxis(np.asarray(points, np.float64), -2, 0)
+    at_d = area_cross_ratio(d, np.stack([b, c, e, a], axis=-2))
+    at_b = area_cross_ratio(b, np.stack([d, c, e, a], axis=-2))
+    return np.fmax(p2_invariant(at_d), p2_invariant(at_b))
+
+
+@dataclass(frozen=True, slots=True)
+class Decoded(ArrayRecord):
+    """k targets.
+
+    Attributes
+    ----------
+    words : ndarray of int64, shape (k,)
+        Values of their codes.
+    members : ndarray of int, shape (k, 8)
+        Which points are their template dots, in the order of the printed design, and their
+        decoding dots.
+    bias : ndarray of float64, shape (k,)
+        Largest distance of a decoding dot from its position, in the unit of the printed design.
+    """
+
+    words: np.ndarray
+    members: np.ndarray
+    bias: np.ndarray
+
+
+def check_family(code: PointFamily) -> None:
+    """Raise a ValueError unless the design has what the method rests on."""
+    names = sorted(code.template_names)
+    good = names == list('ABCDE') and code.rule.dots == _DOTS - 5
+    if good:
+        c, e, a = (code.template[code.template_names.index(name)] for name in 'CEA')
+        good = bool(abs(_cross(a - c, e - c)) < 1e-3 * ((a - c) ** 2).sum())
+        good &= code.template_names[code.reference] == 'E'
+    if not good:
+        raise ValueError(
+            f'the family is {code.name!r}, accepted by gsi_published is one with the template '
+            'dots A, B, C, D and E, the last of which is the reference and on the line from C to '
+            'A, and with three decoding dots'
+        )
+
+
+def decode(points: np.ndarray, code: PointFamily) -> Decoded:
+    """Return the targets that points belong to, of those with the same middle dot the best one.
+
+    Parameters
+    ----------
+    points : ndarray of float64, shape (k, 2)
+        Centres of dots, px.
+    code : PointFamily
+    """
+    groups = _nearest(points)
+    members = np.concatenate([np.zeros((0, _DOTS), int), *_templates(points, groups, code)])
+    count = len(code.template)
+    template = points[members[:, :count]]
+    homogeneous = np.concatenate([template, np.ones((*template.shape[:2], 1))], axis=2)
+    affine = np.linalg.pinv(homogeneous) @ code.template
+    dots = points[members[:, count:]] @ affine[:, :2] + affine[:, 2:]
+    distance = np.linalg.norm(dots[:, :, None] - code.positions, axis=3)
+    nearest = distance.argmin(axis=2)
+    bias = distance.min(axis=2).max(axis=1, initial=0.0)
+    words = np.bitwise_or.reduce(np.int64(1) << code.position_numbers[nearest], axis=1)
+    order = np.lexsort((bias, members[:, code.reference]))
+    order = order[(bias[order] <= LARGEST_BIAS) & np.isin(words[order], code.words)]
+    _, first = np.unique(members[order, code.reference], return_index=True)
+    return Decoded(words, members, bias).select(order[first])
+
+
+def _nearest(points: np.ndarray) -> np.ndarray:
+    """Return each point and the points nearest to it, shape (k, 8)."""
+    if len(points) < _DOTS:
+        return np.zeros((0, _DOTS), int)
+    groups = []
+    count = max(_PART // len(points), 1)
+    for start in range(0, len(points), count):
+        part = points[start : start + count]
+        square = ((part[:, None] - points) ** 2).sum(axis=2)
+        square[np.arange(len(part)), np.arange(start, start + len(part))] = -1.0
+        nearest = np.argpartition(square, _DOTS - 1, axis=1)[:, :_DOTS]
+        order = np.argsort(np.take_along_axis(square, nearest, axis=1), axis=1)
+        groups.append(np.take_along_axis(nearest, order, axis=1))
+    return np.concatenate(groups)
+
+
+def _templates(points: np.ndarray, groups: np.ndarray, code: PointFamily) -> list[np.ndarray]:
+    """Return members of targets as `Decoded` has them, from groups whose first dot is E."""
+    wanted = float(template_invariant(code.template[_roles(code)]))
+    found = []
+    for pair in combinations(range(1, _DOTS), 2):
+        others = [index for index in range(1, _DOTS) if index not in pair]
+        for a, c in (pair, pair[::-1]):
+            e_to_a = points[groups[:, a]] - points[groups[:, 0]]
+            e_to_c = points[groups[:, c]] - points[groups[:, 0]]
+            line = e_to_a - e_to_c
+            halves = np.hypot(*e_to_a.T), np.hypot(*e_to_c.T)
+            good = np.abs(_cross(e_to_a, e_to_c)) < _OFF_LINE * (line**2).sum(axis=1)
+            good &= (e_to_a * e_to_c).sum(axis=1) < 0
+            good &= np.maximum(*halves) <= _DISTANCE_RATIO * np.minimum(*halves)
+            arms = points[groups[:, others]] - points[groups[:, [c]]]
+            of_b = _cross(line[:, None], arms) > 0  # y points down
+            good &= np.isin(of_b.sum(axis=1), (2, 3))
+            for b, d in product(others, others):
+                if b != d:
+                    sides = of_b[:, others.index(b)] & ~of_b[:, others.index(d)]
+                    which = groups[good & sides][:, [a, b, c, d, 0]]
+                    rest = [index for index in others if index not in (b, d)]
+                    invariant = template_invariant(points[which])
+                    near = np.abs(invariant - wanted) < _INVARIANT_ERROR
+                    template = which[:, np.argsort(_roles(code))]
+                    dots = groups[good & sides][:, rest]
+                    found.append(np.concatenate([template, dots], axis=1)[near])
+    return found
+
+
+def _roles(code: PointFamily) -> list[int]:
+    """Return the indices of A, B, C, D and E among the template dots."""
+    return [code.template_names.index(name) for name in 'ABCDE']
+
+
+def _cross(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    area: np.ndarray = first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
+    return area
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,6 +369,15 @@ def _undecoded(dots: np.ndarray) -> list[Target]:
     """Return the dots that belong to no target."""
     spread = (_CONTOUR_ERROR**2, 0.0, 0.0, _CONTOUR_ERROR**2)
     return [
-        Target(UNDECODED, 0, x, y, major, minor, angle, covariance=spread)
+        Target(
+            id=UNDECODED,
+            code=0,
+            x=x,
+            y=y,
+            semi_major=major,
+            semi_minor=minor,
+            angle=angle,
+            covariance=spread,
+        )
         for x, y, major, minor, angle in dots.tolist()
     ]

@@ -191,12 +191,12 @@ def place_targets(
     misplaced = np.sort(np.where(found, np.log1p(distance**2), 0.0), axis=1)[:, :-1]
     uneven = median(np.abs(growth - np.log(scale)[:, None]), measured)
     return Placement(
-        fit.homographies,
-        fit.covariance * excess[:, None, None],
-        near.mean(axis=1),
-        misplaced.sum(axis=1),
-        scale,
-        uneven,
+        homographies=fit.homographies,
+        covariance=fit.covariance * excess[:, None, None],
+        share=near.mean(axis=1),
+        misplacement=misplaced.sum(axis=1),
+        scale=scale,
+        unevenness=uneven,
     )
 
 

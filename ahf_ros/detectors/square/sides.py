@@ -172,12 +172,12 @@ def _edge_shift(
     cell = np.linalg.norm(inner - points, axis=3)
     each = (len(corners), 4 * along.size)
     outlines = OutlinePoints(
-        points.reshape(*each, 2),
-        normals.reshape(*each, 2),
-        -np.ones(each, int),
-        _REACH_IN_CELLS * cell.reshape(each),
-        (cell * (_IN_CELL[1] - _IN_CELL[0])).reshape(each),
-        np.zeros(each),
+        points=points.reshape(*each, 2),
+        normals=normals.reshape(*each, 2),
+        polarity=-np.ones(each, int),
+        scale=_REACH_IN_CELLS * cell.reshape(each),
+        spacing=(cell * (_IN_CELL[1] - _IN_CELL[0])).reshape(each),
+        curvature=np.zeros(each),
     )
     edges = measure_outlines(gray, outlines, blur, reach=1.0)
     halfway = (1 + contrast[:, None]) / 2 * edges.bright
@@ -228,12 +228,12 @@ def _outlines(
         return np.repeat(of_sides, _PROFILES, axis=1)
 
     outlines = OutlinePoints(
-        points.reshape(count, -1, 2),
-        repeated(normals),
-        np.ones((count, 4 * _PROFILES), int),
-        repeated(reach),
-        repeated(lengths * (along[1] - along[0])),
-        np.zeros((count, 4 * _PROFILES)),
+        points=points.reshape(count, -1, 2),
+        normals=repeated(normals),
+        polarity=np.ones((count, 4 * _PROFILES), int),
+        scale=repeated(reach),
+        spacing=repeated(lengths * (along[1] - along[0])),
+        curvature=np.zeros((count, 4 * _PROFILES)),
     )
     return outlines, along
 

@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING
 from ahf_ros.interchange.files import write_whole
 
 if TYPE_CHECKING:
-    from ahf_ros.interchange.export.measured_images import MeasuredImage
-    from ahf_ros.interchange.export.survey import Control, Survey
+    from ahf_ros.interchange.export.survey import Control, MeasuredImage, Survey
 
 
 @dataclass(frozen=True, slots=True)

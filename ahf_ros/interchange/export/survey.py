@@ -1,4 +1,4 @@
-"""A survey: photographs, the labelled marks in them, and control points."""
+"""A survey: measured photographs, the labelled marks in them, and control points."""
 
 from __future__ import annotations
 
@@ -7,19 +7,94 @@ import os
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import PurePath
+from pathlib import Path, PurePath
+from typing import Any
 
 import numpy as np
 
-from ahf_ros.interchange.export.measured_images import MeasuredImage
+from ahf_ros.interchange.fields import checked_file_name, parsed_integer
+from ahf_ros.interchange.target_json import json_lines, targets_from_json
 from ahf_ros.target import UNDECODED, Target
 from ahf_ros.text import shown
+
+MAXIMUM_SIDE = 2**15
+"""Maximum side of an image, px."""
 
 LISTED = 10
 """Number of labels that a message lists."""
 
 UNKNOWN_VARIANCE = 1.0
 """Variance of a coordinate of a mark whose covariance is not known, px^2."""
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredImage:
+    """What was identified in an image.
+
+    Attributes
+    ----------
+    path : str
+        Path of the image, as the user wrote it.
+    width, height : int
+        Size of the image, px.
+    targets : tuple of Target
+        Undecoded ones may be among them.
+
+    Examples
+    --------
+    >>> MeasuredImage('photos/a.jpg', 6000, 4000, ()).targets
+    ()
+    """
+
+    path: str
+    width: int
+    height: int
+    targets: tuple[Target, ...]
+
+
+def read_measured_images(path: str | Path) -> tuple[MeasuredImage, ...]:
+    """Return what was identified, from the output of `ahf identify --json`.
+
+    Parameters
+    ----------
+    path : str or Path
+        A JSON object a line with 'image', 'width', 'height' and 'targets', whose 'id', 'x' and
+        'y' are required. A stack is measured once, in its first image. '-' stands for standard
+        input.
+
+    Returns
+    -------
+    tuple of MeasuredImage
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be read or a line is not as described; the message names both.
+    """
+    return tuple(measured_image(content, where) for where, content in json_lines(path))
+
+
+def measured_image(content: Any, where: str) -> MeasuredImage:
+    """Return what a record of `ahf identify --json` says, see `read_measured_images`.
+
+    Parameters
+    ----------
+    content : dict
+    where : str
+        What errors call the record.
+
+    Raises
+    ------
+    ValueError
+        If the record is not as described.
+    """
+    targets = tuple(targets_from_json(content, where))
+    checked_file_name(content.get('image'), f'{where}: image')
+    width, height = (
+        parsed_integer(content.get(name), f'{where}: {name}', 1, MAXIMUM_SIDE)
+        for name in ('width', 'height')
+    )
+    return MeasuredImage(content['image'], width, height, targets)
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,7 +234,9 @@ def make_survey(
     if control is None:
         return Survey(photographs, known, {})
     points = _control_points(control.points, labels)
-    return Survey(photographs, known, points, control.crs, control.sigma)
+    return Survey(
+        photographs=photographs, labels=known, control=points, crs=control.crs, sigma=control.sigma
+    )
 
 
 def notes_on(control: Control, survey: Survey) -> list[str]:
@@ -219,7 +296,7 @@ def _photograph(
         xx, xy, _, yy = target.covariance
         known = (xx, xy, yy) if xx > 0 and yy > 0 else (UNKNOWN_VARIANCE, 0.0, UNKNOWN_VARIANCE)
         label, x, y = labels[target.key], target.x + origin, target.y + origin
-        marks[target.key] = Mark(label, x, y, known, target)
+        marks[target.key] = Mark(label=label, x=x, y=y, covariance=known, target=target)
     ordered = tuple(marks[key] for key in sorted(marks))
     return Photograph(image.path, image.width, image.height, ordered)
 

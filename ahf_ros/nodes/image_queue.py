@@ -1,0 +1,331 @@
+"""The queue of images of the node `detector`: which of them wait, where, and what becomes of them.
+
+Images of a lossless queue wait in memory up to a limit, beyond it on disk. The middleware keeps
+what a node does not take, without a bound that ROS 2 could set: a process that was slow to take 60
+images of 10 MB grew by 490 MB. So the node takes every message at once.
+"""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+import threading
+import time
+import traceback
+from collections import deque
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import partial
+from itertools import count
+from typing import Any, BinaryIO, TypeAlias
+
+from rclpy.clock import Clock, ClockType
+from rclpy.serialization import deserialize_message, serialize_message
+from sensor_msgs.msg import CompressedImage, Image
+from std_msgs.msg import Header
+
+from ahf_ros.detectors.contract import Unavailable
+from ahf_ros.msg import CodedTargetArray
+from ahf_ros.nodes.answers import Answers
+from ahf_ros.nodes.diagnostics import Tally
+from ahf_ros.nodes.pipeline import Pipeline, Stopping
+from ahf_ros.nodes.process import LOG_PERIOD, ProcessNode
+from ahf_ros.nodes.settings import LOSSLESS
+from ahf_ros.nodes.worker import Worker
+from ahf_ros.stream import Answer, Kind, Remark, message_frame, why_refused
+from ahf_ros.text import printable
+
+SEGMENT = 64 * 2**20
+"""Size beyond which a file is not continued, bytes. Its space is free once all in it was taken."""
+
+RESERVE = 256 * 2**20
+"""Space of the disk that is left to others, bytes."""
+
+PERIOD = 0.05
+"""Time between two looks at whether a stack is overdue, s."""
+
+ImageMessage: TypeAlias = Image | CompressedImage
+"""The messages that images arrive in."""
+
+Take: TypeAlias = Callable[[], ImageMessage]
+"""Returns the message that waited; called once."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Waiting:
+    """An image that waits for its turn, and what it is identified by."""
+
+    number: int
+    take: Take
+    pipeline: Pipeline
+    arrived: float  # s of the monotonic clock
+
+    @property
+    def lossless(self) -> bool:
+        return self.pipeline.settings.queue == LOSSLESS
+
+
+class ImageQueue:
+    """Identifies the images of a node in the order of their arrival, and publishes the answers.
+
+    Every image of a lossless queue waits. Of other images, as many wait as a stack has: a newer
+    one takes the place of the oldest, and a stack has no images on both sides of such a gap.
+    An image is identified as the parameters are when it arrives.
+
+    Parameters
+    ----------
+    node : ProcessNode
+        Has the timer and the log.
+    worker : Worker
+        Identifies the images.
+    answers : Answers
+        Publishes what is identified.
+    tally : Tally
+        Counts to continue.
+    """
+
+    def __init__(self, node: ProcessNode, worker: Worker, answers: Answers, tally: Tally) -> None:
+        self._logger = node.get_logger()
+        self._worker = worker
+        self._answers = answers
+        self._tally = tally
+        self._lock = threading.Lock()
+        self._numbers = count(1)
+        self._in_force: Pipeline | None = None
+        self._begin()
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._timer = node.create_timer(PERIOD, self._look, clock=steady)
+        self._timer.cancel()
+
+    def _begin(self) -> None:
+        self._waiting: deque[_Waiting] = deque()
+        self._messages = WaitingMessages()
+        self._last: _Waiting | None = None
+        self._ending = False
+
+    @property
+    def pipeline(self) -> Pipeline:
+        """The pipeline in force."""
+        assert self._in_force is not None
+        return self._in_force
+
+    def renew(self, pipeline: Pipeline) -> None:
+        """Identify the images that arrive from now on by a pipeline; it begins a new stack."""
+        self._in_force = pipeline
+        self._worker.append(self._settle)
+        if pipeline.settings.stacking.stack > 1:
+            self._timer.reset()
+        else:
+            self._timer.cancel()
+
+    def discard(self) -> None:
+        """Give up the images that wait."""
+        self._timer.cancel()
+        self._worker.discard()
+        self._begin()
+
+    def put(self, message: ImageMessage) -> None:
+        """Let an image wait for its turn."""
+        self._count(message)
+        pipeline = self.pipeline
+        settings = pipeline.settings
+        take: Take = lambda: message  # noqa: E731
+        if settings.queue == LOSSLESS:
+            try:
+                take = self._messages.put(message, settings.queue_memory * 2**20)
+            except ValueError as error:
+                self._tell(why_refused(error))
+                return
+        with self._lock:
+            image = _Waiting(next(self._numbers), take, pipeline, time.monotonic())
+            replaceable = [] if image.lossless else [it for it in self._waiting if not it.lossless]
+            self._waiting.append(image)
+            if len(replaceable) < settings.stacking.stack:
+                self._worker.append(self._identify_next)
+            else:  # it takes the turn of the oldest one
+                self._waiting.remove(replaceable[0])
+                self._tally.dropped += 1
+
+    def identify(self, message: ImageMessage, expected: int | None = None) -> CodedTargetArray:
+        """Identify an image out of turn; called in the thread of the worker.
+
+        Parameters
+        ----------
+        message : Image or CompressedImage
+        expected : int, optional
+            N; where None, the N of the parameters.
+
+        Raises
+        ------
+        ValueError
+            If the image is refused, which is counted and logged, or the node stops.
+        """
+        pipeline = self.pipeline
+        try:
+            return pipeline.message(pipeline.stream.identify(message_frame(message), expected))
+        except Stopping:
+            raise
+        except Exception as error:
+            remark = why_refused(error)
+            self._tell(remark)
+            raise ValueError(remark.text) from error
+
+    def _count(self, message: ImageMessage) -> None:
+        self._tally.received += 1
+        if backwards := self._tally.compare_stamps(message.header):
+            self._logger.warning(backwards, throttle_duration_sec=LOG_PERIOD)
+        kind = getattr(message, 'format', '')
+        if not kind:
+            kind = f'{message.width} x {message.height} px, {message.encoding}'
+        if changed := self._tally.compare_kinds(kind):
+            self._logger.warning(changed, throttle_duration_sec=LOG_PERIOD)
+
+    def _identify_next(self) -> None:
+        """Identify the image that has waited longest, or add it to its stack."""
+        with self._lock:
+            image = self._waiting.popleft()
+        last, self._last = self._last, image
+        stream = image.pipeline.stream
+        if last and last.pipeline is not image.pipeline:
+            self._end(last, 'parameters changed')
+        elif last and last.number != image.number - 1:
+            self._tally.dropped += stream.forget()
+        self._handle(image, stream.add(lambda: message_frame(image.take())))
+
+    def _settle(self) -> None:
+        """End a stack that was begun with other parameters."""
+        if self._last and self._last.pipeline is not self._in_force:
+            self._end(self._last, 'parameters changed')
+
+    def _look(self) -> None:
+        if self._overdue() and not self._ending:
+            self._ending = True
+            self._worker.append(self._end_overdue)
+
+    def _overdue(self) -> _Waiting | None:
+        """Return the last image if the next one of its stack has not come in time."""
+        last = self._last
+        if not last or not last.pipeline.stream.waiting:
+            return None
+        limit = last.pipeline.settings.stack_timeout
+        return last if time.monotonic() - last.arrived > limit else None
+
+    def _end_overdue(self) -> None:
+        self._ending = False
+        if last := self._overdue():
+            limit = last.pipeline.settings.stack_timeout
+            self._end(last, f'no image followed for {limit:g} s')
+
+    def _end(self, last: _Waiting, why: str) -> None:
+        self._handle(last, last.pipeline.stream.end(why))
+
+    def _handle(self, image: _Waiting, said: Iterable[Answer[Header] | Remark]) -> None:
+        """Publish the answers of a stream, and tell its remarks."""
+        try:
+            for it in said:
+                if isinstance(it, Remark):
+                    self._tell(it)
+                else:
+                    self._publish(it, image)
+        except Stopping:
+            return
+        except Unavailable as error:
+            self._tell(why_refused(error))
+
+    def _publish(self, answer: Answer[Header], image: _Waiting) -> None:
+        try:
+            self._answers.publish(answer, image.pipeline, image.arrived)
+        except Exception as error:
+            # No image may end the node.
+            self._tell(why_refused(error))
+
+    def _tell(self, remark: Remark) -> None:
+        """Count and log a remark."""
+        if remark.kind == Kind.INCOMPLETE:
+            self._tally.incomplete += 1
+            self._logger.warning(remark.text, throttle_duration_sec=LOG_PERIOD)
+        elif remark.kind == Kind.SPLIT:
+            self._tally.split += 1
+            self._logger.warning(remark.text, throttle_duration_sec=LOG_PERIOD)
+        else:
+            self._tally.rejected += 1
+            self._tally.reason = remark.text
+            if remark.error and not isinstance(remark.error, ValueError):
+                lines = ''.join(traceback.format_exception(remark.error)).splitlines()
+                self._logger.error('\n'.join(map(printable, lines)))
+            text = f'image refused: {remark.text}'
+            self._logger.warning(text, throttle_duration_sec=LOG_PERIOD)
+
+
+class _Segment:
+    """A file without a name that holds messages one after the other."""
+
+    def __init__(self) -> None:
+        self.file: BinaryIO = tempfile.TemporaryFile()  # noqa: SIM115
+        self.size = 0
+        self.waiting = 0
+
+
+class WaitingMessages:
+    """Messages that wait, in bounded memory and without loss."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._memory = 0
+        self._segment: _Segment | None = None
+
+    def put(self, message: Any, limit: int) -> Take:
+        """Keep a message until it is taken.
+
+        Parameters
+        ----------
+        message : sensor_msgs.msg.Image or sensor_msgs.msg.CompressedImage
+        limit : int
+            Memory that waiting messages may take together, bytes; one may always wait.
+
+        Raises
+        ------
+        ValueError
+            If it would have to wait on disk and there is no space.
+        """
+        size = len(message.data)
+        with self._lock:
+            if not self._memory or self._memory + size <= limit:
+                self._memory += size
+                return partial(self._taken, message, size)
+        return self._written(type(message), serialize_message(message))
+
+    def _taken(self, message: Any, size: int) -> Any:
+        with self._lock:
+            self._memory -= size
+        return message
+
+    def _written(self, kind: type, data: bytes) -> Take:
+        free = shutil.disk_usage(tempfile.gettempdir()).free
+        if free < len(data) + RESERVE:
+            raise ValueError(
+                f'the queue is full: queue_memory is used up and {tempfile.gettempdir()} has '
+                f'{free} bytes left, accepted are at least {len(data) + RESERVE}'
+            )
+        with self._lock:
+            segment = self._segment
+            if segment is None or segment.size > SEGMENT:
+                segment = self._segment = _Segment()
+            place = segment.size
+            segment.file.seek(place)
+            segment.file.write(data)
+            segment.size += len(data)
+            segment.waiting += 1
+        return partial(self._read, kind, segment, place, len(data))
+
+    def _read(self, kind: type, segment: _Segment, place: int, size: int) -> Any:
+        with self._lock:
+            segment.file.seek(place)
+            data = segment.file.read(size)
+            segment.waiting -= 1
+            if not segment.waiting:
+                # Nothing in it waits: the next message that has to begins another file.
+                segment.file.close()
+                if segment is self._segment:
+                    self._segment = None
+        return deserialize_message(data, kind)
