@@ -13,7 +13,7 @@ development.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
@@ -124,8 +124,8 @@ def fitted(seeds: Sequence[int]) -> dict[str, np.ndarray]:
     return {'intercept': np.round([intercept], 3), 'weights': np.round(weights, 3)}
 
 
-def reliability(seeds: Sequence[int]) -> Iterator[str]:
-    """Yield the lines of the table of the scenes of some seeds."""
+def reliability(seeds: Sequence[int]) -> list[str]:
+    """Return the lines of the table of the scenes of some seeds."""
     values, right, condition = gathered(seeds)
     return reliability_table(condition, confidence(values), right)
 

@@ -17,8 +17,6 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-from rich.console import Console
-from rich.progress import track
 
 from ahf_ros.codes.dots import dot_family
 from ahf_ros.detectors.contract import DetectorSettings
@@ -31,6 +29,7 @@ from ahf_ros.synthetic.patterns import LIGHT_NAMES
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 from ahf_ros.target import Target
 from benchmarks.reliability import NEAR, reliability_table, run
+from benchmarks.report import progress
 from benchmarks.textures import lookalikes
 
 PER_RADIUS = 6.4
@@ -103,7 +102,7 @@ def gathered(seeds: Sequence[int]) -> dict[str, Compared]:
     """Return the readings of the scenes of some seeds by condition."""
     wanted = [named for seed in seeds for named in scenes(seed)]
     parts: dict[str, list[Compared]] = {}
-    for condition, scene in track(wanted, 'scenes', console=Console(stderr=True)):
+    for condition, scene in progress(wanted, 'scenes'):
         parts.setdefault(condition, []).append(compared(render(scene)))
     for seed in seeds:
         images = map(lookalikes, range(LOOKALIKES * seed, LOOKALIKES * (seed + 1)))
@@ -136,8 +135,8 @@ def logistic_regression(features: np.ndarray, right: np.ndarray) -> np.ndarray:
     return np.concatenate([[weights[0] - slopes @ mean], slopes])
 
 
-def reliability(seeds: Sequence[int]) -> Iterator[str]:
-    """Yield the lines of the table of the scenes of some seeds."""
+def reliability(seeds: Sequence[int]) -> list[str]:
+    """Return the lines of the table of the scenes of some seeds."""
     parts = gathered(seeds)
     every = Compared.joined(list(parts.values()))
     conditions = np.repeat(list(parts), [len(of.right) for of in parts.values()])

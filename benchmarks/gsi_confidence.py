@@ -20,8 +20,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from rich.console import Console
-from rich.progress import track
 
 from ahf_ros.codes.gsi_library import GSI_LIBRARY, point_family
 from ahf_ros.detectors import DetectorSettings, create_detector
@@ -35,6 +33,7 @@ from ahf_ros.target import DottedTarget
 from benchmarks.confidence import rising_regression
 from benchmarks.gsi import texture
 from benchmarks.reliability import NEAR, reliability_table, run
+from benchmarks.report import progress
 
 BASE = SceneSettings(
     family='gsi', width=1600, height=1200, targets=6, dot_radius=5.0, focal_length=6.0
@@ -139,9 +138,8 @@ def gathered(seeds: Iterable[int]) -> tuple[list[str], np.ndarray, np.ndarray]:
     conditions, parts = [], []
     for seed in seeds:
         with TemporaryDirectory() as folder:
-            for condition, settings in track(
-                list(scenes(seed, Path(folder))), f'scenes of {seed}', console=Console(stderr=True)
-            ):
+            every = list(scenes(seed, Path(folder)))
+            for condition, settings in progress(every, f'scenes of {seed}'):
                 parts.append(hypotheses(render(settings)))
                 conditions += [condition] * len(parts[-1][1])
         for number in range(TEXTURES):
@@ -159,8 +157,8 @@ def fitted(seeds: Iterable[int]) -> dict[str, np.ndarray]:
     return {'weights': np.round(np.append(intercept, SIGNS * slopes), 3) + 0.0}
 
 
-def reliability(seeds: Iterable[int]) -> Iterator[str]:
-    """Yield the lines of the table of the scenes of some seeds."""
+def reliability(seeds: Iterable[int]) -> list[str]:
+    """Return the lines of the table of the scenes of some seeds."""
     conditions, features, right = gathered(seeds)
     return reliability_table(conditions, probability(features), right)
 

@@ -19,20 +19,17 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
-
-from rich.console import Console
-from rich.progress import track
 
 from ahf_ros.codes.families import FAMILY_NAMES
 from ahf_ros.detectors import DETECTOR_NAMES
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
-from benchmarks.filter import machine
-from benchmarks.identification import FIRST_TEST_SEED, Row, are_tests, with_detector
-from benchmarks.output import add_output, publish
+from benchmarks import report
+from benchmarks.report import number
+from benchmarks.rows import Case, Scene, detector, measured
 
 _VIEWS: dict[str, dict[str, Any]] = {
     'radius 20, 0.04': {'ambient': 0.04},
@@ -141,17 +138,14 @@ def photograph(options: argparse.Namespace, row: str, light: str, seed: int) -> 
     return rendering
 
 
-def measure(options: argparse.Namespace) -> Iterator[Row]:
-    """Render and identify every scene with every seed; yield a row of each row and light."""
-    run = with_detector(options)
-    cells = [(row, light) for row in options.rows for light in options.lights]
-    for row, light in track(cells, 'scenes', console=Console(stderr=True)):
-        cell = Row(row, light)
-        for seed in options.seeds:
-            rendering = photograph(options, row, light, seed)
-            truth = rendering.targets
-            cell.add(rendering.image, truth, run(rendering.image, options.family, len(truth)))
-        yield cell
+def case(options: argparse.Namespace, row: str, light: str) -> Case:
+    """Return a cell of the table."""
+
+    def make(seed: int) -> Scene:
+        rendering = photograph(options, row, light, seed)
+        return rendering.image, rendering.targets
+
+    return Case(row, light, make, options.family)
 
 
 def cell_text(record: dict[str, Any]) -> str:
@@ -162,37 +156,33 @@ def cell_text(record: dict[str, Any]) -> str:
     return text if record['nees'] is None else f'{text} ({record["nees"]:.1f})'
 
 
-def markdown(report: dict[str, Any]) -> str:
+def markdown(figures: report.Report) -> str:
     """Return the report as a table."""
-    facts = report['machine']
-    kind = 'Test' if report['test'] else 'Development'
-    records = {(of['group'], of['name']): of for of in report['rows']}
-    rows, lights = (list(dict.fromkeys(keys)) for keys in zip(*records, strict=True))
+    records = {(of['group'], of['name']): of for of in figures['rows']}
+    names, lights = (list(dict.fromkeys(keys)) for keys in zip(*records, strict=True))
+    rows = []
+    for name in names:
+        of_row = [records[name, light] for light in lights]
+        slowest = number(max(of['seconds'] for of in of_row), 2)
+        rows.append((name, of_row[0]['expected'], *map(cell_text, of_row), slowest))
+    right, expected, wrong, false = (
+        sum(of[key] for of in figures['rows'])
+        for key in ('right', 'expected', 'wrong', 'false_positives')
+    )
     lines = [
-        f'{report["method"]}, family {report["family"]}, setting `{report["setting"]}`. {kind} '
-        f'seeds: {", ".join(map(str, report["seeds"]))}. {facts["processor"]}, {facts["cores"]} '
-        f'cores, Python {facts["python"]}, numpy {facts["numpy"]}, OpenCV {facts["opencv"]}.',
+        f'{figures["method"]}, family {figures["family"]}, setting `{figures["setting"]}`. '
+        + report.about_text(figures),
         '',
-        f'| right of N (NEES) | N | {" | ".join(lights)} | s |',
-        '|---' * (len(lights) + 3) + '|',
+        *report.table(('right of N (NEES)', 'N', *lights, 's'), rows),
+        '',
+        f'{right} of {expected} right, {wrong} wrong, {false} false.',
     ]
-    for row in rows:
-        of_row = [records[row, light] for light in lights]
-        cells = ' | '.join(map(cell_text, of_row))
-        slowest = max(of['seconds'] for of in of_row)
-        lines.append(f'| {row} | {of_row[0]["expected"]} | {cells} | {slowest:.2f} |')
-    sums = [sum(of[name] for of in report['rows']) for name in ('right', 'expected')]
-    false = [sum(of[name] for of in report['rows']) for name in ('wrong', 'false_positives')]
-    lines += ['', '{} of {} right, {} wrong, {} false.'.format(*sums, *false)]
     return '\n'.join(lines)
 
 
 def parser() -> argparse.ArgumentParser:
     """Return what can be chosen."""
-    made = argparse.ArgumentParser(
-        description=__doc__.split('\n\n')[0],
-        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
-    )
+    made = report.parser(__doc__)
     made.add_argument('--detector', choices=DETECTOR_NAMES, default='ring')
     made.add_argument('--family', choices=FAMILY_NAMES, default='metashape12')
     made.add_argument('--ahf', action='store_true', help='search for filters, N being given')
@@ -202,15 +192,13 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument('--rows', nargs='+', choices=every, help='of the group; default: all')
     made.add_argument('--lights', nargs='+', choices=LIGHT_NAMES, help='default: of the group')
     made.add_argument('--targets', type=int, default=SceneSettings().targets)
-    made.add_argument('--seeds', nargs='+', type=int, default=[FIRST_TEST_SEED])
-    add_output(made)
     return made
 
 
 def chosen(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     """Return the options, with the rows and lights of the group where none are given."""
     made = parser()
-    options = made.parse_args(arguments)
+    options = report.parsed(made, arguments)
     group = GROUPS[options.group]
     options.rows = options.rows or list(group.rows)
     options.lights = options.lights or list(group.lights)
@@ -222,22 +210,17 @@ def chosen(arguments: Sequence[str] | None = None) -> argparse.Namespace:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Measure and print."""
     options = chosen(arguments)
-    try:
-        test = are_tests(options.seeds)
-    except ValueError as error:
-        print(error, file=sys.stderr)
-        return 2
-    report: dict[str, Any] = {
-        'method': options.detector + (' with AHF' if options.ahf else ''),
-        'family': options.family,
-        'setting': options.setting,
-        'group': options.group,
-        'seeds': options.seeds,
-        'test': test,
-        'machine': machine(),
-    }
-    report['rows'] = [row.record() for row in measure(options)]
-    publish(report, markdown(report), options.output)
+    figures = report.about(
+        options.seeds,
+        method=options.detector + (' with AHF' if options.ahf else ''),
+        family=options.family,
+        setting=options.setting,
+        group=options.group,
+    )
+    cases = [case(options, row, light) for row in options.rows for light in options.lights]
+    run = detector(options.detector, ahf=options.ahf)
+    figures['rows'] = [by[''].record() for by in measured(cases, options.seeds, {'': run})]
+    report.publish(figures, markdown(figures), options)
     return 0
 
 

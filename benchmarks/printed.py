@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import argparse
 import sys
-import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 from pathlib import Path
 
@@ -23,6 +23,8 @@ from ahf_ros.printing.drawing import Drawing
 from ahf_ros.printing.pdf import pdf_bytes
 from ahf_ros.printing.settings import SheetSettings
 from ahf_ros.printing.sheets import Placed, Sheets
+from benchmarks.report import number, table
+from benchmarks.speed import seconds
 
 SCALE = 8.0
 """Pixels of a rendered page in a millimetre."""
@@ -40,10 +42,8 @@ identified. The radius of the dot is 4 to 12 px (`RADII` in `benchmarks/printed.
 6 % of the light, the blur of the lens is 0.7 px. The error is the largest distance of a centre
 from where it was printed. Bright targets of `metashape20` have dots of 12 px: with dots of 8 px,
 542 of them were left undecoded, none was wrong. The machine was busy.
-
-| family | polarity | printed | right | wrong | largest error, mm | s |
-|---|---|---|---|---|---|---|"""
-"""What the table begins with."""
+"""
+"""What the page begins with."""
 
 _INK, _BLUR = 0.06, 0.7  # reflectance of black, and the blur of the lens, px
 _WHITE, _GAMMA = 220, 2.2  # gray value of white, which is light to the power of 1 / gamma
@@ -112,8 +112,8 @@ def identified(settings: SheetSettings) -> Outcome:
     detect = create_detector(family=settings.family, polarity=settings.polarity)
     outcome = Outcome()
     targets = list(sheets.targets())
-    for number, image in enumerate(images(sheets.pages()), 1):
-        shown = [target for target in targets if target.page == number]
+    for page, image in enumerate(images(sheets.pages()), 1):
+        shown = [target for target in targets if target.page == page]
         outcome = outcome.joined(_compared(shown, detect(image), image.shape, settings))
     return outcome
 
@@ -138,33 +138,29 @@ def _compared(
     return Outcome(len(printed), len(distances), wrong, max(distances.values(), default=0.0))
 
 
-def main() -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Print a line a family and polarity; return 1 unless every target was identified."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--families', nargs='+', choices=FAMILY_NAMES, default=FAMILY_NAMES)
-    parser.add_argument('--sample', type=int, default=0, help='IDs of each family; 0: all.')
-    parser.add_argument('--output', type=Path, help='File for the table, in Markdown.')
-    options = parser.parse_args()
-    every, lines = Outcome(), [HEAD]
-    print(HEAD)
+    made = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
+    made.add_argument('--families', nargs='+', choices=FAMILY_NAMES, default=FAMILY_NAMES)
+    made.add_argument('--sample', type=int, default=0, help='IDs of each family; 0: all.')
+    made.add_argument('--output', type=Path, help='File for the table, in Markdown.')
+    options = made.parse_args(arguments)
+    every, rows = Outcome(), []
     for name in options.families:
         ids = sample(name, options.sample) if options.sample else ''
         square = name in (*KINDS['aruco'], *KINDS['apriltag'])
         for polarity in ('dark',) if square else ('dark', 'bright'):
-            settings = settings_of(name, polarity, ids)
-            start = time.perf_counter()
-            outcome = identified(settings)
-            seconds = time.perf_counter() - start
-            lines.append(
-                f'| {name} | {polarity} | {outcome.printed} | {outcome.right} | '
-                f'{outcome.wrong} | {outcome.error:.4f} | {seconds:.1f} |'
-            )
-            print(lines[-1], flush=True)
-            every = every.joined(outcome)
-    lines.append(f'\n{every.printed} printed, {every.right} right, {every.wrong} wrong.')
-    print(lines[-1])
+            elapsed, of = seconds(partial(identified, settings_of(name, polarity, ids)))
+            ends = number(of.error, 4), number(elapsed, 1)
+            rows.append((name, polarity, of.printed, of.right, of.wrong, *ends))
+            print(*rows[-1], file=sys.stderr)
+            every = every.joined(of)
+    head = ('family', 'polarity', 'printed', 'right', 'wrong', 'largest error, mm', 's')
+    total = f'{every.printed} printed, {every.right} right, {every.wrong} wrong.'
+    page = '\n'.join([HEAD, *table(head, rows), '', total])
+    print(page)
     if options.output:
-        options.output.write_text('\n'.join(lines) + '\n', encoding='utf-8')
+        options.output.write_text(page + '\n', encoding='utf-8')
     return int(every.right < every.printed or every.wrong > 0)
 
 

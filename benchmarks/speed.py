@@ -4,6 +4,7 @@ The published algorithm is that of the paper: every filter by numpy's Fourier tr
 precision, one chromosome after the other, a generation of 50 before it looks whether to stop
 (Table 1). Both drive the same detector on the same image.
 
+- One filter, against the recipe, Eq. (1) to (7) as they stand; the tests compare what they give.
 - One candidate: a filter and an identification through it; ours with all threads at work.
 - The whole of AHF, from the image to its targets.
 - A stream: an image under unchanged light, against one filter and one identification.
@@ -29,13 +30,39 @@ from ahf_ros.filtering.genes import genes_of
 from ahf_ros.filtering.genetic import search
 from ahf_ros.filtering.homomorphic import HomomorphicFilter
 from ahf_ros.filtering.settings import PUBLISHED, FilterSettings, GeneticSettings, TuningSettings
+from ahf_ros.filtering.transfer import median_distance
+from ahf_ros.imaging.logarithm import mapping
 from ahf_ros.session import create_identifier, identify
 from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import count_codes
-from benchmarks.filter import Recipe, machine
+from benchmarks.report import machine, machine_text, table
+from support.fourier import distances, sampled
 
 ROUNDS = 7
 FRAMES = 6
+PAPER_GAINS = (2.8, 0.82)
+"""Of a filter that the paper reports."""
+
+
+class Recipe:
+    """The published filter, as one writes it down in numpy."""
+
+    def __init__(self, shape: tuple[int, int], settings: FilterSettings) -> None:
+        self.distances = distances(*shape)
+        self.median = median_distance(*shape)
+        self.settings = settings
+
+    def __call__(self, image: np.ndarray, gamma_high: float, gamma_low: float) -> np.ndarray:
+        """Return the filtered image, 8 bit."""
+        spectrum = np.fft.fft2(np.log(image / 255 + self.settings.log_offset))
+        difference = gamma_high - gamma_low
+        attenuated = np.exp(-difference * (self.distances / self.median) ** 2)
+        response = difference * (1 - attenuated) + gamma_low
+        values = np.fft.ifft2(response * spectrum).real
+        scale, zero = mapping(
+            sampled(values), self.settings.black_percentile, self.settings.white_percentile
+        )
+        return np.clip(np.rint(np.exp(values + scale) - zero), 0, 255).astype(np.uint8)
 
 
 def seconds(work: Callable[[], Any]) -> tuple[float, Any]:
@@ -43,6 +70,22 @@ def seconds(work: Callable[[], Any]) -> tuple[float, Any]:
     started = time.perf_counter()
     result = work()
     return time.perf_counter() - started, result
+
+
+def filters(image: np.ndarray, recipe: Recipe) -> tuple[float, ...]:
+    """Return the median time of one filter, s: published, ours in one thread and in all threads.
+
+    Every round times each way in turn, so that all of them meet the same machine.
+    """
+    prepared, gains = HomomorphicFilter(image), PAPER_GAINS
+    with ThreadPoolExecutor(os.cpu_count()) as executor:
+        ways = (
+            partial(recipe, image, *gains),
+            partial(prepared.filtered, *gains),
+            partial(prepared.filtered, *gains, executor=executor),
+        )
+        times = [[seconds(way)[0] for way in ways] for _ in range(ROUNDS)]
+    return tuple(statistics.median(column) for column in zip(*times, strict=True))
 
 
 def published(recipe: Recipe, image: np.ndarray, detector: Any, expected: int) -> tuple[int, int]:
@@ -118,18 +161,19 @@ def main() -> None:
     scene = SceneSettings(light=options.light, ambient=options.ambient, seed=options.seed)
     image, expected = render(scene).image, scene.targets
     detector, recipe = create_detector('traditional'), Recipe(image.shape, FilterSettings())
-    theirs, ours = candidates(image, detector, recipe)
-    facts = machine()
     print(
         f'{scene.light} {scene.ambient:g}, {scene.width} x {scene.height} px, {expected} targets; '
-        f'{facts["processor"]}, {facts["cores"]} cores, numpy {facts["numpy"]}, '
-        f'OpenCV {facts["opencv"]}\n'
+        f'{machine_text(machine())}\n'
     )
-    print('| | s | compared with | s | times faster |\n|---|---|---|---|---|')
+    print('\n'.join(table(('', 's', 'compared with', 's', 'times faster'), [])))
 
     def row(name: str, own: float, other: str, others: float) -> None:
         print(f'| {name} | {own:.3f} | {other} | {others:.3f} | {others / own:.1f} |', flush=True)
 
+    theirs, alone, shared = filters(image, recipe)
+    row('one filter, in one thread', alone, 'published', theirs)
+    row('one filter, in all threads', shared, 'published', theirs)
+    theirs, ours = candidates(image, detector, recipe)
     row('one candidate, traditional', ours, 'published', theirs)
     duration, (count, evaluations) = seconds(lambda: published(recipe, image, detector, expected))
     other = f'published, traditional: {count} in {evaluations} identifications'

@@ -14,7 +14,7 @@ from benchmarks import soak
 def test_every_image_is_answered_and_nothing_is_left_behind(graph: Any) -> None:
     run = soak.Soak(graph, count=130, interval=10)  # everything happens once
     run.run()
-    figures = soak.report(run, 1.0)
+    figures = soak.figures_of(run, 1.0)
     assert figures['answered'] == figures['images'] >= 130
     assert figures['unexpected IDs'] == 0
     assert figures['rejected'] == figures['messages that are not images'] == 13 + 1
