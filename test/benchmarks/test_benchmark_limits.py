@@ -50,8 +50,3 @@ def test_files_hold_what_is_printed(tmp_path, capsys):
     (row,) = report['rows']
     assert (row['expected'], row['right'] + row['wrong'] <= 4) == (4, True)
     assert limits.markdown(report) + '\n' == printed
-
-
-def test_seeds_for_tests_and_for_development_are_kept_apart(capsys):
-    assert limits.main(['--seeds', '1', '101']) == 2
-    assert 'accepted are all below 101 or none' in capsys.readouterr().err
