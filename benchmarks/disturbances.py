@@ -14,7 +14,7 @@ import argparse
 import os
 import sys
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
@@ -51,6 +51,10 @@ COVERED_ROWS = ('over', 'paper', 'finger', 'spot', 'highlight')
 
 Table = dict[str, dict[str, 'Count']]
 """Reports by row and column."""
+
+Detect = Callable[[np.ndarray], list[Target]]
+Job = tuple[str, str, Detect, Iterable[Scene]]
+"""Row and column of a table, and what is identified in which scenes."""
 
 _NO_ID = 2**31 - 1  # of any family
 
@@ -89,15 +93,6 @@ class Count:
             target.confidence for target, kind in zip(targets, kinds, strict=True) if kind != RIGHT
         ]
 
-    def join(self, other: Count) -> None:
-        """Add the reports of other images."""
-        self.expected += other.expected
-        self.right += other.right
-        self.wrong += other.wrong
-        self.false += other.false
-        self.stated += other.stated
-        self.seconds += other.seconds
-
     def above(self, confidence: float) -> int:
         """Return how many reports with more than a confidence are not right."""
         return sum(stated > confidence for stated in self.stated)
@@ -113,7 +108,7 @@ def detector(name: str, target_family: str) -> Detector:
     return create_detector(name, settings=DetectorSettings(family=target_family))
 
 
-def counted(detect: Callable[[np.ndarray], list[Target]], scenes: Iterable[Scene]) -> Count:
+def counted(detect: Detect, scenes: Iterable[Scene]) -> Count:
     """Return the reports of some scenes."""
     count = Count()
     for image, truth in scenes:
@@ -124,16 +119,14 @@ def counted(detect: Callable[[np.ndarray], list[Target]], scenes: Iterable[Scene
     return count
 
 
-def disturbance_table(options: argparse.Namespace) -> Table:
-    """Return the reports by disturbance and family."""
-    made: Table = {}
+def disturbed(options: argparse.Namespace) -> Iterator[Job]:
+    """Yield disturbances by family."""
     for name in options.families:
         detect = detector(options.detector, name)
         targets = Targets(name, options.count, options.seed, options.bright)
-        for row, scenes in progress(targets.rows(), name):
+        for row, scenes in targets.rows():
             if not options.rows or any(part in row for part in options.rows):
-                made.setdefault(row, {})[name] = counted(detect, scenes)
-    return made
+                yield row, name, detect, scenes
 
 
 def far_apart(code: Family, sectors: int, seed: int) -> tuple[int, ...]:
@@ -163,54 +156,43 @@ def far_apart(code: Family, sectors: int, seed: int) -> tuple[int, ...]:
     return tuple(sorted(chosen))
 
 
-def expected_table(options: argparse.Namespace) -> Table:
-    """Return the reports of covered targets whose IDs are a known set, chosen far apart."""
-    made: Table = {}
+def expected(options: argparse.Namespace) -> Iterator[Job]:
+    """Yield covered targets whose IDs are a known set, chosen far apart."""
     for name in options.families:
         ids = far_apart(family(name), COVERED_SECTORS, options.seed)
         detect = detector(options.detector, name)
         if isinstance(detect, Expecting):
             detect = detect.expecting(frozenset(ids))
         targets = Targets(name, options.count, options.seed, options.bright, ids)
-        for row, scenes in progress(targets.rows(), name):
+        for row, scenes in targets.rows():
             if any(part in row for part in options.rows or COVERED_ROWS):
-                made.setdefault(row, {})[f'{name}, {len(ids)} IDs'] = counted(detect, scenes)
-    return made
+                yield row, f'{name}, {len(ids)} IDs', detect, scenes
 
 
-def family_table(options: argparse.Namespace) -> Table:
-    """Return the reports by family of the targets and family, or all, that they are read as."""
-    made: Table = {}
-    read_as = (*FAMILY_NAMES, *([AUTO] if options.detector == AUTO else []))
-    for shown in progress(FAMILY_NAMES, 'families'):
+def families(options: argparse.Namespace) -> Iterator[Job]:
+    """Yield targets by their family and by the family, or all, that they are read as."""
+    for shown in FAMILY_NAMES:
         sheets = Targets(shown, options.count, options.seed, options.bright).sheets()
         scenes = [(sheet.photograph(Exposure()), sheet.truth) for sheet in sheets]
-        for name in read_as:
-            detect = of_family(detector(options.detector, name), shown if name == AUTO else name)
-            seen = ((image, truth if name in (shown, AUTO) else []) for image, truth in scenes)
-            made.setdefault(shown, {})[name] = counted(detect, seen)
+        yield from _read(options, shown, shown, scenes)
     folder = Path(os.environ.get('AHF_PHOTOS', PHOTOS)) / 'panel'
-    panel = read_truth(folder / 'truth.csv') if folder.exists() else {}
-    for photograph, truth in progress(panel.items(), 'photographs'):
-        image = read_image(folder / photograph)
-        row = made.setdefault('photographs of aicon14', {})
-        for name in read_as:
-            expected = truth if name in ('aicon14', AUTO) else []
-            detect = of_family(
-                detector(options.detector, name), 'aicon14' if name == AUTO else name
-            )
-            row.setdefault(name, Count()).join(counted(detect, [(image, expected)]))
-    if AUTO in read_as:
-        own = {**{name: name for name in FAMILY_NAMES}, 'photographs of aicon14': 'aicon14'}
-        one = sum(made[row][own[row]].seconds for row in made)
-        print(
-            f'all families take {sum(row[AUTO].seconds for row in table.values()) / one:.2f} '
-            'times the time of the right one'
-        )
-    return made
+    if folder.exists():
+        panel = read_truth(folder / 'truth.csv')
+        scenes = [(read_image(folder / name), truth) for name, truth in panel.items()]
+        yield from _read(options, 'photographs of aicon14', 'aicon14', scenes)
 
 
-def of_family(detect: Detector, name: str) -> Callable[[np.ndarray], list[Target]]:
+def _read(
+    options: argparse.Namespace, row: str, shown: str, scenes: Sequence[Scene]
+) -> Iterator[Job]:
+    """Yield scenes of a family as those of every family; of another one they show no target."""
+    for name in (*FAMILY_NAMES, *([AUTO] if options.detector == AUTO else [])):
+        own = name in (shown, AUTO)
+        detect = of_family(detector(options.detector, name), shown if own else name)
+        yield row, name, detect, [(image, truth if own else []) for image, truth in scenes]
+
+
+def of_family(detect: Detector, name: str) -> Detect:
     """Return a detector whose targets of other families than one have an ID that is none."""
 
     def detected(image: np.ndarray) -> list[Target]:
@@ -219,10 +201,9 @@ def of_family(detect: Detector, name: str) -> Callable[[np.ndarray], list[Target
     return detected
 
 
-def lookalike_table(options: argparse.Namespace) -> Table:
-    """Return the reports by kind of mark and family that it is read as."""
-    made: Table = {}
-    for kind, draw in progress(LOOKALIKES.items(), 'look-alikes'):
+def lookalikes(options: argparse.Namespace) -> Iterator[Job]:
+    """Yield marks that are no targets by their kind and the family that they are read as."""
+    for kind, draw in LOOKALIKES.items():
         for name in options.families:
             generator = np.random.default_rng([options.seed, 3])
             inks = [draw(family(name), generator) for _ in range(LOOKALIKE_COUNT)]
@@ -232,16 +213,22 @@ def lookalike_table(options: argparse.Namespace) -> Table:
                 for start in range(0, LOOKALIKE_COUNT, size)
             ]
             scenes = ((sheet.photograph(Exposure()), ()) for sheet in sheets)
-            made.setdefault(kind, {})[name] = counted(detector(options.detector, name), scenes)
-    return made
+            yield kind, name, detector(options.detector, name), scenes
 
 
-TABLES: dict[str, Callable[[argparse.Namespace], Table]] = {
-    'disturbances': disturbance_table,
-    'expected': expected_table,
-    'families': family_table,
-    'look-alikes': lookalike_table,
+TABLES: dict[str, Callable[[argparse.Namespace], Iterator[Job]]] = {
+    'disturbances': disturbed,
+    'expected': expected,
+    'families': families,
+    'look-alikes': lookalikes,
 }
+
+
+def time_of_all(counts: Table) -> str:
+    """Return how long reading targets as those of all families takes, beside the right one."""
+    right = sum(row[name.split()[-1]].seconds for name, row in counts.items())
+    ratio = sum(row[AUTO].seconds for row in counts.values()) / right
+    return f'all families take {ratio:.2f} times the time of the right one'
 
 
 def markdown(title: str, counts: Table) -> str:
@@ -264,7 +251,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = made.parse_args(arguments)
     figures: report.Report = {'detector': options.detector, 'seed': options.seed}
     for name in options.tables:
-        counts = TABLES[name](options)
+        counts: Table = {}
+        for row, column, detect, scenes in progress(TABLES[name](options), name):
+            counts.setdefault(row, {})[column] = counted(detect, scenes)
+        if name == 'families' and options.detector == AUTO:
+            print(time_of_all(counts))
         print(markdown(name, counts), end='\n\n', flush=True)
         figures[name] = {
             row: {column: asdict(count) for column, count in cells.items()}

@@ -14,7 +14,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from statistics import median
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,7 @@ from benchmarks import report
 from benchmarks.dots_confidence import PER_RADIUS, reliability
 from benchmarks.report import number, table
 from benchmarks.rows import detector, measured, rendered
-from benchmarks.speed import seconds
+from benchmarks.speed import in_turns
 from benchmarks.textures import SIZE, lookalikes, textured_image
 
 METHODS = (
@@ -118,16 +118,12 @@ def reports(images: Callable[[int], np.ndarray], count: int) -> dict[str, int]:
 def times(seed: int) -> Iterator[dict[str, Any]]:
     """Yield the median times of `dots` and `ring` on 60 targets in 10.6 MP, in turns."""
     for light in ('normal', 'stripe'):
-        jobs = []
+        works = []
         for family in ('dots', 'metashape12'):
             scene = SceneSettings(family=family, targets=60, light=light, seed=seed)
-            made, image = create_detector(family=family), render(scene).image
-            made(image[:400, :400])  # tables that are made once are not timed
-            jobs.append((made, image, []))
-        for _ in range(ROUNDS):
-            for made, image, durations in jobs:
-                durations.append(seconds(lambda run=made, of=image: run(of))[0])
-        own, others = (median(durations) for _, _, durations in jobs)
+            works.append(partial(create_detector(family=family), render(scene).image))
+            works[-1]()  # tables that are made once are not timed
+        own, others = in_turns(works, ROUNDS)
         yield {'light': light, 'dots': own, 'ring': others, 'ratio': own / others}
 
 

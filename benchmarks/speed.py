@@ -18,9 +18,10 @@ import argparse
 import os
 import statistics
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -72,11 +73,14 @@ def seconds(work: Callable[[], Any]) -> tuple[float, Any]:
     return time.perf_counter() - started, result
 
 
-def filters(image: np.ndarray, recipe: Recipe) -> tuple[float, ...]:
-    """Return the median time of one filter, s: published, ours in one thread and in all threads.
+def in_turns(works: Sequence[Callable[[], Any]], rounds: int = ROUNDS) -> tuple[float, ...]:
+    """Return the median time of each work, s; in turns, so that all meet the same machine."""
+    times = [[seconds(work)[0] for work in works] for _ in range(rounds)]
+    return tuple(statistics.median(column) for column in zip(*times, strict=True))
 
-    Every round times each way in turn, so that all of them meet the same machine.
-    """
+
+def filters(image: np.ndarray, recipe: Recipe) -> tuple[float, ...]:
+    """Return the time of one filter, s: published, ours in one thread and in all threads."""
     prepared, gains = HomomorphicFilter(image), PAPER_GAINS
     with ThreadPoolExecutor(os.cpu_count()) as executor:
         ways = (
@@ -84,8 +88,7 @@ def filters(image: np.ndarray, recipe: Recipe) -> tuple[float, ...]:
             partial(prepared.filtered, *gains),
             partial(prepared.filtered, *gains, executor=executor),
         )
-        times = [[seconds(way)[0] for way in ways] for _ in range(ROUNDS)]
-    return tuple(statistics.median(column) for column in zip(*times, strict=True))
+        return in_turns(ways)
 
 
 def published(recipe: Recipe, image: np.ndarray, detector: Any, expected: int) -> tuple[int, int]:
@@ -113,41 +116,34 @@ def candidates(image: np.ndarray, detector: Any, recipe: Recipe) -> tuple[float,
     generator = np.random.default_rng(0)
     low, high = generator.uniform(0, 1, 4 * threads), generator.uniform(1, 4, 4 * threads)
     gains = list(zip(high.tolist(), low.tolist(), strict=True))
-    times: list[tuple[float, float]] = []
+    chosen = cycle(gains)
     with ThreadPoolExecutor(threads) as executor:
-        for turn in range(ROUNDS):
-            chosen = gains[turn % len(gains)]
-            theirs, _ = seconds(lambda chosen=chosen: detector(recipe(image, *chosen)))
-            ours, _ = seconds(
-                lambda: list(executor.map(lambda it: draft(prepared.filtered(*it)), gains))
+        theirs, ours = in_turns(
+            (
+                lambda: detector(recipe(image, *next(chosen))),
+                lambda: list(executor.map(lambda it: draft(prepared.filtered(*it)), gains)),
             )
-            times.append((theirs, ours / len(gains)))
-    theirs, ours = (statistics.median(column) for column in zip(*times, strict=True))
-    return theirs, ours
+        )
+    return theirs, ours / len(gains)
 
 
 def stream(image: np.ndarray, detector: Any, expected: int) -> tuple[float, float]:
     """Return the median time of an image of a stream, and of its filter and identification, s."""
     identifier = create_identifier(detector=detector, expected_targets=expected)
     state = identifier.identify(image).filter
-    times = []
+    values = state.gamma_high, state.gamma_low, state.cutoff, state.attenuation
+
+    def unchanged() -> None:
+        assert identifier.identify(image).filter.evaluations == 1
+
     with ThreadPoolExecutor(os.cpu_count()) as executor:
-        for _ in range(FRAMES):
-            whole, result = seconds(lambda: identifier.identify(image))
-            assert result.filter.evaluations == 1
-            parts, _ = seconds(
-                lambda: detector(
-                    HomomorphicFilter(image).filtered(
-                        state.gamma_high,
-                        state.gamma_low,
-                        state.cutoff,
-                        state.attenuation,
-                        executor,
-                    )
-                )
-            )
-            times.append((whole, parts))
-    whole, parts = (statistics.median(column) for column in zip(*times, strict=True))
+        whole, parts = in_turns(
+            (
+                unchanged,
+                lambda: detector(HomomorphicFilter(image).filtered(*values, executor)),
+            ),
+            FRAMES,
+        )
     return whole, parts
 
 
