@@ -15,6 +15,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import cv2
@@ -27,6 +28,7 @@ from ahf_ros.synthetic.scene import SceneSettings, render
 from benchmarks import report
 from benchmarks.report import number, table
 from benchmarks.rows import Case, Row, Scene, detector, measured, rendered
+from benchmarks.speed import in_turns
 from benchmarks.textures import dot_grid
 from support import PHOTOS
 
@@ -131,21 +133,18 @@ TABLES = {
 }
 
 
-def speed(seed: int, rounds: int = 3) -> list[dict[str, Any]]:
+def speed(seed: int) -> list[dict[str, Any]]:
     """Return the times of `gsi` and `ring` on 60 targets in images of one size, in turns."""
     rows = []
     for light in ('normal', 'stripe'):
         shown = replace(LARGE, targets=60, light=light, seed=seed)
         rings = replace(shown, family='metashape12', dot_radius=20.0)
-        runs = [(create_detector(family=scene.family), render(scene)) for scene in (shown, rings)]
-        times: list[list[float]] = [[], []]
-        for _ in range(rounds + 1):
-            for (made, rendering), of_one in zip(runs, times, strict=True):
-                started = time.process_time()
-                made(rendering.image)
-                of_one.append(time.process_time() - started)
-        right = [score(rendering, made(rendering.image)).right for made, rendering in runs]
-        own, other = (min(of_one[1:]) for of_one in times)
+        works, right = [], []
+        for rendering in map(render, (shown, rings)):
+            made = create_detector(family=rendering.settings.family)
+            right.append(score(rendering, made(rendering.image)).right)
+            works.append(partial(made, rendering.image))
+        own, other = in_turns(works, clock=time.process_time)
         rows.append({'name': light, 'right': right, 'gsi': own, 'ring': other})
     return rows
 

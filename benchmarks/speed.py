@@ -66,16 +66,22 @@ class Recipe:
         return np.clip(np.rint(np.exp(values + scale) - zero), 0, 255).astype(np.uint8)
 
 
-def seconds(work: Callable[[], Any]) -> tuple[float, Any]:
+def seconds(
+    work: Callable[[], Any], clock: Callable[[], float] = time.perf_counter
+) -> tuple[float, Any]:
     """Return the time that `work` takes, s, and its result."""
-    started = time.perf_counter()
+    started = clock()
     result = work()
-    return time.perf_counter() - started, result
+    return clock() - started, result
 
 
-def in_turns(works: Sequence[Callable[[], Any]], rounds: int = ROUNDS) -> tuple[float, ...]:
+def in_turns(
+    works: Sequence[Callable[[], Any]],
+    rounds: int = ROUNDS,
+    clock: Callable[[], float] = time.perf_counter,
+) -> tuple[float, ...]:
     """Return the median time of each work, s; in turns, so that all meet the same machine."""
-    times = [[seconds(work)[0] for work in works] for _ in range(rounds)]
+    times = [[seconds(work, clock)[0] for work in works] for _ in range(rounds)]
     return tuple(statistics.median(column) for column in zip(*times, strict=True))
 
 
