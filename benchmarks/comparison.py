@@ -1,19 +1,12 @@
 """Two reports of `benchmarks.identification` side by side, and what has become worse.
 
-    python -m benchmarks.comparison BEFORE.json AFTER.json
-
-`python -m benchmarks.identification --compare BEFORE.json` measures and compares at once. Times
-are comparable only if both were measured on the same machine, one after the other. The time in
-multiples of the plain search for contours depends less on the machine.
+`python -m benchmarks.identification --compare BEFORE.json` prints it. Times are comparable only if
+both were measured on the same machine, one after the other. The time in multiples of the plain
+search for contours depends less on the machine.
 """
 
 from __future__ import annotations
 
-import argparse
-import json
-import sys
-from collections.abc import Sequence
-from pathlib import Path
 from statistics import median
 
 from benchmarks.report import Report, number, table
@@ -116,22 +109,3 @@ def markdown(before: Report, after: Report) -> str:
     findings = worse(before, after)
     lines += ['', 'Worse:' if findings else 'Nothing is worse.', *findings]
     return '\n'.join(lines)
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Print the table; return 1 if something is worse."""
-    parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
-    parser.add_argument('before', type=Path)
-    parser.add_argument('after', type=Path)
-    options = parser.parse_args(arguments)
-    before, after = (json.loads(file.read_text()) for file in (options.before, options.after))
-    try:
-        print(markdown(before, after))
-    except ValueError as error:
-        print(error, file=sys.stderr)
-        return 2
-    return int(bool(worse(before, after)))
-
-
-if __name__ == '__main__':
-    sys.exit(main())

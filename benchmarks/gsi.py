@@ -56,46 +56,6 @@ DRIVEN = {
 }
 
 
-def views() -> Iterator[Case]:
-    """Yield twenty targets of 6 mm by angle of view."""
-    for tilt in (0, 10, 20, 30, 40, 50, 60, 65, 70, 75, 80):
-        yield rendered('views', f'{tilt} deg', replace(PAPER, tilt=float(tilt)))
-
-
-def sizes() -> Iterator[Case]:
-    """Yield targets of 3 mm and of mixed sizes by angle of view."""
-    for name, changes in (
-        ('3 mm', {'dot_radius': PAPER.dot_radius / 2}),
-        ('3 mm, at half the distance', {}),
-        ('3, 6 and 12 mm', {'sizes': '0.5, 1, 2'}),
-    ):
-        for tilt in (0.0, 30.0, 60.0):
-            scene = replace(PAPER, tilt=tilt, **changes)
-            yield rendered('sizes', f'{name}, {tilt:.0f} deg', scene)
-
-
-def centres() -> Iterator[Case]:
-    """Yield clean light and dots of 10 px."""
-    for polarity, tilt in (('dark', 0.0), ('bright', 0.0), ('dark', 45.0)):
-        scene = replace(LARGE, polarity=polarity, tilt=tilt, focal_length=3.0, targets=40)
-        yield rendered('centres', f'{polarity}, {tilt:.0f} deg', scene)
-
-
-def lights() -> Iterator[Case]:
-    """Yield projected light and hard shadow."""
-    for light in ('stripe', 'lattice', 'fringe', 'shadow'):
-        for ambient in (0.3, 0.12, 0.04):
-            scene = replace(LARGE, light=light, ambient=ambient)
-            yield rendered('lights', f'{light} {ambient:g}', scene)
-
-
-def filtered() -> Iterator[Case]:
-    """Yield stripes for the search of filters."""
-    for ambient in (0.3, 0.12, 0.04):
-        scene = replace(LARGE, light='stripe', ambient=ambient, targets=20)
-        yield rendered('ahf', f'stripe {ambient:g}', replace(scene, width=2400, height=1600))
-
-
 def texture(seed: int) -> Scene:
     """Return noise of all wavelengths, with edges of any strength."""
     generator = np.random.default_rng(seed)
@@ -123,14 +83,45 @@ def without_targets() -> Iterator[Case]:
         yield case(f'photograph {path.stem}', lambda _, path=path: (read_image(path), ()))
 
 
-TABLES = {
-    'views': ('Twenty targets of 6 mm by angle of view (Figures 6 and 12)', views),
-    'sizes': ('Targets of 3 mm and of mixed sizes (Tables 7 and 8)', sizes),
-    'centres': ('Centres in clean light, dots of 10 px', centres),
-    'lights': ('54 targets in 3984 x 2656 px, dots of 10 px, by light', lights),
-    'ahf': ('`gsi_published` without AHF and with it, under stripes', filtered),
-    'no targets': ('Images without targets', without_targets),
+SEARCHED = replace(LARGE, light='stripe', targets=20, width=2400, height=1600)
+"""Stripes for the search of filters."""
+
+SIZES: dict[str, dict[str, Any]] = {
+    '3 mm': {'dot_radius': PAPER.dot_radius / 2},
+    '3 mm, at half the distance': {},
+    '3, 6 and 12 mm': {'sizes': '0.5, 1, 2'},
 }
+
+TABLES = {
+    'Twenty targets of 6 mm by angle of view (Figures 6 and 12)': [
+        rendered('views', f'{tilt} deg', replace(PAPER, tilt=float(tilt)))
+        for tilt in (0, 10, 20, 30, 40, 50, 60, 65, 70, 75, 80)
+    ],
+    'Targets of 3 mm and of mixed sizes (Tables 7 and 8)': [
+        rendered('sizes', f'{name}, {tilt:.0f} deg', replace(PAPER, tilt=tilt, **changes))
+        for name, changes in SIZES.items()
+        for tilt in (0.0, 30.0, 60.0)
+    ],
+    'Centres in clean light, dots of 10 px': [
+        rendered(
+            'centres',
+            f'{polarity}, {tilt:.0f} deg',
+            replace(LARGE, polarity=polarity, tilt=tilt, focal_length=3.0, targets=40),
+        )
+        for polarity, tilt in (('dark', 0.0), ('bright', 0.0), ('dark', 45.0))
+    ],
+    '54 targets in 3984 x 2656 px, dots of 10 px, by light': [
+        rendered('lights', f'{light} {ambient:g}', replace(LARGE, light=light, ambient=ambient))
+        for light in ('stripe', 'lattice', 'fringe', 'shadow')
+        for ambient in (0.3, 0.12, 0.04)
+    ],
+    '`gsi_published` without AHF and with it, under stripes': [
+        rendered('ahf', f'stripe {ambient:g}', replace(SEARCHED, ambient=ambient))
+        for ambient in (0.3, 0.12, 0.04)
+    ],
+    'Images without targets': list(without_targets()),
+}
+"""Cases by the titles of their tables; the names of tables are their groups."""
 
 
 def speed(seed: int) -> list[dict[str, Any]]:
@@ -182,7 +173,8 @@ def markdown(rows: dict[str, list[Row]]) -> str:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Measure and print as Markdown."""
-    every = (*TABLES, 'speed')
+    tables = {cases[0].group: (title, cases) for title, cases in TABLES.items()}
+    every = (*tables, 'speed')
     made = report.parser(__doc__)
     made.add_argument('--tables', nargs='+', choices=every, default=every)
     options = report.parsed(made, arguments)
@@ -194,9 +186,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print('\n## Time for 60 targets in 3984 x 2656 px, processor time\n')
             print('\n'.join(speed_lines(figures['speed'])), flush=True)
         else:
-            title, cases = TABLES[name]
+            title, cases = tables[name]
             methods = DRIVEN if name == 'ahf' else METHODS
-            rows = list(measured(list(cases()), options.seeds, methods))
+            rows = list(measured(cases, options.seeds, methods))
             by_method = {method: [row[method] for row in rows] for method in methods}
             print(f'\n## {title}\n\n{markdown(by_method)}', flush=True)
             figures['tables'][name] = {

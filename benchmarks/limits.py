@@ -20,13 +20,13 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from ahf_ros.codes.families import FAMILY_NAMES
 from ahf_ros.detectors import DETECTOR_NAMES
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
-from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
+from ahf_ros.synthetic.scene import SceneSettings, render
 from benchmarks import report
 from benchmarks.report import number
 from benchmarks.rows import Case, Scene, detector, measured
@@ -66,28 +66,13 @@ _EXPOSURES: dict[str, dict[str, Any]] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Group:
-    """Rows that are one table.
-
-    Attributes
-    ----------
-    rows : dict
-        What differs from a scene of dots of 20 px, by the name of the row.
-    lights : tuple of str
-        The columns.
-    """
-
-    rows: dict[str, dict[str, Any]]
-    lights: tuple[str, ...]
-
-
 GROUPS = {
-    'light': Group(_VIEWS, ('stripe', 'fine_stripe', 'lattice', 'dense_lattice')),
-    'edge shift': Group(_SHIFTS | _HALVES, ('normal', 'fringe', 'stripe', 'lattice')),
-    'exposure': Group(_EXPOSURES, ('normal',)),
+    'light': (_VIEWS, ('stripe', 'fine_stripe', 'lattice', 'dense_lattice')),
+    'edge shift': (_SHIFTS | _HALVES, ('normal', 'fringe', 'stripe', 'lattice')),
+    'exposure': (_EXPOSURES, ('normal',)),
 }
-"""The tables by their names."""
+"""By its name, what differs in each row of a table from a scene of dots of 20 px, and the lights
+that are its columns."""
 
 SETTINGS: dict[str, dict[str, Any]] = {
     'usual': {},
@@ -119,7 +104,7 @@ DOT_SHARES = {'gsi': 0.5, 'dots': 0.7}
 
 def scene(options: argparse.Namespace, row: str, light: str, seed: int) -> SceneSettings:
     """Return the scene of a row, a light and a seed."""
-    changes = GROUPS[options.group].rows[row] | SETTINGS[options.setting]
+    changes = GROUPS[options.group][0][row] | SETTINGS[options.setting]
     radius = changes.get('dot_radius', SceneSettings().dot_radius)
     changes['dot_radius'] = radius * DOT_SHARES.get(options.family, 1.0)
     return SceneSettings(
@@ -127,22 +112,16 @@ def scene(options: argparse.Namespace, row: str, light: str, seed: int) -> Scene
     )
 
 
-def photograph(options: argparse.Namespace, row: str, light: str, seed: int) -> Rendering:
-    """Return the rendering of a row, a light and a seed; of some, each half has its own shift."""
-    settings = scene(options, row, light, seed)
-    rendering = render(settings)
-    if row in _HALVES:
-        other = render(replace(settings, edge_shift=-settings.edge_shift))
-        right = slice(settings.width // 2, None)
-        rendering.image[:, right] = other.image[:, right]
-    return rendering
-
-
 def case(options: argparse.Namespace, row: str, light: str) -> Case:
-    """Return a cell of the table."""
+    """Return a cell of the table; in some, each half of an image has its own shift."""
 
     def make(seed: int) -> Scene:
-        rendering = photograph(options, row, light, seed)
+        settings = scene(options, row, light, seed)
+        rendering = render(settings)
+        if row in _HALVES:
+            other = render(replace(settings, edge_shift=-settings.edge_shift))
+            right = slice(settings.width // 2, None)
+            rendering.image[:, right] = other.image[:, right]
         return rendering.image, rendering.targets
 
     return Case(row, light, make, options.family)
@@ -188,7 +167,7 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument('--ahf', action='store_true', help='search for filters, N being given')
     made.add_argument('--setting', choices=tuple(SETTINGS), default='usual')
     made.add_argument('--group', choices=tuple(GROUPS), default='light')
-    every = tuple(row for group in GROUPS.values() for row in group.rows)
+    every = tuple(row for rows, _ in GROUPS.values() for row in rows)
     made.add_argument('--rows', nargs='+', choices=every, help='of the group; default: all')
     made.add_argument('--lights', nargs='+', choices=LIGHT_NAMES, help='default: of the group')
     made.add_argument('--targets', type=int, default=SceneSettings().targets)
@@ -199,10 +178,10 @@ def chosen(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     """Return the options, with the rows and lights of the group where none are given."""
     made = parser()
     options = report.parsed(made, arguments)
-    group = GROUPS[options.group]
-    options.rows = options.rows or list(group.rows)
-    options.lights = options.lights or list(group.lights)
-    if foreign := [row for row in options.rows if row not in group.rows]:
+    rows, lights = GROUPS[options.group]
+    options.rows = options.rows or list(rows)
+    options.lights = options.lights or list(lights)
+    if foreign := [row for row in options.rows if row not in rows]:
         made.error(f'rows has {foreign[0]!r}, accepted are those of the group {options.group!r}')
     return options
 

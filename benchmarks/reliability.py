@@ -9,9 +9,12 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import re
 import subprocess
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -25,6 +28,21 @@ NEAR = 5.0
 
 CLASSES = (0.0, 0.5, 0.9, 0.95, 0.98, 0.99, 0.999, 1.0)
 """Bounds of the classes of confidence in the table."""
+
+
+Parts = Iterator[tuple[np.ndarray, ...]]
+"""Conditions, features and what is right of the readings of one image after the other."""
+
+
+def gathered(readings: Callable[[int], Parts], seeds: Sequence[int]) -> tuple[np.ndarray, ...]:
+    """Return the readings of the scenes of some seeds, joined; each seed has a process."""
+    with ProcessPoolExecutor(min(len(seeds), os.cpu_count() or 1)) as pool:
+        parts = [part for of in pool.map(partial(_listed, readings), seeds) for part in of]
+    return tuple(np.concatenate(column) for column in zip(*parts, strict=True))
+
+
+def _listed(readings: Callable[[int], Parts], seed: int) -> list[tuple[np.ndarray, ...]]:
+    return list(readings(seed))
 
 
 def reliability_table(
