@@ -18,7 +18,7 @@ import numpy as np
 
 from ahf_ros.codes.ring import canonical, family
 from ahf_ros.detectors.contract import DetectorSettings
-from ahf_ros.detectors.ring.confidence import confidence, features
+from ahf_ros.detectors.ring.confidence import WEIGHTS, confidence, features
 from ahf_ros.detectors.ring.detector import find_hypotheses
 from ahf_ros.imaging.image import as_gray
 from benchmarks.conditions import COMMON, scenes
@@ -108,4 +108,4 @@ def reliability(seeds: Sequence[int]) -> list[str]:
 
 
 if __name__ == '__main__':
-    run('confidence', __doc__, fitted, reliability)
+    run('confidence', __doc__, fitted, reliability, WEIGHTS)

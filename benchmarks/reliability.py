@@ -20,7 +20,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ahf_ros.detectors.ring.fitted_weights import PATH
 from benchmarks.report import FIRST_TEST_SEED, table
 
 NEAR = 5.0
@@ -74,7 +73,7 @@ def write_weights(
     purpose: str,
     seeds: Sequence[int],
     weights: Mapping[str, np.ndarray],
-    path: Path = PATH,
+    path: Path,
 ) -> None:
     """Replace one set of a file, and say from which seeds and at which commit it was fitted.
 
@@ -85,7 +84,7 @@ def write_weights(
     seeds : sequence of int
     weights : mapping of str to ndarray
     path : Path
-        The file; that of the ring detector by default.
+        The file.
     """
     sets = json.loads(path.read_text(encoding='utf-8'))
     commit = subprocess.run(
@@ -112,7 +111,7 @@ def run(
     description: str,
     fitted: Callable[[Sequence[int]], Mapping[str, np.ndarray]],
     reliability: Callable[[Sequence[int]], list[str]],
-    path: Path = PATH,
+    path: Path,
 ) -> None:
     """Write weights with --fit, or print their reliability as Markdown.
 

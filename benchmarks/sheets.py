@@ -173,14 +173,16 @@ def cell_pixels(radius: float, cell: float = CELL) -> int:
     return 2 * math.ceil(cell * radius)
 
 
-def target_sheet(name: str, numbers: np.ndarray, seed: int, **layout: Any) -> Sheet:
+def target_sheet(
+    name: str, numbers: np.ndarray | Sequence[int], seed: int, **layout: Any
+) -> Sheet:
     """Return a sheet of targets.
 
     Parameters
     ----------
     name : str
         Family of ring codes, or of square markers.
-    numbers : ndarray of int
+    numbers : ndarray or sequence of int
         IDs.
     seed : int
     **layout
@@ -193,7 +195,8 @@ def target_sheet(name: str, numbers: np.ndarray, seed: int, **layout: Any) -> Sh
             return lambda turn: ring_cover(code, code.word(number), turn, _PINHOLE)
         return lambda turn: square_cover(name, number, _SQUARE, turn)
 
-    return Sheet(name, seed, **layout).drawn((number, ink(number)) for number in numbers.tolist())
+    every = map(int, numbers)
+    return Sheet(name, seed, **layout).drawn((number, ink(number)) for number in every)
 
 
 def mark_sheet(inks: Iterable[Ink], seed: int, *, radius: float = 12.0) -> Sheet:

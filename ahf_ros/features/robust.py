@@ -18,7 +18,9 @@ import numpy as np
 
 _Solution = TypeVar('_Solution')
 
-_NORMAL = 1.4826  # standard deviation of normal errors over the median of their sizes
+NORMAL = 1.4826
+"""Standard deviation of normal errors over the median of their sizes."""
+
 _RIDGE = 1e-3  # added to normal matrices, in weights, so that they can be inverted
 
 
@@ -57,7 +59,7 @@ def spread(sizes: np.ndarray, selected: np.ndarray, minimum: float) -> np.ndarra
     -------
     ndarray of float64, shape (k, 1)
     """
-    return np.maximum(_NORMAL * median(sizes, selected), minimum)[:, None]
+    return np.maximum(NORMAL * median(sizes, selected), minimum)[:, None]
 
 
 def cauchy(weights: np.ndarray | float, errors: np.ndarray) -> np.ndarray:

@@ -19,7 +19,8 @@ SOFT = 1.0
 ROUNDS = 4
 """How often soft edges are measured."""
 
-_MINIMUM_SHARE = 0.5  # of the expected edges, for a fit to count
+MINIMUM_SHARE = 0.5
+"""Of the expected edges, for a fit to count."""
 
 
 def fit_circles_of_any_blur(
@@ -43,7 +44,7 @@ def fit_circles_of_any_blur(
     Fit
     """
     fit = fit_circles(gray, frames, circles, reach=reach, projective=projective, rounds=rounds)
-    soft = np.flatnonzero((fit.blur > SOFT) & (fit.share >= _MINIMUM_SHARE))
+    soft = np.flatnonzero((fit.blur > SOFT) & (fit.share >= MINIMUM_SHARE))
     if not soft.size:
         return fit
     first = fit.select(soft)
@@ -56,5 +57,5 @@ def fit_circles_of_any_blur(
         rounds=ROUNDS,
         blur=first.blur,
     )
-    good = again.share >= _MINIMUM_SHARE
+    good = again.share >= MINIMUM_SHARE
     return fit.replaced(soft[good], again.select(good))

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ahf_ros.codes.ring import family
-from ahf_ros.detectors.ring.explained import NOTHING, Explained
+from ahf_ros.detectors.ring.explained import Explained
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import Fit
@@ -36,9 +36,9 @@ def test_certain_targets_are_explained_with_their_bands_and_whole_dots_without()
     target = Explained.by(read(True, share=0.5))
     dot = Explained.by(read(False))
     assert (target.certain.tolist(), dot.certain.tolist()) == ([True], [False])
-    assert np.allclose(target.sizes, 10 * (CODE.band_outer + 0.4))
-    assert np.allclose(dot.sizes, 14)
+    assert np.allclose(target.sizes, 10 * (CODE.band_outer + 0.45))
+    assert np.allclose(dot.sizes, 14.5)
     assert len(Explained.by(read(False, share=0.5)).frames) == 0
-    both = Explained.joined([NOTHING, target, dot])
+    both = Explained.joined([target, dot])
     assert [len(both.outlines_in(level)) for level in (0, 3, 4, 6)] == [2, 2, 1, 0]
     assert np.allclose(both.outlines_in(0), both.outlines)

@@ -10,7 +10,9 @@ from ahf_ros.features.circles import Circles, dot_circles
 REACH = 0.45
 """Distance from an expected edge to look for it, dot radii: less than half a gap."""
 
-_RAYS = 48  # about a dot whose band is fitted with it
+RAYS = 48
+"""About a dot that is measured; half of them, where it only is looked for."""
+
 _INNER_PART = 0.4  # of a sector, to either side; next to its ends the blur rounds an arc off
 
 
@@ -35,7 +37,7 @@ def target_circles(
         Number of points on each edge of the band, a sector.
     family : Family
     """
-    dot = dot_circles(polarity, _RAYS)
+    dot = dot_circles(polarity, RAYS)
     count = family.bits * samples
     angles = 2 * np.pi * (np.arange(count) + 0.5) / count
     sector, depth = np.divmod((angles - starts[:, None]) * family.bits / (2 * np.pi), 1)

@@ -11,11 +11,12 @@ and shows how far it can be trusted.
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ahf_ros.detectors.ring.fitted_weights import fitted_weights
+from ahf_ros.features.logistic import logistic, read_weights
 
 if TYPE_CHECKING:
     from ahf_ros.detectors.ring.hypotheses import Hypotheses
@@ -23,7 +24,11 @@ if TYPE_CHECKING:
 CERTAIN = 0.75
 """Confidence from which words are reported."""
 
-_INTERCEPT, _WEIGHTS = fitted_weights('confidence', 'intercept', 'weights')
+WEIGHTS = Path(__file__).with_name('fitted_weights.json')
+"""The data file, which says what made it."""
+
+_OF_TARGET = np.concatenate(read_weights(WEIGHTS, 'confidence', 'intercept', 'weights'))
+_OF_MARGIN = np.array([0.0, 1.0])
 
 
 def features(read: Hypotheses) -> np.ndarray:
@@ -57,14 +62,9 @@ def confidence(values: np.ndarray) -> np.ndarray:
     values : ndarray of float, shape (k, 4)
         As `features` gives them.
     """
-    return target_probability(values) * _logistic(np.expm1(values[:, 0]))
+    return target_probability(values) * logistic(np.expm1(values[:, :1]), _OF_MARGIN)
 
 
 def target_probability(values: np.ndarray) -> np.ndarray:
     """Return the probabilities that readings are of targets, shape (k,), values (k, 4)."""
-    return _logistic(_INTERCEPT + values @ _WEIGHTS)
-
-
-def _logistic(odds: np.ndarray) -> np.ndarray:
-    """Return the probabilities of log odds."""
-    return np.asarray(1 / (1 + np.exp(-np.clip(odds, -30, 30))))
+    return logistic(values, _OF_TARGET)

@@ -13,14 +13,12 @@ import numpy as np
 
 from ahf_ros.detectors.claims import owners
 from ahf_ros.detectors.contract import DetectorSettings
-from ahf_ros.detectors.ring.confidence import features, target_probability
+from ahf_ros.detectors.ring.confidence import CERTAIN, features, target_probability
+from ahf_ros.detectors.ring.decoding import CLEAR
 from ahf_ros.detectors.ring.detector import find_hypotheses
 from ahf_ros.detectors.ring.hypotheses import on_targets
 from ahf_ros.features import frame
 from ahf_ros.imaging.image import as_gray, check_image
-
-_CLEAR = 20.0  # usual margin of words; which word it is does not matter here
-_COUNTED = 0.75  # probability of being a target, from which a dot counts
 
 
 def estimate_count(image: np.ndarray, settings: DetectorSettings | None = None) -> int:
@@ -48,9 +46,10 @@ def estimate_count(image: np.ndarray, settings: DetectorSettings | None = None) 
     read = find_hypotheses(as_gray(image), settings)
     major, _, _ = frame.ellipse_axes(read.frames)
     minimum, maximum = settings.radii
-    clear = replace(read, margin=np.full(len(read.words), _CLEAR), coded=0 * read.coded)
+    # Which word it is does not matter here.
+    clear = replace(read, margin=np.full(len(read.words), CLEAR), coded=0 * read.coded)
     probability = np.where(read.words > 0, target_probability(features(clear)), 0.0)
-    counted = (probability >= _COUNTED) & (major >= minimum) & (major <= maximum)
+    counted = (probability >= CERTAIN) & (major >= minimum) & (major <= maximum)
     order = np.argsort(-read.seen[counted], kind='stable')
     targets = read.select(np.flatnonzero(counted)[order])
     certain = np.ones(len(order), bool)

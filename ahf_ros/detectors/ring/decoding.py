@@ -17,18 +17,24 @@ from ahf_ros.detectors.ring.codewords import best_words, margins, prior
 from ahf_ros.detectors.ring.likelihood import Evidence
 from ahf_ros.features.array_record import ArrayRecord
 
-_DOUBT = 5.0  # most that a reading says for or against a word
-_COVER = 6.0  # price of something that covers a stretch of the band
-_LIKE_PAPER = 8.5  # the same of something that looks like paper
-_USUAL, _IN_LIGHT = 0.05, 15.0  # probability of edges of light from which, times which it grows
+_MOST = 5.0  # most that a reading says for or against a word
+_LIKE_PAPER = 6.5  # the same of something that looks like paper
+_IN_LIGHT = 15.0  # times the probability of edges of light, by which that grows
 _MORE = 0.6  # of each further reading of that
 _COVERED = 0.1  # price of each further reading that something else covers
 _BORDER = 4.8  # price of a border of an arc of any length, at one of about 120 angles
 _RANKED = 1.2  # evidence of a reading that ranks words, which one cover must not settle
-_NEAR = 3  # angles on either side of the clearest one
 _DRAW = 5.0  # lead of a word that is not expected, which is as good as none
-_ROUNDING = 1e-5  # of sums of float32
-_NEVER = np.float32(-1e9)
+_NEVER = np.float32(-np.inf)
+
+COVER = 6.0
+"""Price of something that covers a stretch of the band."""
+
+CLEAR = 15.0
+"""Log odds of a word against the next ID that leave no doubt of it."""
+
+DOUBT = 3.0
+"""Log odds of arcs of any length against a word that leave one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,34 +143,22 @@ def decode(
     return decoded.replaced(read, found)
 
 
-@dataclass(frozen=True, slots=True)
-class _Angles(ArrayRecord):
-    """Evidence of k bands for paper and ink, (k, m), its weight, that of the dot, and light, (k,).
-
-    Where light has many edges, it explains what looks like paper on a mark.
-    """
-
-    paper: np.ndarray
-    ink: np.ndarray
-    weight: np.ndarray
-    dot: np.ndarray
-    lit: np.ndarray
-
-    @property
-    def like_paper(self) -> np.ndarray:
-        """Price of something that looks like paper, float32, shape (k,)."""
-        more = np.maximum(self.lit - np.float32(_USUAL), 0)
-        return np.float32(_LIKE_PAPER) * (1 + np.float32(_IN_LIGHT) * more)
-
-
-def _doubted(evidence: Evidence) -> _Angles:
-    """Return the evidence of whole bands, no reading of which counts too much.
+def _doubted(evidence: Evidence) -> Evidence:
+    """Return the evidence of whole bands, (k, m), no reading of which counts too much.
 
     Light may do anything at any angle.
     """
-    most = np.float32(_DOUBT) * evidence.weight[:, None]
+    most = np.float32(_MOST) * evidence.weight[:, None]
     paper, ink = (most * np.tanh(of.sum(axis=1) / most) for of in (evidence.paper, evidence.ink))
-    return _Angles(paper, ink, evidence.weight, evidence.dot, evidence.lit)
+    return replace(evidence, paper=paper, ink=ink)
+
+
+def _like_paper(of: Evidence) -> np.ndarray:
+    """Return the prices of something that looks like paper, float32, shape (k,).
+
+    Where light has many edges, it explains what looks like paper on a mark.
+    """
+    return np.float32(_LIKE_PAPER) * (1 + np.float32(_IN_LIGHT) * of.lit)
 
 
 def sectors_by_phase(per_sector: int, family: Family) -> np.ndarray:
@@ -215,14 +209,13 @@ def lengthened(bits: np.ndarray, overhang: np.ndarray) -> np.ndarray:
     return bits
 
 
-def _clearest(evidence: _Angles) -> np.ndarray:
+def _clearest(evidence: Evidence) -> np.ndarray:
     """Return the angles of each band from that on at which it is seen best, shape (k, m)."""
     best = np.maximum(evidence.paper, evidence.ink)
-    window = np.sum([np.roll(best, shift, axis=1) for shift in range(-_NEAR, _NEAR + 1)], axis=0)
-    return (window.argmax(axis=1)[:, None] + np.arange(best.shape[1])) % best.shape[1]
+    return (best.argmax(axis=1)[:, None] + np.arange(best.shape[1])) % best.shape[1]
 
 
-def _along_words(evidence: _Angles, bits: np.ndarray) -> np.ndarray:
+def _along_words(evidence: Evidence, bits: np.ndarray) -> np.ndarray:
     """Return the evidence for words at each angle, bits (k, w, m), shape (m, k, w).
 
     A border between two sectors may lie to either side of the angles next to it, or in a reading,
@@ -235,30 +228,30 @@ def _along_words(evidence: _Angles, bits: np.ndarray) -> np.ndarray:
     return np.where(border, np.maximum(np.maximum(paper, ink), 0), seen)
 
 
-def _covered_paths(seen: np.ndarray, of: _Angles) -> np.ndarray:
+def _covered_paths(seen: np.ndarray, of: Evidence) -> np.ndarray:
     """Return the evidence for words with their best covers, shape (k, w).
 
     Parameters
     ----------
     seen : ndarray of float32, shape (m, k, w)
         Evidence where nothing covers the band.
-    of : _Angles
+    of : Evidence
         Of k bands.
     """
     cost, paper = np.float32(_COVERED) * of.weight[:, None], of.paper.T[..., None]
-    price = of.like_paper[:, None]
+    price = _like_paper(of)[:, None]
     clear = seen[0]
     covered, like_paper = (np.full_like(clear, _NEVER) for _ in range(2))
     for of_angle, as_paper in zip(seen[1:], paper[1:], strict=True):
         before = clear
         clear = np.maximum(np.maximum(clear, covered), like_paper) + of_angle
-        covered = np.maximum(covered, before - np.float32(_COVER)) - cost
+        covered = np.maximum(covered, before - np.float32(COVER)) - cost
         like_paper = np.maximum(like_paper, before - price)
         like_paper += as_paper - np.float32(_MORE) * of.weight[:, None]
     return np.maximum(np.maximum(clear, covered), like_paper)
 
 
-def _hidden(seen: np.ndarray, scores: np.ndarray, of: _Angles) -> np.ndarray:
+def _hidden(seen: np.ndarray, scores: np.ndarray, of: Evidence) -> np.ndarray:
     """Return where the best paths of one word of each band are covered, shape (k, m).
 
     Parameters
@@ -267,20 +260,22 @@ def _hidden(seen: np.ndarray, scores: np.ndarray, of: _Angles) -> np.ndarray:
         Evidence of the word where nothing covers the band.
     scores : ndarray of float32, shape (k,)
         The same of its best path.
-    of : _Angles
+    of : Evidence
         Of k bands.
     """
     hidden = np.zeros(seen.T.shape, bool)
-    some = np.flatnonzero(scores > seen.sum(axis=0) + _ROUNDING * np.abs(seen).sum(axis=0))
+    some = np.flatnonzero(
+        scores > seen.sum(axis=0) + len(seen) * np.finfo(seen.dtype).eps * np.abs(seen).sum(axis=0)
+    )
     if some.size:
         hidden[some] = _backtracked(seen[:, some], of.select(some))
     return hidden
 
 
-def _backtracked(seen: np.ndarray, of: _Angles) -> np.ndarray:
+def _backtracked(seen: np.ndarray, of: Evidence) -> np.ndarray:
     """Return the same for bands of which a part is covered."""
     cost, paper = np.float32(_COVERED) * of.weight, of.paper.T
-    prices = np.stack([0 * cost, np.full_like(cost, _COVER), of.like_paper])
+    prices = np.stack([0 * cost, np.full_like(cost, COVER), _like_paper(of)])
     scores = np.full((3, seen.shape[1]), _NEVER)
     scores[0] = seen[0]
     came = np.zeros((len(seen), 3, seen.shape[1]), np.intp)
@@ -306,10 +301,10 @@ def _borders(bits: np.ndarray) -> np.ndarray:
     return np.count_nonzero(bits != np.roll(bits, 1, axis=1), axis=1)
 
 
-def _free_paths(evidence: _Angles) -> np.ndarray:
+def _free_paths(evidence: Evidence) -> np.ndarray:
     """Return the evidence for arcs of ink of any length, with their best covers, shape (k,)."""
     cost = np.float32(_COVERED) * evidence.weight
-    border, cover = np.float32(_BORDER), np.float32(_COVER)
+    border, cover = np.float32(_BORDER), np.float32(COVER)
     paper, ink = evidence.paper.T, evidence.ink.T
     white, dark = paper[0], ink[0]
     covered = np.full_like(white, _NEVER)

@@ -15,7 +15,7 @@ import numpy as np
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes.ring import family
 from ahf_ros.detectors.contract import DetectorSettings
-from ahf_ros.detectors.ring.explained import NOTHING, WHOLE, Explained
+from ahf_ros.detectors.ring.explained import WHOLE, Explained
 from ahf_ros.detectors.ring.families import (
     by_clear_dots,
     decoded,
@@ -131,7 +131,7 @@ def read_image(
     pyramid = image_pyramid(gray, settings.max_radius)
     images = (pyramid.gray, *pyramid.halves)
     found = [Hypotheses.unread(NO_FITS, families[0])]
-    explained = NOTHING
+    explained = Explained.by(found[0])
     for octave in octaves(pyramid, *settings.radii):
         part = octave.pyramid.gray
         for propose in proposals:

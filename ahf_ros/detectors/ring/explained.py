@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ahf_ros.detectors.ring.circles import REACH
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
@@ -13,8 +14,6 @@ from ahf_ros.features.soft_edges import SOFT
 
 WHOLE = 0.9
 """Share of the edge of a dot that is explained, or reported, without a word."""
-
-_MARGIN = 0.4  # width of the quiet margin round a dot or a band, dot radii
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,21 +47,10 @@ class Explained(ArrayRecord):
         explained = certain | ((read.share >= WHOLE) & (read.blur < SOFT))
         read, certain = read.select(explained), certain[explained]
         _, minor, _ = frame.ellipse_axes(read.frames)
-        radii = np.where(certain, read.reach / minor, 1.0) + _MARGIN
+        radii = np.where(certain, read.reach / minor, 1.0) + REACH
         outlines = frame.circle_outlines(read.frames, radii)
         return Explained(read.frames, outlines, radii * minor, certain, read.edge_shift)
 
     def outlines_in(self, level: int) -> np.ndarray:
         """Return the outlines with edges in the image that is halved `level` times, its px."""
         return frame.reduced(self.outlines[self.sizes > 2**level], level)
-
-
-_NO_FRAMES, _NO_SIZES = np.zeros((0, 3, 3)), np.zeros(0)
-NOTHING = Explained(
-    _NO_FRAMES,
-    frame.circle_outlines(_NO_FRAMES, _NO_SIZES),
-    _NO_SIZES,
-    np.zeros(0, bool),
-    _NO_SIZES,
-)
-"""The record of an image of which nothing is known."""

@@ -15,6 +15,7 @@ import numpy as np
 from ahf_ros.codes.ring import FAMILY_NAMES, Family, canonical, family
 from ahf_ros.codes.same_print import words_of_print
 from ahf_ros.detectors.claims import leading
+from ahf_ros.detectors.ring.decoding import CLEAR, DOUBT
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.prior import NOTHING_KNOWN, Prior
 from ahf_ros.detectors.ring.reading import read_bands
@@ -22,9 +23,6 @@ from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import Fit
 
 _CLEAREST = 48  # dots that tell which family comes first
-_DOUBTFUL = -5.0  # log odds against arcs of any length, from which a word may be another one
-_CLEARLY = 1.03  # times the evidence of a word, of a rival that is likelier
-_CLEAR = 25.0  # log odds against the next ID, which no word of another family has
 _FIRST = 8  # doubtful words that rivals read first
 
 
@@ -93,8 +91,8 @@ def _against_rivals(
     better than its word, it may be one of theirs. If the rivals contest none of the most doubtful
     words, they contest no other one.
     """
-    coded = np.where(found.certain & (found.margin < _CLEAR), found.coded, 0.0)
-    doubtful = np.argsort(coded, kind='stable')[: (coded < _DOUBTFUL).sum()]
+    coded = np.where(found.certain & (found.margin < CLEAR), found.coded, 0.0)
+    doubtful = np.argsort(coded, kind='stable')[: (coded < -DOUBT).sum()]
     read = {code.name for code in families}
     rivals = [family(name) for name in FAMILY_NAMES if name not in read]
     confidence = found.confidence.copy()
@@ -104,8 +102,7 @@ def _against_rivals(
         word = found.select(some)
         others = [read_bands(gray, dots.select(some), code, prior) for code in rivals]
         better = [
-            (_evidence(other) > _CLEARLY * _evidence(word)) & (other.coded > word.coded)
-            for other in others
+            (_evidence(other) > _evidence(word)) & (other.coded > word.coded) for other in others
         ]
         contested = np.any(better, axis=0)
         confidence[some[contested]] = 0.0

@@ -20,10 +20,9 @@ from ahf_ros.detectors.ring.reading import PER_SECTOR
 from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import fit_circles
 from ahf_ros.features.profiles import USUAL_BLUR
-from ahf_ros.features.soft_edges import ROUNDS, SOFT
+from ahf_ros.features.soft_edges import MINIMUM_SHARE, ROUNDS, SOFT
 
 _USUAL_ROUNDS = 2  # how often edges are measured that are not soft
-_MINIMUM_SHARE = 0.5  # of the expected edges, for a fit to count
 _FARTHEST, _FARTHEST_SOFT = 2.0, 0.4  # that a centre is moved in a larger image or the same, px
 
 
@@ -98,7 +97,7 @@ def _fitted(
         gray, read.frames, circles, reach=REACH, projective=True, rounds=rounds, blur=read.blur
     )
     moved = np.hypot(*(fit.frames[:, :2, 2] - read.frames[:, :2, 2]).T)
-    good = (fit.share >= _MINIMUM_SHARE) & (moved <= farthest)
+    good = (fit.share >= MINIMUM_SHARE) & (moved <= farthest)
     better = replace(
         read,
         frames=fit.frames,

@@ -3,7 +3,8 @@
 Most dots of a scene are none: spots of a lattice, holes, letters, sectors of bands. The sectors of
 any word are each paper, ink, or covered, so that the best of the three in each sector bounds the
 evidence of the edges for every word, and what speaks for ink rather than paper bounds that against
-bare paper.
+bare paper. A bright dot that looks like what lies beyond the band is a hole in something dark, as
+those of letters are.
 """
 
 from __future__ import annotations
@@ -13,16 +14,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from ahf_ros.codes.ring import Family
-from ahf_ros.detectors.ring.likelihood import edge_evidence, growth_by
-from ahf_ros.detectors.ring.polar import polar_images
+from ahf_ros.detectors.ring.decoding import COVER
+from ahf_ros.detectors.ring.likelihood import HOPEFUL, edge_evidence, growth_by
+from ahf_ros.detectors.ring.polar import DOT, MARGIN, PolarImages, polar_images
 from ahf_ros.features.circle_fit import Fit
 
 _ANGLES, _CIRCLES = 64, 36
 _PHASES = 4  # of the sectors
 _SHIFTS = (-1.2, 0.0, 1.2)  # of edges, px; readings keep farther away from these than the error
-_COVER = 5.0  # price of a sector that is covered
-_HOPEFUL = 0.2  # bound of the mean evidence of a reading, from which a band is read
 _CAP = 3.0  # evidence of a reading against bare paper
+_ALIKE, _MOST = 0.15, 0.5  # difference of ln, and share of what is beyond, that show a hole
 
 
 def may_be_targets(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> np.ndarray:
@@ -39,7 +40,7 @@ def may_be_targets(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> n
     for code in families:
         bits.setdefault(code.band, set()).add(code.bits)
     bounds = [_bound(gray, dots, band, of_band) for band, of_band in bits.items()]
-    return np.asarray(np.max(bounds, axis=0) > _HOPEFUL)
+    return np.asarray(np.max(bounds, axis=0) > HOPEFUL)
 
 
 def _bound(gray: np.ndarray, dots: Fit, band: tuple[float, float], bits: set[int]) -> np.ndarray:
@@ -52,11 +53,22 @@ def _bound(gray: np.ndarray, dots: Fit, band: tuple[float, float], bits: set[int
         cap = _CAP * edges.weight[:, None]
         for count in bits:
             paper, ink = (_of_sectors(of.sum(axis=1), count) for of in (edges.paper, edges.ink))
-            of_word = np.maximum(np.maximum(paper, ink), -_COVER).sum(axis=2)
+            of_word = np.maximum(np.maximum(paper, ink), -COVER).sum(axis=2)
             marked = _of_sectors(np.clip((edges.ink - edges.paper).sum(axis=1), -cap, cap), count)
             bound = np.minimum(of_word, np.maximum(marked, 0).sum(axis=2)).max(axis=1)
             best = np.maximum(best, bound / (_ANGLES * edges.weight))
-    return best
+    return np.where(_holes(polar, band), -np.inf, best)
+
+
+def _holes(polar: PolarImages, band: tuple[float, float]) -> np.ndarray:
+    """Return whether dots are holes through which one sees what lies beyond the band, (k,)."""
+    one = np.ones(len(polar.size))
+    inside, outside = (
+        np.concatenate([polar.logs(polar.at(one * radius))[0] for radius in radii], axis=1)
+        for radii in (DOT, band[1] + MARGIN)
+    )
+    alike = np.abs(outside - np.median(inside, axis=1, keepdims=True)) < _ALIKE
+    return np.asarray((polar.polarity < 0) & (alike.mean(axis=1) > _MOST))
 
 
 def _of_sectors(values: np.ndarray, bits: int) -> np.ndarray:

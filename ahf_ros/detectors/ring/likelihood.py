@@ -17,32 +17,28 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ahf_ros.detectors.ring.polar import (
-    CORRELATION,
-    LIGHT_EDGE,
-    SATURATED,
-    PolarImages,
-)
+from ahf_ros.detectors.ring.polar import CORRELATION, LIGHT_EDGE, SATURATED, PolarImages
 from ahf_ros.features.array_record import ArrayRecord
+from ahf_ros.features.soft_edges import SOFT
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
 _BESIDE = 2.6  # distance of a reading from an edge that is sharp, px
-_SOFT, _BESIDE_SOFT = 1.0, 1.0  # blur of an edge, px, from which that grows, and how fast
 _NEAREST, _FARTHEST = 0.13, 0.36  # bounds of that distance, dot radii
 _FLAT = 0.12  # deviation of steps of ln where there is no edge, but for noise
-_WHITE = 0.03  # the same of paper between ground that glare makes white
 _MARK, _MARK_TAIL = 0.18, 0.3  # of the step of a mark: towards less, where blur fills it, and more
 _PAPER_LEVEL, _INK_LEVEL = 0.05, 0.12  # of levels of paper and ink under predicted light
-_ANY_STEP, _ANY_LEVEL = 0.2, 0.25  # densities of steps and levels of ln where anything lies
+_ANY = 0.22  # density of steps and levels of ln where anything lies
 _PLAIN = 0.35  # share of what lies about any dot that is as flat as ground
-_SURPRISES = (0.05, 0.5)  # smallest and largest probability of a level that nothing predicts
 _MARKED = 0.2  # share of what is dark that has marks, from which it is in shadow
 _UNLIKELY = 2.5  # standard deviations, from which a level was not predicted
-_LIGHT_EDGES = (0.02, 0.5)  # smallest and largest probability of one between two readings
+_SURPRISES = (0.05, 0.5)  # least and largest probability of light that nothing predicts
+_ACROSS = (0.3, 0.75)  # shares of the gap, between which edges of light show
 _ANGLES = 120  # at which large targets have all the evidence that readings can give
 _MAXIMUM_GROWTH = 0.3  # dot radii
 _RADIUS, _DEPTH = 2.25, 0.2  # of readings, and distance of their depths, dot radii
-_MINIMUM_WEIGHT = 0.08  # of a reading among many that are alike
+
+HOPEFUL = 0.2
+"""Mean log odds of a reading, from which a band is read on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +118,7 @@ def weights(polar: PolarImages) -> np.ndarray:
     """
     angles = polar.gray.shape[1]
     along = 2 * np.pi * _RADIUS * polar.size / angles / CORRELATION
-    return np.clip(along, _MINIMUM_WEIGHT, min(1.0, _ANGLES / angles)).astype(np.float32)
+    return np.minimum(along, min(1.0, _ANGLES / angles)).astype(np.float32)
 
 
 def edge_evidence(
@@ -138,7 +134,7 @@ def edge_evidence(
         As for `band_edges`.
     """
     inner, outer = band_edges(radius, growth, band)
-    beside = _BESIDE + _BESIDE_SOFT * np.maximum(polar.blur - _SOFT, 0)
+    beside = _BESIDE + np.maximum(polar.blur - SOFT, 0)
     beside = np.clip(beside / polar.size, _NEAREST, _FARTHEST)
     beside = np.minimum(beside, 0.45 * (outer - inner))
     before = np.minimum(beside, 0.5 * (inner - radius - growth))
@@ -182,10 +178,10 @@ def light_edges(
 ) -> np.ndarray:
     """Return the probabilities of an edge of light between neighbours, as gaps show it, (k,)."""
     start, width = radius + growth, inner - radius - growth
-    near, far = (polar.logs(polar.at(start + part * width)) for part in (0.3, 0.75))
+    near, far = (polar.logs(polar.at(start + part * width)) for part in _ACROSS)
     noise = np.hypot(near[1], far[1])
     many = (np.abs(near[0] - far[0]) > np.hypot(LIGHT_EDGE, 2 * noise)).mean(axis=1)
-    return np.clip(many, *_LIGHT_EDGES)
+    return np.clip(many, *_SURPRISES)
 
 
 def _step_evidence(
@@ -193,7 +189,7 @@ def _step_evidence(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the evidence of steps from ground into bands for paper and for ink.
 
-    Glare makes the step of a mark smaller. Where it makes ground white, paper between is white.
+    Glare makes the step of a mark smaller.
 
     Parameters
     ----------
@@ -209,9 +205,8 @@ def _step_evidence(
     mark = polar.logs(ink)[0] - beside
     step = level - beside
     limit = polar.glare[:, None, None]
-    glare, white = ground >= limit, np.minimum(*ground.swapaxes(0, 1))[:, None] >= SATURATED
-    flat = np.where(white & (limit <= SATURATED), np.float32(_WHITE), np.float32(_FLAT))
-    flat = _normal(step, np.sqrt(flat**2 + noise**2 + of_ground**2))
+    glare = ground >= limit
+    flat = _normal(step, np.sqrt(_FLAT**2 + noise**2 + of_ground**2))
     more = (step - mark) * np.sign(mark)
     expected = of_ground * _gain(ground, ink)
     low, high = (np.sqrt(spread**2 + noise**2 + expected**2) for spread in (_MARK, _MARK_TAIL))
@@ -221,10 +216,10 @@ def _step_evidence(
         less = glare & (more < 0) & (more > -np.abs(mark))
         inked = np.where(less, np.maximum(inked, 1 / np.maximum(np.abs(mark), _FLAT)), inked)
     lit = edges.astype(np.float32)[:, None, None]
-    anything = _PLAIN * flat + (1 - _PLAIN) * _ANY_STEP
+    anything = _PLAIN * flat + (1 - _PLAIN) * _ANY
     clear = (band < SATURATED) | np.isinf(limit)
     paper, ink = (
-        np.where(clear, np.log(((1 - lit) * density + lit * _ANY_STEP) / anything), 0)
+        np.where(clear, np.log(((1 - lit) * density + lit * _ANY) / anything), 0)
         for density in (flat, inked)
     )
     return paper, ink
@@ -268,8 +263,8 @@ def level_evidence(
     of_ink = np.sqrt(_INK_LEVEL**2 + noise**2 + (spread * _gain(light, inked)) ** 2)
     errors = level - polar.logs(light)[0]
     densities = [_normal(errors, of_paper), _normal(level - polar.logs(inked)[0], of_ink)]
-    anything = _PLAIN * densities[0] + (1 - _PLAIN) * _ANY_LEVEL
-    depth = np.clip(_DEPTH * polar.size / CORRELATION, _MINIMUM_WEIGHT, 1)
+    anything = _PLAIN * densities[0] + (1 - _PLAIN) * _ANY
+    depth = np.minimum(_DEPTH * polar.size / CORRELATION, 1)
     share = (weights(polar) * depth).astype(np.float32)
     limit = polar.glare[:, None, None]
     seen = known & ((levels < SATURATED) | np.isinf(limit))
@@ -284,7 +279,7 @@ def level_evidence(
     dark = levels <= polar.shade[:, None, None]
     surprise = _surprise(errors, of_paper, seen & on_ground)
     paper, ink = (
-        np.where(seen, np.log(((1 - surprise) * of + surprise * _ANY_LEVEL) / anything), 0)
+        np.where(seen, np.log(((1 - surprise) * of + surprise * _ANY) / anything), 0)
         * share[:, None, None]
         for of in densities
     )

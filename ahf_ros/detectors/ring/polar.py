@@ -9,6 +9,7 @@ import numpy as np
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.circle_fit import Fit
+from ahf_ros.features.robust import NORMAL
 from ahf_ros.features.sampling import sample_circles, within
 from ahf_ros.imaging.black import black_lift, lifted
 from ahf_ros.imaging.logarithm import LOG_OFFSET
@@ -22,27 +23,28 @@ SATURATED = 253.0
 LIGHT_EDGE = 0.3
 """Step of ln I from which it is an edge of light."""
 
+DOT, GAP, MARGIN = np.array([0.3, 0.6]), np.array([0.4, 0.65]), np.array([0.3, 0.6])
+"""Where levels are read: dot radii, shares of the gap, and dot radii beyond the band."""
+
+PART = 256
+"""Targets at a time, which bounds the memory."""
+
 CIRCLES = 56
 """Of a polar image, which are then less than a tenth of a dot radius apart."""
 
 _INNERMOST, _MARGIN = 0.3, 0.95  # first circle, and last one beyond the band, dot radii
-_SEEN = 0.15  # beyond the band, that the image must show, dot radii
 _PERSPECTIVE = 1.5  # of circles, more than perspective makes one side of them larger
 _SMALL = 7.0  # radius of a dot whose levels tell more than its edge, px
 _PRINTED = 0.25  # usual contrast of prints, up to which the levels of larger dots count
 _LEVELS = (0.75, 1.4)  # where the levels of dot and gap are read, dot radii
 _MINIMUM_LEVEL = 1.0  # gray value that ratios are taken of
-_MINIMUM_CONTRAST = 0.02  # dark over bright, that bright marks are computed from
-_GAP = (0.35, 0.65)  # where noise is measured, shares of the gap
-_BEYOND = (0.3, 0.65)  # where glare shows as well, dot radii beyond the band
 _NOISE = (1.2, 40.0)  # smallest and largest noise, gray values
-_MEDIAN = 0.6745  # of the size of a normal deviate
 _EVEN = 0.015  # deviation of ln of ground in even light
 _UNLIKE = 4.0  # standard deviations of ground, from which a level is unlike the rest
-_COVERED = 0.34  # share of the angles whose ground is darker, from which that is light
+_LIGHT = 0.3  # share of the ground that is darker, or has edges, from which that is light
+_GLARE_EDGES = 0.03  # share of the ground, more than edges of glare have
 _WHITE_OUT = 0.6  # share of the ground that is saturated, from which that is no glare
 _NO_GLARE = 256.0  # more than any gray value
-_COVERS_EDGES, _GLARE_EDGES = 0.3, 0.03  # shares of ground, more than edges of these have
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +106,7 @@ class PolarImages(ArrayRecord):
         polarity, contrast = (
             _along(of, paper).astype(np.float32) for of in (self.polarity, self.contrast)
         )
-        bright = paper / np.maximum(contrast, _MINIMUM_CONTRAST)
+        bright = paper / contrast
         bright = np.where(seen >= SATURATED, np.minimum(bright, seen), bright)
         return np.where(polarity > 0, contrast * paper, bright)
 
@@ -142,7 +144,7 @@ def polar_images(
     values = np.maximum(sample_circles(gray, dots.frames, angles, radii), 0)
     contrast, lift = _appearance(gray, dots)
     values = lifted(values, lift.astype(np.float32)[:, None, None])
-    places = [1 + (inner - 1) * part for part in _GAP] + [outer + away for away in _BEYOND]
+    places = [*(1 + (inner - 1) * GAP), *(outer + MARGIN)]
     ground = values[:, :, [np.abs(radii - place).argmin() for place in places]]
     apart = 2 * np.pi * inner * dots.size / count
     later = _later(ground, apart)
@@ -183,7 +185,7 @@ def _appearance(gray: np.ndarray, dots: Fit) -> tuple[np.ndarray, np.ndarray]:
     contrast = np.maximum(dots.contrast, by_levels)
     lift = black_lift(contrast, dots.bright)
     dark, bright = (lifted(of, lift) for of in (contrast * dots.bright, dots.bright))
-    return dark / np.maximum(bright, _MINIMUM_LEVEL), lift
+    return np.maximum(dark, _MINIMUM_LEVEL) / np.maximum(bright, _MINIMUM_LEVEL), lift
 
 
 def _later(gap: np.ndarray, apart: np.ndarray) -> np.ndarray:
@@ -197,7 +199,7 @@ def _later(gap: np.ndarray, apart: np.ndarray) -> np.ndarray:
 def _noise(gap: np.ndarray, later: np.ndarray) -> np.ndarray:
     """Return the noise of gray values, from readings (k, m, 2) and later ones, shape (k,)."""
     change = np.abs(later - gap).reshape(len(gap), 2 * gap.shape[1])
-    usual = np.median(change, axis=1) / (_MEDIAN * np.sqrt(2))
+    usual = np.median(change, axis=1) * (NORMAL / np.sqrt(2))
     return np.clip(usual, *_NOISE)
 
 
@@ -219,13 +221,13 @@ def _usual_levels(
     logs, of_later = (np.log(of + np.float32(LOG_OFFSET)) for of in (ground, later))
     values = logs.reshape(len(logs), logs.shape[1] * logs.shape[2])
     usual = np.median(values, axis=1)
-    spread = np.median(np.abs(values - usual[:, None]), axis=1) / _MEDIAN
+    spread = np.median(np.abs(values - usual[:, None]), axis=1) * NORMAL
     width = _UNLIKE * np.maximum(np.maximum(spread, _EVEN), noise / np.exp(usual))
     dark = logs < (usual - width)[:, None, None]
     darker = (dark[..., ::2] | dark[..., 1::2]).mean(axis=(1, 2))
     across, along = logs[..., 1::2] - logs[..., ::2], (of_later - logs)[..., ::2]
     edges = (np.maximum(np.abs(across), np.abs(along)) > LIGHT_EDGE).mean(axis=(1, 2))
-    light = (darker > _COVERED) | (edges > _COVERS_EDGES)
+    light = (darker > _LIGHT) | (edges > _LIGHT)
     shade = np.where(light, 0, np.exp(usual - width) - LOG_OFFSET)
     white = (ground >= SATURATED).mean(axis=(1, 2))
     glare = np.minimum(np.exp(usual + width) - LOG_OFFSET, SATURATED)
@@ -245,7 +247,7 @@ def _visible(
     centres = frames[:, :2, 2] / frames[:, 2:, 2]
     inside = (centres > reach) & (centres < np.array(shape[1::-1]) - 1 - reach)
     border = np.flatnonzero(~inside.all(axis=1))
-    ends = frame.circle_points(angles, np.array([(inner + outer) / 2, outer + _SEEN]))
+    ends = frame.circle_points(angles, np.array([(inner + outer) / 2, outer]))
     visible[border] = within(frame.project(frames[border], ends), shape).transpose(0, 2, 1)
     return visible
 

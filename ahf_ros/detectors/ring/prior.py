@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ahf_ros.features.robust import NORMAL
+
 _USUAL = 1.0  # deviation of the shift of edges of images, px
 _LEAST = 0.3  # of those of the targets of one image, which are not lit and printed alike
-_SPREAD = 2.0  # of the deviation that certain targets show, because others are less certain
 _FEWEST = 3  # certain targets that tell the shift of an image
-_MEDIAN = 0.6745  # of the size of a normal deviate
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +35,7 @@ class Prior:
         if len(shifts) < _FEWEST:
             return Prior(expected)
         shift = float(np.median(shifts))
-        spread = _SPREAD / _MEDIAN * float(np.median(np.abs(shifts - shift)))
+        spread = NORMAL * float(np.median(np.abs(shifts - shift)))
         return Prior(expected, shift, float(np.clip(spread, _LEAST, _USUAL)))
 
 

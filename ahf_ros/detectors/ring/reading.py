@@ -14,16 +14,25 @@ import numpy as np
 
 from ahf_ros.codes.ring import Family
 from ahf_ros.detectors.ring.circles import REACH, target_circles
-from ahf_ros.detectors.ring.decoding import Words, decode
+from ahf_ros.detectors.ring.decoding import CLEAR, DOUBT, Words, decode
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.light import predicted_light
 from ahf_ros.detectors.ring.likelihood import (
+    HOPEFUL,
     Evidence,
     edge_evidence,
     growth_by,
     level_evidence,
 )
-from ahf_ros.detectors.ring.polar import PolarImages, angles_of, polar_images
+from ahf_ros.detectors.ring.polar import (
+    DOT,
+    GAP,
+    MARGIN,
+    PART,
+    PolarImages,
+    angles_of,
+    polar_images,
+)
 from ahf_ros.detectors.ring.prior import NOTHING_KNOWN, Prior
 from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import Fit, fit_circles
@@ -33,17 +42,8 @@ from ahf_ros.imaging.black import lifted
 PER_SECTOR = 10
 """Angles of a sector at which bands are read."""
 
-_FIRST_PER_SECTOR = 5  # points on each edge of a sector in the first joint fit
 _SHIFTS = np.arange(-2.4, 2.41, 0.4)  # of edges, that are tried, px
 _DEPTHS = np.array([0.2, 0.4, 0.6, 0.8])  # of the band, where its levels are read
-_DOT_RADII = np.array([0.3, 0.6])  # where the level of the dot is read, dot radii
-_GAP_DEPTHS = np.array([0.4, 0.65])  # the same of the gap, in its width
-_MARGIN_DEPTHS = np.array([0.3, 0.6])  # the same beyond the band, dot radii
-_HOPEFUL = 0.2  # mean log odds of a reading, from which a band is read on
-_CLEAR = 15.0  # log odds of a word by edges alone against the next ID, that leave no doubt
-_DOUBT = 3.0  # log odds against it of arcs of any length, that leave one
-_PLENTY = 1.4  # mean log odds of a reading, below which they leave one as well
-_PART = 256  # dots at a time, which bounds the memory
 
 
 def read_bands(
@@ -67,8 +67,8 @@ def read_bands(
         One of each dot.
     """
     parts = [
-        _read_part(gray, dots.select(slice(start, start + _PART)), family, prior)
-        for start in range(0, max(len(dots.frames), 1), _PART)
+        _read_part(gray, dots.select(slice(start, start + PART)), family, prior)
+        for start in range(0, max(len(dots.frames), 1), PART)
     ]
     return Hypotheses.joined(parts)
 
@@ -81,7 +81,7 @@ def _read_part(gray: np.ndarray, dots: Fit, family: Family, prior: Prior) -> Hyp
     growth = best_growth(polar, family.band, prior)
     edges = edge_evidence(polar, 1 - growth, growth, family.band)
     words = decode(edges, _overhang(growth, family), family, prior.expected)
-    read = np.flatnonzero(_mean_odds(words, edges.weight) > _HOPEFUL)
+    read = np.flatnonzero(_mean_odds(words, edges.weight) > HOPEFUL)
     growth, words = growth[read], words.select(read)
     printed = dots.select(read)
     printed = replace(printed, frames=frame.scaled(printed.frames, 1 - growth))
@@ -97,16 +97,16 @@ def _read_part(gray: np.ndarray, dots: Fit, family: Family, prior: Prior) -> Hyp
         prior.expected,
     )
     words = words.replaced(some, of_levels)
-    good = _mean_odds(words, edges.weight[read]) > _HOPEFUL
+    good = _mean_odds(words, edges.weight[read]) > HOPEFUL
     read, printed, words = read[good], printed.select(good), words.select(good)
-    fit = _joint_fit(gray, printed, words, _FIRST_PER_SECTOR, 1, family)
+    fit = _joint_fit(gray, printed, words, PER_SECTOR // 2, 1, family)
     growth = fit.polarity * fit.edge_shift / fit.size
     polar = polar_images(gray, fit, family.band, family.bits * PER_SECTOR)
     edges = edge_evidence(polar, np.ones(len(read)), growth, family.band)
     of_edges = decode(edges, _overhang(growth, family), family, prior.expected)
     words = _words(gray, fit, polar, edges, growth, family, prior.expected)
     words = _preferred(words, of_edges, ~_doubtful(of_edges, edges))
-    good = _mean_odds(words, edges.weight) > _HOPEFUL
+    good = _mean_odds(words, edges.weight) > HOPEFUL
     read, fit, words = read[good], fit.select(good), words.select(good)
     fit = _joint_fit(gray, fit, words, PER_SECTOR, 2, family)
     return unread.replaced(read, Hypotheses.of(fit, words, family))
@@ -146,9 +146,8 @@ def best_growth(
 
 def _doubtful(words: Words, edges: Evidence) -> np.ndarray:
     """Return whether edges alone leave a doubt of their words, shape (k,)."""
-    doubtful: np.ndarray = (words.margin < _CLEAR) | (words.coded < -_DOUBT)
-    doubtful |= words.hidden.any(axis=1) | edges.covered.any(axis=(1, 2))
-    return doubtful | (_mean_odds(words, edges.weight) < _PLENTY)
+    doubtful: np.ndarray = (words.margin < CLEAR) | (words.coded < -DOUBT)
+    return doubtful | words.hidden.any(axis=1) | edges.covered.any(axis=(1, 2))
 
 
 def _preferred(words: Words, of_edges: Words, clear: np.ndarray) -> Words:
@@ -198,10 +197,10 @@ def _words(
     inner, outer = family.band
     radii = np.concatenate(
         [
-            _DOT_RADII,
-            1 + (inner - 1) * _GAP_DEPTHS,
+            DOT,
+            1 + (inner - 1) * GAP,
             inner + (outer - inner) * _DEPTHS,
-            outer + _MARGIN_DEPTHS,
+            outer + MARGIN,
         ]
     )
     angles = angles_of(family.bits * PER_SECTOR)

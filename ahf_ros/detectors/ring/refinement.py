@@ -7,37 +7,25 @@ one side of an edge by those on the other. IDs may come from a filtered image, c
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from ahf_ros.codes import ring
 from ahf_ros.codes.ring import Family, canonical
-from ahf_ros.detectors.ring.circles import REACH
+from ahf_ros.detectors.ring.circles import RAYS, REACH
 from ahf_ros.detectors.ring.full_size import with_soft_edges
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.prior import Prior
 from ahf_ros.detectors.ring.reading import read_bands
 from ahf_ros.features import frame
-from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.circle_fit import Fit, fit_dots
 from ahf_ros.features.ellipse_targets import ellipse_fields
+from ahf_ros.features.soft_edges import MINIMUM_SHARE
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, Target
 
-_FIRST_RAYS, _RAYS = 24, 48  # about a dot, for its polarity and a first frame, and for its centre
-_MINIMUM_SHARE = 0.5  # of the expected edges, for a fit to count
 _FARTHEST, _FARTHEST_SHARE = 1.0, 0.2  # that a centre is moved: px, or radii of its dot
-
-
-@dataclass(frozen=True, slots=True)
-class _Located(ArrayRecord):
-    """Frames, covariances of their centres, shares of the expected edges, and their shifts."""
-
-    frames: np.ndarray
-    covariance: np.ndarray
-    share: np.ndarray
-    shift: np.ndarray
 
 
 def refine_centres(
@@ -85,7 +73,7 @@ def refine_centres(
     located = _locate(gray, start, targets, family, polarities, expected)
     moved = np.hypot(*(located.frames[:, :2, 2] - start[:, :2, 2]).T)
     reach = np.maximum(_FARTHEST, _FARTHEST_SHARE * frame.ellipse_axes(start)[1])
-    good = (located.share >= _MINIMUM_SHARE) & (moved <= reach)
+    good = (located.share >= MINIMUM_SHARE) & (moved <= reach)
     places = ellipse_fields(located.frames, located.covariance, located.shift)
     return [
         replace(target, **place) if is_good else target
@@ -100,20 +88,21 @@ def _locate(
     family: Family,
     polarities: Sequence[int],
     expected: frozenset[int],
-) -> _Located:
-    """Return where targets are, by dot and band where the band agrees, else by the dot."""
+) -> Hypotheses:
+    """Return targets, by dot and band where the band agrees, else by the dot."""
     dots = _fit_either_polarity(gray, start, polarities)
     decoded = np.flatnonzero(
-        [target.id != UNDECODED for target in targets] & (dots.share >= _MINIMUM_SHARE)
+        [target.id != UNDECODED for target in targets] & (dots.share >= MINIMUM_SHARE)
     )
     hypotheses, which = _agreeing(gray, dots, decoded, targets, family, expected)
     # Of two hypotheses on one target, the one with the larger margin comes first.
     order = np.argsort(-hypotheses.seen, kind='stable')
     by_band, best = np.unique(which[order], return_index=True)
     rest = np.setdiff1d(np.arange(len(targets)), by_band)
-    alone = fit_dots(gray, start[rest], dots.polarity[rest], rays=_RAYS, reach=REACH)
-    located = _located(dots).replaced(rest, _located(alone))
-    return located.replaced(by_band, _located(hypotheses.select(order[best])))
+    alone = fit_dots(gray, start[rest], dots.polarity[rest], rays=RAYS, reach=REACH)
+    located = Hypotheses.unread(dots, family)
+    located = located.replaced(rest, Hypotheses.unread(alone, family))
+    return located.replaced(by_band, hypotheses.select(order[best]))
 
 
 def _agreeing(
@@ -137,22 +126,17 @@ def _agreeing(
         read = read_bands(gray, some, code, Prior(expected))
         which = of_family
         agreed = (read.words > 0) & (canonical(read.words, code)[0] == codes[which])
-        agreed &= read.share >= _MINIMUM_SHARE
+        agreed &= read.share >= MINIMUM_SHARE
         parts.append(with_soft_edges(gray, read, agreed).select(agreed))
         of_parts.append(which[agreed])
     return Hypotheses.joined(parts), np.concatenate(of_parts)
-
-
-def _located(of: Fit | Hypotheses) -> _Located:
-    shift = of.shift if isinstance(of, Hypotheses) else np.full(len(of.frames), np.nan)
-    return _Located(of.frames, of.covariance, of.share, shift)
 
 
 def _fit_either_polarity(gray: np.ndarray, frames: np.ndarray, polarities: Sequence[int]) -> Fit:
     """Return first fits of dots, each with the polarity that its edge has."""
     count = len(frames)
     fits = [
-        fit_dots(gray, frames, np.full(count, polarity), rays=_FIRST_RAYS, reach=REACH, rounds=1)
+        fit_dots(gray, frames, np.full(count, polarity), rays=RAYS // 2, reach=REACH, rounds=1)
         for polarity in polarities
     ]
     # Flat parts show edges of the wrong polarity, too, but these are faint. Those within a bright
