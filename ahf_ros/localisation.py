@@ -10,11 +10,11 @@ and P(0, 0) = a is the position. This holds in any frame of the cloud and for an
 and for lens distortion as far as it is linear across a target. Eleven numbers are fitted by least
 squares to about a thousand points, less the outliers of a plane of least median error.
 
-`benchmarks/positions.py` compares methods. With 0.1 mm of noise at one metre, a dot of 20 px and
-45 degrees of tilt, positions are 0.005 mm off; those of the four nearest points are 0.08 mm off,
-and those of a fit without perspective, g and h, 0.32 mm. With ink four times as noisy and no
-points on the dot, the homography is 0.007 mm off and the four nearest points give no position. For
-such a dot, 17 degrees off the axis, a distortion of k1 = 0.1 adds 0.01 mm.
+On simulated clouds with 0.1 mm of noise at one metre, a dot of 20 px and 45 degrees of tilt,
+positions are 0.005 mm off; those of the four nearest points are 0.08 mm off, and those of a fit
+without perspective, g and h, 0.32 mm. With ink four times as noisy and no points on the dot, the
+homography is 0.007 mm off and the four nearest points give no position. For such a dot, 17 degrees
+off the axis, a distortion of k1 = 0.1 adds 0.01 mm.
 """
 
 from __future__ import annotations

@@ -12,53 +12,37 @@ import argparse
 import ast
 import json
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
-from importlib.abc import MetaPathFinder
-from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
+from importlib.machinery import SourceFileLoader
 from pathlib import Path
-from types import CodeType, ModuleType
+from types import CodeType
 from typing import Any
 
 
-class Changed(SourceFileLoader):
-    """Loads a module with one of its constants changed."""
+def change(constant: str, value: float) -> None:
+    """Change a constant of a module that is not imported yet; ValueError if it has none.
 
-    name_of_constant = ''
-    value: float = 0.0
+    Parameters
+    ----------
+    constant : str
+        Name of the module, a dot, and that of the constant.
+    value : float
+    """
+    module, _, name = constant.rpartition('.')
+    compiled = SourceFileLoader.get_code
 
-    def get_code(self, fullname: str) -> CodeType:
-        """Return the code of the module, compiled from its source."""
-        tree = ast.parse(self.get_data(self.path))
-        replace = assigned(tree).get(self.name_of_constant)
+    def get_code(loader: SourceFileLoader, fullname: str) -> CodeType | None:
+        if fullname != module:
+            return compiled(loader, fullname)
+        tree = ast.parse(loader.get_data(loader.path))
+        replace = assigned(tree).get(name)
         if replace is None:
-            raise ValueError(f'{fullname} has no constant {self.name_of_constant}')
-        replace(self.value)
-        return compile(ast.fix_missing_locations(tree), self.path, 'exec')
+            raise ValueError(f'{module} has no constant {name}')
+        replace(value)
+        return compile(ast.fix_missing_locations(tree), loader.path, 'exec')
 
-
-class Finder(MetaPathFinder):
-    """Finds one module and has it loaded with a constant changed."""
-
-    def __init__(self, constant: str, value: float) -> None:
-        self._module, _, self._name = constant.rpartition('.')
-        self._value = value
-        self.used = False
-
-    def find_spec(
-        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
-    ) -> ModuleSpec | None:
-        """Return the specification of the module, and nothing for any other."""
-        if fullname != self._module:
-            return None
-        spec = PathFinder.find_spec(fullname, path, target)
-        if spec is None or spec.origin is None:
-            return None
-        loader = Changed(fullname, spec.origin)
-        loader.name_of_constant, loader.value = self._name, self._value
-        spec.loader = loader
-        self.used = True
-        return spec
+    SourceFileLoader.get_code = get_code  # type: ignore[method-assign]
 
 
 def assigned(tree: ast.Module) -> dict[str, Callable[[float], None]]:
@@ -129,10 +113,9 @@ def main() -> None:
     options = parser.parse_args()
     if options.change:
         constant, value = options.change
-        finder = Finder(constant, float(value))
-        sys.meta_path.insert(0, finder)
+        change(constant, float(value))
     found = results(options.folder)
-    if options.change and not finder.used:
+    if options.change and constant.rpartition('.')[0] not in sys.modules:
         raise SystemExit(f'{constant} is not in a module that the detector imports')
     print(json.dumps(found))
 

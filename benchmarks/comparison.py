@@ -1,21 +1,15 @@
 """Two reports of `benchmarks.identification` side by side, and what has become worse.
 
-    python -m benchmarks.comparison BEFORE.json AFTER.json
-
-`python -m benchmarks.identification --compare BEFORE.json` measures and compares at once. Times
-are comparable only if both were measured on the same machine, one after the other. The time in
-multiples of the plain search for contours depends less on the machine.
+`python -m benchmarks.identification --compare BEFORE.json` prints it. Times are comparable only if
+both were measured on the same machine, one after the other. The time in multiples of the plain
+search for contours depends less on the machine.
 """
 
 from __future__ import annotations
 
-import argparse
-import json
-import sys
-from collections.abc import Sequence
-from pathlib import Path
 from statistics import median
-from typing import Any
+
+from benchmarks.report import Report, number, table
 
 TARGETS = 1
 """Targets that a row may lose: last bits decide on the weakest one."""
@@ -25,8 +19,6 @@ SLOWER = 1.05
 
 SAME = ('width', 'height', 'seeds')
 """What two reports must share."""
-
-Report = dict[str, Any]
 
 
 def check_comparable(before: Report, after: Report) -> None:
@@ -84,26 +76,28 @@ def markdown(before: Report, after: Report) -> str:
     """Return the rows that both reports have as one table, with totals and findings below."""
     both = pairs(before, after)
     head = ('', '', 'N', 'right', 'wrong', 'false', 'RMSE XY (px)', 's', 'time', '/ contours')
-    lines = [
-        f'{after["method"]}, {after["width"]} x {after["height"]} px, seeds '
-        f'{", ".join(map(str, after["seeds"]))}: before, after. Times are ratios after / before.',
-        '',
-        f'| {" | ".join(head)} |',
-        '|---' * len(head) + '|',
+    rows = [
+        (
+            new['group'],
+            new['name'],
+            new['expected'],
+            *(f'{old[key]}, {new[key]}' for key in ('right', 'wrong', 'false_positives')),
+            f'{number(old["rmse_xy"], 4)}, {number(new["rmse_xy"], 4)}',
+            f'{number(old["seconds"], 2)}, {number(new["seconds"], 2)}',
+            *(number(ratio, 2) for ratio in times(old, new)),
+        )
+        for old, new in both
     ]
-    for old, new in both:
-        cells = [new['group'], new['name'], new['expected']]
-        cells += [f'{old[key]}, {new[key]}' for key in ('right', 'wrong', 'false_positives')]
-        cells += [f'{number(old["rmse_xy"], 4)}, {number(new["rmse_xy"], 4)}']
-        cells += [f'{number(old["seconds"], 2)}, {number(new["seconds"], 2)}']
-        cells += [number(ratio, 2) for ratio in times(old, new)]
-        lines.append(f'| {" | ".join(map(str, cells))} |')
     old_sum, new_sum = (
         [sum(row[key] for row in rows) for key in ('right', 'wrong', 'false_positives', 'seconds')]
         for rows in zip(*both, strict=True)
     )
     ratios = [median(column) for column in zip(*(times(*pair) for pair in both), strict=True)]
-    lines += [
+    lines = [
+        f'{after["method"]}, {after["width"]} x {after["height"]} px, seeds '
+        f'{", ".join(map(str, after["seeds"]))}: before, after. Times are ratios after / before.',
+        '',
+        *table(head, rows),
         '',
         f'{len(both)} rows: right {old_sum[0]}, {new_sum[0]}; wrong {old_sum[1]}, {new_sum[1]}; '
         f'false {old_sum[2]}, {new_sum[2]}; {old_sum[3]:.2f} s, {new_sum[3]:.2f} s; '
@@ -115,27 +109,3 @@ def markdown(before: Report, after: Report) -> str:
     findings = worse(before, after)
     lines += ['', 'Worse:' if findings else 'Nothing is worse.', *findings]
     return '\n'.join(lines)
-
-
-def number(value: float | None, digits: int) -> str:
-    """Return a number with some digits, - for none."""
-    return '-' if value is None else f'{value:.{digits}f}'
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Print the table; return 1 if something is worse."""
-    parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
-    parser.add_argument('before', type=Path)
-    parser.add_argument('after', type=Path)
-    options = parser.parse_args(arguments)
-    before, after = (json.loads(file.read_text()) for file in (options.before, options.after))
-    try:
-        print(markdown(before, after))
-    except ValueError as error:
-        print(error, file=sys.stderr)
-        return 2
-    return int(bool(worse(before, after)))
-
-
-if __name__ == '__main__':
-    sys.exit(main())

@@ -18,10 +18,9 @@ from ahf_ros.synthetic.patterns import LIGHT_NAMES, benchmark_lights
 from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import Target, TrueTarget
 from benchmarks import occluders
-from benchmarks.disturbed import blurred, compressed, noisy
+from benchmarks.disturbed import blurred, compressed, noisy, overlapping
 from benchmarks.exposure import Exposure
 from benchmarks.lookalikes import LOOKALIKES
-from benchmarks.overlaps import overlapping
 from benchmarks.sheets import COLUMNS, ROWS, mark_sheet, random_numbers, target_sheet
 
 SHADOWS = (0.3, 0.08, 0.04, 0.02)

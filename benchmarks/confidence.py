@@ -12,19 +12,17 @@ development.
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Sequence
 
 import numpy as np
 
 from ahf_ros.codes.ring import canonical, family
 from ahf_ros.detectors.contract import DetectorSettings
-from ahf_ros.detectors.ring.confidence import confidence, features
+from ahf_ros.detectors.ring.confidence import WEIGHTS, confidence, features
 from ahf_ros.detectors.ring.detector import find_hypotheses
 from ahf_ros.imaging.image import as_gray
-from benchmarks.conditions import COMMON, Scene, scenes
-from benchmarks.reliability import NEAR, reliability_table, run
+from benchmarks.conditions import COMMON, scenes
+from benchmarks.reliability import NEAR, Parts, gathered, reliability_table, run
 
 COVERED = ('cover', 'cover like paper', 'another target')
 """Conditions under which something lies on targets."""
@@ -42,41 +40,20 @@ _MINIMUM_MARGIN = np.log1p(2.0)  # of readings that count: others are not certai
 _WHOLE, _TRACE = 0.97, -2.2  # share of the band that is seen, and feature of arcs, without a trace
 
 
-def readings(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
-    """Return the features of all plausible readings, and which are right.
-
-    Returns
-    -------
-    features : ndarray of float64, shape (k, n)
-    right : ndarray of bool, shape (k,)
-    """
-    code = family(scene.family)
-    read = find_hypotheses(as_gray(scene.image), DetectorSettings(family=code.name))
-    read = read.select(read.words > 0)
-    _, ids = canonical(read.words, code)
-    true = [(target.x, target.y, target.id) for target in scene.truth]
-    x, y, number = np.array(true).reshape(-1, 3).T
-    near = np.hypot(read.frames[:, :1, 2] - x, read.frames[:, 1:2, 2] - y) < NEAR
-    right = (near & (ids[:, None] == number)).any(axis=1)
-    seen = near.any(axis=1) | (not scene.others)
-    return features(read.select(seen)), right[seen]
-
-
-def gathered(seeds: Sequence[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the readings of the scenes of some seeds, and the condition of each."""
-    with ProcessPoolExecutor(min(len(seeds), os.cpu_count() or 1)) as pool:
-        parts = [part for of_seed in pool.map(_gathered, seeds) for part in of_seed]
-    values, right, condition = (np.concatenate(part) for part in zip(*parts, strict=True))
-    return values, right, condition
-
-
-def _gathered(seed: int) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Return the readings of the scenes of a seed, scene by scene."""
-    parts = []
+def readings(seed: int) -> Parts:
+    """Yield condition, features and rightness of all plausible readings of each scene."""
     for scene in scenes(seed):
-        values, right = readings(scene)
-        parts.append((values, right, np.full(len(values), scene.condition)))
-    return parts
+        code = family(scene.family)
+        read = find_hypotheses(as_gray(scene.image), DetectorSettings(family=code.name))
+        read = read.select(read.words > 0)
+        _, ids = canonical(read.words, code)
+        true = [(target.x, target.y, target.id) for target in scene.truth]
+        x, y, number = np.array(true).reshape(-1, 3).T
+        near = np.hypot(read.frames[:, :1, 2] - x, read.frames[:, 1:2, 2] - y) < NEAR
+        right = (near & (ids[:, None] == number)).any(axis=1)
+        seen = near.any(axis=1) | (not scene.others)
+        condition = np.full(seen.sum(), scene.condition)
+        yield condition, features(read.select(seen)), right[seen]
 
 
 def rising_regression(
@@ -114,7 +91,7 @@ def rising_regression(
 
 def fitted(seeds: Sequence[int]) -> dict[str, np.ndarray]:
     """Return the numbers of the regression on the scenes of some seeds, by their names."""
-    values, right, condition = gathered(seeds)
+    condition, values, right = gathered(readings, seeds)
     # A cover without a trace cannot be told.
     no_trace = ~right & np.isin(condition, COVERED) & (values[:, VISIBLE] > _WHOLE)
     no_trace &= values[:, CODED] > _TRACE
@@ -124,11 +101,11 @@ def fitted(seeds: Sequence[int]) -> dict[str, np.ndarray]:
     return {'intercept': np.round([intercept], 3), 'weights': np.round(weights, 3)}
 
 
-def reliability(seeds: Sequence[int]) -> Iterator[str]:
-    """Yield the lines of the table of the scenes of some seeds."""
-    values, right, condition = gathered(seeds)
+def reliability(seeds: Sequence[int]) -> list[str]:
+    """Return the lines of the table of the scenes of some seeds."""
+    condition, values, right = gathered(readings, seeds)
     return reliability_table(condition, confidence(values), right)
 
 
 if __name__ == '__main__':
-    run('confidence', __doc__, fitted, reliability)
+    run('confidence', __doc__, fitted, reliability, WEIGHTS)

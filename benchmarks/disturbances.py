@@ -11,33 +11,31 @@ targets. Seeds from 101 on are for tests: nothing in the package was chosen by l
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from rich.console import Console
-from rich.progress import track
 
+from ahf_ros.codes.cyclic import smallest_rotation
 from ahf_ros.codes.families import AUTO, KINDS
-from ahf_ros.codes.ring import FAMILY_NAMES, family
+from ahf_ros.codes.ring import FAMILY_NAMES, Family, family
 from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.detectors.contract import Detector, Expecting
 from ahf_ros.evaluation import FALSE, RIGHT, WRONG, judge
 from ahf_ros.interchange.image_files import read_image
 from ahf_ros.interchange.truth_files import read_truth
 from ahf_ros.target import Target, TrueTarget
+from benchmarks import report
 from benchmarks.disturbed import Scene, Targets
 from benchmarks.exposure import Exposure
-from benchmarks.identification import PHOTOS
 from benchmarks.lookalikes import LOOKALIKES
+from benchmarks.report import FIRST_TEST_SEED, progress, table
 from benchmarks.sheets import COLUMNS, ROWS, mark_sheet
-from benchmarks.traceless import far_apart
+from support import PHOTOS
 
 LOOKALIKE_COUNT = 300
 """Marks of each kind that are no targets."""
@@ -50,6 +48,13 @@ COVERED_SECTORS = 3
 
 COVERED_ROWS = ('over', 'paper', 'finger', 'spot', 'highlight')
 """Parts of the names of rows whose targets are covered."""
+
+Table = dict[str, dict[str, 'Count']]
+"""Reports by row and column."""
+
+Detect = Callable[[np.ndarray], list[Target]]
+Job = tuple[str, str, Detect, Iterable[Scene]]
+"""Row and column of a table, and what is identified in which scenes."""
 
 _NO_ID = 2**31 - 1  # of any family
 
@@ -88,15 +93,6 @@ class Count:
             target.confidence for target, kind in zip(targets, kinds, strict=True) if kind != RIGHT
         ]
 
-    def join(self, other: Count) -> None:
-        """Add the reports of other images."""
-        self.expected += other.expected
-        self.right += other.right
-        self.wrong += other.wrong
-        self.false += other.false
-        self.stated += other.stated
-        self.seconds += other.seconds
-
     def above(self, confidence: float) -> int:
         """Return how many reports with more than a confidence are not right."""
         return sum(stated > confidence for stated in self.stated)
@@ -112,7 +108,7 @@ def detector(name: str, target_family: str) -> Detector:
     return create_detector(name, settings=DetectorSettings(family=target_family))
 
 
-def counted(detect: Callable[[np.ndarray], list[Target]], scenes: Iterator[Scene]) -> Count:
+def counted(detect: Detect, scenes: Iterable[Scene]) -> Count:
     """Return the reports of some scenes."""
     count = Count()
     for image, truth in scenes:
@@ -123,66 +119,80 @@ def counted(detect: Callable[[np.ndarray], list[Target]], scenes: Iterator[Scene
     return count
 
 
-def disturbance_table(options: argparse.Namespace) -> dict[str, dict[str, Count]]:
-    """Return the reports by disturbance and family."""
-    table: dict[str, dict[str, Count]] = {}
+def disturbed(options: argparse.Namespace) -> Iterator[Job]:
+    """Yield disturbances by family."""
     for name in options.families:
         detect = detector(options.detector, name)
         targets = Targets(name, options.count, options.seed, options.bright)
-        for row, scenes in _shown(targets.rows(), name):
+        for row, scenes in targets.rows():
             if not options.rows or any(part in row for part in options.rows):
-                table.setdefault(row, {})[name] = counted(detect, scenes)
-    return table
+                yield row, name, detect, scenes
 
 
-def expected_table(options: argparse.Namespace) -> dict[str, dict[str, Count]]:
-    """Return the reports of covered targets whose IDs are a known set, chosen far apart."""
-    table: dict[str, dict[str, Count]] = {}
+def far_apart(code: Family, sectors: int, seed: int) -> tuple[int, ...]:
+    """Return IDs that cannot look alike, up to a number of sectors of each covered.
+
+    Parameters
+    ----------
+    code : Family
+    sectors : int
+        Largest number of neighbouring sectors that are covered.
+    seed : int
+        Of the order in which IDs are tried.
+    """
+    windows = [
+        sum(1 << (start + step) % code.bits for step in range(count))
+        for count in range(sectors + 1)
+        for start in range(code.bits)
+    ]
+    seen: set[int] = set()
+    chosen = []
+    for index in np.random.default_rng([seed, 8]).permutation(len(code.words)).tolist():
+        left = code.words[index] & ~np.array(windows)
+        looks = set(smallest_rotation(left, code.bits).tolist())
+        if not looks & seen:
+            chosen.append(index + 1)
+            seen |= looks
+    return tuple(sorted(chosen))
+
+
+def expected(options: argparse.Namespace) -> Iterator[Job]:
+    """Yield covered targets whose IDs are a known set, chosen far apart."""
     for name in options.families:
         ids = far_apart(family(name), COVERED_SECTORS, options.seed)
         detect = detector(options.detector, name)
         if isinstance(detect, Expecting):
             detect = detect.expecting(frozenset(ids))
         targets = Targets(name, options.count, options.seed, options.bright, ids)
-        for row, scenes in _shown(targets.rows(), name):
+        for row, scenes in targets.rows():
             if any(part in row for part in options.rows or COVERED_ROWS):
-                table.setdefault(row, {})[f'{name}, {len(ids)} IDs'] = counted(detect, scenes)
-    return table
+                yield row, f'{name}, {len(ids)} IDs', detect, scenes
 
 
-def family_table(options: argparse.Namespace) -> dict[str, dict[str, Count]]:
-    """Return the reports by family of the targets and family, or all, that they are read as."""
-    table: dict[str, dict[str, Count]] = {}
-    read_as = (*FAMILY_NAMES, *([AUTO] if options.detector == AUTO else []))
-    for shown in _shown(FAMILY_NAMES, 'families'):
+def families(options: argparse.Namespace) -> Iterator[Job]:
+    """Yield targets by their family and by the family, or all, that they are read as."""
+    for shown in FAMILY_NAMES:
         sheets = Targets(shown, options.count, options.seed, options.bright).sheets()
         scenes = [(sheet.photograph(Exposure()), sheet.truth) for sheet in sheets]
-        for name in read_as:
-            detect = of_family(detector(options.detector, name), shown if name == AUTO else name)
-            seen = ((image, truth if name in (shown, AUTO) else []) for image, truth in scenes)
-            table.setdefault(shown, {})[name] = counted(detect, seen)
+        yield from _read(options, shown, shown, scenes)
     folder = Path(os.environ.get('AHF_PHOTOS', PHOTOS)) / 'panel'
-    panel = read_truth(folder / 'truth.csv') if folder.exists() else {}
-    for photograph, truth in _shown(panel.items(), 'photographs'):
-        image = read_image(folder / photograph)
-        row = table.setdefault('photographs of aicon14', {})
-        for name in read_as:
-            expected = truth if name in ('aicon14', AUTO) else []
-            detect = of_family(
-                detector(options.detector, name), 'aicon14' if name == AUTO else name
-            )
-            row.setdefault(name, Count()).join(counted(detect, iter([(image, expected)])))
-    if AUTO in read_as:
-        own = {**{name: name for name in FAMILY_NAMES}, 'photographs of aicon14': 'aicon14'}
-        one = sum(table[row][own[row]].seconds for row in table)
-        print(
-            f'all families take {sum(row[AUTO].seconds for row in table.values()) / one:.2f} '
-            'times the time of the right one'
-        )
-    return table
+    if folder.exists():
+        panel = read_truth(folder / 'truth.csv')
+        scenes = [(read_image(folder / name), truth) for name, truth in panel.items()]
+        yield from _read(options, 'photographs of aicon14', 'aicon14', scenes)
 
 
-def of_family(detect: Detector, name: str) -> Callable[[np.ndarray], list[Target]]:
+def _read(
+    options: argparse.Namespace, row: str, shown: str, scenes: Sequence[Scene]
+) -> Iterator[Job]:
+    """Yield scenes of a family as those of every family; of another one they show no target."""
+    for name in (*FAMILY_NAMES, *([AUTO] if options.detector == AUTO else [])):
+        own = name in (shown, AUTO)
+        detect = of_family(detector(options.detector, name), shown if own else name)
+        yield row, name, detect, [(image, truth if own else []) for image, truth in scenes]
+
+
+def of_family(detect: Detector, name: str) -> Detect:
     """Return a detector whose targets of other families than one have an ID that is none."""
 
     def detected(image: np.ndarray) -> list[Target]:
@@ -191,10 +201,9 @@ def of_family(detect: Detector, name: str) -> Callable[[np.ndarray], list[Target
     return detected
 
 
-def lookalike_table(options: argparse.Namespace) -> dict[str, dict[str, Count]]:
-    """Return the reports by kind of mark and family that it is read as."""
-    table: dict[str, dict[str, Count]] = {}
-    for kind, draw in _shown(LOOKALIKES.items(), 'look-alikes'):
+def lookalikes(options: argparse.Namespace) -> Iterator[Job]:
+    """Yield marks that are no targets by their kind and the family that they are read as."""
+    for kind, draw in LOOKALIKES.items():
         for name in options.families:
             generator = np.random.default_rng([options.seed, 3])
             inks = [draw(family(name), generator) for _ in range(LOOKALIKE_COUNT)]
@@ -204,65 +213,55 @@ def lookalike_table(options: argparse.Namespace) -> dict[str, dict[str, Count]]:
                 for start in range(0, LOOKALIKE_COUNT, size)
             ]
             scenes = ((sheet.photograph(Exposure()), ()) for sheet in sheets)
-            table.setdefault(kind, {})[name] = counted(detector(options.detector, name), scenes)
-    return table
+            yield kind, name, detector(options.detector, name), scenes
 
 
-def _shown(items: Any, what: str) -> Iterator[Any]:
-    """Yield items and show how far it has come."""
-    items = items if isinstance(items, Iterator) else list(items)
-    total = None if isinstance(items, Iterator) else len(items)
-    yield from track(items, what, total=total, console=Console(stderr=True))
-
-
-TABLES: dict[str, Callable[[argparse.Namespace], dict[str, dict[str, Count]]]] = {
-    'disturbances': disturbance_table,
-    'expected': expected_table,
-    'families': family_table,
-    'look-alikes': lookalike_table,
+TABLES: dict[str, Callable[[argparse.Namespace], Iterator[Job]]] = {
+    'disturbances': disturbed,
+    'expected': expected,
+    'families': families,
+    'look-alikes': lookalikes,
 }
 
 
-def markdown(title: str, table: dict[str, dict[str, Count]]) -> str:
+def time_of_all(counts: Table) -> str:
+    """Return how long reading targets as those of all families takes, beside the right one."""
+    right = sum(row[name.split()[-1]].seconds for name, row in counts.items())
+    ratio = sum(row[AUTO].seconds for row in counts.values()) / right
+    return f'all families take {ratio:.2f} times the time of the right one'
+
+
+def markdown(title: str, counts: Table) -> str:
     """Return a table as Markdown."""
-    columns = list(dict.fromkeys(name for row in table.values() for name in row))
-    lines = [f'| {title} | {" | ".join(columns)} |', '|---' * (len(columns) + 1) + '|']
-    for name, row in table.items():
-        cells = [str(row[column]) if column in row else '-' for column in columns]
-        lines.append(f'| {name} | {" | ".join(cells)} |')
-    return '\n'.join(lines)
+    columns = list(dict.fromkeys(name for row in counts.values() for name in row))
+    rows = [(name, *(row.get(column, '-') for column in columns)) for name, row in counts.items()]
+    return '\n'.join(table((title, *columns), rows))
 
 
-def parser() -> argparse.ArgumentParser:
-    """Return the options."""
-    made = argparse.ArgumentParser(
-        description=__doc__.split('\n\n')[0],
-        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
-    )
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Measure and print."""
+    made = report.parser(__doc__, seeds=False)
     made.add_argument('--detector', choices=('auto', 'traditional'), default='auto')
     made.add_argument('--tables', nargs='+', choices=TABLES, default=list(TABLES))
     made.add_argument('--families', nargs='+', choices=TARGETS, default=FAMILY_NAMES)
     made.add_argument('--rows', nargs='+', default=[], help='rows with one of these in their name')
     made.add_argument('--count', type=int, default=216, help='targets of a row')
-    made.add_argument('--seed', type=int, default=101, help='of the first sheet')
+    made.add_argument('--seed', type=int, default=FIRST_TEST_SEED, help='of the first sheet')
     made.add_argument('--bright', action='store_true', help='bright targets on dark paper')
-    made.add_argument('--json', type=Path, metavar='FILE', help='also write a JSON object')
-    return made
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Measure and print."""
-    options = parser().parse_args(arguments)
-    report: dict[str, Any] = {'detector': options.detector, 'seed': options.seed}
+    options = made.parse_args(arguments)
+    figures: report.Report = {'detector': options.detector, 'seed': options.seed}
     for name in options.tables:
-        table = TABLES[name](options)
-        print(markdown(name, table), end='\n\n', flush=True)
-        report[name] = {
+        counts: Table = {}
+        for row, column, detect, scenes in progress(TABLES[name](options), name):
+            counts.setdefault(row, {})[column] = counted(detect, scenes)
+        if name == 'families' and options.detector == AUTO:
+            print(time_of_all(counts))
+        print(markdown(name, counts), end='\n\n', flush=True)
+        figures[name] = {
             row: {column: asdict(count) for column, count in cells.items()}
-            for row, cells in table.items()
+            for row, cells in counts.items()
         }
-    if options.json:
-        options.json.write_text(json.dumps(report, indent=1))
+    report.write(figures, options)
     return 0
 
 

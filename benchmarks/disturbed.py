@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -9,15 +10,16 @@ from functools import partial
 import cv2
 import numpy as np
 
-from ahf_ros.codes.ring import FAMILY_NAMES
+from ahf_ros.codes.ring import FAMILY_NAMES, family
 from ahf_ros.target import TrueTarget
 from benchmarks import occluders
 from benchmarks.exposure import Exposure
-from benchmarks.overlaps import overlapping
 from benchmarks.sheets import COLUMNS, Sheet, random_numbers, target_sheet
 
 RADIUS = 12.0
 """Of the dots, px."""
+
+_CELL = 10.0  # half of the side of a cell with a target on another one, dot radii
 
 COVERS = {'black': 61.0, 'gray 80': 80.0, 'gray 128': 128.0, 'gray 170': 170.0, 'white': 220.0}
 """Gray values of what covers targets; black and white are those of ink and paper."""
@@ -92,6 +94,36 @@ def compressed(quality: int, image: np.ndarray, _: np.random.Generator) -> np.nd
     """Return an image after JPEG compression."""
     _, code = cv2.imencode('.jpg', image, [cv2.IMWRITE_JPEG_QUALITY, quality])
     return cv2.imdecode(code, cv2.IMREAD_GRAYSCALE)
+
+
+def overlapping(
+    name: str, numbers: np.ndarray, seed: int, distance: float, radius: float = 12.0
+) -> tuple[np.ndarray, list[TrueTarget]]:
+    """Return an image of targets with another one on each, and all targets that it shows.
+
+    Parameters
+    ----------
+    name : str
+        Family of all targets.
+    numbers : ndarray of int
+        IDs of the targets below; those above have other ones.
+    seed : int
+    distance : float
+        Between the centres of two targets, dot radii.
+    radius : float
+        Of the dots, px.
+    """
+    sheet = target_sheet(name, numbers, seed, radius=radius, cell=_CELL)
+    generator = np.random.default_rng([seed, 3])
+    free = np.setdiff1d(np.arange(1, family(name).words.size + 1), numbers)
+    above = generator.permutation(free)[: len(numbers)].tolist()
+    directions = generator.uniform(0, 2 * math.pi, len(numbers)).tolist()
+    papers = occluders.other_targets(name, above, distance, directions)
+    truth = sheet.truth
+    for mark, number, direction in zip(sheet.marks, above, directions, strict=True):
+        x, y = mark.plane @ (distance * np.array([math.cos(direction), math.sin(direction)]))
+        truth.append(TrueTarget(number, mark.x + x, mark.y + y))
+    return sheet.photograph(Exposure(occluder=papers)), truth
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,25 +11,21 @@ package was chosen by looking at them.
 
 from __future__ import annotations
 
-import argparse
 import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from pathlib import Path
-from statistics import median
+from functools import partial
 from typing import Any
 
 import numpy as np
-from rich.console import Console
-from rich.progress import track
 
-from ahf_ros.detectors import DetectorSettings, create_detector
-from ahf_ros.session import identify
+from ahf_ros.detectors import create_detector
 from ahf_ros.synthetic.scene import SceneSettings, render
+from benchmarks import report
 from benchmarks.dots_confidence import PER_RADIUS, reliability
-from benchmarks.filter import machine
-from benchmarks.identification import FIRST_TEST_SEED, Row
-from benchmarks.speed import seconds
+from benchmarks.report import number, table
+from benchmarks.rows import detector, measured, rendered
+from benchmarks.speed import in_turns
 from benchmarks.textures import SIZE, lookalikes, textured_image
 
 METHODS = (
@@ -49,7 +45,6 @@ FIRST_TEXTURE = 100_000
 """Seed of the first textured image; those of development are below."""
 
 ROUNDS = 5
-FAMILY = DetectorSettings(family='dots')
 _BASE = SceneSettings(family='dots', width=1600, height=1200, targets=30, dot_radius=14.0)
 
 
@@ -81,140 +76,107 @@ def scenes() -> Iterator[tuple[str, str, SceneSettings]]:
 
 def scene_rows(seeds: Sequence[int], methods: Sequence[tuple[str, bool]]) -> list[dict[str, Any]]:
     """Render and identify every scene with every seed, by some of the methods."""
-    every = list(scenes())
-    records = []
-    for group, name, scene in track(every, 'scenes', console=Console(stderr=True)):
-        rows = {method: Row(group, name) for method in methods}
-        for seed in seeds:
-            rendering = render(replace(scene, seed=seed))
-            truth = rendering.targets
-            for (detector, with_ahf), row in rows.items():
-                expected = len(truth) if with_ahf else 0
-                found = identify(
-                    rendering.image,
-                    detector=create_detector(detector, settings=FAMILY),
-                    expected_targets=expected,
-                )
-                row.add(rendering.image, truth, (found.targets, found.filter.duration))
-        records += [
-            {'detector': detector, 'ahf': with_ahf, **row.record()}
-            for (detector, with_ahf), row in rows.items()
-        ]
-    return records
+    runs = {str(number): detector(name, ahf=ahf) for number, (name, ahf) in enumerate(methods)}
+    cases = [rendered(*case) for case in scenes()]
+    return [
+        {'detector': name, 'ahf': ahf, **row.record()}
+        for by_method in measured(cases, seeds, runs)
+        for (name, ahf), row in zip(methods, by_method.values(), strict=True)
+    ]
 
 
-def scene_table(records: Sequence[dict[str, Any]]) -> Iterator[str]:
-    """Yield the lines of the table of scenes."""
+def scene_table(records: Sequence[dict[str, Any]]) -> list[str]:
+    """Return the lines of the table of scenes."""
     methods = list(dict.fromkeys((of['detector'], of['ahf']) for of in records))
-    names = [name + (' with AHF' if with_ahf else '') for name, with_ahf in methods]
-    yield f'| | | N | {" | ".join(names)} | NEES of dots | s |'
-    yield '|---' * (len(names) + 5) + '|'
+    names = [name + (' with AHF' if ahf else '') for name, ahf in methods]
+    rows = []
     for start in range(0, len(records), len(methods)):
-        row = records[start : start + len(methods)]
+        of_case = records[start : start + len(methods)]
+        first = of_case[0]
         cells = [
             f'{of["right"]}, {of["wrong"]} wrong, {of["false_positives"]} false'
             + ('' if of['rmse_xy'] is None else f' ({of["rmse_xy"]:.3f})')
-            for of in row
+            for of in of_case
         ]
-        nees = '-' if row[0]['nees'] is None else f'{row[0]["nees"]:.1f}'
-        head = (row[0]['group'], row[0]['name'], str(row[0]['expected']))
-        duration = f'{row[0]["seconds"]:.2f}'
-        yield f'| {" | ".join((*head, *cells, nees, duration))} |'
+        ends = number(first['nees'], 1), number(first['seconds'], 2)
+        rows.append((first['group'], first['name'], first['expected'], *cells, *ends))
+    return table(('', '', 'N', *names, 'NEES of dots', 's'), rows)
 
 
 def reports(images: Callable[[int], np.ndarray], count: int) -> dict[str, int]:
     """Return the number of targets reported in images without any, by detector."""
-    detectors = [create_detector(name, settings=FAMILY) for name in ('dots', 'dots_published')]
-    found = {detector.name: 0 for detector in detectors}
+    made = [create_detector(name, family='dots') for name in ('dots', 'dots_published')]
+    found = {one.name: 0 for one in made}
     seeds = range(FIRST_TEXTURE, FIRST_TEXTURE + count)
-    for seed in track(seeds, images.__name__, console=Console(stderr=True)):
+    for seed in report.progress(seeds, images.__name__):
         image = images(seed)
-        for detector in detectors:
-            found[detector.name] += len(detector(image))
+        for one in made:
+            found[one.name] += len(one(image))
     return found
 
 
 def times(seed: int) -> Iterator[dict[str, Any]]:
     """Yield the median times of `dots` and `ring` on 60 targets in 10.6 MP, in turns."""
     for light in ('normal', 'stripe'):
-        jobs = []
+        works = []
         for family in ('dots', 'metashape12'):
             scene = SceneSettings(family=family, targets=60, light=light, seed=seed)
-            detector = create_detector(family=family)
-            image = render(scene).image
-            detector(image[:400, :400])  # tables that are made once are not timed
-            jobs.append((detector, image, []))
-        for _ in range(ROUNDS):
-            for detector, image, durations in jobs:
-                durations.append(seconds(lambda run=detector, of=image: run(of))[0])
-        own, others = (median(durations) for _, _, durations in jobs)
+            works.append(partial(create_detector(family=family), render(scene).image))
+            works[-1]()  # tables that are made once are not timed
+        own, others = in_turns(works, ROUNDS)
         yield {'light': light, 'dots': own, 'ring': others, 'ratio': own / others}
 
 
-def lines(report: dict[str, Any]) -> Iterator[str]:
-    """Yield the lines of the report as Markdown."""
-    facts = report['machine']
-    kind = 'Test' if report['test'] else 'Development'
-    yield (
-        f'Rings of dots, {_BASE.width} x {_BASE.height} px. {kind} seeds: '
-        f'{", ".join(map(str, report["seeds"]))}. {facts["processor"]}, {facts["cores"]} cores, '
-        f'Python {facts["python"]}, numpy {facts["numpy"]}, OpenCV {facts["opencv"]}.'
-    )
-    if 'rows' in report:
-        yield from ('', 'Targets of 90 px width where the row does not say otherwise.', '')
-        yield from scene_table(report['rows'])
-    if 'textures' in report:
+def markdown(figures: report.Report) -> str:
+    """Return the report as a page."""
+    size = f'{_BASE.width} x {_BASE.height} px'
+    lines = [f'Rings of dots, {size}. {report.about_text(figures)}']
+    if 'rows' in figures:
+        lines += ['', 'Targets of 90 px width where the row does not say otherwise.', '']
+        lines += scene_table(figures['rows'])
+    if 'textures' in figures:
         width, height = SIZE
         for what, part in (
             (f'{TEXTURES} textured images', 'textures'),
             (f'{LOOKALIKES} images of rings in rings with dots', 'lookalikes'),
         ):
-            told = ', '.join(f'`{name}` {count}' for name, count in report[part].items())
-            yield from ('', f'Reports in {what} of {width} x {height} px: {told}.')
-    if 'confidence' in report:
-        yield from ('', 'Of the readings of `dots` with a confidence in the given range:', '')
-        yield from report['confidence']
-    if 'times' in report:
-        yield from ('', '60 targets in 3984 x 2656 px, median time in s:', '')
-        yield from ('| light | `dots` | `ring` | ratio |', '|---|---|---|---|')
-        for of in report['times']:
-            numbers = f'{of["dots"]:.2f} | {of["ring"]:.2f} | {of["ratio"]:.2f}'
-            yield f'| {of["light"]} | {numbers} |'
+            told = ', '.join(f'`{name}` {count}' for name, count in figures[part].items())
+            lines += ['', f'Reports in {what} of {width} x {height} px: {told}.']
+    if 'confidence' in figures:
+        lines += ['', 'Of the readings of `dots` with a confidence in the given range:', '']
+        lines += figures['confidence']
+    if 'times' in figures:
+        names = ('dots', 'ring', 'ratio')
+        rows = [(of['light'], *(number(of[it], 2) for it in names)) for of in figures['times']]
+        lines += ['', '60 targets in 3984 x 2656 px, median time in s:', '']
+        lines += table(('light', '`dots`', '`ring`', 'ratio'), rows)
+    return '\n'.join(lines)
 
 
-def main() -> None:
-    """Measure and print."""
-    parser = argparse.ArgumentParser(
-        description=__doc__.split('\n\n')[0],
-        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
-    )
-    parser.add_argument('--parts', nargs='+', choices=PARTS, default=PARTS)
-    parser.add_argument('--seeds', nargs='+', type=int, default=[FIRST_TEST_SEED])
-    parser.add_argument(
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Measure and print; parts that an earlier JSON object has and that are not asked for stay."""
+    made = report.parser(__doc__)
+    made.add_argument('--parts', nargs='+', choices=PARTS, default=PARTS)
+    made.add_argument(
         '--no-ahf', dest='ahf', action='store_false', help='scenes without AHF only, much faster'
     )
-    parser.add_argument(
-        '--json', type=Path, metavar='FILE', help='also write a JSON object; other parts stay'
-    )
-    options = parser.parse_args()
+    options = report.parsed(made, arguments)
     seeds = options.seeds
-    report: dict[str, Any] = {}
+    figures: report.Report = {}
     if options.json and options.json.exists():
-        report = json.loads(options.json.read_text())
-    report.update(seeds=seeds, machine=machine(), test=min(seeds) >= FIRST_TEST_SEED)
+        figures = json.loads(options.json.read_text())
+    figures |= report.about(seeds)
     if 'time' in options.parts:
-        report['times'] = list(times(seeds[0]))
+        figures['times'] = list(times(seeds[0]))
     if 'scenes' in options.parts:
         methods = [it for it in METHODS if options.ahf or not it[1]]
-        report['rows'] = scene_rows(seeds, methods)
+        figures['rows'] = scene_rows(seeds, methods)
     if 'textures' in options.parts:
-        report['textures'] = reports(textured_image, TEXTURES)
-        report['lookalikes'] = reports(lookalikes, LOOKALIKES)
+        figures['textures'] = reports(textured_image, TEXTURES)
+        figures['lookalikes'] = reports(lookalikes, LOOKALIKES)
     if 'confidence' in options.parts:
-        report['confidence'] = list(reliability(seeds[:1]))
-    if options.json:
-        options.json.write_text(json.dumps(report, indent=1))
-    print('\n'.join(lines(report)))
+        figures['confidence'] = reliability(seeds[:1])
+    report.publish(figures, markdown(figures), options)
 
 
 if __name__ == '__main__':

@@ -13,24 +13,21 @@ are for tests, those below for development.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
-from rich.console import Console
-from rich.progress import track
 
 from ahf_ros.codes.dots import dot_family
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.dots.confidence import WEIGHTS, target_probability, word_probability
 from ahf_ros.detectors.dots.detector import find_rings
-from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.pyramid import image_pyramid
 from ahf_ros.imaging.image import as_gray
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
-from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
+from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import Target
-from benchmarks.reliability import NEAR, reliability_table, run
+from benchmarks.reliability import NEAR, Parts, gathered, reliability_table, run
 from benchmarks.textures import lookalikes
 
 PER_RADIUS = 6.4
@@ -44,16 +41,6 @@ LOOKALIKES = 40
 
 AMBIENT = (0.3, 0.12, 0.04, 0.02)
 """Ambient light, as a share of the projector's."""
-
-
-@dataclass(frozen=True, slots=True)
-class Compared(ArrayRecord):
-    """Readings, and whether they are of targets, and right, shape (k,) each."""
-
-    target_features: np.ndarray
-    word_features: np.ndarray
-    of_target: np.ndarray
-    right: np.ndarray
 
 
 def scenes(seed: int) -> Iterator[tuple[str, SceneSettings]]:
@@ -82,42 +69,37 @@ def scenes(seed: int) -> Iterator[tuple[str, SceneSettings]]:
         yield 'no targets', replace(base, family=family, light=light, dot_radius=12.0)
 
 
-def compared(scene: Rendering) -> Compared:
-    """Return all plausible readings of a scene, compared with the truth."""
-    return _compared(scene.image, scene.targets if scene.settings.family == 'dots' else ())
+def readings(seed: int) -> Parts:
+    """Yield the plausible readings of each image: condition, features, of a target or not, right.
+
+    There are features of a reading as that of a target, and as that of a word.
+    """
+    for condition, settings in scenes(seed):
+        scene = render(settings)
+        yield _compared(condition, scene.image, scene.targets if settings.family == 'dots' else ())
+    for image in map(lookalikes, range(LOOKALIKES * seed, LOOKALIKES * (seed + 1))):
+        yield _compared('lookalikes', image, ())
 
 
-def _compared(image: np.ndarray, targets: Sequence[Target]) -> Compared:
+def _compared(
+    condition: str, image: np.ndarray, targets: Sequence[Target]
+) -> tuple[np.ndarray, ...]:
     settings, code = DetectorSettings(family='dots'), dot_family()
     pyramid = image_pyramid(as_gray(image), settings.max_radius)
     rings = find_rings(pyramid, settings, code)
     x, y, true = np.array([(it.x, it.y, it.id) for it in targets]).reshape(-1, 3).T
     near = np.hypot(rings.frames[:, :1, 2] - x, rings.frames[:, 1:2, 2] - y) < NEAR
-    right = near & (code.ids(rings.words)[:, None] == true)
-    return Compared(
-        rings.target_features, rings.word_features, near.any(axis=1), right.any(axis=1)
-    )
-
-
-def gathered(seeds: Sequence[int]) -> dict[str, Compared]:
-    """Return the readings of the scenes of some seeds by condition."""
-    wanted = [named for seed in seeds for named in scenes(seed)]
-    parts: dict[str, list[Compared]] = {}
-    for condition, scene in track(wanted, 'scenes', console=Console(stderr=True)):
-        parts.setdefault(condition, []).append(compared(render(scene)))
-    for seed in seeds:
-        images = map(lookalikes, range(LOOKALIKES * seed, LOOKALIKES * (seed + 1)))
-        parts.setdefault('lookalikes', []).extend(_compared(image, ()) for image in images)
-    return {condition: Compared.joined(of) for condition, of in parts.items()}
+    right = (near & (code.ids(rings.words)[:, None] == true)).any(axis=1)
+    features = rings.target_features, rings.word_features
+    return np.full(len(right), condition), *features, near.any(axis=1), right
 
 
 def fitted(seeds: Sequence[int]) -> dict[str, np.ndarray]:
     """Return intercepts and weights of both regressions on the scenes of some seeds."""
-    every = Compared.joined(list(gathered(seeds).values()))
-    some = every.select(every.of_target)
+    _, of_targets, of_words, shown, right = gathered(readings, seeds)
     return {
-        'target': np.round(logistic_regression(every.target_features, every.of_target), 2),
-        'word': np.round(logistic_regression(some.word_features, some.right), 2),
+        'target': np.round(logistic_regression(of_targets, shown), 2),
+        'word': np.round(logistic_regression(of_words[shown], right[shown]), 2),
     }
 
 
@@ -136,13 +118,11 @@ def logistic_regression(features: np.ndarray, right: np.ndarray) -> np.ndarray:
     return np.concatenate([[weights[0] - slopes @ mean], slopes])
 
 
-def reliability(seeds: Sequence[int]) -> Iterator[str]:
-    """Yield the lines of the table of the scenes of some seeds."""
-    parts = gathered(seeds)
-    every = Compared.joined(list(parts.values()))
-    conditions = np.repeat(list(parts), [len(of.right) for of in parts.values()])
-    stated = target_probability(every.target_features) * word_probability(every.word_features)
-    return reliability_table(conditions, stated, every.right)
+def reliability(seeds: Sequence[int]) -> list[str]:
+    """Return the lines of the table of the scenes of some seeds."""
+    conditions, of_targets, of_words, _, right = gathered(readings, seeds)
+    stated = target_probability(of_targets) * word_probability(of_words)
+    return reliability_table(conditions, stated, right)
 
 
 if __name__ == '__main__':

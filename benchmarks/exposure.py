@@ -49,8 +49,11 @@ class Cell(NamedTuple):
     width: float
 
 
-Occluder = Callable[[Cell, np.random.Generator], tuple[np.ndarray, np.ndarray | float]]
+Covered = tuple[np.ndarray, np.ndarray | float]
 """The share of each sample that an object covers, and the gray value of the object."""
+
+Occluder = Callable[[Cell, np.random.Generator], Covered]
+"""An object before a mark."""
 
 Glare = Callable[[Cell, np.random.Generator], np.ndarray]
 """Gray values that a reflection adds to each sample."""

@@ -13,15 +13,13 @@ the file of fitted weights. Seeds from 101 on are for tests, those below for dev
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from rich.console import Console
-from rich.progress import track
 
 from ahf_ros.codes.gsi_library import GSI_LIBRARY, point_family
 from ahf_ros.detectors import DetectorSettings, create_detector
@@ -34,7 +32,7 @@ from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 from ahf_ros.target import DottedTarget
 from benchmarks.confidence import rising_regression
 from benchmarks.gsi import texture
-from benchmarks.reliability import NEAR, reliability_table, run
+from benchmarks.reliability import NEAR, Parts, gathered, reliability_table, run
 
 BASE = SceneSettings(
     family='gsi', width=1600, height=1200, targets=6, dot_radius=5.0, focal_length=6.0
@@ -134,34 +132,27 @@ def found_in(image: np.ndarray) -> Hypotheses:
     return find_hypotheses(pyramid, settings, point_family())[0]
 
 
-def gathered(seeds: Iterable[int]) -> tuple[list[str], np.ndarray, np.ndarray]:
-    """Return conditions, features and rightness of the hypotheses of the images of some seeds."""
-    conditions, parts = [], []
-    for seed in seeds:
-        with TemporaryDirectory() as folder:
-            for condition, settings in track(
-                list(scenes(seed, Path(folder))), f'scenes of {seed}', console=Console(stderr=True)
-            ):
-                parts.append(hypotheses(render(settings)))
-                conditions += [condition] * len(parts[-1][1])
-        for number in range(TEXTURES):
-            features = found_in(texture(100 * seed + number)[0]).features
-            parts.append((features, np.zeros(len(features), bool)))
-            conditions += ['no targets'] * len(features)
-    features, right = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return conditions, features, right
+def readings(seed: int) -> Parts:
+    """Yield condition, features and rightness of the hypotheses of each image."""
+    with TemporaryDirectory() as folder:
+        for condition, settings in scenes(seed, Path(folder)):
+            features, right = hypotheses(render(settings))
+            yield np.full(len(right), condition), features, right
+    for number in range(TEXTURES):
+        features = found_in(texture(100 * seed + number)[0]).features
+        yield np.full(len(features), 'no targets'), features, np.zeros(len(features), bool)
 
 
-def fitted(seeds: Iterable[int]) -> dict[str, np.ndarray]:
+def fitted(seeds: Sequence[int]) -> dict[str, np.ndarray]:
     """Return intercept and weights of the regression on the scenes of some seeds, shape (8,)."""
-    _, features, right = gathered(seeds)
+    _, features, right = gathered(readings, seeds)
     intercept, slopes = rising_regression(SIGNS * features, right, np.ones(len(right)))
     return {'weights': np.round(np.append(intercept, SIGNS * slopes), 3) + 0.0}
 
 
-def reliability(seeds: Iterable[int]) -> Iterator[str]:
-    """Yield the lines of the table of the scenes of some seeds."""
-    conditions, features, right = gathered(seeds)
+def reliability(seeds: Sequence[int]) -> list[str]:
+    """Return the lines of the table of the scenes of some seeds."""
+    conditions, features, right = gathered(readings, seeds)
     return reliability_table(conditions, probability(features), right)
 
 

@@ -26,20 +26,22 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 from statistics import median, quantiles
-from typing import Any
 
 import rclpy
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
 from ahf_ros.msg import CodedTargetArray
+from ahf_ros.nodes.demo import profile_variable
 from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.nodes.settings import LATEST, LOSSLESS
 from ahf_ros.synthetic.scene import SceneSettings, render
-from benchmarks.filter import machine
-from benchmarks.node import TRANSPORTS
-from benchmarks.output import add_output, publish
+from benchmarks import report
 from support import live
+
+PROFILE = Path(__file__).resolve().parents[1] / 'config' / 'fastdds_shm.xml'
+TRANSPORTS = {'defaults': {}, PROFILE.name: {profile_variable(): str(PROFILE)}}
+"""Environments by the names of what they set up."""
 
 SIZES = {'2.5 MP': (1936, 1296, 20), '10.6 MP': (3984, 2656, 54)}
 """Width, height and targets of the images."""
@@ -206,36 +208,34 @@ def measured(options: argparse.Namespace) -> dict[str, Figures]:
     return rows
 
 
-def markdown(report: dict[str, Any]) -> str:
+def markdown(figures: report.Report) -> str:
     """Return the figures as a table, a row a transport, size and checkout."""
     rows = {
-        f'{name}, {row}': of for name, it in report['transports'].items() for row, of in it.items()
+        f'{name}, {row}': of
+        for name, it in figures['transports'].items()
+        for row, of in it.items()
     }
     names = list(next(iter(rows.values())))
-    lines = [f'| {report["light"]} | {" | ".join(names)} |', '|---' * (len(names) + 1) + '|']
-    lines += [
-        f'| {name} | {" | ".join(f"{of[it]:.4g}" for it in names)} |' for name, of in rows.items()
-    ]
-    return '\n'.join(lines)
+    cells = [(name, *(f'{of[it]:.4g}' for it in names)) for name, of in rows.items()]
+    return '\n'.join(report.table((figures['light'], *names), cells))
 
 
 def main() -> int:
     """Measure with every transport, each in a process of its own, and print."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument('--images', type=int, default=40, help='of each stream')
-    parser.add_argument('--light', default='stripe', help='on the targets')
-    parser.add_argument('--sizes', nargs='+', choices=SIZES, default=list(SIZES))
-    parser.add_argument('--transports', nargs='+', choices=TRANSPORTS, default=list(TRANSPORTS))
-    parser.add_argument(
+    made = report.parser(__doc__, seeds=False)
+    made.add_argument('--images', type=int, default=40, help='of each stream')
+    made.add_argument('--light', default='stripe', help='on the targets')
+    made.add_argument('--sizes', nargs='+', choices=SIZES, default=list(SIZES))
+    made.add_argument('--transports', nargs='+', choices=TRANSPORTS, default=list(TRANSPORTS))
+    made.add_argument(
         '--before', type=Path, metavar='FOLDER', help='another checkout, measured in turn'
     )
-    parser.add_argument('--alone', action='store_true', help=argparse.SUPPRESS)
-    add_output(parser)
-    options = parser.parse_args()
+    made.add_argument('--alone', action='store_true', help=argparse.SUPPRESS)
+    options = made.parse_args()
     if options.alone:
         print(json.dumps(measured(options)))
         return 0
-    report: dict[str, Any] = {'machine': machine(), 'light': options.light, 'transports': {}}
+    transports = {}
     for name in options.transports:
         done = subprocess.run(
             [sys.executable, '-m', 'benchmarks.latency', *sys.argv[1:], '--alone'],
@@ -243,8 +243,9 @@ def main() -> int:
             stdout=subprocess.PIPE,
             check=True,
         )
-        report['transports'][name] = json.loads(done.stdout)
-    publish(report, markdown(report), options.output)
+        transports[name] = json.loads(done.stdout)
+    figures = {'machine': report.machine(), 'light': options.light, 'transports': transports}
+    report.publish(figures, markdown(figures), options)
     return 0
 
 

@@ -19,20 +19,17 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
-
-from rich.console import Console
-from rich.progress import track
 
 from ahf_ros.codes.families import FAMILY_NAMES
 from ahf_ros.detectors import DETECTOR_NAMES
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
-from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
-from benchmarks.filter import machine
-from benchmarks.identification import FIRST_TEST_SEED, Row, are_tests, with_detector
-from benchmarks.output import add_output, publish
+from ahf_ros.synthetic.scene import SceneSettings, render
+from benchmarks import report
+from benchmarks.report import number
+from benchmarks.rows import Case, Scene, detector, measured
 
 _VIEWS: dict[str, dict[str, Any]] = {
     'radius 20, 0.04': {'ambient': 0.04},
@@ -69,28 +66,13 @@ _EXPOSURES: dict[str, dict[str, Any]] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Group:
-    """Rows that are one table.
-
-    Attributes
-    ----------
-    rows : dict
-        What differs from a scene of dots of 20 px, by the name of the row.
-    lights : tuple of str
-        The columns.
-    """
-
-    rows: dict[str, dict[str, Any]]
-    lights: tuple[str, ...]
-
-
 GROUPS = {
-    'light': Group(_VIEWS, ('stripe', 'fine_stripe', 'lattice', 'dense_lattice')),
-    'edge shift': Group(_SHIFTS | _HALVES, ('normal', 'fringe', 'stripe', 'lattice')),
-    'exposure': Group(_EXPOSURES, ('normal',)),
+    'light': (_VIEWS, ('stripe', 'fine_stripe', 'lattice', 'dense_lattice')),
+    'edge shift': (_SHIFTS | _HALVES, ('normal', 'fringe', 'stripe', 'lattice')),
+    'exposure': (_EXPOSURES, ('normal',)),
 }
-"""The tables by their names."""
+"""By its name, what differs in each row of a table from a scene of dots of 20 px, and the lights
+that are its columns."""
 
 SETTINGS: dict[str, dict[str, Any]] = {
     'usual': {},
@@ -122,7 +104,7 @@ DOT_SHARES = {'gsi': 0.5, 'dots': 0.7}
 
 def scene(options: argparse.Namespace, row: str, light: str, seed: int) -> SceneSettings:
     """Return the scene of a row, a light and a seed."""
-    changes = GROUPS[options.group].rows[row] | SETTINGS[options.setting]
+    changes = GROUPS[options.group][0][row] | SETTINGS[options.setting]
     radius = changes.get('dot_radius', SceneSettings().dot_radius)
     changes['dot_radius'] = radius * DOT_SHARES.get(options.family, 1.0)
     return SceneSettings(
@@ -130,28 +112,19 @@ def scene(options: argparse.Namespace, row: str, light: str, seed: int) -> Scene
     )
 
 
-def photograph(options: argparse.Namespace, row: str, light: str, seed: int) -> Rendering:
-    """Return the rendering of a row, a light and a seed; of some, each half has its own shift."""
-    settings = scene(options, row, light, seed)
-    rendering = render(settings)
-    if row in _HALVES:
-        other = render(replace(settings, edge_shift=-settings.edge_shift))
-        right = slice(settings.width // 2, None)
-        rendering.image[:, right] = other.image[:, right]
-    return rendering
+def case(options: argparse.Namespace, row: str, light: str) -> Case:
+    """Return a cell of the table; in some, each half of an image has its own shift."""
 
+    def make(seed: int) -> Scene:
+        settings = scene(options, row, light, seed)
+        rendering = render(settings)
+        if row in _HALVES:
+            other = render(replace(settings, edge_shift=-settings.edge_shift))
+            right = slice(settings.width // 2, None)
+            rendering.image[:, right] = other.image[:, right]
+        return rendering.image, rendering.targets
 
-def measure(options: argparse.Namespace) -> Iterator[Row]:
-    """Render and identify every scene with every seed; yield a row of each row and light."""
-    run = with_detector(options)
-    cells = [(row, light) for row in options.rows for light in options.lights]
-    for row, light in track(cells, 'scenes', console=Console(stderr=True)):
-        cell = Row(row, light)
-        for seed in options.seeds:
-            rendering = photograph(options, row, light, seed)
-            truth = rendering.targets
-            cell.add(rendering.image, truth, run(rendering.image, options.family, len(truth)))
-        yield cell
+    return Case(row, light, make, options.family)
 
 
 def cell_text(record: dict[str, Any]) -> str:
@@ -162,59 +135,53 @@ def cell_text(record: dict[str, Any]) -> str:
     return text if record['nees'] is None else f'{text} ({record["nees"]:.1f})'
 
 
-def markdown(report: dict[str, Any]) -> str:
+def markdown(figures: report.Report) -> str:
     """Return the report as a table."""
-    facts = report['machine']
-    kind = 'Test' if report['test'] else 'Development'
-    records = {(of['group'], of['name']): of for of in report['rows']}
-    rows, lights = (list(dict.fromkeys(keys)) for keys in zip(*records, strict=True))
+    records = {(of['group'], of['name']): of for of in figures['rows']}
+    names, lights = (list(dict.fromkeys(keys)) for keys in zip(*records, strict=True))
+    rows = []
+    for name in names:
+        of_row = [records[name, light] for light in lights]
+        slowest = number(max(of['seconds'] for of in of_row), 2)
+        rows.append((name, of_row[0]['expected'], *map(cell_text, of_row), slowest))
+    right, expected, wrong, false = (
+        sum(of[key] for of in figures['rows'])
+        for key in ('right', 'expected', 'wrong', 'false_positives')
+    )
     lines = [
-        f'{report["method"]}, family {report["family"]}, setting `{report["setting"]}`. {kind} '
-        f'seeds: {", ".join(map(str, report["seeds"]))}. {facts["processor"]}, {facts["cores"]} '
-        f'cores, Python {facts["python"]}, numpy {facts["numpy"]}, OpenCV {facts["opencv"]}.',
+        f'{figures["method"]}, family {figures["family"]}, setting `{figures["setting"]}`. '
+        + report.about_text(figures),
         '',
-        f'| right of N (NEES) | N | {" | ".join(lights)} | s |',
-        '|---' * (len(lights) + 3) + '|',
+        *report.table(('right of N (NEES)', 'N', *lights, 's'), rows),
+        '',
+        f'{right} of {expected} right, {wrong} wrong, {false} false.',
     ]
-    for row in rows:
-        of_row = [records[row, light] for light in lights]
-        cells = ' | '.join(map(cell_text, of_row))
-        slowest = max(of['seconds'] for of in of_row)
-        lines.append(f'| {row} | {of_row[0]["expected"]} | {cells} | {slowest:.2f} |')
-    sums = [sum(of[name] for of in report['rows']) for name in ('right', 'expected')]
-    false = [sum(of[name] for of in report['rows']) for name in ('wrong', 'false_positives')]
-    lines += ['', '{} of {} right, {} wrong, {} false.'.format(*sums, *false)]
     return '\n'.join(lines)
 
 
 def parser() -> argparse.ArgumentParser:
     """Return what can be chosen."""
-    made = argparse.ArgumentParser(
-        description=__doc__.split('\n\n')[0],
-        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
-    )
+    made = report.parser(__doc__)
     made.add_argument('--detector', choices=DETECTOR_NAMES, default='ring')
     made.add_argument('--family', choices=FAMILY_NAMES, default='metashape12')
     made.add_argument('--ahf', action='store_true', help='search for filters, N being given')
     made.add_argument('--setting', choices=tuple(SETTINGS), default='usual')
     made.add_argument('--group', choices=tuple(GROUPS), default='light')
-    every = tuple(row for group in GROUPS.values() for row in group.rows)
+    every = tuple(row for rows, _ in GROUPS.values() for row in rows)
     made.add_argument('--rows', nargs='+', choices=every, help='of the group; default: all')
     made.add_argument('--lights', nargs='+', choices=LIGHT_NAMES, help='default: of the group')
     made.add_argument('--targets', type=int, default=SceneSettings().targets)
-    made.add_argument('--seeds', nargs='+', type=int, default=[FIRST_TEST_SEED])
-    add_output(made)
     return made
 
 
 def chosen(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     """Return the options, with the rows and lights of the group where none are given."""
     made = parser()
-    options = made.parse_args(arguments)
-    group = GROUPS[options.group]
-    options.rows = options.rows or list(group.rows)
-    options.lights = options.lights or list(group.lights)
-    if foreign := [row for row in options.rows if row not in group.rows]:
+    options = report.parsed(made, arguments)
+    rows, lights = GROUPS[options.group]
+    options.rows = options.rows or list(rows)
+    options.lights = options.lights or list(lights)
+    if foreign := [row for row in options.rows if row not in rows]:
         made.error(f'rows has {foreign[0]!r}, accepted are those of the group {options.group!r}')
     return options
 
@@ -222,22 +189,17 @@ def chosen(arguments: Sequence[str] | None = None) -> argparse.Namespace:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Measure and print."""
     options = chosen(arguments)
-    try:
-        test = are_tests(options.seeds)
-    except ValueError as error:
-        print(error, file=sys.stderr)
-        return 2
-    report: dict[str, Any] = {
-        'method': options.detector + (' with AHF' if options.ahf else ''),
-        'family': options.family,
-        'setting': options.setting,
-        'group': options.group,
-        'seeds': options.seeds,
-        'test': test,
-        'machine': machine(),
-    }
-    report['rows'] = [row.record() for row in measure(options)]
-    publish(report, markdown(report), options.output)
+    figures = report.about(
+        options.seeds,
+        method=options.detector + (' with AHF' if options.ahf else ''),
+        family=options.family,
+        setting=options.setting,
+        group=options.group,
+    )
+    cases = [case(options, row, light) for row in options.rows for light in options.lights]
+    run = detector(options.detector, ahf=options.ahf)
+    figures['rows'] = [by[''].record() for by in measured(cases, options.seeds, {'': run})]
+    report.publish(figures, markdown(figures), options)
     return 0
 
 

@@ -11,10 +11,8 @@ import cv2
 import numpy as np
 
 from ahf_ros.codes.ring import Family, sectors
-from ahf_ros.synthetic.covers import Cover, ring_cover, stamp_cover
-
-Ink = Callable[[float], Cover]
-"""The ink of a mark that is turned by an angle, rad."""
+from ahf_ros.synthetic.covers import ring_cover, stamp_cover
+from benchmarks.sheets import Ink
 
 _FINE = 61  # sectors of arcs of any length; a prime, so that they meet no sectors of a family
 _NUMBERS = (9, 10, 11, 13, 14, 15, 16, 17, 18, 20, 22)

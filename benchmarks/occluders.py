@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
 
 from ahf_ros.codes.ring import family
 from ahf_ros.synthetic.covers import ring_cover
-from benchmarks.exposure import GAMMA, INK, WHITE, Cell, Glare, Occluder
+from benchmarks.exposure import GAMMA, INK, WHITE, Cell, Covered, Glare, Occluder
 
 _LABEL = 3.8  # radius of the paper that another target is printed on, dot radii
 _DIRTY = 3.8  # radius of the area that dirt lies in, dot radii
@@ -29,93 +29,57 @@ def over_sectors(count: float, gray: float, *, whole: bool = False) -> Occluder:
     whole : bool
         Whether its sides lie on edges of sectors, instead of anywhere.
     """
-    return partial(_wedge, count, gray, whole)
 
+    def wedge(cell: Cell, generator: np.random.Generator) -> Covered:
+        step = 2 * math.pi / cell.bits
+        position = generator.integers(cell.bits) if whole else generator.uniform(0, cell.bits)
+        start = cell.turn + step * position
+        inner = generator.uniform(1.2, cell.inner - 0.2)
+        outer = generator.uniform(cell.outer + 0.2, 4.6)
+        distance = np.hypot(cell.x, cell.y)
+        sides = np.minimum(_beside(cell, start), -_beside(cell, start + count * step))
+        ends = np.minimum(distance - inner, outer - distance)
+        return _share(np.minimum(sides, ends), cell), gray
 
-def _wedge(
-    count: float, gray: float, whole: bool, cell: Cell, generator: np.random.Generator
-) -> tuple[np.ndarray, float]:
-    step = 2 * math.pi / cell.bits
-    position = generator.integers(cell.bits) if whole else generator.uniform(0, cell.bits)
-    start = cell.turn + step * position
-    inner = generator.uniform(1.2, cell.inner - 0.2)
-    outer = generator.uniform(cell.outer + 0.2, 4.6)
-    distance = np.hypot(cell.x, cell.y)
-    sides = np.minimum(_beside(cell, start), -_beside(cell, start + count * step))
-    ends = np.minimum(distance - inner, outer - distance)
-    return _share(np.minimum(sides, ends), cell), gray
+    return wedge
 
 
 def finger(width: float, gray: float) -> Occluder:
-    """Return a bar with a round end that reaches from outside across the band.
+    """Return a bar, so many dot radii wide, whose round end reaches across the band."""
 
-    Parameters
-    ----------
-    width : float
-        Width of the bar, dot radii.
-    gray : float
-        Its gray value.
-    """
-    return partial(_finger, width, gray)
+    def bar(cell: Cell, generator: np.random.Generator) -> Covered:
+        direction = generator.uniform(0, 2 * math.pi)
+        end = generator.uniform(1.2, cell.inner - 0.2) + width / 2
+        along = cell.x * math.cos(direction) + cell.y * math.sin(direction)
+        across = cell.y * math.cos(direction) - cell.x * math.sin(direction)
+        return _share(width / 2 - np.hypot(np.minimum(along - end, 0), across), cell), gray
 
-
-def _finger(
-    width: float, gray: float, cell: Cell, generator: np.random.Generator
-) -> tuple[np.ndarray, float]:
-    direction = generator.uniform(0, 2 * math.pi)
-    end = generator.uniform(1.2, cell.inner - 0.2) + width / 2
-    along = cell.x * math.cos(direction) + cell.y * math.sin(direction)
-    across = cell.y * math.cos(direction) - cell.x * math.sin(direction)
-    return _share(width / 2 - np.hypot(np.minimum(along - end, 0), across), cell), gray
+    return bar
 
 
 def paper(distance: float, gray: float) -> Occluder:
     """Return a sheet with a straight edge at a distance from the centre, dot radii."""
-    return partial(_paper, distance, gray)
 
+    def sheet(cell: Cell, generator: np.random.Generator) -> Covered:
+        direction = generator.uniform(0, 2 * math.pi)
+        along = cell.x * math.cos(direction) + cell.y * math.sin(direction)
+        return _share(along - distance, cell), gray
 
-def _paper(
-    distance: float, gray: float, cell: Cell, generator: np.random.Generator
-) -> tuple[np.ndarray, float]:
-    direction = generator.uniform(0, 2 * math.pi)
-    along = cell.x * math.cos(direction) + cell.y * math.sin(direction)
-    return _share(along - distance, cell), gray
+    return sheet
 
 
 def disc(radius: float, gray: float) -> Occluder:
     """Return a disc on the middle of the band, of a radius in dot radii."""
-    return partial(_disc, radius, gray)
-
-
-def _disc(
-    radius: float, gray: float, cell: Cell, generator: np.random.Generator
-) -> tuple[np.ndarray, float]:
-    return _share(radius - _from_band(cell, generator), cell), gray
+    return lambda cell, generator: (_share(radius - _from_band(cell, generator), cell), gray)
 
 
 def specks(count: int, widths: tuple[float, float]) -> Occluder:
-    """Return specks of dirt of any gray value, all over the target.
-
-    Parameters
-    ----------
-    count : int
-        Of one target.
-    widths : tuple of 2 float
-        Smallest and largest diameter, dot radii.
-    """
+    """Return so many specks of dirt of any gray value on a target, `widths` in dot radii."""
     return partial(_dirt, _speck, count, widths)
 
 
 def scratches(count: int, widths: tuple[float, float]) -> Occluder:
-    """Return straight scratches of any gray value that go across the target.
-
-    Parameters
-    ----------
-    count : int
-        Of one target.
-    widths : tuple of 2 float
-        Smallest and largest width, dot radii.
-    """
+    """Return so many straight scratches of any gray value across it, `widths` in dot radii."""
     return partial(_dirt, _scratch, count, widths)
 
 
@@ -125,7 +89,7 @@ def _dirt(
     widths: tuple[float, float],
     cell: Cell,
     generator: np.random.Generator,
-) -> tuple[np.ndarray, np.ndarray]:
+) -> Covered:
     covered, gray = np.zeros_like(cell.x), np.full_like(cell.x, WHITE)
     for _ in range(count):
         distance = draw(cell, generator)
@@ -167,26 +131,21 @@ def other_targets(
     directions : sequence of float
         To their centres, rad counter-clockwise.
     """
-    return partial(_other_target, name, iter(zip(numbers, directions, strict=True)), distance)
-
-
-def _other_target(
-    name: str,
-    others: Iterator[tuple[int, float]],
-    distance: float,
-    cell: Cell,
-    generator: np.random.Generator,
-) -> tuple[np.ndarray, np.ndarray]:
     code = family(name)
-    number, direction = next(others)
-    turn = generator.uniform(0, 2 * math.pi)
-    x = cell.x - np.float32(distance * math.cos(direction))
-    y = cell.y - np.float32(distance * math.sin(direction))
-    ink = ring_cover(code, code.word(number), turn, 0.0)(
-        x, y, np.eye(2, dtype=np.float32) * cell.width
-    )
-    gray = WHITE * (1 - (1 - INK) * ink) ** (1 / GAMMA)
-    return _share(_LABEL - np.hypot(x, y), cell), gray
+    others = iter(zip(numbers, directions, strict=True))
+
+    def other(cell: Cell, generator: np.random.Generator) -> Covered:
+        number, direction = next(others)
+        turn = generator.uniform(0, 2 * math.pi)
+        x = cell.x - np.float32(distance * math.cos(direction))
+        y = cell.y - np.float32(distance * math.sin(direction))
+        ink = ring_cover(code, code.word(number), turn, 0.0)(
+            x, y, np.eye(2, dtype=np.float32) * cell.width
+        )
+        gray = WHITE * (1 - (1 - INK) * ink) ** (1 / GAMMA)
+        return _share(_LABEL - np.hypot(x, y), cell), gray
+
+    return other
 
 
 def highlight(radius: float, levels: float) -> Glare:
@@ -199,14 +158,12 @@ def highlight(radius: float, levels: float) -> Glare:
     levels : float
         Gray values that it adds in its middle.
     """
-    return partial(_highlight, radius, levels)
 
+    def added(cell: Cell, generator: np.random.Generator) -> np.ndarray:
+        distance = _from_band(cell, generator)
+        return (levels * np.exp(-0.5 * (distance / radius) ** 2)).astype(np.float32)
 
-def _highlight(
-    radius: float, levels: float, cell: Cell, generator: np.random.Generator
-) -> np.ndarray:
-    distance = _from_band(cell, generator)
-    return (levels * np.exp(-0.5 * (distance / radius) ** 2)).astype(np.float32)
+    return added
 
 
 def _from_band(cell: Cell, generator: np.random.Generator) -> np.ndarray:

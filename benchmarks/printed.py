@@ -7,10 +7,10 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
-import time
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from functools import partial
 from itertools import islice
 from pathlib import Path
 
@@ -19,10 +19,14 @@ import numpy as np
 
 from ahf_ros import FAMILY_NAMES, create_detector
 from ahf_ros.codes.families import KINDS, numbers_of
+from ahf_ros.evaluation import Score, score, total
 from ahf_ros.printing.drawing import Drawing
 from ahf_ros.printing.pdf import pdf_bytes
 from ahf_ros.printing.settings import SheetSettings
-from ahf_ros.printing.sheets import Placed, Sheets
+from ahf_ros.printing.sheets import Sheets
+from ahf_ros.target import TrueTarget
+from benchmarks.report import number, table
+from benchmarks.speed import seconds
 
 SCALE = 8.0
 """Pixels of a rendered page in a millimetre."""
@@ -40,42 +44,13 @@ identified. The radius of the dot is 4 to 12 px (`RADII` in `benchmarks/printed.
 6 % of the light, the blur of the lens is 0.7 px. The error is the largest distance of a centre
 from where it was printed. Bright targets of `metashape20` have dots of 12 px: with dots of 8 px,
 542 of them were left undecoded, none was wrong. The machine was busy.
-
-| family | polarity | printed | right | wrong | largest error, mm | s |
-|---|---|---|---|---|---|---|"""
-"""What the table begins with."""
+"""
+"""What the page begins with."""
 
 _INK, _BLUR = 0.06, 0.7  # reflectance of black, and the blur of the lens, px
 _WHITE, _GAMMA = 220, 2.2  # gray value of white, which is light to the power of 1 / gamma
 _PAGES = 20  # of a document, to bound the memory
-_FAR = 0.5  # mm; what is farther from every printed target is none of them
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What was identified of the targets that were printed.
-
-    Attributes
-    ----------
-    printed, right, wrong : int
-        Targets on the pages, those with the right ID, and reports of anything else.
-    error : float
-        Largest distance of a right one from where it was printed, mm.
-    """
-
-    printed: int = 0
-    right: int = 0
-    wrong: int = 0
-    error: float = 0.0
-
-    def joined(self, other: Outcome) -> Outcome:
-        """Return the outcome of both."""
-        return Outcome(
-            self.printed + other.printed,
-            self.right + other.right,
-            self.wrong + other.wrong,
-            max(self.error, other.error),
-        )
+_FAR = 4.0  # px; what is farther from every printed target is none of them
 
 
 def settings_of(name: str, polarity: str, ids: str = '', page: str = 'A5') -> SheetSettings:
@@ -106,66 +81,54 @@ def images(pages: Iterable[Drawing]) -> Iterator[np.ndarray]:
                 yield np.rint(_WHITE * blurred ** (1 / _GAMMA)).astype(np.uint8)
 
 
-def identified(settings: SheetSettings) -> Outcome:
+def identified(settings: SheetSettings) -> Score:
     """Print targets, render the pages and identify what they show."""
-    sheets = Sheets(settings)
+    sheets, paper = Sheets(settings), settings.paper
     detect = create_detector(family=settings.family, polarity=settings.polarity)
-    outcome = Outcome()
-    targets = list(sheets.targets())
-    for number, image in enumerate(images(sheets.pages()), 1):
-        shown = [target for target in targets if target.page == number]
-        outcome = outcome.joined(_compared(shown, detect(image), image.shape, settings))
-    return outcome
+    targets, scores = list(sheets.targets()), []
+    for page, image in enumerate(images(sheets.pages()), 1):
+        down, across = image.shape[0] / paper.height, image.shape[1] / paper.width
+        truth = [
+            TrueTarget(it.id, it.x * across - 0.5, (paper.height - it.y) * down - 0.5)
+            for it in targets
+            if it.page == page
+        ]
+        scores.append(score(truth, detect(image), tolerance=_FAR))
+    return total(scores)
 
 
-def _compared(
-    printed: list[Placed], found: list, shape: tuple[int, int], settings: SheetSettings
-) -> Outcome:
-    """Return the outcome of one page."""
-    height, width = shape
-    paper = settings.paper
-    places = {target.id: (target.x, target.y) for target in printed}
-    distances: dict[int, float] = {}
-    wrong = 0
-    for target in found:
-        x = (target.x + 0.5) * paper.width / width
-        y = paper.height - (target.y + 0.5) * paper.height / height
-        distance = float(np.hypot(*np.subtract(places.get(target.id, (np.inf,) * 2), (x, y))))
-        if distance < _FAR and target.id not in distances:
-            distances[target.id] = distance
-        else:
-            wrong += 1
-    return Outcome(len(printed), len(distances), wrong, max(distances.values(), default=0.0))
+def largest_error(figures: Score) -> float:
+    """Return the largest distance of a right target from where it was printed, mm."""
+    return max((math.hypot(*error) / SCALE for error in figures.errors), default=0.0)
 
 
-def main() -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Print a line a family and polarity; return 1 unless every target was identified."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--families', nargs='+', choices=FAMILY_NAMES, default=FAMILY_NAMES)
-    parser.add_argument('--sample', type=int, default=0, help='IDs of each family; 0: all.')
-    parser.add_argument('--output', type=Path, help='File for the table, in Markdown.')
-    options = parser.parse_args()
-    every, lines = Outcome(), [HEAD]
-    print(HEAD)
+    made = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
+    made.add_argument('--families', nargs='+', choices=FAMILY_NAMES, default=FAMILY_NAMES)
+    made.add_argument('--sample', type=int, default=0, help='IDs of each family; 0: all.')
+    made.add_argument('--output', type=Path, help='File for the table, in Markdown.')
+    options = made.parse_args(arguments)
+    scores, rows = [], []
     for name in options.families:
         ids = sample(name, options.sample) if options.sample else ''
         square = name in (*KINDS['aruco'], *KINDS['apriltag'])
         for polarity in ('dark',) if square else ('dark', 'bright'):
-            settings = settings_of(name, polarity, ids)
-            start = time.perf_counter()
-            outcome = identified(settings)
-            seconds = time.perf_counter() - start
-            lines.append(
-                f'| {name} | {polarity} | {outcome.printed} | {outcome.right} | '
-                f'{outcome.wrong} | {outcome.error:.4f} | {seconds:.1f} |'
-            )
-            print(lines[-1], flush=True)
-            every = every.joined(outcome)
-    lines.append(f'\n{every.printed} printed, {every.right} right, {every.wrong} wrong.')
-    print(lines[-1])
+            elapsed, of = seconds(partial(identified, settings_of(name, polarity, ids)))
+            wrong = of.wrong + of.false_positives
+            ends = number(largest_error(of), 4), number(elapsed, 1)
+            rows.append((name, polarity, of.expected, of.right, wrong, *ends))
+            print(*rows[-1], file=sys.stderr)
+            scores.append(of)
+    every = total(scores)
+    wrong = every.wrong + every.false_positives
+    head = ('family', 'polarity', 'printed', 'right', 'wrong', 'largest error, mm', 's')
+    summary = f'{every.expected} printed, {every.right} right, {wrong} wrong.'
+    page = '\n'.join([HEAD, *table(head, rows), '', summary])
+    print(page)
     if options.output:
-        options.output.write_text('\n'.join(lines) + '\n', encoding='utf-8')
-    return int(every.right < every.printed or every.wrong > 0)
+        options.output.write_text(page + '\n', encoding='utf-8')
+    return int(every.right < every.expected or wrong > 0)
 
 
 if __name__ == '__main__':

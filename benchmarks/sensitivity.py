@@ -28,12 +28,11 @@ from itertools import chain, islice
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
-from rich.progress import track
 
 from ahf_ros.synthetic.scene import SceneSettings, render
 from benchmarks.changed_constant import assigned
 from benchmarks.conditions import Scene, disturbed, strange
+from benchmarks.report import progress, table
 
 ROOT = Path(__file__).resolve().parent.parent
 ROOMS = ('ahf_ros.features.', 'ahf_ros.detectors.ring.')
@@ -128,7 +127,7 @@ def rendered(scenes: Sequence[SceneSettings]) -> Iterator[Scene]:
     """Yield scenes under light."""
     for settings in scenes:
         rendering = render(settings)
-        yield Scene('light', rendering.image, rendering.truth, settings.family)
+        yield Scene('light', rendering.image, rendering.targets, settings.family)
 
 
 def screened() -> Iterator[Scene]:
@@ -178,12 +177,10 @@ def measured(
     folder: Path, names: dict[str, float], what: str
 ) -> tuple[Outcome, dict[str, list[Outcome]]]:
     """Return the outcome as it is, and those with each constant halved and doubled."""
-    console = Console(stderr=True)
     changes = [(name, changed(name, names[name], factor)) for name in names for factor in FACTORS]
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         done = pool.map(lambda change: outcome(folder, *change), changes)
-        count = len(changes)
-        found = list(track(done, what, count, console=console, disable=not names))
+        found = list(progress(done, what, len(changes)))
     tried = {
         name: found[start : start + len(FACTORS)]
         for name, start in zip(names, range(0, len(found), len(FACTORS)), strict=True)
@@ -196,14 +193,14 @@ def ranked(tried: dict[str, list[Outcome]]) -> list[str]:
     return sorted(tried, key=lambda name: -max(one.loss() for one in tried[name]))
 
 
-def table(names: dict[str, float], default: Outcome, tried: dict[str, list[Outcome]]) -> str:
+def outcome_table(
+    names: dict[str, float], default: Outcome, tried: dict[str, list[Outcome]]
+) -> str:
     """Return outcomes as Markdown."""
-    lines = ['| constant | value | halved | doubled |', '|---|---|---|---|']
-    lines.append(f'| none changed | | {default} | {default} |')
+    rows = [('none changed', '', default, default)]
     for name, outcomes in tried.items():
-        short = name.removeprefix('ahf_ros.')
-        lines.append(f'| `{short}` | {names[name]:g} | {" | ".join(map(str, outcomes))} |')
-    return '\n'.join(lines)
+        rows.append((f'`{name.removeprefix("ahf_ros.")}`', f'{names[name]:g}', *outcomes))
+    return '\n'.join(table(('constant', 'value', 'halved', 'doubled'), rows))
 
 
 def main() -> None:
@@ -221,14 +218,14 @@ def main() -> None:
         if not names:
             small = written(screened(), Path(folder, 'small'))
             default, tried = measured(small, values, f'{len(values)} constants')
-            print(table(values, default, tried), end='\n\n', file=sys.stderr)
+            print(outcome_table(values, default, tried), end='\n\n', file=sys.stderr)
             names = {name: values[name] for name in ranked(tried)[: 3 * options.count // 2]}
         large = written(rendered(LARGE), Path(folder, 'large'))
         default, tried = measured(large, names, 'the table')
         total = sum(settings.targets for settings in LARGE)
         print(f'Targets with the right ID, of {total}, and the RMSE of their centres in px.\n')
         shown = ranked(tried)[: options.count]
-        print(table(names, default, {name: tried[name] for name in shown}))
+        print(outcome_table(names, default, {name: tried[name] for name in shown}))
 
 
 if __name__ == '__main__':

@@ -7,8 +7,9 @@ pixels and blurred alike by the lens. Glare is added before the sensor saturates
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -18,6 +19,9 @@ from ahf_ros.codes.square import dictionary
 from ahf_ros.synthetic.covers import Cover, ring_cover, square_cover
 from ahf_ros.target import TrueTarget
 from benchmarks.exposure import GAMMA, INK, WHITE, Cell, Exposure
+
+Ink = Callable[[float], Cover]
+"""The ink of a mark that is turned by an angle, rad."""
 
 COLUMNS, ROWS = 9, 6
 """Cells of a whole sheet."""
@@ -53,7 +57,7 @@ class Mark:
     y: float
     plane: np.ndarray
     turn: float
-    ink: np.ndarray
+    ink: np.ndarray = field(default_factory=lambda: np.empty((0, 0), np.uint8))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,31 +67,35 @@ class Sheet:
     Attributes
     ----------
     name : str
-        Family of the targets.
+        Family of the targets; '' where the marks are none.
+    seed : int
+        Of places, sizes, directions and of what happens to the sheet.
     radius : float
         Usual radius of the dots, px.
     columns : int
         Of the grid, which is filled row by row.
-    marks : tuple of Mark
-    seed : int
+    spread : float
+        Largest deviation of a radius, as a share of it.
     bright : bool
         Whether ink and paper have changed places.
     cell : float
         Half of the side of a cell, dot radii.
+    marks : tuple of Mark
     """
 
     name: str
-    radius: float
-    columns: int
-    marks: tuple[Mark, ...]
     seed: int
+    radius: float = 12.0
+    columns: int = COLUMNS
+    spread: float = 0.1
     bright: bool = False
     cell: float = CELL
-    _side: int = field(init=False)
+    marks: tuple[Mark, ...] = ()
 
-    def __post_init__(self) -> None:
-        """Round the cells to whole pixels."""
-        object.__setattr__(self, '_side', cell_pixels(self.radius, self.cell))
+    @property
+    def side(self) -> int:
+        """Side of a cell, px."""
+        return cell_pixels(self.radius, self.cell)
 
     @property
     def truth(self) -> list[TrueTarget]:
@@ -98,15 +106,35 @@ class Sheet:
         """Return an image of the sheet, ndarray of uint8; the same exposure gives the same one."""
         generator = np.random.default_rng([self.seed, 1])
         rows = -(-len(self.marks) // self.columns)
-        shape = rows * self._side, self.columns * self._side
+        side = self.side
+        shape = rows * side, self.columns * side
         share, glare = np.zeros(shape, np.float32), np.zeros(shape, np.float32)
         share[:] = 1.0 if not self.bright else INK
         for index, mark in enumerate(self.marks):
             row, column = divmod(index, self.columns)
-            top, left = row * self._side, column * self._side
-            cell = slice(top, top + self._side), slice(left, left + self._side)
+            top, left = row * side, column * side
+            cell = slice(top, top + side), slice(left, left + side)
             share[cell], glare[cell] = self._cell(mark, (left, top), exposure, generator)
         return exposure.photograph(share, glare, generator)
+
+    def drawn(self, inks: Iterable[tuple[int, Ink]]) -> Sheet:
+        """Return the sheet with marks, each given by its number and its ink."""
+        generator = np.random.default_rng([self.seed, 0])
+        side, marks = self.side, []
+        for index, (number, ink) in enumerate(inks):
+            row, column = divmod(index, self.columns)
+            middle = np.array([column + 0.5, row + 0.5]) * side - 0.5
+            x, y = (middle + generator.uniform(-0.5, 0.5, 2)).tolist()
+            radius = self.radius * (1 + self.spread * generator.uniform(-1, 1))
+            plane = _random_plane(radius, generator)
+            turn = generator.uniform(0, 2 * math.pi)
+            mark = Mark(number, x, y, plane, turn)
+            places = _plane_samples(mark, (column * side, row * side), side)
+            jacobian = np.linalg.inv(plane) / _SAMPLES * 1.5
+            share = ink(turn)(*places, jacobian.astype(np.float32))
+            samples = np.rint(np.clip(share, 0, 1) * 255).astype(np.uint8)
+            marks.append(replace(mark, ink=samples))
+        return replace(self, marks=tuple(marks))
 
     def _cell(
         self,
@@ -118,7 +146,7 @@ class Sheet:
         """Return the reflectance of a cell and the gray values of the glare on it."""
         ink = mark.ink.astype(np.float32) / np.float32(255)
         share = INK + (1 - INK) * ink if self.bright else 1 - (1 - INK) * ink
-        glare = np.zeros((self._side, self._side), np.float32)
+        glare = np.zeros((self.side, self.side), np.float32)
         if exposure.occluder or exposure.glare:
             cell = self._samples(mark, corner)
             if exposure.occluder:
@@ -127,11 +155,11 @@ class Sheet:
             if exposure.glare:
                 added = exposure.glare(cell, generator)
                 glare = cv2.resize(added, glare.shape, interpolation=cv2.INTER_AREA)
-        size = (self._side, self._side)
+        size = (self.side, self.side)
         return cv2.resize(share, size, interpolation=cv2.INTER_AREA), glare
 
     def _samples(self, mark: Mark, corner: tuple[int, int]) -> Cell:
-        x, y = _plane_samples(mark, corner, self._side)
+        x, y = _plane_samples(mark, corner, self.side)
         bits, inner, outer = 12, 2.25, 3.5
         if self.name in FAMILY_NAMES:
             code = family(self.name)
@@ -146,15 +174,7 @@ def cell_pixels(radius: float, cell: float = CELL) -> int:
 
 
 def target_sheet(
-    name: str,
-    numbers: np.ndarray,
-    seed: int,
-    *,
-    radius: float = 12.0,
-    columns: int = COLUMNS,
-    spread: float = 0.1,
-    bright: bool = False,
-    cell: float = CELL,
+    name: str, numbers: np.ndarray | Sequence[int], seed: int, **layout: Any
 ) -> Sheet:
     """Return a sheet of targets.
 
@@ -162,39 +182,26 @@ def target_sheet(
     ----------
     name : str
         Family of ring codes, or of square markers.
-    numbers : ndarray of int
+    numbers : ndarray or sequence of int
         IDs.
     seed : int
-        Of places, sizes, directions and of what happens to the sheet.
-    radius : float
-        Of the dots, px.
-    columns : int
-        Of the grid.
-    spread : float
-        Largest deviation of a radius, as a share of it.
-    bright : bool
-        Whether ink and paper change places.
-    cell : float
-        Half of the side of a cell, dot radii.
+    **layout
+        Other fields of `Sheet`.
     """
-    ring = name in FAMILY_NAMES
 
-    def cover(number: int, turn: float) -> Cover:
-        if ring:
+    def ink(number: int) -> Ink:
+        if name in FAMILY_NAMES:
             code = family(name)
-            return ring_cover(code, code.word(number), turn, _PINHOLE)
-        return square_cover(name, number, _SQUARE, turn)
+            return lambda turn: ring_cover(code, code.word(number), turn, _PINHOLE)
+        return lambda turn: square_cover(name, number, _SQUARE, turn)
 
-    drawn = [(int(number), cover) for number in numbers]
-    return _drawn_sheet(name, drawn, seed, radius, columns, spread, bright, cell)
+    every = map(int, numbers)
+    return Sheet(name, seed, **layout).drawn((number, ink(number)) for number in every)
 
 
-def mark_sheet(
-    covers: list[Callable[[float], Cover]], seed: int, *, radius: float = 12.0
-) -> Sheet:
-    """Return a sheet of marks that are no targets, each given by its ink at a turn, rad."""
-    drawn = [(0, lambda _, turn, ink=ink: ink(turn)) for ink in covers]
-    return _drawn_sheet('', drawn, seed, radius, COLUMNS, 0.1, False, CELL)
+def mark_sheet(inks: Iterable[Ink], seed: int, *, radius: float = 12.0) -> Sheet:
+    """Return a sheet of marks that are no targets."""
+    return Sheet('', seed, radius=radius).drawn((0, ink) for ink in inks)
 
 
 def random_numbers(
@@ -216,34 +223,6 @@ def random_numbers(
     return [
         generator.permutation(every)[: min(size, count - start)] for start in range(0, count, size)
     ]
-
-
-def _drawn_sheet(
-    name: str,
-    drawn: list[tuple[int, Callable[[int, float], Cover]]],
-    seed: int,
-    radius: float,
-    columns: int,
-    spread: float,
-    bright: bool,
-    cell: float,
-) -> Sheet:
-    generator = np.random.default_rng([seed, 0])
-    side = cell_pixels(radius, cell)
-    marks = []
-    for index, (number, cover) in enumerate(drawn):
-        row, column = divmod(index, columns)
-        middle = np.array([column + 0.5, row + 0.5]) * side - 0.5
-        x, y = (middle + generator.uniform(-0.5, 0.5, 2)).tolist()
-        plane = _random_plane(radius * (1 + spread * generator.uniform(-1, 1)), generator)
-        turn = generator.uniform(0, 2 * math.pi)
-        mark = Mark(number, x, y, plane, turn, np.empty((0, 0), np.uint8))
-        places = _plane_samples(mark, (column * side, row * side), side)
-        jacobian = np.linalg.inv(plane) / _SAMPLES * 1.5
-        ink = cover(number, turn)(*places, jacobian.astype(np.float32))
-        ink = np.rint(np.clip(ink, 0, 1) * 255).astype(np.uint8)
-        marks.append(Mark(number, x, y, plane, turn, ink))
-    return Sheet(name, radius, columns, tuple(marks), seed, bright, cell)
 
 
 def _random_plane(radius: float, generator: np.random.Generator) -> np.ndarray:

@@ -9,19 +9,14 @@ where the target is not identified. No limits of size are set. Seeds from 101 on
 
 from __future__ import annotations
 
-import argparse
 import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from rich.console import Console
-from rich.progress import track
-
 from ahf_ros.detectors import create_detector
 from ahf_ros.evaluation import RIGHT, judge, score
-from benchmarks.filter import machine
-from benchmarks.identification import FIRST_TEST_SEED
-from benchmarks.output import add_output, publish
+from benchmarks import report
+from benchmarks.report import FIRST_TEST_SEED, number
 from support.collage import collage
 
 RADII = {
@@ -43,7 +38,7 @@ TILTS = (0.0, 40.0)
 def measure(families: Sequence[str], lights: Sequence[str], seed: int) -> Iterator[dict[str, Any]]:
     """Render and identify an image of each family, light and tilt; yield its row."""
     cells = [(family, light, tilt) for family in families for light in lights for tilt in TILTS]
-    for family, light, tilt in track(cells, 'images', console=Console(stderr=True)):
+    for family, light, tilt in report.progress(cells, 'images'):
         shown = collage(
             RADII[family], family, light=light, ambient=LIGHTS[light], tilt=tilt, seed=seed
         )
@@ -69,53 +64,30 @@ def measure(families: Sequence[str], lights: Sequence[str], seed: int) -> Iterat
         }
 
 
-def markdown(report: dict[str, Any]) -> str:
-    """Return the report as a table."""
-    facts = report['machine']
-    radii = sorted({float(radius) for row in report['rows'] for radius in row['errors']})
+def markdown(figures: report.Report) -> str:
+    """Return the report as a table: a dash where a target is missed, nothing where none is."""
+    radii = sorted({float(radius) for row in figures['rows'] for radius in row['errors']})
     columns = [f'{radius:g}' for radius in radii]
-    kind = 'Test' if report['test'] else 'Development'
-    lines = [
-        f'{kind} seed: {report["seed"]}. {facts["processor"]}, {facts["cores"]} cores, Python '
-        f'{facts["python"]}, numpy {facts["numpy"]}, OpenCV {facts["opencv"]}.',
-        '',
-        f'| family, px | light | MP | {" | ".join(columns)} | wrong | false |',
-        '|---' * (len(columns) + 5) + '|',
-    ]
-    for row in report['rows']:
-        cells = [_cell(row['errors'], radius) for radius in columns]
-        ends = (row['wrong'], row['false_positives'])
-        start = (row['family'], row['light'], f'{row["megapixels"]:.0f}')
-        lines.append(f'| {" | ".join(map(str, (*start, *cells, *ends)))} |')
-    return '\n'.join(lines)
+    rows = []
+    for row in figures['rows']:
+        errors = row['errors']
+        cells = [number(errors[radius], 3) if radius in errors else '' for radius in columns]
+        start = (row['family'], row['light'], number(row['megapixels'], 0))
+        rows.append((*start, *cells, row['wrong'], row['false_positives']))
+    head = ('family, px', 'light', 'MP', *columns, 'wrong', 'false')
+    return '\n'.join([report.about_text(figures), '', *report.table(head, rows)])
 
 
-def _cell(errors: dict[str, float | None], radius: str) -> str:
-    """Return the error of a target, a dash where it is missed, nothing where there is none."""
-    if radius not in errors:
-        return ''
-    error = errors[radius]
-    return '-' if error is None else f'{error:.3f}'
-
-
-def main() -> None:
+def main(arguments: Sequence[str] | None = None) -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(
-        description=__doc__.split('\n\n')[0],
-        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
-    )
-    parser.add_argument('--families', nargs='+', choices=tuple(RADII), default=tuple(RADII))
-    parser.add_argument('--lights', nargs='+', choices=tuple(LIGHTS), default=tuple(LIGHTS))
-    parser.add_argument('--seed', type=int, default=FIRST_TEST_SEED)
-    add_output(parser)
-    options = parser.parse_args()
-    report: dict[str, Any] = {
-        'seed': options.seed,
-        'test': options.seed >= FIRST_TEST_SEED,
-        'machine': machine(),
-        'rows': list(measure(options.families, options.lights, options.seed)),
-    }
-    publish(report, markdown(report), options.output)
+    made = report.parser(__doc__, seeds=False)
+    made.add_argument('--families', nargs='+', choices=tuple(RADII), default=tuple(RADII))
+    made.add_argument('--lights', nargs='+', choices=tuple(LIGHTS), default=tuple(LIGHTS))
+    made.add_argument('--seed', type=int, default=FIRST_TEST_SEED)
+    options = made.parse_args(arguments)
+    figures = report.about([options.seed])
+    figures['rows'] = list(measure(options.families, options.lights, options.seed))
+    report.publish(figures, markdown(figures), options)
 
 
 if __name__ == '__main__':

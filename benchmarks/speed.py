@@ -4,6 +4,7 @@ The published algorithm is that of the paper: every filter by numpy's Fourier tr
 precision, one chromosome after the other, a generation of 50 before it looks whether to stop
 (Table 1). Both drive the same detector on the same image.
 
+- One filter, against the recipe, Eq. (1) to (7) as they stand; the tests compare what they give.
 - One candidate: a filter and an identification through it; ours with all threads at work.
 - The whole of AHF, from the image to its targets.
 - A stream: an image under unchanged light, against one filter and one identification.
@@ -17,9 +18,10 @@ import argparse
 import os
 import statistics
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -29,20 +31,70 @@ from ahf_ros.filtering.genes import genes_of
 from ahf_ros.filtering.genetic import search
 from ahf_ros.filtering.homomorphic import HomomorphicFilter
 from ahf_ros.filtering.settings import PUBLISHED, FilterSettings, GeneticSettings, TuningSettings
+from ahf_ros.filtering.transfer import median_distance
+from ahf_ros.imaging.logarithm import mapping
 from ahf_ros.session import create_identifier, identify
 from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import count_codes
-from benchmarks.filter import Recipe, machine
+from benchmarks.report import machine, machine_text, table
+from support.fourier import distances, sampled
 
 ROUNDS = 7
 FRAMES = 6
+PAPER_GAINS = (2.8, 0.82)
+"""Of a filter that the paper reports."""
 
 
-def seconds(work: Callable[[], Any]) -> tuple[float, Any]:
+class Recipe:
+    """The published filter, as one writes it down in numpy."""
+
+    def __init__(self, shape: tuple[int, int], settings: FilterSettings) -> None:
+        self.distances = distances(*shape)
+        self.median = median_distance(*shape)
+        self.settings = settings
+
+    def __call__(self, image: np.ndarray, gamma_high: float, gamma_low: float) -> np.ndarray:
+        """Return the filtered image, 8 bit."""
+        spectrum = np.fft.fft2(np.log(image / 255 + self.settings.log_offset))
+        difference = gamma_high - gamma_low
+        attenuated = np.exp(-difference * (self.distances / self.median) ** 2)
+        response = difference * (1 - attenuated) + gamma_low
+        values = np.fft.ifft2(response * spectrum).real
+        scale, zero = mapping(
+            sampled(values), self.settings.black_percentile, self.settings.white_percentile
+        )
+        return np.clip(np.rint(np.exp(values + scale) - zero), 0, 255).astype(np.uint8)
+
+
+def seconds(
+    work: Callable[[], Any], clock: Callable[[], float] = time.perf_counter
+) -> tuple[float, Any]:
     """Return the time that `work` takes, s, and its result."""
-    started = time.perf_counter()
+    started = clock()
     result = work()
-    return time.perf_counter() - started, result
+    return clock() - started, result
+
+
+def in_turns(
+    works: Sequence[Callable[[], Any]],
+    rounds: int = ROUNDS,
+    clock: Callable[[], float] = time.perf_counter,
+) -> tuple[float, ...]:
+    """Return the median time of each work, s; in turns, so that all meet the same machine."""
+    times = [[seconds(work, clock)[0] for work in works] for _ in range(rounds)]
+    return tuple(statistics.median(column) for column in zip(*times, strict=True))
+
+
+def filters(image: np.ndarray, recipe: Recipe) -> tuple[float, ...]:
+    """Return the time of one filter, s: published, ours in one thread and in all threads."""
+    prepared, gains = HomomorphicFilter(image), PAPER_GAINS
+    with ThreadPoolExecutor(os.cpu_count()) as executor:
+        ways = (
+            partial(recipe, image, *gains),
+            partial(prepared.filtered, *gains),
+            partial(prepared.filtered, *gains, executor=executor),
+        )
+        return in_turns(ways)
 
 
 def published(recipe: Recipe, image: np.ndarray, detector: Any, expected: int) -> tuple[int, int]:
@@ -70,41 +122,34 @@ def candidates(image: np.ndarray, detector: Any, recipe: Recipe) -> tuple[float,
     generator = np.random.default_rng(0)
     low, high = generator.uniform(0, 1, 4 * threads), generator.uniform(1, 4, 4 * threads)
     gains = list(zip(high.tolist(), low.tolist(), strict=True))
-    times: list[tuple[float, float]] = []
+    chosen = cycle(gains)
     with ThreadPoolExecutor(threads) as executor:
-        for turn in range(ROUNDS):
-            chosen = gains[turn % len(gains)]
-            theirs, _ = seconds(lambda chosen=chosen: detector(recipe(image, *chosen)))
-            ours, _ = seconds(
-                lambda: list(executor.map(lambda it: draft(prepared.filtered(*it)), gains))
+        theirs, ours = in_turns(
+            (
+                lambda: detector(recipe(image, *next(chosen))),
+                lambda: list(executor.map(lambda it: draft(prepared.filtered(*it)), gains)),
             )
-            times.append((theirs, ours / len(gains)))
-    theirs, ours = (statistics.median(column) for column in zip(*times, strict=True))
-    return theirs, ours
+        )
+    return theirs, ours / len(gains)
 
 
 def stream(image: np.ndarray, detector: Any, expected: int) -> tuple[float, float]:
     """Return the median time of an image of a stream, and of its filter and identification, s."""
     identifier = create_identifier(detector=detector, expected_targets=expected)
     state = identifier.identify(image).filter
-    times = []
+    values = state.gamma_high, state.gamma_low, state.cutoff, state.attenuation
+
+    def unchanged() -> None:
+        assert identifier.identify(image).filter.evaluations == 1
+
     with ThreadPoolExecutor(os.cpu_count()) as executor:
-        for _ in range(FRAMES):
-            whole, result = seconds(lambda: identifier.identify(image))
-            assert result.filter.evaluations == 1
-            parts, _ = seconds(
-                lambda: detector(
-                    HomomorphicFilter(image).filtered(
-                        state.gamma_high,
-                        state.gamma_low,
-                        state.cutoff,
-                        state.attenuation,
-                        executor,
-                    )
-                )
-            )
-            times.append((whole, parts))
-    whole, parts = (statistics.median(column) for column in zip(*times, strict=True))
+        whole, parts = in_turns(
+            (
+                unchanged,
+                lambda: detector(HomomorphicFilter(image).filtered(*values, executor)),
+            ),
+            FRAMES,
+        )
     return whole, parts
 
 
@@ -118,18 +163,19 @@ def main() -> None:
     scene = SceneSettings(light=options.light, ambient=options.ambient, seed=options.seed)
     image, expected = render(scene).image, scene.targets
     detector, recipe = create_detector('traditional'), Recipe(image.shape, FilterSettings())
-    theirs, ours = candidates(image, detector, recipe)
-    facts = machine()
     print(
         f'{scene.light} {scene.ambient:g}, {scene.width} x {scene.height} px, {expected} targets; '
-        f'{facts["processor"]}, {facts["cores"]} cores, numpy {facts["numpy"]}, '
-        f'OpenCV {facts["opencv"]}\n'
+        f'{machine_text(machine())}\n'
     )
-    print('| | s | compared with | s | times faster |\n|---|---|---|---|---|')
+    print('\n'.join(table(('', 's', 'compared with', 's', 'times faster'), [])))
 
     def row(name: str, own: float, other: str, others: float) -> None:
         print(f'| {name} | {own:.3f} | {other} | {others:.3f} | {others / own:.1f} |', flush=True)
 
+    theirs, alone, shared = filters(image, recipe)
+    row('one filter, in one thread', alone, 'published', theirs)
+    row('one filter, in all threads', shared, 'published', theirs)
+    theirs, ours = candidates(image, detector, recipe)
     row('one candidate, traditional', ours, 'published', theirs)
     duration, (count, evaluations) = seconds(lambda: published(recipe, image, detector, expected))
     other = f'published, traditional: {count} in {evaluations} identifications'

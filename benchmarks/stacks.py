@@ -18,8 +18,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from rich.console import Console
-from rich.progress import track
 
 from ahf_ros.session import create_identifier
 from ahf_ros.session_settings import StackSettings
@@ -27,9 +25,9 @@ from ahf_ros.stream import identify_parts
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
 from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import Identification
-from benchmarks.filter import machine
-from benchmarks.identification import FIRST_TEST_SEED, Row, are_tests
-from benchmarks.output import add_output, publish
+from benchmarks import report
+from benchmarks.report import number
+from benchmarks.rows import Row
 
 LIGHTS = ('stripe', 'fine_stripe', 'lattice', 'dense_lattice')
 COLUMNS = ('first image', 'stack', 'normal light')
@@ -39,7 +37,7 @@ AMBIENT = 0.02
 def measure(options: argparse.Namespace) -> Iterator[dict[str, Any]]:
     """Yield the figures of each size and light: of one image, of the stack, in normal light."""
     cells = [(radius, light) for radius in options.radii for light in options.lights]
-    for radius, light in track(cells, 'scenes', console=Console(stderr=True)):
+    for radius, light in report.progress(cells, 'scenes'):
         rows = {column: Row(f'radius {radius:g}', light) for column in COLUMNS}
         chosen: Counter[str] = Counter()
         parts = 0
@@ -77,85 +75,44 @@ def identified(images: list[np.ndarray], expected: int) -> tuple[list[Identifica
     return found, time.perf_counter() - started
 
 
-def markdown(report: dict[str, Any]) -> str:
+def markdown(figures: report.Report) -> str:
     """Return the report as a table."""
-    facts = report['machine']
-    kind = 'Test' if report['test'] else 'Development'
-    seeds = ', '.join(map(str, report['seeds']))
-    head = (
-        'radius',
-        'light',
-        *COLUMNS,
-        'parts',
-        'RMSE px',
-        'in normal light',
-        'NEES',
-        's',
-        'combination',
-    )
-    lines = [
-        f'{report["phases"]} phases, ambient light {AMBIENT:g}, {report["targets"]} targets an '
-        f'image; right / wrong / false. {kind} seeds: {seeds}. {facts["processor"]}, Python '
-        f'{facts["python"]}, numpy {facts["numpy"]}, OpenCV {facts["opencv"]}.',
-        '',
-        f'| {" | ".join(head)} |',
-        '|---' * len(head) + '|',
-    ]
-    for row in report['rows']:
+    numbers = ('RMSE px', 'in normal light', 'NEES', 's')
+    head = ('radius', 'light', *COLUMNS, 'parts', *numbers, 'combination')
+    rows = []
+    for row in figures['rows']:
         counts = [
             f'{of["right"]} / {of["wrong"]} / {of["false_positives"]}'
             for of in (row[column] for column in COLUMNS)
         ]
         stack, normal = row['stack'], row['normal light']
-        numbers = [
-            '-' if value is None else f'{value:.{digits}f}'
-            for value, digits in (
-                (stack['rmse_xy'], 4),
-                (normal['rmse_xy'], 4),
-                (stack['nees'], 1),
-                (stack['seconds'], 1),
-            )
-        ]
+        errors = number(stack['rmse_xy'], 4), number(normal['rmse_xy'], 4)
+        others = number(stack['nees'], 1), number(stack['seconds'], 1)
         names = ', '.join(sorted(row['combinations']))
-        cells = (f'{row["radius"]:g}', row['light'], *counts, str(row['parts']), *numbers, names)
-        lines.append(f'| {" | ".join(cells)} |')
+        start = (f'{row["radius"]:g}', row['light'])
+        rows.append((*start, *counts, row['parts'], *errors, *others, names))
+    lines = [
+        f'{figures["phases"]} phases, ambient light {AMBIENT:g}, {figures["targets"]} targets an '
+        f'image; right / wrong / false. {report.about_text(figures)}',
+        '',
+        *report.table(head, rows),
+    ]
     return '\n'.join(lines)
-
-
-def parser() -> argparse.ArgumentParser:
-    """Return what can be chosen."""
-    made = argparse.ArgumentParser(
-        description=__doc__.split('\n\n')[0],
-        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
-    )
-    made.add_argument('--lights', nargs='+', choices=LIGHT_NAMES, default=LIGHTS)
-    made.add_argument('--radii', nargs='+', type=float, default=[6.0, 20.0])
-    made.add_argument('--phases', type=int, default=4)
-    made.add_argument('--targets', type=int, default=SceneSettings().targets)
-    made.add_argument('--width', type=int, default=SceneSettings().width)
-    made.add_argument('--height', type=int, default=SceneSettings().height)
-    made.add_argument('--seeds', nargs='+', type=int, default=[FIRST_TEST_SEED])
-    add_output(made)
-    return made
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Measure and print."""
-    options = parser().parse_args(arguments)
-    try:
-        test = are_tests(options.seeds)
-    except ValueError as error:
-        print(error, file=sys.stderr)
-        return 2
-    report: dict[str, Any] = {
-        'seeds': options.seeds,
-        'test': test,
-        'phases': options.phases,
-        'targets': options.targets,
-        'machine': machine(),
-        'rows': list(measure(options)),
-    }
-    publish(report, markdown(report), options.output)
+    made, usual = report.parser(__doc__), SceneSettings()
+    made.add_argument('--lights', nargs='+', choices=LIGHT_NAMES, default=LIGHTS)
+    made.add_argument('--radii', nargs='+', type=float, default=[6.0, 20.0])
+    made.add_argument('--phases', type=int, default=4)
+    made.add_argument('--targets', type=int, default=usual.targets)
+    made.add_argument('--width', type=int, default=usual.width)
+    made.add_argument('--height', type=int, default=usual.height)
+    options = report.parsed(made, arguments)
+    figures = report.about(options.seeds, phases=options.phases, targets=options.targets)
+    figures['rows'] = list(measure(options))
+    report.publish(figures, markdown(figures), options)
     return 0
 
 

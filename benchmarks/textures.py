@@ -32,6 +32,22 @@ def lookalikes(seed: int) -> np.ndarray:
     return _photograph(_rings(generator), generator)
 
 
+def dot_grid(seed: int) -> np.ndarray:
+    """Return an image of a regular grid of 2,000 dots, slightly turned and foreshortened."""
+    generator = np.random.default_rng(seed)
+    width, height = 3984, 2656
+    image = np.full((height, width), 215, np.uint8)
+    turn = np.sin(np.deg2rad(generator.uniform(0, 5)))
+    for column in range(50):
+        for row in range(40):
+            x, y = 300 + 64 * column, 100 + 60 * row
+            centre = (x - 0.3 * turn * y, y + 0.02 * turn * x)
+            place = tuple(round(16 * float(value)) for value in centre)
+            cv2.circle(image, place, 16 * 8, 40, -1, cv2.LINE_AA, shift=4)
+    noise = generator.normal(0, 2, image.shape)
+    return np.clip(cv2.GaussianBlur(image, (0, 0), 0.8) + noise, 0, 255).astype(np.uint8)
+
+
 def _photograph(texture: np.ndarray, generator: np.random.Generator) -> np.ndarray:
     reflectance = _seen(texture, generator)
     image = 225 / 255 * np.maximum(reflectance, 10) * _light(generator)

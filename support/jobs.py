@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import time
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +21,3 @@ def do_as_told(task: Any, report: Report) -> Any:
         raise ValueError(f'{value} is not accepted')
     report(f'{what} {value}')
     return value**2 if what == 'square' else os.getpid()
-
-
-def sleep(seconds: float, _: Report) -> None:
-    time.sleep(seconds)

@@ -13,11 +13,11 @@ from support import live, vector_units
 with suppress(ModuleNotFoundError):
     from hypothesis import HealthCheck, settings
 
-    # Neither the speed of a machine nor chance decides: `benchmarks.attack` draws other examples.
-    slow = [HealthCheck.too_slow]
-    settings.register_profile(
-        'same', deadline=None, derandomize=True, database=None, suppress_health_check=slow
-    )
+    # Neither the speed of a machine nor chance decides, unless `--hypothesis-profile attack` asks
+    # for many other examples.
+    free = settings(deadline=None, database=None, suppress_health_check=[HealthCheck.too_slow])
+    settings.register_profile('same', free, derandomize=True)
+    settings.register_profile('attack', free, max_examples=10_000)
     settings.load_profile('same')
 
 

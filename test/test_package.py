@@ -61,7 +61,7 @@ NOT_IN_ROSDEP = {
 of other software."""
 
 TO_RUN, TO_TEST = ('depend', 'exec_depend'), ('depend', 'exec_depend', 'test_depend')
-OWN = {'ahf_ros', 'benchmarks', 'paper_plots', 'support'}
+OWN = {'ahf_ros', 'benchmarks', 'support'}
 
 needs_rosbags = pytest.mark.skipif(
     not importlib.util.find_spec('rosbags'), reason='rosbags is not installed'

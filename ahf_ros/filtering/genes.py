@@ -1,8 +1,8 @@
 """Search space of the filter.
 
 The published search [1]_ tunes the two gains; Eq. (8) gives the attenuation and the median of D
-the cut-off. The extended search, which finds more with the same number of filters
-(`benchmarks/strategies.py`), also tunes
+the cut-off. The extended search, which finds more with the same number of filters, also
+tunes
 
 - the cut-off. Eq. (4) depends on cut-off and attenuation through c / D0^2 only, so one of them is
   enough. A small D0 is a wide blur, which removes slow changes of light.

@@ -2,11 +2,11 @@
 
 It knows nothing of images: it minimises a discrepancy, |N - n| in the paper, down to zero.
 
-Two choices that Table 1 leaves open were made by experiment (`benchmarks/genetic.py`: five
-synthetic objectives shaped like |N - n|, 40 seeds each). The mutation rate of 0.1 applies to each
-bit: applied to each chromosome, where one bit then flips, 37 % of the searches got stuck
-instead of 12 %. A tournament of eight needed 24 to 51 % of the evaluations of a tournament of two,
-and was closer to zero on every objective after 200 evaluations.
+Two choices that Table 1 leaves open were made by experiment (five synthetic objectives shaped like
+|N - n|, 40 seeds each). The mutation rate of 0.1 applies to each bit: applied to each chromosome,
+where one bit then flips, 37 % of the searches got stuck instead of 12 %. A tournament of eight
+needed 24 to 51 % of the evaluations of a tournament of two, and was closer to zero on every
+objective after 200 evaluations.
 
 References
 ----------

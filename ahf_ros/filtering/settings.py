@@ -156,8 +156,7 @@ class AdaptiveSettings:
     """Whether a filter is searched for, and how.
 
     The default of `max_evaluations` bounds the cost of an image where no filter shows all N
-    targets. With the extended genes, 50 filters find what 100 of the published search do
-    (`benchmarks/strategies.py`).
+    targets. With the extended genes, 50 filters find what 100 of the published search do.
 
     Examples
     --------

@@ -7,25 +7,26 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from benchmarks import dot_patterns, gsi
+from benchmarks import gsi
+from benchmarks.rows import measured, rendered
+from benchmarks.textures import dot_grid
 
 SMALL = replace(gsi.LARGE, width=700, height=500, targets=2, dot_radius=6.0)
 
 
 def test_every_row_has_the_figures_of_both_detectors() -> None:
-    cases = [('two targets', gsi.rendered(SMALL))]
-    rows = gsi.measured('views', iter(cases), [1])
-    assert list(rows) == ['gsi', 'gsi_published']
-    for (row,) in rows.values():
+    (by_method,) = measured([rendered('views', 'two targets', SMALL)], [1], gsi.METHODS)
+    assert list(by_method) == ['gsi', 'gsi_published']
+    for row in by_method.values():
         figures = row.record()
         assert (figures['right'], figures['wrong'], figures['false_positives']) == (2, 0, 0)
-    head, rule, line = gsi.markdown(rows).splitlines()
+    head, rule, line = gsi.markdown({name: [row] for name, row in by_method.items()}).splitlines()
     assert head.count('|') == rule.count('|') == line.count('|')
     assert line.startswith('| two targets | 2 of 2 | 0 | 0 | 0.0')
 
 
 def test_tables_have_all_that_the_figures_ask_for() -> None:
-    names = {table: [name for name, _ in cases()] for table, (_, cases) in gsi.TABLES.items()}
+    names = {cases[0].group: [case.name for case in cases] for cases in gsi.TABLES.values()}
     assert {f'{tilt} deg' for tilt in (0, 60, 65, 70, 75, 80)} <= set(names['views'])
     lights = {
         f'{light} {ambient}'
@@ -38,15 +39,8 @@ def test_tables_have_all_that_the_figures_ask_for() -> None:
 
 
 def test_the_grid_has_all_of_its_dots_in_the_image() -> None:
-    image = dot_patterns.dot_grid(5)
-    assert image.shape == dot_patterns.SIZE[::-1]
-    assert np.array_equal(image, dot_patterns.dot_grid(5))
+    image = dot_grid(5)
+    assert image.shape == (2656, 3984)
+    assert np.array_equal(image, dot_grid(5))
     count, _ = cv2.connectedComponents((image < 128).astype(np.uint8))
-    assert count - 1 == dot_patterns.COLUMNS * dot_patterns.ROWS
-
-
-def test_patterns_are_told_with_reports_and_times() -> None:
-    row = {'name': 'lattice', **{it: {'reports': 0, 'seconds': 1.25} for it in ('gsi', 'dots')}}
-    head, rule, line = dot_patterns.table([row]).splitlines()
-    assert head.count('|') == rule.count('|') == line.count('|')
-    assert line == '| lattice | 0 | 1.25 | 0 | 1.25 |'
+    assert count - 1 == 2000

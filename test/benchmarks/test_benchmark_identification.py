@@ -10,6 +10,7 @@ import pytest
 
 from ahf_ros.target import Target, TrueTarget
 from benchmarks import identification
+from benchmarks.rows import normalised_squares
 from support import ROOT
 
 NORMAL = ('--quick', '--lights', 'normal', '--groups', 'light')
@@ -55,12 +56,12 @@ def test_seeds_for_tests_and_for_development_are_kept_apart():
 
 def test_every_row_is_a_scene_that_can_be_made():
     for quick in ([], ['--quick']):
-        rows = identification.chosen_scenes(identification.parser().parse_args(quick))
-        assert len({row[:2] for row in rows}) == len(rows) >= 50
+        rows = identification.chosen_cases(identification.parser().parse_args(quick))
+        assert len({(row.group, row.name) for row in rows}) == len(rows) >= 50
 
 
 def test_squares_are_in_units_of_the_covariance():
     truth = [TrueTarget(1, 100.0, 100.0), TrueTarget(2, 200.0, 100.0)]
     right = Target(1, 71, 100.2, 99.9, 5, 5, covariance=(0.04, 0.0, 0.0, 0.01))
     unknown = Target(2, 75, 200.0, 100.0, 5, 5)
-    assert identification.normalised_squares(truth, [right, unknown]) == pytest.approx([2.0])
+    assert normalised_squares(truth, [right, unknown]) == pytest.approx([2.0])

@@ -25,7 +25,7 @@ def test_every_row_is_a_scene_that_can_be_made(family, setting):
 def test_the_halves_of_an_image_may_be_shifted_in_opposite_directions():
     made = limits.chosen(['--group', 'edge shift', '--targets', '20'])
     both, less = (
-        limits.photograph(made, f'radius 10, {name} px', 'normal', 1).image
+        limits.case(made, f'radius 10, {name} px', 'normal').make(1)[0]
         for name in ('-1 and +1', '-1')
     )
     middle = both.shape[1] // 2
@@ -50,8 +50,3 @@ def test_files_hold_what_is_printed(tmp_path, capsys):
     (row,) = report['rows']
     assert (row['expected'], row['right'] + row['wrong'] <= 4) == (4, True)
     assert limits.markdown(report) + '\n' == printed
-
-
-def test_seeds_for_tests_and_for_development_are_kept_apart(capsys):
-    assert limits.main(['--seeds', '1', '101']) == 2
-    assert 'accepted are all below 101 or none' in capsys.readouterr().err

@@ -15,9 +15,9 @@ from benchmarks.sensitivity import (
     constants,
     main,
     outcome,
+    outcome_table,
     ranked,
     rendered,
-    table,
     written,
 )
 from support import ROOT
@@ -77,11 +77,11 @@ def test_what_costs_most_comes_first() -> None:
 
 
 def test_the_table_shows_what_changed() -> None:
-    lines = table(
+    lines = outcome_table(
         {CERTAIN: 0.98}, Outcome(9, 0, 0, 0.01), {CERTAIN: [Outcome(), Outcome(8, 1, 0)]}
     )
     assert lines.splitlines()[-2:] == [
-        '| none changed | | 9 (0.010) | 9 (0.010) |',
+        '| none changed |  | 9 (0.010) | 9 (0.010) |',
         '| `detectors.ring.confidence.CERTAIN` | 0.98 | fails | 8, 1 wrong |',
     ]
 

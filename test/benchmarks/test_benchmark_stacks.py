@@ -17,8 +17,3 @@ def test_a_stack_is_compared_with_one_image_and_with_normal_light(tmp_path: Path
     assert row['normal light']['right'] == 3
     assert row['first image']['right'] <= 3
     assert (tmp_path / 'stacks.md').read_text().count('3 / 0 / 0') >= 2
-
-
-def test_seeds_for_tests_and_for_development_are_not_mixed(capsys) -> None:
-    assert stacks.main(['--seeds', '1', '101']) == 2
-    assert 'seeds' in capsys.readouterr().err

@@ -1,7 +1,8 @@
-"""Every benchmark starts."""
+"""Every benchmark starts, and every one that is named exists."""
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 
@@ -35,3 +36,15 @@ def test_every_benchmark_tells_how_it_is_used() -> None:
         check=False,
     )
     assert done.returncode == 0, done.stderr
+
+
+def test_documents_and_docstrings_name_benchmarks_that_exist() -> None:
+    folders = ('docs', 'ahf_ros', 'benchmarks', 'scripts', 'test')
+    files = [ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', ROOT / 'CHANGELOG.rst']
+    for folder in folders:
+        files += [it for it in (ROOT / folder).rglob('*') if it.suffix in ('.md', '.py', '.json')]
+    text = ''.join(file.read_text() for file in files)
+    named = set(re.findall(r'\bbenchmarks[./]([a-z_]+)', text))
+    assert len(named) >= 20
+    modules = {file.stem for file in (ROOT / 'benchmarks').glob('*.py')}
+    assert named - modules == set()

@@ -12,9 +12,9 @@ from ahf_ros.detectors.external.guarded import guarded
 from ahf_ros.evaluation import RIGHT, WRONG, judge
 from ahf_ros.target import Target
 from benchmarks import occluders
+from benchmarks.disturbances import far_apart
 from benchmarks.exposure import Exposure
 from benchmarks.sheets import target_sheet
-from benchmarks.traceless import far_apart
 
 FAMILY = family('metashape12')
 IDS = far_apart(FAMILY, 3, 31)

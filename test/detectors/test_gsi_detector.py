@@ -54,7 +54,7 @@ def errors(shown: Rendering, targets: list) -> np.ndarray:
 def test_targets_are_identified_and_placed(changes: dict, bound: float) -> None:
     shown = rendering(**changes)
     found = create_detector(family='gsi', min_radius=2.0)(shown.image)
-    figures = score(shown.truth, found)
+    figures = score(shown.targets, found)
     assert figures.right == len(shown.targets)
     assert figures.wrong == figures.false_positives == 0
     assert np.sqrt((errors(shown, found) ** 2).mean()) < bound
@@ -78,7 +78,7 @@ def test_dots_have_any_radius_and_the_data_file_need_not_say_which(
     own = {'targets': 3, 'dot_radius': pixels, 'family_file': str(path), 'seed': 5}
     shown = render(SceneSettings(**{**SIZE, 'width': 1600, 'height': 1200, **own, **changes}))
     found = create_detector(family='gsi')(shown.image)
-    figures = score(shown.truth, found)
+    figures = score(shown.targets, found)
     assert (figures.right, figures.wrong, figures.false_positives) == (3, 0, 0)
     assert np.hypot(*errors(shown, found).T).max() < 0.15
     sizes = {target.id: target.semi_major for target in shown.targets}
@@ -229,7 +229,7 @@ def test_a_dot_that_was_found_may_be_hidden_and_one_that_was_not_found_may_not()
 def test_targets_in_deep_lattices_are_read() -> None:
     scene = {'width': 1800, 'height': 1200, 'targets': 5, 'dot_radius': 10.0, 'seed': 5}
     shown = rendering(light='lattice', ambient=0.04, **scene)
-    figures = score(shown.truth, create_detector(family='gsi')(shown.image))
+    figures = score(shown.targets, create_detector(family='gsi')(shown.image))
     assert (figures.right, figures.wrong, figures.false_positives) == (5, 0, 0)
 
 
@@ -270,7 +270,7 @@ def test_a_family_of_ones_own_is_printed_and_identified(tmp_path: Path) -> None:
     )
     shown = render(scene)
     found = create_detector(family='gsi', family_file=str(path))(shown.image)
-    figures = score(shown.truth, found)
+    figures = score(shown.targets, found)
     assert (figures.right, figures.wrong, figures.false_positives) == (4, 0, 0)
     assert all(family.number(target.code) == target.id for target in found)
     assert np.hypot(*errors(shown, found).T).max() < 0.05
@@ -334,6 +334,6 @@ def test_paper_in_a_dark_stripe_is_not_taken_for_a_dot() -> None:
     # As wide as a dot, a stripe has the outline of one on most of its circumference.
     shown = rendering(light='stripe', ambient=0.04, dot_radius=10.0, targets=3, width=1300)
     found = create_detector(family='gsi')(shown.image)
-    figures = score(shown.truth, found)
+    figures = score(shown.targets, found)
     assert figures.right >= 2
     assert figures.wrong == figures.false_positives == 0

@@ -58,7 +58,7 @@ def test_too_few_points_are_no_target() -> None:
 def test_even_light_is_enough_for_the_published_method(changes: dict) -> None:
     shown = rendering(**changes)
     found = create_detector('gsi_published', family='gsi')(shown.image)
-    figures = score(shown.truth, found)
+    figures = score(shown.targets, found)
     assert (figures.right, figures.wrong, figures.false_positives) == (4, 0, 0)
     assert figures.rmse and figures.rmse[2] < 0.3
     for target in found:
@@ -73,12 +73,12 @@ def test_a_filter_that_ahf_finds_makes_up_for_uneven_light() -> None:
         light='stripe', ambient=0.12, dot_radius=9.0, targets=1, width=700, height=500
     )
     detector = create_detector('gsi_published', family='gsi')
-    assert score(shown.truth, detector(shown.image)).right == 0
+    assert score(shown.targets, detector(shown.image)).right == 0
     found = identify(
         shown.image, detector=detector, expected_targets=1, population=8, max_evaluations=24
     )
     assert found.filter.applied
-    assert score(shown.truth, found.targets).right == 1
+    assert score(shown.targets, found.targets).right == 1
 
 
 def test_dots_of_no_target_are_reported_on_request() -> None:

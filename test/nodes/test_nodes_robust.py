@@ -10,8 +10,7 @@ from unittest import mock
 
 import numpy as np
 import pytest
-
-from benchmarks import fuzz
+from hypothesis import HealthCheck, given, settings
 
 pytest.importorskip('rclpy', reason='ROS 2 is not installed')
 
@@ -29,6 +28,7 @@ from ahf_ros.nodes.settings import DetectorNodeSettings
 from ahf_ros.settings.nested import flat_parameters
 from ahf_ros.synthetic.scene import SceneSettings, render
 from support import live
+from support.hostile import IMAGES, Fields
 
 SCENE = {'width': 320, 'height': 240, 'targets': 3, 'dot_radius': 9.0}
 ENDLESS = {
@@ -201,9 +201,27 @@ def test_simulated_time_that_has_not_begun_stands_still_or_jumps(
 
 
 def test_any_message_is_answered_or_rejected(graph: Any) -> None:
-    figures = fuzz.through_node(graph, 150)
-    assert figures['answered'] > 5
-    assert figures['answered'] + figures['rejected'] == figures['sent'] >= 150
+    drawn: list[Fields] = []
+
+    @settings(suppress_health_check=list(HealthCheck))
+    @given(IMAGES)
+    def draw(fields: Fields) -> None:
+        drawn.append(fields)
+
+    draw()
+    bench = Bench(graph, 'fuzz', queue='lossless')
+    answers = graph.listen(CodedTargetArray, '/fuzz/coded_targets', len(drawn))
+    image = graph.node.create_publisher(Image, '/fuzz/image', len(drawn))
+    graph.until(image.get_subscription_count)
+    for fields in drawn:
+        image.publish(Image(header=Header(), **fields))
+    graph.until(
+        lambda: int(bench.told('answered')) + int(bench.told('rejected')) == len(drawn) >= 100
+    )
+    graph.until(lambda: len(answers) == int(bench.told('answered')))
+    assert len(answers) > 5
+    status, log = bench.process.end()
+    assert (status, 'Traceback' in log) == (0, False), log
 
 
 def test_parameters_are_those_described_and_take_integers_for_numbers(graph: Any) -> None:
