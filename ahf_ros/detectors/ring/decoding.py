@@ -14,12 +14,12 @@ import numpy as np
 
 from ahf_ros.codes.ring import Family
 from ahf_ros.detectors.ring.codewords import best_words, margins, prior
-from ahf_ros.detectors.ring.likelihood import Evidence
+from ahf_ros.detectors.ring.likelihood import SURPRISES, Evidence
 from ahf_ros.features.array_record import ArrayRecord
 
 _MOST = 5.0  # most that a reading says for or against a word
-_LIKE_PAPER = 6.5  # the same of something that looks like paper
-_IN_LIGHT = 15.0  # times the probability of edges of light, by which that grows
+_LIKE_PAPER = 8.5  # the same of something that looks like paper
+_IN_LIGHT = 15.0  # times the probability of edges of light beyond the least, by which that grows
 _MORE = 0.6  # of each further reading of that
 _COVERED = 0.1  # price of each further reading that something else covers
 _BORDER = 4.8  # price of a border of an arc of any length, at one of about 120 angles
@@ -158,7 +158,7 @@ def _like_paper(of: Evidence) -> np.ndarray:
 
     Where light has many edges, it explains what looks like paper on a mark.
     """
-    return np.float32(_LIKE_PAPER) * (1 + np.float32(_IN_LIGHT) * of.lit)
+    return np.float32(_LIKE_PAPER) * (1 + np.float32(_IN_LIGHT) * (of.lit - SURPRISES[0]))
 
 
 def sectors_by_phase(per_sector: int, family: Family) -> np.ndarray:

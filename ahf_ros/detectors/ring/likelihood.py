@@ -31,11 +31,13 @@ _ANY = 0.22  # density of steps and levels of ln where anything lies
 _PLAIN = 0.35  # share of what lies about any dot that is as flat as ground
 _MARKED = 0.2  # share of what is dark that has marks, from which it is in shadow
 _UNLIKELY = 2.5  # standard deviations, from which a level was not predicted
-_SURPRISES = (0.05, 0.5)  # least and largest probability of light that nothing predicts
 _ACROSS = (0.3, 0.75)  # shares of the gap, between which edges of light show
 _ANGLES = 120  # at which large targets have all the evidence that readings can give
 _MAXIMUM_GROWTH = 0.3  # dot radii
 _RADIUS, _DEPTH = 2.25, 0.2  # of readings, and distance of their depths, dot radii
+
+SURPRISES = (0.05, 0.5)
+"""Least and largest probability of light that nothing predicts."""
 
 HOPEFUL = 0.2
 """Mean log odds of a reading, from which a band is read on."""
@@ -181,7 +183,7 @@ def light_edges(
     near, far = (polar.logs(polar.at(start + part * width)) for part in _ACROSS)
     noise = np.hypot(near[1], far[1])
     many = (np.abs(near[0] - far[0]) > np.hypot(LIGHT_EDGE, 2 * noise)).mean(axis=1)
-    return np.clip(many, *_SURPRISES)
+    return np.clip(many, *SURPRISES)
 
 
 def _step_evidence(
@@ -303,7 +305,7 @@ def _surprise(errors: np.ndarray, width: np.ndarray, which: np.ndarray) -> np.nd
     """Return the probabilities that nothing predicts a level, as ground shows them, (k, 1, 1)."""
     outside = (np.abs(errors) > _UNLIKELY * width) & which
     share = outside.sum(axis=(1, 2)) / np.maximum(which.sum(axis=(1, 2)), 1)
-    return np.clip(share, *_SURPRISES)[:, None, None]
+    return np.clip(share, *SURPRISES)[:, None, None]
 
 
 def _normal(values: np.ndarray, spread: np.ndarray) -> np.ndarray:
