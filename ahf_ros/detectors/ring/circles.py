@@ -8,7 +8,10 @@ from ahf_ros.codes.ring import Family
 from ahf_ros.features.circles import Circles, dot_circles
 
 REACH = 0.45
-"""Distance from an expected edge to look for it, dot radii: less than half a gap."""
+"""Distance from an expected edge to look for it, dot radii: less than half a gap.
+
+Half of it leaves small dots less to measure than they have, twice as much reaches the band.
+"""
 
 _RAYS = 48  # about a dot whose band is fitted with it
 _INNER_PART = 0.4  # of a sector, to either side; next to its ends the blur rounds an arc off

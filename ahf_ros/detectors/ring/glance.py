@@ -20,7 +20,7 @@ from ahf_ros.features.circle_fit import Fit
 _PER_SECTOR, _CIRCLES = 3, 36  # angles of the shortest sectors, and circles
 _PHASES = 4  # of the sectors
 _SHIFTS = (-1.2, 0.0, 1.2)  # of edges, px; readings keep farther away from these than the error
-_COVER = 5.0  # price of a sector that is covered
+_COVER = 5.0  # price of a sector that is covered, less than where words are decoded
 _HOPEFUL = 0.1  # bound of the mean evidence of a reading, from which a band is read
 _CAP = 3.0  # evidence of a reading against bare paper
 
