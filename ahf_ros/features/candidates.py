@@ -136,7 +136,7 @@ def find_candidates(
             continue
         shape = of_level.marked.shape
         if mask is None:
-            mask = mask_of(_reduced(explained, level), shape)
+            mask = mask_of((frame.reduced(outline, level) for outline in explained), shape)
         else:
             mask = cv2.resize(mask, shape[::-1], interpolation=cv2.INTER_NEAREST)
         rest = of_level.unmasked(mask)
@@ -144,15 +144,6 @@ def find_candidates(
             points, polarity = _elected(rest.curved(_LONG * radii[1]), radii, shapes, polarities)
             candidates.append(Candidates(level, points, radii, polarity))
     return candidates
-
-
-def _reduced(
-    outlines: Sequence[np.ndarray] | np.ndarray, level: int
-) -> Sequence[np.ndarray] | np.ndarray:
-    """Return outlines in the pixels of a level, an array of them as an array."""
-    if isinstance(outlines, np.ndarray):
-        return frame.reduced(outlines, level)
-    return [frame.reduced(outline, level) for outline in outlines]
 
 
 def _elected(

@@ -155,10 +155,6 @@ def fit_circles(
         Of the edges, as far as it is known: standard deviation in px.
     covariances : bool
         Whether covariances are needed; they are NaN otherwise.
-
-    Returns
-    -------
-    Fit
     """
     blur = np.full(len(frames), USUAL_BLUR) if blur is None else blur
     window = _window(circles)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import cv2
@@ -74,12 +74,11 @@ class LogEdges:
         return strong & (along * along > np.float32(_STRAIGHT**2) * squares)
 
 
-def mask_of(polygons: Sequence[np.ndarray] | np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+def mask_of(polygons: Iterable[np.ndarray], shape: tuple[int, ...]) -> np.ndarray:
     """Return a mask of shape (height, width) that is not 0 in polygons, each of shape (n, 2)."""
     mask = np.zeros(shape, np.uint8)
-    corners = np.rint(polygons) if isinstance(polygons, np.ndarray) else map(np.rint, polygons)
-    for polygon in corners:
-        cv2.fillPoly(mask, [polygon.astype(np.int32)], 1)
+    for polygon in polygons:
+        cv2.fillPoly(mask, [np.rint(polygon).astype(np.int32)], 1)
     return mask
 
 

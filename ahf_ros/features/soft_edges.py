@@ -35,10 +35,6 @@ def fit_circles_of_any_blur(
     ----------
     gray, frames, circles, reach, projective, rounds
         As for `ahf_ros.features.circle_fit.fit_circles`.
-
-    Returns
-    -------
-    Fit
     """
     fit = fit_circles(gray, frames, circles, reach=reach, projective=projective, rounds=rounds)
     soft = np.flatnonzero((fit.blur > SOFT) & (fit.share >= ENOUGH))

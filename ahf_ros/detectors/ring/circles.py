@@ -8,7 +8,10 @@ from ahf_ros.codes.ring import Family
 from ahf_ros.features.circles import Circles, dot_circles
 
 REACH = 0.45
-"""Distance from an expected edge to look for it, dot radii: less than half a gap."""
+"""Distance from an expected edge to look for it, dot radii: less than half a gap.
+
+Half of it leaves small dots less to measure than they have, twice as much reaches the band.
+"""
 
 RAYS = 48
 """About a dot that is measured; half of them, where it only is looked for."""

@@ -17,6 +17,7 @@ from ahf_ros.detectors.ring.codewords import best_words, margins, prior
 from ahf_ros.detectors.ring.likelihood import SURPRISES, Evidence
 from ahf_ros.features.array_record import ArrayRecord
 
+_COVER = 6.0  # price of something that covers a stretch of the band
 _MOST = 5.0  # most that a reading says for or against a word
 _LIKE_PAPER = 8.5  # the same of something that looks like paper
 _IN_LIGHT = 15.0  # times the probability of edges of light beyond the least, by which that grows
@@ -26,9 +27,6 @@ _BORDER = 4.8  # price of a border of an arc of any length, at one of about 120 
 _RANKED = 1.2  # evidence of a reading that ranks words, which one cover must not settle
 _DRAW = 5.0  # lead of a word that is not expected, which is as good as none
 _NEVER = np.float32(-np.inf)
-
-COVER = 6.0
-"""Price of something that covers a stretch of the band."""
 
 CLEAR = 15.0
 """Log odds of a word against the next ID that leave no doubt of it."""
@@ -245,7 +243,7 @@ def _covered_paths(seen: np.ndarray, of: Evidence) -> np.ndarray:
     for of_angle, as_paper in zip(seen[1:], paper[1:], strict=True):
         before = clear
         clear = np.maximum(np.maximum(clear, covered), like_paper) + of_angle
-        covered = np.maximum(covered, before - np.float32(COVER)) - cost
+        covered = np.maximum(covered, before - np.float32(_COVER)) - cost
         like_paper = np.maximum(like_paper, before - price)
         like_paper += as_paper - np.float32(_MORE) * of.weight[:, None]
     return np.maximum(np.maximum(clear, covered), like_paper)
@@ -275,7 +273,7 @@ def _hidden(seen: np.ndarray, scores: np.ndarray, of: Evidence) -> np.ndarray:
 def _backtracked(seen: np.ndarray, of: Evidence) -> np.ndarray:
     """Return the same for bands of which a part is covered."""
     cost, paper = np.float32(_COVERED) * of.weight, of.paper.T
-    prices = np.stack([0 * cost, np.full_like(cost, COVER), _like_paper(of)])
+    prices = np.stack([0 * cost, np.full_like(cost, _COVER), _like_paper(of)])
     scores = np.full((3, seen.shape[1]), _NEVER)
     scores[0] = seen[0]
     came = np.zeros((len(seen), 3, seen.shape[1]), np.intp)
@@ -304,7 +302,7 @@ def _borders(bits: np.ndarray) -> np.ndarray:
 def _free_paths(evidence: Evidence) -> np.ndarray:
     """Return the evidence for arcs of ink of any length, with their best covers, shape (k,)."""
     cost = np.float32(_COVERED) * evidence.weight
-    border, cover = np.float32(_BORDER), np.float32(COVER)
+    border, cover = np.float32(_BORDER), np.float32(_COVER)
     paper, ink = evidence.paper.T, evidence.ink.T
     white, dark = paper[0], ink[0]
     covered = np.full_like(white, _NEVER)

@@ -14,7 +14,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from ahf_ros.codes.ring import Family
-from ahf_ros.detectors.ring.decoding import COVER
 from ahf_ros.detectors.ring.likelihood import edge_evidence, growth_by
 from ahf_ros.detectors.ring.polar import DOT, MARGIN, PolarImages, polar_images
 from ahf_ros.features.circle_fit import Fit
@@ -22,6 +21,7 @@ from ahf_ros.features.circle_fit import Fit
 _PER_SECTOR, _CIRCLES = 3, 36  # angles of the shortest sectors, and circles
 _PHASES = 4  # of the sectors
 _SHIFTS = (-1.2, 0.0, 1.2)  # of edges, px; readings keep farther away from these than the error
+_COVER = 5.0  # price of a sector that is covered, less than where words are decoded
 _HOPEFUL = 0.1  # bound of the mean evidence of a reading, from which a band is read
 _CAP = 3.0  # evidence of a reading against bare paper
 _ALIKE, _MOST = 0.15, 0.5  # difference of ln, and share of what is beyond, that show a hole
@@ -55,7 +55,7 @@ def _bound(gray: np.ndarray, dots: Fit, band: tuple[float, float], bits: set[int
         cap = _CAP * edges.weight[:, None]
         for count in bits:
             paper, ink = (_of_sectors(of.sum(axis=1), count) for of in (edges.paper, edges.ink))
-            of_word = np.maximum(np.maximum(paper, ink), -COVER).sum(axis=2)
+            of_word = np.maximum(np.maximum(paper, ink), -_COVER).sum(axis=2)
             marked = _of_sectors(np.clip((edges.ink - edges.paper).sum(axis=1), -cap, cap), count)
             bound = np.minimum(of_word, np.maximum(marked, 0).sum(axis=2)).max(axis=1)
             best = np.maximum(best, bound / (angles * edges.weight))

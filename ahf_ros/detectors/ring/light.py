@@ -73,9 +73,9 @@ def predicted_light(
         logs = (logs - middle) * ground
         first, second = (np.fft.rfft2(of, (_TRANSFORM,) * 2) for of in (logs, logs * logs))
         # Of the squares of differences between ground and shifted ground.
-        # Opposite shifts compare the same pairs of points, which the real part says of both.
-        both = 2 * (seen.conj() * second).real - 2 * (first.real**2 + first.imag**2)
-        differ = np.fft.irfft2(both, (_TRANSFORM,) * 2).reshape(len(logs), -1)[:, candidates]
+        both = 2 * seen.conj() * second - 2 * np.abs(first) ** 2
+        differ = np.fft.irfft2(both, (_TRANSFORM,) * 2)
+        differ = (differ + _turned(differ)).reshape(len(logs), -1)[:, candidates] / 2
         differ = np.maximum(differ / overlap, _ROUNDING) * order
         best = np.argpartition(differ, _SHIFTS, axis=1)[:, :_SHIFTS]
         of_best = np.take_along_axis(differ, best, axis=1)
@@ -118,6 +118,11 @@ def _geometry(
     candidates = (overlap > _OVERLAP * whole.sum()) & (away > 0) & (away <= _FARTHEST)
     which = np.flatnonzero(candidates)
     return points, whole, which, np.random.default_rng(0).uniform(1, _ALIKE, len(which))
+
+
+def _turned(of_shifts: np.ndarray) -> np.ndarray:
+    """Return what belongs to the opposite shifts, which compare the same pairs of points."""
+    return np.roll(of_shifts[:, ::-1, ::-1], 1, axis=(1, 2))
 
 
 def _places(
