@@ -26,6 +26,7 @@ _COVERED = 0.1  # price of each further reading that something else covers
 _BORDER = 4.8  # price of a border of an arc of any length, at one of about 120 angles
 _RANKED = 1.2  # evidence of a reading that ranks words, which one cover must not settle
 _DRAW = 5.0  # lead of a word that is not expected, which is as good as none
+_NEAR = 3  # angles on either side of the clearest one
 _NEVER = np.float32(-np.inf)
 
 CLEAR = 15.0
@@ -210,7 +211,8 @@ def lengthened(bits: np.ndarray, overhang: np.ndarray) -> np.ndarray:
 def _clearest(evidence: Evidence) -> np.ndarray:
     """Return the angles of each band from that on at which it is seen best, shape (k, m)."""
     best = np.maximum(evidence.paper, evidence.ink)
-    return (best.argmax(axis=1)[:, None] + np.arange(best.shape[1])) % best.shape[1]
+    window = np.sum([np.roll(best, shift, axis=1) for shift in range(-_NEAR, _NEAR + 1)], axis=0)
+    return (window.argmax(axis=1)[:, None] + np.arange(best.shape[1])) % best.shape[1]
 
 
 def _along_words(evidence: Evidence, bits: np.ndarray) -> np.ndarray:
