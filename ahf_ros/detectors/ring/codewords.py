@@ -10,6 +10,7 @@ from ahf_ros.codes.cyclic import rotated_words
 from ahf_ros.codes.ring import Family, canonical
 
 _EXHAUSTIVE = 50_000  # rotations of words, up to which all of them compete
+_MINIMUM_EVIDENCE = 2.0  # for ones, in units of ln
 
 COMPETITORS = 24
 """Number of words of each band that are returned, more than there are rotations of one."""
@@ -47,7 +48,7 @@ def best_words(
     everything = len(family.words) * family.bits <= _EXHAUSTIVE
     count = COMPETITORS * (2 if expected else 1)
     words, phases = np.zeros((2, len(sectors), count), np.int64)
-    hopeful = np.flatnonzero((sectors > 0).any(axis=(1, 2)))
+    hopeful = np.flatnonzero(np.maximum(sectors, 0).sum(axis=2).max(axis=1) > _MINIMUM_EVIDENCE)
     # Where sectors begin, each says most for one or zero; any other phase mixes neighbours.
     likely = np.argsort(-np.abs(sectors).sum(axis=2), axis=1, kind='stable')[:, :_PHASES]
     of_phases = np.take_along_axis(sectors, likely[..., None], axis=1).astype(np.float32)

@@ -13,12 +13,14 @@ import numpy as np
 
 from ahf_ros.detectors.claims import owners
 from ahf_ros.detectors.contract import DetectorSettings
-from ahf_ros.detectors.ring.confidence import CERTAIN, features, target_probability
+from ahf_ros.detectors.ring.confidence import features, target_probability
 from ahf_ros.detectors.ring.decoding import CLEAR
 from ahf_ros.detectors.ring.detector import find_hypotheses
 from ahf_ros.detectors.ring.hypotheses import on_targets
 from ahf_ros.features import frame
 from ahf_ros.imaging.image import as_gray, check_image
+
+_COUNTED = 0.9  # probability of being a target, from which a dot counts
 
 
 def estimate_count(image: np.ndarray, settings: DetectorSettings | None = None) -> int:
@@ -49,7 +51,7 @@ def estimate_count(image: np.ndarray, settings: DetectorSettings | None = None) 
     # Which word it is does not matter here.
     clear = replace(read, margin=np.full(len(read.words), CLEAR), coded=0 * read.coded)
     probability = np.where(read.words > 0, target_probability(features(clear)), 0.0)
-    counted = (probability >= CERTAIN) & (major >= minimum) & (major <= maximum)
+    counted = (probability >= _COUNTED) & (major >= minimum) & (major <= maximum)
     order = np.argsort(-read.seen[counted], kind='stable')
     targets = read.select(np.flatnonzero(counted)[order])
     certain = np.ones(len(order), bool)
