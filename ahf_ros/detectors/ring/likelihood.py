@@ -25,6 +25,7 @@ from ahf_ros.imaging.logarithm import LOG_OFFSET
 _BESIDE = 2.6  # distance of a reading from an edge that is sharp, px
 _NEAREST, _FARTHEST = 0.13, 0.36  # bounds of that distance, dot radii
 _FLAT = 0.12  # deviation of steps of ln where there is no edge, but for noise
+_WHITE = 0.03  # the same of paper between ground that glare makes white
 _MARK, _MARK_TAIL = 0.18, 0.3  # of the step of a mark: towards less, where blur fills it, and more
 _PAPER_LEVEL, _INK_LEVEL = 0.05, 0.12  # of levels of paper and ink under predicted light
 _ANY = 0.22  # density of steps and levels of ln where anything lies
@@ -191,7 +192,7 @@ def _step_evidence(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the evidence of steps from ground into bands for paper and for ink.
 
-    Glare makes the step of a mark smaller.
+    Glare makes the step of a mark smaller. Where it makes ground white, paper between is white.
 
     Parameters
     ----------
@@ -207,8 +208,9 @@ def _step_evidence(
     mark = polar.logs(ink)[0] - beside
     step = level - beside
     limit = polar.glare[:, None, None]
-    glare = ground >= limit
-    flat = _normal(step, np.sqrt(_FLAT**2 + noise**2 + of_ground**2))
+    glare, white = ground >= limit, np.minimum(*ground.swapaxes(0, 1))[:, None] >= SATURATED
+    flat = np.where(white & (limit <= SATURATED), np.float32(_WHITE), np.float32(_FLAT))
+    flat = _normal(step, np.sqrt(flat**2 + noise**2 + of_ground**2))
     more = (step - mark) * np.sign(mark)
     expected = of_ground * _gain(ground, ink)
     low, high = (np.sqrt(spread**2 + noise**2 + expected**2) for spread in (_MARK, _MARK_TAIL))
