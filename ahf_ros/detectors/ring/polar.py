@@ -23,7 +23,7 @@ SATURATED = 253.0
 LIGHT_EDGE = 0.3
 """Step of ln I from which it is an edge of light."""
 
-DOT, GAP, MARGIN = np.array([0.3, 0.6]), np.array([0.4, 0.65]), np.array([0.3, 0.6])
+DOT, GAP, MARGIN = np.array([0.3, 0.6]), np.array([0.35, 0.65]), np.array([0.3, 0.65])
 """Where levels are read: dot radii, shares of the gap, and dot radii beyond the band."""
 
 PART = 256
