@@ -18,7 +18,7 @@ from ahf_ros.batch.results import file_fingerprint
 from ahf_ros.batch.task import ImageOutcome, ImageTask, Level, Message
 from ahf_ros.detectors import Detector, DetectorSettings, create_detector
 from ahf_ros.drawing.overlay import draw, summary
-from ahf_ros.edge_shift import edge_shift_remark
+from ahf_ros.edge_shift import edge_shift_remark, white_remark
 from ahf_ros.imaging.image import check_image
 from ahf_ros.imaging.stack import ImageStack
 from ahf_ros.interchange.files import read_bytes
@@ -189,7 +189,10 @@ def _messages(of: _Found) -> Iterator[Message]:
             f'{path}: the image seems to be mirrored: most IDs are not among the expected ones, '
             'and most would be in a mirror'
         )
-    if remark := edge_shift_remark(found.edge_shift):
+    remarks = [edge_shift_remark(found.edge_shift)]
+    if found.count == 0:
+        remarks.append(white_remark(of.stack.images[0]))
+    for remark in filter(None, remarks):
         yield Message(f'{path}: {remark}')
     for target in found.targets:
         yield Message(

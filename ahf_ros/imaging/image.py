@@ -19,6 +19,9 @@ MAXIMUM_PIXELS = 2**28
 HOT_SHARE = 100_000
 """One pixel in so many may be hot, that is, brighter than any light in the image."""
 
+SATURATED = 253.0
+"""Gray value from which a reading is white, whatever the light."""
+
 IMAGE_TYPES = (np.uint8, np.uint16, np.float32, np.float64)
 """Accepted pixel types, in the byte order of the machine."""
 

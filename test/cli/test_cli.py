@@ -205,6 +205,15 @@ def test_edges_that_are_not_where_they_should_be_are_reported(folder, tmp_path, 
     assert said in printed.err
 
 
+def test_an_image_that_is_white_is_named_where_nothing_is_identified(tmp_path, capsys):
+    image = np.full((200, 300), 255, np.uint8)
+    image[:, :30] = 90
+    write_image(tmp_path / 'white.png', image)
+    status('identify', tmp_path / 'white.png')
+    said = 'white.png: 90 % of the image is white: gaps or bands of targets may have vanished'
+    assert said in capsys.readouterr().err
+
+
 def test_scenes_are_rendered_with_ink_gain_and_over_exposure(tmp_path):
     shares = {}
     for option, value in (('--edge-shift', 0), ('--edge-shift', 2), ('--overexposure', 9)):

@@ -14,9 +14,10 @@ from ahf_ros.detectors.ring.likelihood import (
     light_edges,
     weights,
 )
-from ahf_ros.detectors.ring.polar import SATURATED, PolarImages, angles_of, polar_images
+from ahf_ros.detectors.ring.polar import PolarImages, angles_of, polar_images
 from ahf_ros.features.circle_fit import fit_dots
 from ahf_ros.features.frame import affine_frames
+from ahf_ros.imaging.image import SATURATED
 
 BAND = (2.25, 3.5)
 ANGLES, CIRCLES, OUTERMOST = 60, 200, BAND[1] + 0.95

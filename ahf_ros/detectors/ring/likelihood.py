@@ -17,9 +17,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ahf_ros.detectors.ring.polar import CORRELATION, LIGHT_EDGE, SATURATED, PolarImages
+from ahf_ros.detectors.ring.polar import CORRELATION, LIGHT_EDGE, PolarImages
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.soft_edges import SOFT
+from ahf_ros.imaging.image import SATURATED
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
 _BESIDE = 2.6  # distance of a reading from an edge that is sharp, px

@@ -12,13 +12,11 @@ from ahf_ros.features.circle_fit import Fit
 from ahf_ros.features.robust import NORMAL
 from ahf_ros.features.sampling import sample_circles, within
 from ahf_ros.imaging.black import black_lift, lifted
+from ahf_ros.imaging.image import SATURATED
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
 CORRELATION = 2.5
 """Distance of independent readings, px."""
-
-SATURATED = 253.0
-"""Gray value from which a reading is white, whatever the light."""
 
 LIGHT_EDGE = 0.3
 """Step of ln I from which it is an edge of light."""
