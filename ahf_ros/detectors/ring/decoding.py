@@ -180,19 +180,7 @@ def _middles(overhang: np.ndarray, per_sector: int) -> np.ndarray:
 
 
 def bits_at(words: np.ndarray, phases: np.ndarray, per_sector: int, family: Family) -> np.ndarray:
-    """Return whether words have a mark at each angle.
-
-    Parameters
-    ----------
-    words, phases : ndarray of int, shape (...)
-    per_sector : int
-        Number of angles of a sector.
-    family : Family
-
-    Returns
-    -------
-    ndarray of bool, shape (..., family.bits * per_sector)
-    """
+    """Return whether words have a mark at each angle, by their phases, (...), bool, (..., m)."""
     count = family.bits * per_sector
     sector = (np.arange(count) - phases[..., None]) % count // per_sector
     return (words[..., None] >> sector & 1).astype(bool)
@@ -229,15 +217,7 @@ def _along_words(evidence: Evidence, bits: np.ndarray) -> np.ndarray:
 
 
 def _covered_paths(seen: np.ndarray, of: Evidence) -> np.ndarray:
-    """Return the evidence for words with their best covers, shape (k, w).
-
-    Parameters
-    ----------
-    seen : ndarray of float32, shape (m, k, w)
-        Evidence where nothing covers the band.
-    of : Evidence
-        Of k bands.
-    """
+    """Return the evidence for words with their best covers, (k, w), from `seen`, (m, k, w)."""
     cost, paper = np.float32(_COVERED) * of.weight[:, None], of.paper.T[..., None]
     price = _like_paper(of)[:, None]
     clear = seen[0]
@@ -254,19 +234,11 @@ def _covered_paths(seen: np.ndarray, of: Evidence) -> np.ndarray:
 def _hidden(seen: np.ndarray, scores: np.ndarray, of: Evidence) -> np.ndarray:
     """Return where the best paths of one word of each band are covered, shape (k, m).
 
-    Parameters
-    ----------
-    seen : ndarray of float32, shape (m, k)
-        Evidence of the word where nothing covers the band.
-    scores : ndarray of float32, shape (k,)
-        The same of its best path.
-    of : Evidence
-        Of k bands.
+    From the evidence of the word at each angle, (m, k), and that of its best path, (k,).
     """
     hidden = np.zeros(seen.T.shape, bool)
-    some = np.flatnonzero(
-        scores > seen.sum(axis=0) + len(seen) * np.finfo(seen.dtype).eps * np.abs(seen).sum(axis=0)
-    )
+    rounding = np.finfo(seen.dtype).eps * np.abs(seen).sum(axis=0)
+    some = np.flatnonzero(scores > seen.sum(axis=0) + len(seen) * rounding)
     if some.size:
         hidden[some] = _backtracked(seen[:, some], of.select(some))
     return hidden

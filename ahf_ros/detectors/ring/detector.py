@@ -178,16 +178,7 @@ def report(hypotheses: Hypotheses, settings: DetectorSettings) -> list[Target]:
 
 
 def _explained(target: Target, certain: bool, likely_family: str, likely_id: int) -> Target:
-    """Return a target, with the reason if it is not decoded.
-
-    Parameters
-    ----------
-    target : Target
-    certain : bool
-        Whether its word alone was certain.
-    likely_family, likely_id
-        Of its most likely word.
-    """
+    """Return a target with its likeliest word, and the reason if it is not decoded."""
     if target.id != UNDECODED:
         return target
     if not certain and target.confidence < _UNLIKELY:

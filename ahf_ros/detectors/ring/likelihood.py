@@ -100,16 +100,9 @@ def growth_by(shift: float, size: np.ndarray) -> np.ndarray:
 def band_edges(
     radius: np.ndarray, growth: np.ndarray, band: tuple[float, float]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the radii of the edges of a band whose ink has grown on all sides, shape (k,) each.
+    """Return the radii of the edges of a band whose ink has grown on all sides, (k,) each.
 
-    Parameters
-    ----------
-    radius : ndarray of float64, shape (k,)
-        Of the dot as printed.
-    growth : ndarray of float64, shape (k,)
-        Of what has the colour of the dot; the unit of both is that of the frame.
-    band : tuple of 2 float
-        Radii of the band, dot radii.
+    The radii of dots as printed and the growth of their colour, (k,), have the unit of the frame.
     """
     inner, outer = band
     return inner * radius - growth, outer * radius + growth
@@ -135,7 +128,7 @@ def edge_evidence(
     polar : PolarImages
         Of k dots.
     radius, growth, band
-        As for `band_edges`.
+        Of the dots as printed and of their colour, (k,), in units of the frame; radii of the band.
     """
     inner, outer = band_edges(radius, growth, band)
     beside = _BESIDE + np.maximum(polar.blur - SOFT, 0)
@@ -191,18 +184,9 @@ def light_edges(
 def _step_evidence(
     polar: PolarImages, band: np.ndarray, ground: np.ndarray, edges: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the evidence of steps from ground into bands for paper and for ink.
+    """Return the evidence of steps from ground into bands, (k, 2, m), for paper and for ink.
 
     Glare makes the step of a mark smaller. Where it makes ground white, paper between is white.
-
-    Parameters
-    ----------
-    polar : PolarImages
-        Of k dots.
-    band, ground : ndarray of float32, shape (k, 2, m)
-        Gray values beside the inner and the outer edge of bands.
-    edges : ndarray of float64, shape (k,)
-        As `light_edges` gives them.
     """
     (level, noise), (beside, of_ground) = polar.logs(band), polar.logs(ground)
     ink = polar.inked(ground, band)

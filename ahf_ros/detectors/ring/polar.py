@@ -204,17 +204,10 @@ def _noise(gap: np.ndarray, later: np.ndarray) -> np.ndarray:
 def _usual_levels(
     ground: np.ndarray, later: np.ndarray, noise: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return between which gray values the light on ground makes it, shape (k,) each.
+    """Return between which gray values the light on ground (k, m, 4) makes it, shape (k,) each.
 
     A small part of the ground that is darker is covered. What is brighter, has soft borders and
     leaves much of a target as it is, is under glare. All else is light.
-
-    Parameters
-    ----------
-    ground, later : ndarray of float32, shape (k, m, 4)
-        Gray values at two radii in the gap and two in the margin, and those at later angles.
-    noise : ndarray of float64, shape (k,)
-        Of gray values.
     """
     logs, of_later = (np.log(of + np.float32(LOG_OFFSET)) for of in (ground, later))
     values = logs.reshape(len(logs), logs.shape[1] * logs.shape[2])

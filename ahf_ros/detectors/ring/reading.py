@@ -151,17 +151,10 @@ def _doubtful(words: Words, edges: Evidence) -> np.ndarray:
 
 
 def _preferred(words: Words, of_edges: Words, clear: np.ndarray) -> Words:
-    """Return words by all evidence, but by edges alone where these are clear.
+    """Return words by all evidence, but by edges alone where these are clear, bool, (k,).
 
     Under spots of light, levels are not known well enough to contradict all edges of a target. The
     evidence against anything is that of both, so that targets and families compare.
-
-    Parameters
-    ----------
-    words, of_edges : Words
-        By all evidence, and by edges alone.
-    clear : ndarray of bool, shape (k,)
-        Whether edges alone leave no doubt.
     """
     which = np.flatnonzero(clear)
     some, seen, marked = of_edges.select(which), words.seen[which], words.marked[which]
@@ -178,19 +171,9 @@ def _words(
     family: Family,
     expected: frozenset[int],
 ) -> Words:
-    """Return the words of targets by all evidence.
+    """Return the words of targets, in frames of their printed dots, by all evidence.
 
-    Parameters
-    ----------
-    gray : ndarray of float32, shape (height, width)
-    targets : Fit
-        Of k targets, in frames of their printed dots.
-    polar, edges
-        As they are seen there.
-    growth : ndarray of float64, shape (k,)
-        Of ink, dot radii.
-    family, expected
-        As for `decode`.
+    Ink has grown there by shape (k,), dot radii.
     """
     if not len(targets.frames):
         return Words.none(0, family.bits * PER_SECTOR)
