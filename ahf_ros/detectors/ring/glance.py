@@ -18,7 +18,7 @@ from ahf_ros.detectors.ring.likelihood import edge_evidence, growth_by
 from ahf_ros.detectors.ring.polar import DOT, MARGIN, PolarImages, polar_images
 from ahf_ros.features.circle_fit import Fit
 
-_PER_SECTOR, _CIRCLES = 3, 36  # angles of the shortest sectors, and circles
+_PER_SECTOR, _CIRCLES = 5, 36  # angles of the shortest sectors, and circles
 _PHASES = 4  # of the sectors
 _SHIFTS = (-1.2, 0.0, 1.2)  # of edges, px; readings keep farther away from these than the error
 _COVER = 5.0  # price of a sector that is covered, less than where words are decoded
