@@ -66,14 +66,9 @@ def scenes(seed: int) -> Iterator[Scene]:
 
 
 def lit(seed: int) -> Iterator[SceneSettings]:
-    """Yield scenes under all lights as in the figures, and smaller ones in deeper shadow.
-
-    Under each light there are also texts and other marks without targets.
-    """
+    """Yield scenes under all lights as in the figures, and smaller ones in deeper shadow."""
     for light, ambient in benchmark_lights():
         yield SceneSettings(light=light, ambient=ambient, seed=seed)
-    for light in LIGHT_NAMES:
-        yield SceneSettings(light=light, targets=0, distractors=100, seed=seed)
     generator = np.random.default_rng(seed)
     for light, ambient in product(LIGHT_NAMES[1:], SHADOWS):
         radius = float(generator.choice([9, 14, 20, 24]))
