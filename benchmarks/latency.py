@@ -43,8 +43,8 @@ PROFILE = Path(__file__).resolve().parents[1] / 'config' / 'fastdds_shm.xml'
 TRANSPORTS = {'defaults': {}, PROFILE.name: {profile_variable(): str(PROFILE)}}
 """Environments by the names of what they set up."""
 
-SIZES = {'2.5 MP': (1936, 1296, 20), '10.6 MP': (3984, 2656, 54)}
-"""Width, height and targets of the images."""
+SIZES = {'2.5 MP': (1936, 1296, 10.0), '10.6 MP': (3984, 2656, 20.0)}
+"""Width and height of the images, and the radius of the dots of 54 targets, px."""
 
 STEP = 0.93
 """Ratio of two rates of the series."""
@@ -186,9 +186,9 @@ def measured(options: argparse.Namespace) -> dict[str, Figures]:
     rows = {}
     folders = {'before': options.before, 'now': None} if options.before else {'now': None}
     for size in options.sizes:
-        width, height, targets = SIZES[size]
+        width, height, radius = SIZES[size]
         scene = SceneSettings(
-            width=width, height=height, targets=targets, light=options.light, ambient=0.3
+            width=width, height=height, dot_radius=radius, light=options.light, ambient=0.3
         )
         message = image_message(render(scene).image, Header())
         with live.opened() as graph:
