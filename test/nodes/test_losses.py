@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+import pytest
+
+pytest.importorskip('rclpy', reason='ROS 2 is not installed')
+
 from ahf_ros.nodes.inputs import Losses
 
 
