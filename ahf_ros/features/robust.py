@@ -18,9 +18,7 @@ import numpy as np
 
 _Solution = TypeVar('_Solution')
 
-NORMAL = 1.4826
-"""Standard deviation of normal errors over the median of their sizes."""
-
+NORMAL = 1.4826  # standard deviation of normal errors over the median of their sizes
 _RIDGE = 1e-3  # added to normal matrices, in weights, so that they can be inverted
 
 

@@ -20,7 +20,7 @@ from ahf_ros.detectors.ring.hypotheses import on_targets
 from ahf_ros.features import frame
 from ahf_ros.imaging.image import as_gray, check_image
 
-_COUNTED = 0.9  # probability of being a target, from which a dot counts
+_OF_WORDS = 0.25  # of what speaks against a word, which counts against a target
 
 
 def estimate_count(image: np.ndarray, settings: DetectorSettings | None = None) -> int:
@@ -49,9 +49,9 @@ def estimate_count(image: np.ndarray, settings: DetectorSettings | None = None) 
     major, _, _ = frame.ellipse_axes(read.frames)
     minimum, maximum = settings.radii
     # Which word it is does not matter here.
-    clear = replace(read, margin=np.full(len(read.words), CLEAR), coded=0 * read.coded)
+    clear = replace(read, margin=np.full(len(read.words), CLEAR), coded=_OF_WORDS * read.coded)
     probability = np.where(read.words > 0, target_probability(features(clear)), 0.0)
-    counted = (probability >= _COUNTED) & (major >= minimum) & (major <= maximum)
+    counted = (probability > 0.5) & (major >= minimum) & (major <= maximum)
     order = np.argsort(-read.seen[counted], kind='stable')
     targets = read.select(np.flatnonzero(counted)[order])
     certain = np.ones(len(order), bool)
