@@ -9,9 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from statistics import median
 
-import numpy as np
-
-from ahf_ros.imaging.image import SATURATED, as_gray
 from ahf_ros.target import UNDECODED, Target
 
 NOTABLE_EDGE_SHIFT = 0.5
@@ -20,8 +17,6 @@ NOTABLE_EDGE_SHIFT = 0.5
 The gamma of a camera alone makes edges 0.4 px too bright in a sharp image: up to half of the
 standard deviation of its blur.
 """
-
-_MUCH_WHITE = 0.3  # share of an image
 
 
 def median_edge_shift(targets: Iterable[Target]) -> float | None:
@@ -54,23 +49,3 @@ def edge_shift_remark(shift: float | None) -> str:
     if shift < 0:
         return f'edges are {-shift:.1f} px too bright: the photograph is over-exposed or blurred'
     return f'edges are {shift:.1f} px too dark: ink gain or under-exposure'
-
-
-def white_remark(image: np.ndarray) -> str:
-    """Return what it means that much of an image is white; empty if little is.
-
-    Where light makes ink as white as paper, gaps or bands of targets vanish.
-
-    Parameters
-    ----------
-    image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
-
-    Examples
-    --------
-    >>> white_remark(np.full((20, 20), 255, np.uint8)).partition(': ')
-    ('100 % of the image is white', ': ', 'gaps or bands of targets may have vanished')
-    """
-    share = float((as_gray(image) >= SATURATED).mean())
-    if share < _MUCH_WHITE:
-        return ''
-    return f'{100 * share:.0f} % of the image is white: gaps or bands of targets may have vanished'
