@@ -48,7 +48,7 @@ def estimate_count(image: np.ndarray, settings: DetectorSettings | None = None) 
     read = find_hypotheses(as_gray(image), settings)
     major, _, _ = frame.ellipse_axes(read.frames)
     minimum, maximum = settings.radii
-    # Which word it is does not matter here.
+    # Which of several words it is does not matter here.
     clear = replace(read, margin=np.full(len(read.words), CLEAR), coded=_OF_WORDS * read.coded)
     probability = np.where(read.words > 0, target_probability(features(clear)), 0.0)
     counted = (probability > 0.5) & (major >= minimum) & (major <= maximum)

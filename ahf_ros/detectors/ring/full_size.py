@@ -61,11 +61,13 @@ def with_soft_edges(image: np.ndarray, read: Hypotheses, right: np.ndarray) -> H
 def _measured(image: np.ndarray, read: Hypotheses, which: np.ndarray) -> Hypotheses:
     """Return hypotheses, some with frames from the edges of an image, if it shows them."""
     selected = np.flatnonzero(which)
+    if not selected.size:
+        return read
+    gray = image.astype(np.float32, copy=False)
     for code in dict.fromkeys(read.families[selected]):
         of_code = selected[read.families[selected] == code]
         some = read.select(of_code)
         circles = target_circles(some.words, some.starts, some.polarity, PER_SECTOR, code)
-        gray = image.astype(np.float32, copy=False)
         fit = fit_circles_of_any_blur(gray, some.frames, circles, reach=REACH, projective=True)
         fitted = replace(
             some,
