@@ -94,8 +94,9 @@ class ImageQueue:
         self._in_force: Pipeline | None = None
         self._begin()
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._timer = node.create_timer(PERIOD, self._look, clock=steady)
-        self._timer.cancel()
+        # It is never cancelled: rclpy ends the node where one thread cancels a timer that is due
+        # while another is about to call it.
+        node.create_timer(PERIOD, self._look, clock=steady)
 
     def _begin(self) -> None:
         self._waiting: deque[_Waiting] = deque()
@@ -113,14 +114,9 @@ class ImageQueue:
         """Identify the images that arrive from now on by a pipeline; it begins a new stack."""
         self._in_force = pipeline
         self._worker.append(self._settle)
-        if pipeline.settings.stacking.stack > 1:
-            self._timer.reset()
-        else:
-            self._timer.cancel()
 
     def discard(self) -> None:
         """Give up the images that wait."""
-        self._timer.cancel()
         self._worker.discard()
         self._begin()
 
