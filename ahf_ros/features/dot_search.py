@@ -15,10 +15,12 @@ import numpy as np
 
 from ahf_ros.features import frame
 from ahf_ros.features.candidates import find_candidates
-from ahf_ros.features.dots import Dots, distinct
+from ahf_ros.features.dots import NO_DOTS, Dots, distinct
 from ahf_ros.features.ellipses import fit_ellipses, resized
 from ahf_ros.features.outlines import whole_outlines
 from ahf_ros.features.pyramid import ImagePyramid
+
+_LEVELS = 2  # whose edges may follow a whole outline; those of the second are less noisy
 
 
 def whole_dots(
@@ -39,9 +41,12 @@ def whole_dots(
     Dots
         Without duplicates, in px of the image, to about half a pixel.
     """
-    dots = whole_outlines(pyramid.edges[0], min_radius / 2, max_radius / 2)
-    dots = resized(pyramid.logs[1], dots.select(np.isin(dots.polarity, polarities)))
-    return distinct(replace(dots, frames=frame.enlarged(dots.frames, 1)))
+    found = [NO_DOTS]
+    for level, edges in enumerate(pyramid.edges[:_LEVELS], start=1):
+        dots = whole_outlines(edges, min_radius / 2**level, max_radius / 2**level)
+        dots = resized(pyramid.logs[level], dots.select(np.isin(dots.polarity, polarities)))
+        found.append(replace(dots, frames=frame.enlarged(dots.frames, level)))
+    return distinct(Dots.joined(found))
 
 
 def voted_dots(

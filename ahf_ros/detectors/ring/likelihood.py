@@ -143,7 +143,8 @@ def edge_evidence(
     away = np.stack([before, beside], axis=1) * (polar.size / polar.blur)[:, None]
     tail = (0.5 * np.exp(-0.5 * away**2)).astype(np.float32)
     weight = weights(polar)
-    share = weight[:, None, None] * polar.visible
+    visible = polar.reach[:, None] >= np.stack([inner + beside, outer + beside], axis=1)[..., None]
+    share = weight[:, None, None] * visible
     return Evidence(
         paper=paper * share,
         ink=ink * share,
@@ -256,15 +257,15 @@ def level_evidence(
     depth = np.minimum(_DEPTH * polar.size / CORRELATION, 1)
     share = (weights(polar) * depth).astype(np.float32)
     limit = polar.glare[:, None, None]
-    seen = known & ((levels < SATURATED) | np.isinf(limit))
+    seen = known & ((levels < SATURATED) | np.isinf(limit)) & (radii <= polar.reach[..., None])
     inner, outer = band
     in_dot, in_band = radii < 1, (radii > inner) & (radii < outer)
     on_ground = ~in_dot & ~in_band
     middle = (inner + outer) / 2
     halves = (radii > 1) & (radii < middle), radii > middle
-    for half, visible in zip(halves, polar.visible.transpose(1, 0, 2), strict=True):
+    for half in halves:
         glare = (levels[..., half & on_ground] >= limit).any(axis=2)
-        seen[..., half] &= (visible & ~glare)[..., None]
+        seen[..., half] &= ~glare[..., None]
     dark = levels <= polar.shade[:, None, None]
     surprise = _surprise(errors, of_paper, seen & on_ground)
     paper, ink = (

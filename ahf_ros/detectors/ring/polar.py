@@ -53,8 +53,8 @@ class PolarImages(ArrayRecord):
     ----------
     gray : ndarray of float32, shape (k, m, n)
         Black is lifted, see `ahf_ros.imaging.black`.
-    visible : ndarray of bool, shape (k, 2, m)
-        Whether the image shows the inner and the outer half of the band at an angle.
+    reach : ndarray of float64, shape (k, m)
+        Up to which radius the image shows the target at an angle, dot radii.
     outermost : ndarray of float64, shape (k,)
         Radius of the last circle, dot radii.
     polarity : ndarray of int, shape (k,)
@@ -75,7 +75,7 @@ class PolarImages(ArrayRecord):
     """
 
     gray: np.ndarray
-    visible: np.ndarray
+    reach: np.ndarray
     outermost: np.ndarray
     polarity: np.ndarray
     contrast: np.ndarray
@@ -150,7 +150,7 @@ def polar_images(
     shade, glare = _usual_levels(ground, later, noise)
     return PolarImages(
         gray=values,
-        visible=_visible(gray.shape, dots.frames, angles, band),
+        reach=_reach(gray.shape, dots.frames, angles, radii),
         outermost=np.full(len(values), outermost),
         polarity=dots.polarity,
         contrast=contrast,
@@ -227,20 +227,19 @@ def _usual_levels(
     return shade.astype(np.float32), glare.astype(np.float32)
 
 
-def _visible(
-    shape: tuple[int, ...], frames: np.ndarray, angles: np.ndarray, band: tuple[float, float]
+def _reach(
+    shape: tuple[int, ...], frames: np.ndarray, angles: np.ndarray, radii: np.ndarray
 ) -> np.ndarray:
-    """Return whether an image shows halves of bands at angles, bool, shape (k, 2, m)."""
-    inner, outer = band
-    visible = np.ones((len(frames), 2, len(angles)), bool)
+    """Return up to which of the radii an image shows targets at angles, shape (k, m)."""
+    reach = np.full((len(frames), len(angles)), np.inf)
     major, _, _ = frame.ellipse_axes(frames)
-    reach = (_PERSPECTIVE * (outer + _MARGIN) * major)[:, None]
+    farthest = (_PERSPECTIVE * radii[-1] * major)[:, None]
     centres = frames[:, :2, 2] / frames[:, 2:, 2]
-    inside = (centres > reach) & (centres < np.array(shape[1::-1]) - 1 - reach)
+    inside = (centres > farthest) & (centres < np.array(shape[1::-1]) - 1 - farthest)
     border = np.flatnonzero(~inside.all(axis=1))
-    ends = frame.circle_points(angles, np.array([(inner + outer) / 2, outer]))
-    visible[border] = within(frame.project(frames[border], ends), shape).transpose(0, 2, 1)
-    return visible
+    points = frame.project(frames[border], frame.circle_points(angles, radii))
+    reach[border] = np.where(within(points, shape), radii, 0).max(axis=2)
+    return reach
 
 
 def _along(of_targets: np.ndarray, values: np.ndarray) -> np.ndarray:

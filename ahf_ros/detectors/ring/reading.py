@@ -128,7 +128,7 @@ def best_growth(
     prior : Prior
         What is known before, in px of the image.
     """
-    polar = replace(polar, gray=polar.gray[:, ::2], visible=polar.visible[..., ::2])
+    polar = replace(polar, gray=polar.gray[:, ::2], reach=polar.reach[:, ::2])
     best = np.full(len(polar.size), -np.inf)
     growth = np.zeros(len(polar.size))
     for shift in _SHIFTS:
@@ -192,7 +192,7 @@ def _words(
     light = predicted_light(gray, targets.frames, polar.lift, angles, radii, family.band)
     evidence = edges.plus(level_evidence(polar, levels, *light, radii, family.band))
     words = decode(evidence, _overhang(growth, family), family, expected)
-    return replace(words, hidden=words.hidden | ~polar.visible.any(axis=1))
+    return replace(words, hidden=words.hidden | (polar.reach < radii[len(DOT) + len(GAP)]))
 
 
 def _mean_odds(words: Words, weight: np.ndarray) -> np.ndarray:
