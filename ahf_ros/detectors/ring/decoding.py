@@ -118,14 +118,18 @@ def decode(
         paper=np.take_along_axis(some.paper, order, 1),
         ink=np.take_along_axis(some.ink, order, 1),
     )
-    evidence_of = _along_words(turned, np.take_along_axis(bits, order[:, None], axis=2))
-    scores = _covered_paths(evidence_of, turned)
+    along = np.take_along_axis(bits, order[:, None], axis=2).transpose(2, 0, 1)
+    evidence_of = _along_words(turned, along)
+    like_paper = _half_paper(evidence.select(read), order)
+    as_paper = np.where(along, like_paper.T[..., None], turned.paper.T[..., None])
+    scores = _covered_paths(evidence_of, as_paper, turned)
     likely = scores + prior(words, family, expected)
     rows, best = np.arange(len(read)), likely.argmax(axis=1)
     # What is expected wins a draw, but an ID that is read clearly is no other one.
     read_as, known_as = (margins(words, of, best, family) for of in (scores, likely))
     margin = np.clip(known_as, read_as, read_as + _DRAW)
-    turned_hidden = _hidden(evidence_of[:, rows, best], scores[rows, best], turned)
+    of_best = evidence_of[:, rows, best], as_paper[:, rows, best]
+    turned_hidden = _hidden(*of_best, scores[rows, best], turned)
     hidden = np.empty(turned_hidden.shape, bool)
     np.put_along_axis(hidden, order, turned_hidden, axis=1)
     score = scores[rows, best].astype(np.float64)
@@ -147,17 +151,34 @@ def _doubted(evidence: Evidence) -> Evidence:
 
     Light may do anything at any angle.
     """
-    most = np.float32(_MOST) * evidence.weight[:, None]
-    paper, ink = (most * np.tanh(of.sum(axis=1) / most) for of in (evidence.paper, evidence.ink))
+    paper, ink = (_bounded(of.sum(axis=1), evidence) for of in (evidence.paper, evidence.ink))
     return replace(evidence, paper=paper, ink=ink)
 
 
-def _like_paper(of: Evidence) -> np.ndarray:
-    """Return the prices of something that looks like paper, float32, shape (k,).
+def _bounded(values: np.ndarray, of: Evidence) -> np.ndarray:
+    most = np.float32(_MOST) * of.weight[:, None]
+    return most * np.tanh(values / most)
 
-    Where light has many edges, it explains what looks like paper on a mark.
+
+def _half_paper(evidence: Evidence, order: np.ndarray) -> np.ndarray:
+    """Return the evidence for marks that something like paper covers, or half of them, (k, m)."""
+    (in_paper, out_paper), (in_ink, out_ink) = (
+        of.transpose(1, 0, 2) for of in (evidence.paper, evidence.ink)
+    )
+    # A half that is covered explains what does not agree, but speaks for nothing.
+    most = np.float32(_MORE) * evidence.weight[:, None]
+    half = np.minimum(np.maximum(in_ink + out_paper, in_paper + out_ink), most)
+    likely = _bounded(np.maximum(half, in_paper + out_paper), evidence)
+    return np.take_along_axis(likely, order, axis=1)
+
+
+def _like_paper(of: Evidence) -> tuple[np.ndarray, np.ndarray]:
+    """Return the prices of something that looks like paper, of its first reading and of more.
+
+    Where light has many edges, it explains what looks like paper on a mark. float32, shape (k,).
     """
-    return np.float32(_LIKE_PAPER) * (1 + np.float32(_IN_LIGHT) * (of.lit - SURPRISES[0]))
+    light = 1 + np.float32(_IN_LIGHT) * (of.lit - SURPRISES[0])
+    return np.float32(_LIKE_PAPER) * light, np.float32(_MORE) * of.weight * light
 
 
 def sectors_by_phase(per_sector: int, family: Family) -> np.ndarray:
@@ -203,51 +224,56 @@ def _clearest(evidence: Evidence) -> np.ndarray:
     return (window.argmax(axis=1)[:, None] + np.arange(best.shape[1])) % best.shape[1]
 
 
-def _along_words(evidence: Evidence, bits: np.ndarray) -> np.ndarray:
-    """Return the evidence for words at each angle, bits (k, w, m), shape (m, k, w).
+def _along_words(evidence: Evidence, along: np.ndarray) -> np.ndarray:
+    """Return the evidence for words at each angle, bits and result of shape (m, k, w).
 
     A border between two sectors may lie to either side of the angles next to it, or in a reading,
     which is then neither.
     """
-    along = bits.transpose(2, 0, 1)
     paper, ink = evidence.paper.T[..., None], evidence.ink.T[..., None]
     seen = np.where(along, ink, paper)
     border = (along != np.roll(along, 1, axis=0)) | (along != np.roll(along, -1, axis=0))
     return np.where(border, np.maximum(np.maximum(paper, ink), 0), seen)
 
 
-def _covered_paths(seen: np.ndarray, of: Evidence) -> np.ndarray:
-    """Return the evidence for words with their best covers, (k, w), from `seen`, (m, k, w)."""
-    cost, paper = np.float32(_COVERED) * of.weight[:, None], of.paper.T[..., None]
-    price = _like_paper(of)[:, None]
+def _covered_paths(seen: np.ndarray, as_paper: np.ndarray, of: Evidence) -> np.ndarray:
+    """Return the evidence for words with their best covers, (k, w).
+
+    From the evidence where they are seen, and where something like paper covers them, (m, k, w).
+    """
+    cost = np.float32(_COVERED) * of.weight[:, None]
+    price, more = (of_cover[:, None] for of_cover in _like_paper(of))
     clear = seen[0]
     covered, like_paper = (np.full_like(clear, _NEVER) for _ in range(2))
-    for of_angle, as_paper in zip(seen[1:], paper[1:], strict=True):
+    for of_angle, of_paper in zip(seen[1:], as_paper[1:], strict=True):
         before = clear
         clear = np.maximum(np.maximum(clear, covered), like_paper) + of_angle
         covered = np.maximum(covered, before - np.float32(_COVER)) - cost
         like_paper = np.maximum(like_paper, before - price)
-        like_paper += as_paper - np.float32(_MORE) * of.weight[:, None]
+        like_paper += of_paper - more
     return np.maximum(np.maximum(clear, covered), like_paper)
 
 
-def _hidden(seen: np.ndarray, scores: np.ndarray, of: Evidence) -> np.ndarray:
+def _hidden(
+    seen: np.ndarray, as_paper: np.ndarray, scores: np.ndarray, of: Evidence
+) -> np.ndarray:
     """Return where the best paths of one word of each band are covered, shape (k, m).
 
-    From the evidence of the word at each angle, (m, k), and that of its best path, (k,).
+    From the evidence of the word at each angle, (m, k) each, and that of its best path, (k,).
     """
     hidden = np.zeros(seen.T.shape, bool)
     rounding = np.finfo(seen.dtype).eps * np.abs(seen).sum(axis=0)
     some = np.flatnonzero(scores > seen.sum(axis=0) + len(seen) * rounding)
     if some.size:
-        hidden[some] = _backtracked(seen[:, some], of.select(some))
+        hidden[some] = _backtracked(seen[:, some], as_paper[:, some], of.select(some))
     return hidden
 
 
-def _backtracked(seen: np.ndarray, of: Evidence) -> np.ndarray:
+def _backtracked(seen: np.ndarray, as_paper: np.ndarray, of: Evidence) -> np.ndarray:
     """Return the same for bands of which a part is covered."""
-    cost, paper = np.float32(_COVERED) * of.weight, of.paper.T
-    prices = np.stack([0 * cost, np.full_like(cost, _COVER), _like_paper(of)])
+    cost = np.float32(_COVERED) * of.weight
+    price, more = _like_paper(of)
+    prices = np.stack([0 * cost, np.full_like(cost, _COVER), price])
     scores = np.full((3, seen.shape[1]), _NEVER)
     scores[0] = seen[0]
     came = np.zeros((len(seen), 3, seen.shape[1]), np.intp)
@@ -258,8 +284,7 @@ def _backtracked(seen: np.ndarray, of: Evidence) -> np.ndarray:
         came[index, 0] = scores.argmax(axis=0)
         best = np.maximum(scores, begun)
         best[0] = scores.max(axis=0)
-        more = np.float32(_MORE) * of.weight
-        scores = best + np.stack([seen[index], -cost, paper[index] - more])
+        scores = best + np.stack([seen[index], -cost, as_paper[index] - more])
     hidden = np.empty(seen.shape, bool)
     state = scores.argmax(axis=0)
     for index in range(len(seen) - 1, -1, -1):
