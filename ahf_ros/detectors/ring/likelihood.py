@@ -151,24 +151,31 @@ def edge_evidence(
         weight=weight,
         dot=np.zeros_like(weight),
         lit=edges.astype(np.float32),
-        covered=_covered(polar, inside, ground / (1 - tail[..., None]), ink > paper),
+        covered=_covered(polar, inside, ground / (1 - tail[..., None]), ink > paper, visible),
     )
 
 
 def _covered(
-    polar: PolarImages, band: np.ndarray, ground: np.ndarray, marked: np.ndarray
+    polar: PolarImages,
+    band: np.ndarray,
+    ground: np.ndarray,
+    marked: np.ndarray,
+    visible: np.ndarray,
 ) -> np.ndarray:
     """Return where something covers the ground, which is no shadow, all of shape (k, 2, m).
 
     Marks in shadow are darker than those in the light, and nothing that covers a target is.
     """
     shade = polar.shade[:, None, None]
-    covered = ground <= shade
+    covered = (ground <= shade) & visible
     if not covered.any():
         return covered
     in_shadow = covered & marked & (band < polar.inked(shade, band))
     shadow = in_shadow.sum(axis=(1, 2)) > _MARKED * covered.sum(axis=(1, 2))
-    return np.asarray(covered & ~shadow[:, None, None])
+    covered = covered & ~shadow[:, None, None]
+    # The border of what is as dark as ink looks like the edge of a mark.
+    differ = polar.logs(ground)[0] - polar.logs(polar.inked(shade, ground))[0]
+    return np.asarray(covered | (covered & (np.abs(differ) < LIGHT_EDGE))[:, ::-1])
 
 
 def light_edges(
