@@ -132,6 +132,7 @@ def decode(
     turned_hidden = _hidden(*of_best, scores[rows, best], turned)
     hidden = np.empty(turned_hidden.shape, bool)
     np.put_along_axis(hidden, order, turned_hidden, axis=1)
+    hidden |= (some.paper == 0) & (some.ink == 0)
     score = scores[rows, best].astype(np.float64)
     bare = np.maximum(turned.paper.sum(axis=1), 0)
     found = Words(
@@ -139,7 +140,7 @@ def decode(
         starts=2 * np.pi * phases[rows, best] / angles,
         margin=margin.astype(np.float64),
         marked=score - bare + some.dot,
-        coded=score - _free_paths(turned) - _BORDER * _borders(bits[rows, best]),
+        coded=score - _free_paths(turned) - _BORDER * _borders(bits[rows, best], hidden),
         seen=score,
         hidden=hidden,
     )
@@ -293,9 +294,10 @@ def _backtracked(seen: np.ndarray, as_paper: np.ndarray, of: Evidence) -> np.nda
     return hidden.T
 
 
-def _borders(bits: np.ndarray) -> np.ndarray:
-    """Return the number of borders of arcs of ink, bits (k, m), shape (k,)."""
-    return np.count_nonzero(bits != np.roll(bits, 1, axis=1), axis=1)
+def _borders(bits: np.ndarray, unknown: np.ndarray) -> np.ndarray:
+    """Return the number of borders of arcs of ink that are seen, of shape (k, m) each, (k,)."""
+    border = (bits != np.roll(bits, 1, axis=1)) & ~(unknown & np.roll(unknown, 1, axis=1))
+    return np.count_nonzero(border, axis=1)
 
 
 def _free_paths(evidence: Evidence) -> np.ndarray:

@@ -9,14 +9,14 @@ import numpy as np
 from ahf_ros.codes.ring import Family
 from ahf_ros.detectors.claims import Rivals, leading, owners
 from ahf_ros.detectors.ring.confidence import CERTAIN, confidence, features
-from ahf_ros.detectors.ring.decoding import DOUBT, Words
+from ahf_ros.detectors.ring.decoding import Words
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.circle_fit import Fit
 
 _CLEARLY = 2.0  # times the evidence of another claim to the same ID or dot
 _OVERLAP = 0.92  # of the radii of two targets, at which the paper of one hides marks of the other
-_ON_TOP = 0.05  # of the evidence, added to that against arcs of any length
+_DOUBT, _ON_TOP = 1e-4, 3.0  # least doubt of a word, and times as sure as what lies below it
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,8 +149,8 @@ def resolve(hypotheses: Hypotheses, ids: np.ndarray) -> tuple[np.ndarray, np.nda
 
     kept = owners(len(ids), on_it)
     certain = kept & leading(seen, hypotheses.certain, against, _CLEARLY)
-    on_top = np.exp(hypotheses.coded + _ON_TOP * seen)
-    certain = leading(on_top, certain, _overlapping(hypotheses), np.exp(DOUBT))
+    sure = 1 / (_DOUBT + 1 - hypotheses.confidence)
+    certain = leading(sure, certain, _overlapping(hypotheses), _ON_TOP)
     return kept, leading(seen, certain, lambda index: ids == ids[index], _CLEARLY)
 
 
@@ -165,8 +165,7 @@ def _overlapping(hypotheses: Hypotheses) -> Rivals:
     """Return of which hypotheses the bands overlap.
 
     There the paper of one target lies on that of the other. White paper on white paper may hide
-    marks without a trace, so that only the one on top is certain. It is the one that agrees better
-    with its word.
+    marks without a trace, so that only the one on top is certain, which is the surer one.
     """
     major, _, _ = frame.ellipse_axes(hypotheses.frames)
     outer = major * np.array([code.band_outer for code in hypotheses.families])

@@ -174,8 +174,10 @@ def _covered(
     shadow = in_shadow.sum(axis=(1, 2)) > _MARKED * covered.sum(axis=(1, 2))
     covered = covered & ~shadow[:, None, None]
     # The border of what is as dark as ink looks like the edge of a mark.
-    differ = polar.logs(ground)[0] - polar.logs(polar.inked(shade, ground))[0]
-    return np.asarray(covered | (covered & (np.abs(differ) < LIGHT_EDGE))[:, ::-1])
+    as_ink = polar.logs(polar.inked(shade, ground))[0]
+    like_ink = [np.abs(polar.logs(of)[0] - as_ink) < LIGHT_EDGE for of in (ground, band)]
+    across = like_ink[1].all(axis=1, keepdims=True)
+    return np.asarray(covered | ((covered & like_ink[0])[:, ::-1] & across))
 
 
 def light_edges(
