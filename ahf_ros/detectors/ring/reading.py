@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from ahf_ros.codes.ring import Family
+from ahf_ros.detectors.ring.borders import border_evidence
 from ahf_ros.detectors.ring.circles import REACH, target_circles
 from ahf_ros.detectors.ring.decoding import CLEAR, DOUBT, Words, decode
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
@@ -106,6 +107,8 @@ def _read_part(gray: np.ndarray, dots: Fit, family: Family, prior: Prior) -> Hyp
     of_edges = decode(edges, _overhang(growth, family), family, prior.expected)
     words = _words(gray, fit, polar, edges, growth, family, prior.expected)
     words = _preferred(words, of_edges, ~_doubtful(of_edges, edges))
+    of_borders = border_evidence(polar, words, _overhang(growth, family), family)
+    words = replace(words, coded=words.coded + of_borders)
     good = _mean_odds(words, edges.weight) > HOPEFUL
     read, fit, words = read[good], fit.select(good), words.select(good)
     fit = _joint_fit(gray, fit, words, PER_SECTOR, 2, family)

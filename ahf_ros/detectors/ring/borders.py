@@ -1,0 +1,62 @@
+"""Where arcs of ink end: at the borders of sectors, if they are marks of a code.
+
+The readings of a band find a border to one angle. The share of the band beside it that is dark
+tells its place to a small part of that, whatever the blur. Arcs of any length, and those of another
+number of sectors, end anywhere.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ahf_ros.codes.ring import Family
+from ahf_ros.detectors.ring.decoding import Words, bits_at
+from ahf_ros.detectors.ring.polar import PolarImages
+from ahf_ros.features.robust import median
+from ahf_ros.imaging.logarithm import LOG_OFFSET
+
+_BESIDE = 3  # angles on either side of a border
+_DEPTHS = (0.3, 0.5, 0.7)  # of the band, whose mean is read
+_CONTRAST = 0.5  # share of the step of a mark, from which a border is seen
+_ERROR, _PIXELS = 0.15, 0.25  # standard deviation of the place of a border, angles and px
+_ANYWHERE, _SPAN = 0.1, 2.5  # share of borders that light moves, and where to, angles
+
+
+def border_evidence(
+    polar: PolarImages, words: Words, overhang: np.ndarray, family: Family
+) -> np.ndarray:
+    """Return the log odds that arcs end where the sectors do, against anywhere near, shape (k,).
+
+    Parameters
+    ----------
+    polar : PolarImages
+        Of k targets.
+    words : Words
+        Their words.
+    overhang : ndarray of float64, shape (k,)
+        By how many angles ink is longer at either end than its sectors.
+    family : Family
+    """
+    count, one = words.hidden.shape[1], np.ones(len(overhang))
+    inner, outer = family.band
+    levels = np.mean([polar.at(one * (inner + (outer - inner) * of)) for of in _DEPTHS], axis=0)
+    phases = np.rint(words.starts * count / (2 * np.pi)).astype(int)
+    bits = bits_at(words.words, phases, count // family.bits, family)
+    rows, places = np.nonzero(bits != np.roll(bits, 1, axis=1))
+    about = levels[rows[:, None], (places[:, None] + np.arange(-_BESIDE, _BESIDE)) % count]
+    begins = bits[rows, places]
+    about = np.where(begins[:, None], about, about[:, ::-1])  # paper first
+    paper, ink = np.log(about[:, [0, -1]] + LOG_OFFSET).T
+    seen = np.abs(paper - ink) > _CONTRAST * np.abs(np.log(polar.contrast[rows]))
+    rows, places, about, begins = rows[seen], places[seen], about[seen], begins[seen]
+    paper, ink = about[:, :1], about[:, -1:]
+    bright = np.clip((about - ink) / (paper - ink), 0, 1).sum(axis=1)
+    away = np.zeros(words.hidden.shape)
+    known = np.zeros(away.shape, bool)
+    away[rows, places] = np.where(begins, 1, -1) * (bright - _BESIDE + overhang[rows])
+    known[rows, places] = True
+    away -= median(away, known, 0.0)[:, None]  # frames may be turned by a part of an angle
+    error = np.hypot(_ERROR, _PIXELS * count / (np.pi * (inner + outer) * polar.size))[:, None]
+    there = np.exp(-0.5 * (away / error) ** 2) / (error * np.sqrt(2 * np.pi))
+    odds = np.log((1 - _ANYWHERE) * there * _SPAN + _ANYWHERE)
+    return np.asarray((odds * known).sum(axis=1))
