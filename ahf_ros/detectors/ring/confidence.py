@@ -34,8 +34,8 @@ _OF_MARGIN = np.array([0.0, 1.0])
 def features(read: Hypotheses) -> np.ndarray:
     """Return what speaks for readings, float64, shape (k, 4).
 
-    Logarithm of the log odds of words against the next ID; root of the log odds against arcs of ink
-    of any length, with their sign; the share of the expected edges that are in their place, and
+    Logarithm of the log odds of words against the next ID; root of the log odds of arcs of ink of
+    any length against them, negative; the share of the expected edges that are in their place, and
     that of the band that is seen.
 
     Parameters
@@ -46,7 +46,7 @@ def features(read: Hypotheses) -> np.ndarray:
     return np.stack(
         [
             np.log1p(np.maximum(read.margin, 0)),
-            np.sign(read.coded) * np.sqrt(np.abs(read.coded)),
+            -np.sqrt(np.maximum(-read.coded, 0)),
             read.share,
             1 - read.hidden,
         ],
