@@ -28,7 +28,7 @@ WEIGHTS = Path(__file__).with_name('fitted_weights.json')
 """The data file, which says what made it."""
 
 _OF_TARGET = np.concatenate(read_weights(WEIGHTS, 'confidence', 'intercept', 'weights'))
-_OF_MARGIN = np.array([0.0, 1.0])
+_OF_MARGIN = np.array([-1.0, 1.0])  # one or two log odds leave a doubt
 
 
 def features(read: Hypotheses) -> np.ndarray:
