@@ -15,7 +15,7 @@ import numpy as np
 from ahf_ros.codes.ring import FAMILY_NAMES, Family, canonical, family
 from ahf_ros.codes.same_print import words_of_print
 from ahf_ros.detectors.claims import leading
-from ahf_ros.detectors.ring.decoding import CLEAR, DOUBT
+from ahf_ros.detectors.ring.decoding import DOUBT
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.prior import NOTHING_KNOWN, Prior
 from ahf_ros.detectors.ring.reading import read_bands
@@ -91,7 +91,7 @@ def _against_rivals(
     better than its word, it may be one of theirs. If the rivals contest none of the most doubtful
     words, they contest no other one.
     """
-    coded = np.where(found.certain & (found.margin < CLEAR), found.coded, 0.0)
+    coded = np.where(found.certain, found.coded, 0.0)
     doubtful = np.argsort(coded, kind='stable')[: (coded < -DOUBT).sum()]
     read = {code.name for code in families}
     rivals = [family(name) for name in FAMILY_NAMES if name not in read]
