@@ -1,8 +1,8 @@
 """Where arcs of ink end: at the borders of sectors, if they are marks of a code.
 
 The readings of a band find a border to one angle. The share of the band beside it that is dark
-tells its place to a small part of that, whatever the blur. Arcs of any length, and those of another
-number of sectors, end anywhere.
+tells its place to a small part of that, whatever the blur. Arcs of any length, and those of
+another number of sectors, end anywhere.
 """
 
 from __future__ import annotations

@@ -41,7 +41,8 @@ def by_clear_dots(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> li
     clearest = np.argsort(-dots.share * (1 - dots.contrast), kind='stable')[:_CLEAREST]
     some = dots.select(clearest)
     odds = np.stack([_odds(read_bands(gray, some, code)) for code in families])
-    won = np.bincount(odds.argmax(axis=0)[odds.max(axis=0) > 0], minlength=len(families))
+    certain = np.isfinite(odds.max(axis=0))
+    won = np.bincount(odds.argmax(axis=0)[certain], minlength=len(families))
     return [families[index] for index in np.argsort(-won, kind='stable')]
 
 
@@ -87,9 +88,8 @@ def _against_rivals(
 ) -> Hypotheses:
     """Return hypotheses of dots, none certain where a family that is not read has more evidence.
 
-    It has to agree better with arcs of any length as well. Where arcs of any length explain a band
-    better than its word, it may be one of theirs. If the rivals contest none of the most doubtful
-    words, they contest no other one.
+    Where arcs of any length explain a band better than its word, it may be one of theirs. If the
+    rivals contest none of the most doubtful words, they contest no other one.
     """
     coded = np.where(found.certain, found.coded, 0.0)
     doubtful = np.argsort(coded, kind='stable')[: (coded < -DOUBT).sum()]
@@ -101,9 +101,7 @@ def _against_rivals(
             break
         word = found.select(some)
         others = [read_bands(gray, dots.select(some), code, prior) for code in rivals]
-        better = [
-            (_evidence(other) > _evidence(word)) & (other.coded > word.coded) for other in others
-        ]
+        better = [_odds(other) > _odds(word) for other in others]
         contested = np.any(better, axis=0)
         confidence[some[contested]] = 0.0
         if not contested.any():
@@ -111,15 +109,10 @@ def _against_rivals(
     return replace(found, confidence=confidence)
 
 
-def _evidence(read: Hypotheses) -> np.ndarray:
-    """Return the evidence for words of different families, by how many each has, shape (k,)."""
-    choices = [len(code.words) * code.bits for code in read.families]
-    return read.seen - np.log(np.maximum(choices, 1))
-
-
 def _odds(read: Hypotheses) -> np.ndarray:
-    """Return the same where words are certain, and 0 elsewhere, shape (k,)."""
-    return np.where(read.certain, _evidence(read), 0.0)
+    """Return how well words of any family agree with arcs, -inf if they are not certain, (k,)."""
+    choices = [len(code.words) * code.bits for code in read.families]
+    return np.where(read.certain, read.coded - np.log(np.maximum(choices, 1)), -np.inf)
 
 
 def _contested(read: Hypotheses) -> Hypotheses:

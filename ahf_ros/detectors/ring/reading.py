@@ -83,30 +83,29 @@ def _read_part(gray: np.ndarray, dots: Fit, family: Family, prior: Prior) -> Hyp
     edges = edge_evidence(polar, 1 - growth, growth, family.band)
     words = decode(edges, _overhang(growth, family), family, prior.expected)
     read = np.flatnonzero(_mean_odds(words, edges.weight) > HOPEFUL)
-    growth, words = growth[read], words.select(read)
+    edges, growth = edges.select(read), growth[read]
     printed = dots.select(read)
     printed = replace(printed, frames=frame.scaled(printed.frames, 1 - growth))
-    some = np.flatnonzero(_doubtful(words, edges.select(read)))
-    of_levels = _words(
+    # In the frame of the printed dot, the same growth is a larger share.
+    larger = growth / (1 - growth)
+    words = _settled(
         gray,
-        printed.select(some),
-        polar.select(read[some]),
-        edges.select(read[some]),
-        # In the frame of the printed dot, the same growth is a larger share.
-        growth[some] / (1 - growth[some]),
+        printed,
+        polar.select(read),
+        edges,
+        words.select(read),
+        larger,
         family,
         prior.expected,
     )
-    words = words.replaced(some, of_levels)
-    good = _mean_odds(words, edges.weight[read]) > HOPEFUL
+    good = _mean_odds(words, edges.weight) > HOPEFUL
     read, printed, words = read[good], printed.select(good), words.select(good)
     fit = _joint_fit(gray, printed, words, PER_SECTOR // 2, 1, family)
     growth = fit.polarity * fit.edge_shift / fit.size
     polar = polar_images(gray, fit, family.band, family.bits * PER_SECTOR)
     edges = edge_evidence(polar, np.ones(len(read)), growth, family.band)
-    of_edges = decode(edges, _overhang(growth, family), family, prior.expected)
-    words = _words(gray, fit, polar, edges, growth, family, prior.expected)
-    words = _preferred(words, of_edges, ~_doubtful(of_edges, edges))
+    words = decode(edges, _overhang(growth, family), family, prior.expected)
+    words = _settled(gray, fit, polar, edges, words, growth, family, prior.expected)
     of_borders = border_evidence(polar, words, _overhang(growth, family), family)
     words = replace(words, coded=words.coded + of_borders)
     good = _mean_odds(words, edges.weight) > HOPEFUL
@@ -153,33 +152,24 @@ def _doubtful(words: Words, edges: Evidence) -> np.ndarray:
     return doubtful | words.hidden.any(axis=1) | edges.covered.any(axis=(1, 2))
 
 
-def _preferred(words: Words, of_edges: Words, clear: np.ndarray) -> Words:
-    """Return words by all evidence, but by edges alone where these are clear, bool, (k,).
-
-    Under spots of light, levels are not known well enough to contradict all edges of a target. The
-    evidence against anything is that of both, so that targets and families compare.
-    """
-    which = np.flatnonzero(clear)
-    some, seen, marked = of_edges.select(which), words.seen[which], words.marked[which]
-    some = replace(some, seen=np.maximum(some.seen, seen), marked=np.maximum(some.marked, marked))
-    return words.replaced(which, some)
-
-
-def _words(
+def _settled(
     gray: np.ndarray,
     targets: Fit,
     polar: PolarImages,
     edges: Evidence,
+    words: Words,
     growth: np.ndarray,
     family: Family,
     expected: frozenset[int],
 ) -> Words:
-    """Return the words of targets, in frames of their printed dots, by all evidence.
+    """Return the words of targets, by all evidence where edges alone leave a doubt.
 
-    Ink has grown there by shape (k,), dot radii.
+    Targets are in the frames of their printed dots, where ink has grown by shape (k,), dot radii.
     """
-    if not len(targets.frames):
-        return Words.none(0, family.bits * PER_SECTOR)
+    some = np.flatnonzero(_doubtful(words, edges))
+    if not some.size:
+        return words
+    targets, polar, edges = targets.select(some), polar.select(some), edges.select(some)
     inner, outer = family.band
     radii = np.concatenate(
         [
@@ -194,8 +184,9 @@ def _words(
     levels = lifted(levels, polar.lift.astype(np.float32)[:, None, None])
     light = predicted_light(gray, targets.frames, polar.lift, angles, radii, family.band)
     evidence = edges.plus(level_evidence(polar, levels, *light, radii, family.band))
-    words = decode(evidence, _overhang(growth, family), family, expected)
-    return replace(words, hidden=words.hidden | (polar.reach < radii[len(DOT) + len(GAP)]))
+    of_all = decode(evidence, _overhang(growth[some], family), family, expected)
+    hidden = of_all.hidden | (polar.reach < radii[len(DOT) + len(GAP)])
+    return words.replaced(some, replace(of_all, hidden=hidden))
 
 
 def _mean_odds(words: Words, weight: np.ndarray) -> np.ndarray:
