@@ -87,19 +87,19 @@ def test_of_two_claims_to_an_id_the_clearly_better_one_stays():
 
 
 @pytest.mark.parametrize(
-    ('apart', 'odds', 'on_top'),
+    ('apart', 'confidence', 'on_top'),
     [
-        (55, [90, 50], [True, False]),
-        (55, [90, 80], [False, False]),
-        (70, [90, 50], [True, True]),
+        (55, [0.99, 0.9], [True, False]),
+        (55, [0.99, 0.98], [False, False]),
+        (70, [0.99, 0.9], [True, True]),
     ],
 )
-def test_of_two_targets_whose_bands_overlap_only_the_clearly_better_one_is_certain(
-    apart, odds, on_top
+def test_of_two_targets_whose_bands_overlap_only_the_surer_one_is_certain(
+    apart, confidence, on_top
 ):
     places = [(50, 50), (50 + apart, 50)]
-    assert resolved(places, odds, [1, 2])[1] == on_top
-    assert resolved(places, odds, [1, 2], [True, False])[1] == [True, False]
+    assert resolved(places, [90, 80], [1, 2], confidence)[1] == on_top
+    assert resolved(places, [90, 80], [1, 2], [True, False])[1] == [True, False]
 
 
 def test_uncertain_claims_do_not_count():

@@ -48,7 +48,7 @@ def polar(
     lit = np.broadcast_to(np.asarray(light, float), ANGLES)[:, None]
     return PolarImages(
         gray=np.where(dark, contrast * lit, lit).astype(np.float32)[None],
-        visible=np.ones((1, 2, ANGLES), bool),
+        reach=np.full((1, ANGLES), np.inf),
         outermost=np.array([OUTERMOST]),
         polarity=np.array([polarity]),
         contrast=np.array([contrast]),
@@ -108,9 +108,9 @@ def test_the_halves_of_a_band_are_seen_apart() -> None:
 
 
 def test_angles_that_the_image_does_not_show_say_nothing() -> None:
-    hidden = np.ones((1, 2, ANGLES), bool)
-    hidden[..., 5:25] = False
-    evidence = edge_evidence(replace(polar(), visible=hidden), ONE, NONE, BAND)
+    reach = np.full((1, ANGLES), np.inf)
+    reach[:, 5:25] = BAND[0]
+    evidence = edge_evidence(replace(polar(), reach=reach), ONE, NONE, BAND)
     assert not evidence.paper[..., 5:25].any()
     assert not evidence.ink[..., 5:25].any()
     assert evidence.paper[..., 25:].all()
@@ -264,8 +264,8 @@ def test_polar_images_of_an_image() -> None:
     assert image.contrast[0] == pytest.approx(0.25, abs=0.05)
     assert image.size[0] == pytest.approx(12, abs=0.3)
     assert image.at(np.array([0.6])) == pytest.approx(50, abs=2)
-    assert image.at(np.array([2.0]))[image.visible[:, 0]] == pytest.approx(200, abs=2)
+    assert image.at(np.array([2.0]))[image.reach >= sum(BAND) / 2] == pytest.approx(200, abs=2)
     # Counter-clockwise as seen, from +x: first out of the image, then in it, then out of it again.
-    for half, radius in enumerate((sum(BAND) / 2, BAND[1])):
+    for radius in (sum(BAND) / 2, BAND[1]):
         inside = 60 + radius * 12 * np.cos(angles_of(ANGLES)) < 99
-        assert (image.visible[0, half] == inside).mean() > 0.95
+        assert ((image.reach[0] >= radius) == inside).mean() > 0.95

@@ -11,15 +11,14 @@ import numpy as np
 
 from ahf_ros.codes.ring import Family
 from ahf_ros.detectors.ring.decoding import Words, bits_at
-from ahf_ros.detectors.ring.polar import PolarImages
+from ahf_ros.detectors.ring.polar import DEPTHS, PolarImages
 from ahf_ros.features.robust import median
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
 _BESIDE = 3  # angles on either side of a border
-_DEPTHS = (0.3, 0.5, 0.7)  # of the band, whose mean is read
 _CONTRAST = 0.5  # share of the step of a mark, from which a border is seen
 _ERROR, _PIXELS = 0.15, 0.25  # standard deviation of the place of a border, angles and px
-_ANYWHERE, _SPAN = 0.1, 2.5  # share of borders that light moves, and where to, angles
+_ANYWHERE = 0.1  # share of borders that light moves
 
 
 def border_evidence(
@@ -37,9 +36,9 @@ def border_evidence(
         By how many angles ink is longer at either end than its sectors.
     family : Family
     """
-    count, one = words.hidden.shape[1], np.ones(len(overhang))
-    inner, outer = family.band
-    levels = np.mean([polar.at(one * (inner + (outer - inner) * of)) for of in _DEPTHS], axis=0)
+    count, (inner, outer) = words.hidden.shape[1], family.band
+    radii = inner + (outer - inner) * np.tile(DEPTHS, (len(overhang), 1)).T
+    levels = np.mean([polar.at(of) for of in radii], axis=0)
     phases = np.rint(words.starts * count / (2 * np.pi)).astype(int)
     bits = bits_at(words.words, phases, count // family.bits, family)
     rows, places = np.nonzero(bits != np.roll(bits, 1, axis=1))
@@ -58,5 +57,5 @@ def border_evidence(
     away -= median(away, known, 0.0)[:, None]  # frames may be turned by a part of an angle
     error = np.hypot(_ERROR, _PIXELS * count / (np.pi * (inner + outer) * polar.size))[:, None]
     there = np.exp(-0.5 * (away / error) ** 2) / (error * np.sqrt(2 * np.pi))
-    odds = np.log((1 - _ANYWHERE) * there * _SPAN + _ANYWHERE)
+    odds = np.log((1 - _ANYWHERE) * there * _BESIDE + _ANYWHERE)
     return np.asarray((odds * known).sum(axis=1))

@@ -16,7 +16,7 @@ from ahf_ros.features.circle_fit import Fit
 
 _CLEARLY = 2.0  # times the evidence of another claim to the same ID or dot
 _OVERLAP = 0.92  # of the radii of two targets, at which the paper of one hides marks of the other
-_DOUBT, _ON_TOP = 1e-4, 3.0  # least doubt of a word, and times as sure as what lies below it
+_ON_TOP = 3.0  # times as sure of its word as of what lies below it
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,7 +149,7 @@ def resolve(hypotheses: Hypotheses, ids: np.ndarray) -> tuple[np.ndarray, np.nda
 
     kept = owners(len(ids), on_it)
     certain = kept & leading(seen, hypotheses.certain, against, _CLEARLY)
-    sure = 1 / (_DOUBT + 1 - hypotheses.confidence)
+    sure = 1 / (1 - hypotheses.confidence + np.finfo(float).eps)
     certain = leading(sure, certain, _overlapping(hypotheses), _ON_TOP)
     return kept, leading(seen, certain, lambda index: ids == ids[index], _CLEARLY)
 

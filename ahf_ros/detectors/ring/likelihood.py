@@ -172,12 +172,13 @@ def _covered(
         return covered
     in_shadow = covered & marked & (band < polar.inked(shade, band))
     shadow = in_shadow.sum(axis=(1, 2)) > _MARKED * covered.sum(axis=(1, 2))
-    covered = covered & ~shadow[:, None, None]
+    covered &= ~shadow[:, None, None]
     # The border of what is as dark as ink looks like the edge of a mark.
     as_ink = polar.logs(polar.inked(shade, ground))[0]
     like_ink = [np.abs(polar.logs(of)[0] - as_ink) < LIGHT_EDGE for of in (ground, band)]
-    across = like_ink[1].all(axis=1, keepdims=True)
-    return np.asarray(covered | ((covered & like_ink[0])[:, ::-1] & across))
+    across = np.logical_and.reduce(like_ink[1], axis=1, keepdims=True)
+    hidden = np.asarray(covered & like_ink[0])[:, ::-1] & across
+    return np.asarray(covered | hidden)
 
 
 def light_edges(
@@ -273,8 +274,7 @@ def level_evidence(
     middle = (inner + outer) / 2
     halves = (radii > 1) & (radii < middle), radii > middle
     for half in halves:
-        glare = (levels[..., half & on_ground] >= limit).any(axis=2)
-        seen[..., half] &= ~glare[..., None]
+        seen[..., half] &= ~(levels[..., half & on_ground] >= limit).any(axis=2, keepdims=True)
     dark = levels <= polar.shade[:, None, None]
     surprise = _surprise(errors, of_paper, seen & on_ground)
     paper, ink = (

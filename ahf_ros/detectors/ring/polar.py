@@ -24,6 +24,9 @@ LIGHT_EDGE = 0.3
 DOT, GAP, MARGIN = np.array([0.3, 0.6]), np.array([0.35, 0.65]), np.array([0.3, 0.65])
 """Where levels are read: dot radii, shares of the gap, and dot radii beyond the band."""
 
+DEPTHS = np.array([0.2, 0.4, 0.6, 0.8])
+"""The same in the band, shares of it."""
+
 PART = 256
 """Targets at a time, which bounds the memory."""
 

@@ -26,6 +26,7 @@ from ahf_ros.detectors.ring.likelihood import (
     level_evidence,
 )
 from ahf_ros.detectors.ring.polar import (
+    DEPTHS,
     DOT,
     GAP,
     MARGIN,
@@ -44,7 +45,6 @@ PER_SECTOR = 10
 """Angles of a sector at which bands are read."""
 
 _SHIFTS = np.arange(-2.4, 2.41, 0.4)  # of edges, that are tried, px
-_DEPTHS = np.array([0.2, 0.4, 0.6, 0.8])  # of the band, where its levels are read
 
 
 def read_bands(
@@ -175,7 +175,7 @@ def _settled(
         [
             DOT,
             1 + (inner - 1) * GAP,
-            inner + (outer - inner) * _DEPTHS,
+            inner + (outer - inner) * DEPTHS,
             outer + MARGIN,
         ]
     )
