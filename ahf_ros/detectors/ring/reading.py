@@ -186,7 +186,8 @@ def _settled(
     evidence = edges.plus(level_evidence(polar, levels, *light, radii, family.band))
     of_all = decode(evidence, _overhang(growth[some], family), family, expected)
     hidden = of_all.hidden | (polar.reach < radii[len(DOT) + len(GAP)])
-    return words.replaced(some, replace(of_all, hidden=hidden))
+    # What speaks against no target is that of edges, so that all targets compare.
+    return words.replaced(some, replace(of_all, seen=words.seen[some], hidden=hidden))
 
 
 def _mean_odds(words: Words, weight: np.ndarray) -> np.ndarray:
