@@ -15,7 +15,6 @@ import numpy as np
 from ahf_ros.codes.ring import FAMILY_NAMES, Family, canonical, family
 from ahf_ros.codes.same_print import words_of_print
 from ahf_ros.detectors.claims import leading
-from ahf_ros.detectors.ring.decoding import DOUBT
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.prior import NOTHING_KNOWN, Prior
 from ahf_ros.detectors.ring.reading import read_bands
@@ -88,15 +87,16 @@ def _against_rivals(
 ) -> Hypotheses:
     """Return hypotheses of dots, none certain where a family that is not read has more evidence.
 
-    Where arcs of any length explain a band better than its word, it may be one of theirs. If the
-    rivals contest none of the most doubtful words, they contest no other one.
+    Where arcs of any length explain a band better than its word, it may be one of theirs. Where
+    rivals contest most of the most doubtful words, they read all.
     """
-    coded = np.where(found.certain, found.coded, 0.0)
-    doubtful = np.argsort(coded, kind='stable')[: (coded < -DOUBT).sum()]
+    certain = np.flatnonzero(found.certain)
+    order = certain[np.argsort(found.coded[certain], kind='stable')]
+    first = order[: min(_FIRST, (found.coded[certain] < 0).sum())]
     read = {code.name for code in families}
     rivals = [family(name) for name in FAMILY_NAMES if name not in read]
     confidence = found.confidence.copy()
-    for some in (doubtful[:_FIRST], doubtful[_FIRST:]):
+    for some in (first, order[len(first) :]):
         if not some.size or not rivals:
             break
         word = found.select(some)
@@ -104,7 +104,7 @@ def _against_rivals(
         better = [_odds(other) > _odds(word) for other in others]
         contested = np.any(better, axis=0)
         confidence[some[contested]] = 0.0
-        if not contested.any():
+        if contested.mean() < 0.5:
             break
     return replace(found, confidence=confidence)
 
