@@ -17,7 +17,7 @@ from ahf_ros.imaging.logarithm import LOG_OFFSET
 
 _BESIDE = 3  # angles on either side of a border
 _CONTRAST = 0.5  # share of the step of a mark, from which a border is seen
-_ERROR, _PIXELS = 0.15, 0.25  # standard deviation of the place of a border, angles and px
+_ERROR, _PIXELS = 0.15, 0.4  # standard deviation of the place of a border, angles and px
 _ANYWHERE = 0.1  # share of borders that light moves
 
 
