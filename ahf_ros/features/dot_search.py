@@ -45,7 +45,9 @@ def whole_dots(
     for level, edges in enumerate(pyramid.edges[:_LEVELS], start=1):
         dots = whole_outlines(edges, min_radius / 2**level, max_radius / 2**level)
         dots = resized(pyramid.logs[level], dots.select(np.isin(dots.polarity, polarities)))
-        found.append(replace(dots, frames=frame.enlarged(dots.frames, level)))
+        frames = frame.enlarged(dots.frames, level)
+        # The finer outline of a dot is the better one.
+        found.append(replace(dots, frames=frames, share=dots.share / level))
     return distinct(Dots.joined(found))
 
 

@@ -20,7 +20,7 @@ from ahf_ros.detectors.ring.hypotheses import on_targets
 from ahf_ros.features import frame
 from ahf_ros.imaging.image import as_gray, check_image
 
-_OF_WORDS = 0.25  # of what speaks against a word, which counts against a target
+_OF_WORDS = 0.5  # of what speaks against a word, which counts against a target
 
 
 def estimate_count(image: np.ndarray, settings: DetectorSettings | None = None) -> int:
