@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from ahf_ros.codes.ring import family
-from ahf_ros.detectors.ring.explained import Explained
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
+from ahf_ros.detectors.ring.known import Explained
 from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import Fit
 

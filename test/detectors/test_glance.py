@@ -9,10 +9,10 @@ import pytest
 
 from ahf_ros.codes.ring import family
 from ahf_ros.detectors import DetectorSettings
-from ahf_ros.detectors.ring import glance
+from ahf_ros.detectors.ring import proposals as glance
 from ahf_ros.detectors.ring.circles import REACH
 from ahf_ros.detectors.ring.detector import find_hypotheses, report
-from ahf_ros.detectors.ring.glance import may_be_targets
+from ahf_ros.detectors.ring.proposals import may_be_targets
 from ahf_ros.features.circle_fit import Fit, fit_dots
 from ahf_ros.features.frame import affine_frames
 from ahf_ros.synthetic.scene import SceneSettings, render

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ahf_ros.detectors.ring.prior import NOTHING_KNOWN, Prior
+from ahf_ros.detectors.ring.known import NOTHING_KNOWN, Prior
 
 
 def test_few_certain_targets_tell_nothing_but_which_ids_are_expected() -> None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from ahf_ros.codes.ring import Family
 from ahf_ros.detectors.ring.decoding import Words, bits_at
+from ahf_ros.detectors.ring.likelihood import normal
 from ahf_ros.detectors.ring.polar import DEPTHS, PolarImages
 from ahf_ros.features.robust import median
 from ahf_ros.imaging.logarithm import LOG_OFFSET
@@ -26,15 +27,7 @@ def border_evidence(
 ) -> np.ndarray:
     """Return the log odds that arcs end where the sectors do, against anywhere near, shape (k,).
 
-    Parameters
-    ----------
-    polar : PolarImages
-        Of k targets.
-    words : Words
-        Their words.
-    overhang : ndarray of float64, shape (k,)
-        By how many angles ink is longer at either end than its sectors.
-    family : Family
+    `overhang`, shape (k,), is by how many angles ink is longer at either end than its sectors.
     """
     count, (inner, outer) = words.hidden.shape[1], family.band
     radii = inner + (outer - inner) * np.tile(DEPTHS, (len(overhang), 1)).T
@@ -56,6 +49,5 @@ def border_evidence(
     known[rows, places] = True
     away -= median(away, known, 0.0)[:, None]  # frames may be turned by a part of an angle
     error = np.hypot(_ERROR, _PIXELS * count / (np.pi * (inner + outer) * polar.size))[:, None]
-    there = np.exp(-0.5 * (away / error) ** 2) / (error * np.sqrt(2 * np.pi))
-    odds = np.log((1 - _ANYWHERE) * there * _BESIDE + _ANYWHERE)
+    odds = np.log((1 - _ANYWHERE) * normal(away, error) * _BESIDE + _ANYWHERE)
     return np.asarray((odds * known).sum(axis=1))

@@ -26,19 +26,9 @@ def target_circles(
     samples: int,
     family: Family,
 ) -> Circles:
-    """Return the edges of ring targets.
+    """Return the edges of k targets, with some points a sector on each edge of the band.
 
-    Parameters
-    ----------
-    words : ndarray of int64, shape (k,)
-        Code words, in any rotation.
-    starts : ndarray of float, shape (k,)
-        Where in the frame the sector of the lowest bit starts, rad counter-clockwise from +x.
-    polarity : ndarray of int, shape (k,)
-        1 for a dark target, -1 for a bright one.
-    samples : int
-        Number of points on each edge of the band, a sector.
-    family : Family
+    See `decoding.Words` for words and starts. The polarity is 1 for a dark target, else -1.
     """
     dot = dot_circles(polarity, RAYS)
     count = family.bits * samples

@@ -23,27 +23,15 @@ _UNEXPECTED = 20.0  # evidence against words that are not expected, more than fo
 def best_words(
     sectors: np.ndarray, family: Family, expected: frozenset[int] = frozenset()
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the valid words with the most evidence.
+    """Return the valid words with the most evidence, and the best phase of each.
+
+    Both have the shape (k, COMPETITORS), the best first, words in the rotation read and 0 where
+    there is none. `sectors`, shape (k, p, n), is the evidence for one over zero in each of n bits.
 
     Bands without evidence for any mark are not read. In the others every rotation of every word
     competes at the likeliest of p phases, which are ways to divide the band into sectors. In
     families of more than 50000 rotations, only those words compete that differ from the sectors'
     own evidence in the ten least certain sectors at most.
-
-    Parameters
-    ----------
-    sectors : ndarray of float, shape (k, p, n)
-        Evidence for one over zero in each of the n bits of k bands.
-    family : Family
-    expected : frozenset of int
-        As for `prior`.
-
-    Returns
-    -------
-    words : ndarray of int64, shape (k, COMPETITORS)
-        In the rotation read, the best first; 0 where there is none.
-    phases : ndarray of int, shape (k, COMPETITORS)
-        The best phase of each.
     """
     everything = len(family.words) * family.bits <= _EXHAUSTIVE
     count = COMPETITORS * (2 if expected else 1)
@@ -80,15 +68,9 @@ def _best(scores: np.ndarray, count: int) -> np.ndarray:
 
 
 def prior(words: np.ndarray, family: Family, expected: frozenset[int]) -> np.ndarray:
-    """Return the evidence for words before they are read, float32, of their shape.
+    """Return the evidence for words in any rotation before they are read, float32, of their shape.
 
-    Parameters
-    ----------
-    words : ndarray of int64
-        In any rotation.
-    family : Family
-    expected : frozenset of int
-        IDs of the words that are likely; all are alike where it is empty.
+    `expected` are the IDs that are likely. Empty: all IDs are equally likely.
     """
     if not expected:
         return np.zeros(words.shape, np.float32)
@@ -96,16 +78,9 @@ def prior(words: np.ndarray, family: Family, expected: frozenset[int]) -> np.nda
 
 
 def margins(words: np.ndarray, scores: np.ndarray, best: np.ndarray, family: Family) -> np.ndarray:
-    """Return the evidence for the best words over those of other IDs, shape (k,).
+    """Return the evidence for the best words, indices (k,), over those of other IDs, shape (k,).
 
-    Parameters
-    ----------
-    words : ndarray of int64, shape (k, c)
-    scores : ndarray of float, shape (k, c)
-        Evidence for each.
-    best : ndarray of int, shape (k,)
-        Indices of the best ones.
-    family : Family
+    From words and the evidence for each, shape (k, c).
     """
     ids, rows = canonical(words, family)[1], np.arange(len(words))
     others = np.where(ids == ids[rows, best][:, None], -np.inf, scores).max(axis=1)

@@ -37,11 +37,6 @@ def features(read: Hypotheses) -> np.ndarray:
     Logarithm of the log odds of words against the next ID; root of the log odds of arcs of ink of
     any length against them, negative; the share of the expected edges that are in their place, and
     that of the band that is seen.
-
-    Parameters
-    ----------
-    read : Hypotheses
-        Of k words.
     """
     return np.stack(
         [
@@ -55,13 +50,7 @@ def features(read: Hypotheses) -> np.ndarray:
 
 
 def confidence(values: np.ndarray) -> np.ndarray:
-    """Return the probabilities that readings are right, shape (k,).
-
-    Parameters
-    ----------
-    values : ndarray of float, shape (k, 4)
-        As `features` gives them.
-    """
+    """Return the probabilities that readings are right, shape (k,), from their `features`."""
     return target_probability(values) * logistic(np.expm1(values[:, :1]), _OF_MARGIN)
 
 

@@ -86,17 +86,10 @@ def decode(
     family: Family,
     expected: frozenset[int] = frozenset(),
 ) -> Words:
-    """Return the words with the most evidence.
+    """Return the words with the most evidence, of k bands at m angles in the order of sectors.
 
-    Parameters
-    ----------
-    evidence : Evidence
-        Of k bands at m angles, in the order of the sectors.
-    overhang : ndarray of float64, shape (k,)
-        By how many angles ink is longer at either end than its sectors.
-    family : Family
-    expected : frozenset of int
-        IDs that are likely to be there. Empty: all IDs are equally likely.
+    `overhang`, shape (k,), is by how many angles ink is longer at either end than its sectors;
+    `expected` are IDs that are likely to be there. Empty: all IDs are equally likely.
     """
     of_bands = _doubted(evidence)
     count, angles = of_bands.paper.shape
@@ -120,7 +113,9 @@ def decode(
     )
     along = np.take_along_axis(bits, order[:, None], axis=2).transpose(2, 0, 1)
     evidence_of = _along_words(turned, along)
-    like_paper = _half_paper(evidence.select(read), order)
+    like_paper = np.take_along_axis(
+        np.maximum(some.paper, _half_paper(evidence.select(read))), order, axis=1
+    )
     as_paper = np.where(along, like_paper.T[..., None], turned.paper.T[..., None])
     scores = _covered_paths(evidence_of, as_paper, turned)
     likely = scores + prior(words, family, expected)
@@ -161,16 +156,15 @@ def _bounded(values: np.ndarray, of: Evidence) -> np.ndarray:
     return most * np.tanh(values / most)
 
 
-def _half_paper(evidence: Evidence, order: np.ndarray) -> np.ndarray:
-    """Return the evidence for marks that something like paper covers, or half of them, (k, m)."""
+def _half_paper(evidence: Evidence) -> np.ndarray:
+    """Return the evidence for marks of which something like paper covers one half, (k, m)."""
     (in_paper, out_paper), (in_ink, out_ink) = (
         of.transpose(1, 0, 2) for of in (evidence.paper, evidence.ink)
     )
     # A half that is covered explains what does not agree, but speaks for nothing.
     most = np.float32(_MORE) * evidence.weight[:, None]
     half = np.minimum(np.maximum(in_ink + out_paper, in_paper + out_ink), most)
-    likely = _bounded(np.maximum(half, in_paper + out_paper), evidence)
-    return np.take_along_axis(likely, order, axis=1)
+    return _bounded(half, evidence)
 
 
 def _like_paper(of: Evidence) -> tuple[np.ndarray, np.ndarray]:
@@ -183,12 +177,7 @@ def _like_paper(of: Evidence) -> tuple[np.ndarray, np.ndarray]:
 
 
 def sectors_by_phase(per_sector: int, family: Family) -> np.ndarray:
-    """Return the indices of the angles of every sector at each phase.
-
-    Returns
-    -------
-    ndarray of int, shape (per_sector, family.bits, per_sector)
-    """
+    """Return the indices of the angles of every sector at each phase, (p, bits, p), int."""
     count = family.bits * per_sector
     first = np.arange(per_sector)[:, None] + np.arange(0, count, per_sector)
     return (first[..., None] + np.arange(per_sector)) % count

@@ -15,7 +15,6 @@ import numpy as np
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes.ring import family
 from ahf_ros.detectors.contract import DetectorSettings
-from ahf_ros.detectors.ring.explained import WHOLE, Explained
 from ahf_ros.detectors.ring.families import (
     by_clear_dots,
     decoded,
@@ -24,7 +23,7 @@ from ahf_ros.detectors.ring.families import (
 )
 from ahf_ros.detectors.ring.full_size import at_full_size
 from ahf_ros.detectors.ring.hypotheses import Hypotheses, resolve
-from ahf_ros.detectors.ring.prior import Prior
+from ahf_ros.detectors.ring.known import WHOLE, Explained, Prior
 from ahf_ros.detectors.ring.proposals import PROPOSALS, Proposal, measure_dots, propose_whole
 from ahf_ros.detectors.ring.refinement import refine_centres
 from ahf_ros.features import frame
@@ -46,7 +45,7 @@ class RingDetector:
     ----------
     settings : DetectorSettings
     expected : frozenset of int
-        IDs that are likely to be there; all are alike where it is empty.
+        IDs that are likely to be there. Empty: all IDs are equally likely.
     """
 
     settings: DetectorSettings = field(default_factory=DetectorSettings)
@@ -90,16 +89,7 @@ def find_hypotheses(
     """Return all dots of an image and the words that their bands may show, before any decision.
 
     Parts of faint contrast are stretched and read as images of their own. Of what they show, only
-    certain words that the image itself does not show are added.
-
-    Parameters
-    ----------
-    gray : ndarray of uint8 or float32, shape (height, width)
-        Gray values from 0 to 255.
-    settings : DetectorSettings
-        What the targets look like.
-    expected : frozenset of int
-        IDs that are likely to be there. Empty: all IDs are equally likely.
+    certain words that the image itself does not show are added. `gray` may be uint8 as well.
     """
     found = read_image(gray, settings, expected)
     for part in faint_parts(gray):
@@ -119,13 +109,8 @@ def read_image(
 ) -> Hypotheses:
     """Return the dots and words that an image shows at its own contrast.
 
-    Parameters
-    ----------
-    gray, settings, expected
-        As for `find_hypotheses`.
-    proposals : sequence of callable
-        Ways to propose dots, one after the other. What is read of the dots of one explains edges,
-        which the next ones need not look at.
+    Dots are proposed in several ways, one after the other. What is read of the dots of one
+    explains edges, which the next ones need not look at.
     """
     families = [family(name) for name in settings.families]
     pyramid = image_pyramid(gray, settings.max_radius)

@@ -16,7 +16,7 @@ from ahf_ros.codes.ring import FAMILY_NAMES, Family, canonical, family
 from ahf_ros.codes.same_print import words_of_print
 from ahf_ros.detectors.claims import leading
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
-from ahf_ros.detectors.ring.prior import NOTHING_KNOWN, Prior
+from ahf_ros.detectors.ring.known import NOTHING_KNOWN, Prior
 from ahf_ros.detectors.ring.reading import read_bands
 from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import Fit
@@ -26,15 +26,7 @@ _FIRST = 8  # doubtful words that rivals read first
 
 
 def by_clear_dots(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> list[Family]:
-    """Return families in the order of how many of the clearest dots are theirs.
-
-    Parameters
-    ----------
-    gray : ndarray of float32, shape (height, width)
-        Gray values from 0 to 255.
-    dots : Fit
-    families : sequence of Family
-    """
+    """Return families in the order of how many of the clearest dots are theirs."""
     if len(families) == 1 or not len(dots.frames):
         return list(families)
     clearest = np.argsort(-dots.share * (1 - dots.contrast), kind='stable')[:_CLEAREST]
@@ -51,23 +43,9 @@ def read_families(
     families: Sequence[Family],
     prior: Prior = NOTHING_KNOWN,
 ) -> Hypotheses:
-    """Read the bands about dots as words of several families.
+    """Return what the bands about dots are read as, at least one hypothesis of each dot.
 
-    Parameters
-    ----------
-    gray : ndarray of float32, shape (height, width)
-        Gray values from 0 to 255.
-    dots : Fit
-        Of k dots.
-    families : sequence of Family
-        The first one reads all dots, the others those that are not certain yet.
-    prior : Prior
-        What is known before.
-
-    Returns
-    -------
-    Hypotheses
-        At least one of each dot.
+    The first family reads all dots, the others those that are not certain yet.
     """
     first, *others = families
     found = read_bands(gray, dots, first, prior)
@@ -129,13 +107,7 @@ def _contested(read: Hypotheses) -> Hypotheses:
 
 
 def decoded(hypotheses: Hypotheses) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the families, the canonical code words and the IDs of hypotheses.
-
-    Returns
-    -------
-    names : ndarray of str, shape (k,)
-    codes, ids : ndarray of int64, shape (k,)
-    """
+    """Return the names of families, the canonical code words and the IDs of k hypotheses."""
     names = np.array([code.name for code in hypotheses.families], str)
     codes, ids = np.zeros((2, len(names)), np.int64)
     for name in np.unique(names):
@@ -145,15 +117,7 @@ def decoded(hypotheses: Hypotheses) -> tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 def settle_same_prints(hypotheses: Hypotheses, families: Sequence[str]) -> Hypotheses:
-    """Assign prints shared by several families to one family, or mark them uncertain.
-
-    Parameters
-    ----------
-    hypotheses : Hypotheses
-        Of all dots of an image.
-    families : sequence of str
-        Names of the families that the image may show.
-    """
+    """Assign prints shared by several of the named families to one, or mark them uncertain."""
     names, codes, _ = decoded(hypotheses)
     certain = np.flatnonzero(hypotheses.certain)
     prints = {int(i): words_of_print(str(names[i]), int(codes[i])) for i in certain}

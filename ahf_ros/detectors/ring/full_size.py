@@ -24,12 +24,7 @@ from ahf_ros.features.soft_edges import SOFT, fit_circles_of_any_blur
 def at_full_size(images: Sequence[np.ndarray], read: Hypotheses) -> Hypotheses:
     """Return hypotheses in px of an image, those of certain words with frames from its edges.
 
-    Parameters
-    ----------
-    images : sequence of ndarray of uint8 or float32
-        The image and its halves, down to the one in which the targets were read.
-    read : Hypotheses
-        In px of that one.
+    `images` are the image and its halves, down to the one in whose px the targets were read.
     """
     read = with_soft_edges(images[-1], read, read.certain)
     for image in reversed(images[:-1]):
@@ -45,16 +40,7 @@ def at_full_size(images: Sequence[np.ndarray], read: Hypotheses) -> Hypotheses:
 
 
 def with_soft_edges(image: np.ndarray, read: Hypotheses, right: np.ndarray) -> Hypotheses:
-    """Return hypotheses, those of right words with soft edges with frames from all of these.
-
-    Parameters
-    ----------
-    image : ndarray of uint8 or float32
-        In which they were read.
-    read : Hypotheses
-    right : ndarray of bool, shape (k,)
-        Whether their words are right.
-    """
+    """Return hypotheses, those of right words with soft edges with frames from all of these."""
     return _measured(image, read, right & (read.blur > SOFT))
 
 

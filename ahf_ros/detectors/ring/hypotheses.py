@@ -123,23 +123,12 @@ class Hypotheses(ArrayRecord):
 
 
 def resolve(hypotheses: Hypotheses, ids: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Resolve which hypotheses to keep, and which of these stay certain.
+    """Return which hypotheses to keep, and which of these stay certain, bool, shape (k,) each.
 
-    Parameters
-    ----------
-    hypotheses : Hypotheses
-        In the order of their evidence, the certain ones first.
-    ids : ndarray of int, shape (k,)
-        Equal where words are the same.
-
-    Returns
-    -------
-    kept : ndarray of bool, shape (k,)
-        Whether it is the best one of its dot. Dots on the band of a certain target are its sectors
-        and are dropped.
-    certain : ndarray of bool, shape (k,)
-        Whether it is kept, and neither another reading of its dot, nor a target whose band
-        overlaps, nor another claim to its ID comes near to it.
+    They come in the order of their evidence, the certain ones first; `ids` are equal where words
+    are the same. The best one of a dot is kept. Dots on the band of a certain target are its
+    sectors and are dropped. Certain stays what neither another reading of its dot, nor a target
+    whose band overlaps, nor another claim to its ID comes near to.
     """
     seen, order = hypotheses.seen, np.arange(len(ids))
     on_it = on_targets(hypotheses, hypotheses.certain)

@@ -39,24 +39,9 @@ def predicted_light(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the gray values that paper has at points of bands, and how far they are known.
 
-    Parameters
-    ----------
-    gray : ndarray of float32, shape (height, width)
-        Gray values from 0 to 255.
-    frames : ndarray of float64, shape (k, 3, 3)
-        Of the targets.
-    lift : ndarray of float64, shape (k,)
-        Gray values that black is lifted to.
-    angles, radii : ndarray of float64, shape (m,) and (d,)
-        Of the points, rad and dot radii.
-    band : tuple of 2 float
-        Radii of the band, dot radii.
-
-    Returns
-    -------
-    light : ndarray of float32, shape (k, m, d)
-    spread : ndarray of float32, shape (k, m, d)
-        Standard deviation of its logarithm; infinite where no ground predicts it.
+    The points are at angles (m,), rad, and radii (d,) of targets with frames (k, 3, 3), in which
+    black is lifted to gray values (k,). The second array is the standard deviation of the
+    logarithm of the first, infinite where no ground predicts it; both are float32, (k, m, d).
     """
     points, ground, candidates, order = _geometry(band)
     seen = np.fft.rfft2(ground, (_TRANSFORM,) * 2)

@@ -123,12 +123,7 @@ def edge_evidence(
 ) -> Evidence:
     """Return the evidence of steps across the edges of bands.
 
-    Parameters
-    ----------
-    polar : PolarImages
-        Of k dots.
-    radius, growth, band
-        Of the dots as printed and of their colour, (k,), in units of the frame; radii of the band.
+    From the radii of the dots as printed and the growth of their colour, (k,), units of the frame.
     """
     inner, outer = band_edges(radius, growth, band)
     beside = _BESIDE + np.maximum(polar.blur - SOFT, 0)
@@ -206,12 +201,12 @@ def _step_evidence(
     limit = polar.glare[:, None, None]
     glare, white = ground >= limit, np.minimum(*ground.swapaxes(0, 1))[:, None] >= SATURATED
     flat = np.where(white & (limit <= SATURATED), np.float32(_WHITE), np.float32(_FLAT))
-    flat = _normal(step, np.sqrt(flat**2 + noise**2 + of_ground**2))
+    flat = normal(step, np.sqrt(flat**2 + noise**2 + of_ground**2))
     more = (step - mark) * np.sign(mark)
     expected = of_ground * _gain(ground, ink)
     low, high = (np.sqrt(spread**2 + noise**2 + expected**2) for spread in (_MARK, _MARK_TAIL))
     width = np.where(more > 0, high, low)
-    inked = _normal(more, width) * (2 * width / (low + high))
+    inked = normal(more, width) * (2 * width / (low + high))
     if glare.any():
         less = glare & (more < 0) & (more > -np.abs(mark))
         inked = np.where(less, np.maximum(inked, 1 / np.maximum(np.abs(mark), _FLAT)), inked)
@@ -241,20 +236,9 @@ def level_evidence(
 ) -> Evidence:
     """Return the evidence of levels in dots and bands, and beside these, under predicted light.
 
-    Parameters
-    ----------
-    polar : PolarImages
-        Of k targets, for how ink looks.
-    levels : ndarray of float32, shape (k, m, d)
-        Gray values.
-    light : ndarray of float32, shape (k, m, d)
-        Gray values of paper there, as `predicted_light` gives them.
-    spread : ndarray of float32, shape (k, m, d)
-        Deviation of its logarithm; infinite where nothing predicts it.
-    radii : ndarray of float64, shape (d,)
-        Where they are, in dot radii: in the dot, in the gap, in the band or beyond it.
-    band : tuple of 2 float
-        Radii of the band, dot radii.
+    Gray values `levels`, shape (k, m, d), were read at radii (d,): in the dot, in the gap, in the
+    band or beyond it. `light` and `spread`, as `predicted_light` gives them, are what paper has
+    there and the deviation of its logarithm. Of `polar` only the look of ink is used.
     """
     level, noise = polar.logs(levels)
     known = np.isfinite(spread)
@@ -262,7 +246,7 @@ def level_evidence(
     of_paper = np.sqrt(_PAPER_LEVEL**2 + noise**2 + spread**2)
     of_ink = np.sqrt(_INK_LEVEL**2 + noise**2 + (spread * _gain(light, inked)) ** 2)
     errors = level - polar.logs(light)[0]
-    densities = [_normal(errors, of_paper), _normal(level - polar.logs(inked)[0], of_ink)]
+    densities = [normal(errors, of_paper), normal(level - polar.logs(inked)[0], of_ink)]
     anything = _PLAIN * densities[0] + (1 - _PLAIN) * _ANY
     depth = np.minimum(_DEPTH * polar.size / CORRELATION, 1)
     share = (weights(polar) * depth).astype(np.float32)
@@ -305,7 +289,7 @@ def _surprise(errors: np.ndarray, width: np.ndarray, which: np.ndarray) -> np.nd
     return np.clip(share, *SURPRISES)[:, None, None]
 
 
-def _normal(values: np.ndarray, spread: np.ndarray) -> np.ndarray:
+def normal(values: np.ndarray, spread: np.ndarray) -> np.ndarray:
     """Return the densities of values under normal distributions about 0."""
     density: np.ndarray = np.exp(-0.5 * (values / spread) ** 2) / (spread * np.sqrt(2 * np.pi))
     return density

@@ -124,21 +124,7 @@ def polar_images(
     count: int,
     circles: int = CIRCLES,
 ) -> PolarImages:
-    """Return the polar images of targets.
-
-    Parameters
-    ----------
-    gray : ndarray of float32, shape (height, width)
-        Gray values from 0 to 255.
-    dots : Fit
-        Of k dots, or of dots and bands.
-    band : tuple of 2 float
-        Radii of the band, dot radii.
-    count : int
-        Number of angles, see `angles_of`.
-    circles : int
-        Number of circles.
-    """
+    """Return the polar images of targets at some angles, see `angles_of`, on some circles."""
     angles, (inner, outer) = angles_of(count), band
     outermost = outer + _MARGIN
     radii = np.linspace(_INNERMOST, outermost, circles)

@@ -17,6 +17,7 @@ from ahf_ros.detectors.ring.borders import border_evidence
 from ahf_ros.detectors.ring.circles import REACH, target_circles
 from ahf_ros.detectors.ring.decoding import CLEAR, DOUBT, Words, decode
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
+from ahf_ros.detectors.ring.known import NOTHING_KNOWN, Prior
 from ahf_ros.detectors.ring.light import predicted_light
 from ahf_ros.detectors.ring.likelihood import (
     HOPEFUL,
@@ -35,7 +36,6 @@ from ahf_ros.detectors.ring.polar import (
     angles_of,
     polar_images,
 )
-from ahf_ros.detectors.ring.prior import NOTHING_KNOWN, Prior
 from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import Fit, fit_circles
 from ahf_ros.features.sampling import sample_circles
@@ -50,23 +50,7 @@ _SHIFTS = np.arange(-2.4, 2.41, 0.4)  # of edges, that are tried, px
 def read_bands(
     gray: np.ndarray, dots: Fit, family: Family, prior: Prior = NOTHING_KNOWN
 ) -> Hypotheses:
-    """Read the bands about dots, and refine dot and band together.
-
-    Parameters
-    ----------
-    gray : ndarray of float32, shape (height, width)
-        Gray values from 0 to 255.
-    dots : Fit
-        Of k dots.
-    family : Family
-    prior : Prior
-        What is known before, in px of the image.
-
-    Returns
-    -------
-    Hypotheses
-        One of each dot.
-    """
+    """Read the bands about dots, and refine dot and band together: one hypothesis of each dot."""
     parts = [
         _read_part(gray, dots.select(slice(start, start + PART)), family, prior)
         for start in range(0, max(len(dots.frames), 1), PART)
@@ -87,26 +71,19 @@ def _read_part(gray: np.ndarray, dots: Fit, family: Family, prior: Prior) -> Hyp
     printed = dots.select(read)
     printed = replace(printed, frames=frame.scaled(printed.frames, 1 - growth))
     # In the frame of the printed dot, the same growth is a larger share.
-    larger = growth / (1 - growth)
-    words = _settled(
-        gray,
-        printed,
-        polar.select(read),
-        edges,
-        words.select(read),
-        larger,
-        family,
-        prior.expected,
-    )
+    overhang = _overhang(growth / (1 - growth), family)
+    some = polar.select(read), edges, words.select(read)
+    words = _settled(gray, printed, *some, overhang, family, prior.expected)
     good = _mean_odds(words, edges.weight) > HOPEFUL
     read, printed, words = read[good], printed.select(good), words.select(good)
     fit = _joint_fit(gray, printed, words, PER_SECTOR // 2, 1, family)
     growth = fit.polarity * fit.edge_shift / fit.size
     polar = polar_images(gray, fit, family.band, family.bits * PER_SECTOR)
     edges = edge_evidence(polar, np.ones(len(read)), growth, family.band)
-    words = decode(edges, _overhang(growth, family), family, prior.expected)
-    words = _settled(gray, fit, polar, edges, words, growth, family, prior.expected)
-    of_borders = border_evidence(polar, words, _overhang(growth, family), family)
+    overhang = _overhang(growth, family)
+    words = decode(edges, overhang, family, prior.expected)
+    words = _settled(gray, fit, polar, edges, words, overhang, family, prior.expected)
+    of_borders = border_evidence(polar, words, overhang, family)
     words = replace(words, coded=words.coded + of_borders)
     good = _mean_odds(words, edges.weight) > HOPEFUL
     read, fit, words = read[good], fit.select(good), words.select(good)
@@ -120,15 +97,6 @@ def best_growth(
     """Return by how much the colour of dots has grown on all edges, so that these fit best, (k,).
 
     In the dot radii of the image; a dot that is seen with radius 1 was printed with less.
-
-    Parameters
-    ----------
-    polar : PolarImages
-        Of k dots.
-    band : tuple of 2 float
-        Radii of the band, dot radii.
-    prior : Prior
-        What is known before, in px of the image.
     """
     polar = replace(polar, gray=polar.gray[:, ::2], reach=polar.reach[:, ::2])
     best = np.full(len(polar.size), -np.inf)
@@ -158,33 +126,27 @@ def _settled(
     polar: PolarImages,
     edges: Evidence,
     words: Words,
-    growth: np.ndarray,
+    overhang: np.ndarray,
     family: Family,
     expected: frozenset[int],
 ) -> Words:
     """Return the words of targets, by all evidence where edges alone leave a doubt.
 
-    Targets are in the frames of their printed dots, where ink has grown by shape (k,), dot radii.
+    Targets are in the frames of their printed dots.
     """
     some = np.flatnonzero(_doubtful(words, edges))
     if not some.size:
         return words
     targets, polar, edges = targets.select(some), polar.select(some), edges.select(some)
     inner, outer = family.band
-    radii = np.concatenate(
-        [
-            DOT,
-            1 + (inner - 1) * GAP,
-            inner + (outer - inner) * DEPTHS,
-            outer + MARGIN,
-        ]
-    )
+    of_gap, of_band = 1 + (inner - 1) * GAP, inner + (outer - inner) * DEPTHS
+    radii = np.concatenate([DOT, of_gap, of_band, outer + MARGIN])
     angles = angles_of(family.bits * PER_SECTOR)
     levels = np.maximum(sample_circles(gray, targets.frames, angles, radii), 0)
     levels = lifted(levels, polar.lift.astype(np.float32)[:, None, None])
     light = predicted_light(gray, targets.frames, polar.lift, angles, radii, family.band)
     evidence = edges.plus(level_evidence(polar, levels, *light, radii, family.band))
-    of_all = decode(evidence, _overhang(growth[some], family), family, expected)
+    of_all = decode(evidence, overhang[some], family, expected)
     hidden = of_all.hidden | (polar.reach < radii[len(DOT) + len(GAP)])
     # What speaks against no target is that of edges, so that all targets compare.
     return words.replaced(some, replace(of_all, seen=words.seen[some], hidden=hidden))

@@ -16,7 +16,7 @@ from ahf_ros.codes.ring import Family, canonical
 from ahf_ros.detectors.ring.circles import RAYS, REACH
 from ahf_ros.detectors.ring.full_size import with_soft_edges
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
-from ahf_ros.detectors.ring.prior import Prior
+from ahf_ros.detectors.ring.known import Prior
 from ahf_ros.detectors.ring.reading import read_bands
 from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import ENOUGH, Fit, fit_dots
@@ -38,12 +38,13 @@ def refine_centres(
 
     Where the band of a target can be read and agrees with `Target.code`, dot and band together
     give the image of the physical centre. Elsewhere the dot gives the centre of its ellipse. A
-    target without an edge near its ellipse is returned unchanged. No ID changes.
+    target without an edge near its ellipse is returned unchanged. No ID and no place in the list
+    changes.
 
     Parameters
     ----------
     image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
-        The image as received.
+        The image as received; `ValueError` if it is none, see `check_image`.
     targets : sequence of Target
         To about a pixel.
     family : Family
@@ -51,17 +52,7 @@ def refine_centres(
     polarities : sequence of int
         Those to be expected: 1 for a dark dot on bright ground, -1 for a bright one on dark.
     expected : frozenset of int
-        IDs that are likely to be there; all are alike where it is empty.
-
-    Returns
-    -------
-    list of Target
-        In the order of `targets`.
-
-    Raises
-    ------
-    ValueError
-        If `image` is not an image, see `ahf_ros.imaging.image.check_image`.
+        IDs that are likely to be there. Empty: all IDs are equally likely.
     """
     check_image(image)
     if not targets:

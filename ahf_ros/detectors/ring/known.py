@@ -1,4 +1,8 @@
-"""What is explained of an image while its dots are looked for: certain targets, and whole dots."""
+"""What is known of an image while its targets are read.
+
+Certain targets and whole dots explain edges, so that no dots are looked for there, and tell how
+edges have shifted.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +14,14 @@ from ahf_ros.detectors.ring.circles import REACH
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
+from ahf_ros.features.robust import NORMAL
 
 WHOLE = 0.9
 """Share of the edge of a dot that is explained, or reported, without a word."""
+
+_USUAL = 1.0  # deviation of the shift of edges of images, px
+_LEAST = 0.3  # of those of the targets of one image, which are not lit and printed alike
+_FEWEST = 3  # certain targets that tell the shift of an image
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,3 +62,33 @@ class Explained(ArrayRecord):
     def outlines_in(self, level: int) -> np.ndarray:
         """Return the outlines with edges in the image that is halved `level` times, its px."""
         return frame.reduced(self.outlines[self.sizes > 2**level], level)
+
+
+@dataclass(frozen=True, slots=True)
+class Prior:
+    """What is known before a target is read.
+
+    Attributes
+    ----------
+    expected : frozenset of int
+        IDs that are likely to be there. Empty: all IDs are equally likely.
+    shift, deviation : float
+        By how much what is dark has probably grown on all edges, and its standard deviation, px.
+    """
+
+    expected: frozenset[int] = frozenset()
+    shift: float = 0.0
+    deviation: float = _USUAL
+
+    @staticmethod
+    def after(expected: frozenset[int], shifts: np.ndarray) -> Prior:
+        """Return what is known once certain targets show shifts of edges, shape (k,), px."""
+        if len(shifts) < _FEWEST:
+            return Prior(expected)
+        shift = float(np.median(shifts))
+        spread = NORMAL * float(np.median(np.abs(shifts - shift)))
+        return Prior(expected, shift, float(np.clip(spread, _LEAST, _USUAL)))
+
+
+NOTHING_KNOWN = Prior()
+"""That of an image of which no target was read yet."""
