@@ -18,7 +18,7 @@ from ahf_ros.detectors.ring.likelihood import SURPRISES, Evidence
 from ahf_ros.features.array_record import ArrayRecord
 
 _COVER = 6.0  # price of something that covers a stretch of the band
-_MOST = 5.0  # most that a reading says for or against a word
+_MAXIMUM_READING = 5.0  # for or against a word
 _LIKE_PAPER = 8.5  # the same of something that looks like paper
 _IN_LIGHT = 15.0  # times the probability of edges of light beyond the least, by which that grows
 _MORE = 0.6  # of each further reading of that
@@ -152,7 +152,7 @@ def _doubted(evidence: Evidence) -> Evidence:
 
 
 def _bounded(values: np.ndarray, of: Evidence) -> np.ndarray:
-    most = np.float32(_MOST) * of.weight[:, None]
+    most = np.float32(_MAXIMUM_READING) * of.weight[:, None]
     return most * np.tanh(values / most)
 
 

@@ -19,9 +19,9 @@ from ahf_ros.features.robust import NORMAL
 WHOLE = 0.9
 """Share of the edge of a dot that is explained, or reported, without a word."""
 
-_USUAL = 1.0  # deviation of the shift of edges of images, px
-_LEAST = 0.3  # of those of the targets of one image, which are not lit and printed alike
-_FEWEST = 3  # certain targets that tell the shift of an image
+_USUAL_DEVIATION = 1.0  # of the shift of edges of images, px
+_MINIMUM_DEVIATION = 0.3  # of targets of one image, which are not lit and printed alike, px
+_MINIMUM_TARGETS = 3  # certain targets that tell the shift of an image
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,16 +78,16 @@ class Prior:
 
     expected: frozenset[int] = frozenset()
     shift: float = 0.0
-    deviation: float = _USUAL
+    deviation: float = _USUAL_DEVIATION
 
     @staticmethod
     def after(expected: frozenset[int], shifts: np.ndarray) -> Prior:
         """Return what is known once certain targets show shifts of edges, shape (k,), px."""
-        if len(shifts) < _FEWEST:
+        if len(shifts) < _MINIMUM_TARGETS:
             return Prior(expected)
         shift = float(np.median(shifts))
         spread = NORMAL * float(np.median(np.abs(shifts - shift)))
-        return Prior(expected, shift, float(np.clip(spread, _LEAST, _USUAL)))
+        return Prior(expected, shift, float(np.clip(spread, _MINIMUM_DEVIATION, _USUAL_DEVIATION)))
 
 
 NOTHING_KNOWN = Prior()

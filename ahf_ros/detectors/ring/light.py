@@ -19,7 +19,7 @@ from ahf_ros.imaging.logarithm import LOG_OFFSET
 
 _CELLS, _TRANSFORM = 64, 96  # sides of the rectified target and of its transforms
 _MARGIN = 0.85  # beyond the band, dot radii
-_FARTHEST = 3.6  # shift, dot radii
+_MAXIMUM_SHIFT = 3.6  # shift, dot radii
 _ASIDE = 0.18  # distance of ground from edges, dot radii
 _OVERLAP = 0.12  # share of the ground that a shift must compare
 _SHIFTS = 60  # best ones, that predict
@@ -100,7 +100,7 @@ def _geometry(
     overlap = np.fft.irfft2(np.abs(seen) ** 2, (_TRANSFORM,) * 2)
     steps = np.fft.fftfreq(_TRANSFORM, 1 / _TRANSFORM) * (2 * reach / _CELLS)
     away = np.hypot(steps[:, None], steps)
-    candidates = (overlap > _OVERLAP * whole.sum()) & (away > 0) & (away <= _FARTHEST)
+    candidates = (overlap > _OVERLAP * whole.sum()) & (away > 0) & (away <= _MAXIMUM_SHIFT)
     which = np.flatnonzero(candidates)
     return points, whole, which, np.random.default_rng(0).uniform(1, _ALIKE, len(which))
 

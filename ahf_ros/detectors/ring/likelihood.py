@@ -24,7 +24,7 @@ from ahf_ros.imaging.image import SATURATED
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
 _BESIDE = 2.6  # distance of a reading from an edge that is sharp, px
-_NEAREST, _FARTHEST = 0.13, 0.36  # bounds of that distance, dot radii
+_MINIMUM_BESIDE, _MAXIMUM_BESIDE = 0.13, 0.36  # bounds of that distance, dot radii
 _FLAT = 0.12  # deviation of steps of ln where there is no edge, but for noise
 _WHITE = 0.03  # the same of paper between ground that glare makes white
 _MARK, _MARK_TAIL = 0.18, 0.3  # of the step of a mark: towards less, where blur fills it, and more
@@ -127,7 +127,7 @@ def edge_evidence(
     """
     inner, outer = band_edges(radius, growth, band)
     beside = _BESIDE + np.maximum(polar.blur - SOFT, 0)
-    beside = np.clip(beside / polar.size, _NEAREST, _FARTHEST)
+    beside = np.clip(beside / polar.size, _MINIMUM_BESIDE, _MAXIMUM_BESIDE)
     beside = np.minimum(beside, 0.45 * (outer - inner))
     before = np.minimum(beside, 0.5 * (inner - radius - growth))
     edges = light_edges(polar, radius, growth, inner)

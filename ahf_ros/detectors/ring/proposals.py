@@ -30,7 +30,7 @@ _SHIFTS = (-1.2, 0.0, 1.2)  # of edges, px; readings keep farther away from thes
 _COVER = 5.0  # price of a sector that is covered, less than where words are decoded
 _HOPEFUL = 0.1  # bound of the mean evidence of a reading, from which a band is read
 _CAP = 3.0  # evidence of a reading against bare paper
-_ALIKE, _MOST = 0.15, 0.5  # difference of ln, and share of what is beyond, that show a hole
+_ALIKE, _BEYOND = 0.15, 0.5  # difference of ln, and share of what is beyond, that show a hole
 
 Proposal = Callable[[Octave, Sequence[int], Explained], Dots]
 """From an octave, the polarities of dots and what is explained already to dots of the octave."""
@@ -120,7 +120,7 @@ def _holes(polar: PolarImages, band: tuple[float, float]) -> np.ndarray:
         for radii in (DOT, band[1] + MARGIN)
     )
     alike = np.abs(outside - np.median(inside, axis=1, keepdims=True)) < _ALIKE
-    return np.asarray((polar.polarity < 0) & (alike.mean(axis=1) > _MOST))
+    return np.asarray((polar.polarity < 0) & (alike.mean(axis=1) > _BEYOND))
 
 
 def _of_sectors(values: np.ndarray, bits: int) -> np.ndarray:

@@ -24,7 +24,7 @@ from ahf_ros.features.ellipse_targets import ellipse_fields
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, Target
 
-_FARTHEST, _FARTHEST_SHARE = 1.0, 0.2  # that a centre is moved: px, or radii of its dot
+_MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE = 1.0, 0.2  # that a centre is moved: px, or radii of its dot
 
 
 def refine_centres(
@@ -62,7 +62,7 @@ def refine_centres(
     start = frame.affine_frames(*np.array(columns).T)
     located = _locate(gray, start, targets, family, polarities, expected)
     moved = np.hypot(*(located.frames[:, :2, 2] - start[:, :2, 2]).T)
-    reach = np.maximum(_FARTHEST, _FARTHEST_SHARE * frame.ellipse_axes(start)[1])
+    reach = np.maximum(_MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE * frame.ellipse_axes(start)[1])
     good = (located.share >= ENOUGH) & (moved <= reach)
     places = ellipse_fields(located.frames, located.covariance, located.shift)
     return [

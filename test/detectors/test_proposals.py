@@ -9,7 +9,7 @@ import pytest
 
 from ahf_ros.codes.ring import family
 from ahf_ros.detectors import DetectorSettings
-from ahf_ros.detectors.ring import proposals as glance
+from ahf_ros.detectors.ring import proposals
 from ahf_ros.detectors.ring.circles import REACH
 from ahf_ros.detectors.ring.detector import find_hypotheses, report
 from ahf_ros.detectors.ring.proposals import may_be_targets
@@ -74,7 +74,7 @@ def test_a_glance_saves_time_and_changes_nothing(
     changes = {'width': 800, 'height': 600, 'targets': 6}
     image, settings = render(replace(scene, **changes)).image, DetectorSettings()
     few = find_hypotheses(image, settings)
-    monkeypatch.setattr(glance, '_HOPEFUL', -np.inf)
+    monkeypatch.setattr(proposals, '_HOPEFUL', -np.inf)
     all_dots = find_hypotheses(image, settings)
     assert len(all_dots.words) > 1.2 * len(few.words)
     targets, expected = report(few, settings), report(all_dots, settings)

@@ -1,14 +1,15 @@
-"""What is explained of an image while its dots are looked for."""
+"""What is known of an image while its targets are read."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from ahf_ros.codes.ring import family
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
-from ahf_ros.detectors.ring.known import Explained
+from ahf_ros.detectors.ring.known import NOTHING_KNOWN, Explained, Prior
 from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import Fit
 
@@ -42,3 +43,17 @@ def test_certain_targets_are_explained_with_their_bands_and_whole_dots_without()
     both = Explained.joined([target, dot])
     assert [len(both.outlines_in(level)) for level in (0, 3, 4, 6)] == [2, 2, 1, 0]
     assert np.allclose(both.outlines_in(0), both.outlines)
+
+
+def test_few_certain_targets_tell_nothing_but_which_ids_are_expected() -> None:
+    assert Prior.after(frozenset(), np.array([0.8, 0.8])) == NOTHING_KNOWN
+    assert Prior.after(frozenset({7}), np.zeros(0)) == Prior(frozenset({7}))
+
+
+def test_the_shift_of_certain_targets_is_probably_that_of_the_others() -> None:
+    alike = Prior.after(frozenset(), np.array([0.8, 0.82, 0.78, 0.8, 5.0]))
+    assert alike.shift == pytest.approx(0.8)
+    assert alike.deviation < NOTHING_KNOWN.deviation
+    apart = Prior.after(frozenset(), np.array([-1.5, -0.5, 0.4, 1.6]))
+    assert apart.deviation == NOTHING_KNOWN.deviation
+    assert apart.deviation > alike.deviation > 0  # not all are lit and printed alike
