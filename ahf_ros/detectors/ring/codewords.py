@@ -6,7 +6,7 @@ from functools import cache, lru_cache
 
 import numpy as np
 
-from ahf_ros.codes.cyclic import rotated_words
+from ahf_ros.codes.cyclic import rotated_words, smallest_rotation
 from ahf_ros.codes.ring import Family, canonical
 
 _EXHAUSTIVE = 50_000  # rotations of words, up to which all of them compete
@@ -74,7 +74,8 @@ def prior(words: np.ndarray, family: Family, expected: frozenset[int]) -> np.nda
     """
     if not expected:
         return np.zeros(words.shape, np.float32)
-    return _prior_table(family, expected)[words]
+    likely = np.isin(words, _expected_rotations(family, expected))
+    return np.where(likely, np.float32(0), np.float32(-_UNEXPECTED))
 
 
 def margins(words: np.ndarray, scores: np.ndarray, best: np.ndarray, family: Family) -> np.ndarray:
@@ -90,7 +91,7 @@ def margins(words: np.ndarray, scores: np.ndarray, best: np.ndarray, family: Fam
 @cache
 def _all_rotations(family: Family) -> tuple[np.ndarray, np.ndarray]:
     """Return all rotations of all words, and their bits."""
-    return _with_ones(np.flatnonzero(_number_table(family)), family.bits)
+    return _with_ones(_rotated(family.words, family), family.bits)
 
 
 def _near_rotations(
@@ -104,34 +105,22 @@ def _near_rotations(
     certain = (sectors > 0) @ (1 << np.arange(family.bits)) & ~(1 << uncertain).sum(axis=1)
     choices = np.arange(1 << _UNCERTAIN)[:, None] >> np.arange(_UNCERTAIN) & 1
     words = np.unique(certain[:, None] + (1 << uncertain) @ choices.T)
-    valid = words[_number_table(family)[words] > 0]
+    valid = words[np.isin(smallest_rotation(words, family.bits), family.words)]
     # At least two words have to compete.
-    words = np.concatenate([valid, family.words[:2], _rotations(family, expected)])
+    words = np.concatenate([valid, family.words[:2], _expected_rotations(family, expected)])
     return _with_ones(np.unique(words), family.bits)
 
 
 @lru_cache(maxsize=8)
-def _rotations(family: Family, numbers: frozenset[int]) -> np.ndarray:
-    """Return all rotations of the words with some IDs."""
-    return np.flatnonzero(np.isin(_number_table(family), list(numbers)))
+def _expected_rotations(family: Family, numbers: frozenset[int]) -> np.ndarray:
+    """Return all rotations of the words with some IDs, ascending."""
+    return _rotated(family.words[np.isin(family.numbers, list(numbers))], family)
 
 
-@lru_cache(maxsize=8)
-def _prior_table(family: Family, expected: frozenset[int]) -> np.ndarray:
-    """Return the evidence for all words of n bits before they are read."""
-    table = np.full(1 << family.bits, -_UNEXPECTED, np.float32)
-    table[_rotations(family, expected)] = 0
-    return table
-
-
-@cache
-def _number_table(family: Family) -> np.ndarray:
-    """Return the IDs of all words of n bits in any rotation, 0 for those that have none."""
-    numbers = np.zeros(1 << family.bits, np.int32)
-    for turn in range(family.bits):
-        turned = rotated_words(family.words, turn, family.bits)
-        numbers[turned] = np.arange(1, len(turned) + 1)
-    return numbers
+def _rotated(words: np.ndarray, family: Family) -> np.ndarray:
+    """Return all rotations of words, ascending."""
+    turns = [rotated_words(words, turn, family.bits) for turn in range(family.bits)]
+    return np.unique(turns)
 
 
 def _with_ones(words: np.ndarray, bits: int) -> tuple[np.ndarray, np.ndarray]:

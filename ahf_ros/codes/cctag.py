@@ -1,0 +1,58 @@
+"""Concentric circles whose widths are the code: CCTag (Calvet et al., CVPR 2016, p. 562).
+
+From the outside to the middle, black and white rings follow each other, each of which is narrow or
+wide. Read in that order, the highest bit first and 1 where a ring is wide, they are the ID. What
+is left in the middle is white. The tables of radii that the authors print follow this rule.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+_WIDTHS = {'cctag3': (5, 0.10, 0.15), 'cctag4': (7, 0.08, 0.12)}
+
+CCTAG_NAMES = tuple(_WIDTHS)
+"""Families of CCTag, by the number of their black rings."""
+
+
+@dataclass(frozen=True, slots=True)
+class CircleFamily:
+    """The targets of one number of rings.
+
+    Attributes
+    ----------
+    name : str
+    bits : int
+        Number of rings, black and white, that are read.
+    narrow, wide : float
+        Widths of rings, in radii of the outermost circle.
+    """
+
+    name: str
+    bits: int
+    narrow: float
+    wide: float
+
+    @property
+    def numbers(self) -> range:
+        """All IDs."""
+        return range(1 << self.bits)
+
+    def radii(self, numbers: np.ndarray) -> np.ndarray:
+        """Return the radii of the circles of IDs (k,), from 1 inwards, shape (k, bits + 1)."""
+        wide = np.asarray(numbers)[:, None] >> np.arange(self.bits)[::-1] & 1
+        widths = np.where(wide, self.wide, self.narrow)
+        return 1 - np.concatenate([np.zeros((len(widths), 1)), widths.cumsum(axis=1)], axis=1)
+
+
+def circle_family(name: str) -> CircleFamily:
+    """Return the family of a name of `CCTAG_NAMES`.
+
+    Examples
+    --------
+    >>> circle_family('cctag3').radii([4]).round(2).tolist()
+    [[1.0, 0.9, 0.8, 0.65, 0.55, 0.45]]
+    """
+    return CircleFamily(name, *_WIDTHS[name])
