@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from ahf_ros.filtering.genes import FIRST
-from ahf_ros.filtering.homomorphic import HomomorphicFilter
-from ahf_ros.filtering.identifier import Identifier
+from ahf_ros.filtering.homomorphic import HomomorphicFilter, median_distance
+from ahf_ros.filtering.identifier import Identifier, is_mirrored
 from ahf_ros.filtering.settings import (
     EXTENDED,
     PUBLISHED,
@@ -17,9 +17,10 @@ from ahf_ros.filtering.settings import (
     GeneticSettings,
     TuningSettings,
 )
-from ahf_ros.filtering.transfer import median_distance
 from ahf_ros.filtering.trials import CONFIRMED
+from ahf_ros.session import create_identifier
 from ahf_ros.settings.parameter import parameters
+from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import UNDECODED, Target, count_codes
 
 COUNT = 144
@@ -560,3 +561,39 @@ def test_a_coarse_search_in_vain_does_not_depend_on_the_threads(threads):
 
     assert run(threads) == run(1)
     assert run(1).filter.evaluations == 1 + 30 + CONFIRMED
+
+
+def targets_with(*numbers: int) -> list[Target]:
+    return [Target(number, number, 50.0 * number, 5.0, 4.0, 4.0) for number in numbers]
+
+
+def mirrored(target: Target) -> int | None:
+    """Return 7 for 3, 3 for 7, and so on; 5 is the same, and from 10 on nothing is known."""
+    return 10 - target.id if target.id < 10 else None
+
+
+def test_most_ids_decide():
+    assert is_mirrored(targets_with(7, 8, 9), {1, 2, 3}, mirrored)
+    assert is_mirrored(targets_with(7, 8, 9, 3, 20), {1, 2, 3}, mirrored)
+    assert not is_mirrored(targets_with(1, 2, 3), {1, 2, 3}, mirrored)
+    assert not is_mirrored(targets_with(1, 2, 8, 9), {1, 2, 3}, mirrored)
+
+
+def test_what_cannot_tell_does_not():
+    assert not is_mirrored(targets_with(7, 8, 9), (), mirrored)  # any ID may be there
+    assert not is_mirrored(targets_with(7, 8), {2, 3}, mirrored)  # too few
+    assert not is_mirrored(targets_with(11, 12, 13), {1, 2, 3}, mirrored)  # others
+    assert not is_mirrored(targets_with(9, UNDECODED, UNDECODED), {1, 11}, mirrored)
+    assert not is_mirrored([], {1, 2, 3}, mirrored)
+
+
+def test_a_mirrored_image_of_expected_targets_is_said_to_be_one():
+    rendering = render(SceneSettings(width=640, height=480, targets=8, dot_radius=10, seed=3))
+    ids = ','.join(str(target.id) for target in rendering.targets)
+    identifier = create_identifier(expected_ids=ids, ahf=False)
+    assert not identifier.identify(rendering.image).mirrored
+    found = identifier.identify(rendering.image[:, ::-1].copy())
+    assert found.mirrored
+    assert found.count < 4 and found.expected == 8
+    assert not create_identifier().identify(rendering.image[:, ::-1].copy()).mirrored
+    assert not identifier.identify(rendering.image[::-1, ::-1].copy()).mirrored  # upside down
