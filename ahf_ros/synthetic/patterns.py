@@ -21,13 +21,8 @@ def uniform(_generator: np.random.Generator, _defocus: float, _shift: float) -> 
 def stripes(period: float, direction: float = 0.0) -> Callable[..., Pattern]:
     """Return a factory of hard-edged stripes with half of each period lit.
 
-    Parameters
-    ----------
-    period : float
-        In projector px.
-    direction : float
-        Direction of the normal of the stripes, rad from +u. Each pattern deviates from it by up to
-        10 degrees, and half of the patterns are mirrored.
+    The period is in projector px, the direction of the normal of the stripes in rad from +u. Each
+    pattern deviates from it by up to 10 degrees, and half of the patterns are mirrored.
     """
 
     def make(generator: np.random.Generator, defocus: float, shift: float) -> Pattern:
@@ -134,40 +129,18 @@ LIGHT_NAMES: tuple[str, ...] = tuple(_MAKERS)
 def light_pattern(
     name: str, defocus: float, generator: np.random.Generator, shift: float = 0.0
 ) -> Pattern:
-    """Return the pattern of a light with random phase, directions and positions.
+    """Return the pattern of one of `LIGHT_NAMES` with random phase, directions and positions.
 
-    Parameters
-    ----------
-    name : str
-        One of `LIGHT_NAMES`.
-    defocus : float
-        Standard deviation of the blur of the projector, projector px.
-    generator : numpy.random.Generator
-        Draws phase, directions and positions.
-    shift : float
-        Added to the phase, periods; a light without a period stays as it is.
-
-    Raises
-    ------
-    ValueError
-        If no light has this name.
+    The defocus of the projector is a standard deviation in projector px. The shift is added to the
+    phase, in periods; a light without a period stays as it is.
     """
-    if name not in _MAKERS:
-        raise ValueError(f'light is {name!r}, accepted is one of {", ".join(LIGHT_NAMES)}')
     return _MAKERS[name](generator, defocus, shift)
 
 
 def turned(pattern: Pattern, scale: float, turn: float) -> Pattern:
     """Return a pattern, scaled and turned about the middle of the projector.
 
-    Parameters
-    ----------
-    pattern : Pattern
-        Its edges get softer with the scale, too.
-    scale : float
-        Size of the new pattern divided by the old one's.
-    turn : float
-        Angle from +u towards +v, rad.
+    The turn is from +u towards +v, rad. Edges get softer with the scale, too.
     """
     if scale == 1 and not turn:
         return pattern

@@ -1,4 +1,4 @@
-"""Prints of point-distributed targets and of rings of dots."""
+"""Prints of point-distributed targets and of rings of dots; ink that is gained, in any family."""
 
 from __future__ import annotations
 
@@ -15,11 +15,15 @@ from ahf_ros.codes.dots import dot_family
 from ahf_ros.codes.gsi_library import GSI_LIBRARY, point_family
 from ahf_ros.interchange.truth_files import read_truth
 from ahf_ros.synthetic.camera import Camera, tilted_camera
-from ahf_ros.synthetic.designs import designs
+from ahf_ros.synthetic.covers import design
 from ahf_ros.synthetic.prints import Mark, print_mark
 from ahf_ros.synthetic.scene import SceneSettings, render
+from support.square_markers import needs_square_markers
 
 GSI, DOTS = point_family(), dot_family()
+NUMBER = 18
+STEP = 0.015  # of the samples, radii of the dot
+ROUND = ('metashape12', 'metashape20', 'aicon14', 'gsi', 'dots')
 
 
 def camera(tilt: float = 0.0) -> Camera:
@@ -28,9 +32,9 @@ def camera(tilt: float = 0.0) -> Camera:
 
 def printed(family: str, number: int, turn: float, radius: float, looking: Camera) -> np.ndarray:
     """Return the ink in each pixel under even light."""
-    design = designs(family, 0.0)[1](number, turn, 0.0)
+    shown = design(family, number, turn, 0.0, 0.0)
     image = np.zeros((400, 400), np.float32)
-    mark = Mark(np.zeros(2), radius, design.reach, design.cover)
+    mark = Mark(np.zeros(2), radius, shown.reach, shown.cover)
     print_mark(image, np.ones_like(image), mark, looking, 1.0, 0.7)
     return image
 
@@ -129,3 +133,43 @@ def test_the_command_renders_families_from_data_files(tmp_path: Path) -> None:
     assert main(arguments) == 0
     ((target,),) = read_truth(tmp_path / 'truth.csv').values()
     assert target.id > 50000
+
+
+def ink_of(name: str, growth: float) -> np.ndarray:
+    """Return where there is ink, on a grid that is the same for all growths."""
+    half = proportions(name).reach + 0.5
+    along = np.arange(-half, half, STEP, dtype=np.float32)
+    x, y = np.meshgrid(along, along[::-1])
+    cover = design(name, NUMBER, 0.4, growth, 0.0).cover
+    return cover(x, y, np.eye(2, dtype=np.float32) * np.float32(STEP)) > 0.5
+
+
+def reached(inked: np.ndarray, distance: float) -> np.ndarray:
+    """Return what lies within a distance of ink."""
+    ground = (~inked).astype(np.uint8)
+    steps = cv2.distanceTransform(ground, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) - 0.5
+    return steps * STEP < distance
+
+
+@pytest.mark.parametrize(
+    'name', [*ROUND, pytest.param('aruco_4x4_50', marks=needs_square_markers)]
+)
+def test_ink_grows_and_shrinks_by_the_same_length_on_every_edge(name: str) -> None:
+    plain = ink_of(name, 0.0)
+    for found, expected in (
+        (ink_of(name, 0.15), reached(plain, 0.15)),
+        (ink_of(name, -0.12), ~reached(~plain, 0.12)),
+    ):
+        changed = (expected != plain).sum()
+        assert changed > 0.1 * plain.sum()
+        # Where ink grows, sectors keep sharp corners.
+        assert (found != expected).sum() < 0.08 * changed
+
+
+def test_the_same_growth_leaves_holes_that_are_smaller() -> None:
+    near = np.zeros((1, 2), np.float32)
+    near[0] = 0.05, 0.25
+    jacobian = np.eye(2, dtype=np.float32) * np.float32(STEP)
+    for growth, inked in ((0.0, [0, 0]), (0.1, [0, 1]), (0.35, [1, 1])):
+        cover = design('metashape12', 1, 0.0, growth, 0.3).cover
+        assert cover(near, near * 0, jacobian)[0].tolist() == inked

@@ -113,11 +113,6 @@ def test_a_pattern_is_scaled_and_turned() -> None:
     assert np.allclose(upright, original(v, -u), atol=1e-3)
 
 
-def test_an_unknown_light_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"light is 'disco', accepted is one of normal, stripe"):
-        light_pattern('disco', 0.5, np.random.default_rng(0))
-
-
 @pytest.mark.parametrize('tilt', [0.0, 60.0])
 @pytest.mark.parametrize('seed', range(4))
 def test_the_projector_stands_aside_and_lights_the_origin(tilt: float, seed: int) -> None:
