@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import fields
+from functools import partial
 from itertools import islice
 from numbers import Real
 from typing import Any
@@ -40,18 +41,9 @@ element."""
 def checked_targets(found: Any, name: str) -> list[Target]:
     """Return a result as a list of targets of Python numbers in the ranges of `CodedTarget.msg`.
 
-    Parameters
-    ----------
-    found : object
-        What a detector or a refinement returned.
-    name : str
-        What errors call it, such as "detector 'mine'".
-
-    Raises
-    ------
-    ValueError
-        If it is not a list or tuple of `Target` with fields as `checked_target` accepts them. The
-        message names the detector, the target, the field, its value and what is accepted.
+    A ValueError is raised if what a detector or a refinement returned is not a list or tuple of
+    `Target` with fields as `checked_target` accepts them. The message names the detector as
+    `name` does, the target, the field, its value and what is accepted.
     """
     if not isinstance(found, (list, tuple)):
         raise ValueError(f'{name} returned {shown(found)}, accepted is a list of targets')
@@ -68,21 +60,11 @@ def checked_targets(found: Any, name: str) -> list[Target]:
 def checked_target(target: Any, name: str) -> Target:
     """Return a target whose fields are Python numbers in the ranges of `CodedTarget.msg`.
 
-    Parameters
-    ----------
-    target : Target
-        Its fields may be of any type. Accepted are an `id` from -1 to 2^31 - 1, a `code` from 0 to
-        2^32 - 1, finite coordinates and semi-axes, an `angle` within a turn, a `confidence` from
-        0 to 1, a covariance that is symmetric and positive semidefinite, a `family` that is a
-        printable text, and an `edge_shift` that is None or a number of px; numpy scalars and
-        arrays are converted.
-    name : str
-        What errors call it.
-
-    Raises
-    ------
-    ValueError
-        If a field is not accepted; the message names the field, its value and what is accepted.
+    Accepted are an `id` from -1 to 2^31 - 1, a `code` from 0 to 2^32 - 1, finite coordinates and
+    semi-axes, an `angle` within a turn, a `confidence` from 0 to 1, a covariance that is symmetric
+    and positive semidefinite, a `family` that is a printable text, and an `edge_shift` that is
+    None or a number of px; numpy scalars and arrays are converted. A ValueError names the target
+    as `name` does, the field, its value and what is accepted.
     """
     if not isinstance(target, Target):
         raise ValueError(f'{name} is {shown(target)}, accepted is a Target')
@@ -179,31 +161,18 @@ def _is_covariance(xx: float, xy: float, yx: float, yy: float) -> bool:
     return xx * yy - xy * yx >= -ASYMMETRY * scale**2
 
 
-def _integers(minimum: int, maximum: int) -> Callable[[Any, str], int]:
-    return lambda value, name: checked_integer(value, name, minimum, maximum)
-
-
-def _numbers(minimum: float, maximum: float) -> Callable[[Any, str], float]:
-    return lambda value, name: checked_number(value, name, minimum, maximum)
-
-
-def _edge_shift(value: Any, name: str) -> float | None:
-    limit = MAXIMUM_LENGTH_PX
-    return None if value is None else checked_number(value, name, -limit, limit)
-
-
-_PLACE = _numbers(-MAXIMUM_LENGTH_PX, MAXIMUM_LENGTH_PX)
-_AXIS = _numbers(0, MAXIMUM_LENGTH_PX)
+_PLACE = partial(checked_number, minimum=-MAXIMUM_LENGTH_PX, maximum=MAXIMUM_LENGTH_PX)
+_AXIS = partial(checked_number, minimum=0, maximum=MAXIMUM_LENGTH_PX)
 _CHECKS: dict[str, Callable[[Any, str], Any]] = {
-    'id': _integers(UNDECODED, MAXIMUM_ID),
-    'code': _integers(0, 2**32 - 1),
+    'id': partial(checked_integer, minimum=UNDECODED, maximum=MAXIMUM_ID),
+    'code': partial(checked_integer, minimum=0, maximum=2**32 - 1),
     'x': _PLACE,
     'y': _PLACE,
     'semi_major': _AXIS,
     'semi_minor': _AXIS,
-    'angle': _numbers(-2 * math.pi, 2 * math.pi),
-    'confidence': _numbers(0, 1),
+    'angle': partial(checked_number, minimum=-2 * math.pi, maximum=2 * math.pi),
+    'confidence': partial(checked_number, minimum=0, maximum=1),
     'covariance': _covariance,
     'family': checked_text,
-    'edge_shift': _edge_shift,
+    'edge_shift': lambda value, name: None if value is None else _PLACE(value, name),
 }
