@@ -6,7 +6,14 @@ import pytest
 from ahf_ros.filtering.genes import FIRST, genes_of, tuned
 from ahf_ros.filtering.genetic import decoded, encoded
 from ahf_ros.filtering.homomorphic import median_distance, transfer
-from ahf_ros.filtering.settings import EXTENDED, PUBLISHED, TuningSettings
+from ahf_ros.filtering.settings import (
+    EXTENDED,
+    PUBLISHED,
+    AdaptiveSettings,
+    FilterSettings,
+    GeneticSettings,
+    TuningSettings,
+)
 from support.fourier import filtered_logarithm_fft
 
 SHAPE = (48, 64)
@@ -64,9 +71,35 @@ def test_an_exponent_is_a_power_of_the_filtered_image():
         ({'exponent_min': 0.0}, 'exponent_min is 0.0, accepted is a number from 0.01'),
     ],
 )
-def test_a_setting_out_of_range_is_refused(values, words):
+def test_a_range_that_makes_no_sense_is_refused(values, words):
     with pytest.raises(ValueError, match=words):
         TuningSettings(**values)
+
+
+@pytest.mark.parametrize(
+    ('settings', 'name', 'value'),
+    [
+        (AdaptiveSettings, 'threads', -1),
+        (AdaptiveSettings, 'ahf', 1),
+        (FilterSettings, 'log_offset', 0.0),
+        (FilterSettings, 'black_percentile', 50.0),
+        (FilterSettings, 'white_percentile', 101.0),
+        (GeneticSettings, 'population', 1),
+        (GeneticSettings, 'population', 50.0),
+        (GeneticSettings, 'generations', 0),
+        (GeneticSettings, 'stall', 0),
+        (GeneticSettings, 'tournament', 0),
+        (GeneticSettings, 'crossover', 1.1),
+        (GeneticSettings, 'mutation', -0.1),
+        (GeneticSettings, 'mutation', float('nan')),
+        (GeneticSettings, 'max_evaluations', -1),
+        (GeneticSettings, 'max_duration', -1.0),
+        (GeneticSettings, 'seed', -1),
+    ],
+)
+def test_a_setting_out_of_range_is_refused(settings, name, value):
+    with pytest.raises(ValueError, match=f'^{name} is {value}, accepted is'):
+        settings(**{name: value})
 
 
 def test_the_first_filters_are_chromosomes_far_apart():

@@ -161,40 +161,12 @@ def test_a_speck_on_even_ground_is_still_seen(speck):
     assert abs(filtered[10, 10] - 128) < 10
 
 
-@pytest.mark.parametrize(
-    ('image', 'words'),
-    [
-        (np.zeros((40, 40), np.uint8), 'image is constant'),
-        (np.ones((1, 1), np.uint8), 'image is 1 x 1 px'),
-        (np.zeros((40, 40, 3), np.uint8), 'image has shape'),
-    ],
-)
-def test_what_is_not_an_image_is_refused(image, words):
-    with pytest.raises(ValueError, match=words):
-        HomomorphicFilter(image)
-
-
 def test_a_filter_out_of_range_is_refused():
     prepared = HomomorphicFilter(scene(32, 32))
     with pytest.raises(ValueError, match='gamma_low is 3'):
         prepared.filtered(2.0, 3.0)
     with pytest.raises(ValueError, match='cutoff is -1'):
         prepared.filtered(2.0, 0.5, cutoff=-1.0)
-
-
-@pytest.mark.parametrize(
-    ('name', 'value'),
-    [('log_offset', 0.0), ('black_percentile', 50.0), ('white_percentile', 101.0)],
-)
-def test_a_setting_out_of_range_is_refused(name, value):
-    with pytest.raises(ValueError, match=f'^{name} is {value}, accepted is'):
-        FilterSettings(**{name: value})
-
-
-def test_distances_of_a_small_spectrum():
-    # frequencies 0, 1, -2, -1 down and 0, 1, -1 across
-    expected = np.sqrt([[0, 1, 1], [1, 2, 2], [4, 5, 5], [1, 2, 2]])
-    np.testing.assert_array_equal(distances(4, 3), expected)
 
 
 @pytest.mark.parametrize('shape', SPECTRA)

@@ -54,24 +54,6 @@ def test_dots_are_where_the_design_has_them(tilt: float) -> None:
     assert len(set(gaps.argmin(axis=1))) == 8
 
 
-def test_b_to_d_is_counter_clockwise_as_seen() -> None:
-    rendering = render(SceneSettings(width=400, height=400, targets=1, family='gsi', dot_radius=6))
-    (target,) = rendering.targets
-    assert target.code == GSI.word(target.id)
-    dark = (rendering.image < rendering.image.max() / 2).astype(np.uint8)
-    _, _, _, centroids = cv2.connectedComponentsWithStats(dark)
-    dots = (centroids[1:] - (target.x, target.y)) * [1, -1]
-    design = GSI.places[[0, 1, 2, 3, 4, *(5 + GSI.decoding_dots(target.code))]]
-    gaps = []
-    for turn in np.linspace(0, 2 * math.pi, 1000):
-        rotation = np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
-        for mirror in (1, -1):
-            turned = target.semi_major / GSI.dot_radius * (design * [1, mirror]) @ rotation
-            gap = np.hypot(*(turned[:, None] - dots[None]).transpose(2, 0, 1)).min(axis=1).max()
-            gaps.append((gap, mirror))
-    assert min(gaps)[1] == 1 and min(gaps)[0] < 1
-
-
 def test_the_ink_of_a_target_is_that_of_its_eight_dots() -> None:
     ink = printed('gsi', 505, 1.0, 7.0, camera())
     assert ink.sum() == pytest.approx(8 * math.pi * 49, rel=2e-3)
