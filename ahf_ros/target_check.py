@@ -18,24 +18,15 @@ import numpy as np
 from ahf_ros.target import UNDECODED, Target
 from ahf_ros.text import shown
 
-MAXIMUM_LENGTH = 100_000
-"""Maximum number of targets in a result."""
-
 MAXIMUM_ID = 2**31 - 1
 """Maximum ID, as in the message."""
 
 MAXIMUM_LENGTH_PX = 65536.0
 """Maximum size of a coordinate or a semi-axis, px: twice the side of the largest image."""
 
-MAXIMUM_VARIANCE = MAXIMUM_LENGTH_PX**2
-"""Maximum size of an element of a covariance, px^2."""
-
-MAXIMUM_TEXT = 200
-"""Maximum number of characters of the name of a family."""
-
-ASYMMETRY = 1e-5
-"""Difference of the two covariances of x and y that rounding may leave, as a share of the largest
-element."""
+_MAXIMUM_COUNT = 100_000  # of targets in a result
+_MAXIMUM_TEXT = 200  # characters of the name of a family
+_ASYMMETRY = 1e-5  # of a covariance, which rounding may leave, as a share of its largest element
 
 
 def checked_targets(found: Any, name: str) -> list[Target]:
@@ -47,10 +38,10 @@ def checked_targets(found: Any, name: str) -> list[Target]:
     """
     if not isinstance(found, (list, tuple)):
         raise ValueError(f'{name} returned {shown(found)}, accepted is a list of targets')
-    items = list(islice(found, MAXIMUM_LENGTH + 1))
-    if len(items) > MAXIMUM_LENGTH:
+    items = list(islice(found, _MAXIMUM_COUNT + 1))
+    if len(items) > _MAXIMUM_COUNT:
         raise ValueError(
-            f'{name} returned more targets than are accepted, at most {MAXIMUM_LENGTH}'
+            f'{name} returned more targets than are accepted, at most {_MAXIMUM_COUNT}'
         )
     return [
         checked_target(target, f'{name}: target {number}') for number, target in enumerate(items)
@@ -96,10 +87,10 @@ def checked_integer(value: Any, name: str, minimum: int, maximum: int) -> int:
 
 def checked_text(value: Any, name: str) -> str:
     """Return a value as a printable text, or raise a ValueError that calls it `name`."""
-    if isinstance(value, str) and len(value) <= MAXIMUM_TEXT and value.isprintable():
+    if isinstance(value, str) and len(value) <= _MAXIMUM_TEXT and value.isprintable():
         return value if type(value) is str else str(value)
     raise ValueError(
-        f'{name} is {shown(value)}, accepted is a printable text of at most {MAXIMUM_TEXT} '
+        f'{name} is {shown(value)}, accepted is a printable text of at most {_MAXIMUM_TEXT} '
         'characters'
     )
 
@@ -137,7 +128,7 @@ def _number(value: Any) -> float | None:
 def _covariance(value: Any, name: str) -> tuple[float, ...]:
     elements: Any = value if type(value) is tuple else _listed(value)
     numbers = [_number(it) for it in elements] if len(elements) == 4 else []
-    known = [it for it in numbers if it is not None and abs(it) <= MAXIMUM_VARIANCE]
+    known = [it for it in numbers if it is not None and abs(it) <= MAXIMUM_LENGTH_PX**2]
     if len(known) == 4 and _is_covariance(*known):
         same = all(new is old for new, old in zip(known, elements, strict=True))
         return elements if same and elements is value else tuple(known)
@@ -156,9 +147,9 @@ def _listed(value: Any) -> list[Any]:
 
 def _is_covariance(xx: float, xy: float, yx: float, yy: float) -> bool:
     scale = max(abs(xx), abs(xy), abs(yx), abs(yy))
-    if min(xx, yy) < 0 or abs(xy - yx) > ASYMMETRY * scale:
+    if min(xx, yy) < 0 or abs(xy - yx) > _ASYMMETRY * scale:
         return False
-    return xx * yy - xy * yx >= -ASYMMETRY * scale**2
+    return xx * yy - xy * yx >= -_ASYMMETRY * scale**2
 
 
 _PLACE = partial(checked_number, minimum=-MAXIMUM_LENGTH_PX, maximum=MAXIMUM_LENGTH_PX)
