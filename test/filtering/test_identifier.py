@@ -178,10 +178,11 @@ def test_too_many_targets_are_as_bad_as_too_few():
     assert (result.count, result.filter.applied) == (4, True)
 
 
-def test_without_an_expected_number_nothing_is_filtered():
+@pytest.mark.parametrize(('expected', 'ahf'), [(0, True), (COUNT, False)])
+def test_without_an_expected_number_or_switched_off_nothing_is_filtered(expected, ahf):
     detector = Dots()
-    result = identify(DIM, detector, 0)
-    assert (result.expected, detector.calls, result.filter.applied) == (0, 1, False)
+    result = identify(DIM, detector, expected, AdaptiveSettings(ahf=ahf))
+    assert (result.expected, detector.calls, result.filter.applied) == (expected, 1, False)
 
 
 class Estimate:
@@ -254,12 +255,6 @@ def test_an_estimate_that_is_no_number_is_refused(estimate):
         identify(DIM, Dots(), 0, SHORT, estimate=Estimate(estimate))
 
 
-def test_switched_off_nothing_is_filtered():
-    detector = Dots()
-    result = identify(DIM, detector, COUNT, AdaptiveSettings(ahf=False))
-    assert (result.expected, detector.calls, result.filter.applied) == (COUNT, 1, False)
-
-
 @pytest.mark.parametrize('kind', [np.uint16, np.float32, np.float64])
 def test_a_detector_sees_8_bit_images_whatever_was_received(kind):
     detector = Dots()
@@ -289,7 +284,7 @@ def test_centres_from_the_8_bit_version_of_an_image_are_refined():
     assert result.targets == (target(9),)
 
 
-def test_a_stream_begins_with_the_filter_that_worked_last():
+def test_a_stream_begins_with_the_filter_that_worked_last_until_reset():
     detector = Dots()
     identifier = Identifier(detector)
     first = identifier.identify(DIM, expected_targets=COUNT)
@@ -300,11 +295,6 @@ def test_a_stream_begins_with_the_filter_that_worked_last():
     assert (second.filter.evaluations, second.filter.generations, detector.calls) == (1, 0, 1)
     assert second.filter.gamma_low == first.filter.gamma_low
     assert identifier.last_search is None
-
-
-def test_reset_forgets_what_worked():
-    identifier = Identifier(Dots())
-    first = identifier.identify(DIM, expected_targets=COUNT)
     identifier.reset()
     again = identifier.identify(DIM, expected_targets=COUNT)
     assert again.filter.evaluations == first.filter.evaluations > 1
