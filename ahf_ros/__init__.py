@@ -7,68 +7,6 @@ from importlib import import_module
 from pkgutil import extend_path
 from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:
-    from ahf_ros.detectors import (
-        DETECTOR_NAMES,
-        FAMILY_NAMES,
-        Detector,
-        DetectorSettings,
-        create_detector,
-    )
-    from ahf_ros.drawing.overlay import draw
-    from ahf_ros.evaluation import score
-    from ahf_ros.filtering.identifier import Identifier
-    from ahf_ros.filtering.settings import AdaptiveSettings
-    from ahf_ros.imaging.stack import ImageStack
-    from ahf_ros.interchange.image_files import read_image, write_image
-    from ahf_ros.session import create_identifier, identify
-    from ahf_ros.session_settings import IdentificationSettings
-    from ahf_ros.synthetic.scene import SceneSettings, render
-    from ahf_ros.target import (
-        UNDECODED,
-        DottedTarget,
-        FilterState,
-        Identification,
-        SearchTrace,
-        SquareMarker,
-        Target,
-        TrueTarget,
-        UndecodedTarget,
-    )
-
-# The generated messages (ahf_ros.msg, ahf_ros.srv) may live in another directory of sys.path:
-# an installed copy when Python runs from a checkout, or the build tree.
-__path__ = extend_path(__path__, __name__)
-
-__all__ = [
-    'DETECTOR_NAMES',
-    'FAMILY_NAMES',
-    'UNDECODED',
-    'AdaptiveSettings',
-    'Detector',
-    'DetectorSettings',
-    'DottedTarget',
-    'FilterState',
-    'Identification',
-    'IdentificationSettings',
-    'Identifier',
-    'ImageStack',
-    'SceneSettings',
-    'SearchTrace',
-    'SquareMarker',
-    'Target',
-    'TrueTarget',
-    'UndecodedTarget',
-    'create_detector',
-    'create_identifier',
-    'draw',
-    'identify',
-    'read_image',
-    'render',
-    'score',
-    'write_image',
-]
-
 _MODULES = {
     'DETECTOR_NAMES': 'detectors',
     'FAMILY_NAMES': 'detectors',
@@ -98,6 +36,40 @@ _MODULES = {
     'write_image': 'interchange.image_files',
 }
 
+if TYPE_CHECKING:  # which takes what is imported `as` itself for public
+    from ahf_ros.detectors import DETECTOR_NAMES as DETECTOR_NAMES
+    from ahf_ros.detectors import FAMILY_NAMES as FAMILY_NAMES
+    from ahf_ros.detectors import Detector as Detector
+    from ahf_ros.detectors import DetectorSettings as DetectorSettings
+    from ahf_ros.detectors import create_detector as create_detector
+    from ahf_ros.drawing.overlay import draw as draw
+    from ahf_ros.evaluation import score as score
+    from ahf_ros.filtering.identifier import Identifier as Identifier
+    from ahf_ros.filtering.settings import AdaptiveSettings as AdaptiveSettings
+    from ahf_ros.imaging.stack import ImageStack as ImageStack
+    from ahf_ros.interchange.image_files import read_image as read_image
+    from ahf_ros.interchange.image_files import write_image as write_image
+    from ahf_ros.session import create_identifier as create_identifier
+    from ahf_ros.session import identify as identify
+    from ahf_ros.session_settings import IdentificationSettings as IdentificationSettings
+    from ahf_ros.synthetic.scene import SceneSettings as SceneSettings
+    from ahf_ros.synthetic.scene import render as render
+    from ahf_ros.target import UNDECODED as UNDECODED
+    from ahf_ros.target import DottedTarget as DottedTarget
+    from ahf_ros.target import FilterState as FilterState
+    from ahf_ros.target import Identification as Identification
+    from ahf_ros.target import SearchTrace as SearchTrace
+    from ahf_ros.target import SquareMarker as SquareMarker
+    from ahf_ros.target import Target as Target
+    from ahf_ros.target import TrueTarget as TrueTarget
+    from ahf_ros.target import UndecodedTarget as UndecodedTarget
+else:
+    __all__ = list(_MODULES)
+
+# The generated messages (ahf_ros.msg, ahf_ros.srv) may live in another directory of sys.path:
+# an installed copy when Python runs from a checkout, or the build tree.
+__path__ = extend_path(__path__, __name__)
+
 
 def __getattr__(name: str) -> Any:
     """Import a public name, see PEP 562."""
@@ -113,4 +85,4 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     """Return what is for users."""
-    return sorted([*__all__, '__version__'])
+    return sorted([*_MODULES, '__version__'])

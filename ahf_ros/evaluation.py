@@ -15,13 +15,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ahf_ros.deprecation import deprecated_arguments
-from ahf_ros.target import UNDECODED, Target, TrueTarget, Truth, WithTargets
+from ahf_ros.target import UNDECODED, Target, TrueTarget, Truth
 from ahf_ros.text import printable
+
+if TYPE_CHECKING:
+    from ahf_ros.synthetic.scene import Rendering
 
 TOLERANCE = 5.0
 """Maximum distance of a report from its target, px."""
@@ -30,32 +33,17 @@ MAXIMUM_PAIRS = 4_000_000
 """Maximum number of pairs of a report and a target whose x differ by no more than the tolerance:
 0.7 GB of memory."""
 
-RIGHT = 'right'
-"""Report with the ID of its target; at most one per target."""
-
-WRONG = 'wrong'
-"""Report with another ID than its target has."""
-
-FOUND = 'found'
-"""Report without an ID, of a target that no other report has."""
-
-FALSE = 'false'
-"""Any other report: there is no target, or it was reported already."""
+RIGHT = 'right'  # a report with the ID of its target; at most one per target
+WRONG = 'wrong'  # with another ID than its target has
+FOUND = 'found'  # without an ID, of a target that no other report has
+FALSE = 'false'  # any other: there is no target, or it was reported already
 
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """Judgement of a report.
+    """Judgement of a report, and the target that is there."""
 
-    Attributes
-    ----------
-    kind : str
-        `RIGHT`, `WRONG`, `FOUND` or `FALSE`.
-    target : TrueTarget or None
-        The target that is there.
-    """
-
-    kind: str
+    kind: str  # `RIGHT`, `WRONG`, `FOUND` or `FALSE`
     target: TrueTarget | None = None
 
 
@@ -114,38 +102,19 @@ class Score:
 
 
 def judge(
-    truth: WithTargets | Iterable[TrueTarget | Target],
-    reported: WithTargets | Iterable[Target],
+    truth: Rendering | Iterable[TrueTarget | Target],
+    reported: Iterable[Target],
     *,
     tolerance: float = TOLERANCE,
 ) -> tuple[Verdict, ...]:
-    """Judge each report.
+    """Judge each report; the arguments are those of `score`.
 
     Reports are paired with targets of the same ID first, then the remaining reports with any
     target. The nearest pairs come first, so the order of the reports does not matter.
-
-    Parameters
-    ----------
-    truth : Rendering, or iterable of TrueTarget or Target
-        The targets that the image shows.
-    reported : Identification, or iterable of Target
-        The targets that were identified.
-    tolerance : float
-        Maximum distance of a report from its target, px.
-
-    Returns
-    -------
-    tuple of Verdict
-        One for each report.
-
-    Raises
-    ------
-    ValueError
-        If `tolerance` is not a number above 0, or more than `MAXIMUM_PAIRS` are to be compared.
     """
     if not tolerance > 0:
         raise ValueError(f'tolerance is {tolerance!r}, accepted is a number above 0')
-    truth, reported = _true_targets(truth), _targets(reported)
+    truth, reported = _true_targets(truth), tuple(reported)
     pairs = _pairs(truth, reported, tolerance)
     verdicts: dict[int, Verdict] = {}
     taken: set[int] = set()
@@ -165,8 +134,8 @@ def judge(
 
 @deprecated_arguments(positions=('tolerance',))
 def score(
-    truth: WithTargets | Iterable[TrueTarget | Target],
-    reported: WithTargets | Iterable[Target],
+    truth: Rendering | Iterable[TrueTarget | Target],
+    reported: Iterable[Target],
     *,
     tolerance: float = TOLERANCE,
 ) -> Score:
@@ -174,8 +143,17 @@ def score(
 
     Parameters
     ----------
-    truth, reported, tolerance
-        As for `judge`.
+    truth : Rendering, or iterable of TrueTarget or Target
+        The targets that the image shows.
+    reported : Identification, or iterable of Target
+        The targets that were identified.
+    tolerance : float
+        Maximum distance of a report from its target, px.
+
+    Raises
+    ------
+    ValueError
+        If `tolerance` is not a number above 0, or more than `MAXIMUM_PAIRS` are to be compared.
 
     Examples
     --------
@@ -184,28 +162,35 @@ def score(
     >>> figures.right, figures.expected, figures.wrong, figures.false_positives
     (1, 2, 0, 0)
     """
-    truth, reported = _true_targets(truth), _targets(reported)
+    truth, reported = _true_targets(truth), tuple(reported)
     verdicts = judge(truth, reported, tolerance=tolerance)
     kinds = [verdict.kind for verdict in verdicts]
-    met = [verdict.target for verdict in verdicts]
-    ignored = [
-        kind in (RIGHT, FOUND) and target is not None and not target.confirmed
-        for kind, target in zip(kinds, met, strict=True)
+    met = [
+        (report, verdict.kind, verdict.target)
+        for report, verdict in zip(reported, verdicts, strict=True)
+        if verdict.target is not None
     ]
+    ignored = sum(kind != WRONG and not target.confirmed for _, kind, target in met)
     errors = tuple(
         (report.x - target.x, report.y - target.y)
-        for report, kind, target in zip(reported, kinds, met, strict=True)
-        if kind == RIGHT and target is not None and target.confirmed
+        for report, kind, target in met
+        if kind == RIGHT and target.confirmed
     )
     return Score(
         expected=sum(target.confirmed for target in truth),
-        reported=len(reported) - sum(ignored),
-        found=len({target for target in met if target is not None and target.confirmed}),
+        reported=len(reported) - ignored,
+        found=len({target for _, _, target in met if target.confirmed}),
         right=len(errors),
         wrong=kinds.count(WRONG),
         false_positives=kinds.count(FALSE),
         errors=errors,
     )
+
+
+def _true_targets(truth: Rendering | Iterable[TrueTarget | Target]) -> tuple[TrueTarget, ...]:
+    """Return the truth of a scene, or of targets."""
+    targets: Any = getattr(truth, 'targets', truth)
+    return tuple(it if isinstance(it, TrueTarget) else TrueTarget.of(it) for it in targets)
 
 
 def total(scores: Iterable[Score]) -> Score:
@@ -225,25 +210,10 @@ def total(scores: Iterable[Score]) -> Score:
 def evaluate(
     truth: Truth, results: Mapping[str, Sequence[Target]], tolerance: float = TOLERANCE
 ) -> dict[str, Score]:
-    """Return the figures of every image that has a truth or a result.
+    """Return the figures of every image that has a truth or a result, by its name.
 
     An image without a result has no reports. An image without a truth shows no targets, so all
     its reports are false.
-
-    Parameters
-    ----------
-    truth : mapping of str to sequence of TrueTarget
-        The targets that each image shows.
-    results : mapping of str to sequence of Target
-        The targets that were identified in each image.
-    tolerance : float
-        As for `judge`.
-
-    Examples
-    --------
-    >>> scores = evaluate({'a.png': [TrueTarget(7, 10.0, 10.0)]}, {'a.png': []})
-    >>> scores['a.png'].decoding
-    0.0
     """
     names = dict.fromkeys([*truth, *results])
     return {
@@ -253,13 +223,7 @@ def evaluate(
 
 
 def table(scores: Mapping[str, Score]) -> str:
-    """Return a text table of the figures of each image and of all together.
-
-    Parameters
-    ----------
-    scores : mapping of str to Score
-        Figures by name of the image.
-    """
+    """Return a text table of the figures of each image, by name, and of all together."""
     head = ('image', 'N', 'n', 'I', 'd', 'C %', 'R %', 'D %', 'wrong', 'false')
     rows: list[tuple[str, ...]] = [(*head, 'RMSE X px', 'Y', 'XY')]
     rows += [_row(name, item) for name, item in scores.items()]
@@ -268,17 +232,6 @@ def table(scores: Mapping[str, Score]) -> str:
     return '\n'.join(
         '  '.join([row[0].ljust(widths[0]), *map(str.rjust, row[1:], widths[1:])]) for row in rows
     )
-
-
-def _true_targets(
-    truth: WithTargets | Iterable[TrueTarget | Target],
-) -> tuple[TrueTarget, ...]:
-    """Return the truth of a scene, or of targets."""
-    return tuple(it if isinstance(it, TrueTarget) else TrueTarget.of(it) for it in _targets(truth))
-
-
-def _targets(shown: Any) -> tuple[Any, ...]:
-    return tuple(getattr(shown, 'targets', shown))
 
 
 def _row(name: str, item: Score) -> tuple[str, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any, Protocol, overload
+from typing import TYPE_CHECKING, Any, overload
 
 if TYPE_CHECKING:
     import numpy as np
@@ -170,15 +170,6 @@ class TrueTarget:
     def of(cls, target: Target) -> TrueTarget:
         """Return the truth of a target whose ID and centre are exact, as in a rendering."""
         return cls(target.id, target.x, target.y)
-
-
-class WithTargets(Protocol):
-    """What shows targets: an `Identification`, or a scene whose targets are known."""
-
-    @property
-    def targets(self) -> Sequence[Target]:
-        """The targets."""
-        ...
 
 
 Truth = Mapping[str, Sequence[TrueTarget]]
@@ -361,10 +352,10 @@ class Identification:
             raise ModuleNotFoundError(
                 'pandas is not installed, to_dataframe needs it: pip install pandas'
             ) from error
-        plain = [it.name for it in fields(Target) if it.name != 'covariance']
         table: dict[str, Any] = {
-            name: [getattr(target, name) for target in self] for name in plain
+            it.name: [getattr(target, it.name) for target in self] for it in fields(Target)
         }
+        del table['covariance']
         for row, column, name in ((0, 0, 'xx'), (0, 1, 'xy'), (1, 1, 'yy')):
             table[f'covariance_{name}'] = self.covariances[:, row, column]
         return pandas.DataFrame(table)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import fields
+from functools import partial
 from itertools import islice
 from numbers import Real
 from typing import Any
@@ -17,48 +18,30 @@ import numpy as np
 from ahf_ros.target import UNDECODED, Target
 from ahf_ros.text import shown
 
-MAXIMUM_LENGTH = 100_000
-"""Maximum number of targets in a result."""
-
 MAXIMUM_ID = 2**31 - 1
 """Maximum ID, as in the message."""
 
 MAXIMUM_LENGTH_PX = 65536.0
 """Maximum size of a coordinate or a semi-axis, px: twice the side of the largest image."""
 
-MAXIMUM_VARIANCE = MAXIMUM_LENGTH_PX**2
-"""Maximum size of an element of a covariance, px^2."""
-
-MAXIMUM_TEXT = 200
-"""Maximum number of characters of the name of a family."""
-
-ASYMMETRY = 1e-5
-"""Difference of the two covariances of x and y that rounding may leave, as a share of the largest
-element."""
+_MAXIMUM_COUNT = 100_000  # of targets in a result
+_MAXIMUM_TEXT = 200  # characters of the name of a family
+_ASYMMETRY = 1e-5  # of a covariance, which rounding may leave, as a share of its largest element
 
 
 def checked_targets(found: Any, name: str) -> list[Target]:
     """Return a result as a list of targets of Python numbers in the ranges of `CodedTarget.msg`.
 
-    Parameters
-    ----------
-    found : object
-        What a detector or a refinement returned.
-    name : str
-        What errors call it, such as "detector 'mine'".
-
-    Raises
-    ------
-    ValueError
-        If it is not a list or tuple of `Target` with fields as `checked_target` accepts them. The
-        message names the detector, the target, the field, its value and what is accepted.
+    A ValueError is raised if what a detector or a refinement returned is not a list or tuple of
+    `Target` with fields as `checked_target` accepts them. The message names the detector as
+    `name` does, the target, the field, its value and what is accepted.
     """
     if not isinstance(found, (list, tuple)):
         raise ValueError(f'{name} returned {shown(found)}, accepted is a list of targets')
-    items = list(islice(found, MAXIMUM_LENGTH + 1))
-    if len(items) > MAXIMUM_LENGTH:
+    items = list(islice(found, _MAXIMUM_COUNT + 1))
+    if len(items) > _MAXIMUM_COUNT:
         raise ValueError(
-            f'{name} returned more targets than are accepted, at most {MAXIMUM_LENGTH}'
+            f'{name} returned more targets than are accepted, at most {_MAXIMUM_COUNT}'
         )
     return [
         checked_target(target, f'{name}: target {number}') for number, target in enumerate(items)
@@ -68,21 +51,11 @@ def checked_targets(found: Any, name: str) -> list[Target]:
 def checked_target(target: Any, name: str) -> Target:
     """Return a target whose fields are Python numbers in the ranges of `CodedTarget.msg`.
 
-    Parameters
-    ----------
-    target : Target
-        Its fields may be of any type. Accepted are an `id` from -1 to 2^31 - 1, a `code` from 0 to
-        2^32 - 1, finite coordinates and semi-axes, an `angle` within a turn, a `confidence` from
-        0 to 1, a covariance that is symmetric and positive semidefinite, a `family` that is a
-        printable text, and an `edge_shift` that is None or a number of px; numpy scalars and
-        arrays are converted.
-    name : str
-        What errors call it.
-
-    Raises
-    ------
-    ValueError
-        If a field is not accepted; the message names the field, its value and what is accepted.
+    Accepted are an `id` from -1 to 2^31 - 1, a `code` from 0 to 2^32 - 1, finite coordinates and
+    semi-axes, an `angle` within a turn, a `confidence` from 0 to 1, a covariance that is symmetric
+    and positive semidefinite, a `family` that is a printable text, and an `edge_shift` that is
+    None or a number of px; numpy scalars and arrays are converted. A ValueError names the target
+    as `name` does, the field, its value and what is accepted.
     """
     if not isinstance(target, Target):
         raise ValueError(f'{name} is {shown(target)}, accepted is a Target')
@@ -114,10 +87,10 @@ def checked_integer(value: Any, name: str, minimum: int, maximum: int) -> int:
 
 def checked_text(value: Any, name: str) -> str:
     """Return a value as a printable text, or raise a ValueError that calls it `name`."""
-    if isinstance(value, str) and len(value) <= MAXIMUM_TEXT and value.isprintable():
+    if isinstance(value, str) and len(value) <= _MAXIMUM_TEXT and value.isprintable():
         return value if type(value) is str else str(value)
     raise ValueError(
-        f'{name} is {shown(value)}, accepted is a printable text of at most {MAXIMUM_TEXT} '
+        f'{name} is {shown(value)}, accepted is a printable text of at most {_MAXIMUM_TEXT} '
         'characters'
     )
 
@@ -155,7 +128,7 @@ def _number(value: Any) -> float | None:
 def _covariance(value: Any, name: str) -> tuple[float, ...]:
     elements: Any = value if type(value) is tuple else _listed(value)
     numbers = [_number(it) for it in elements] if len(elements) == 4 else []
-    known = [it for it in numbers if it is not None and abs(it) <= MAXIMUM_VARIANCE]
+    known = [it for it in numbers if it is not None and abs(it) <= MAXIMUM_LENGTH_PX**2]
     if len(known) == 4 and _is_covariance(*known):
         same = all(new is old for new, old in zip(known, elements, strict=True))
         return elements if same and elements is value else tuple(known)
@@ -174,36 +147,23 @@ def _listed(value: Any) -> list[Any]:
 
 def _is_covariance(xx: float, xy: float, yx: float, yy: float) -> bool:
     scale = max(abs(xx), abs(xy), abs(yx), abs(yy))
-    if min(xx, yy) < 0 or abs(xy - yx) > ASYMMETRY * scale:
+    if min(xx, yy) < 0 or abs(xy - yx) > _ASYMMETRY * scale:
         return False
-    return xx * yy - xy * yx >= -ASYMMETRY * scale**2
+    return xx * yy - xy * yx >= -_ASYMMETRY * scale**2
 
 
-def _integers(minimum: int, maximum: int) -> Callable[[Any, str], int]:
-    return lambda value, name: checked_integer(value, name, minimum, maximum)
-
-
-def _numbers(minimum: float, maximum: float) -> Callable[[Any, str], float]:
-    return lambda value, name: checked_number(value, name, minimum, maximum)
-
-
-def _edge_shift(value: Any, name: str) -> float | None:
-    limit = MAXIMUM_LENGTH_PX
-    return None if value is None else checked_number(value, name, -limit, limit)
-
-
-_PLACE = _numbers(-MAXIMUM_LENGTH_PX, MAXIMUM_LENGTH_PX)
-_AXIS = _numbers(0, MAXIMUM_LENGTH_PX)
+_PLACE = partial(checked_number, minimum=-MAXIMUM_LENGTH_PX, maximum=MAXIMUM_LENGTH_PX)
+_AXIS = partial(checked_number, minimum=0, maximum=MAXIMUM_LENGTH_PX)
 _CHECKS: dict[str, Callable[[Any, str], Any]] = {
-    'id': _integers(UNDECODED, MAXIMUM_ID),
-    'code': _integers(0, 2**32 - 1),
+    'id': partial(checked_integer, minimum=UNDECODED, maximum=MAXIMUM_ID),
+    'code': partial(checked_integer, minimum=0, maximum=2**32 - 1),
     'x': _PLACE,
     'y': _PLACE,
     'semi_major': _AXIS,
     'semi_minor': _AXIS,
-    'angle': _numbers(-2 * math.pi, 2 * math.pi),
-    'confidence': _numbers(0, 1),
+    'angle': partial(checked_number, minimum=-2 * math.pi, maximum=2 * math.pi),
+    'confidence': partial(checked_number, minimum=0, maximum=1),
     'covariance': _covariance,
     'family': checked_text,
-    'edge_shift': _edge_shift,
+    'edge_shift': lambda value, name: None if value is None else _PLACE(value, name),
 }

@@ -29,9 +29,8 @@ import numpy as np
 from ahf_ros.detectors import Drafter, create_detector
 from ahf_ros.filtering.genes import genes_of
 from ahf_ros.filtering.genetic import search
-from ahf_ros.filtering.homomorphic import HomomorphicFilter
+from ahf_ros.filtering.homomorphic import HomomorphicFilter, median_distance
 from ahf_ros.filtering.settings import PUBLISHED, FilterSettings, GeneticSettings, TuningSettings
-from ahf_ros.filtering.transfer import median_distance
 from ahf_ros.imaging.logarithm import mapping
 from ahf_ros.session import create_identifier, identify
 from ahf_ros.synthetic.scene import SceneSettings, render
@@ -109,10 +108,10 @@ def published(recipe: Recipe, image: np.ndarray, detector: Any, expected: int) -
     genes = genes_of(TuningSettings(search=PUBLISHED))
     generator = np.random.default_rng(settings.seed)
     result = search(discrepancy, genes, settings, generator)
-    for _ in range(settings.population * result.generations - result.evaluations):
+    for _ in range(settings.population * len(result.history) - len(result.tried)):
         # the rest of the last generation, which that algorithm evaluates as well
         discrepancy(result.values)
-    return expected - int(result.discrepancy), len(found)
+    return expected - int(min(result.discrepancies)), len(found)
 
 
 def candidates(image: np.ndarray, detector: Any, recipe: Recipe) -> tuple[float, float]:

@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ahf_ros.filtering.homomorphic import Transfer, transfer
 from ahf_ros.filtering.settings import FilterSettings
-from ahf_ros.filtering.transfer import Transfer, transfer
 from ahf_ros.imaging.logarithm import logarithm, mapping, sample_lattice
 
 

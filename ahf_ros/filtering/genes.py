@@ -8,7 +8,7 @@ tunes
   enough. A small D0 is a wide blur, which removes slow changes of light.
 - the contrast of the output, g^p with an exponent p up to 1. With p near 0 the 8-bit image shows
   ln g. Because g^p = exp(p s), the exponent is a factor of both gains: the four numbers of
-  `ahf_ros.filtering.transfer.Transfer` describe every filter of the space.
+  `ahf_ros.filtering.homomorphic.Transfer` describe every filter of the space.
 
 Of a stack of images, the combination that is filtered is one more gene, the last one.
 
@@ -21,12 +21,9 @@ from __future__ import annotations
 
 import math
 
-from ahf_ros.filtering.chromosome import Gene, Values
+from ahf_ros.filtering.genetic import Gene, Values
+from ahf_ros.filtering.homomorphic import Transfer, median_distance, transfer
 from ahf_ros.filtering.settings import PUBLISHED, TuningSettings
-from ahf_ros.filtering.transfer import Transfer, median_distance, transfer
-
-_CUTOFF_STEP, _EXPONENT_STEP = 0.5, 1.0  # octaves: 11 cut-offs and 4 exponents by default
-
 
 FIRST = ((3.1, 0.85, -2.5, 0.0), (4.0, 0.18, -3.0, -2.0), (3.8, 0.85, -0.5, 0.0))
 """Values of the genes of filters that are far apart. Of thirty filters the first two helped `ring`
@@ -34,62 +31,23 @@ most often, the others `gsi` and `dots`; where none of them shows more targets t
 received, hardly any other filter does."""
 
 
-def genes_of(settings: TuningSettings) -> tuple[Gene, ...]:
-    """Return the genes of the gains and, if extended, of cut-off and exponent in octaves.
-
-    Parameters
-    ----------
-    settings : TuningSettings
-    """
-    gains = (
-        Gene(
-            'gamma_high',
-            settings.gamma_high_min,
-            settings.gamma_high_max,
-            settings.gamma_high_step,
-        ),
-        Gene('gamma_low', settings.gamma_low_min, settings.gamma_low_max, settings.gamma_low_step),
-    )
-    if settings.search == PUBLISHED:
-        return gains
-    cutoffs = math.log2(settings.cutoff_min), math.log2(settings.cutoff_max)
-    exponent = math.ceil(math.log2(settings.exponent_min))
-    return (
-        *gains,
-        Gene('cutoff', *cutoffs, _CUTOFF_STEP),
-        Gene('exponent', exponent, 0.0, _EXPONENT_STEP),
-    )
-
-
-def with_combination(genes: tuple[Gene, ...], count: int) -> tuple[Gene, ...]:
-    """Return the genes of an image, or of a stack with a number of combinations."""
-    return genes if count == 1 else (*genes, Gene('combination', 0.0, count - 1.0, 1.0))
-
-
-def first_filters(genes: tuple[Gene, ...], plain: Values | None) -> list[Values]:
-    """Return the values of filters that are far apart, to try first.
-
-    Parameters
-    ----------
-    genes : tuple of Gene
-        Two or four, and the combination of a stack.
-    plain : tuple of float or None
-        Combination of a stack that is filtered; None for one image.
-    """
-    combination = plain or ()
-    return [(*of[: len(genes) - len(combination)], *combination) for of in FIRST]
+def genes_of(settings: TuningSettings, combinations: int = 1) -> tuple[Gene, ...]:
+    """Return the genes of the search space; cut-off and exponent are in octaves."""
+    genes = [
+        Gene(settings.gamma_high_min, settings.gamma_high_max, settings.gamma_high_step),
+        Gene(settings.gamma_low_min, settings.gamma_low_max, settings.gamma_low_step),
+    ]
+    if settings.search != PUBLISHED:  # by default 11 cut-offs and 4 exponents
+        cutoffs = math.log2(settings.cutoff_min), math.log2(settings.cutoff_max)
+        genes.append(Gene(*cutoffs, step=0.5))
+        genes.append(Gene(math.ceil(math.log2(settings.exponent_min)), 0.0, step=1.0))
+    if combinations > 1:
+        genes.append(Gene(0.0, combinations - 1.0, step=1.0))
+    return tuple(genes)
 
 
 def tuned(shape: tuple[int, int], values: Values) -> Transfer:
-    """Return the filter of an image for values of the genes.
-
-    Parameters
-    ----------
-    shape : tuple of int
-        Height and width of the image, px.
-    values : tuple of float
-        Values of two or four genes, see `genes_of`.
-    """
+    """Return the filter of an image of a height and width for values of two or four genes."""
     if len(values) == 2:
         return transfer(shape, *values)
     gamma_high, gamma_low, cutoff, exponent = values

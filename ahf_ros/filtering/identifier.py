@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import nullcontext
 from dataclasses import asdict, dataclass, replace
@@ -28,14 +28,13 @@ import numpy as np
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.deprecation import deprecated_arguments
 from ahf_ros.edge_shift import median_edge_shift
-from ahf_ros.filtering.fusion import fused
-from ahf_ros.filtering.genes import first_filters, genes_of, tuned, with_combination
+from ahf_ros.filtering.genes import FIRST, genes_of, tuned
 from ahf_ros.filtering.genetic import SearchResult, Values, search
-from ahf_ros.filtering.mirroring import MirroredId, is_mirrored
 from ahf_ros.filtering.settings import AdaptiveSettings
-from ahf_ros.filtering.trials import DetectorFunction, Trials, confirmed
+from ahf_ros.filtering.trials import DetectorFunction, Trials, confirmed, fused
 from ahf_ros.imaging.stack import ImageStack
 from ahf_ros.target import (
+    UNDECODED,
     FilterState,
     Identification,
     SearchTrace,
@@ -52,120 +51,10 @@ measured in the image as received."""
 Estimate = Callable[[np.ndarray], int]
 """From the image as received to the number of coded targets that it seems to show."""
 
+MirroredId = Callable[[Target], int | None]
+"""From a target to the ID that it has in a mirror, None if that is unknown."""
 
-@dataclass(frozen=True, slots=True)
-class Choice:
-    """What was chosen for an image or stack, and how it was found.
-
-    Attributes
-    ----------
-    expected : int
-        N.
-    filter : tuple of float or None
-        What was chosen, see `Trials`.
-    remembered : tuple of float or None
-        What to try first for the next image.
-    evaluations : int
-        Number of identifications.
-    tried : tuple of tuple of float
-        What a search tried.
-    search : SearchResult or None
-        The search; None if there was none.
-    """
-
-    expected: int
-    filter: Values | None
-    remembered: Values | None
-    evaluations: int
-    tried: tuple[Values, ...] = ()
-    search: SearchResult | None = None
-
-
-def choose(
-    trials: Trials,
-    expected: int,
-    settings: AdaptiveSettings,
-    remembered: Values | None,
-    executor: Executor | None,
-    clock: Callable[[], float],
-) -> Choice:
-    """Return what shows n targets with the smallest |N - n|.
-
-    Parameters
-    ----------
-    trials : Trials
-    expected : int
-        N; 0 if it is unknown.
-    settings : AdaptiveSettings
-        A patience of 0 is no limit.
-    remembered : tuple of float or None
-        What worked for the image before.
-    executor : concurrent.futures.Executor or None
-        Threads of the search.
-    clock : callable
-        Time in s.
-    """
-    discrepancy = partial(trials.discrepancy, expected)
-    searching = settings.ahf and expected > 0
-    if searching and remembered and discrepancy(remembered, executor) == 0:
-        return Choice(expected, remembered, remembered, len(trials.targets))
-    plain = _best_plain(trials, expected, executor)
-    kept = None if plain == trials.plain[0] else plain
-    if not searching or discrepancy(plain) == 0:
-        return Choice(expected, plain, kept if searching else remembered, len(trials.targets))
-    searched = trials.reduced() if settings.coarse else trials
-    genes = with_combination(genes_of(settings.tuning), len(trials.plain))
-    initial = [remembered] if remembered and len(remembered) == len(genes) else []
-    reference = math.inf
-    if settings.genetic.patience:
-        initial += first_filters(genes, plain)
-        reference = searched.discrepancy(expected, plain, executor)
-    result = search(
-        partial(searched.discrepancy, expected),
-        genes,
-        settings.genetic,
-        np.random.default_rng(settings.genetic.seed),
-        initial=initial,
-        reference=reference,
-        executor=executor,
-        clock=clock,
-    )
-    evaluations = len(trials.plain) + result.evaluations
-    tried = result.tried
-    if searched is not trials:
-        tried = confirmed(expected, tried, searched, trials, executor)
-        evaluations += len(tried)
-    best = min(tried, key=discrepancy)
-    if discrepancy(best) < discrepancy(plain):
-        return Choice(
-            expected=expected,
-            filter=best,
-            remembered=best,
-            evaluations=evaluations,
-            tried=tried,
-            search=result,
-        )
-    return Choice(
-        expected=expected,
-        filter=plain,
-        remembered=kept,
-        evaluations=evaluations,
-        tried=tried,
-        search=result,
-    )
-
-
-def _best_plain(trials: Trials, expected: int, executor: Executor | None) -> Values | None:
-    """Return the first of the best without a filter; without N, the most promising one."""
-    best = trials.plain[0]
-    trials.count(best, executor)
-    for plain in trials.plain[1:] if expected else ():
-        fewest = trials.discrepancy(expected, best)
-        if fewest == 0:
-            break
-        if trials.discrepancy(expected, plain, executor) < fewest:
-            best = plain
-    return best
+_MINIMUM_MIRRORED = 3  # targets; fewer may have the IDs of a mirrored image by chance
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,6 +71,18 @@ class Memory:
 
     filter: Values | None = None
     settled: tuple[int, int] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class _Choice:
+    """What was chosen for an image or stack, and how it was found."""
+
+    expected: int
+    filter: Values | None
+    remembered: Values | None  # to try first for the next image
+    evaluations: int
+    tried: tuple[Values, ...] = ()  # in a search
+    search: SearchResult | None = None
 
 
 class Identifier:
@@ -259,7 +160,10 @@ class Identifier:
         draft = draft if draft and refine else detector
         self._detector = _interruptible(detector, interrupt)
         self._draft = _interruptible(draft, interrupt)
-        self._settings = _with_patience(settings or AdaptiveSettings(), patience)
+        self._settings = settings = settings or AdaptiveSettings()
+        if not settings.genetic.patience and not settings.fusion:
+            genetic = replace(settings.genetic, patience=patience)
+            self._settings = replace(settings, genetic=genetic)
         self._expected_targets = expected_targets
         self._refine = refine
         self._estimate = estimate
@@ -295,7 +199,7 @@ class Identifier:
         Identification
             The result with the smallest `|N - n|`; of equally good ones the one from the image as
             received, then the first. With `fusion`, and after a search, what this filter and the
-            others show together, see `ahf_ros.filtering.fusion`. The evaluations of its filter
+            others show together, see `ahf_ros.filtering.trials`. The evaluations of its filter
             state are the identifications that led to it; threads may have begun others when the
             right one was found.
 
@@ -313,67 +217,100 @@ class Identifier:
         given = self._expected_targets if expected_targets is None else expected_targets
         _check_count('expected_targets', given)
         settings = self._settings
-        expected = len(settings.listed) or given
+        listed = settings.listed
+        expected = len(listed) or given
         estimating = not expected and self._estimate is not None
-        trials = Trials(
-            stack,
-            self._detector,
-            self._draft,
-            settings.listed,
-            settings.filter,
-            self._name,
-        )
+        trials = Trials(stack, self._detector, self._draft, settings, self._name)
         threads = settings.threads or os.cpu_count() or 1
         with ThreadPoolExecutor(threads) if threads > 1 else nullcontext() as executor:
-            choice = None
-            if estimating:
-                choice = self._steady(trials, executor)
+            choice = self._steady(trials, executor) if estimating else None
             if choice is None:
                 wanted = self._estimated(trials, executor) if estimating else expected
-                remembered = self._remembered(trials)
-                choice = choose(trials, wanted, settings, remembered, executor, self._clock)
+                choice = self._chosen(trials, wanted, executor)
         targets = trials.targets[choice.filter]
         fusing = settings.fusion and choice.tried
         if fusing:
-            targets = fused(trials.of([choice.filter, *trials.plain, *choice.tried]))
+            agreeing = dict.fromkeys([choice.filter, *trials.plain, *choice.tried])
+            targets = fused([trials.targets[values] for values in agreeing])
         self.last_search = choice.search
         settled = (count_codes(targets), choice.expected) if estimating else None
         self.memory = Memory(choice.remembered, settled)
-        number, used = trials.parts(choice.filter)
+        number, gains = trials.parts(choice.filter)
         received = trials.image(choice.filter)
-        if self._refine and (used or fusing or received.dtype != np.uint8):
+        if self._refine and (gains or fusing or received.dtype != np.uint8):
             targets = checked_targets(self._refine(received, targets), f'refine of {self._name}')
         state = FilterState(
             evaluations=choice.evaluations,
-            generations=choice.search.generations if choice.search else 0,
+            generations=len(choice.search.history) if choice.search else 0,
             duration=self._clock() - started,
         )
-        if used:
-            state = replace(state, applied=True, **asdict(tuned(stack.shape, used)))
+        if gains:
+            state = replace(state, applied=True, **asdict(tuned(stack.shape, gains)))
         ordered = sorted_targets(targets)
-        mirrored = self._mirrored is not None and is_mirrored(
-            trials.targets[choice.filter] + trials.others[choice.filter],
-            settings.listed,
-            self._mirrored,
-        )
-        name = stack.names[number]
         return Identification(
             targets=tuple(ordered),
             expected=choice.expected,
             filter=state,
             estimated=estimating,
-            mirrored=mirrored,
-            combination=name,
-            expected_ids=tuple(sorted(settings.listed)),
-            search=trace_of(choice.search, trials, stack) if choice.search else None,
+            mirrored=self._mirrored is not None
+            and is_mirrored(trials.found[choice.filter], listed, self._mirrored),
+            combination=stack.names[number],
+            expected_ids=tuple(sorted(listed)),
+            search=_trace_of(choice.search, trials, stack) if choice.search else None,
             edge_shift=median_edge_shift(ordered),
         )
 
-    def _steady(self, trials: Trials, executor: Executor | None) -> Choice | None:
+    def _chosen(self, trials: Trials, expected: int, executor: Executor | None) -> _Choice:
+        """Return what shows n targets with the smallest |N - n|; N is 0 if it is unknown."""
+        settings, remembered = self._settings, self._remembered(trials)
+        discrepancy = partial(trials.discrepancy, expected)
+        searching = settings.ahf and expected > 0
+        if searching and remembered and discrepancy(remembered, executor) == 0:
+            return _Choice(expected, remembered, remembered, len(trials.targets))
+        plain = _best_plain(trials, expected, executor)
+        kept = None if plain == trials.plain[0] else plain
+        if not searching or discrepancy(plain) == 0:
+            return _Choice(expected, plain, kept if searching else remembered, len(trials.targets))
+        searched = trials.reduced() if settings.coarse else trials
+        genes = genes_of(settings.tuning, len(trials.plain))
+        initial = [remembered] if remembered and len(remembered) == len(genes) else []
+        reference = math.inf
+        if settings.genetic.patience:
+            combination = plain or ()
+            count = len(genes) - len(combination)
+            initial += [(*values[:count], *combination) for values in FIRST]
+            reference = searched.discrepancy(expected, plain, executor)
+        result = search(
+            partial(searched.discrepancy, expected),
+            genes,
+            settings.genetic,
+            np.random.default_rng(settings.genetic.seed),
+            initial=initial,
+            reference=reference,
+            executor=executor,
+            clock=self._clock,
+        )
+        evaluations = len(trials.plain) + len(result.tried)
+        tried = result.tried
+        if settings.coarse:
+            tried = confirmed(expected, tried, searched, trials, executor)
+            evaluations += len(tried)
+        best = min(tried, key=discrepancy)
+        better = discrepancy(best) < discrepancy(plain)
+        return _Choice(
+            expected=expected,
+            filter=best if better else plain,
+            remembered=best if better else kept,
+            evaluations=evaluations,
+            tried=tried,
+            search=result,
+        )
+
+    def _steady(self, trials: Trials, executor: Executor | None) -> _Choice | None:
         """Return the filter and N of the image before if it still shows the same n."""
         remembered, settled = self._remembered(trials) or trials.plain[0], self.memory.settled
         if settled and 0 < settled[0] == trials.count(remembered, executor):
-            return Choice(settled[1], remembered, remembered, 1)
+            return _Choice(settled[1], remembered, remembered, 1)
         return None
 
     def _estimated(self, trials: Trials, executor: Executor | None) -> int:
@@ -391,6 +328,36 @@ class Identifier:
         return remembered if trials.suits(remembered, len(genes)) else None
 
 
+def is_mirrored(
+    targets: Sequence[Target], expected: Collection[int], mirrored: MirroredId
+) -> bool:
+    """Return whether most IDs in an image are not expected, and most would be in a mirror.
+
+    Every word of a family of ring codes is another word of the family in a mirror, so that a
+    mirrored image shows as many targets as the original. This is known only where IDs are
+    expected; `targets` has those with other IDs, too.
+    """
+    decoded = {target.key: target for target in targets if target.id != UNDECODED}.values()
+    if not expected or len(decoded) < _MINIMUM_MIRRORED:
+        return False
+    direct = sum(target.id in expected for target in decoded)
+    reflected = sum(mirrored(target) in expected for target in decoded)
+    return 2 * direct < len(decoded) < 2 * reflected
+
+
+def _best_plain(trials: Trials, expected: int, executor: Executor | None) -> Values | None:
+    """Return the first of the best without a filter; without N, the most promising one."""
+    best = trials.plain[0]
+    trials.count(best, executor)
+    for plain in trials.plain[1:] if expected else ():
+        fewest = trials.discrepancy(expected, best)
+        if fewest == 0:
+            break
+        if trials.discrepancy(expected, plain, executor) < fewest:
+            best = plain
+    return best
+
+
 def _interruptible(
     detector: DetectorFunction, interrupt: Callable[[], None] | None
 ) -> DetectorFunction:
@@ -405,29 +372,15 @@ def _interruptible(
     return detect
 
 
-def _with_patience(settings: AdaptiveSettings, patience: int) -> AdaptiveSettings:
-    """Return settings with the patience of the detector if they have none of their own."""
-    if settings.genetic.patience or settings.fusion:
-        return settings
-    return replace(settings, genetic=replace(settings.genetic, patience=patience))
-
-
 def _check_count(name: str, count: Any) -> None:
     if isinstance(count, bool) or not isinstance(count, Integral) or count < 0:
         raise ValueError(f'{name} is {count!r}, accepted is an integer of at least 0')
 
 
-def trace_of(search: SearchResult, trials: Trials, stack: ImageStack) -> SearchTrace:
+def _trace_of(search: SearchResult, trials: Trials, stack: ImageStack) -> SearchTrace:
     """Return the filters of a search and their discrepancies.
 
-    Parameters
-    ----------
-    search : SearchResult
-        A search on the images at half their size has the filters that act alike on the whole ones.
-    trials : Trials
-        Of the whole images.
-    stack : ImageStack
-        The images as received, or one.
+    A search on the images at half their size has the filters that act alike on the whole ones.
     """
     parts = [trials.parts(values) for values in search.tried]
     filters = [tuned(stack.shape, gains or (1.0, 1.0)) for _, gains in parts]
@@ -439,6 +392,6 @@ def trace_of(search: SearchResult, trials: Trials, stack: ImageStack) -> SearchT
         gamma_low=tuple(it.gamma_low for it in filters),
         cutoff=tuple(it.cutoff for it in filters),
         attenuation=tuple(it.attenuation for it in filters),
-        generations=tuple(generation.evaluations for generation in search.history),
+        generations=search.history,
         combinations=tuple(names[number] for number, _ in parts) if names else (),
     )

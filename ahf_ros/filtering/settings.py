@@ -84,17 +84,17 @@ class TuningSettings:
     def __post_init__(self) -> None:
         """Check every parameter, and the ranges against each other."""
         check_parameters(self)
-        self._check_order('gamma_high_min', 'gamma_high_max')
-        self._check_order('gamma_low_min', 'gamma_low_max')
-        self._check_order('gamma_low_max', 'gamma_high_min')
-        self._check_order('cutoff_min', 'cutoff_max')
-
-    def _check_order(self, lower: str, upper: str) -> None:
-        value, maximum = getattr(self, lower), getattr(self, upper)
-        if value > maximum:
-            raise ValueError(
-                f'{lower} is {value!r}, accepted is a number of at most {upper}, {maximum!r}'
-            )
+        for lower, upper in (
+            ('gamma_high_min', 'gamma_high_max'),
+            ('gamma_low_min', 'gamma_low_max'),
+            ('gamma_low_max', 'gamma_high_min'),
+            ('cutoff_min', 'cutoff_max'),
+        ):
+            value, maximum = getattr(self, lower), getattr(self, upper)
+            if value > maximum:
+                raise ValueError(
+                    f'{lower} is {value!r}, accepted is a number of at most {upper}, {maximum!r}'
+                )
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
+from dataclasses import asdict, dataclass, field
 from functools import partial
+from itertools import chain
 from threading import Lock
 from typing import Any
 
 import cv2
 import numpy as np
 
-from ahf_ros.filtering.chromosome import Values
 from ahf_ros.filtering.genes import tuned
+from ahf_ros.filtering.genetic import Values
 from ahf_ros.filtering.homomorphic import HomomorphicFilter
-from ahf_ros.filtering.settings import FilterSettings
+from ahf_ros.filtering.settings import AdaptiveSettings
 from ahf_ros.imaging.stack import ImageStack
-from ahf_ros.target import UNDECODED, Target, count_codes
+from ahf_ros.target import UNDECODED, Target, count_codes, sorted_targets
 from ahf_ros.target_check import checked_targets
 
 DetectorFunction = Callable[[np.ndarray], list[Target]]
@@ -26,38 +29,28 @@ once where several filters are tried at a time."""
 CONFIRMED = 5
 """Number of filters of a reduced image that are tried on the whole one."""
 
+_REACH = 0.5  # semi-major axes; targets that are closer are at the same place
+_MINIMUM_REACH = 2.0  # px, for dots so small that noise moves their centres further
+_MINIMUM_FILTERS = 2  # that must agree on a target that the best filter does not show
+_MAJORITY = 2  # times the filters of any contradicting claim: two to one
+
 
 class Trials:
     """The targets of one image or stack, as received and through every filter tried.
 
     What is tried is a tuple of values of the genes. None stands for one image as received. Of a
     stack, the last value is the number of the combination, and is alone for a combination that is
-    not filtered.
-
-    Parameters
-    ----------
-    stack : ImageStack
-        The images as received, or one.
-    detector : callable
-        For images as received, and combinations of them.
-    draft : callable
-        For filtered ones.
-    listed : frozenset of int
-        The IDs that are searched for, others are left out; empty if all are.
-    settings : FilterSettings
-    name : str
-        What errors call the detector.
-    halved : bool
-        Whether all images are at half their size.
+    not filtered. The detector sees what is not filtered, the draft the rest; errors call either
+    `name`. With `halved`, all images are at half their size.
 
     Attributes
     ----------
     plain : tuple
         What is tried without a filter, the most promising first.
-    targets : dict
+    found : dict
         From what was tried to its targets.
-    others : dict
-        The same for the targets whose IDs are not listed.
+    targets : dict
+        The same for the targets whose IDs are listed in the settings; all if none is.
     """
 
     def __init__(
@@ -65,8 +58,7 @@ class Trials:
         stack: ImageStack,
         detector: DetectorFunction,
         draft: DetectorFunction,
-        listed: frozenset[int],
-        settings: FilterSettings,
+        settings: AdaptiveSettings,
         name: str,
         halved: bool = False,
     ) -> None:
@@ -76,12 +68,12 @@ class Trials:
         self.plain: tuple[Values | None, ...] = (
             tuple((float(number),) for number in numbers) if self._several else (None,)
         )
-        self._listed = listed
+        self.found: dict[Values | None, list[Target]] = {}
         self.targets: dict[Values | None, list[Target]] = {}
-        self.others: dict[Values | None, list[Target]] = {}
         self._detector = detector
         self._draft = draft
         self._settings = settings
+        self._listed = settings.listed
         self._name = name
         self._halved = halved
         self._lock = Lock()
@@ -105,7 +97,14 @@ class Trials:
         """Return the image, or the combination of the stack, before it is filtered."""
         number, _ = self.parts(values)
         with self._lock:
-            return self._combined(number)
+            if number not in self._images:
+                image = self._stack.combined(self._stack.names[number])
+                if self._halved:
+                    height, width = image.shape
+                    size = (max(width // 2, 1), max(height // 2, 1))
+                    image = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+                self._images[number] = image
+            return self._images[number]
 
     def discrepancy(
         self, expected: int, values: Values | None, executor: Executor | None = None
@@ -114,28 +113,23 @@ class Trials:
         return abs(expected - self.count(values, executor))
 
     def count(self, values: Values | None, executor: Executor | None = None) -> int:
-        """Return n through a filter."""
+        """Return n through a filter; the threads of the executor share the image's strips."""
         if values not in self.targets:
-            found = checked_targets(self._found(values, executor), self._name)
-            wanted = self._listed | {UNDECODED}
-            listed, others = found, []
-            if self._listed:
-                listed = [target for target in found if target.id in wanted]
-                others = [target for target in found if target.id not in wanted]
-            self.others[values], self.targets[values] = others, listed
+            self.found[values] = checked_targets(self._detected(values, executor), self._name)
+            self.targets[values] = [
+                target
+                for target in self.found[values]
+                if not self._listed or target.id in self._listed or target.id == UNDECODED
+            ]
         return count_codes(self.targets[values])
 
     def reduced(self) -> Trials:
         """Return trials of all images at half their size."""
-        draft, listed, settings = self._draft, self._listed, self._settings
-        return Trials(self._stack, draft, draft, listed, settings, self._name, halved=True)
+        draft = self._draft
+        return Trials(self._stack, draft, draft, self._settings, self._name, halved=True)
 
-    def of(self, tried: Sequence[Values | None]) -> list[list[Target]]:
-        """Return what each filter showed; one that is listed twice counts once."""
-        return [self.targets[values] for values in dict.fromkeys(tried)]
-
-    def _found(self, values: Values | None, executor: Executor | None) -> Any:
-        """Return what the detector finds through a filter, listed or not, without a check."""
+    def _detected(self, values: Values | None, executor: Executor | None) -> Any:
+        """Return what the detector finds through a filter, without a check."""
         number, chosen = self.parts(values)
         image = self.image(values)
         if self._several and image.min() == image.max():
@@ -144,25 +138,10 @@ class Trials:
             return self._detector(image)
         with self._lock:
             if number not in self._prepared:
-                self._prepared[number] = HomomorphicFilter(image, self._settings)
+                self._prepared[number] = HomomorphicFilter(image, self._settings.filter)
         # equal gains leave the image as it is, but for the mapping to 8 bit
-        used = tuned(image.shape, chosen or (1.0, 1.0))
-        return self._draft(
-            self._prepared[number].filtered(
-                used.gamma_high, used.gamma_low, used.cutoff, used.attenuation, executor
-            )
-        )
-
-    def _combined(self, number: int) -> np.ndarray:
-        """Return a combination, which is made once."""
-        if number not in self._images:
-            image = self._stack.combined(self._stack.names[number])
-            if self._halved:
-                height, width = image.shape
-                size = (max(width // 2, 1), max(height // 2, 1))
-                image = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
-            self._images[number] = image
-        return self._images[number]
+        used = asdict(tuned(image.shape, chosen or (1.0, 1.0)))
+        return self._draft(self._prepared[number].filtered(**used, executor=executor))
 
 
 def confirmed(
@@ -174,23 +153,58 @@ def confirmed(
 ) -> tuple[Values, ...]:
     """Try the best filters of a reduced image on the whole one, up to the first that shows N.
 
-    Parameters
-    ----------
-    expected : int
-        N.
-    tried : sequence of tuple of float
-        Filters of the reduced image.
-    reduced, whole : Trials
-    executor : concurrent.futures.Executor or None
-        Threads that share the strips of an image.
-
-    Returns
-    -------
-    tuple of tuple of float
-        The filters tried on the whole image, the best of the reduced one first.
+    Return those tried, the best of the reduced image first.
     """
     best = sorted(tried, key=partial(reduced.discrepancy, expected))[:CONFIRMED]
     for count, values in enumerate(best, 1):
         if whole.discrepancy(expected, values, executor) == 0:
             return tuple(best[:count])
     return tuple(best)
+
+
+@dataclass(slots=True)
+class _Claim:
+    """An ID at a place."""
+
+    target: Target  # through the best filter that shows it
+    first: int  # index of that filter
+    filters: set[int] = field(default_factory=set)
+
+    def near(self, other: Target) -> bool:
+        """Return whether another target is at the same place."""
+        reach = max(_REACH * self.target.semi_major, _MINIMUM_REACH)
+        return bool(np.hypot(other.x - self.target.x, other.y - self.target.y) < reach)
+
+
+def fused(results: Sequence[Sequence[Target]]) -> list[Target]:
+    """Return the targets on which filters agree, sorted, each as the best of its filters shows it.
+
+    The best filter for the whole image may hide a target that another one shows. If the light
+    makes a detector read a wrong ID, it does so through few filters, and the wrong ID varies. A
+    target counts if the best filter, the first one, or at least two others show it, and if twice
+    as many filters show it as any contradicting claim: another ID at its place, or its ID at
+    another place. Undecoded targets are ignored.
+    """
+    by_key: defaultdict[tuple[str, int], list[_Claim]] = defaultdict(list)
+    for index, targets in enumerate(results):
+        for target in targets:
+            if target.id == UNDECODED:
+                continue
+            same = [claim for claim in by_key[target.key] if claim.near(target)]
+            if not same:
+                same = [_Claim(target, index)]
+                by_key[target.key] += same
+            same[0].filters.add(index)
+    claims = list(chain.from_iterable(by_key.values()))
+    kept = [
+        claim.target
+        for claim in claims
+        if (claim.first == 0 or len(claim.filters) >= _MINIMUM_FILTERS)
+        and all(
+            len(claim.filters) >= _MAJORITY * len(other.filters)
+            for other in claims
+            if other is not claim
+            and (other.target.key == claim.target.key or claim.near(other.target))
+        )
+    ]
+    return sorted_targets(kept)

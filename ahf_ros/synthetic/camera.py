@@ -50,17 +50,9 @@ class Camera:
         return _transform(np.linalg.inv(self.pose), np.stack((x, y), axis=1))
 
     def rays(self, columns: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the rays (x, y, 1) of pixels.
+        """Return x and y of the rays (x, y, 1) of pixels, whose shapes broadcast together.
 
-        Parameters
-        ----------
-        columns, rows : ndarray of float64
-            Pixel coordinates, px, with shapes that broadcast together.
-
-        Returns
-        -------
-        x, y : ndarray of float64
-            Without distortion each has the shape of its argument, otherwise the common shape.
+        Without distortion each has the shape of its argument, otherwise the common shape.
         """
         x = (columns - self.intrinsics[0, 2]) / self.intrinsics[0, 0]
         y = (rows - self.intrinsics[1, 2]) / self.intrinsics[1, 1]
@@ -82,22 +74,29 @@ class Camera:
         ray = self.pose @ np.array([*point, 1.0])
         x, y = ray[:2] / ray[2]
         pinhole = (self.pose[:2, :2] - np.outer((x, y), self.pose[2, :2])) / ray[2]
+        return self._pixels_by_ray(x, y) @ pinhole
+
+    def _pixels_by_ray(self, x: float, y: float) -> np.ndarray:
+        """Return d(pixel) / d(ray) at the ray (x, y, 1), shape (2, 2)."""
         radial = np.eye(2) * (1 + self.distortion * (x * x + y * y))
         radial += 2 * self.distortion * np.outer((x, y), (x, y))
-        return np.diag(np.diag(self.intrinsics)[:2]) @ radial @ pinhole
+        return np.diag(np.diag(self.intrinsics)[:2]) @ radial
+
+    @property
+    def _normal(self) -> np.ndarray:
+        """Unit normal of the wall as the camera sees it."""
+        axes = self.pose[:, :2] / np.linalg.norm(self.pose[:, :2], axis=0)
+        return np.cross(axes[:, 0], axes[:, 1])
 
     def view_angle(self, points: np.ndarray) -> np.ndarray:
         """Return the angles between the rays to points on the wall and its normal, rad."""
-        axes = self.pose[:, :2] / np.linalg.norm(self.pose[:, :2], axis=0)
-        normal = np.cross(axes[:, 0], axes[:, 1])
         rays = np.column_stack((points, np.ones(len(points)))) @ self.pose.T
-        return np.arccos(np.abs(rays @ normal) / np.linalg.norm(rays, axis=1))
+        return np.arccos(np.abs(rays @ self._normal) / np.linalg.norm(rays, axis=1))
 
     @property
     def tilt(self) -> float:
         """Angle between the optical axis and the wall's normal, degrees."""
-        axes = self.pose[:, :2] / np.linalg.norm(self.pose[:, :2], axis=0)
-        return math.degrees(math.acos(min(abs(np.cross(axes[:, 0], axes[:, 1])[2]), 1.0)))
+        return math.degrees(math.acos(min(abs(self._normal[2]), 1.0)))
 
     def vignetting(self, pixels: np.ndarray) -> np.ndarray:
         """Return the vignetting of pixels, shape (n, 2): cos^4 of the field angle."""
@@ -106,23 +105,10 @@ class Camera:
         return share
 
     def circle(self, centre: np.ndarray, radius: float) -> tuple[float, float, float]:
-        """Return the ellipse that is the image of a circle on the wall.
+        """Return the semi-axes, px, and the angle of the image of a circle on the wall.
 
-        It is exact for a pinhole camera; lens distortion is taken as affine across the circle.
-
-        Parameters
-        ----------
-        centre : ndarray of float64, shape (2,)
-            Centre on the wall.
-        radius : float
-            Radius in units of the wall.
-
-        Returns
-        -------
-        semi_major, semi_minor : float
-            In px.
-        angle : float
-            Direction of the major axis, rad in (-pi/2, pi/2], from +x towards +y.
+        The angle is that of `Target`. The ellipse is exact for a pinhole camera; lens distortion
+        is taken as affine across the circle.
         """
         ray = self.pose @ np.array([*centre, 1.0])
         x, y = ray[:2] / ray[2]
@@ -132,9 +118,7 @@ class Camera:
         conic = back.T @ np.diag([1.0, 1.0, -1.0]) @ back
         middle = -np.linalg.solve(conic[:2, :2], conic[:2, 2])
         level = -(conic[2, 2] + conic[2, :2] @ middle)
-        radial = np.eye(2) * (1 + self.distortion * (x * x + y * y))
-        radial += 2 * self.distortion * np.outer((x, y), (x, y))
-        to_pixel = np.diag(np.diag(self.intrinsics)[:2]) @ radial
+        to_pixel = self._pixels_by_ray(x, y)
         spread = to_pixel @ np.linalg.inv(conic[:2, :2] / level) @ to_pixel.T
         squares, directions = np.linalg.eigh(spread)
         angle = math.atan2(directions[1, 1], directions[0, 1])
@@ -147,20 +131,10 @@ class Camera:
 
 @dataclass(frozen=True, slots=True)
 class Sensor:
-    """Conversion of light into grey values.
+    """Conversion of light into grey values, which are light to the power of 1 / gamma."""
 
-    Attributes
-    ----------
-    full_well : float
-        Photoelectrons at saturation; 0 for an image without noise.
-    read_noise : float
-        Standard deviation, electrons.
-    gamma : float
-        Grey values are light to the power of 1 / gamma.
-    """
-
-    full_well: float
-    read_noise: float
+    full_well: float  # photoelectrons at saturation; 0 for an image without noise
+    read_noise: float  # standard deviation, electrons
     gamma: float
 
     def grey_values(self, light: np.ndarray, generator: np.random.Generator) -> np.ndarray:
@@ -190,19 +164,9 @@ def tilted_camera(
 ) -> Camera:
     """Return a camera that looks at the wall's origin, tilted about a random axis.
 
-    Parameters
-    ----------
-    width, height : int
-        Size of the image, px.
-    focal_length : float
-        In px. It is also the distance from the wall's origin, in units of the wall.
-    tilt : float
-        Angle between the optical axis and the wall's normal, rad.
-    distortion : float
-        k1, dimensionless.
-    generator : numpy.random.Generator
-        Draws the direction of the tilt and the principal point, which is at most 1 % of the
-        width off the middle of the image.
+    The focal length in px is also the distance from the wall's origin, in units of the wall; the
+    tilt is in rad. The generator draws the direction of the tilt and the principal point, which is
+    at most 1 % of the width off the middle of the image.
     """
     direction = generator.uniform(0, 2 * math.pi)
     offset = generator.uniform(-0.01, 0.01, 2) * width

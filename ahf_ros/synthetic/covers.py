@@ -1,17 +1,25 @@
-"""The ink of printed targets, as functions of the place."""
+"""The ink of everything that is printed on the wall, as functions of the place."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+import string
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
-from ahf_ros.codes.ring import Family, sectors
-from ahf_ros.codes.square import marker
+from ahf_ros.codes.designs import HALF_SIDE, proportions
+from ahf_ros.codes.dots import DotFamily, dot_family
+from ahf_ros.codes.gsi import PointFamily
+from ahf_ros.codes.gsi_library import point_family
+from ahf_ros.codes.ring import Family, family, sectors
+from ahf_ros.codes.square import SQUARE_NAMES, marker
 
 _CELL = 32  # side of a cell in the picture of a square marker, px
+_SIDE = 256  # px of the picture of a distractor, finer than any in an image
+_FINE = 3  # fractional bits of drawing coordinates
 
 Cover = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 """From points (x, y) of a mark, float32 of one shape in units of its radius, to the ink, 0 to 1.
@@ -21,40 +29,76 @@ is the change of (x, y) across the width of an anti-aliased edge, along the colu
 """
 
 
-def ring_cover(
-    family: Family, word: int, turn: float, pinhole: float, growth: float = 0.0
-) -> Cover:
-    """Return the ink of a ring target.
+@dataclass(frozen=True, slots=True)
+class Design:
+    """A printed target: its code word and its ink, with lengths in radii of its dot.
 
-    The signed distance to each edge, in widths of an anti-aliased edge, gives the covered
-    fraction of a sample.
+    A circle of radius `reach` holds all ink. The ellipse that is reported of the target is the
+    image of a circle of radius `radius`.
+    """
+
+    code: int
+    cover: Cover
+    reach: float
+    radius: float
+
+
+def design(
+    name: str, number: int, turn: float, growth: float, pinhole: float, file: str = ''
+) -> Design:
+    """Return the design of a target of a family, or of the family that a data file describes.
 
     Parameters
     ----------
-    family : Family
-        Family with the proportions and the number of sectors.
-    word : int
-        Code word.
     turn : float
-        Direction of the edge at which sector 0 begins, rad.
-    pinhole : float
-        Radius of the hole in the centre of the dot, in radii of the dot; 0 for none.
+        Counter-clockwise rotation, rad.
     growth : float
         Length by which the ink is larger on every edge, in radii of the dot; less than half of a
-        sector.
+        sector or a cell.
+    pinhole : float
+        Radius of the hole in the centre of the dot, in radii of the dot; 0 for none. Square
+        markers and point-distributed targets have none.
+    """
+    if name in SQUARE_NAMES:
+        word, cover = number, square_cover(name, number, HALF_SIDE, turn, growth)
+    elif name == 'gsi':
+        points = point_family(file)
+        word = points.word(number)
+        cover = _point_cover(points, word, turn, growth)
+    elif name == 'dots':
+        dots = dot_family(file)
+        word = dots.word(number)
+        cover = _dot_ring_cover(dots, word, turn, pinhole, growth)
+    else:
+        ring = family(name)
+        word = ring.word(number)
+        cover = ring_cover(ring, word, turn, pinhole, growth)
+    common = proportions(name, file)
+    return Design(
+        code=word, cover=cover, reach=common.reach + max(growth, 0.0), radius=common.radius
+    )
+
+
+def ring_cover(
+    family: Family, word: int, turn: float, pinhole: float, growth: float = 0.0
+) -> Cover:
+    """Return the ink of a ring target whose sector 0 begins at `turn`, as for `design`.
+
+    The signed distance to each edge, in widths of an anti-aliased edge, gives the covered
+    fraction of a sample.
     """
     inner, outer = np.float32(family.band_inner - growth), np.float32(family.band_outer + growth)
 
     def cover(x: np.ndarray, y: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
         distance = np.sqrt(x * x + y * y)
-        radial = edge_width(jacobian, x, y, distance)
-        inked = dot_share(distance, radial, pinhole, growth)
+        radial = _edge_width(jacobian, x, y, distance)
+        inked = _dot_share(distance, radial, pinhole, growth)
         margin = np.float32(2 * radial.max())
         band = (distance > inner - margin) & (distance < outer + margin)
         distance, radial, x, y = distance[band], radial[band], x[band], y[band]
-        ring = inside_share(distance - inner, radial)
-        ring *= inside_share(outer - distance, radial)
-        around = edge_width(jacobian, -y, x, distance) / distance
+        ring = _inside_share(distance - inner, radial)
+        ring *= _inside_share(outer - distance, radial)
+        around = _edge_width(jacobian, -y, x, distance) / distance
         angle, wider = np.arctan2(y, x) - turn, np.float32(growth) / distance
         ring *= _sector_cover(sectors(word, family.bits), angle, around, wider)
         inked[band] += ring
@@ -63,28 +107,96 @@ def ring_cover(
     return cover
 
 
+def _sector_cover(
+    colours: np.ndarray, angle: np.ndarray, width: np.ndarray, growth: np.ndarray
+) -> np.ndarray:
+    """Return the fraction of each sample that inked sectors cover.
+
+    For each sample there are its angle, the width of an edge and the length by which ink is
+    wider, less than half of a sector, all in rad.
+    """
+    bits = len(colours)
+    position = angle * np.float32(bits / (2 * math.pi))
+    edge = np.rint(position)
+    after = edge.astype(np.int32) % bits
+    shades = colours.astype(np.float32)
+    beyond = (position - edge) * np.float32(2 * math.pi / bits)
+    share = _inside_share(beyond + growth * (shades[after] - shades[after - 1]), width)
+    cover: np.ndarray = shades[after] * share + shades[after - 1] * (1 - share)
+    return cover
+
+
+def _point_cover(family: PointFamily, word: int, turn: float, growth: float) -> Cover:
+    """Return the ink of a point-distributed target, turned about its reference point."""
+    places, radii = family.dots(word)
+    cosine, sine = math.cos(turn), math.sin(turn)
+    places = places @ np.array([[cosine, sine], [-sine, cosine]]) / family.dot_radius
+    radii = radii / family.dot_radius + growth
+
+    def cover(x: np.ndarray, y: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
+        return _with_dots(np.zeros_like(x), x, y, places, radii, jacobian)
+
+    return cover
+
+
+def _dot_ring_cover(
+    family: DotFamily, word: int, turn: float, pinhole: float, growth: float
+) -> Cover:
+    """Return the ink of a ring of dots; dot 0 is in the direction `turn`."""
+    places = family.places(word, turn)
+    radii = [family.dot_radius + growth] * len(places)
+    inner = np.float32(family.ground_radius - growth)
+    outer = np.float32(family.border_radius + growth)
+
+    def cover(x: np.ndarray, y: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
+        distance = np.sqrt(x * x + y * y)
+        width = _edge_width(jacobian, x, y, distance)
+        inked = _dot_share(distance, width, pinhole, growth)
+        border = _inside_share(distance - inner, width)
+        border *= _inside_share(outer - distance, width)
+        inked += border
+        return _with_dots(inked, x, y, places, radii, jacobian)
+
+    return cover
+
+
+def _with_dots(
+    inked: np.ndarray,
+    x: np.ndarray,
+    y: np.ndarray,
+    places: np.ndarray,
+    radii: Sequence[float] | np.ndarray,
+    jacobian: np.ndarray,
+) -> np.ndarray:
+    """Add the ink of dots to samples, in place, and return them."""
+    for place, radius in zip(places, radii, strict=True):
+        across, up = x - np.float32(place[0]), y - np.float32(place[1])
+        near = np.maximum(np.abs(across), np.abs(up)) < radius + 2 * np.abs(jacobian).sum()
+        across, up = across[near], up[near]
+        distance = np.sqrt(across * across + up * up)
+        width = _edge_width(jacobian, across, up, distance)
+        inked[near] += _inside_share(np.float32(radius) - distance, width)
+    return np.minimum(inked, 1, out=inked)
+
+
 def square_cover(
     name: str, number: int, half_side: float, turn: float, growth: float = 0.0
 ) -> Cover:
-    """Return the ink of a square marker.
-
-    Parameters
-    ----------
-    name : str
-        Name of the dictionary, one of `ahf_ros.codes.square.SQUARE_NAMES`.
-    number : int
-        ID of the marker.
-    half_side : float
-        Half the side of the marker, in radii of the mark.
-    turn : float
-        Rotation of the marker, counter-clockwise, rad.
-    growth : float
-        Length by which the ink is larger on every edge, in radii of the mark; less than a cell.
-    """
+    """Return the ink of a square marker; half its side and growth are in radii of the mark."""
     ink = 255 - marker(name, number, _CELL)
     side = len(ink)
     ink = _grown(np.pad(ink, _CELL), growth * side / (2 * half_side))
     return stamp_cover(ink, half_side * len(ink) / side, turn)
+
+
+def _grown(ink: np.ndarray, growth: float) -> np.ndarray:
+    """Return a picture of ink, 255, that is larger by a length in px on every edge."""
+    inside, outside = (
+        cv2.distanceTransform(where.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+        for where in (ink > 0, ink == 0)
+    )
+    beyond = np.where(ink > 0, inside - 0.5, 0.5 - outside) + growth  # an edge is between pixels
+    return np.rint(_inside_share(beyond, np.float32(1)) * 255).astype(np.uint8)
 
 
 def card_cover(half_width: float, turn: float) -> Cover:
@@ -95,22 +207,15 @@ def card_cover(half_width: float, turn: float) -> Cover:
         width = np.float32(np.sqrt(abs(np.linalg.det(jacobian))))
         across, up = np.abs(x * cosine + y * sine), np.abs(y * cosine - x * sine)
         outermost = np.maximum(np.maximum(across, up), (across + up) * np.float32(math.sqrt(0.5)))
-        return inside_share(np.float32(half_width) - outermost, width)
+        return _inside_share(np.float32(half_width) - outermost, width)
 
     return cover
 
 
 def stamp_cover(stamp: np.ndarray, half_side: float, turn: float) -> Cover:
-    """Return the ink of a picture.
+    """Return the ink of a picture, uint8, shape (side, side), with 255 where there is ink.
 
-    Parameters
-    ----------
-    stamp : ndarray of uint8, shape (side, side)
-        255 where there is ink.
-    half_side : float
-        Half the side of the picture, in radii of the mark.
-    turn : float
-        Rotation of the picture, counter-clockwise, rad.
+    Half its side is in radii of the mark; it is turned counter-clockwise by an angle in rad.
     """
     cosine, sine = np.float32(math.cos(turn)), np.float32(math.sin(turn))
     half = np.float32(len(stamp) / 2)
@@ -127,7 +232,7 @@ def stamp_cover(stamp: np.ndarray, half_side: float, turn: float) -> Cover:
     return cover
 
 
-def edge_width(
+def _edge_width(
     jacobian: np.ndarray, x: np.ndarray, y: np.ndarray, distance: np.ndarray
 ) -> np.ndarray:
     """Return the width of an edge perpendicular to (x, y), a vector of length `distance`."""
@@ -137,60 +242,86 @@ def edge_width(
     return np.maximum(width, np.float32(1e-6), out=width)
 
 
-def inside_share(distance: np.ndarray, width: np.ndarray) -> np.ndarray:
+def _inside_share(distance: np.ndarray, width: np.ndarray) -> np.ndarray:
     """Return the fraction of each sample on the positive side of an edge."""
     share: np.ndarray = distance / width + np.float32(0.5)
     return np.clip(share, 0, 1, out=share)
 
 
-def dot_share(
+def _dot_share(
     distance: np.ndarray, width: np.ndarray, pinhole: float, growth: float
 ) -> np.ndarray:
-    """Return the fraction of each sample that a dot of radius 1 covers.
+    """Return the fraction of each sample that a dot of radius 1 covers, without its pinhole.
 
-    Parameters
-    ----------
-    distance : ndarray of float32
-        Of the samples from its centre, in its radii.
-    width : ndarray of float32
-        Of its edge, in its radii.
-    pinhole, growth : float
-        As for `ring_cover`.
+    `distance` is that from its centre, `width` that of its edge, float32, in its radii.
     """
-    inked = inside_share(np.float32(1 + growth) - distance, width)
+    inked = _inside_share(np.float32(1 + growth) - distance, width)
     if pinhole:
-        inked -= inside_share(np.float32(pinhole - growth) - distance, width)
+        inked -= _inside_share(np.float32(pinhole - growth) - distance, width)
     return inked
 
 
-def _grown(ink: np.ndarray, growth: float) -> np.ndarray:
-    """Return a picture of ink, 255, that is larger by a length in px on every edge."""
-    inside, outside = (
-        cv2.distanceTransform(where.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-        for where in (ink > 0, ink == 0)
-    )
-    beyond = np.where(ink > 0, inside - 0.5, 0.5 - outside) + growth  # an edge is between pixels
-    return np.rint(inside_share(beyond, np.float32(1)) * 255).astype(np.uint8)
+def distractor_cover(generator: np.random.Generator) -> tuple[Cover, float]:
+    """Return the ink of a random distractor in the unit circle, and its radius in dot radii.
 
-
-def _sector_cover(
-    colours: np.ndarray, angle: np.ndarray, width: np.ndarray, growth: np.ndarray
-) -> np.ndarray:
-    """Return the fraction of each sample that inked sectors cover; angles are in rad.
-
-    Parameters
-    ----------
-    colours : ndarray of bool, shape (bits,)
-    angle, width, growth : ndarray of float32
-        Angle of each sample, width of an edge there, and length by which ink is wider there, less
-        than half of a sector.
+    Distractors are marks that are not coded targets: plain dots, rings, text, leaves.
     """
-    bits = len(colours)
-    position = angle * np.float32(bits / (2 * math.pi))
-    edge = np.rint(position)
-    after = edge.astype(np.int32) % bits
-    shades = colours.astype(np.float32)
-    beyond = (position - edge) * np.float32(2 * math.pi / bits)
-    share = inside_share(beyond + growth * (shades[after] - shades[after - 1]), width)
-    cover: np.ndarray = shades[after] * share + shades[after - 1] * (1 - share)
-    return cover
+    kinds = ((_draw_dot, 1.0), (_draw_ring, 2.0), (_draw_text, 3.0), (_draw_leaf, 4.0))
+    draw, radius = kinds[generator.integers(len(kinds))]
+    stamp = np.zeros((_SIDE, _SIDE), np.uint8)
+    draw(stamp, generator)
+    turned = generator.uniform(0, 2 * math.pi)
+    return stamp_cover(stamp, 1.0, turned), radius * generator.uniform(0.6, 1.3)
+
+
+def _fixed(points: np.ndarray) -> np.ndarray:
+    """Return points of the unit circle as fixed-point drawing coordinates."""
+    pixels = (np.asarray(points) + 1) * (_SIDE / 2) - 0.5
+    return np.rint(pixels * 2**_FINE).astype(np.int32)
+
+
+def _draw_disc(stamp: np.ndarray, radius: float, shade: int) -> None:
+    middle = tuple(_fixed(np.zeros(2)).tolist())
+    cv2.circle(stamp, middle, int(radius * _SIDE / 2 * 2**_FINE), shade, -1, cv2.LINE_AA, _FINE)
+
+
+def _draw_dot(stamp: np.ndarray, _generator: np.random.Generator) -> None:
+    """Draw an uncoded target."""
+    _draw_disc(stamp, 0.95, 255)
+
+
+def _draw_ring(stamp: np.ndarray, generator: np.random.Generator) -> None:
+    """Draw a closed ring, like a letter O or a washer."""
+    _draw_disc(stamp, 0.95, 255)
+    _draw_disc(stamp, 0.95 * generator.uniform(0.4, 0.8), 0)
+
+
+def _draw_text(stamp: np.ndarray, generator: np.random.Generator) -> None:
+    """Draw one to three lines of capital letters and digits."""
+    characters = np.array(list(string.ascii_uppercase + string.digits))
+    count = int(generator.integers(1, 4))
+    height = 1.3 / count
+    for line in range(count):
+        text = ''.join(generator.choice(characters, int(generator.integers(2, 6))))
+        font, weight = cv2.FONT_HERSHEY_DUPLEX, int(generator.integers(2, 6))
+        (width, ascent), _ = cv2.getTextSize(text, font, 1.0, weight)
+        scale = min(1.2 * _SIDE / 2 / width, 0.7 * height * _SIDE / 2 / ascent)
+        baseline = (-0.65 + height * (line + 0.8) + 1) * _SIDE / 2
+        origin = (int(0.2 * _SIDE), int(baseline))
+        cv2.putText(stamp, text, origin, font, scale, 255, weight, cv2.LINE_AA)
+
+
+def _draw_leaf(stamp: np.ndarray, generator: np.random.Generator) -> None:
+    """Draw a pointed leaf with a stalk, lighter than ink and with a light vein."""
+    along = np.linspace(0, 1, 40)
+    breadth = generator.uniform(0.2, 0.45)
+    edge = breadth * np.sin(math.pi * along ** generator.uniform(0.6, 1.0))
+    bend = generator.uniform(-0.3, 0.3) * np.sin(math.pi * along)
+    spine = np.stack((1.3 * along - 0.4, bend), axis=1)
+    side = np.stack((np.zeros_like(edge), edge), axis=1)
+    outline = np.concatenate((spine + side, (spine - side)[::-1]))
+    shade = int(generator.integers(120, 240))
+    cv2.fillPoly(stamp, [_fixed(outline)], shade, cv2.LINE_AA, _FINE)
+    stalk = np.array([[-0.9, generator.uniform(-0.2, 0.2)], [-0.4, 0.0]])
+    cv2.polylines(stamp, [_fixed(stalk)], False, shade, 6, cv2.LINE_AA, _FINE)
+    cv2.polylines(stamp, [_fixed(spine)], False, shade // 2, 3, cv2.LINE_AA, _FINE)

@@ -22,15 +22,7 @@ _TRIES = 1000  # positions per distractor: one in 200 of the image being free is
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placements:
-    """Circles in the image that do not overlap.
-
-    Attributes
-    ----------
-    centres : ndarray of float64, shape (n, 2)
-        In px.
-    radii : ndarray of float64, shape (n,)
-        In px.
-    """
+    """Circles in the image that do not overlap: centres, shape (n, 2), and radii, (n,), px."""
 
     centres: np.ndarray
     radii: np.ndarray
@@ -39,28 +31,16 @@ class Placements:
 def quiet_radius(semi_major: np.ndarray | float, focal_length: float, zone: float) -> np.ndarray:
     """Return the radius of the circle in the image that holds a target and its quiet zone, px.
 
-    Parameters
-    ----------
-    semi_major : float or ndarray
-        Semi-major axis of the dot, px.
-    focal_length : float
-        In px. On a tilted wall, the nearer half of a target appears larger; the shorter the focal
-        length, the more so.
-    zone : float
-        Radius of the quiet zone in radii of the dot.
+    The semi-major axis of its dot and the focal length are in px, the radius of the quiet zone is
+    in radii of the dot. On a tilted wall, the nearer half of a target appears larger; the shorter
+    the focal length, the more so.
     """
     reach = zone * np.asarray(semi_major, dtype=float)
     return 1.02 * reach / np.maximum(1 - reach / focal_length, 0.1)
 
 
 def size_ratios(text: str) -> list[float]:
-    """Return the ratios that a text lists, such as '0.5, 1, 2'.
-
-    Raises
-    ------
-    ValueError
-        If they are not numbers from 0.05 to 20.
-    """
+    """Return the ratios that a text lists, such as '0.5, 1, 2'; from 0.05 to 20, or ValueError."""
     try:
         ratios = [float(part) for part in text.split(',')]
     except ValueError:
@@ -80,22 +60,8 @@ def grid_placements(
 ) -> Placements:
     """Place circles at random inside the cells of a grid, one per cell.
 
-    The grid is as coarse as possible. Cells where the camera sees the wall at more than
-    the maximum view angle stay empty.
-
-    Parameters
-    ----------
-    camera : Camera
-        Camera that sees the wall.
-    radii : ndarray of float64, shape (n,)
-        Radii of the circles, px.
-    generator : numpy.random.Generator
-        Draws the cells and the positions inside them.
-
-    Raises
-    ------
-    ValueError
-        If too few cells show the wall within that angle.
+    The radii are in px. The grid is as coarse as possible. Cells where the camera sees the wall at
+    more than the maximum view angle stay empty; a ValueError is raised if too few are left.
     """
     steepest = max(MAXIMUM_VIEW_ANGLE, camera.tilt + TILT_MARGIN)
     count = len(radii)
@@ -127,21 +93,8 @@ def scattered_placements(
 ) -> Placements:
     """Place circles at random where the image is free, the largest circle first.
 
-    Parameters
-    ----------
-    camera : Camera
-        Camera with the size of the image.
-    radii : ndarray of float64, shape (n,)
-        Radii of the circles, px.
-    taken : Placements
-        Circles that must not be overlapped.
-    generator : numpy.random.Generator
-        Draws the centres.
-
-    Raises
-    ------
-    ValueError
-        If no free position is found in `_TRIES` attempts.
+    The radii are in px; circles in `taken` are not overlapped. A ValueError is raised if no free
+    position is found in `_TRIES` attempts.
     """
     size = np.array([camera.width, camera.height])
     centres, occupied = taken.centres, taken.radii

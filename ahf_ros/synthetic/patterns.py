@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -18,66 +19,60 @@ def uniform(_generator: np.random.Generator, _defocus: float, _shift: float) -> 
     return lambda u, _v: np.ones_like(u)
 
 
-def stripes(period: float, direction: float = 0.0) -> Callable[..., Pattern]:
-    """Return a factory of hard-edged stripes with half of each period lit.
+def stripes(
+    generator: np.random.Generator,
+    defocus: float,
+    shift: float,
+    *,
+    period: float,
+    direction: float = 0.0,
+) -> Pattern:
+    """Return hard-edged stripes with half of each period, in projector px, lit.
 
-    Parameters
-    ----------
-    period : float
-        In projector px.
-    direction : float
-        Direction of the normal of the stripes, rad from +u. Each pattern deviates from it by up to
-        10 degrees, and half of the patterns are mirrored.
+    Each pattern deviates from the direction of their normal, rad from +u, by up to 10 degrees, and
+    half of the patterns are mirrored.
     """
+    x, y, phase = _wave(generator, period, direction, shift)
 
-    def make(generator: np.random.Generator, defocus: float, shift: float) -> Pattern:
-        x, y, phase = _wave(generator, period, direction, shift)
+    def pattern(u: np.ndarray, v: np.ndarray) -> np.ndarray:
+        along = _remainder(u * x + (v * y + phase), period)
+        return _soft_step(np.float32(period / 4) - np.abs(along, out=along), defocus)
 
-        def pattern(u: np.ndarray, v: np.ndarray) -> np.ndarray:
-            along = _remainder(u * x + (v * y + phase), period)
-            return _soft_step(np.float32(period / 4) - np.abs(along, out=along), defocus)
-
-        return pattern
-
-    return make
+    return pattern
 
 
-def fringe(period: float) -> Callable[..., Pattern]:
-    """Return a factory of sinusoidal fringes with a period in projector px."""
+def fringe(
+    generator: np.random.Generator, defocus: float, shift: float, *, period: float
+) -> Pattern:
+    """Return sinusoidal fringes with a period in projector px."""
+    x, y, phase = _wave(generator, period, 0.0, shift)
+    wave = np.float32(2 * math.pi / period)
+    contrast = np.float32(0.5 * math.exp(-((float(wave) * defocus) ** 2) / 2))
 
-    def make(generator: np.random.Generator, defocus: float, shift: float) -> Pattern:
-        x, y, phase = _wave(generator, period, 0.0, shift)
-        wave = np.float32(2 * math.pi / period)
-        contrast = np.float32(0.5 * math.exp(-((float(wave) * defocus) ** 2) / 2))
+    def pattern(u: np.ndarray, v: np.ndarray) -> np.ndarray:
+        return np.float32(0.5) + contrast * np.cos((u * x + (v * y + phase)) * wave)
 
-        def pattern(u: np.ndarray, v: np.ndarray) -> np.ndarray:
-            return np.float32(0.5) + contrast * np.cos((u * x + (v * y + phase)) * wave)
-
-        return pattern
-
-    return make
+    return pattern
 
 
-def lattice(period: float, diameter: float) -> Callable[..., Pattern]:
-    """Return a factory of square lattices of bright round spots; lengths in projector px.
+def lattice(
+    generator: np.random.Generator, defocus: float, shift: float, *, period: float, diameter: float
+) -> Pattern:
+    """Return a square lattice of bright round spots; lengths in projector px.
 
     A shift moves them twice as far along the second axis, so that four of a quarter light almost
     every point.
     """
+    x, y, phase = _wave(generator, period, 0.0, shift)
+    second = np.float32(generator.uniform(0, period) + 2 * shift * period)
 
-    def make(generator: np.random.Generator, defocus: float, shift: float) -> Pattern:
-        x, y, phase = _wave(generator, period, 0.0, shift)
-        second = np.float32(generator.uniform(0, period) + 2 * shift * period)
+    def pattern(u: np.ndarray, v: np.ndarray) -> np.ndarray:
+        across = _remainder(u * x + (v * y + phase), period)
+        along = _remainder(v * x - (u * y + second), period)
+        distance = np.sqrt(across * across + along * along)
+        return _soft_step(np.float32(diameter / 2) - distance, defocus)
 
-        def pattern(u: np.ndarray, v: np.ndarray) -> np.ndarray:
-            across = _remainder(u * x + (v * y + phase), period)
-            along = _remainder(v * x - (u * y + second), period)
-            distance = np.sqrt(across * across + along * along)
-            return _soft_step(np.float32(diameter / 2) - distance, defocus)
-
-        return pattern
-
-    return make
+    return pattern
 
 
 def spots(generator: np.random.Generator, defocus: float, _shift: float) -> Pattern:
@@ -117,13 +112,13 @@ def shadow(generator: np.random.Generator, defocus: float, _shift: float) -> Pat
 
 _MAKERS: dict[str, Callable[[np.random.Generator, float, float], Pattern]] = {
     'normal': uniform,
-    'stripe': stripes(26),
-    'wide_stripe': stripes(70),
-    'fine_stripe': stripes(14),
-    'diagonal_stripe': stripes(34, math.pi / 4),
-    'lattice': lattice(30, 18),
-    'dense_lattice': lattice(16, 9.6),
-    'fringe': fringe(40),
+    'stripe': partial(stripes, period=26),
+    'wide_stripe': partial(stripes, period=70),
+    'fine_stripe': partial(stripes, period=14),
+    'diagonal_stripe': partial(stripes, period=34, direction=math.pi / 4),
+    'lattice': partial(lattice, period=30, diameter=18),
+    'dense_lattice': partial(lattice, period=16, diameter=9.6),
+    'fringe': partial(fringe, period=40),
     'spots': spots,
     'shadow': shadow,
 }
@@ -134,40 +129,18 @@ LIGHT_NAMES: tuple[str, ...] = tuple(_MAKERS)
 def light_pattern(
     name: str, defocus: float, generator: np.random.Generator, shift: float = 0.0
 ) -> Pattern:
-    """Return the pattern of a light with random phase, directions and positions.
+    """Return the pattern of one of `LIGHT_NAMES` with random phase, directions and positions.
 
-    Parameters
-    ----------
-    name : str
-        One of `LIGHT_NAMES`.
-    defocus : float
-        Standard deviation of the blur of the projector, projector px.
-    generator : numpy.random.Generator
-        Draws phase, directions and positions.
-    shift : float
-        Added to the phase, periods; a light without a period stays as it is.
-
-    Raises
-    ------
-    ValueError
-        If no light has this name.
+    The defocus of the projector is a standard deviation in projector px. The shift is added to the
+    phase, in periods; a light without a period stays as it is.
     """
-    if name not in _MAKERS:
-        raise ValueError(f'light is {name!r}, accepted is one of {", ".join(LIGHT_NAMES)}')
     return _MAKERS[name](generator, defocus, shift)
 
 
 def turned(pattern: Pattern, scale: float, turn: float) -> Pattern:
     """Return a pattern, scaled and turned about the middle of the projector.
 
-    Parameters
-    ----------
-    pattern : Pattern
-        Its edges get softer with the scale, too.
-    scale : float
-        Size of the new pattern divided by the old one's.
-    turn : float
-        Angle from +u towards +v, rad.
+    The turn is from +u towards +v, rad. Edges get softer with the scale, too.
     """
     if scale == 1 and not turn:
         return pattern

@@ -21,19 +21,11 @@ _BLOCK_PIXELS = 1 << 18  # supersampled at a time, to bound the memory
 class Mark:
     """Something printed on the wall.
 
-    Attributes
-    ----------
-    centre : ndarray of float64, shape (2,)
-        Centre on the wall.
-    radius : float
-        Unit of length of `cover`, in units of the wall; for a target, the radius of its dot.
-    reach : float
-        Radius of the circle that holds all ink, in radii of the mark.
-    cover : Cover
-        The ink.
+    The radius is the unit of length of `cover`, in units of the wall; for a target, that of its
+    dot. A circle of radius `reach`, in radii of the mark, holds all ink.
     """
 
-    centre: np.ndarray
+    centre: np.ndarray  # on the wall, shape (2,)
     radius: float
     reach: float
     cover: Cover
@@ -53,20 +45,9 @@ def print_mark(
 
     The light on the ink is supersampled, blurred by the lens and averaged over each pixel.
 
-    Parameters
-    ----------
-    image : ndarray of float32, shape (height, width)
-        Light that the wall sends to each pixel; modified in place.
-    light : ndarray of float32, shape (height, width)
-        Light that a white wall would send.
-    mark : Mark
-        Its centre must be in the image.
-    camera : Camera
-        Camera that sees the mark.
-    change : float
-        Reflectance of the ink minus the ground's.
-    blur : float
-        Standard deviation of the blur of the lens, px.
+    `image` is the light that the wall sends to each pixel, float32, modified in place; `light` is
+    what a white wall would send. The centre of the mark must be in the image; `change` is the
+    reflectance of the ink minus the ground's, `blur` the standard deviation of the lens's, px.
     """
     sigma, edge = blur * _SUPERSAMPLING, 1.0
     if sigma >= 1:

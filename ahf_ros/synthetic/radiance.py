@@ -19,21 +19,11 @@ _MAXIMUM_GRAIN = 256  # px, so that the noise also varies in small images
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Projector:
-    """A projector beside the camera that lights the same part of the wall.
+    """A projector beside the camera that lights the same part of the wall."""
 
-    Attributes
-    ----------
-    pose : ndarray of float64, shape (3, 3)
-        Homography from the wall (x, y, 1) to rays (x, y, 1).
-    position : ndarray of float64, shape (3,)
-        Position in the coordinates of the wall.
-    scale : float
-        Focal length, projector px; projector pixel (0, 0) is the principal point.
-    """
-
-    pose: np.ndarray
-    position: np.ndarray
-    scale: float
+    pose: np.ndarray  # homography from the wall (x, y, 1) to rays (x, y, 1)
+    position: np.ndarray  # in the coordinates of the wall, shape (3,)
+    scale: float  # focal length, projector px; projector pixel (0, 0) is the principal point
 
     @property
     def homography(self) -> np.ndarray:
@@ -60,16 +50,9 @@ def rig_projector(
     """Return a projector 12 to 20 degrees beside the camera, aimed at the wall's origin.
 
     It is displaced along the axis of the wall's tilt, so that projector and camera see the wall
-    at similar angles, and rotated about its optical axis by up to 8 degrees.
-
-    Parameters
-    ----------
-    camera_pose : ndarray, shape (3, 3)
-        `Camera.pose`; the optical axis meets the origin of the wall.
-    pixel : float
-        Size of a projector pixel at the wall's origin, units of the wall.
-    generator : numpy.random.Generator
-        Draws the angles and the distance.
+    at similar angles, and rotated about its optical axis by up to 8 degrees. The camera's optical
+    axis meets the origin of the wall, where a projector pixel has the size `pixel`, in units of
+    the wall.
     """
     aside = generator.uniform(math.radians(12), math.radians(20)) * generator.choice((-1, 1))
     turn = generator.uniform(-math.radians(8), math.radians(8))
@@ -97,28 +80,11 @@ def wall_radiance(
     highest: float,
     generator: np.random.Generator,
 ) -> np.ndarray:
-    """Return the light that a white wall sends to each pixel.
+    """Return the light that a white wall sends to each pixel, float32; 1 saturates the sensor.
 
-    Parameters
-    ----------
-    camera : Camera
-        Camera that sees the wall.
-    projector : Projector
-        Projector that lights it.
-    pattern : Pattern
-        Projected pattern, defocus included.
-    ambient : float
-        Ambient light as a fraction of the projector's light, both at the wall's origin.
-    average, highest : float
-        The exposure: the mean light of a fully lit wall is `average`, or less if its brightest
-        point would exceed `highest`.
-    generator : numpy.random.Generator
-        Draws the direction of the ambient light.
-
-    Returns
-    -------
-    ndarray of float32, shape (height, width)
-        Light at each pixel; 1 saturates the sensor.
+    Ambient light, of a random direction, is a fraction of the projector's light, both at the
+    wall's origin. The exposure is such that the mean light of a fully lit wall is `average`, or
+    less if its brightest point would exceed `highest`.
     """
     lit, surrounding = _smooth_light(camera, projector, ambient, generator)
     white = lit + surrounding
@@ -143,23 +109,9 @@ def wall_radiance(
 def paper_texture(
     shape: tuple[int, int], deviation: float, dot_radius: float, generator: np.random.Generator
 ) -> np.ndarray:
-    """Return the unevenness of the paper: noise of several grain sizes.
+    """Return factors of the reflectance of uneven paper: noise of several grain sizes.
 
-    Parameters
-    ----------
-    shape : tuple of int
-        Height and width of the image, px.
-    deviation : float
-        Standard deviation of the reflectance, as a fraction of its mean.
-    dot_radius : float
-        Radius of the dots in the image, px. Grain sizes are proportional to it.
-    generator : numpy.random.Generator
-        Draws the noise.
-
-    Returns
-    -------
-    ndarray of float32
-        Factors of the reflectance, around 1.
+    Their mean is 1. Grain sizes are proportional to the radius of the dots in the image, px.
     """
     factors = np.ones(shape, np.float32)
     each = np.float32(deviation / math.sqrt(len(_GRAINS)))

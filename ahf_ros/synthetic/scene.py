@@ -11,17 +11,17 @@ import numpy as np
 
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes.designs import proportions
-from ahf_ros.codes.families import FAMILY_NAMES
+from ahf_ros.codes.families import FAMILY_NAMES, numbers_of
+from ahf_ros.codes.gsi_library import point_family
 from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.synthetic.camera import Camera, Sensor, tilted_camera
-from ahf_ros.synthetic.covers import card_cover
-from ahf_ros.synthetic.designs import designs
-from ahf_ros.synthetic.distractors import distractor_marks
+from ahf_ros.synthetic.covers import card_cover, design, distractor_cover
 from ahf_ros.synthetic.layout import (
     Placements,
     finest_grid,
     grid_placements,
     quiet_radius,
+    scattered_placements,
     size_ratios,
 )
 from ahf_ros.synthetic.patterns import LIGHT_NAMES, light_pattern, turned
@@ -29,12 +29,8 @@ from ahf_ros.synthetic.prints import Mark, mark_at, print_mark
 from ahf_ros.synthetic.radiance import paper_texture, rig_projector, wall_radiance
 from ahf_ros.target import Target, TrueTarget, sorted_targets
 
-CARD_WIDTH = math.cos(math.pi / 8)
-"""Width of an eight-sided card, as a share of the distance of its corners."""
-
+_CARD_WIDTH = math.cos(math.pi / 8)  # of eight sides, as a share of the distance of its corners
 _MAXIMUM_SHIFT = 0.35  # of edges, in dot radii: nearly half a sector of the finest ring codes
-
-__all__ = ['Rendering', 'SceneSettings', 'render']
 
 _PROJECTOR_PIXELS = 6.4  # per radius of a dot: 1280 across an image of 200 radii, as by default
 _PIXEL_DEVIATION = 12**-0.5  # standard deviation of a position inside a pixel, px
@@ -178,8 +174,8 @@ class SceneSettings:
             )
         ratios = size_ratios(self.sizes)
         smallest = self.dot_radius * (1 - self.radius_spread) * min(ratios)
-        if abs(self.edge_shift) > _MAXIMUM_SHIFT * smallest:
-            most = _MAXIMUM_SHIFT * smallest
+        most = _MAXIMUM_SHIFT * smallest
+        if abs(self.edge_shift) > most:
             raise ValueError(
                 f'edge_shift is {self.edge_shift!r}, accepted is a number from {-most:.3g} to '
                 f'{most:.3g} with dots of {smallest:.3g} px'
@@ -197,7 +193,7 @@ class SceneSettings:
     def free_radius(self) -> float:
         """Radius of what is left free about a target, in radii of its dot."""
         zone = proportions(self.family, self.family_file).quiet_zone
-        return zone if self.wall == 1 else zone / CARD_WIDTH
+        return zone if self.wall == 1 else zone / _CARD_WIDTH
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -273,9 +269,7 @@ def render(settings: SceneSettings, phase: int = 0) -> Rendering:
     projector_pixel = settings.dot_radius / _PROJECTOR_PIXELS
     projector = rig_projector(camera.pose, projector_pixel, setup)
     cards, marks, targets, placements = _coded_targets(settings, camera, wall)
-    distractors = distractor_marks(
-        settings.distractors, settings.dot_radius, camera, placements, clutter
-    )
+    distractors = _distractors(settings, camera, placements, clutter)
 
     softness = math.hypot(settings.defocus, _PIXEL_DEVIATION / projector_pixel)
     size, turn = settings.light_scale, math.radians(settings.light_turn)
@@ -313,7 +307,9 @@ def _coded_targets(
     Prints are larger where the wall is farther away, so that every dot is about `dot_radius` in
     the image. Codes repeat only if there are more targets than codes.
     """
-    every, design_of = designs(settings.family, settings.pinhole, settings.family_file)
+    name, file = settings.family, settings.family_file
+    # IDs are drawn from those of gsi in the order of its data file
+    every = point_family(file).numbers if name == 'gsi' else numbers_of(name, file)
     count = settings.targets
     semi_major = settings.dot_radius * (
         1 + settings.radius_spread * generator.uniform(-1, 1, count)
@@ -330,13 +326,26 @@ def _coded_targets(
 
     cards, marks, targets = [], [], []
     for number, pixel, size, turn in zip(ids, placements.centres, semi_major, turns, strict=True):
-        design = design_of(number, turn, gain / size)
-        mark = mark_at(camera, pixel, size, design.reach, design.cover)
+        printed = design(name, number, turn, gain / size, settings.pinhole, file)
+        mark = mark_at(camera, pixel, size, printed.reach, printed.cover)
         x, y = camera.project(mark.centre[None])[0].tolist()
-        ellipse = camera.circle(mark.centre, design.radius * mark.radius)
+        ellipse = camera.circle(mark.centre, printed.radius * mark.radius)
         marks.append(mark)
         if settings.wall < 1:
-            card = card_cover(free * CARD_WIDTH, turn)
+            card = card_cover(free * _CARD_WIDTH, turn)
             cards.append(Mark(mark.centre, mark.radius, free, card))
-        targets.append(Target(number, design.code, x, y, *ellipse, family=settings.family))
+        targets.append(Target(number, printed.code, x, y, *ellipse, family=name))
     return cards, marks, targets, placements
+
+
+def _distractors(
+    settings: SceneSettings, camera: Camera, taken: Placements, generator: np.random.Generator
+) -> list[Mark]:
+    """Return distractors that overlap neither each other nor the targets."""
+    drawn = [distractor_cover(generator) for _ in range(settings.distractors)]
+    radii = np.array([radius for _, radius in drawn]) * settings.dot_radius
+    placements = scattered_placements(camera, radii, taken, generator)
+    return [
+        mark_at(camera, pixel, radius, 1.0, cover)
+        for pixel, radius, (cover, _) in zip(placements.centres, radii, drawn, strict=True)
+    ]

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from ahf_ros.codes.designs import Arc, Contour, _outlines, printed_design, proportions
 from ahf_ros.codes.families import numbers_of
-from ahf_ros.synthetic.designs import designs
+from ahf_ros.synthetic.covers import design
 from support.square_markers import needs_square_markers
 
 ROUND = ('metashape12', 'metashape20', 'aicon14', 'gsi', 'dots')
@@ -51,11 +51,11 @@ def inside(contours: tuple[Contour, ...], points: np.ndarray) -> np.ndarray:
 )
 def test_outlines_hold_the_ink_of_rendered_targets(name: str) -> None:
     pinhole = 0.2
-    _, design_of = designs(name, pinhole)
     every = numbers_of(name)
     generator = np.random.default_rng(5)
     for number in (every[0], every[len(every) // 2], every[-1]):
-        rendered, printed = design_of(number, 0.0, 0.0), printed_design(name, number, pinhole)
+        rendered = design(name, number, 0.0, 0.0, pinhole)
+        printed = printed_design(name, number, pinhole)
         assert printed.code == rendered.code
         points = generator.uniform(-1.1, 1.1, (1500, 2)) * rendered.reach
         points[:100] /= 5 * rendered.reach  # in the dot, about its hole

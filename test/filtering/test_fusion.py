@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ahf_ros.filtering.fusion import fused
 from ahf_ros.filtering.identifier import Identifier
 from ahf_ros.filtering.settings import AdaptiveSettings, GeneticSettings
+from ahf_ros.filtering.trials import fused
 from ahf_ros.target import UNDECODED, Target
 
 

@@ -1,11 +1,20 @@
+from dataclasses import astuple
+
 import numpy as np
 import pytest
 
-from ahf_ros.filtering.chromosome import decoded, encoded
-from ahf_ros.filtering.genes import first_filters, genes_of, tuned, with_combination
-from ahf_ros.filtering.homomorphic import HomomorphicFilter
-from ahf_ros.filtering.settings import EXTENDED, PUBLISHED, TuningSettings
-from ahf_ros.filtering.transfer import median_distance, transfer
+from ahf_ros.filtering.genes import FIRST, genes_of, tuned
+from ahf_ros.filtering.genetic import decoded, encoded
+from ahf_ros.filtering.homomorphic import median_distance, transfer
+from ahf_ros.filtering.settings import (
+    EXTENDED,
+    PUBLISHED,
+    AdaptiveSettings,
+    FilterSettings,
+    GeneticSettings,
+    TuningSettings,
+)
+from support.fourier import filtered_logarithm_fft
 
 SHAPE = (48, 64)
 
@@ -21,15 +30,8 @@ def test_an_extended_search_also_tunes_cutoff_and_exponent():
     settings = TuningSettings(search=EXTENDED, cutoff_min=0.25, cutoff_max=2, exponent_min=0.3)
     *gains, cutoff, exponent = genes_of(settings)
     assert tuple(gains) == genes_of(TuningSettings(search=PUBLISHED))
-    assert [cutoff.value(index) for index in range(cutoff.count)] == [
-        -2,
-        -1.5,
-        -1,
-        -0.5,
-        0,
-        0.5,
-        1,
-    ]
+    octaves = [-2, -1.5, -1, -0.5, 0, 0.5, 1]
+    assert [cutoff.value(index) for index in range(cutoff.count)] == octaves
     assert [exponent.value(index) for index in range(exponent.count)] == [-1, 0]
     assert tuned(SHAPE, (2.8, 0.82, 0.0, 0.0)) == transfer(SHAPE, 2.8, 0.82)
     chosen = tuned(SHAPE, (3.0, 1.0, -1.0, -2.0))
@@ -40,10 +42,9 @@ def test_an_extended_search_also_tunes_cutoff_and_exponent():
 
 def test_an_exponent_is_a_power_of_the_filtered_image():
     image = np.random.default_rng(1).integers(20, 255, SHAPE).astype(np.uint8)
-    prepared = HomomorphicFilter(image)
     whole, root = (
-        prepared.filtered_logarithm(it.gamma_high, it.gamma_low, it.cutoff, it.attenuation)
-        for it in (tuned(SHAPE, (2.0, 0.5, -0.5, 0.0)), tuned(SHAPE, (2.0, 0.5, -0.5, -1.0)))
+        filtered_logarithm_fft(image, *astuple(tuned(SHAPE, (2.0, 0.5, -0.5, exponent))))
+        for exponent in (0.0, -1.0)
     )
     assert np.allclose(np.exp(root), np.sqrt(np.exp(whole)), rtol=1e-4)
 
@@ -70,19 +71,40 @@ def test_an_exponent_is_a_power_of_the_filtered_image():
         ({'exponent_min': 0.0}, 'exponent_min is 0.0, accepted is a number from 0.01'),
     ],
 )
-def test_a_setting_out_of_range_is_refused(values, words):
+def test_a_range_that_makes_no_sense_is_refused(values, words):
     with pytest.raises(ValueError, match=words):
         TuningSettings(**values)
 
 
-@pytest.mark.parametrize('plain', [None, (2.0,)])
-@pytest.mark.parametrize('search', [PUBLISHED, EXTENDED])
-def test_the_first_filters_are_chromosomes_far_apart(search, plain):
-    genes = with_combination(genes_of(TuningSettings(search=search)), 3 if plain else 1)
-    first = first_filters(genes, plain)
-    for values in first:
-        bits = np.array(encoded(values, genes))
-        assert np.allclose(decoded(bits, genes), values)
-        assert plain is None or values[-1:] == plain
-    light_kept = [values[1] / values[0] for values in first]
+@pytest.mark.parametrize(
+    ('settings', 'name', 'value'),
+    [
+        (AdaptiveSettings, 'threads', -1),
+        (AdaptiveSettings, 'ahf', 1),
+        (FilterSettings, 'log_offset', 0.0),
+        (FilterSettings, 'black_percentile', 50.0),
+        (FilterSettings, 'white_percentile', 101.0),
+        (GeneticSettings, 'population', 1),
+        (GeneticSettings, 'population', 50.0),
+        (GeneticSettings, 'generations', 0),
+        (GeneticSettings, 'stall', 0),
+        (GeneticSettings, 'tournament', 0),
+        (GeneticSettings, 'crossover', 1.1),
+        (GeneticSettings, 'mutation', -0.1),
+        (GeneticSettings, 'mutation', float('nan')),
+        (GeneticSettings, 'max_evaluations', -1),
+        (GeneticSettings, 'max_duration', -1.0),
+        (GeneticSettings, 'seed', -1),
+    ],
+)
+def test_a_setting_out_of_range_is_refused(settings, name, value):
+    with pytest.raises(ValueError, match=f'^{name} is {value}, accepted is'):
+        settings(**{name: value})
+
+
+def test_the_first_filters_are_chromosomes_far_apart():
+    genes = genes_of(TuningSettings())
+    for values in FIRST:
+        assert np.allclose(decoded(np.array(encoded(values, genes)), genes), values)
+    light_kept = [values[1] / values[0] for values in FIRST]
     assert max(light_kept) > 4 * min(light_kept)

@@ -6,13 +6,19 @@ import cv2
 import numpy as np
 import pytest
 
-from ahf_ros.filtering.homomorphic import HomomorphicFilter
+from ahf_ros.filtering import homomorphic
+from ahf_ros.filtering.homomorphic import (
+    HomomorphicFilter,
+    blur_taps,
+    median_distance,
+    transfer,
+)
 from ahf_ros.filtering.settings import FilterSettings
 from ahf_ros.imaging.logarithm import logarithm
-from ahf_ros.settings.parameter import parameters
-from support.fourier import filtered_fft, filtered_logarithm_fft
+from support.fourier import distances, filtered_fft, filtered_logarithm_fft, response
 
 SHAPES = [(16, 16), (17, 31), (101, 64), (64, 101), (300, 211), (140, 140)]
+SPECTRA = [(16, 16), (16, 17), (21, 16), (31, 45), (64, 40), (1, 1), (1, 9), (40, 3)]
 GAINS = [(1.0, 0.0), (1.2, 0.25), (2.8, 0.82), (3.7, 0.66), (4.0, 0.0), (1.0, 0.9)]
 
 
@@ -32,13 +38,21 @@ def noise(height, width, seed=0):
     return (generator.random((height, width)) > 0.5).astype(np.uint8) * 255
 
 
+def filtered_logarithm(image, *parameters):
+    """Return s of Eq. (6) as the filter computes it."""
+    prepared = HomomorphicFilter(image)
+    blur = homomorphic._Blur.of(transfer(image.shape, *parameters), image.shape)
+    whole = slice(0, image.shape[0])
+    return homomorphic._filtered_rows(prepared._padded(blur), whole, blur, 0.0)
+
+
 @pytest.mark.parametrize('gains', GAINS)
 @pytest.mark.parametrize('shape', SHAPES)
 @pytest.mark.parametrize(('image_of', 'bound'), [(scene, 0.0015), (noise, 0.008)])
 def test_the_spatial_form_is_the_fourier_form(shape, gains, image_of, bound):
     image = image_of(*shape)
     spread = np.ptp(logarithm(image, FilterSettings().log_offset))
-    spatial = HomomorphicFilter(image).filtered_logarithm(*gains)
+    spatial = filtered_logarithm(image, *gains)
     assert np.abs(spatial - filtered_logarithm_fft(image, *gains)).max() < bound * spread
 
 
@@ -59,7 +73,7 @@ def test_the_filtered_image_is_that_of_the_fourier_form(shape, gains):
 def test_cutoff_and_attenuation_are_free(shape, cutoff, attenuation):
     image = scene(*shape)
     arguments = (2.0, 0.4, cutoff, attenuation)
-    spatial = HomomorphicFilter(image).filtered_logarithm(*arguments)
+    spatial = filtered_logarithm(image, *arguments)
     reference = filtered_logarithm_fft(image, *arguments)
     assert np.abs(spatial - reference).max() < 0.02
     assert np.ptp(reference) > 0.5
@@ -99,13 +113,8 @@ def test_the_result_does_not_depend_on_the_threads(threads):
     image = scene(600, 301)
     expected = HomomorphicFilter(image).filtered(2.8, 0.82)
     with ThreadPoolExecutor(threads) as executor:
-        prepared = HomomorphicFilter(image)
-        result = prepared.filtered(2.8, 0.82, executor=executor)
-        logarithms = prepared.filtered_logarithm(2.8, 0.82, executor=executor)
+        result = HomomorphicFilter(image).filtered(2.8, 0.82, executor=executor)
     np.testing.assert_array_equal(result, expected)
-    np.testing.assert_array_equal(
-        logarithms, HomomorphicFilter(image).filtered_logarithm(2.8, 0.82)
-    )
 
 
 def test_one_image_is_filtered_from_several_threads_at_once():
@@ -152,40 +161,84 @@ def test_a_speck_on_even_ground_is_still_seen(speck):
     assert abs(filtered[10, 10] - 128) < 10
 
 
-@pytest.mark.parametrize(
-    ('image', 'words'),
-    [
-        (np.zeros((40, 40), np.uint8), 'image is constant'),
-        (np.ones((1, 1), np.uint8), 'image is 1 x 1 px'),
-        (np.zeros((40, 40, 3), np.uint8), 'image has shape'),
-    ],
-)
-def test_what_is_not_an_image_is_refused(image, words):
-    with pytest.raises(ValueError, match=words):
-        HomomorphicFilter(image)
-
-
 def test_a_filter_out_of_range_is_refused():
     prepared = HomomorphicFilter(scene(32, 32))
     with pytest.raises(ValueError, match='gamma_low is 3'):
         prepared.filtered(2.0, 3.0)
     with pytest.raises(ValueError, match='cutoff is -1'):
-        prepared.filtered_logarithm(2.0, 0.5, cutoff=-1.0)
+        prepared.filtered(2.0, 0.5, cutoff=-1.0)
+
+
+@pytest.mark.parametrize('shape', SPECTRA)
+def test_distances_are_measured_from_the_centre_of_the_shifted_spectrum(shape):
+    height, width = shape
+    rows, columns = np.mgrid[:height, :width]
+    centred = np.hypot(rows - height // 2, columns - width // 2)
+    np.testing.assert_array_equal(np.fft.fftshift(distances(*shape)), centred)
+
+
+@pytest.mark.parametrize('shape', SPECTRA)
+def test_median_distance_is_the_median(shape):
+    assert median_distance(*shape) == pytest.approx(np.median(distances(*shape)), rel=1e-15)
+
+
+def test_median_distance_at_the_size_of_the_paper():
+    assert median_distance(2656, 3984) == pytest.approx(1297.7276293583334, rel=1e-15)
+
+
+def test_published_values_are_the_default():
+    filled = transfer((40, 60), 2.8, 0.82)
+    assert filled.cutoff == median_distance(40, 60)
+    assert filled.attenuation == 2.8 - 0.82
+
+
+def test_the_response_runs_from_the_low_to_the_high_gain():
+    gains = response((32, 48), transfer((32, 48), 3.0, 0.5, cutoff=2.0, attenuation=1.5))
+    assert gains[0, 0] == 0.5
+    assert gains[0, 2] == pytest.approx(2.5 * (1 - np.exp(-1.5)) + 0.5)
+    assert gains[16, 24] == pytest.approx(3.0)
 
 
 @pytest.mark.parametrize(
-    ('name', 'value'),
-    [('log_offset', 0.0), ('black_percentile', 50.0), ('white_percentile', 101.0)],
+    ('values', 'words'),
+    [
+        ({'gamma_high': 0.0}, 'gamma_high is 0.0, accepted is a number above 0'),
+        ({'gamma_high': float('inf')}, 'gamma_high is inf'),
+        ({'gamma_high': float('nan')}, 'gamma_high is nan'),
+        ({'gamma_low': -0.1}, 'gamma_low is -0.1, accepted is a number from 0 to gamma_high, 2'),
+        ({'gamma_low': 2.1}, 'gamma_low is 2.1'),
+        ({'gamma_low': float('nan')}, 'gamma_low is nan'),
+        ({'cutoff': 0.0}, 'cutoff is 0.0, accepted is a number above 0'),
+        ({'cutoff': float('nan')}, 'cutoff is nan'),
+        ({'attenuation': -0.1}, 'attenuation is -0.1, accepted is a number of at least 0'),
+        ({'attenuation': float('inf')}, 'attenuation is inf'),
+    ],
 )
-def test_a_setting_out_of_range_is_refused(name, value):
-    with pytest.raises(ValueError, match=f'^{name} is {value}, accepted is'):
-        FilterSettings(**{name: value})
+def test_a_number_out_of_range_is_refused_by_name(values, words):
+    with pytest.raises(ValueError, match=words):
+        transfer((40, 60), **{'gamma_high': 2.0, 'gamma_low': 0.5, **values})
 
 
-def test_every_setting_describes_itself():
-    assert [item.name for item in parameters(FilterSettings)] == [
-        'log_offset',
-        'black_percentile',
-        'white_percentile',
-    ]
-    assert all(item.description.endswith('.') for item in parameters(FilterSettings))
+@pytest.mark.parametrize('length', [16, 17, 100, 101])
+@pytest.mark.parametrize('attenuation', [0.0, 0.2, 1.0, 4.0])
+def test_all_taps_together_are_the_fourier_filter(length, attenuation, monkeypatch):
+    monkeypatch.setattr(homomorphic, '_TOLERANCE', 0)
+    signal = np.random.default_rng(1).normal(size=length)
+    gaussian = np.exp(-attenuation * (np.fft.fftfreq(length) / 0.4) ** 2)
+    expected = np.fft.ifft(np.fft.fft(signal) * gaussian).real
+    taps = blur_taps(length, attenuation, 0.4 * length)
+    periodic = np.pad(signal, len(taps) // 2, mode='wrap')
+    np.testing.assert_allclose(np.convolve(periodic, taps, 'valid'), expected, atol=1e-13)
+
+
+@pytest.mark.parametrize('attenuation', [0.01, 0.5, 1.0, 2.0, 4.0])
+@pytest.mark.parametrize('share', [0.33, 0.05])
+def test_cut_taps_are_symmetric_few_and_sum_to_one(attenuation, share):
+    taps = blur_taps(1000, attenuation, share * 1000)
+    assert taps.sum() == pytest.approx(1, abs=1e-12)
+    np.testing.assert_array_equal(taps, taps[::-1])
+    assert len(taps) < 70
+
+
+def test_without_attenuation_one_tap_is_left():
+    np.testing.assert_array_equal(blur_taps(100, 0.0, 30.0), [1.0])

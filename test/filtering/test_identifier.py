@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from ahf_ros.filtering.genes import FIRST
-from ahf_ros.filtering.homomorphic import HomomorphicFilter
-from ahf_ros.filtering.identifier import Identifier
+from ahf_ros.filtering.homomorphic import HomomorphicFilter, median_distance
+from ahf_ros.filtering.identifier import Identifier, is_mirrored
 from ahf_ros.filtering.settings import (
     EXTENDED,
     PUBLISHED,
@@ -17,9 +17,9 @@ from ahf_ros.filtering.settings import (
     GeneticSettings,
     TuningSettings,
 )
-from ahf_ros.filtering.transfer import median_distance
 from ahf_ros.filtering.trials import CONFIRMED
-from ahf_ros.settings.parameter import parameters
+from ahf_ros.session import create_identifier
+from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import UNDECODED, Target, count_codes
 
 COUNT = 144
@@ -178,10 +178,11 @@ def test_too_many_targets_are_as_bad_as_too_few():
     assert (result.count, result.filter.applied) == (4, True)
 
 
-def test_without_an_expected_number_nothing_is_filtered():
+@pytest.mark.parametrize(('expected', 'ahf'), [(0, True), (COUNT, False)])
+def test_without_an_expected_number_or_switched_off_nothing_is_filtered(expected, ahf):
     detector = Dots()
-    result = identify(DIM, detector, 0)
-    assert (result.expected, detector.calls, result.filter.applied) == (0, 1, False)
+    result = identify(DIM, detector, expected, AdaptiveSettings(ahf=ahf))
+    assert (result.expected, detector.calls, result.filter.applied) == (expected, 1, False)
 
 
 class Estimate:
@@ -254,12 +255,6 @@ def test_an_estimate_that_is_no_number_is_refused(estimate):
         identify(DIM, Dots(), 0, SHORT, estimate=Estimate(estimate))
 
 
-def test_switched_off_nothing_is_filtered():
-    detector = Dots()
-    result = identify(DIM, detector, COUNT, AdaptiveSettings(ahf=False))
-    assert (result.expected, detector.calls, result.filter.applied) == (COUNT, 1, False)
-
-
 @pytest.mark.parametrize('kind', [np.uint16, np.float32, np.float64])
 def test_a_detector_sees_8_bit_images_whatever_was_received(kind):
     detector = Dots()
@@ -289,7 +284,7 @@ def test_centres_from_the_8_bit_version_of_an_image_are_refined():
     assert result.targets == (target(9),)
 
 
-def test_a_stream_begins_with_the_filter_that_worked_last():
+def test_a_stream_begins_with_the_filter_that_worked_last_until_reset():
     detector = Dots()
     identifier = Identifier(detector)
     first = identifier.identify(DIM, expected_targets=COUNT)
@@ -300,11 +295,6 @@ def test_a_stream_begins_with_the_filter_that_worked_last():
     assert (second.filter.evaluations, second.filter.generations, detector.calls) == (1, 0, 1)
     assert second.filter.gamma_low == first.filter.gamma_low
     assert identifier.last_search is None
-
-
-def test_reset_forgets_what_worked():
-    identifier = Identifier(Dots())
-    first = identifier.identify(DIM, expected_targets=COUNT)
     identifier.reset()
     again = identifier.identify(DIM, expected_targets=COUNT)
     assert again.filter.evaluations == first.filter.evaluations > 1
@@ -364,22 +354,9 @@ def test_targets_with_the_same_id_count_once_and_are_passed_on():
     assert (result.count, len(result.targets), result.filter.evaluations) == (2, 3, 1)
 
 
-@pytest.mark.parametrize(
-    ('found', 'words'),
-    [
-        (None, 'detector returned None, accepted is a list of targets'),
-        ({1: 2}, 'detector returned {1: 2}'),
-        ([3], 'detector: target 0 is 3, accepted is a Target'),
-        ([target(7, x=float('nan'))], 'detector: target 0: x is nan, accepted'),
-        ([target(7, y=float('inf'))], 'detector: target 0: y is inf, accepted'),
-    ],
-)
-def test_what_is_no_list_of_targets_is_refused(found, words):
-    with pytest.raises(ValueError, match=words):
-        identify(DIM, lambda image: found, COUNT)
-
-
-def test_a_refinement_is_held_to_the_same():
+def test_what_is_no_list_of_targets_is_refused():
+    with pytest.raises(ValueError, match='detector returned None, accepted is a list of targets'):
+        identify(DIM, lambda image: None, COUNT)
     with pytest.raises(ValueError, match='refine of detector returned None'):
         identify(DIM, Dots(), COUNT, refine=lambda image, targets: None)
 
@@ -407,18 +384,6 @@ def test_what_is_not_an_image_is_refused_before_the_detector_sees_it(image):
     assert detector.calls == 0
 
 
-@pytest.mark.parametrize(
-    ('values', 'words'),
-    [
-        ({'threads': -1}, 'threads is -1'),
-        ({'ahf': 1}, 'ahf is 1, accepted is true or false'),
-    ],
-)
-def test_a_setting_out_of_range_is_refused(values, words):
-    with pytest.raises(ValueError, match=words):
-        AdaptiveSettings(**values)
-
-
 def test_one_filter_is_a_range_too():
     one = TuningSettings(
         search=PUBLISHED,
@@ -438,15 +403,6 @@ def test_the_settings_of_the_filter_reach_it():
     settings = replace(SHORT, filter=FilterSettings(black_percentile=40.0), threads=1)
     identify(DIM, lambda image: seen.append(image) or [], 5, settings)
     assert all((image == 0).mean() > 0.3 for image in seen[1:])
-
-
-def test_no_name_stands_for_two_settings():
-    names = [
-        item.name
-        for settings in (AdaptiveSettings, TuningSettings, FilterSettings, GeneticSettings)
-        for item in parameters(settings)
-    ]
-    assert len(names) == len(set(names))
 
 
 def test_ids_that_are_listed_beat_a_number():
@@ -560,3 +516,39 @@ def test_a_coarse_search_in_vain_does_not_depend_on_the_threads(threads):
 
     assert run(threads) == run(1)
     assert run(1).filter.evaluations == 1 + 30 + CONFIRMED
+
+
+def targets_with(*numbers: int) -> list[Target]:
+    return [Target(number, number, 50.0 * number, 5.0, 4.0, 4.0) for number in numbers]
+
+
+def mirrored(target: Target) -> int | None:
+    """Return 7 for 3, 3 for 7, and so on; 5 is the same, and from 10 on nothing is known."""
+    return 10 - target.id if target.id < 10 else None
+
+
+def test_most_ids_decide():
+    assert is_mirrored(targets_with(7, 8, 9), {1, 2, 3}, mirrored)
+    assert is_mirrored(targets_with(7, 8, 9, 3, 20), {1, 2, 3}, mirrored)
+    assert not is_mirrored(targets_with(1, 2, 3), {1, 2, 3}, mirrored)
+    assert not is_mirrored(targets_with(1, 2, 8, 9), {1, 2, 3}, mirrored)
+
+
+def test_what_cannot_tell_does_not():
+    assert not is_mirrored(targets_with(7, 8, 9), (), mirrored)  # any ID may be there
+    assert not is_mirrored(targets_with(7, 8), {2, 3}, mirrored)  # too few
+    assert not is_mirrored(targets_with(11, 12, 13), {1, 2, 3}, mirrored)  # others
+    assert not is_mirrored(targets_with(9, UNDECODED, UNDECODED), {1, 11}, mirrored)
+    assert not is_mirrored([], {1, 2, 3}, mirrored)
+
+
+def test_a_mirrored_image_of_expected_targets_is_said_to_be_one():
+    rendering = render(SceneSettings(width=640, height=480, targets=8, dot_radius=10, seed=3))
+    ids = ','.join(str(target.id) for target in rendering.targets)
+    identifier = create_identifier(expected_ids=ids, ahf=False)
+    assert not identifier.identify(rendering.image).mirrored
+    found = identifier.identify(rendering.image[:, ::-1].copy())
+    assert found.mirrored
+    assert found.count < 4 and found.expected == 8
+    assert not create_identifier().identify(rendering.image[:, ::-1].copy()).mirrored
+    assert not identifier.identify(rendering.image[::-1, ::-1].copy()).mirrored  # upside down

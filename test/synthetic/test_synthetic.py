@@ -274,7 +274,7 @@ def test_ink_that_is_gained_makes_dots_larger_about_the_same_centres(shift: floa
 
 def test_light_above_saturation_is_lost() -> None:
     usual, over = light_of(render(IDEAL)), light_of(render(replace(IDEAL, overexposure=4.0)))
-    assert over == pytest.approx(np.minimum(4 * usual, 1), abs=0.04)
+    assert np.abs(over - np.minimum(4 * usual, 1)).max() <= 0.04
     assert (over == 1).mean() > 0.8
     assert usual.max() < 1
 

@@ -1,4 +1,4 @@
-"""Prints of point-distributed targets and of rings of dots."""
+"""Prints of point-distributed targets and of rings of dots; ink that is gained, in any family."""
 
 from __future__ import annotations
 
@@ -15,11 +15,15 @@ from ahf_ros.codes.dots import dot_family
 from ahf_ros.codes.gsi_library import GSI_LIBRARY, point_family
 from ahf_ros.interchange.truth_files import read_truth
 from ahf_ros.synthetic.camera import Camera, tilted_camera
-from ahf_ros.synthetic.designs import designs
+from ahf_ros.synthetic.covers import design
 from ahf_ros.synthetic.prints import Mark, print_mark
 from ahf_ros.synthetic.scene import SceneSettings, render
+from support.square_markers import needs_square_markers
 
 GSI, DOTS = point_family(), dot_family()
+NUMBER = 18
+STEP = 0.015  # of the samples, radii of the dot
+ROUND = ('metashape12', 'metashape20', 'aicon14', 'gsi', 'dots')
 
 
 def camera(tilt: float = 0.0) -> Camera:
@@ -28,9 +32,9 @@ def camera(tilt: float = 0.0) -> Camera:
 
 def printed(family: str, number: int, turn: float, radius: float, looking: Camera) -> np.ndarray:
     """Return the ink in each pixel under even light."""
-    design = designs(family, 0.0)[1](number, turn, 0.0)
+    shown = design(family, number, turn, 0.0, 0.0)
     image = np.zeros((400, 400), np.float32)
-    mark = Mark(np.zeros(2), radius, design.reach, design.cover)
+    mark = Mark(np.zeros(2), radius, shown.reach, shown.cover)
     print_mark(image, np.ones_like(image), mark, looking, 1.0, 0.7)
     return image
 
@@ -48,24 +52,6 @@ def test_dots_are_where_the_design_has_them(tilt: float) -> None:
     gaps = np.hypot(*(looking.project(wall)[:, None] - centroids[None, 1:]).transpose(2, 0, 1))
     assert gaps.min(axis=1).max() < 0.4
     assert len(set(gaps.argmin(axis=1))) == 8
-
-
-def test_b_to_d_is_counter_clockwise_as_seen() -> None:
-    rendering = render(SceneSettings(width=400, height=400, targets=1, family='gsi', dot_radius=6))
-    (target,) = rendering.targets
-    assert target.code == GSI.word(target.id)
-    dark = (rendering.image < rendering.image.max() / 2).astype(np.uint8)
-    _, _, _, centroids = cv2.connectedComponentsWithStats(dark)
-    dots = (centroids[1:] - (target.x, target.y)) * [1, -1]
-    design = GSI.places[[0, 1, 2, 3, 4, *(5 + GSI.decoding_dots(target.code))]]
-    gaps = []
-    for turn in np.linspace(0, 2 * math.pi, 1000):
-        rotation = np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
-        for mirror in (1, -1):
-            turned = target.semi_major / GSI.dot_radius * (design * [1, mirror]) @ rotation
-            gap = np.hypot(*(turned[:, None] - dots[None]).transpose(2, 0, 1)).min(axis=1).max()
-            gaps.append((gap, mirror))
-    assert min(gaps)[1] == 1 and min(gaps)[0] < 1
 
 
 def test_the_ink_of_a_target_is_that_of_its_eight_dots() -> None:
@@ -129,3 +115,43 @@ def test_the_command_renders_families_from_data_files(tmp_path: Path) -> None:
     assert main(arguments) == 0
     ((target,),) = read_truth(tmp_path / 'truth.csv').values()
     assert target.id > 50000
+
+
+def ink_of(name: str, growth: float) -> np.ndarray:
+    """Return where there is ink, on a grid that is the same for all growths."""
+    half = proportions(name).reach + 0.5
+    along = np.arange(-half, half, STEP, dtype=np.float32)
+    x, y = np.meshgrid(along, along[::-1])
+    cover = design(name, NUMBER, 0.4, growth, 0.0).cover
+    return cover(x, y, np.eye(2, dtype=np.float32) * np.float32(STEP)) > 0.5
+
+
+def reached(inked: np.ndarray, distance: float) -> np.ndarray:
+    """Return what lies within a distance of ink."""
+    ground = (~inked).astype(np.uint8)
+    steps = cv2.distanceTransform(ground, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) - 0.5
+    return steps * STEP < distance
+
+
+@pytest.mark.parametrize(
+    'name', [*ROUND, pytest.param('aruco_4x4_50', marks=needs_square_markers)]
+)
+def test_ink_grows_and_shrinks_by_the_same_length_on_every_edge(name: str) -> None:
+    plain = ink_of(name, 0.0)
+    for found, expected in (
+        (ink_of(name, 0.15), reached(plain, 0.15)),
+        (ink_of(name, -0.12), ~reached(~plain, 0.12)),
+    ):
+        changed = (expected != plain).sum()
+        assert changed > 0.1 * plain.sum()
+        # Where ink grows, sectors keep sharp corners.
+        assert (found != expected).sum() < 0.08 * changed
+
+
+def test_the_same_growth_leaves_holes_that_are_smaller() -> None:
+    near = np.zeros((1, 2), np.float32)
+    near[0] = 0.05, 0.25
+    jacobian = np.eye(2, dtype=np.float32) * np.float32(STEP)
+    for growth, inked in ((0.0, [0, 0]), (0.1, [0, 1]), (0.35, [1, 1])):
+        cover = design('metashape12', 1, 0.0, growth, 0.3).cover
+        assert cover(near, near * 0, jacobian)[0].tolist() == inked

@@ -11,8 +11,7 @@ import pytest
 from ahf_ros.codes.ring import family
 from ahf_ros.synthetic import prints
 from ahf_ros.synthetic.camera import Camera, tilted_camera
-from ahf_ros.synthetic.covers import Cover, ring_cover
-from ahf_ros.synthetic.distractors import distractor_cover
+from ahf_ros.synthetic.covers import Cover, distractor_cover, ring_cover
 from ahf_ros.synthetic.prints import Mark, print_mark
 
 RING = family('metashape12')
