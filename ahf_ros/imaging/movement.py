@@ -19,18 +19,10 @@ from ahf_ros.blas import one_blas_thread
 from ahf_ros.imaging.image import as_gray
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
-SIGNIFICANT = 6.0
-"""Number of standard deviations from zero at which a displacement counts as movement."""
-
-MINIMUM_EDGES = 60
-"""Number of edges that coincide, for a displacement to be measured."""
-
-WINDOW = 2
-"""Maximum distance of an edge from its place along its normal, px."""
-
-PEAK = 1.5
-"""Ratio of coincidences in a peak to those beside it, or in another peak."""
-
+_SIGNIFICANT = 6.0  # standard deviations from zero, a displacement that is movement
+_MINIMUM_EDGES = 60  # that coincide, for a displacement to be measured
+_WINDOW = 2  # px, maximum distance of an edge from its place along its normal
+_PEAK = 1.5  # ratio of coincidences in a peak to those beside it, or in another peak
 _BINS = 4  # per px, of displacements along a normal
 _NEAR = 0.75  # px, a displacement that is refined
 _RING = 1.25  # px, distance from a peak at which it has fallen
@@ -39,16 +31,9 @@ _DIRECTIONS = 12  # of normals, which count alike: light has few, prints have ma
 _STRIPED = 2.5  # ratio of edges in a direction to the median of all directions
 _ENOUGH = 120  # edges of other directions
 _UNEVEN = 0.1  # px, systematic error where no edge of the first image coincides
-
-REACH = 16
-"""Maximum displacement that is looked for, px of an image and of smaller ones of it."""
-
-MINIMUM_SHIFT = 0.05
-"""Smaller displacements of a scene do not count, px: uneven light moves edges by as much."""
-
-MINIMUM_PART_SHIFT = 0.7
-"""Smaller displacements of a part of the scene do not count, px."""
-
+_REACH = 16  # px of an image and of smaller ones of it, maximum displacement that is looked for
+_MINIMUM_SHIFT = 0.05  # px, of a scene, that counts: uneven light moves edges by as much
+_MINIMUM_PART_SHIFT = 0.7  # px, of a part of the scene, that counts
 _BLUR = 1.0  # px, of the logarithm; edges become as wide in sharp images as in soft ones
 _STEEP = 0.06  # of ln per px, an edge; paper is flatter
 _NOISY = 6.0  # standard deviations of the gradient in flat parts, an edge
@@ -65,15 +50,7 @@ _TILES = 4  # along each side, that are looked at one by one
 
 @dataclass(frozen=True, slots=True)
 class Displacement:
-    """A displacement of a scene between two images.
-
-    Attributes
-    ----------
-    x, y : float
-        In px.
-    deviation : float
-        Standard deviation of its length, px.
-    """
+    """A displacement of a scene between two images and the deviation of its length, px."""
 
     x: float
     y: float
@@ -81,40 +58,31 @@ class Displacement:
 
     def exceeds(self, minimum: float) -> bool:
         """Return whether it is longer than a minimum, and significant."""
-        return bool(np.hypot(self.x, self.y) > max(minimum, SIGNIFICANT * self.deviation))
+        return bool(np.hypot(self.x, self.y) > max(minimum, _SIGNIFICANT * self.deviation))
 
     def __str__(self) -> str:
         """Return the length with its standard deviation."""
         return f'{np.hypot(self.x, self.y):.2f} px (standard deviation {self.deviation:.3f} px)'
 
 
-def measured(normals: np.ndarray, found: np.ndarray) -> Displacement | None:
+def _measured(normals: np.ndarray, found: np.ndarray) -> Displacement | None:
     """Return the displacement at which edges coincide, None where none stands out.
 
-    Parameters
-    ----------
-    normals : ndarray of float32, shape (n, 2)
-        Unit normals of the edges.
-    found : ndarray of float32, shape (n, m)
-        Where along its normal each edge is seen again, px; NaN where it is not.
+    `normals` are unit vectors, float32, shape (n, 2). `found` has where along its normal each edge
+    is seen again, px, float32, shape (n, m), NaN where it is not.
     """
-    if len(normals) < MINIMUM_EDGES:
+    if len(normals) < _MINIMUM_EDGES:
         return None
-    weights = direction_weights(normals)
+    weights = _direction_weights(normals)
     peak = _peak(normals, weights, _seen(found))
     return None if peak is None else _refined(normals, weights, found, peak)
 
 
-def direction_weights(normals: np.ndarray) -> np.ndarray:
+def _direction_weights(normals: np.ndarray) -> np.ndarray:
     """Return weights of edges, 1 on average, with which all directions count alike.
 
     Directions with many times more edges than others are stripes of light. They and their
     neighbours are left out where enough edges remain.
-
-    Parameters
-    ----------
-    normals : ndarray, shape (n, 2)
-        Unit normals of the edges.
     """
     angles = np.arctan2(normals[:, 1], normals[:, 0])
     classes = np.floor((angles / (2 * np.pi) + 0.5) * _DIRECTIONS).astype(int) % _DIRECTIONS
@@ -130,10 +98,10 @@ def direction_weights(normals: np.ndarray) -> np.ndarray:
 
 def _seen(found: np.ndarray) -> np.ndarray:
     """Return whether an edge is seen again near each displacement, shape (n, bins)."""
-    edges, bins = len(found), 2 * (WINDOW + 1) * _BINS + 1
+    edges, bins = len(found), 2 * (_WINDOW + 1) * _BINS + 1
     seen = np.zeros((edges, bins), bool)
     rows, columns = np.nonzero(~np.isnan(found))
-    middle = np.rint((found[rows, columns] + WINDOW + 1) * _BINS).astype(int)
+    middle = np.rint((found[rows, columns] + _WINDOW + 1) * _BINS).astype(int)
     for beside in (-1, 0, 1):
         seen[rows, np.clip(middle + beside, 0, bins - 1)] = True
     return seen
@@ -143,7 +111,7 @@ def _coincidences(
     normals: np.ndarray, weights: np.ndarray, seen: np.ndarray, shifts: np.ndarray
 ) -> np.ndarray:
     """Return how many edges are seen again at each displacement, shape (shifts,)."""
-    bins = np.rint((normals @ shifts.T + WINDOW + 1) * _BINS).astype(int)
+    bins = np.rint((normals @ shifts.T + _WINDOW + 1) * _BINS).astype(int)
     return np.array([weights @ np.take_along_axis(seen, of[:, None], 1)[:, 0] for of in bins.T])
 
 
@@ -156,7 +124,7 @@ def _peak(normals: np.ndarray, weights: np.ndarray, seen: np.ndarray) -> np.ndar
     angles = np.arange(12) * (np.pi / 6)
     ring = best + _RING * np.stack((np.cos(angles), np.sin(angles)), 1)
     beside = _coincidences(normals, weights, seen, ring)
-    enough = counts.max() >= max(MINIMUM_EDGES, PEAK * beside.max())
+    enough = counts.max() >= max(_MINIMUM_EDGES, _PEAK * beside.max())
     return best if enough else None
 
 
@@ -171,7 +139,7 @@ def _refined(
         off = np.where(np.isnan(off), np.inf, off)
         nearest = np.take_along_axis(off, np.abs(off).argmin(1)[:, None], 1)[:, 0]
         close = np.abs(nearest) < width
-        if close.sum() < MINIMUM_EDGES:
+        if close.sum() < _MINIMUM_EDGES:
             break
         rest, of = nearest[close], normals[close]
         robust = weights[close] * (1 - (rest / width) ** 2) ** 2
@@ -179,7 +147,7 @@ def _refined(
         shift += np.linalg.solve(normal_matrix, (of * robust[:, None]).T @ rest)
         spread = 1.4826 * float(np.median(np.abs(rest)))
         inverse = np.linalg.inv(normal_matrix)
-        middle = (of * robust[:, None] ** 2).T @ (of * robust[:, None] ** 0)
+        middle = (of * robust[:, None] ** 2).T @ of
         variance = spread**2 * float(np.trace(inverse @ middle @ inverse))
         share = float(weights[close].sum() / weights.sum())
         width = max(min(width, 4 * spread), 0.1)
@@ -189,24 +157,12 @@ def _refined(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Edges:
-    """Edges of an image, ready to be looked for in others.
+    """Edges of an image, ready to be looked for in others; arrays are of float32.
 
-    Attributes
-    ----------
-    x, y : ndarray of float32, shape (n,)
-        Places, px.
-    normals : ndarray of float32, shape (n, 2)
-        Unit vectors from dark to bright.
-    steps : ndarray of float32, shape (n,)
-        Gradients of the logarithm, 1 / px.
-    places : ndarray of float32, shape (n,)
-        Exact places along the normals, px.
-    shape : tuple of int
-        Height and width of the image, px.
-    gradients : tuple of ndarray of float32, shape (height, width)
-        Of the logarithm of the image, along x and y, 1 / px.
-    coarse : Edges or None
-        Those of the image at a quarter of its size; None where that is too small.
+    n edges are at the pixels `x` and `y`, have unit vectors `normals` from dark to bright, shape
+    (n, 2), gradients `steps` of the logarithm, 1 / px, and exact `places` along the normals, px.
+    `shape` is that of the image, and `gradients` are those of its logarithm along x and y, 1 / px.
+    `coarse` are the edges of the image at a quarter of its size, None where that is too small.
     """
 
     x: np.ndarray
@@ -216,22 +172,17 @@ class Edges:
     places: np.ndarray
     shape: tuple[int, int]
     gradients: tuple[np.ndarray, np.ndarray]
-    coarse: Edges | None = None
+    coarse: Edges | None
 
 
 def find_edges(image: np.ndarray) -> Edges:
-    """Return the edges of an image.
-
-    Parameters
-    ----------
-    image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
-    """
+    """Return the edges of an image that `ahf_ros.imaging.image.check_image` accepts."""
     gradients = _gradients(image)
     size = cv2.magnitude(*gradients)
     flat = float(np.percentile(size[::4, ::4], _FLAT)) / _FLAT_SIZE
     minimum = max(_STEEP, _NOISY * flat)
     inside = np.zeros(size.shape, bool)
-    margin = REACH + 2
+    margin = _REACH + 2
     inside[margin:-margin, margin:-margin] = True
     crest = np.zeros(size.shape, bool)
     for beside in ((3, 1), (1, 3)):
@@ -245,35 +196,38 @@ def find_edges(image: np.ndarray) -> Edges:
     good = np.abs(places) < 1
     x, y, normals, steps, places = (of[good] for of in (x, y, normals, steps, places))
     coarse = find_edges(_reduced(image)) if min(size.shape) >= _COARSE * _MINIMUM_SIDE else None
-    at = x.astype(np.float32), y.astype(np.float32)
-    return Edges(*at, normals, steps, places, size.shape, gradients, coarse)
+    return Edges(
+        x=x.astype(np.float32),
+        y=y.astype(np.float32),
+        normals=normals,
+        steps=steps,
+        places=places,
+        shape=size.shape,
+        gradients=gradients,
+        coarse=coarse,
+    )
 
 
 @one_blas_thread()
 def displacement(edges: Edges, image: np.ndarray) -> Displacement | None:
     """Return by how much a scene moved, None where nothing shows that it did.
 
-    Parameters
-    ----------
-    edges : Edges
-        Of the first image.
-    image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
-        The other image, of the same size.
+    The edges are those of the first image, and the other image has the same size.
     """
-    if len(edges.x) < MINIMUM_EDGES:
+    if len(edges.x) < _MINIMUM_EDGES:
         return None
     gradients = _gradients(image)
     found = _partners(edges, gradients, np.zeros(2))
-    whole = measured(edges.normals, found)
+    whole = _measured(edges.normals, found)
     if whole is None:
         return _far(edges, gradients) or _coarse(edges, image)
-    if whole.exceeds(MINIMUM_SHIFT):
+    if whole.exceeds(_MINIMUM_SHIFT):
         return whole
     height, width = edges.shape
     tile = (edges.y * _TILES // height) * _TILES + edges.x * _TILES // width
     for number in range(_TILES**2):
-        part = measured(edges.normals[tile == number], found[tile == number])
-        if part and part.exceeds(MINIMUM_PART_SHIFT):
+        part = _measured(edges.normals[tile == number], found[tile == number])
+        if part and part.exceeds(_MINIMUM_PART_SHIFT):
             return part
     return None
 
@@ -335,9 +289,9 @@ def _partners(
 ) -> np.ndarray:
     """Return where along its normal each edge is seen again, from a place shifted by whole pixels.
 
-    Shape (n, 2 WINDOW + 1), px; the maximum near each whole offset, else NaN.
+    Shape (n, 2 * _WINDOW + 1), px; the maximum near each whole offset, else NaN.
     """
-    offsets = np.arange(-WINDOW - 1.0, WINDOW + 2.0)
+    offsets = np.arange(-_WINDOW - 1.0, _WINDOW + 2.0)
     x, y = edges.x + np.float32(shift[0]), edges.y + np.float32(shift[1])
     along = _profiles(gradients, x, y, edges.normals, offsets)
     middle = along[:, 1:-1]
@@ -355,9 +309,9 @@ def _alike(steps: np.ndarray, others: np.ndarray) -> np.ndarray:
 
 def _repeats(edges: Edges) -> bool:
     """Return whether the first image is like itself at a displacement."""
-    counts, side = _counts(edges, edges.gradients, 2 * REACH)
+    counts, side = _counts(edges, edges.gradients, 2 * _REACH)
     apart = np.hypot(side[:, None], side) >= _APART
-    return bool(counts.max() < PEAK * counts[apart].max())
+    return bool(counts.max() < _PEAK * counts[apart].max())
 
 
 def _counts(
@@ -367,7 +321,7 @@ def _counts(
     every = slice(None, None, -(-len(edges.x) // _FAR_EDGES))
     x, y = (of[every].astype(int) for of in (edges.x, edges.y))
     normals, steps = edges.normals[every], edges.steps[every]
-    weights = direction_weights(normals)
+    weights = _direction_weights(normals)
     height, width = edges.shape
     side = np.arange(-reach, reach + 1)
     counts = np.zeros((len(side), len(side)))
@@ -385,13 +339,13 @@ def _far(edges: Edges, gradients: tuple[np.ndarray, np.ndarray]) -> Displacement
 
     A pattern of light that moved is like itself at several displacements, and so is the image.
     """
-    counts, side = _counts(edges, gradients, REACH)
+    counts, side = _counts(edges, gradients, _REACH)
     row, column = divmod(int(counts.argmax()), len(side))
     apart = np.hypot(side[:, None] - side[row], side - side[column]) >= _APART
-    if counts.max() < max(PEAK * counts[apart].max(), MINIMUM_EDGES) or _repeats(edges):
+    if counts.max() < max(_PEAK * counts[apart].max(), _MINIMUM_EDGES) or _repeats(edges):
         return None
     shift = np.array((side[column], side[row]))
-    rest = measured(edges.normals, _partners(edges, gradients, shift))
+    rest = _measured(edges.normals, _partners(edges, gradients, shift))
     if rest is None:
         return None
     return Displacement(rest.x + float(shift[0]), rest.y + float(shift[1]), rest.deviation)

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ahf_ros.codes.gsi import Rule, positions_of, valid_words, value_of
-from ahf_ros.codes.gsi_library import GSI_LIBRARY, library_text, point_family, with_codes
+from ahf_ros.codes.gsi import GSI_LIBRARY, Rule, point_family, positions_of, valid_words, value_of
+from ahf_ros.codes.gsi_learning import library_text, with_codes
 
 KNOWN = {
     1: (3, 6, 8),

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ahf_ros.codes.ring import FAMILY_NAMES, family, sectors, smallest_rotation
+from ahf_ros.codes.cyclic import smallest_rotation
+from ahf_ros.codes.ring import FAMILY_NAMES, family, sectors, words_of_print
 
 
 def rotations(word: int, bits: int) -> list[int]:
@@ -113,3 +114,25 @@ def test_a_number_outside_the_table_is_refused(number: int) -> None:
 def test_an_unknown_family_is_refused() -> None:
     with pytest.raises(ValueError, match=r"family is 'metashape13', .*metashape12, .*aicon14"):
         family('metashape13')
+
+
+def outline(name: str, word: int) -> list[bool]:
+    """Return the band of a word, some samples a degree, from its first mark on."""
+    code = family(name)
+    samples = [bit for bit in sectors(word, code.bits) for _ in range(1680 // code.bits)]
+    starts = [i for i in range(1680) if samples[i] and not samples[i - 1]]
+    return min(samples[i:] + samples[:i] for i in starts)
+
+
+def test_opposite_quarters_are_a_word_of_three_families() -> None:
+    words = {'metashape12': 455, 'metashape16': 3855, 'metashape20': 31775}
+    for name, word in words.items():
+        assert words_of_print(name, word) == words
+        assert outline(name, word) == outline('metashape12', 455)
+
+
+@pytest.mark.parametrize('name', [name for name in FAMILY_NAMES if name != 'metashape20'])
+def test_all_other_words_are_prints_of_their_own(name: str) -> None:
+    words = family(name).words.tolist()
+    shared = [word for word in words if words_of_print(name, word) != {name: word}]
+    assert shared == {'metashape12': [455], 'metashape16': [3855]}.get(name, [])

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from ahf_ros.cli import main
-from ahf_ros.codes.gsi import positions_of
+from ahf_ros.codes.gsi import point_family, positions_of
 from ahf_ros.codes.gsi_learning import learn_family
-from ahf_ros.codes.gsi_library import point_family
 from ahf_ros.interchange.point_lists import read_point_list
 from support import ROOT
 from support.photographs import IN_CI

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ahf_ros.codes.gsi import value_of
-from ahf_ros.codes.gsi_library import point_family
+from ahf_ros.codes.gsi import point_family, value_of
 from ahf_ros.detectors.gsi.published import area_cross_ratio, p2_invariant, template_invariant
 
 # Table 3, px. A is printed as (2047.00, 1072.58), where two digits changed places.

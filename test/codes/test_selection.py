@@ -25,7 +25,7 @@ def smallest_distance(name: str, ids: Sequence[int]) -> int:
 
 def confused_pairs(name: str, ids: Sequence[int]) -> int:
     """Return the number of pairs of IDs that a cover in one colour can turn into each other."""
-    return int(np.triu(selection._confused(name, np.asarray(ids), '')).sum())
+    return int(np.triu(selection._confused(name, np.asarray(ids), ''), 1).sum())
 
 
 def rotations(word: int, bits: int) -> list[str]:
