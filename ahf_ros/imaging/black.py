@@ -22,7 +22,7 @@ def black_lift(contrast: np.ndarray, bright: np.ndarray) -> np.ndarray:
     Examples
     --------
     >>> black_lift(np.array([0.0, 0.3]), np.array([200.0, 200.0])).round()
-    array([54.,  0.])
+    array([53.,  0.])
     """
     wanted = _PRINTED * (1 - contrast)
     missing = np.maximum(wanted - contrast, 0) * bright

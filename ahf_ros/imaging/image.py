@@ -10,22 +10,16 @@ import numpy as np
 MINIMUM_SIDE = 16
 """Minimum width and height of an image, px; a smaller one cannot show a readable target."""
 
-MAXIMUM_SIDE = 32767
-"""Maximum width and height of an image, px; OpenCV resamples no larger one."""
-
-MAXIMUM_PIXELS = 2**28
-"""Maximum number of pixels of an image; a filter takes some 30 bytes for each."""
-
-HOT_SHARE = 100_000
-"""One pixel in so many may be hot, that is, brighter than any light in the image."""
-
 SATURATED = 253.0
 """Gray value from which a reading is white, whatever the light."""
 
-_MUCH_WHITE = 0.3  # share of an image
-
 IMAGE_TYPES = (np.uint8, np.uint16, np.float32, np.float64)
 """Accepted pixel types, in the byte order of the machine."""
+
+_MAXIMUM_SIDE = 32767  # px; OpenCV resamples no larger image
+_MAXIMUM_PIXELS = 2**28  # a filter takes some 30 bytes for each
+_HOT_SHARE = 100_000  # one pixel in so many may be brighter than any light in the image
+_MUCH_WHITE = 0.3  # share of an image
 
 
 def check_image(image: Any, name: str = 'image') -> None:
@@ -62,16 +56,16 @@ def check_image(image: Any, name: str = 'image') -> None:
 
 def check_size(width: int, height: int, name: str) -> None:
     """Raise a ValueError if an image is too large, be it decoded or not yet; sides in px."""
-    if max(width, height) > MAXIMUM_SIDE or width * height > MAXIMUM_PIXELS:
+    if max(width, height) > _MAXIMUM_SIDE or width * height > _MAXIMUM_PIXELS:
         raise ValueError(
-            f'{name} is {width} x {height} px, accepted are sides of at most {MAXIMUM_SIDE} px '
-            f'and at most {MAXIMUM_PIXELS} px in all'
+            f'{name} is {width} x {height} px, accepted are sides of at most {_MAXIMUM_SIDE} px '
+            f'and at most {_MAXIMUM_PIXELS} px in all'
         )
 
 
 def brightest(image: np.ndarray) -> float:
     """Return the gray value of the brightest light in an image, hot pixels excluded."""
-    rank = image.size - 1 - image.size // HOT_SHARE
+    rank = image.size - 1 - image.size // _HOT_SHARE
     return float(np.partition(image, rank, axis=None)[rank]) or float(image.max())
 
 

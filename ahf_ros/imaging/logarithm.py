@@ -14,9 +14,6 @@ LOG_OFFSET = 8.0
 """Added to gray values, 0 to 255, before a logarithm that is searched for edges: about where noise
 hides contrast."""
 
-SAMPLE_ROWS, SAMPLE_COLUMNS = 32, 1024
-"""Size of the lattice on which the output mapping samples the filtered image."""
-
 MINIMUM_CONTRAST = 1e-3
 """Minimum difference of s between black and white; a flatter image stays gray."""
 
@@ -58,7 +55,7 @@ def sample_lattice(height: int, width: int) -> tuple[np.ndarray, np.ndarray]:
     # one at random per interval: even steps could coincide with projected stripes
     generator = np.random.default_rng(0)
     lattice = []
-    for length, count in ((height, SAMPLE_ROWS), (width, SAMPLE_COLUMNS)):
+    for length, count in ((height, 32), (width, 1024)):
         edges = np.linspace(0, length, min(length, count) + 1).astype(int)
         lattice.append(generator.integers(edges[:-1], edges[1:]))
     return lattice[0], lattice[1]

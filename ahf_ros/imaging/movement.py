@@ -38,7 +38,7 @@ _BLUR = 1.0  # px, of the logarithm; edges become as wide in sharp images as in 
 _STEEP = 0.06  # of ln per px, an edge; paper is flatter
 _NOISY = 6.0  # standard deviations of the gradient in flat parts, an edge
 _FLAT, _FLAT_SIZE = 10, 0.459  # percentile of gradients that are noise, and its deviations
-_MAXIMUM_EDGES = 20_000  # evenly distributed ones are enough
+_MAXIMUM_EDGES = 20_000  # evenly distributed ones are enough, and remap takes 32,767
 _SIMILAR = 1.5  # ratio of two steps that may be the same edge
 _FAR_EDGES = 4000  # are enough to look for a displacement of whole pixels
 _COARSE = 4  # times smaller image, in which larger displacements are looked for
@@ -46,6 +46,9 @@ _MINIMUM_SIDE = 100  # px, side of such an image
 _SHORT = 2.0  # px in it, a displacement that the whole image would show
 _APART = 3.0  # px, between two peaks
 _TILES = 4  # along each side, that are looked at one by one
+
+Gradients = tuple[np.ndarray, np.ndarray]
+"""Of an image along x and y, float32, shape (height, width)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,8 +146,9 @@ def _refined(
             break
         rest, of = nearest[close], normals[close]
         robust = weights[close] * (1 - (rest / width) ** 2) ** 2
-        normal_matrix = (of * robust[:, None]).T @ of
-        shift += np.linalg.solve(normal_matrix, (of * robust[:, None]).T @ rest)
+        weighted = of * robust[:, None]
+        normal_matrix = weighted.T @ of
+        shift += np.linalg.solve(normal_matrix, weighted.T @ rest)
         spread = 1.4826 * float(np.median(np.abs(rest)))
         inverse = np.linalg.inv(normal_matrix)
         middle = (of * robust[:, None] ** 2).T @ of
@@ -171,7 +175,7 @@ class Edges:
     steps: np.ndarray
     places: np.ndarray
     shape: tuple[int, int]
-    gradients: tuple[np.ndarray, np.ndarray]
+    gradients: Gradients
     coarse: Edges | None
 
 
@@ -217,7 +221,7 @@ def displacement(edges: Edges, image: np.ndarray) -> Displacement | None:
     if len(edges.x) < _MINIMUM_EDGES:
         return None
     gradients = _gradients(image)
-    found = _partners(edges, gradients, np.zeros(2))
+    found = _partners(edges, gradients)
     whole = _measured(edges.normals, found)
     if whole is None:
         return _far(edges, gradients) or _coarse(edges, image)
@@ -246,32 +250,23 @@ def _reduced(image: np.ndarray) -> np.ndarray:
     return cv2.resize(as_gray(image), size, interpolation=cv2.INTER_AREA)
 
 
-def _gradients(image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _gradients(image: np.ndarray) -> Gradients:
     logarithm = np.log(as_gray(image).astype(np.float32) + np.float32(LOG_OFFSET))
     smooth = cv2.GaussianBlur(logarithm, (0, 0), _BLUR)
-    return cv2.Scharr(smooth, cv2.CV_32F, 1, 0, scale=1 / 32), cv2.Scharr(
-        smooth, cv2.CV_32F, 0, 1, scale=1 / 32
-    )
+    across = cv2.Scharr(smooth, cv2.CV_32F, 1, 0, scale=1 / 32)
+    return across, cv2.Scharr(smooth, cv2.CV_32F, 0, 1, scale=1 / 32)
 
 
 def _profiles(
-    gradients: tuple[np.ndarray, np.ndarray],
-    x: np.ndarray,
-    y: np.ndarray,
-    normals: np.ndarray,
-    offsets: np.ndarray,
+    gradients: Gradients, x: np.ndarray, y: np.ndarray, normals: np.ndarray, offsets: np.ndarray
 ) -> np.ndarray:
     """Return the gradient along each normal at offsets from the edge, shape (n, offsets)."""
     columns = (x[:, None] + normals[:, :1] * offsets).astype(np.float32)
     rows = (y[:, None] + normals[:, 1:] * offsets).astype(np.float32)
-    sampled = np.empty((2, *columns.shape), np.float32)
-    for top in range(0, len(x), 30_000):  # remap has a maximum of rows
-        part = slice(top, top + 30_000)
-        for axis in (0, 1):
-            sampled[axis, part] = cv2.remap(
-                gradients[axis], columns[part], rows[part], cv2.INTER_LINEAR
-            )
-    along: np.ndarray = sampled[0] * normals[:, :1] + sampled[1] * normals[:, 1:]
+    if not len(x):
+        return columns
+    across, down = (cv2.remap(of, columns, rows, cv2.INTER_LINEAR) for of in gradients)
+    along: np.ndarray = across * normals[:, :1] + down * normals[:, 1:]
     return along
 
 
@@ -284,16 +279,13 @@ def _vertex(
     return place, middle + bend * place**2 / 2
 
 
-def _partners(
-    edges: Edges, gradients: tuple[np.ndarray, np.ndarray], shift: np.ndarray
-) -> np.ndarray:
-    """Return where along its normal each edge is seen again, from a place shifted by whole pixels.
+def _partners(edges: Edges, gradients: Gradients, x: int = 0, y: int = 0) -> np.ndarray:
+    """Return where along its normal each edge is seen again, from a place x and y px away.
 
     Shape (n, 2 * _WINDOW + 1), px; the maximum near each whole offset, else NaN.
     """
     offsets = np.arange(-_WINDOW - 1.0, _WINDOW + 2.0)
-    x, y = edges.x + np.float32(shift[0]), edges.y + np.float32(shift[1])
-    along = _profiles(gradients, x, y, edges.normals, offsets)
+    along = _profiles(gradients, edges.x + x, edges.y + y, edges.normals, offsets)
     middle = along[:, 1:-1]
     place, height = _vertex(along[:, :-2], middle, along[:, 2:])
     good = (middle >= along[:, :-2]) & (middle > along[:, 2:])
@@ -307,45 +299,42 @@ def _alike(steps: np.ndarray, others: np.ndarray) -> np.ndarray:
     return (steps > others / _SIMILAR) & (steps < others * _SIMILAR)
 
 
-def _repeats(edges: Edges) -> bool:
-    """Return whether the first image is like itself at a displacement."""
-    counts, side = _counts(edges, edges.gradients, 2 * _REACH)
-    apart = np.hypot(side[:, None], side) >= _APART
-    return bool(counts.max() < _PEAK * counts[apart].max())
-
-
-def _counts(
-    edges: Edges, gradients: tuple[np.ndarray, np.ndarray], reach: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return how many edges are seen again at each displacement, (y, x), and the displacements."""
+def _counts(edges: Edges, gradients: Gradients, reach: int) -> np.ndarray:
+    """Return how many edges are seen again at each displacement (y, x) from -`reach` on, px."""
     every = slice(None, None, -(-len(edges.x) // _FAR_EDGES))
     x, y = (of[every].astype(int) for of in (edges.x, edges.y))
     normals, steps = edges.normals[every], edges.steps[every]
     weights = _direction_weights(normals)
     height, width = edges.shape
-    side = np.arange(-reach, reach + 1)
-    counts = np.zeros((len(side), len(side)))
-    for row, down in enumerate(side):
-        rows = np.clip(y + down, 0, height - 1)
-        for column, right in enumerate(side):
-            at = rows, np.clip(x + right, 0, width - 1)
+    counts = np.zeros((2 * reach + 1, 2 * reach + 1))
+    for row in range(len(counts)):
+        rows = np.clip(y + row - reach, 0, height - 1)
+        for column in range(len(counts)):
+            at = rows, np.clip(x + column - reach, 0, width - 1)
             along = gradients[0][at] * normals[:, 0] + gradients[1][at] * normals[:, 1]
             counts[row, column] = weights @ _alike(along, steps)
-    return counts, side
+    return counts
 
 
-def _far(edges: Edges, gradients: tuple[np.ndarray, np.ndarray]) -> Displacement | None:
+def _single_peak(counts: np.ndarray) -> tuple[int, int] | None:
+    """Return the place of the highest count, None unless it stands out from those apart."""
+    row, column = divmod(int(counts.argmax()), len(counts))
+    rows, columns = np.indices(counts.shape)
+    apart = np.hypot(rows - row, columns - column) >= _APART
+    return (row, column) if counts.max() >= _PEAK * counts[apart].max() else None
+
+
+def _far(edges: Edges, gradients: Gradients) -> Displacement | None:
     """Return a displacement of more than a pixel, None unless just one stands out.
 
     A pattern of light that moved is like itself at several displacements, and so is the image.
     """
-    counts, side = _counts(edges, gradients, _REACH)
-    row, column = divmod(int(counts.argmax()), len(side))
-    apart = np.hypot(side[:, None] - side[row], side - side[column]) >= _APART
-    if counts.max() < max(_PEAK * counts[apart].max(), _MINIMUM_EDGES) or _repeats(edges):
+    counts = _counts(edges, gradients, _REACH)
+    peak = _single_peak(counts)
+    if not peak or counts.max() < _MINIMUM_EDGES:
         return None
-    shift = np.array((side[column], side[row]))
-    rest = _measured(edges.normals, _partners(edges, gradients, shift))
-    if rest is None:
+    if not _single_peak(_counts(edges, edges.gradients, 2 * _REACH)):
         return None
-    return Displacement(rest.x + float(shift[0]), rest.y + float(shift[1]), rest.deviation)
+    x, y = peak[1] - _REACH, peak[0] - _REACH
+    rest = _measured(edges.normals, _partners(edges, gradients, x, y))
+    return Displacement(rest.x + x, rest.y + y, rest.deviation) if rest else None

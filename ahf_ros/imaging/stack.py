@@ -56,11 +56,8 @@ class ImageStack:
             raise ValueError(
                 f'stack has {count} images, accepted is a number from 1 to {MAXIMUM_IMAGES}'
             )
-        if count == 1:
-            check_image(self.images[0])
-            return
         for number, image in enumerate(self.images, start=1):
-            check_image(image, f'image {number} of the stack')
+            check_image(image, f'image {number} of the stack' if count > 1 else 'image')
             if difference := unlike(self.images[0], image):
                 raise ValueError(f'image {number} of the stack {difference}')
 
