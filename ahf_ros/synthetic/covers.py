@@ -13,7 +13,7 @@ import numpy as np
 from ahf_ros.codes.designs import HALF_SIDE, proportions
 from ahf_ros.codes.dots import DotFamily, dot_family
 from ahf_ros.codes.gsi import PointFamily
-from ahf_ros.codes.gsi_library import point_family
+from ahf_ros.codes.gsi import point_family
 from ahf_ros.codes.ring import Family, family, sectors
 from ahf_ros.codes.square import SQUARE_NAMES, marker
 
