@@ -1,6 +1,22 @@
 """Code words and printed designs; here the names of families, which settings need without them."""
 
-RING_NAMES = ('metashape12', 'metashape14', 'metashape16', 'metashape20', 'aicon12', 'aicon14')
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+RING_FOLDER = Path(__file__).with_name('ring_families')
+"""The data files of the families of ring targets."""
+
+
+def _vendor_and_bits(name: str) -> tuple[str, int]:
+    vendor, bits = re.fullmatch(r'(\D+)(\d+)', name).groups()
+    return vendor, int(bits)
+
+
+RING_NAMES = tuple(
+    sorted((path.stem for path in RING_FOLDER.glob('*.json')), key=_vendor_and_bits)
+)
 """Families of ring targets: vendor, and number of sectors."""
 
 ARUCO_NAMES = (

@@ -12,15 +12,16 @@ Words = TypeVar('Words', int, np.ndarray)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CyclicFamily:
-    """Code words of `bits` bits in the order of their IDs.
+    """Code words of `bits` bits, and their IDs, which are above 0.
 
-    `words` has the canonical ones, ndarray of int64, shape (n,), ascending and read-only; index i
-    has the ID i + 1.
+    `words` has the canonical ones, ndarray of int64, shape (n,), ascending; `numbers` are their
+    IDs. Both are read-only.
     """
 
     name: str
     bits: int
     words: np.ndarray
+    numbers: np.ndarray
 
     def canonical(self, words: Any) -> np.ndarray:
         """Return the smallest of all words that are the same code, ndarray of int64."""
@@ -30,7 +31,7 @@ class CyclicFamily:
         """Return the IDs of words wherever their reading begins, 0 where there is none."""
         codes = self.canonical(words)
         index = np.minimum(np.searchsorted(self.words, codes), self.words.size - 1)
-        ids: np.ndarray = np.where(self.words[index] == codes, index + 1, 0)
+        ids: np.ndarray = np.where(self.words[index] == codes, self.numbers[index], 0)
         return ids
 
     def number(self, word: int) -> int | None:
@@ -41,12 +42,18 @@ class CyclicFamily:
 
     def word(self, number: int) -> int:
         """Return the canonical code word of the ID `number`; a ValueError if there is none."""
-        if not 1 <= number <= self.words.size:
+        if number not in self.numbers:
             raise ValueError(
-                f'number is {number!r}, accepted is an ID of {self.name} from 1 to '
-                f'{self.words.size}'
+                f'number is {number!r}, accepted is an ID of {self.name} from '
+                f'{self.numbers.min()} to {self.numbers.max()}'
             )
-        return int(self.words[number - 1])
+        return int(self.words_of(np.array([number]))[0])
+
+    def words_of(self, numbers: np.ndarray) -> np.ndarray:
+        """Return the canonical code words of IDs, each one of the family."""
+        order = np.argsort(self.numbers)
+        found: np.ndarray = self.words[order[np.searchsorted(self.numbers, numbers, sorter=order)]]
+        return found
 
 
 def smallest_rotation(words: Any, bits: int) -> np.ndarray:

@@ -86,6 +86,7 @@ def dot_family(path: str = '') -> DotFamily:
         name=fields['family'].text(),
         bits=bits,
         words=words,
+        numbers=np.arange(1, words.size + 1),
         dot_circle=circle,
         dot_radius=radius,
         ground_radius=ground,

@@ -82,7 +82,7 @@ def numbers_of(name: str, file: str = '') -> Sequence[int]:
     if name in SQUARE_NAMES:
         return range(len(square.dictionary(name).bytesList))
     code = dots.dot_family(file) if name == 'dots' else ring.family(name)
-    return range(1, code.words.size + 1)
+    return sorted(code.numbers.tolist())
 
 
 def check_numbers(field: str, numbers: Iterable[int], families: Sequence[str], file: str) -> None:
@@ -132,7 +132,8 @@ def _check_list(names: Sequence[str], shown: str) -> None:
                 f'detector {kinds[second]}; accepted are families of one detector, which reads '
                 'them together'
             )
-        if _same_print(first, second):
+        if first in ARUCO_NAMES and first.rpartition('_')[0] == second.rpartition('_')[0]:
+            # Dictionaries with one number of cells begin with the same markers.
             raise ValueError(
                 f'{shown}, but targets of {first} and {second} have the same print; accepted is '
                 'one of them'
@@ -142,15 +143,3 @@ def _check_list(names: Sequence[str], shown: str) -> None:
             f'{shown}, but the detector {kinds[names[0]]} reads one family; accepted are several '
             f'of {", ".join(LISTED)}'
         )
-
-
-def _same_print(first: str, second: str) -> bool:
-    """Return whether targets of two families of one kind have the same print."""
-    from ahf_ros.codes import ring
-
-    if first in RING_NAMES:
-        one, other = ring.family(first), ring.family(second)
-        same = (one.bits, one.band) == (other.bits, other.band)
-        return same and not set(one.words.tolist()).isdisjoint(other.words.tolist())
-    # The dictionaries of ArUco with one number of cells begin with the same markers.
-    return first in ARUCO_NAMES and first.rpartition('_')[0] == second.rpartition('_')[0]

@@ -3,7 +3,10 @@
 A code word of n bits is read round the band, least significant bit first: bit s is the sector
 from s 360/n to (s + 1) 360/n degrees counter-clockwise as seen on the printed target, 1 where the
 sector has the colour of the dot. The direction zero is any sector edge, so that all rotations of a
-word are the same code; the smallest one is canonical.
+word are the same code; the smallest one is canonical. No family has the word without marks, which
+is a bare dot, or the one of nothing but marks, unless its file lists that.
+
+Each family is a data file: see docs/ring_targets.md.
 """
 
 from __future__ import annotations
@@ -11,23 +14,24 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from math import gcd
-from string import ascii_lowercase, digits
+from pathlib import Path
 
 import numpy as np
 
-from ahf_ros.codes import RING_NAMES
-from ahf_ros.codes.cyclic import CyclicFamily, smallest_rotation
-
-BAND_RADII = {'metashape': (2.25, 3.5), 'aicon': (2.0, 3.0)}
-"""Inner and outer radius of the bands that vendors print, in radii of the dot."""
+from ahf_ros.codes import RING_FOLDER, RING_NAMES
+from ahf_ros.codes.cyclic import CyclicFamily, mirrored_words, smallest_rotation
+from ahf_ros.codes.data_file import Entry, read_data_file
 
 FAMILY_NAMES = RING_NAMES
 """The ring code families that `family` knows."""
 
+_BITS = (6, 24)
+_MAXIMUM_RADIUS = 12.0  # of a band, dot radii
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Family(CyclicFamily):
-    """The code words of one kind of ring target, and the radii of its band, in dot radii."""
+    """The code words of one kind of ring target, and the radii of its band, in radii of the dot."""
 
     band_inner: float
     band_outer: float
@@ -42,10 +46,8 @@ class Family(CyclicFamily):
 def family(name: str) -> Family:
     """Return a family of ring codes, one of `FAMILY_NAMES`; a ValueError if there is none.
 
-    The words have even parity and are not all ones. Metashape keeps those above 2^(n/2) + 1;
-    AICON (patent DE 197 33 466) those with at least one pair of opposite ones. The lists of 12
-    and 14 bit were compared with published tables and photographs; the order of 16 and 20 bit is
-    the same rule carried on.
+    The lists of metashape12, metashape14, aicon12 and aicon14 were compared with published tables
+    and photographs.
 
     Examples
     --------
@@ -56,27 +58,129 @@ def family(name: str) -> Family:
     """
     if name not in FAMILY_NAMES:
         raise ValueError(f'family is {name!r}, accepted is one of {", ".join(FAMILY_NAMES)}')
-    vendor, bits = name.rstrip(digits), _sector_count(name)
-    # A word that is even or has its highest bit has a smaller rotation, or is 0 or all ones.
-    words = np.arange(1, 1 << (bits - 1), 2, dtype=np.int64)
-    parity = np.zeros_like(words)
-    for bit in range(bits):
-        parity ^= words >> bit & 1
-    words = words[parity == 0]
-    words = words[words == smallest_rotation(words, bits)]
-    half = bits // 2
-    if vendor == 'metashape':
-        words = words[words > (1 << half) + 1]
+    return ring_family(RING_FOLDER / f'{name}.json')
+
+
+@lru_cache(maxsize=64)
+def ring_family(path: Path) -> Family:
+    """Return the family of ring codes that a data file describes.
+
+    A ValueError names the line and the field of what is not accepted in it.
+    """
+    fields = read_data_file(path).keys(
+        ('family', 'bits', 'band'), ('words', 'codes', 'numbers', 'source')
+    )
+    bits = fields['bits'].integer(*_BITS)
+    inner, outer = (
+        of.number('a radius in radii of the dot', 1.0)
+        for of in fields['band'].list('its inner and outer radius, in radii of the dot', (2,))
+    )
+    if not 1 < inner < outer <= _MAXIMUM_RADIUS:
+        fields['band'].refuse(f'two radii that grow from above 1 to {_MAXIMUM_RADIUS:g} at most')
+    if ('words' in fields) == ('codes' in fields):
+        fields['family'].refuse('a family with either the field words or the field codes')
+    if 'codes' in fields:
+        words, numbers = _table(fields['codes'], bits)
     else:
-        words = words[words & (words >> half) & ((1 << half) - 1) != 0]
-    words.setflags(write=False)
-    inner, outer = BAND_RADII[vendor]
-    return Family(name=name, bits=bits, words=words, band_inner=inner, band_outer=outer)
+        words = _words(fields['words'], bits)
+        numbers = _numbers(fields.get('numbers'), words, bits)
+    for of in (words, numbers):
+        of.setflags(write=False)
+    return Family(
+        name=fields['family'].text(),
+        bits=bits,
+        words=words,
+        numbers=numbers,
+        band_inner=inner,
+        band_outer=outer,
+    )
 
 
-def _sector_count(name: str) -> int:
-    """Return the number of sectors of a family, without its words, which may be many."""
-    return int(name.lstrip(ascii_lowercase))
+def _table(codes: Entry, bits: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the words of a table by their IDs, ascending, and these."""
+    words: dict[int, int] = {}
+    for number, entry in codes.items():
+        if not number.isdecimal() or not 0 < int(number) < 1 << 31:
+            entry.refuse('a word whose name is its ID, an integer from 1 to 2147483647')
+        words[_new_word(entry, words, bits)] = int(number)
+    if not words:
+        codes.refuse('a mapping of one ID at least to its word')
+    order = sorted(words)
+    return np.array(order, np.int64), np.array([words[word] for word in order], np.int64)
+
+
+def _new_word(entry: Entry, known: dict[int, int], bits: int) -> int:
+    word = int(smallest_rotation(entry.integer(1, (1 << bits) - 1), bits))
+    if word in known:
+        entry.refuse('a word that is no rotation of one before it')
+    return word
+
+
+def _words(rule: Entry, bits: int) -> np.ndarray:
+    """Return the canonical words that a rule or a list names, ascending."""
+    if isinstance(rule.value, list):
+        known: dict[int, int] = {}
+        for entry in rule.list('a list of words'):
+            known[_new_word(entry, known, bits)] = 0
+        words = np.array(sorted(known), np.int64)
+    else:
+        # A word that is even or has its highest bit has a smaller rotation, or is 0 or all ones.
+        words = np.arange(1, 1 << (bits - 1), 2, dtype=np.int64)
+        if rule.value != 'all':
+            words = _conforming(rule, words, bits)
+        words = words[words == smallest_rotation(words, bits)]
+    if not words.size:
+        rule.refuse('a rule that some word follows')
+    return words
+
+
+def _conforming(rule: Entry, words: np.ndarray, bits: int) -> np.ndarray:
+    """Return the words that follow all of some rules."""
+    known = ('parity', 'opposite_pairs', 'changes', 'above')
+    for name, entry in rule.keys((), known).items():
+        if name == 'parity':
+            if entry.value not in ('even', 'odd'):
+                entry.refuse('even or odd')
+            good = _marks(words, bits) % 2 == (entry.value == 'odd')
+        elif name == 'opposite_pairs':
+            least = entry.integer(1, bits // 2)
+            if bits % 2:
+                entry.refuse('nothing where the number of bits is odd')
+            half = bits // 2
+            good = _marks(words & (words >> half) & ((1 << half) - 1), half) >= least
+        elif name == 'changes':
+            following = words >> 1 | (words & 1) << (bits - 1)
+            good = _marks(words ^ following, bits) <= entry.integer(2, bits)
+        else:
+            good = words > entry.integer(0, 1 << bits)
+        words = words[good]
+    return words
+
+
+def _marks(words: np.ndarray, bits: int) -> np.ndarray:
+    """Return the number of ones of words."""
+    marks = np.zeros_like(words)
+    for bit in range(bits):
+        marks += words >> bit & 1
+    return marks
+
+
+def _numbers(rule: Entry | None, words: np.ndarray, bits: int) -> np.ndarray:
+    """Return the IDs of words: their rank, or what they are if they are read in some way."""
+    if rule is None or rule.value == 'rank':
+        return np.arange(1, words.size + 1)
+    if not isinstance(rule.value, dict):
+        rule.refuse('rank, or a mapping with the fields first_bit and direction')
+    mirrored = False
+    accepted = {
+        'first_bit': ('lowest', 'highest'),
+        'direction': ('counter-clockwise', 'clockwise'),
+    }
+    for name, entry in rule.keys((), tuple(accepted)).items():
+        if entry.value not in accepted[name]:
+            entry.refuse(' or '.join(accepted[name]))
+        mirrored ^= entry.value == accepted[name][1]
+    return smallest_rotation(mirrored_words(words, bits), bits) if mirrored else words.copy()
 
 
 def canonical(words: np.ndarray, family: Family) -> tuple[np.ndarray, np.ndarray]:
@@ -85,7 +189,7 @@ def canonical(words: np.ndarray, family: Family) -> tuple[np.ndarray, np.ndarray
     All are ndarrays of int64, shape (k,), and every word is one of the family.
     """
     codes = family.canonical(words)
-    return codes, np.searchsorted(family.words, codes) + 1
+    return codes, family.ids(codes)
 
 
 def sectors(word: int, bits: int) -> np.ndarray:
@@ -98,19 +202,20 @@ def sectors(word: int, bits: int) -> np.ndarray:
 
 
 @lru_cache(maxsize=100_000)
-def words_of_print(name: str, word: int) -> dict[str, int]:
-    """Return the canonical words of all families whose targets have the print of a word.
+def words_of_print(
+    name: str, word: int, families: tuple[str, ...] = FAMILY_NAMES
+) -> dict[str, int]:
+    """Return the canonical words of those of some families whose targets have the print of a word.
 
     A word all of whose runs are a multiple of some angle may be a word of other numbers of
     sectors, too: 000111000111 of 12 bit is 0000111100001111 of 16. Nothing in an image of the
-    target shows which one is meant. `word` is a word of the family `name`, which is included.
+    target shows which one is meant. `word` is a word of the family `name`, which is included if it
+    is one of these.
 
     Examples
     --------
-    >>> words_of_print('metashape12', 455)
-    {'metashape12': 455, 'metashape16': 3855, 'metashape20': 31775}
-    >>> words_of_print('metashape12', 71)
-    {'metashape12': 71}
+    >>> words_of_print('metashape12', 455, ('metashape12', 'metashape16', 'aicon12'))
+    {'metashape12': 455, 'metashape16': 3855}
     """
     code = family(name)
     inked = sectors(word, code.bits)
@@ -118,12 +223,11 @@ def words_of_print(name: str, word: int) -> dict[str, int]:
     widest = gcd(code.bits, *np.diff(edges).tolist())
     blocks = np.roll(inked, -edges[0])[::widest]  # the print in as few sectors as show it
     words = {}
-    for other in FAMILY_NAMES:
-        count = _sector_count(other)
-        times, rest = divmod(count, len(blocks))
-        if rest or family(other).band != code.band:
+    for other in map(family, families):
+        times, rest = divmod(other.bits, len(blocks))
+        if rest or other.band != code.band:
             continue
-        spread = int(np.repeat(blocks, times) @ (1 << np.arange(count)))
-        if family(other).number(spread):
-            words[other] = int(family(other).canonical(spread))
+        spread = int(np.repeat(blocks, times) @ (1 << np.arange(other.bits)))
+        if other.number(spread):
+            words[other.name] = int(other.canonical(spread))
     return words

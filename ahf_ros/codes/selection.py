@@ -145,7 +145,7 @@ def _orbits(name: str, ids: np.ndarray, file: str) -> np.ndarray:
     """Return all words that are the code of each ID, ndarray of uint64, shape (n, k)."""
     code = _cyclic(name, file)
     if code is not None:
-        words = code.words[ids - 1]
+        words = code.words_of(ids)
         turned = [rotated_words(words, turn, code.bits) for turn in range(code.bits)]
         if name == 'dots':
             turned += [mirrored_words(words, code.bits) for words in turned]
@@ -180,9 +180,10 @@ def _confused(name: str, ids: np.ndarray, file: str) -> np.ndarray:
     code = _cyclic(name, file)
     if code is None:
         return confused
-    words = code.words[ids - 1]
+    words = code.words_of(ids)
     every = code.canonical(np.arange(1 << code.bits))
-    place = np.minimum(np.searchsorted(words, every), ids.size - 1)
+    order = np.argsort(words)
+    place = order[np.minimum(np.searchsorted(words, every, sorter=order), ids.size - 1)]
     index = np.where(words[place] == every, place, -1)
     rows = np.arange(ids.size)
     for length in range(1, code.bits):

@@ -22,6 +22,7 @@ from ahf_ros.features.circle_fit import Fit
 
 _CLEAREST = 48  # dots that tell which family comes first
 _FIRST = 8  # doubtful words that rivals read first
+_DOUBT = 0.05  # odds of another family that has all prints, up to which one is sure
 
 
 def by_clear_dots(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> list[Family]:
@@ -116,22 +117,57 @@ def decoded(hypotheses: Hypotheses) -> tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 def settle_same_prints(hypotheses: Hypotheses, families: Sequence[str]) -> Hypotheses:
-    """Assign prints shared by several of the named families to one, or mark them uncertain."""
+    """Assign prints shared by several of the named families to one, or mark them uncertain.
+
+    The families of an image are as few as explain all of its targets, and of those that explain
+    the same ones that with the fewest words. Where two of these have a print, the nearest target
+    that only one of them has tells which it is.
+    """
     names, codes, _ = decoded(hypotheses)
     certain = np.flatnonzero(hypotheses.certain)
-    prints = {int(i): words_of_print(str(names[i]), int(codes[i])) for i in certain}
-    doubtful = [index for index, words in prints.items() if len(words) > 1]
-    clear = np.array([index for index, words in prints.items() if len(words) == 1], int)
+    prints = {
+        int(index): words_of_print(str(names[index]), int(codes[index]), tuple(families))
+        for index in certain
+    }
+    present, sure = _present(list(prints.values()))
+    options = {
+        index: {name: word for name, word in words.items() if name in present}
+        for index, words in prints.items()
+    }
+    clear = np.array([index for index, words in options.items() if len(words) == 1], int)
+    own = np.array([next(iter(options[index])) for index in clear.tolist()], str)
     words, confidence = hypotheses.words.copy(), hypotheses.confidence.copy()
     of_families = hypotheses.families.copy()
     centres = hypotheses.frames[:, :2, 2]
-    for index in doubtful:
-        of_print = {name: word for name, word in prints[index].items() if name in families}
-        others = clear[np.isin(names[clear], list(of_print))]
-        if not others.size:
+    for index, of_print in options.items():
+        near = np.isin(own, list(of_print))
+        if not near.any():
             confidence[index] = 0.0
             continue
-        nearest = others[np.hypot(*(centres[others] - centres[index]).T).argmin()]
-        words[index] = of_print[names[nearest]]
-        of_families[index] = family(str(names[nearest]))
+        others = clear[near]
+        nearest = np.hypot(*(centres[others] - centres[index]).T).argmin()
+        name = str(own[near][nearest])
+        if name not in sure:
+            confidence[index] = 0.0
+        if name != names[index]:
+            words[index] = of_print[name]
+            of_families[index] = family(name)
     return replace(hypotheses, words=words, confidence=confidence, families=of_families)
+
+
+def _present(prints: Sequence[dict[str, int]]) -> tuple[list[str], set[str]]:
+    """Return the fewest families that have all prints, and those that no other may stand for."""
+    left, present, sure = list(prints), [], set()
+    while left:
+        count = {name: sum(name in of for of in left) for of in left for name in of}
+        size = {name: len(family(name).words) for name in count}
+        best = min(count, key=lambda name: (-count[name], size[name]))
+        covered = [of for of in left if best in of]
+        rivals = set.intersection(*(set(of) for of in covered)) - {best}
+        # A larger family would hardly show only words of a smaller one.
+        doubt = sum((size[best] / size[name]) ** len(covered) for name in rivals)
+        present.append(best)
+        if doubt < _DOUBT:
+            sure.add(best)
+        left = [of for of in left if best not in of]
+    return present, sure

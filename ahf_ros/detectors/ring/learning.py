@@ -301,9 +301,10 @@ def _words(bands: Bands, bits: int, growth: float) -> tuple[np.ndarray, np.ndarr
     count = len(bands.size)
     along = bands.size * (bands.inner + bands.outer) / 2
     turns = np.exp(1j * bits * (angle + rising * growth / along[row]))
-    phase = np.angle(
-        np.bincount(row, turns.real, count) + 1j * np.bincount(row, turns.imag, count)
-    ) / bits
+    phase = (
+        np.angle(np.bincount(row, turns.real, count) + 1j * np.bincount(row, turns.imag, count))
+        / bits
+    )
     m = bands.ink.shape[1]
     offsets = np.linspace(-0.25, 0.25, 9)
     places = (np.arange(bits)[:, None] + 0.5 + offsets) * (2 * np.pi / bits) + phase[:, None, None]

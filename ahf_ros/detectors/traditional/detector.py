@@ -196,7 +196,7 @@ def _identify_dots(
     minimum, maximum = settings.radii
     shown = (minimum <= major) & (major <= maximum) & readings.surrounded
     confidence = np.where(ids == UNDECODED, 0.0, readings.certainty)
-    codes = code.words[np.maximum(ids, 1) - 1]
+    codes = code.canonical(readings.words)
     return targets_from_frames(
         frames[shown], covariance[shown], ids[shown], codes[shown], confidence[shown], code.name
     )
