@@ -22,6 +22,11 @@ class CyclicFamily:
     bits: int
     words: np.ndarray
 
+    @property
+    def numbers(self) -> np.ndarray:
+        """All IDs, ascending."""
+        return np.arange(1, self.words.size + 1)
+
     def canonical(self, words: Any) -> np.ndarray:
         """Return the smallest of all words that are the same code, ndarray of int64."""
         return smallest_rotation(words, self.bits)
@@ -40,7 +45,7 @@ class CyclicFamily:
         return int(self.ids(word)) or None
 
     def word(self, number: int) -> int:
-        """Return the canonical code word of the ID `number`; a ValueError if there is none."""
+        """Return the canonical code word of an ID; raise a ValueError if there is none."""
         if not 1 <= number <= self.words.size:
             raise ValueError(
                 f'number is {number!r}, accepted is an ID of {self.name} from 1 to '

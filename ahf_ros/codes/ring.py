@@ -40,7 +40,7 @@ class Family(CyclicFamily):
 
 @cache
 def family(name: str) -> Family:
-    """Return a family of ring codes, one of `FAMILY_NAMES`; a ValueError if there is none.
+    """Return a family of ring codes by its name; raise a ValueError if there is none.
 
     The words have even parity and are not all ones. Metashape keeps those above 2^(n/2) + 1;
     AICON (patent DE 197 33 466) those with at least one pair of opposite ones. The lists of 12
