@@ -176,10 +176,8 @@ def _outlines(cells: np.ndarray) -> list[list[tuple[int, int]]]:
     after: dict[tuple[int, int], list[tuple[int, int]]] = {}
     for row, column in np.argwhere(cells).tolist():
         corners = [(column, row), (column, row + 1), (column + 1, row + 1), (column + 1, row)]
-        beside = [(row + 1, column), (row + 2, column + 1), (row + 1, column + 2)]
-        beside.append((row, column + 1))
-        for index, neighbour in enumerate(beside):
-            if not padded[neighbour]:
+        for index, (down, right) in enumerate([(1, 0), (2, 1), (1, 2), (0, 1)]):
+            if not padded[row + down, column + right]:
                 after.setdefault(corners[index], []).append(corners[(index + 1) % 4])
     polygons = []
     while after:
