@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 from ahf_ros.detectors import DETECTOR, DetectorSettings, detector_name, estimator
 from ahf_ros.filtering.settings import AdaptiveSettings
-from ahf_ros.imaging.limits import MAXIMUM_IMAGES
+from ahf_ros.imaging import MAXIMUM_IMAGES
 from ahf_ros.settings.parameter import check_parameters, parameter
 
 MAXIMUM_TARGETS = 100_000

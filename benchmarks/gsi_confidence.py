@@ -21,7 +21,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from ahf_ros.codes.gsi_library import GSI_LIBRARY, point_family
+from ahf_ros.codes.gsi import GSI_LIBRARY, point_family
 from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.detectors.gsi.confidence import WEIGHTS, probability
 from ahf_ros.detectors.gsi.detector import find_hypotheses

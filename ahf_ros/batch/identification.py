@@ -19,9 +19,8 @@ from ahf_ros.batch.task import ImageOutcome, ImageTask, Level, Message
 from ahf_ros.detectors import Detector, DetectorSettings, create_detector
 from ahf_ros.drawing.overlay import draw, summary
 from ahf_ros.edge_shift import edge_shift_remark
-from ahf_ros.imaging.image import check_image
+from ahf_ros.imaging.image import check_image, white_remark
 from ahf_ros.imaging.stack import ImageStack
-from ahf_ros.imaging.white import white_remark
 from ahf_ros.interchange.files import read_bytes
 from ahf_ros.interchange.image_files import read_noted_image, write_image
 from ahf_ros.interchange.target_json import to_json

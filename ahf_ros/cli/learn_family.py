@@ -9,9 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ahf_ros.codes.gsi import PointFamily
-from ahf_ros.codes.gsi_learning import Learnt, learn_family
-from ahf_ros.codes.gsi_library import library_text, point_family, with_codes
+from ahf_ros.codes.gsi import PointFamily, point_family
+from ahf_ros.codes.gsi_learning import Learnt, learn_family, library_text, with_codes
 from ahf_ros.interchange.files import write_whole
 from ahf_ros.interchange.point_lists import read_point_list
 

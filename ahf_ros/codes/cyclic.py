@@ -12,44 +12,40 @@ Words = TypeVar('Words', int, np.ndarray)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CyclicFamily:
-    """Code words in the order of their IDs.
+    """Code words of `bits` bits in the order of their IDs.
 
-    Attributes
-    ----------
-    name : str
-        Name of the family.
-    bits : int
-        Length of a word.
-    words : ndarray of int64, shape (n,)
-        The canonical code words, ascending and read-only; index i has the ID i + 1.
+    `words` has the canonical ones, ndarray of int64, shape (n,), ascending and read-only; index i
+    has the ID i + 1.
     """
 
     name: str
     bits: int
     words: np.ndarray
 
+    @property
+    def numbers(self) -> np.ndarray:
+        """All IDs, ascending."""
+        return np.arange(1, self.words.size + 1)
+
     def canonical(self, words: Any) -> np.ndarray:
         """Return the smallest of all words that are the same code, ndarray of int64."""
         return smallest_rotation(words, self.bits)
+
+    def ids(self, words: Any) -> np.ndarray:
+        """Return the IDs of words wherever their reading begins, 0 where there is none."""
+        codes = self.canonical(words)
+        index = np.minimum(np.searchsorted(self.words, codes), self.words.size - 1)
+        ids: np.ndarray = np.where(self.words[index] == codes, index + 1, 0)
+        return ids
 
     def number(self, word: int) -> int | None:
         """Return the ID of `word` wherever its reading begins; None where there is none."""
         if not 0 <= word < 1 << self.bits:
             return None
-        canonical = int(self.canonical(word))
-        index = int(np.searchsorted(self.words, canonical))
-        if index < self.words.size and self.words[index] == canonical:
-            return index + 1
-        return None
+        return int(self.ids(word)) or None
 
     def word(self, number: int) -> int:
-        """Return the canonical code word of the ID `number`.
-
-        Raises
-        ------
-        ValueError
-            If the family has no such ID.
-        """
+        """Return the canonical code word of an ID; raise a ValueError if there is none."""
         if not 1 <= number <= self.words.size:
             raise ValueError(
                 f'number is {number!r}, accepted is an ID of {self.name} from 1 to '
@@ -59,18 +55,7 @@ class CyclicFamily:
 
 
 def smallest_rotation(words: Any, bits: int) -> np.ndarray:
-    """Return the smallest of all rotations of each word.
-
-    Parameters
-    ----------
-    words : array_like of int, any shape
-        Words of `bits` bits, 0 to 2^bits - 1.
-    bits : int
-        Length of a word.
-
-    Returns
-    -------
-    ndarray of int64, shape of `words`
+    """Return the smallest of all rotations of each word of `bits` bits, ndarray of int64.
 
     Examples
     --------
@@ -85,20 +70,7 @@ def smallest_rotation(words: Any, bits: int) -> np.ndarray:
 
 
 def rotated_words(words: Words, turn: int, bits: int) -> Words:
-    """Return words whose sectors are rotated.
-
-    Parameters
-    ----------
-    words : int or ndarray of int64, any shape
-        Words of `bits` bits, 0 to 2^bits - 1.
-    turn : int
-        Number of sectors, 0 to `bits`, by which each bit moves to higher ones.
-    bits : int
-        Length of a word.
-
-    Returns
-    -------
-    int or ndarray of int64, shape of `words`
+    """Return words of `bits` bits, each bit of which moves by `turn` sectors to higher ones.
 
     Examples
     --------
@@ -108,26 +80,15 @@ def rotated_words(words: Words, turn: int, bits: int) -> Words:
     return (words << turn | words >> (bits - turn)) & ((1 << bits) - 1)
 
 
-def mirrored_words(words: np.ndarray, bits: int) -> np.ndarray:
-    """Return words as they read in a mirror, in some rotation.
-
-    Parameters
-    ----------
-    words : ndarray of int64, any shape
-        Words of `bits` bits, 0 to 2^bits - 1.
-    bits : int
-        Length of a word.
-
-    Returns
-    -------
-    ndarray of int64, shape of `words`
+def mirrored_words(words: Words, bits: int) -> Words:
+    """Return words of `bits` bits as they read in a mirror, in some rotation.
 
     Examples
     --------
-    >>> mirrored_words(np.array([0b1011]), 6)
-    array([52])
+    >>> f'{mirrored_words(0b1011, 6):06b}'
+    '110100'
     """
-    mirrored = np.zeros_like(words)
+    mirrored = words & 0
     for bit in range(bits):
-        mirrored |= (words >> bit & 1) << (bits - 1 - bit)
+        mirrored = mirrored << 1 | (words >> bit & 1)
     return mirrored

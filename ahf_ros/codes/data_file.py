@@ -19,16 +19,8 @@ _MAXIMUM_BYTES = 4_000_000  # bytes; ten thousand codes need a tenth of it
 class Entry:
     """A value in a data file, and where it stands.
 
-    Attributes
-    ----------
-    source : str
-        Name of the file.
-    field : str
-        Path of the value from the top of the file, such as `codes.18`; empty for the whole file.
-    line : int
-        Line of the value, from 1.
-    value : object
-        A mapping, a list, a text, a number, a truth value or None.
+    `source` is the name of the file, `field` the path of the value from its top, such as
+    `codes.18`, empty for the whole file; lines count from 1.
     """
 
     source: str
@@ -38,7 +30,7 @@ class Entry:
 
     def refuse(self, accepted: str) -> NoReturn:
         """Raise a ValueError that names file, line, field, value and what is accepted."""
-        text = repr(_plain(self.value))
+        text = repr(self.value)
         text = text if len(text) <= 80 else f'{text[:77]}...'
         raise ValueError(
             f'{self.source}, line {self.line}: {self.field or "the file"} is {text}, '
@@ -80,20 +72,16 @@ class Entry:
     def integer(self, minimum: int, maximum: int) -> int:
         """Return an integer in a range."""
         value = self.value
-        if (
-            isinstance(value, bool)
-            or not isinstance(value, int)
-            or not minimum <= value <= maximum
-        ):
+        whole = isinstance(value, int) and not isinstance(value, bool)
+        if not whole or not minimum <= value <= maximum:
             self.refuse(f'an integer from {minimum} to {maximum}')
         return int(value)
 
-    def number(self, minimum: float = -math.inf, accepted: str = 'a finite number') -> float:
+    def number(self, accepted: str, minimum: float = -math.inf) -> float:
         """Return a finite number of at least `minimum`."""
         value = self.value
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
-            self.refuse(accepted)
-        if not math.isfinite(value) or value < minimum:
+        known = isinstance(value, (int, float)) and not isinstance(value, bool)
+        if not known or not math.isfinite(value) or value < minimum:
             self.refuse(accepted)
         return float(value)
 
@@ -105,17 +93,9 @@ class Entry:
 
 
 def read_data_file(path: str | Path) -> Entry:
-    """Return the content of a data file.
+    """Return the content of a YAML or JSON file.
 
-    Parameters
-    ----------
-    path : str or Path
-        A YAML or JSON file.
-
-    Raises
-    ------
-    ValueError
-        If the file cannot be read or is neither, naming the line.
+    Raise a ValueError that names the line if it is neither, or says why it cannot be read.
     """
     source = str(path)
     if Path(path).exists() and not Path(path).is_file():
@@ -155,14 +135,3 @@ def _refuse_aliases(source: str, value: Any) -> None:
                 )
             seen.add(id(item))
             waiting += item.values() if isinstance(item, CommentedMap) else item
-
-
-def _plain(value: Any) -> Any:
-    """Return a value without the comments that the reader attaches to it."""
-    if isinstance(value, CommentedMap):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, CommentedSeq):
-        return [_plain(item) for item in value]
-    if isinstance(value, float):
-        return float(value)
-    return value

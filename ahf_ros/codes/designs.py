@@ -11,11 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ahf_ros.codes.dots import DotFamily, dot_family
-from ahf_ros.codes.families import FAMILY_NAMES
+from ahf_ros.codes.dots import DotFamily
+from ahf_ros.codes.families import FAMILY_NAMES, code_family
 from ahf_ros.codes.gsi import PointFamily
-from ahf_ros.codes.gsi_library import point_family
-from ahf_ros.codes.ring import Family, family, sectors
+from ahf_ros.codes.ring import Family, sectors
 from ahf_ros.codes.square import SQUARE_NAMES, marker
 
 HALF_SIDE = 2.4
@@ -46,16 +45,9 @@ Contour = tuple[Point | Arc, ...]
 class Proportions:
     """What the targets of a family have in common; lengths are in radii of the dot.
 
-    Attributes
-    ----------
-    reach : float
-        Radius of the circle that holds all ink.
-    radius : float
-        Radius of the circle whose image is reported as the ellipse of the target.
-    quiet_zone : float
-        Radius of the area around a target that is left free.
-    radii : dict of str to float
-        The lengths of the design by their names.
+    `reach` is the radius of the circle that holds all ink, `radius` that of the circle whose image
+    is reported as the ellipse of the target, and `quiet_zone` that of the area that is left free.
+    `radii` has the lengths of the design by their names.
     """
 
     reach: float
@@ -66,34 +58,14 @@ class Proportions:
 
 @dataclass(frozen=True, slots=True)
 class PrintedDesign:
-    """The print of one target.
-
-    Attributes
-    ----------
-    code : int
-        Code word.
-    contours : tuple of Contour
-        A point is inked if it is inside an odd number of them.
-    """
+    """The print of one code word: a point inside an odd number of contours is inked."""
 
     code: int
     contours: tuple[Contour, ...]
 
 
 def proportions(name: str, file: str = '') -> Proportions:
-    """Return what the targets of a family have in common.
-
-    Parameters
-    ----------
-    name : str
-        One of `ahf_ros.codes.families.FAMILY_NAMES`.
-    file : str
-        Data file that describes the family, of `gsi` and `dots`; the usual one where empty.
-
-    Raises
-    ------
-    ValueError
-        If there is no such family, or the data file is not accepted.
+    """Return what the targets of a family have in common; `file` is as for `code_family`.
 
     Examples
     --------
@@ -101,35 +73,27 @@ def proportions(name: str, file: str = '') -> Proportions:
     {'dot': 1.0, 'band_inner': 2.25, 'band_outer': 3.5}
     """
     if name in SQUARE_NAMES:
-        radii = {'half_side': HALF_SIDE}
-        return Proportions(HALF_SIDE * 2**0.5, HALF_SIDE, _QUIET_ZONE, radii)
-    if name == 'gsi':
-        points = point_family(file)
-        reach = points.reach / points.dot_radius
-        radius = float(points.template_radii[points.reference] / points.dot_radius)
-        return Proportions(reach, radius, reach + _MARGIN, {'dot': 1.0})
-    if name == 'dots':
-        dots = dot_family(file)
-        radii = {
-            'dot': 1.0,
-            'dot_circle': dots.dot_circle,
-            'small_dot': dots.dot_radius,
-            'ground': dots.ground_radius,
-            'border': dots.border_radius,
-        }
-        return Proportions(dots.border_radius, 1.0, dots.border_radius + _MARGIN, radii)
-    inner, outer = family(name).band
-    radii = {'dot': 1.0, 'band_inner': inner, 'band_outer': outer}
-    return Proportions(outer, 1.0, _QUIET_ZONE, radii)
+        reach, radii = HALF_SIDE * 2**0.5, {'half_side': HALF_SIDE}
+        return Proportions(reach=reach, radius=HALF_SIDE, quiet_zone=_QUIET_ZONE, radii=radii)
+    code, radius, radii = code_family(name, file), 1.0, {'dot': 1.0}
+    if isinstance(code, Family):
+        radii |= {'band_inner': code.band_inner, 'band_outer': code.band_outer}
+        reach, quiet_zone = code.band_outer, _QUIET_ZONE
+    elif isinstance(code, DotFamily):
+        radii |= {'dot_circle': code.dot_circle, 'small_dot': code.dot_radius}
+        radii |= {'ground': code.ground_radius, 'border': code.border_radius}
+        reach, quiet_zone = code.border_radius, code.border_radius + _MARGIN
+    else:
+        radius = float(code.template_radii[code.reference] / code.dot_radius)
+        reach = code.reach / code.dot_radius
+        quiet_zone = reach + _MARGIN
+    return Proportions(reach=reach, radius=radius, quiet_zone=quiet_zone, radii=radii)
 
 
 def relative_reach(name: str) -> float:
     """Return the radius of a target, in semi-axes of the ellipse that is reported.
 
-    Parameters
-    ----------
-    name : str
-        A family. A target of a family that is not known ends with its ellipse.
+    A target of a family that is not known ends with its ellipse.
 
     Examples
     --------
@@ -143,22 +107,11 @@ def relative_reach(name: str) -> float:
 
 
 def printed_design(name: str, number: int, pinhole: float, file: str = '') -> PrintedDesign:
-    """Return the print of a target.
+    """Return the print of the target of a family with an ID; `file` is as for `code_family`.
 
-    Parameters
-    ----------
-    name, file : str
-        As for `proportions`.
-    number : int
-        ID of the target.
-    pinhole : float
-        Radius of the hole in the centre of the dot, in radii of the dot; 0 for none. Square
-        markers and point-distributed targets have none.
-
-    Raises
-    ------
-    ValueError
-        If the family has no such ID; and as for `proportions`.
+    `pinhole` is the radius of the hole in the centre of the dot, in radii of the dot, 0 for none;
+    square markers and point-distributed targets have none. Raise a ValueError if the family has no
+    such ID, too.
 
     Examples
     --------
@@ -166,19 +119,15 @@ def printed_design(name: str, number: int, pinhole: float, file: str = '') -> Pr
     4
     """
     if name in SQUARE_NAMES:
-        return PrintedDesign(number, _square_contours(name, number))
-    if name == 'gsi':
-        points = point_family(file)
-        word = points.word(number)
-        return PrintedDesign(word, _point_contours(points, word))
+        return PrintedDesign(code=number, contours=tuple(_square_contours(name, number)))
+    code = code_family(name, file)
+    word = code.word(number)
+    if isinstance(code, PointFamily):
+        return PrintedDesign(code=word, contours=tuple(_point_contours(code, word)))
     centre = [circle(1.0)] + [circle(pinhole)] * (pinhole > 0)
-    if name == 'dots':
-        dots = dot_family(file)
-        word = dots.word(number)
-        return PrintedDesign(word, (*centre, *_dot_ring_contours(dots, word)))
-    table = family(name)
-    word = table.word(number)
-    return PrintedDesign(word, (*centre, *_band_contours(table, word)))
+    if isinstance(code, Family):
+        return PrintedDesign(code=word, contours=(*centre, *_band_contours(code, word)))
+    return PrintedDesign(code=word, contours=(*centre, *_dot_ring_contours(code, word)))
 
 
 def circle(radius: float, x: float = 0.0, y: float = 0.0) -> Contour:
@@ -195,12 +144,8 @@ def _band_contours(table: Family, word: int) -> list[Contour]:
         count = int(np.argmin(np.roll(inked, -first)))
         start, extent = first * sector, count * sector
         outer = Arc(x=0.0, y=0.0, radius=table.band_outer, start=start, extent=extent)
-        contours.append(
-            (
-                outer,
-                Arc(x=0.0, y=0.0, radius=table.band_inner, start=start + extent, extent=-extent),
-            )
-        )
+        inner = Arc(x=0.0, y=0.0, radius=table.band_inner, start=start + extent, extent=-extent)
+        contours.append((outer, inner))
     return contours
 
 
@@ -209,20 +154,20 @@ def _dot_ring_contours(table: DotFamily, word: int) -> list[Contour]:
     return [*dots, circle(table.ground_radius), circle(table.border_radius)]
 
 
-def _point_contours(table: PointFamily, word: int) -> tuple[Contour, ...]:
+def _point_contours(table: PointFamily, word: int) -> list[Contour]:
     places, radii = table.dots(word)
     dots = np.column_stack([radii, places]) / table.dot_radius
-    return tuple(circle(*dot) for dot in dots.tolist())
+    return [circle(*dot) for dot in dots.tolist()]
 
 
-def _square_contours(name: str, number: int) -> tuple[Contour, ...]:
+def _square_contours(name: str, number: int) -> list[Contour]:
     cells = marker(name, number, 1) == 0
     side = len(cells)
     scale = 2 * HALF_SIDE / side
-    return tuple(
+    return [
         tuple(((x - side / 2) * scale, (side / 2 - y) * scale) for x, y in corners)
         for corners in _outlines(cells)
-    )
+    ]
 
 
 def _outlines(cells: np.ndarray) -> list[list[tuple[int, int]]]:
@@ -231,10 +176,8 @@ def _outlines(cells: np.ndarray) -> list[list[tuple[int, int]]]:
     after: dict[tuple[int, int], list[tuple[int, int]]] = {}
     for row, column in np.argwhere(cells).tolist():
         corners = [(column, row), (column, row + 1), (column + 1, row + 1), (column + 1, row)]
-        beside = [(row + 1, column), (row + 2, column + 1), (row + 1, column + 2)]
-        beside.append((row, column + 1))
-        for index, neighbour in enumerate(beside):
-            if not padded[neighbour]:
+        for index, (down, right) in enumerate([(1, 0), (2, 1), (1, 2), (0, 1)]):
+            if not padded[row + down, column + right]:
                 after.setdefault(corners[index], []).append(corners[(index + 1) % 4])
     polygons = []
     while after:

@@ -17,29 +17,20 @@ from typing import Any
 import numpy as np
 
 from ahf_ros.codes.cyclic import CyclicFamily, mirrored_words, smallest_rotation
-from ahf_ros.codes.data_file import Entry, read_data_file
+from ahf_ros.codes.data_file import read_data_file
 
 DOTS_DESIGN = Path(__file__).with_name('dots.json')
 """The design of rings of dots that this package prints."""
-
-_BITS = (6, 20)  # of a word
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DotFamily(CyclicFamily):
     """The code words of one kind of ring of dots, and the proportions of its print.
 
-    Attributes
-    ----------
-    source : str
-        Where the design comes from.
-    dot_circle, dot_radius : float
-        Radius of the circle of the small dots, and their own, in radii of the disc.
-    ground_radius, border_radius : float
-        Inner and outer radius of the border, in radii of the disc.
+    Lengths are in radii of the disc: the radius of the circle on which the small dots stand, their
+    own radius, and the inner and outer radius of the border.
     """
 
-    source: str
     dot_circle: float
     dot_radius: float
     ground_radius: float
@@ -59,27 +50,13 @@ class DotFamily(CyclicFamily):
         places: np.ndarray = self.dot_circle * np.stack([np.cos(angles), np.sin(angles)], axis=1)
         return places
 
-    def ids(self, words: np.ndarray) -> np.ndarray:
-        """Return the IDs of words in any rotation or reflection, 0 where there is none."""
-        codes = self.canonical(words)
-        index = np.minimum(np.searchsorted(self.words, codes), self.words.size - 1)
-        ids: np.ndarray = np.where(self.words[index] == codes, index + 1, 0)
-        return ids
-
 
 @lru_cache(maxsize=8)
 def dot_family(path: str = '') -> DotFamily:
-    """Return a family of rings of dots.
+    """Return the family of rings of dots in a data file; our own where empty.
 
-    Parameters
-    ----------
-    path : str
-        Data file, JSON or YAML, as docs/dots.md describes it; our own design where empty.
-
-    Raises
-    ------
-    ValueError
-        If the file cannot be read or does not describe such a family, naming line and field.
+    The file is JSON or YAML, see docs/dots.md. A ValueError names line and field of what is not
+    accepted.
 
     Examples
     --------
@@ -87,17 +64,12 @@ def dot_family(path: str = '') -> DotFamily:
     >>> family.words.size, family.number(0b1000000001)
     (76, 2)
     """
-    return parse_design(read_data_file(path or DOTS_DESIGN))
-
-
-def parse_design(file: Entry) -> DotFamily:
-    """Return the family that the content of a data file describes; see `dot_family`."""
     lengths = ('dot_circle', 'dot_radius', 'ground_radius', 'border_radius')
-    fields = file.keys(('family', 'bits', *lengths), ('source',))
+    fields = read_data_file(path or DOTS_DESIGN).keys(('family', 'bits', *lengths), ('source',))
     circle, radius, ground, border = (
-        fields[name].number(1e-3, 'a length in radii of the disc') for name in lengths
+        fields[name].number('a length in radii of the disc', 1e-3) for name in lengths
     )
-    bits = fields['bits'].integer(*_BITS)
+    bits = fields['bits'].integer(6, 20)
     if circle - radius <= 1:
         fields['dot_circle'].refuse(f'more than {1 + radius:g}, clear of the disc')
     if circle + radius >= ground:
@@ -110,12 +82,10 @@ def parse_design(file: Entry) -> DotFamily:
     words = np.arange(1, (1 << bits) - 1)  # neither the empty ring nor the full one
     words = words[words == smallest_bracelet(words, bits)]
     words.setflags(write=False)
-    source = fields['source'].text() if 'source' in fields else ''
     return DotFamily(
         name=fields['family'].text(),
         bits=bits,
         words=words,
-        source=source,
         dot_circle=circle,
         dot_radius=radius,
         ground_radius=ground,
@@ -124,19 +94,7 @@ def parse_design(file: Entry) -> DotFamily:
 
 
 def smallest_bracelet(words: Any, bits: int) -> np.ndarray:
-    """Return the smallest of all rotations and reflections of each word.
-
-    Parameters
-    ----------
-    words : array_like of int, any shape
-        Words of `bits` bits, 0 to 2^bits - 1.
-    bits : int
-        Length of a word.
-
-    Returns
-    -------
-    ndarray of int64, shape of `words`
-    """
+    """Return the smallest of all rotations and reflections of words, ndarray of int64."""
     words = np.asarray(words, dtype=np.int64)
     smallest: np.ndarray = np.minimum(
         smallest_rotation(words, bits), smallest_rotation(mirrored_words(words, bits), bits)

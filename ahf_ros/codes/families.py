@@ -9,8 +9,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from itertools import combinations
+from typing import TYPE_CHECKING
 
-from ahf_ros.codes.names import APRILTAG_NAMES, ARUCO_NAMES, RING_NAMES, SQUARE_NAMES
+from ahf_ros.codes import APRILTAG_NAMES, ARUCO_NAMES, RING_NAMES, SQUARE_NAMES
+
+if TYPE_CHECKING:
+    from ahf_ros.codes.dots import DotFamily
+    from ahf_ros.codes.gsi import PointFamily
+    from ahf_ros.codes.ring import Family
 
 KINDS: dict[str, tuple[str, ...]] = {
     'ring': RING_NAMES,
@@ -41,23 +47,11 @@ _ALIKE = 0.65  # share of letters of a name that is suggested; tag36h11 and apri
 
 
 def families_in(text: str) -> tuple[str, ...]:
-    """Return the families that a text names.
+    """Return the different families that a text names, in its order.
 
-    Parameters
-    ----------
-    text : str
-        A family, several ring families separated by commas, or 'auto' for all of them.
-
-    Returns
-    -------
-    tuple of str
-        Names of different families, in the order of the text.
-
-    Raises
-    ------
-    ValueError
-        If there is no family; if one is unknown or named twice; if two are of different kinds or
-        have the same print; or if families of their kind are not read together.
+    It names a family, several ring families separated by commas, or 'auto' for all of them. Raise
+    a ValueError if there is no family; if one is unknown or named twice; if two are of different
+    kinds or have the same print; or if families of their kind are not read together.
 
     Examples
     --------
@@ -73,102 +67,69 @@ def families_in(text: str) -> tuple[str, ...]:
     for name in names:
         if name not in FAMILY_NAMES:
             where = f'{shown}, which names {name!r}' if len(names) > 1 else shown
-            raise ValueError(f'{where}, accepted is {_suggested(name) or ACCEPTED}')
+            alike = get_close_matches(name.lower(), FAMILY_NAMES, 1, _ALIKE)
+            accepted = f'{alike[0]}, which is most like it, or another family' if alike else ''
+            raise ValueError(f'{where}, accepted is {accepted or ACCEPTED}')
     if len(names) > 1:
         _check_list(names, shown)
     return names
 
 
-def numbers_of(name: str, file: str = '') -> Sequence[int]:
-    """Return the IDs of a family, ascending.
+def code_family(name: str, file: str = '') -> Family | DotFamily | PointFamily:
+    """Return the codes and the proportions of a family that is not of square markers.
 
-    Parameters
-    ----------
-    name : str
-        One of `FAMILY_NAMES`.
-    file : str
-        Data file that describes the family, for `gsi` and `dots`; the usual one where empty.
-
-    Raises
-    ------
-    ValueError
-        If there is no such family, or the data file is not accepted.
+    `file` is the data file that describes the family, of `gsi` and `dots`; the usual one where
+    empty. Raise a ValueError if there is no such family, or the data file is not accepted.
     """
-    from ahf_ros.codes import dots, gsi_library, ring, square
+    from ahf_ros.codes import dots, gsi, ring
 
     if name == 'gsi':
-        return sorted(gsi_library.point_family(file).numbers.tolist())
-    if name == 'dots':
-        return range(1, dots.dot_family(file).words.size + 1)
+        return gsi.point_family(file)
+    return dots.dot_family(file) if name == 'dots' else ring.family(name)
+
+
+def numbers_of(name: str, file: str = '') -> Sequence[int]:
+    """Return the IDs of a family, ascending; `file` is as for `code_family`."""
+    from ahf_ros.codes import square
+
     if name in SQUARE_NAMES:
-        return range(square.dictionary(name).bytesList.shape[0])
-    return range(1, ring.family(name).words.size + 1)
+        return range(len(square.dictionary(name).bytesList))
+    return sorted(code_family(name, file).numbers.tolist())
 
 
 def check_numbers(field: str, numbers: Iterable[int], families: Sequence[str], file: str) -> None:
     """Refuse numbers that are no ID of any of some families.
 
-    Parameters
-    ----------
-    field : str
-        What errors call the numbers.
-    numbers : iterable of int
-    families : sequence of str
-        Some of `FAMILY_NAMES`.
-    file : str
-        As for `numbers_of`.
-
-    Raises
-    ------
-    ValueError
-        If there are such numbers; the message names them.
+    The ValueError calls them `field` and names them; `file` is as for `code_family`.
     """
-    missing = sorted(set(numbers))
-    for name in families:
-        known = frozenset(numbers_of(name, file))
-        missing = [number for number in missing if number not in known]
+    known = {name: numbers_of(name, file) for name in families}
+    missing = sorted(set(numbers).difference(*known.values()))
     if not missing:
         return
     shown = ', '.join(map(str, missing[:_SHOWN]))
     if len(missing) > _SHOWN:
         shown += f' and {len(missing) - _SHOWN} more'
-    ranges = [(name, numbers_of(name, file)) for name in families]
-    accepted = ', '.join(f'{name} from {all_[0]} to {all_[-1]}' for name, all_ in ranges)
+    accepted = ', '.join(f'{name} from {ids[0]} to {ids[-1]}' for name, ids in known.items())
     raise ValueError(f'{field} has {shown}, accepted are IDs of {accepted}')
 
 
 def mirrored_number(name: str, code: int) -> int | None:
-    """Return the ID that a code has in a mirror.
+    """Return the ID that a code word of a family has in a mirror.
 
-    Parameters
-    ----------
-    name : str
-        Name of a family.
-    code : int
-        One of its code words.
-
-    Returns
-    -------
-    int or None
-        The same ID for a symmetric target; None for families that cannot be read in a mirror.
+    It is the same ID for a symmetric target, and None for families that cannot be read in a
+    mirror.
 
     Examples
     --------
     >>> mirrored_number('metashape12', 71)
     12
     """
-    from ahf_ros.codes import ring
+    from ahf_ros.codes import cyclic, ring
 
     if name not in RING_NAMES:
         return None
     family = ring.family(name)
-    return family.number(ring.mirrored(code, family.bits))
-
-
-def _suggested(name: str) -> str:
-    """Return what is accepted in the place of a name that is like the name of a family."""
-    names = get_close_matches(name.lower(), FAMILY_NAMES, 1, _ALIKE)
-    return f'{names[0]}, which is most like it, or another family' if names else ''
+    return family.number(cyclic.mirrored_words(code, family.bits))
 
 
 def _check_list(names: Sequence[str], shown: str) -> None:
@@ -201,11 +162,7 @@ def _same_print(first: str, second: str) -> bool:
 
     if first in RING_NAMES:
         one, other = ring.family(first), ring.family(second)
-        same = (one.bits, one.band_inner, one.band_outer) == (
-            other.bits,
-            other.band_inner,
-            other.band_outer,
-        )
+        same = (one.bits, one.band) == (other.bits, other.band)
         return same and not set(one.words.tolist()).isdisjoint(other.words.tolist())
     # The dictionaries of ArUco with one number of cells begin with the same markers.
     return first in ARUCO_NAMES and first.rpartition('_')[0] == second.rpartition('_')[0]

@@ -1,14 +1,18 @@
-"""The design and the codes of printed targets, learnt from measured coordinates of their dots."""
+"""The design and the codes of printed targets, learnt from measured coordinates of their dots.
+
+What was learnt is written as the data file that `ahf_ros.codes.gsi.point_family` reads.
+"""
 
 from __future__ import annotations
 
+import json
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
-from ahf_ros.codes.gsi import PointFamily, value_of
+from ahf_ros.codes.gsi import PointFamily, positions_of, value_of
 
 _REFERENCE_LABEL = re.compile(r'CODE(\d+)')
 _DOT_LABEL = re.compile(r'NUGGET(\d+)_(\w+)')
@@ -18,18 +22,11 @@ _DECIMALS = 3  # of learnt coordinates: exports have as many
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasuredTarget:
-    """A target as it was measured, in the plane of its design.
+    """A target as it was measured, laid onto its design.
 
-    Attributes
-    ----------
-    number : int
-        Its ID.
-    scale : float
-        Length in the design of one unit of the coordinates.
-    template : ndarray of float64, shape (n, 2)
-        Template dots, laid onto the design and in its unit.
-    dots : dict of int to ndarray
-        Decoding dots by the numbers of their positions, likewise.
+    `scale` is the length in the design of one unit of the coordinates. `template` has the template
+    dots, float64, shape (n, 2), and `dots` the decoding dots by the numbers of their positions,
+    both in the unit of the design.
     """
 
     number: int
@@ -42,15 +39,9 @@ class MeasuredTarget:
 class Learnt:
     """What a point list says about a family.
 
-    Attributes
-    ----------
-    family : PointFamily
-        The design in the unit of the coordinates; its codes are the base's alone.
-    codes : dict of int to int
-        Values by ID, of all the targets that are complete.
-    targets : tuple of MeasuredTarget
-    left_out : dict of int to str
-        Why other targets were not used.
+    `family` has the design in the unit of the coordinates, and the codes of the base alone;
+    `codes` the values by ID of the targets that are complete; `left_out` says by ID why others
+    were not used.
     """
 
     family: PointFamily
@@ -78,10 +69,6 @@ def learn_family(points: Mapping[str, np.ndarray], base: PointFamily, name: str)
     name : str
         Name of the new family.
 
-    Returns
-    -------
-    Learnt
-
     Raises
     ------
     ValueError
@@ -89,9 +76,10 @@ def learn_family(points: Mapping[str, np.ndarray], base: PointFamily, name: str)
     """
     grouped = _grouped(points, base)
     if not grouped:
+        corners = [of for of in base.template_names if of != _reference_name(base)]
         raise ValueError(
             'the point list has no rows of coded targets, accepted are rows CODEn and NUGGETn_'
-            f'{", NUGGETn_".join(_corner_names(base))} and NUGGETn_<position>'
+            f'{", NUGGETn_".join(corners)} and NUGGETn_<position>'
         )
     targets, left_out = [], {}
     for number, dots in sorted(grouped.items()):
@@ -102,23 +90,80 @@ def learn_family(points: Mapping[str, np.ndarray], base: PointFamily, name: str)
     if not targets:
         number, reason = next(iter(left_out.items()))
         raise ValueError(f'the point list has no complete target; target {number} {reason}')
-    codes: dict[int, int] = {}
+    known: dict[int, int] = {}
     for target in targets:
-        value = value_of(target.dots)
-        for other, known in codes.items():
-            if known == value:
-                raise ValueError(
-                    f'targets {other} and {target.number} have the same dots '
-                    f'{sorted(target.dots)}, accepted is one number a code'
-                )
-        codes[target.number] = value
-    return Learnt(_averaged(targets, base, name), codes, tuple(targets), left_out)
+        other = known.setdefault(value_of(target.dots), target.number)
+        if other != target.number:
+            raise ValueError(
+                f'targets {other} and {target.number} have the same dots '
+                f'{sorted(target.dots)}, accepted is one number a code'
+            )
+    return Learnt(
+        family=_averaged(targets, base, name),
+        codes={number: value for value, number in known.items()},
+        targets=tuple(targets),
+        left_out=left_out,
+    )
 
 
-def _corner_names(base: PointFamily) -> list[str]:
-    """Return the names of the template dots except the reference."""
-    reference = base.template_names[base.reference]
-    return [name for name in base.template_names if name != reference]
+def with_codes(family: PointFamily, codes: dict[int, int]) -> PointFamily:
+    """Return a family that lists more codes, values by ID.
+
+    They take the place of listed codes that have the same ID or value.
+    """
+    codes = {number: word for number, word in codes.items() if family.number(word) != number}
+    listed = {
+        word: number
+        for number, word in family.listed.items()
+        if number not in codes and word not in codes.values()
+    }
+    listed |= {word: number for number, word in codes.items()}
+    words = np.array(sorted(listed), np.int64)
+    numbers = np.array([listed[word] for word in words.tolist()], np.int64)
+    first = family.rule.first_own_number
+    if first is not None and numbers.max(initial=0) >= first:
+        first = 10 ** len(str(numbers.max())) + 1
+    rule = replace(family.rule, first_own_number=first)
+    return replace(family, words=words, numbers=numbers, rule=rule)
+
+
+def library_text(family: PointFamily) -> str:
+    """Return the data file that describes a family, one dot or code a line."""
+
+    def block(name: str, table: Mapping[str, Sequence[float]]) -> str:
+        rows = [f'    {json.dumps(key)}: {json.dumps(value)}' for key, value in table.items()]
+        return f'  "{name}": {{\n' + ',\n'.join(rows) + '\n  }'
+
+    def dots(
+        names: Iterable[str], points: np.ndarray, radii: np.ndarray
+    ) -> dict[str, list[float]]:
+        return {
+            name: point if radius == family.dot_radius else [*point, radius]
+            for name, point, radius in zip(names, points.tolist(), radii.tolist(), strict=True)
+        }
+
+    head = {
+        'family': family.name,
+        'source': family.source,
+        'unit': family.unit,
+        'dot_radius': family.dot_radius,
+        'reference': _reference_name(family),
+    }
+    rule = asdict(family.rule) | {'groups': [sorted(group) for group in family.rule.groups]}
+    numbers = map(str, family.position_numbers.tolist())
+    listed = {str(number): positions_of(word) for number, word in sorted(family.listed.items())}
+    parts = [f'  {json.dumps(key)}: {json.dumps(value)}' for key, value in head.items() if value]
+    parts += [
+        block('template', dots(family.template_names, family.template, family.template_radii)),
+        block('positions', dots(numbers, family.positions, family.position_radii)),
+        f'  "rule": {json.dumps({key: value for key, value in rule.items() if value})}',
+        block('codes', listed),
+    ]
+    return '{\n' + ',\n'.join(parts) + '\n}\n'
+
+
+def _reference_name(family: PointFamily) -> str:
+    return family.template_names[family.reference]
 
 
 def _grouped(
@@ -128,7 +173,7 @@ def _grouped(
     grouped: dict[int, dict[str, np.ndarray]] = {}
     for label, point in points.items():
         if found := _REFERENCE_LABEL.fullmatch(label):
-            name = base.template_names[base.reference]
+            name = _reference_name(base)
         elif found := _DOT_LABEL.fullmatch(label):
             name = found[2]
         else:
@@ -149,45 +194,43 @@ def _measured(number: int, dots: dict[str, np.ndarray], base: PointFamily) -> Me
         raise ValueError(f'has the decoding dots {told}, accepted are {base.rule.dots} positions')
     every = np.array([dots[name] for name in (*base.template_names, *decoding)])
     every -= every.mean(axis=0)
-    flat = every @ np.linalg.svd(every)[2][:2].T
+    flat = every @ np.linalg.svd(every)[2][:2].T @ [1, 1j]
     numbers = [int(name) for name in decoding]
-    design = np.concatenate([base.template, _base_positions(numbers, base)])
-    of_template = np.arange(len(design)) < len(base.template)
-    sides = [flat, flat * [1, -1]]
-    fits = [_laid(side, design, of_template) for side in sides]
-    errors = [np.hypot(*(fit[0] - design)[of_template].T).max() for fit in fits]
-    side = int(np.argmin(errors))
-    spread = np.hypot(*(base.template - base.template.mean(axis=0)).T).max()
-    if errors[side] > _MAXIMUM_DISTANCE * spread:
-        raise ValueError(
-            f'differs from the template by up to {errors[side]:.2f} {base.unit}'.rstrip()
-        )
-    laid, _ = fits[side]
-    # A position that is new is farther away.
-    near = np.hypot(*(laid - design).T) < _MAXIMUM_DISTANCE * spread
-    laid, scale = _laid(sides[side], design, near)
+    known = dict(zip(base.position_numbers.tolist(), base.positions.tolist(), strict=True))
+    places = [*base.template.tolist(), *(known.get(it, (np.nan, np.nan)) for it in numbers)]
+    design = np.array(places) @ [1, 1j]
     count = len(base.template)
+    of_template = np.arange(len(design)) < count
+    spread = np.abs(design[:count] - design[:count].mean()).max()
+
+    def distances(side: np.ndarray) -> np.ndarray:
+        return np.abs(_laid(side, design, of_template)[0] - design)
+
+    side = min(flat, flat.conj(), key=lambda side: distances(side)[:count].max())
+    apart = distances(side)
+    error = apart[:count].max()
+    if error > _MAXIMUM_DISTANCE * spread:
+        raise ValueError(f'differs from the template by up to {error:.2f} {base.unit}'.rstrip())
+    # A position that is new is farther away.
+    laid, scale = _laid(side, design, apart < _MAXIMUM_DISTANCE * spread)
+    points = np.stack([laid.real, laid.imag], axis=1)
     return MeasuredTarget(
-        number, scale, laid[:count], dict(zip(numbers, laid[count:], strict=True))
+        number=number,
+        scale=scale,
+        template=points[:count],
+        dots=dict(zip(numbers, points[count:], strict=True)),
     )
-
-
-def _base_positions(numbers: list[int], base: PointFamily) -> np.ndarray:
-    """Return the places that a design has for positions, NaN for those that it does not have."""
-    known = dict(zip(base.position_numbers.tolist(), base.positions, strict=True))
-    return np.array([known.get(number, (np.nan, np.nan)) for number in numbers]).reshape(-1, 2)
 
 
 def _laid(points: np.ndarray, design: np.ndarray, which: np.ndarray) -> tuple[np.ndarray, float]:
-    """Return points turned, scaled and moved so that some of them lie on a design; the scale."""
-    middle, wanted = points[which].mean(axis=0), design[which].mean(axis=0)
-    centred, aim = points[which] - middle, design[which] - wanted
-    across = (centred * aim).sum()
-    around = (centred[:, 0] * aim[:, 1] - centred[:, 1] * aim[:, 0]).sum()
-    turn = np.array([[across, -around], [around, across]]) / (centred**2).sum()
-    return (points - middle) @ turn.T + wanted, float(
-        np.hypot(across, around) / (centred**2).sum()
-    )
+    """Return points turned, scaled and moved so that some of them lie on a design; the scale.
+
+    Points and design are complex: x + i y.
+    """
+    middle, wanted = points[which].mean(), design[which].mean()
+    centred = points[which] - middle
+    turn = np.vdot(centred, design[which] - wanted) / np.vdot(centred, centred).real
+    return (points - middle) * turn + wanted, float(abs(turn))
 
 
 def _averaged(targets: list[MeasuredTarget], base: PointFamily, name: str) -> PointFamily:
@@ -203,8 +246,7 @@ def _averaged(targets: list[MeasuredTarget], base: PointFamily, name: str) -> Po
     places |= {number: np.mean(points, axis=0) for number, points in seen.items()}
     numbers = sorted(places)
     radius = round(base.dot_radius / scale, _DECIMALS)
-    rule = replace(base.rule, minimum_distance=base.rule.minimum_distance / scale)
-    rule = replace(rule, minimum_distance=round(rule.minimum_distance, _DECIMALS))
+    distance = round(base.rule.minimum_distance / scale, _DECIMALS)
     return replace(
         base,
         name=name,
@@ -215,5 +257,5 @@ def _averaged(targets: list[MeasuredTarget], base: PointFamily, name: str) -> Po
         position_numbers=np.array(numbers),
         positions=np.array([places[number] for number in numbers]).round(_DECIMALS),
         position_radii=np.array([radii.get(it, radius) for it in numbers]).round(_DECIMALS),
-        rule=rule,
+        rule=replace(base.rule, minimum_distance=distance),
     )

@@ -12,9 +12,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from ahf_ros.codes.cyclic import CyclicFamily, mirrored_words, rotated_words
-from ahf_ros.codes.dots import dot_family
-from ahf_ros.codes.gsi_library import point_family
-from ahf_ros.codes.ring import FAMILY_NAMES, family
+from ahf_ros.codes.dots import DotFamily
+from ahf_ros.codes.families import code_family
+from ahf_ros.codes.gsi import PointFamily
 from ahf_ros.codes.square import SQUARE_NAMES, dictionary
 
 _STARTS = 4
@@ -25,32 +25,17 @@ _TABU = 10  # steps for which what was exchanged stays out
 MAXIMUM_WORDS = 2048
 """Number of words among which a set is looked for; of more, as many are drawn at random."""
 
-_BYTE = np.array([bin(byte).count('1') for byte in range(256)], np.uint8)
-
 
 def independent_set(
     conflicts: np.ndarray, count: int, generator: np.random.Generator, thorough: bool = True
 ) -> np.ndarray:
-    """Return a set without two elements in conflict, of `count` elements where one is found.
+    """Return the indices of a set without two elements in conflict, ascending.
 
-    The search starts with elements of few conflicts and then exchanges one element for another
-    one, until there is room for more (Andrade, Resende & Werneck, J. Heuristics 2012, 18, 525).
-
-    Parameters
-    ----------
-    conflicts : ndarray of bool, shape (n, n)
-        Symmetric, false on the diagonal.
-    count : int
-        Number of elements that are enough.
-    generator : numpy.random.Generator
-        Decides where elements are equally good.
-    thorough : bool
-        Whether a set far from `count` is worth the exchanges, too.
-
-    Returns
-    -------
-    ndarray of int, shape (m,)
-        Indices, ascending; m is at most `count`, and less where no larger set was found.
+    It has `count` elements, or fewer where no larger set was found. The search starts with
+    elements of few conflicts and then exchanges one element for another one, until there is room
+    for more (Andrade, Resende & Werneck, J. Heuristics 2012, 18, 525). `conflicts` is symmetric,
+    ndarray of bool, shape (n, n), false on the diagonal. The generator decides where elements are
+    equally good. Unless `thorough`, a set far from `count` is not worth the exchanges.
 
     Examples
     --------
@@ -90,7 +75,6 @@ def _exchanged(
     conflicts: np.ndarray, members: np.ndarray, count: int, generator: np.random.Generator
 ) -> np.ndarray:
     """Return members after exchanges of one for one, each with what then fits in."""
-    members = members.copy()
     best = members.copy()
     against = conflicts[members].sum(axis=0).astype(np.int64)
     barred = np.zeros(len(members), int)
@@ -117,31 +101,12 @@ def _exchanged(
 
 
 def select_ids(name: str, ids: Sequence[int], count: int, file: str = '') -> list[int]:
-    """Return IDs of targets that are hard to confuse.
+    """Return `count` of different IDs of a family whose targets are hard to confuse, ascending.
 
     No two of their words turn into each other by a cover in one colour, and the smallest Hamming
-    distance between any two, over all rotations, is as large as a search finds it.
-
-    Parameters
-    ----------
-    name : str
-        One of `ahf_ros.codes.families.FAMILY_NAMES`.
-    ids : sequence of int
-        Different IDs of the family to select from.
-    count : int
-        Number of IDs to select, at least 1.
-    file : str
-        Data file that describes the family, of `gsi` and `dots`; the usual one where empty.
-
-    Returns
-    -------
-    list of int
-        `count` IDs, ascending; the same ones in every run.
-
-    Raises
-    ------
-    ValueError
-        If no set of so many is found.
+    distance between any two, over all rotations, is as large as a search finds it. They are the
+    same ones in every run. `file` is the data file that describes the family, of `gsi` and `dots`;
+    the usual one where empty. Raise a ValueError if no set of so many is found.
 
     Examples
     --------
@@ -170,28 +135,21 @@ def select_ids(name: str, ids: Sequence[int], count: int, file: str = '') -> lis
     )
 
 
-def _cyclic(name: str, file: str) -> CyclicFamily | None:
-    if name in FAMILY_NAMES:
-        return family(name)
-    return dot_family(file) if name == 'dots' else None
-
-
 def _orbits(name: str, ids: np.ndarray, file: str) -> np.ndarray:
     """Return all words that are the code of each ID, ndarray of uint64, shape (n, k)."""
-    code = _cyclic(name, file)
-    if code is not None:
-        words = code.words[ids - 1]
-        turned = [rotated_words(words, turn, code.bits) for turn in range(code.bits)]
-        if name == 'dots':
-            turned += [mirrored_words(words, code.bits) for words in turned]
-        return np.stack(turned, axis=1).astype(np.uint64)
     if name in SQUARE_NAMES:
         rotations = dictionary(name).bytesList[ids].transpose(0, 2, 1).astype(np.uint64)
         places = np.uint64(8) * np.arange(rotations.shape[2], dtype=np.uint64)
         orbits: np.ndarray = (rotations << places).sum(axis=2, dtype=np.uint64)
         return orbits
-    points = point_family(file)
-    return np.array([[points.word(number)] for number in ids.tolist()], np.uint64)
+    code = code_family(name, file)
+    words = np.array([code.word(number) for number in ids.tolist()])
+    if isinstance(code, PointFamily):
+        return words[:, None].astype(np.uint64)
+    turned = [rotated_words(words, turn, code.bits) for turn in range(code.bits)]
+    if isinstance(code, DotFamily):
+        turned += [mirrored_words(words, code.bits) for words in turned]
+    return np.stack(turned, axis=1).astype(np.uint64)
 
 
 def _distances(orbits: np.ndarray) -> np.ndarray:
@@ -201,21 +159,23 @@ def _distances(orbits: np.ndarray) -> np.ndarray:
     for words in orbits.T:
         for row, word in enumerate(first):
             different = (words ^ word).view(np.uint8).reshape(-1, 8)
-            counted = _BYTE[different].sum(axis=1, dtype=np.uint8)
+            counted = np.unpackbits(different, axis=1).sum(axis=1, dtype=np.uint8)
             np.minimum(distances[row], counted, out=distances[row])
     return distances
 
 
 def _confused(name: str, ids: np.ndarray, file: str) -> np.ndarray:
-    """Return which pairs a cover turns into each other, ndarray of bool, shape (n, n)."""
+    """Return which pairs of ascending IDs a cover turns into each other, bool, shape (n, n).
+
+    An ID and itself may be such a pair.
+    """
     confused = np.zeros((ids.size, ids.size), bool)
-    code = _cyclic(name, file)
-    if code is None:
+    code = None if name in SQUARE_NAMES else code_family(name, file)
+    if not isinstance(code, CyclicFamily):
         return confused
     words = code.words[ids - 1]
     every = code.canonical(np.arange(1 << code.bits))
-    order = np.argsort(words)
-    place = order[np.minimum(np.searchsorted(words, every, sorter=order), ids.size - 1)]
+    place = np.minimum(np.searchsorted(words, every), ids.size - 1)
     index = np.where(words[place] == every, place, -1)
     rows = np.arange(ids.size)
     for length in range(1, code.bits):
@@ -224,6 +184,5 @@ def _confused(name: str, ids: np.ndarray, file: str) -> np.ndarray:
             for covered in (words & ~arc, words | arc):
                 others = index[covered]
                 confused[rows[others >= 0], others[others >= 0]] = True
-    np.fill_diagonal(confused, False)
     both: np.ndarray = confused | confused.T
     return both

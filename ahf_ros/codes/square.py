@@ -6,25 +6,13 @@ from typing import Any
 
 import cv2
 
-from ahf_ros.codes.names import SQUARE_NAMES
+from ahf_ros.codes import SQUARE_NAMES
 
 
 def dictionary(name: str) -> Any:
-    """Return a dictionary of OpenCV.
+    """Return a cv2.aruco.Dictionary by its name, one of `SQUARE_NAMES`.
 
-    Parameters
-    ----------
-    name : str
-        One of `SQUARE_NAMES`.
-
-    Returns
-    -------
-    cv2.aruco.Dictionary
-
-    Raises
-    ------
-    ValueError
-        If there is no such dictionary, or this OpenCV has none at all.
+    Raise a ValueError if there is no such dictionary, or this OpenCV has none at all.
     """
     if name not in SQUARE_NAMES:
         raise ValueError(f'family is {name!r}, accepted is one of {", ".join(SQUARE_NAMES)}')
@@ -34,35 +22,17 @@ def dictionary(name: str) -> Any:
             f'square markers; this is OpenCV {cv2.__version__}'
         )
     kind, _, wanted = name.partition('_')
-    member = {'aruco': 'DICT_', 'apriltag': 'DICT_APRILTAG_'}[kind] + wanted
+    member = f'DICT_APRILTAG_{wanted}' if kind == 'apriltag' else f'DICT_{wanted.upper()}'
     if name == 'aruco_original':
         member = 'DICT_ARUCO_ORIGINAL'
-    if kind == 'aruco':
-        member = member.upper()
     return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, member))
 
 
 def marker(name: str, number: int, cell: int) -> Any:
-    """Return the print of a marker, with its black border and without a margin.
+    """Return the print of a marker, ndarray of uint8, shape (side, side), 0 where there is ink.
 
-    Parameters
-    ----------
-    name : str
-        One of `SQUARE_NAMES`.
-    number : int
-        ID of the marker.
-    cell : int
-        Side of a cell, px.
-
-    Returns
-    -------
-    ndarray of uint8, shape (side, side)
-        0 where there is ink.
-
-    Raises
-    ------
-    ValueError
-        If there is no such marker.
+    It has its black border and no margin; a cell has `cell` px. Raise a ValueError if there is no
+    such ID in the dictionary `name`.
     """
     table = dictionary(name)
     count = table.bytesList.shape[0]

@@ -10,28 +10,19 @@ from __future__ import annotations
 
 import numpy as np
 
-_PRINTED = 0.25
-"""Ratio of the gray values of ink and paper to which black is lifted."""
+_PRINTED = 0.25  # ratio of the gray values of ink and paper to which black is lifted
 
 
 def black_lift(contrast: np.ndarray, bright: np.ndarray) -> np.ndarray:
-    """Return the gray values that black is lifted to.
+    """Return the gray values that black is lifted to, float64, of the shape of both arrays.
 
-    Parameters
-    ----------
-    contrast : ndarray of float64, shape (...)
-        Ratio of the gray values of ink and paper. From 0.2 on, black stays as it is.
-    bright : ndarray of float64, shape (...)
-        Gray value of paper.
-
-    Returns
-    -------
-    ndarray of float64, shape (...)
+    `contrast` is the ratio of the gray values of ink and paper, from 0.2 of which on black stays
+    as it is, and `bright` the gray value of paper.
 
     Examples
     --------
     >>> black_lift(np.array([0.0, 0.3]), np.array([200.0, 200.0])).round()
-    array([54.,  0.])
+    array([53.,  0.])
     """
     wanted = _PRINTED * (1 - contrast)
     missing = np.maximum(wanted - contrast, 0) * bright
@@ -40,14 +31,9 @@ def black_lift(contrast: np.ndarray, bright: np.ndarray) -> np.ndarray:
 
 
 def lifted(values: np.ndarray, lift: np.ndarray) -> np.ndarray:
-    """Return gray values in a range that begins at `lift` instead of at 0.
+    """Return gray values, 0 to 255, in a range that begins at `lift` instead of at 0.
 
-    Parameters
-    ----------
-    values : ndarray of float, shape (...)
-        Gray values from 0 to 255.
-    lift : ndarray of float
-        See `black_lift`; broadcast to the shape of `values`.
+    `lift` is broadcast to the shape of `values`, see `black_lift`.
     """
     moved: np.ndarray = lift + (1 - lift / 255) * values
     return moved

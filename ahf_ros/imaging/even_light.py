@@ -34,15 +34,7 @@ _MAXIMUM_PERCENTILE = 99.9  # percentile that stays within the range
 def even_light(images: Iterable[np.ndarray]) -> np.ndarray:
     """Return the largest values of images, without the seams of their light.
 
-    Parameters
-    ----------
-    images : iterable of ndarray of float32, shape (height, width)
-        Gray values from 0 to 1.
-
-    Returns
-    -------
-    ndarray of float32, shape (height, width)
-        Gray values of the same scale.
+    All are float32, shape (height, width), with gray values from 0 to 1.
 
     Examples
     --------
@@ -72,10 +64,9 @@ def even_light(images: Iterable[np.ndarray]) -> np.ndarray:
 
 def _ranked(images: Iterable[np.ndarray]) -> tuple[np.ndarray, list[np.ndarray]]:
     """Return the largest values, and the brightest ones of the blurred images, in order."""
-    largest: np.ndarray | None = None
     ranked: list[np.ndarray] = []
     for image in images:
-        if largest is None:
+        if not ranked:
             largest = np.zeros(image.shape, np.float32)
             ranked = [np.full(image.shape, _FLOOR, np.float32) for _ in range(_RANKS)]
             lower = np.empty(image.shape, np.float32)
@@ -86,7 +77,6 @@ def _ranked(images: Iterable[np.ndarray]) -> tuple[np.ndarray, list[np.ndarray]]
             cv2.min(brighter, rest, lower)
             cv2.max(brighter, rest, brighter)
             rest, lower = lower, rest
-    assert largest is not None
     return largest, ranked
 
 

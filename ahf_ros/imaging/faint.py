@@ -39,15 +39,7 @@ _MEDIAN = 0.6745 * 6  # of sizes of second differences both ways, in deviations 
 
 @dataclass(frozen=True, slots=True)
 class FaintPart:
-    """A part of an image, stretched.
-
-    Attributes
-    ----------
-    x, y : int
-        Its first pixel in the image.
-    gray : ndarray of float32, shape (height, width)
-        Gray values from 0 to 255.
-    """
+    """A stretched part of an image: its first pixel, and gray values from 0 to 255, float32."""
 
     x: int
     y: int
@@ -57,12 +49,9 @@ class FaintPart:
 def faint_parts(gray: np.ndarray) -> Iterator[FaintPart]:
     """Yield the parts of an image with clear edges of faint contrast.
 
-    Parameters
-    ----------
-    gray : ndarray of uint8 or float32, shape (height, width)
-        Gray values from 0 to 255.
+    The image has gray values from 0 to 255, uint8 or float32, shape (height, width).
     """
-    low, high, faint = measure_tiles(gray)
+    low, high, faint = _measured_tiles(gray)
     faint = _in_groups(faint)
     if not faint.any():
         return
@@ -76,22 +65,14 @@ def faint_parts(gray: np.ndarray) -> Iterator[FaintPart]:
         part = gray[TILE * top : TILE * (top + height), TILE * left : TILE * (left + width)]
         within = labels[rows, columns] == label
         stretched = _stretched(part, low[rows, columns], high[rows, columns], within)
-        yield FaintPart(TILE * int(left), TILE * int(top), stretched)
+        yield FaintPart(x=TILE * int(left), y=TILE * int(top), gray=stretched)
 
 
-def measure_tiles(gray: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the extremes around each tile of an image, and whether their contrast is faint.
+def _measured_tiles(gray: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the extremes of each tile and its neighbours, and whether their contrast is faint.
 
-    Parameters
-    ----------
-    gray : ndarray of uint8 or float32, shape (height, width)
-
-    Returns
-    -------
-    low, high : ndarray of float32, shape (rows, columns)
-        Gray values, of the tile and its neighbours.
-    faint : ndarray of bool, shape (rows, columns)
-        Whether the range is small, but the tile has edges of such a height, clear of noise.
+    All have the shape (rows, columns). Contrast is faint where the range is small, but the tile
+    has edges of such a height, clear of noise.
     """
     half = _half(gray)
     low, high = _extremes(half)

@@ -10,38 +10,24 @@ import numpy as np
 MINIMUM_SIDE = 16
 """Minimum width and height of an image, px; a smaller one cannot show a readable target."""
 
-MAXIMUM_SIDE = 32767
-"""Maximum width and height of an image, px; OpenCV resamples no larger one."""
-
-MAXIMUM_PIXELS = 2**28
-"""Maximum number of pixels of an image; a filter takes some 30 bytes for each."""
-
-HOT_SHARE = 100_000
-"""One pixel in so many may be hot, that is, brighter than any light in the image."""
-
 SATURATED = 253.0
 """Gray value from which a reading is white, whatever the light."""
 
 IMAGE_TYPES = (np.uint8, np.uint16, np.float32, np.float64)
 """Accepted pixel types, in the byte order of the machine."""
 
+_MAXIMUM_SIDE = 32767  # px; OpenCV resamples no larger image
+_MAXIMUM_PIXELS = 2**28  # a filter takes some 30 bytes for each
+_HOT_SHARE = 100_000  # one pixel in so many may be brighter than any light in the image
+_MUCH_WHITE = 0.3  # share of an image
+
 
 def check_image(image: Any, name: str = 'image') -> None:
-    """Raise a ValueError unless `image` is a gray image with contrast.
+    """Raise a ValueError unless `image` is a gray image with contrast, ndarray (height, width).
 
-    Parameters
-    ----------
-    image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
-        Radiance or gray values, linear or not; any strides; floats on any scale.
-    name : str
-        What errors call it.
-
-    Raises
-    ------
-    ValueError
-        If `image` is not a two-dimensional array of an accepted type, is smaller than
-        `MINIMUM_SIDE`, larger than `check_size` accepts or constant, or has a NaN, infinite or
-        negative pixel. The message names the image, what it is and what is accepted.
+    It has radiance or gray values, linear or not, of one of `IMAGE_TYPES` with any strides, floats
+    on any scale, finite and at least 0; it is no smaller than `MINIMUM_SIDE` and no larger than
+    `check_size` accepts. The message begins with `name`.
     """
     if not isinstance(image, np.ndarray):
         raise ValueError(f'{name} is a {type(image).__name__}, accepted is a numpy array')
@@ -57,27 +43,6 @@ def check_image(image: Any, name: str = 'image') -> None:
             f'accepted is at least {MINIMUM_SIDE} x {MINIMUM_SIDE} px'
         )
     check_size(width, height, name)
-    _check_values(image, name)
-
-
-def check_size(width: int, height: int, name: str = 'image') -> None:
-    """Raise a ValueError if an image is too large, be it decoded or not yet.
-
-    Parameters
-    ----------
-    width, height : int
-        Size of the image, px.
-    name : str
-        What errors call it.
-    """
-    if max(width, height) > MAXIMUM_SIDE or width * height > MAXIMUM_PIXELS:
-        raise ValueError(
-            f'{name} is {width} x {height} px, accepted are sides of at most {MAXIMUM_SIDE} px '
-            f'and at most {MAXIMUM_PIXELS} px in all'
-        )
-
-
-def _check_values(image: np.ndarray, name: str) -> None:
     minimum, maximum = image.min(), image.max()  # both NaN if one pixel is
     if not (np.isfinite(minimum) and np.isfinite(maximum)):
         raise ValueError(f'{name} has NaN or infinite pixels, accepted are finite values')
@@ -89,24 +54,26 @@ def _check_values(image: np.ndarray, name: str) -> None:
         )
 
 
+def check_size(width: int, height: int, name: str) -> None:
+    """Raise a ValueError if an image is too large, be it decoded or not yet; sides in px."""
+    if max(width, height) > _MAXIMUM_SIDE or width * height > _MAXIMUM_PIXELS:
+        raise ValueError(
+            f'{name} is {width} x {height} px, accepted are sides of at most {_MAXIMUM_SIDE} px '
+            f'and at most {_MAXIMUM_PIXELS} px in all'
+        )
+
+
 def brightest(image: np.ndarray) -> float:
     """Return the gray value of the brightest light in an image, hot pixels excluded."""
-    rank = image.size - 1 - image.size // HOT_SHARE
+    rank = image.size - 1 - image.size // _HOT_SHARE
     return float(np.partition(image, rank, axis=None)[rank]) or float(image.max())
 
 
 def as_gray(image: np.ndarray) -> np.ndarray:
-    """Return the gray values of an image on a scale from 0 to 255.
+    """Return the gray values of an image on a scale from 0 to 255, uint8 or float32.
 
-    Parameters
-    ----------
-    image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
-
-    Returns
-    -------
-    ndarray of uint8 or float32, shape (height, width)
-        An 8-bit image as it is. Other images are scaled by their brightest light, so that neither
-        the number of bits in use nor a hot pixel matters.
+    An 8-bit image stays as it is. Others are scaled by their brightest light, so that neither the
+    number of bits in use nor a hot pixel matters.
     """
     if image.dtype == np.uint8:
         return image
@@ -116,13 +83,24 @@ def as_gray(image: np.ndarray) -> np.ndarray:
 
 
 def stretched_to_8_bit(image: np.ndarray) -> np.ndarray:
-    """Return an image with its extremes at 0 and 255, uint8; an 8-bit image is its own result.
-
-    Parameters
-    ----------
-    image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
-    """
+    """Return an image with its extremes at 0 and 255, uint8; an 8-bit image is its own result."""
     if image.dtype == np.uint8:
         return image
     scaled = np.empty(image.shape, np.uint8)
     return cv2.normalize(image, scaled, 0, 255, cv2.NORM_MINMAX, cv2.CV_8U)
+
+
+def white_remark(image: np.ndarray) -> str:
+    """Return what it means that much of an image is white; empty if little is.
+
+    Where light makes ink as white as paper, gaps or bands of targets vanish.
+
+    Examples
+    --------
+    >>> white_remark(np.full((20, 20), 255, np.uint8)).partition(': ')
+    ('100 % of the image is white', ': ', 'gaps or bands of targets may have vanished')
+    """
+    share = float((as_gray(image) >= SATURATED).mean())
+    if share < _MUCH_WHITE:
+        return ''
+    return f'{100 * share:.0f} % of the image is white: gaps or bands of targets may have vanished'

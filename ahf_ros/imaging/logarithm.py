@@ -14,29 +14,16 @@ LOG_OFFSET = 8.0
 """Added to gray values, 0 to 255, before a logarithm that is searched for edges: about where noise
 hides contrast."""
 
-SAMPLE_ROWS, SAMPLE_COLUMNS = 32, 1024
-"""Size of the lattice on which the output mapping samples the filtered image."""
-
 MINIMUM_CONTRAST = 1e-3
 """Minimum difference of s between black and white; a flatter image stays gray."""
 
 
 def logarithm(image: np.ndarray, offset: float) -> np.ndarray:
-    """Return z = ln(image / range + offset); for 8- and 16-bit images from a table.
+    """Return z = ln(image / range + offset), float32; for 8- and 16-bit images from a table.
 
-    Parameters
-    ----------
-    image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
-        Gray values of at least 0, not all 0.
-    offset : float
-        Fraction of the range, > 0.
-
-    Returns
-    -------
-    ndarray of float32, shape (height, width)
-        From ln(offset) to ln(1 + offset). The range is 255 for 8-bit images. For 16-bit images it
-        is the maximum of their bit depth, the minimum depth from 8 to 16 that holds `brightest`.
-        For float images it is `brightest`.
+    The offset is a fraction of the range, > 0. The range is 255 for 8-bit images. For 16-bit
+    images it is the maximum of their bit depth, the minimum depth from 8 to 16 that holds
+    `brightest`. For float images it is `brightest`.
     """
     if image.dtype.kind == 'f':
         share = (image / brightest(image)).astype(np.float32)
@@ -52,12 +39,8 @@ def mapping(
 ) -> tuple[float, float]:
     """Return `scale` and `zero` such that exp(s + scale) - zero is the 8-bit image.
 
-    Parameters
-    ----------
-    samples : ndarray
-        Values of s, the logarithm of the image.
-    black_percentile, white_percentile : float
-        Percentiles of exp s that become 0 and 255, %.
+    `samples` are values of s, the logarithm of the image. The percentiles, %, are those of exp s
+    that become 0 and 255.
     """
     percentiles = np.percentile(samples, (black_percentile, white_percentile))
     black, white = (float(value) for value in percentiles)
@@ -71,8 +54,9 @@ def sample_lattice(height: int, width: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the rows and the columns of the lattice of the output mapping, ascending."""
     # one at random per interval: even steps could coincide with projected stripes
     generator = np.random.default_rng(0)
-    lattice = []
-    for length, count in ((height, SAMPLE_ROWS), (width, SAMPLE_COLUMNS)):
+
+    def places(length: int, count: int) -> np.ndarray:
         edges = np.linspace(0, length, min(length, count) + 1).astype(int)
-        lattice.append(generator.integers(edges[:-1], edges[1:]))
-    return lattice[0], lattice[1]
+        return generator.integers(edges[:-1], edges[1:])
+
+    return places(height, 32), places(width, 1024)

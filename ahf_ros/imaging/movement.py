@@ -19,18 +19,10 @@ from ahf_ros.blas import one_blas_thread
 from ahf_ros.imaging.image import as_gray
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
-SIGNIFICANT = 6.0
-"""Number of standard deviations from zero at which a displacement counts as movement."""
-
-MINIMUM_EDGES = 60
-"""Number of edges that coincide, for a displacement to be measured."""
-
-WINDOW = 2
-"""Maximum distance of an edge from its place along its normal, px."""
-
-PEAK = 1.5
-"""Ratio of coincidences in a peak to those beside it, or in another peak."""
-
+_SIGNIFICANT = 6.0  # standard deviations from zero, a displacement that is movement
+_MINIMUM_EDGES = 60  # that coincide, for a displacement to be measured
+_WINDOW = 2  # px, maximum distance of an edge from its place along its normal
+_PEAK = 1.5  # ratio of coincidences in a peak to those beside it, or in another peak
 _BINS = 4  # per px, of displacements along a normal
 _NEAR = 0.75  # px, a displacement that is refined
 _RING = 1.25  # px, distance from a peak at which it has fallen
@@ -39,21 +31,14 @@ _DIRECTIONS = 12  # of normals, which count alike: light has few, prints have ma
 _STRIPED = 2.5  # ratio of edges in a direction to the median of all directions
 _ENOUGH = 120  # edges of other directions
 _UNEVEN = 0.1  # px, systematic error where no edge of the first image coincides
-
-REACH = 16
-"""Maximum displacement that is looked for, px of an image and of smaller ones of it."""
-
-MINIMUM_SHIFT = 0.05
-"""Smaller displacements of a scene do not count, px: uneven light moves edges by as much."""
-
-MINIMUM_PART_SHIFT = 0.7
-"""Smaller displacements of a part of the scene do not count, px."""
-
+_REACH = 16  # px of an image and of smaller ones of it, maximum displacement that is looked for
+_MINIMUM_SHIFT = 0.05  # px, of a scene, that counts: uneven light moves edges by as much
+_MINIMUM_PART_SHIFT = 0.7  # px, of a part of the scene, that counts
 _BLUR = 1.0  # px, of the logarithm; edges become as wide in sharp images as in soft ones
 _STEEP = 0.06  # of ln per px, an edge; paper is flatter
 _NOISY = 6.0  # standard deviations of the gradient in flat parts, an edge
 _FLAT, _FLAT_SIZE = 10, 0.459  # percentile of gradients that are noise, and its deviations
-_MAXIMUM_EDGES = 20_000  # evenly distributed ones are enough
+_MAXIMUM_EDGES = 20_000  # evenly distributed ones are enough, and remap takes 32,767
 _SIMILAR = 1.5  # ratio of two steps that may be the same edge
 _FAR_EDGES = 4000  # are enough to look for a displacement of whole pixels
 _COARSE = 4  # times smaller image, in which larger displacements are looked for
@@ -62,18 +47,13 @@ _SHORT = 2.0  # px in it, a displacement that the whole image would show
 _APART = 3.0  # px, between two peaks
 _TILES = 4  # along each side, that are looked at one by one
 
+Gradients = tuple[np.ndarray, np.ndarray]
+"""Of an image along x and y, float32, shape (height, width)."""
+
 
 @dataclass(frozen=True, slots=True)
 class Displacement:
-    """A displacement of a scene between two images.
-
-    Attributes
-    ----------
-    x, y : float
-        In px.
-    deviation : float
-        Standard deviation of its length, px.
-    """
+    """A displacement of a scene between two images and the deviation of its length, px."""
 
     x: float
     y: float
@@ -81,40 +61,31 @@ class Displacement:
 
     def exceeds(self, minimum: float) -> bool:
         """Return whether it is longer than a minimum, and significant."""
-        return bool(np.hypot(self.x, self.y) > max(minimum, SIGNIFICANT * self.deviation))
+        return bool(np.hypot(self.x, self.y) > max(minimum, _SIGNIFICANT * self.deviation))
 
     def __str__(self) -> str:
         """Return the length with its standard deviation."""
         return f'{np.hypot(self.x, self.y):.2f} px (standard deviation {self.deviation:.3f} px)'
 
 
-def measured(normals: np.ndarray, found: np.ndarray) -> Displacement | None:
+def _measured(normals: np.ndarray, found: np.ndarray) -> Displacement | None:
     """Return the displacement at which edges coincide, None where none stands out.
 
-    Parameters
-    ----------
-    normals : ndarray of float32, shape (n, 2)
-        Unit normals of the edges.
-    found : ndarray of float32, shape (n, m)
-        Where along its normal each edge is seen again, px; NaN where it is not.
+    `normals` are unit vectors, float32, shape (n, 2). `found` has where along its normal each edge
+    is seen again, px, float32, shape (n, m), NaN where it is not.
     """
-    if len(normals) < MINIMUM_EDGES:
+    if len(normals) < _MINIMUM_EDGES:
         return None
-    weights = direction_weights(normals)
+    weights = _direction_weights(normals)
     peak = _peak(normals, weights, _seen(found))
     return None if peak is None else _refined(normals, weights, found, peak)
 
 
-def direction_weights(normals: np.ndarray) -> np.ndarray:
+def _direction_weights(normals: np.ndarray) -> np.ndarray:
     """Return weights of edges, 1 on average, with which all directions count alike.
 
     Directions with many times more edges than others are stripes of light. They and their
     neighbours are left out where enough edges remain.
-
-    Parameters
-    ----------
-    normals : ndarray, shape (n, 2)
-        Unit normals of the edges.
     """
     angles = np.arctan2(normals[:, 1], normals[:, 0])
     classes = np.floor((angles / (2 * np.pi) + 0.5) * _DIRECTIONS).astype(int) % _DIRECTIONS
@@ -130,10 +101,10 @@ def direction_weights(normals: np.ndarray) -> np.ndarray:
 
 def _seen(found: np.ndarray) -> np.ndarray:
     """Return whether an edge is seen again near each displacement, shape (n, bins)."""
-    edges, bins = len(found), 2 * (WINDOW + 1) * _BINS + 1
+    edges, bins = len(found), 2 * (_WINDOW + 1) * _BINS + 1
     seen = np.zeros((edges, bins), bool)
     rows, columns = np.nonzero(~np.isnan(found))
-    middle = np.rint((found[rows, columns] + WINDOW + 1) * _BINS).astype(int)
+    middle = np.rint((found[rows, columns] + _WINDOW + 1) * _BINS).astype(int)
     for beside in (-1, 0, 1):
         seen[rows, np.clip(middle + beside, 0, bins - 1)] = True
     return seen
@@ -143,7 +114,7 @@ def _coincidences(
     normals: np.ndarray, weights: np.ndarray, seen: np.ndarray, shifts: np.ndarray
 ) -> np.ndarray:
     """Return how many edges are seen again at each displacement, shape (shifts,)."""
-    bins = np.rint((normals @ shifts.T + WINDOW + 1) * _BINS).astype(int)
+    bins = np.rint((normals @ shifts.T + _WINDOW + 1) * _BINS).astype(int)
     return np.array([weights @ np.take_along_axis(seen, of[:, None], 1)[:, 0] for of in bins.T])
 
 
@@ -156,7 +127,7 @@ def _peak(normals: np.ndarray, weights: np.ndarray, seen: np.ndarray) -> np.ndar
     angles = np.arange(12) * (np.pi / 6)
     ring = best + _RING * np.stack((np.cos(angles), np.sin(angles)), 1)
     beside = _coincidences(normals, weights, seen, ring)
-    enough = counts.max() >= max(MINIMUM_EDGES, PEAK * beside.max())
+    enough = counts.max() >= max(_MINIMUM_EDGES, _PEAK * beside.max())
     return best if enough else None
 
 
@@ -171,15 +142,16 @@ def _refined(
         off = np.where(np.isnan(off), np.inf, off)
         nearest = np.take_along_axis(off, np.abs(off).argmin(1)[:, None], 1)[:, 0]
         close = np.abs(nearest) < width
-        if close.sum() < MINIMUM_EDGES:
+        if close.sum() < _MINIMUM_EDGES:
             break
         rest, of = nearest[close], normals[close]
         robust = weights[close] * (1 - (rest / width) ** 2) ** 2
-        normal_matrix = (of * robust[:, None]).T @ of
-        shift += np.linalg.solve(normal_matrix, (of * robust[:, None]).T @ rest)
+        weighted = of * robust[:, None]
+        normal_matrix = weighted.T @ of
+        shift += np.linalg.solve(normal_matrix, weighted.T @ rest)
         spread = 1.4826 * float(np.median(np.abs(rest)))
         inverse = np.linalg.inv(normal_matrix)
-        middle = (of * robust[:, None] ** 2).T @ (of * robust[:, None] ** 0)
+        middle = (of * robust[:, None] ** 2).T @ of
         variance = spread**2 * float(np.trace(inverse @ middle @ inverse))
         share = float(weights[close].sum() / weights.sum())
         width = max(min(width, 4 * spread), 0.1)
@@ -189,24 +161,12 @@ def _refined(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Edges:
-    """Edges of an image, ready to be looked for in others.
+    """Edges of an image, ready to be looked for in others; arrays are of float32.
 
-    Attributes
-    ----------
-    x, y : ndarray of float32, shape (n,)
-        Places, px.
-    normals : ndarray of float32, shape (n, 2)
-        Unit vectors from dark to bright.
-    steps : ndarray of float32, shape (n,)
-        Gradients of the logarithm, 1 / px.
-    places : ndarray of float32, shape (n,)
-        Exact places along the normals, px.
-    shape : tuple of int
-        Height and width of the image, px.
-    gradients : tuple of ndarray of float32, shape (height, width)
-        Of the logarithm of the image, along x and y, 1 / px.
-    coarse : Edges or None
-        Those of the image at a quarter of its size; None where that is too small.
+    n edges are at the pixels `x` and `y`, have unit vectors `normals` from dark to bright, shape
+    (n, 2), gradients `steps` of the logarithm, 1 / px, and exact `places` along the normals, px.
+    `shape` is that of the image, and `gradients` are those of its logarithm along x and y, 1 / px.
+    `coarse` are the edges of the image at a quarter of its size, None where that is too small.
     """
 
     x: np.ndarray
@@ -215,23 +175,18 @@ class Edges:
     steps: np.ndarray
     places: np.ndarray
     shape: tuple[int, int]
-    gradients: tuple[np.ndarray, np.ndarray]
-    coarse: Edges | None = None
+    gradients: Gradients
+    coarse: Edges | None
 
 
 def find_edges(image: np.ndarray) -> Edges:
-    """Return the edges of an image.
-
-    Parameters
-    ----------
-    image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
-    """
+    """Return the edges of an image that `ahf_ros.imaging.image.check_image` accepts."""
     gradients = _gradients(image)
     size = cv2.magnitude(*gradients)
     flat = float(np.percentile(size[::4, ::4], _FLAT)) / _FLAT_SIZE
     minimum = max(_STEEP, _NOISY * flat)
     inside = np.zeros(size.shape, bool)
-    margin = REACH + 2
+    margin = _REACH + 2
     inside[margin:-margin, margin:-margin] = True
     crest = np.zeros(size.shape, bool)
     for beside in ((3, 1), (1, 3)):
@@ -245,35 +200,38 @@ def find_edges(image: np.ndarray) -> Edges:
     good = np.abs(places) < 1
     x, y, normals, steps, places = (of[good] for of in (x, y, normals, steps, places))
     coarse = find_edges(_reduced(image)) if min(size.shape) >= _COARSE * _MINIMUM_SIDE else None
-    at = x.astype(np.float32), y.astype(np.float32)
-    return Edges(*at, normals, steps, places, size.shape, gradients, coarse)
+    return Edges(
+        x=x.astype(np.float32),
+        y=y.astype(np.float32),
+        normals=normals,
+        steps=steps,
+        places=places,
+        shape=size.shape,
+        gradients=gradients,
+        coarse=coarse,
+    )
 
 
 @one_blas_thread()
 def displacement(edges: Edges, image: np.ndarray) -> Displacement | None:
     """Return by how much a scene moved, None where nothing shows that it did.
 
-    Parameters
-    ----------
-    edges : Edges
-        Of the first image.
-    image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
-        The other image, of the same size.
+    The edges are those of the first image, and the other image has the same size.
     """
-    if len(edges.x) < MINIMUM_EDGES:
+    if len(edges.x) < _MINIMUM_EDGES:
         return None
     gradients = _gradients(image)
-    found = _partners(edges, gradients, np.zeros(2))
-    whole = measured(edges.normals, found)
+    found = _partners(edges, gradients)
+    whole = _measured(edges.normals, found)
     if whole is None:
         return _far(edges, gradients) or _coarse(edges, image)
-    if whole.exceeds(MINIMUM_SHIFT):
+    if whole.exceeds(_MINIMUM_SHIFT):
         return whole
     height, width = edges.shape
     tile = (edges.y * _TILES // height) * _TILES + edges.x * _TILES // width
     for number in range(_TILES**2):
-        part = measured(edges.normals[tile == number], found[tile == number])
-        if part and part.exceeds(MINIMUM_PART_SHIFT):
+        part = _measured(edges.normals[tile == number], found[tile == number])
+        if part and part.exceeds(_MINIMUM_PART_SHIFT):
             return part
     return None
 
@@ -292,32 +250,23 @@ def _reduced(image: np.ndarray) -> np.ndarray:
     return cv2.resize(as_gray(image), size, interpolation=cv2.INTER_AREA)
 
 
-def _gradients(image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _gradients(image: np.ndarray) -> Gradients:
     logarithm = np.log(as_gray(image).astype(np.float32) + np.float32(LOG_OFFSET))
     smooth = cv2.GaussianBlur(logarithm, (0, 0), _BLUR)
-    return cv2.Scharr(smooth, cv2.CV_32F, 1, 0, scale=1 / 32), cv2.Scharr(
-        smooth, cv2.CV_32F, 0, 1, scale=1 / 32
-    )
+    across = cv2.Scharr(smooth, cv2.CV_32F, 1, 0, scale=1 / 32)
+    return across, cv2.Scharr(smooth, cv2.CV_32F, 0, 1, scale=1 / 32)
 
 
 def _profiles(
-    gradients: tuple[np.ndarray, np.ndarray],
-    x: np.ndarray,
-    y: np.ndarray,
-    normals: np.ndarray,
-    offsets: np.ndarray,
+    gradients: Gradients, x: np.ndarray, y: np.ndarray, normals: np.ndarray, offsets: np.ndarray
 ) -> np.ndarray:
     """Return the gradient along each normal at offsets from the edge, shape (n, offsets)."""
     columns = (x[:, None] + normals[:, :1] * offsets).astype(np.float32)
     rows = (y[:, None] + normals[:, 1:] * offsets).astype(np.float32)
-    sampled = np.empty((2, *columns.shape), np.float32)
-    for top in range(0, len(x), 30_000):  # remap has a maximum of rows
-        part = slice(top, top + 30_000)
-        for axis in (0, 1):
-            sampled[axis, part] = cv2.remap(
-                gradients[axis], columns[part], rows[part], cv2.INTER_LINEAR
-            )
-    along: np.ndarray = sampled[0] * normals[:, :1] + sampled[1] * normals[:, 1:]
+    if not len(x):
+        return columns
+    across, down = (cv2.remap(of, columns, rows, cv2.INTER_LINEAR) for of in gradients)
+    along: np.ndarray = across * normals[:, :1] + down * normals[:, 1:]
     return along
 
 
@@ -330,16 +279,13 @@ def _vertex(
     return place, middle + bend * place**2 / 2
 
 
-def _partners(
-    edges: Edges, gradients: tuple[np.ndarray, np.ndarray], shift: np.ndarray
-) -> np.ndarray:
-    """Return where along its normal each edge is seen again, from a place shifted by whole pixels.
+def _partners(edges: Edges, gradients: Gradients, x: int = 0, y: int = 0) -> np.ndarray:
+    """Return where along its normal each edge is seen again, from a place x and y px away.
 
-    Shape (n, 2 WINDOW + 1), px; the maximum near each whole offset, else NaN.
+    Shape (n, 2 * _WINDOW + 1), px; the maximum near each whole offset, else NaN.
     """
-    offsets = np.arange(-WINDOW - 1.0, WINDOW + 2.0)
-    x, y = edges.x + np.float32(shift[0]), edges.y + np.float32(shift[1])
-    along = _profiles(gradients, x, y, edges.normals, offsets)
+    offsets = np.arange(-_WINDOW - 1.0, _WINDOW + 2.0)
+    along = _profiles(gradients, edges.x + x, edges.y + y, edges.normals, offsets)
     middle = along[:, 1:-1]
     place, height = _vertex(along[:, :-2], middle, along[:, 2:])
     good = (middle >= along[:, :-2]) & (middle > along[:, 2:])
@@ -353,45 +299,42 @@ def _alike(steps: np.ndarray, others: np.ndarray) -> np.ndarray:
     return (steps > others / _SIMILAR) & (steps < others * _SIMILAR)
 
 
-def _repeats(edges: Edges) -> bool:
-    """Return whether the first image is like itself at a displacement."""
-    counts, side = _counts(edges, edges.gradients, 2 * REACH)
-    apart = np.hypot(side[:, None], side) >= _APART
-    return bool(counts.max() < PEAK * counts[apart].max())
-
-
-def _counts(
-    edges: Edges, gradients: tuple[np.ndarray, np.ndarray], reach: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return how many edges are seen again at each displacement, (y, x), and the displacements."""
+def _counts(edges: Edges, gradients: Gradients, reach: int) -> np.ndarray:
+    """Return how many edges are seen again at each displacement (y, x) from -`reach` on, px."""
     every = slice(None, None, -(-len(edges.x) // _FAR_EDGES))
     x, y = (of[every].astype(int) for of in (edges.x, edges.y))
     normals, steps = edges.normals[every], edges.steps[every]
-    weights = direction_weights(normals)
+    weights = _direction_weights(normals)
     height, width = edges.shape
-    side = np.arange(-reach, reach + 1)
-    counts = np.zeros((len(side), len(side)))
-    for row, down in enumerate(side):
-        rows = np.clip(y + down, 0, height - 1)
-        for column, right in enumerate(side):
-            at = rows, np.clip(x + right, 0, width - 1)
+    counts = np.zeros((2 * reach + 1, 2 * reach + 1))
+    for row in range(len(counts)):
+        rows = np.clip(y + row - reach, 0, height - 1)
+        for column in range(len(counts)):
+            at = rows, np.clip(x + column - reach, 0, width - 1)
             along = gradients[0][at] * normals[:, 0] + gradients[1][at] * normals[:, 1]
             counts[row, column] = weights @ _alike(along, steps)
-    return counts, side
+    return counts
 
 
-def _far(edges: Edges, gradients: tuple[np.ndarray, np.ndarray]) -> Displacement | None:
+def _single_peak(counts: np.ndarray) -> tuple[int, int] | None:
+    """Return the place of the highest count, None unless it stands out from those apart."""
+    row, column = divmod(int(counts.argmax()), len(counts))
+    rows, columns = np.indices(counts.shape)
+    apart = np.hypot(rows - row, columns - column) >= _APART
+    return (row, column) if counts.max() >= _PEAK * counts[apart].max() else None
+
+
+def _far(edges: Edges, gradients: Gradients) -> Displacement | None:
     """Return a displacement of more than a pixel, None unless just one stands out.
 
     A pattern of light that moved is like itself at several displacements, and so is the image.
     """
-    counts, side = _counts(edges, gradients, REACH)
-    row, column = divmod(int(counts.argmax()), len(side))
-    apart = np.hypot(side[:, None] - side[row], side - side[column]) >= _APART
-    if counts.max() < max(PEAK * counts[apart].max(), MINIMUM_EDGES) or _repeats(edges):
+    counts = _counts(edges, gradients, _REACH)
+    peak = _single_peak(counts)
+    if not peak or counts.max() < _MINIMUM_EDGES:
         return None
-    shift = np.array((side[column], side[row]))
-    rest = measured(edges.normals, _partners(edges, gradients, shift))
-    if rest is None:
+    if not _single_peak(_counts(edges, edges.gradients, 2 * _REACH)):
         return None
-    return Displacement(rest.x + float(shift[0]), rest.y + float(shift[1]), rest.deviation)
+    x, y = peak[1] - _REACH, peak[0] - _REACH
+    rest = _measured(edges.normals, _partners(edges, gradients, x, y))
+    return Displacement(rest.x + x, rest.y + y, rest.deviation) if rest else None

@@ -7,20 +7,18 @@ of the stack.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import reduce
 
 import cv2
 import numpy as np
 
+from ahf_ros.imaging import MAXIMUM_IMAGES
 from ahf_ros.imaging.even_light import even_light
 from ahf_ros.imaging.image import brightest, check_image
-from ahf_ros.imaging.limits import MAXIMUM_IMAGES
 
-GAMMA = 2.2
-"""Gray values are taken to be light to the power of 1 / GAMMA where light is averaged."""
-
+_GAMMA = 2.2  # gray values are taken to be light to the power of 1 / _GAMMA
 _FLOOR = 2 / 255  # of the range; added to both sides of a quotient, about what noise adds
 _STRIP = 64  # rows combined at a time, which stay in the cache of a core
 
@@ -58,11 +56,8 @@ class ImageStack:
             raise ValueError(
                 f'stack has {count} images, accepted is a number from 1 to {MAXIMUM_IMAGES}'
             )
-        if count == 1:
-            check_image(self.images[0])
-            return
         for number, image in enumerate(self.images, start=1):
-            check_image(image, f'image {number} of the stack')
+            check_image(image, f'image {number} of the stack' if count > 1 else 'image')
             if difference := unlike(self.images[0], image):
                 raise ValueError(f'image {number} of the stack {difference}')
 
@@ -74,8 +69,8 @@ class ImageStack:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the combinations, the most promising first; one where there is one image."""
-        return COMBINATIONS if len(self.images) > 1 else (SINGLE,)
+        """Names of the combinations, the most promising first; of one image empty, and itself."""
+        return COMBINATIONS if len(self.images) > 1 else ('',)
 
     def combined(self, name: str) -> np.ndarray:
         """Return a combination, of the size and the pixel type of the images.
@@ -94,16 +89,17 @@ class ImageStack:
             raise ValueError(
                 f'combination is {name!r}, accepted is one of {", ".join(self.names)}'
             )
-        if name == SINGLE:
-            return self.images[0]
         first = self.images[0]
+        if not name:
+            return first
         scale = max(map(brightest, self.images)) if first.dtype != np.uint8 else 255.0
         result = np.empty_like(first, order='C')
-        if name == EVEN_LIGHT:
+        if name == 'even_light':
             shares = (image.astype(np.float32) / np.float32(scale) for image in self.images)
             _store(even_light(shares) * np.float32(scale), result)
             return result
-        for rows in _strips(first.shape[0]):
+        for top in range(0, len(first), _STRIP):
+            rows = slice(top, top + _STRIP)
             strips = [image[rows].astype(np.float32) / np.float32(scale) for image in self.images]
             _store(_POINTWISE[name](strips) * np.float32(scale), result[rows])
         return result
@@ -128,16 +124,12 @@ def unlike(first: np.ndarray, image: np.ndarray) -> str:
 
 
 def _largest(images: Sequence[np.ndarray]) -> np.ndarray:
-    return reduce(np.maximum, images).copy()
-
-
-def _smallest(images: Sequence[np.ndarray]) -> np.ndarray:
-    return reduce(np.minimum, images).copy()
+    return reduce(np.maximum, images)
 
 
 def _mean_light(images: Sequence[np.ndarray]) -> np.ndarray:
-    light = sum(cv2.pow(image, GAMMA) for image in images)
-    return cv2.pow(light / np.float32(len(images)), 1 / GAMMA)
+    light = sum(cv2.pow(image, _GAMMA) for image in images)
+    return cv2.pow(light / np.float32(len(images)), 1 / _GAMMA)
 
 
 def _mean_gray(images: Sequence[np.ndarray]) -> np.ndarray:
@@ -147,14 +139,8 @@ def _mean_gray(images: Sequence[np.ndarray]) -> np.ndarray:
 def _quotient(images: Sequence[np.ndarray]) -> np.ndarray:
     """Return 1 - darkest / largest, which separates what shines from what is lit."""
     floor = np.float32(_FLOOR)
-    return 1 - (_smallest(images) + floor) / (_largest(images) + floor)
+    return 1 - (reduce(np.minimum, images) + floor) / (_largest(images) + floor)
 
-
-SINGLE = ''
-"""Name of the combination of one image, which is the image."""
-
-EVEN_LIGHT = 'even_light'
-"""Name of the combination of `ahf_ros.imaging.even_light`."""
 
 _POINTWISE: dict[str, Callable[[Sequence[np.ndarray]], np.ndarray]] = {
     'largest': _largest,
@@ -163,12 +149,8 @@ _POINTWISE: dict[str, Callable[[Sequence[np.ndarray]], np.ndarray]] = {
     'quotient': _quotient,
 }
 
-COMBINATIONS: tuple[str, ...] = (EVEN_LIGHT, *_POINTWISE)
+COMBINATIONS: tuple[str, ...] = ('even_light', *_POINTWISE)
 """Names of the combinations of several images, the most promising first."""
-
-
-def _strips(height: int) -> Iterator[slice]:
-    return (slice(top, min(top + _STRIP, height)) for top in range(0, height, _STRIP))
 
 
 def _store(values: np.ndarray, result: np.ndarray) -> None:

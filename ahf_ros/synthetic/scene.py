@@ -12,7 +12,7 @@ import numpy as np
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes.designs import proportions
 from ahf_ros.codes.families import FAMILY_NAMES, numbers_of
-from ahf_ros.codes.gsi_library import point_family
+from ahf_ros.codes.gsi import point_family
 from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.synthetic.camera import Camera, Sensor, tilted_camera
 from ahf_ros.synthetic.covers import card_cover, design, distractor_cover

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ahf_ros.codes.gsi import Rule, positions_of, valid_words, value_of
-from ahf_ros.codes.gsi_library import GSI_LIBRARY, library_text, point_family, with_codes
+from ahf_ros.codes.gsi import GSI_LIBRARY, Rule, point_family, positions_of, valid_words, value_of
+from ahf_ros.codes.gsi_learning import library_text, with_codes
 
 KNOWN = {
     1: (3, 6, 8),
@@ -26,6 +26,7 @@ KNOWN = {
     505: (7, 17, 28),
 }
 GSI = point_family()
+PLACES = dict(zip(GSI.position_numbers.tolist(), map(tuple, GSI.positions), strict=True))
 
 
 def written(folder: Path, old: str, new: str) -> Path:
@@ -53,21 +54,21 @@ def test_all_other_numbers_cannot_be_taken_for_those_of_gsi() -> None:
     assert own.min() > 10000
     assert len(np.unique(GSI.numbers)) == len(GSI.numbers) == len(np.unique(GSI.words)) == 1484
     assert all(GSI.number(GSI.word(number)) == number for number in own[::50].tolist())
+    with pytest.raises(ValueError, match='number is 3, accepted is one of the 1484 IDs of gsi'):
+        GSI.word(3)
+    assert GSI.number(7) is None
 
 
 def test_distances_of_11_mm_leave_the_numbers_of_codes_that_surveys_suggest() -> None:
-    places = dict(zip(GSI.position_numbers.tolist(), map(tuple, GSI.positions), strict=True))
-    rule = Rule(3, 11.0, GSI.rule.groups)
-    words = valid_words(places, rule)
+    words = valid_words(PLACES, Rule(3, 11.0, GSI.rule.groups))
     assert len(words) == 756
     assert sum(max(positions_of(word)) <= 14 for word in words.tolist()) == 140
 
 
 def test_the_positions_are_two_groups_that_mirror_each_other() -> None:
     first, second = GSI.rule.groups
-    places = dict(zip(GSI.position_numbers.tolist(), map(tuple, GSI.positions), strict=True))
-    assert {places[number] for number in first} == {places[number][::-1] for number in second}
-    assert all(places[number][1] > places[number][0] for number in first)
+    assert {PLACES[number] for number in first} == {PLACES[number][::-1] for number in second}
+    assert all(PLACES[number][1] > PLACES[number][0] for number in first)
     for word in GSI.words.tolist():
         split = sorted(len(group & set(positions_of(word))) for group in GSI.rule.groups)
         assert split == [1, 2]
@@ -196,9 +197,3 @@ def test_dots_on_one_line_are_no_template(tmp_path: Path) -> None:
     )
     with pytest.raises(ValueError, match=r'line 4: template .* do not lie on one line'):
         point_family(str(path))
-
-
-def test_a_number_that_does_not_exist_is_refused() -> None:
-    with pytest.raises(ValueError, match='number is 3, accepted is one of the 1484 IDs of gsi'):
-        GSI.word(3)
-    assert GSI.number(7) is None

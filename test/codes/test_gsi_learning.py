@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from ahf_ros.cli import main
-from ahf_ros.codes.gsi import positions_of
+from ahf_ros.codes.gsi import point_family, positions_of
 from ahf_ros.codes.gsi_learning import learn_family
-from ahf_ros.codes.gsi_library import point_family
 from ahf_ros.interchange.point_lists import read_point_list
 from support import ROOT
 from support.photographs import IN_CI
@@ -43,13 +42,6 @@ def survey(numbers: list[int], scale: float, noise: float, seed: int = 1) -> dic
         ):
             points[f'NUGGET{number}_{position}'] = measured(point)
     return points
-
-
-def csv_of(points: dict[str, np.ndarray]) -> str:
-    rows = (
-        f'{label},{x:.3f},{y:.3f},{z:.3f},0.02,0.02,0.02' for label, (x, y, z) in points.items()
-    )
-    return '\n'.join(rows) + '\n'
 
 
 def test_the_design_comes_out_of_a_survey() -> None:
@@ -106,7 +98,9 @@ def test_lists_without_targets_or_with_one_code_twice_are_refused() -> None:
 
 def test_the_command_writes_a_library(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     export, output = tmp_path / 'export.csv', tmp_path / 'mine.json'
-    export.write_text(csv_of(survey([18, 505, 10400], 1.35, 0.02)))
+    points = survey([18, 505, 10400], 1.35, 0.02)
+    rows = [f'{name},{x:.3f},{y:.3f},{z:.3f},0.02,0.02,0.02' for name, (x, y, z) in points.items()]
+    export.write_text('\n'.join(rows) + '\n')
     assert main(['learn-family', str(export), '-o', str(output), '--dot-radius', '2.2']) == 0
     assert '3 targets (18, 505, 10400), 1.3' in capsys.readouterr().err
     family = point_family(str(output))
@@ -135,8 +129,8 @@ def test_bad_lists_are_named(
     assert not output.exists()
 
 
-def test_a_bad_dot_radius_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
-    arguments = ['learn-family', 'no.csv', '-o', str(tmp_path / 'x.json'), '--dot-radius', '-1']
+def test_a_bad_dot_radius_is_refused(capsys: pytest.CaptureFixture) -> None:
+    arguments = ['learn-family', 'no.csv', '-o', 'x.json', '--dot-radius', '-1']
     assert main(arguments) == 2
     assert 'dot_radius is -1.0, accepted is a length above 0' in capsys.readouterr().err
 

@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ahf_ros.codes.gsi import positions_of, value_of
-from ahf_ros.codes.gsi_library import GSI_LIBRARY, point_family
+from ahf_ros.codes.gsi import GSI_LIBRARY, point_family, positions_of, value_of
 from ahf_ros.detectors import create_detector
 from ahf_ros.detectors.gsi.evidence import Evidence, seen_templates
 from ahf_ros.detectors.gsi.grouping import Templates, find_templates

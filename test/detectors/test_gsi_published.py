@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ahf_ros.codes.gsi_library import point_family
+from ahf_ros.codes.gsi import point_family
 from ahf_ros.detectors import create_detector
 from ahf_ros.detectors.gsi.published import decode
 from ahf_ros.evaluation import score

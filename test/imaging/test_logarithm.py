@@ -11,14 +11,11 @@ from support.fourier import sampled
 RAMP = np.arange(256, dtype=np.uint8).reshape(16, 16)
 
 
-def test_the_logarithm_of_an_8_bit_image():
-    expected = np.log(RAMP / 255 + 0.01)
-    np.testing.assert_allclose(logarithm(RAMP, 0.01), expected, rtol=0, atol=1e-6)
-
-
-@pytest.mark.parametrize('depth', [8, 10, 12, 16])
-def test_the_range_of_a_16_bit_image_is_that_of_its_depth(depth):
-    image = (RAMP / 255 * (2**depth - 1)).astype(np.uint16)
+@pytest.mark.parametrize(
+    ('depth', 'kind'), [(8, np.uint8), *((depth, np.uint16) for depth in (8, 10, 12, 16))]
+)
+def test_the_range_of_integers_is_that_of_their_depth(depth, kind):
+    image = (RAMP / 255 * (2**depth - 1)).astype(kind)
     expected = np.log(image / (2**depth - 1) + 0.01)
     np.testing.assert_allclose(logarithm(image, 0.01), expected, rtol=0, atol=1e-6)
 

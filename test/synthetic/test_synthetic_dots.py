@@ -12,7 +12,7 @@ import pytest
 from ahf_ros.cli import main
 from ahf_ros.codes.designs import proportions
 from ahf_ros.codes.dots import dot_family
-from ahf_ros.codes.gsi_library import GSI_LIBRARY, point_family
+from ahf_ros.codes.gsi import GSI_LIBRARY, point_family
 from ahf_ros.interchange.truth_files import read_truth
 from ahf_ros.synthetic.camera import Camera, tilted_camera
 from ahf_ros.synthetic.covers import design

@@ -17,8 +17,7 @@ import cv2
 import numpy as np
 
 from ahf_ros.blas import one_blas_thread
-from ahf_ros.codes.gsi import PointFamily
-from ahf_ros.codes.gsi_library import point_family
+from ahf_ros.codes.gsi import PointFamily, point_family
 from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import DetectorSettings, FamilyDetector
 from ahf_ros.detectors.gsi.confidence import confidence_features

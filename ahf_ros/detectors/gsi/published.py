@@ -31,8 +31,7 @@ from typing import Any, ClassVar
 import cv2
 import numpy as np
 
-from ahf_ros.codes.gsi import PointFamily
-from ahf_ros.codes.gsi_library import point_family
+from ahf_ros.codes.gsi import PointFamily, point_family
 from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import FamilyDetector
 from ahf_ros.features.array_record import ArrayRecord

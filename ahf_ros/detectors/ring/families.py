@@ -12,8 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ahf_ros.codes.ring import FAMILY_NAMES, Family, canonical, family
-from ahf_ros.codes.same_print import words_of_print
+from ahf_ros.codes.ring import FAMILY_NAMES, Family, canonical, family, words_of_print
 from ahf_ros.detectors.claims import leading
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.known import NOTHING_KNOWN, Prior

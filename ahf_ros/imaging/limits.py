@@ -1,4 +1,0 @@
-"""Limits of what is combined, which settings state before any image is there."""
-
-MAXIMUM_IMAGES = 64
-"""Maximum number of images of a stack."""
