@@ -10,8 +10,12 @@ import numpy as np
 import pytest
 
 from ahf_ros.cli import main
-from ahf_ros.interchange.image_files import decode_bytes, read_image, read_noted_image
-from ahf_ros.interchange.image_headers import read_header
+from ahf_ros.interchange.image_files import (
+    decode_bytes,
+    read_header,
+    read_image,
+    read_noted_image,
+)
 
 IMAGE = np.arange(24 * 36, dtype=np.uint16).reshape(24, 36)
 ORIENTATIONS = range(1, 9)

@@ -12,9 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from ahf_ros.interchange.fields import checked_file_name, parsed_integer
+from ahf_ros.interchange.files import checked_file_name
 from ahf_ros.interchange.target_json import json_lines, targets_from_json
 from ahf_ros.target import UNDECODED, Target
+from ahf_ros.target_check import checked_integer
 from ahf_ros.text import shown
 
 MAXIMUM_SIDE = 2**15
@@ -91,7 +92,7 @@ def measured_image(content: Any, where: str) -> MeasuredImage:
     targets = tuple(targets_from_json(content, where))
     checked_file_name(content.get('image'), f'{where}: image')
     width, height = (
-        parsed_integer(content.get(name), f'{where}: {name}', 1, MAXIMUM_SIDE)
+        checked_integer(content.get(name), f'{where}: {name}', 1, MAXIMUM_SIDE)
         for name in ('width', 'height')
     )
     return MeasuredImage(content['image'], width, height, targets)
