@@ -12,19 +12,11 @@ from ahf_ros.printing.paper import LABEL_SHEETS, LabelSheet, Page, length_in, pa
 from ahf_ros.settings.parameter import check_parameters, numbers_in, parameter
 
 _NO_LABELS = 'none'
-_DEFAULT_PAGE = 'A4'
-_DEFAULT_RADIUS = '4mm'
 
 
 @dataclass(frozen=True, slots=True)
 class SheetSettings:
-    """Targets to print, and the pages that they are printed on.
-
-    Examples
-    --------
-    >>> SheetSettings(ids='1-3, 7', dot_radius='0.25in').numbers
-    [1, 2, 3, 7]
-    """
+    """Targets to print, and the pages that they are printed on."""
 
     family: str = parameter('metashape12', 'Family of the targets.', choices=FAMILY_NAMES)
     family_file: str = parameter(
@@ -70,13 +62,7 @@ class SheetSettings:
     )
 
     def __post_init__(self) -> None:
-        """Check each parameter, and that they fit each other.
-
-        Raises
-        ------
-        ValueError
-            If not; the message names the field, its value and what is accepted.
-        """
+        """Check each parameter, and that they fit each other."""
         check_parameters(self)
         check_numbers('ids', numbers_in('ids', self.ids), (self.family,), self.family_file)
         square = self.family in SQUARE_NAMES
@@ -99,13 +85,7 @@ class SheetSettings:
 
     @property
     def numbers(self) -> list[int]:
-        """IDs of the targets, ascending.
-
-        Raises
-        ------
-        ValueError
-            If so many as `best` are not found.
-        """
+        """IDs of the targets, ascending; a ValueError if so many as `best` are not found."""
         given = numbers_in('ids', self.ids)
         every = sorted(given) if given else list(numbers_of(self.family, self.family_file))
         if not self.best:
@@ -122,7 +102,7 @@ class SheetSettings:
         """Radius of the dot, mm."""
         if self.side:
             return length_in('side', self.side) / (2 * HALF_SIDE)
-        return length_in('dot_radius', self.dot_radius or _DEFAULT_RADIUS)
+        return length_in('dot_radius', self.dot_radius or '4mm')
 
     @property
     def size(self) -> str:
@@ -159,5 +139,7 @@ class SheetSettings:
         """The page."""
         if self.sheet:
             return self.sheet.page
-        page = page_in(self.page or _DEFAULT_PAGE)
-        return page.turned() if self.landscape else page
+        page = page_in(self.page or 'A4')
+        if self.landscape:
+            return Page(f'{page.name} landscape', page.height, page.width)
+        return page

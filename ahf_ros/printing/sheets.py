@@ -12,7 +12,7 @@ from functools import cached_property
 
 from ahf_ros.codes.designs import circle, printed_design
 from ahf_ros.printing.drawing import Drawing, Ink, Line, Text, text_width
-from ahf_ros.printing.paper import LabelSheet, Page
+from ahf_ros.printing.paper import LabelSheet
 from ahf_ros.printing.settings import SheetSettings
 from ahf_ros.text import counted
 
@@ -39,17 +39,11 @@ _CUT_LENGTH = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """The places for targets on each page.
+    """The centres of the targets on each page, in the order in which they are filled.
 
-    Attributes
-    ----------
-    places : tuple of tuple of 2 float
-        Centres of the targets, in the order in which they are filled.
-    cuts_x, cuts_y : tuple of float
-        Where targets are cut out: the borders of columns, ascending, and of rows, descending;
-        empty where they are on labels.
-    caption : callable
-        From an ID to its caption about a centre at (0, 0).
+    Targets are cut out at `cuts_x` and `cuts_y`, the borders of columns, ascending, and of rows,
+    descending; they are empty where targets are on labels. `caption` leads from an ID to its
+    caption about a centre at (0, 0).
     """
 
     places: tuple[tuple[float, float], ...]
@@ -57,31 +51,18 @@ class Layout:
     cuts_y: tuple[float, ...]
     caption: Callable[[int], tuple[Text, ...]]
 
-    @property
-    def columns(self) -> int:
-        """Number of columns between cuts."""
-        return len(self.cuts_x) - 1
-
 
 def page_layout(settings: SheetSettings, longest: int) -> Layout:
-    """Return the places for targets on each page.
+    """Return the places for targets on each page, with room for the ID `longest`.
 
-    Parameters
-    ----------
-    settings : SheetSettings
-    longest : int
-        The ID that takes the most room.
-
-    Raises
-    ------
-    ValueError
-        If the page or the label is too small for a single target.
+    A ValueError with the largest accepted size is raised if the page or the label is too small for
+    a single target.
     """
 
     def layout_of(radius: float) -> Layout | None:
         if settings.sheet:
             return _on_labels(settings, settings.sheet, radius, longest)
-        return _in_cells(settings, settings.paper, radius, longest)
+        return _in_cells(settings, radius, longest)
 
     layout = layout_of(settings.radius)
     if layout:
@@ -99,9 +80,11 @@ def page_layout(settings: SheetSettings, longest: int) -> Layout:
     )
 
 
-def _in_cells(settings: SheetSettings, page: Page, radius: float, longest: int) -> Layout | None:
+def _in_cells(settings: SheetSettings, radius: float, longest: int) -> Layout | None:
     """Return a grid of cells side by side, None where there is not room for one."""
-    zone, size = settings.proportions.quiet_zone * radius, _text_size(radius)
+    page = settings.paper
+    zone = settings.proportions.quiet_zone * radius
+    size = min(max(_TEXT_SHARE * radius, _TEXT[0]), _TEXT[1])
     words = str(longest), settings.family, _any_size(settings)
     inner = max(2 * zone, *(text_width(word, size) for word in words))
     width = inner + 2 * _PAD
@@ -137,7 +120,6 @@ def _on_labels(
     """Return the middles of labels, None where a target and its caption do not fit on one."""
     zone, size = settings.proportions.quiet_zone * radius, _TEXT[0]
     reach = sheet.diameter / 2 - _LABEL_PAD
-
     height = zone + (_ABOVE + _BELOW) * size
     for words in (f'{longest}  {_any_size(settings)}', settings.family):
         if math.hypot(text_width(words, size) / 2, height) > reach:
@@ -161,11 +143,6 @@ def _any_size(settings: SheetSettings) -> str:
     return f'{settings.size_name} 00.00 mm'
 
 
-def _text_size(radius: float) -> float:
-    smallest, largest = _TEXT
-    return min(max(_TEXT_SHARE * radius, smallest), largest)
-
-
 def _wrapped(words: tuple[str, ...], size: float, width: float) -> list[str]:
     """Return words in as few lines as there is room for."""
     lines: list[str] = []
@@ -180,16 +157,7 @@ def _wrapped(words: tuple[str, ...], size: float, width: float) -> list[str]:
 
 @dataclass(frozen=True)
 class Placed:
-    """Where a target is printed.
-
-    Attributes
-    ----------
-    id, code : int
-    page : int
-        From 1 on.
-    x, y : float
-        Its centre from the lower left corner of the page, y upwards, mm.
-    """
+    """Where a target is printed: on which page, from 1 on, and where on it its centre is, mm."""
 
     id: int
     code: int
@@ -203,12 +171,6 @@ class Sheets:
     """The pages of a set of targets.
 
     A page or a label that is too small for a target raises a ValueError on the first use.
-
-    Examples
-    --------
-    >>> sheets = Sheets(SheetSettings(ids='1-54'))
-    >>> sheets.count, len(next(sheets.pages()).inks)
-    (2, 35)
     """
 
     settings: SheetSettings
@@ -281,12 +243,13 @@ class Sheets:
             length = _bar_length(side)
             if not length:
                 continue
-            marks = [((MARGIN, _BAR), (MARGIN + length, _BAR))]
+            ends = [(MARGIN, _BAR, MARGIN + length, _BAR)]
             for at in range(0, length + 1, 10):
                 tick = _BAR + (_TICK if at % length else _END)
-                marks.append(((MARGIN + at, _BAR), (MARGIN + at, tick)))
-            turned = [(_along(start, upwards), _along(end, upwards)) for start, end in marks]
-            lines += [Line(start, end, _THIN) for start, end in turned]
+                ends.append((MARGIN + at, _BAR, MARGIN + at, tick))
+            for x1, y1, x2, y2 in ends:
+                start, end = ((y1, x1), (y2, x2)) if upwards else ((x1, y1), (x2, y2))
+                lines.append(Line(start, end, _THIN))
             place = MARGIN + length + 1, _BAR
             if upwards:
                 place = _BAR + _BAR_TEXT * 0.75, MARGIN + length + 1
@@ -299,11 +262,8 @@ class Sheets:
         length = _bar_length(width)
         begin = MARGIN + length + 1 + text_width(f'{length} mm   ', _BAR_TEXT)
         number = f'page {page} of {self.count}'
-        for words in (
-            f'{self.title}, {number}. Print at 100 %.',
-            f'{self.title}, {number}',
-            number,
-        ):
+        long = f'{self.title}, {number}'
+        for words in (f'{long}. Print at 100 %.', long, number):
             if begin + text_width(words, _BAR_TEXT) <= width - MARGIN / 2:
                 return [Text(begin, _BAR, _BAR_TEXT, words, centred=False)]
         return []
@@ -315,18 +275,16 @@ def _bar_length(side: float) -> int:
     return next((length for length in BARS if length <= room), 0)
 
 
-def _along(point: tuple[float, float], upwards: bool) -> tuple[float, float]:
-    return (point[1], point[0]) if upwards else point
-
-
 def _cut_marks(layout: Layout, count: int) -> list[Line]:
     """Return a cross at each corner of the cells of the first `count` targets."""
+    columns = len(layout.cuts_x) - 1
+    if columns < 1:
+        return []
     corners = {
-        (column + right, row + down)
-        for row, column in (divmod(index, max(layout.columns, 1)) for index in range(count))
+        (index % columns + right, index // columns + down)
+        for index in range(count)
         for right in (0, 1)
         for down in (0, 1)
-        if layout.cuts_x
     }
     lines = []
     for column, row in sorted(corners):
