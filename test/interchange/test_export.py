@@ -40,9 +40,13 @@ def target(number: int, x: float, y: float, family: str = 'aicon14') -> Target:
     return Target(number, 19, x, y, 8.0, 7.5, 0.25, 0.99, covariance, family)
 
 
+def image(path: str, *targets: Target) -> list[MeasuredImage]:
+    return [MeasuredImage(path, 60, 40, targets)]
+
+
 IMAGES = (
     MeasuredImage(
-        'in/a b&ü.jpg'.replace(' ', '-'),
+        'in/a-b&ü.jpg',
         8000,
         6000,
         (
@@ -117,31 +121,30 @@ def test_what_is_no_control_point_is_said() -> None:
 
 
 def test_labels_name_the_family_where_there_are_several() -> None:
-    mixed = MeasuredImage('a.jpg', 60, 40, (target(7, 1, 2), target(7, 3, 4, 'metashape12')))
-    assert make_survey([mixed]).labels == ('aicon14_7', 'metashape12_7')
+    mixed = image('a.jpg', target(7, 1, 2), target(7, 3, 4, 'metashape12'))
+    assert make_survey(mixed).labels == ('aicon14_7', 'metashape12_7')
     with pytest.raises(ValueError, match="'7' may be aicon14_7 or metashape12_7, accepted is"):
-        make_survey([mixed], Control({'7': np.zeros(3)}))
-    found = make_survey([mixed], Control({'metashape12_7': np.zeros(3)}))
+        make_survey(mixed, Control({'7': np.zeros(3)}))
+    found = make_survey(mixed, Control({'metashape12_7': np.zeros(3)}))
     assert list(found.control) == ['metashape12_7']
-
-
-def same_image(folder: str = 'other') -> tuple[MeasuredImage, ...]:
-    return (*IMAGES[1:], MeasuredImage(f'{folder}/b.jpg', 60, 40, ()))
 
 
 @pytest.mark.parametrize('name', FORMATS)
 def test_images_of_the_same_name(name: str, tmp_path: Path) -> None:
+    alike = [*IMAGES[1:], *image('other/b.jpg')]
     if FORMATS[name].paths:
-        Export(name, tmp_path).write(same_image())
-        with pytest.raises(
-            ValueError, match=r"'in/\./deep/b\.jpg' is there twice, accepted is one"
-        ):
-            Export(name, tmp_path).write(same_image('in/./deep'))
+        Export(name, tmp_path).write(alike)
+        with pytest.raises(ValueError, match=r"'in/\./deep/b\.jpg' is there twice, accepted is"):
+            Export(name, tmp_path).write([*IMAGES, *image('in/./deep/b.jpg')])
     else:
         message = f"{name} knows images by their names, 'other/b.jpg' and 'in/deep/b.jpg' have"
         with pytest.raises(ValueError, match=message):
-            Export(name, tmp_path).write(same_image(), CONTROL)
+            Export(name, tmp_path).write(alike, CONTROL)
         assert list(tmp_path.iterdir()) == []
+
+
+TWICE = Control({'7': np.ones(3), '07': np.ones(3)})
+SEVEN = target(7, 1, 1)
 
 
 @pytest.mark.parametrize(
@@ -149,46 +152,16 @@ def test_images_of_the_same_name(name: str, tmp_path: Path) -> None:
     [
         ('odm', IMAGES, Control(POINTS, 'UTM 32'), "is 'UTM 32', accepted is EPSG:CODE, WGS84"),
         ('odm', IMAGES, None, 'odm has only control points'),
-        (
-            'odm',
-            IMAGES,
-            Control(POINTS),
-            "odm has no local coordinates, control_crs is '', accep",
-        ),
+        ('odm', IMAGES, Control(POINTS), "odm has no local coordinates, control_crs is '', accep"),
+        ('odm', image('a b.jpg', SEVEN), CONTROL, "odm splits at blanks, .* without: 'a b.jpg'"),
         ('opf', IMAGES, Control(POINTS), 'opf has a standard deviation, accepted is a control si'),
         ('csv', IMAGES, Control({'5': np.zeros(3)}), 'the list has 5, the images show 7, 9, 11'),
-        (
-            'csv',
-            IMAGES,
-            Control({'7': np.ones(3), '07': np.ones(3)}),
-            'control point 7 is there t',
-        ),
+        ('csv', IMAGES, TWICE, 'control point 7 is there twice'),
         ('csv', IMAGES[2:], None, 'no image shows an identified target, accepted is at least one'),
-        (
-            'csv',
-            [MeasuredImage('a', 9, 9, (target(7, 1, 1), target(7, 2, 2)))],
-            None,
-            'a shows target 7 twice',
-        ),
-        ('csv', [MeasuredImage('\udc80', 9, 9, ())], None, 'accepted is a name that prints'),
-        (
-            'odm',
-            [MeasuredImage('a b.jpg', 9, 9, (target(7, 1, 1),))],
-            CONTROL,
-            "odm splits at blanks, accepted is an image without: 'a b.jpg'",
-        ),
-        (
-            'mmvii',
-            [MeasuredImage('a".jpg', 9, 9, (target(7, 1, 1),))],
-            None,
-            'accepted is a name without "',
-        ),
-        (
-            'mmvii',
-            [MeasuredImage('a.jpg', 9, 9, (target(7, 1, 1), target(7, 2, 2, 'my"own')))],
-            None,
-            'accepted is a label without "',
-        ),
+        ('csv', image('a', SEVEN, target(7, 2, 2)), None, 'a shows target 7 twice'),
+        ('csv', image('\udc80'), None, 'accepted is a name that prints'),
+        ('mmvii', image('a".jpg', SEVEN), None, 'accepted is a name without "'),
+        ('mmvii', image('a', SEVEN, target(7, 2, 2, 'my"own')), None, 'is a label without "'),
     ],
 )
 def test_what_a_format_cannot_hold_is_named(

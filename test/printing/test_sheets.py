@@ -5,11 +5,10 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from itertools import combinations
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -27,30 +26,24 @@ from support.svg import rastered
 Box = tuple[float, float, float, float]
 """Left, bottom, right, top."""
 
-SHEETS = {
-    'many': partial(SheetSettings, ids='1-53, 54'),
-    'small': partial(SheetSettings, ids='1-161', dot_radius='0.5mm', page='A5'),
-    'large': partial(SheetSettings, ids='1-3', dot_radius='21mm', polarity='bright'),
-    'one a page': partial(SheetSettings, ids='1-3', per_page=1, page='letter', landscape=True),
-    'four a page': partial(SheetSettings, ids='5-10', per_page=4, dot_radius='1cm'),
-    'own page': partial(SheetSettings, family='aicon12', ids='1-30', page='300x150mm'),
-    'tiny page': partial(SheetSettings, ids='9-12', page='70x70mm', dot_radius='3'),
-    'dots': partial(SheetSettings, family='dots', polarity='bright', dot_radius='3mm'),
-    'gsi': partial(SheetSettings, family='gsi', ids='1, 2, 10001-10003', dot_radius='1.5mm'),
-    'labels': partial(SheetSettings, ids='1-70', labels='avery6450', dot_radius='2mm'),
-    'large labels': partial(
-        SheetSettings,
-        family='metashape20',
-        ids='25000-26000',
-        labels='avery5293',
-        dot_radius='3mm',
-    ),
+LARGE = {'family': 'metashape20', 'ids': '25000-26000'}
+ARUCO = {'family': 'aruco_4x4_1000', 'ids': '990-999'}
+SHEETS: dict[str, dict[str, Any]] = {
+    'many': {'ids': '1-53, 54'},
+    'small': {'ids': '1-161', 'dot_radius': '0.5mm', 'page': 'A5'},
+    'large': {'ids': '1-3', 'dot_radius': '21mm', 'polarity': 'bright'},
+    'one a page': {'ids': '1-3', 'per_page': 1, 'page': 'letter', 'landscape': True},
+    'four a page': {'ids': '5-10', 'per_page': 4, 'dot_radius': '1cm'},
+    'own page': {'family': 'aicon12', 'ids': '1-30', 'page': '300x150mm'},
+    'tiny page': {'ids': '9-12', 'page': '70x70mm', 'dot_radius': '3'},
+    'dots': {'family': 'dots', 'polarity': 'bright', 'dot_radius': '3mm'},
+    'gsi': {'family': 'gsi', 'ids': '1, 2, 10001-10003', 'dot_radius': '1.5mm'},
+    'labels': {'ids': '1-70', 'labels': 'avery6450', 'dot_radius': '2mm'},
+    'large labels': LARGE | {'labels': 'avery5293', 'dot_radius': '3mm'},
 }
 MARKERS = {
-    'markers': partial(SheetSettings, family='apriltag_36h11', ids='0-30', side='30mm'),
-    'marker labels': partial(
-        SheetSettings, family='aruco_4x4_1000', ids='990-999', labels='avery8293', side='12mm'
-    ),
+    'markers': {'family': 'apriltag_36h11', 'ids': '0-30', 'side': '30mm'},
+    'marker labels': ARUCO | {'labels': 'avery8293', 'side': '12mm'},
 }
 ALL = [
     *(pytest.param(item, id=name) for name, item in SHEETS.items()),
@@ -86,11 +79,11 @@ def distance_to(box: Box, x: float, y: float) -> float:
     return math.hypot(beside, max(box[1] - y, 0, y - box[3]))
 
 
-@pytest.mark.parametrize('settings_of', ALL)
+@pytest.mark.parametrize('values', ALL)
 def test_every_target_has_its_caption_and_nothing_overlaps_or_leaves_the_page(
-    settings_of: Callable[[], SheetSettings],
+    values: dict[str, Any],
 ) -> None:
-    settings = settings_of()
+    settings = SheetSettings(**values)
     sheets = Sheets(settings)
     zone = settings.radius * settings.proportions.quiet_zone - 1e-9
     pages = list(sheets.pages())
@@ -142,7 +135,7 @@ def test_labels_are_where_the_maker_has_them() -> None:
     assert (sheet.columns * sheet.rows, sheet.diameter) == (63, 25.4)
     assert right + sheet.left == pytest.approx(sheet.page.width)
     assert bottom + sheet.top == pytest.approx(sheet.page.height)
-    sheets = Sheets(SHEETS['labels']())
+    sheets = Sheets(SheetSettings(**SHEETS['labels']))
     first = next(sheets.targets())
     assert (first.x, first.y) == pytest.approx((0.875 * 25.4, 10 * 25.4))
     assert sheets.count == 2

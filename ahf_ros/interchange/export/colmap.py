@@ -75,6 +75,7 @@ def _database(survey: Survey, names: list[str]) -> bytes:
         path = Path(folder) / DATABASE
         try:
             with closing(sqlite3.connect(path)) as connection, connection:
+                connection.execute('PRAGMA synchronous = OFF')  # of a temporary file
                 connection.executescript(SCHEMA)
                 _fill(connection, survey, names)
         except sqlite3.Error as error:
