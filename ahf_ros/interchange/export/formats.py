@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 class Format:
     """A format: what makes its files, and what they hold.
 
-    `writer` is the module beside this one and the name of the function that returns the content of
+    `writer` is the module below `ahf_ros` and the name of the function that returns the content of
     each file by its path in the folder of the export. `origin` is what is added to our
     coordinates, px: 0.0 where (0, 0) is the centre of the first pixel, 0.5 where it is its corner.
     `paths` says whether the format knows images by their paths; if not, their names have to
@@ -36,13 +36,13 @@ class Format:
 
 
 FORMATS: Mapping[str, Format] = {
-    'metashape': Format('xml_files:metashape_files', 0.5),
-    'mmvii': Format('xml_files:mmvii_files', 0.0),
-    'colmap': Format('colmap:colmap_files', 0.5, paths=True, control=False),
-    'opf': Format('opf:opf_files', 0.5, paths=True),
-    'odm': Format('tables:odm_files', 0.0),
-    'realitycapture': Format('tables:realitycapture_files', 0.5),
-    'csv': Format('tables:csv_files', 0.0, paths=True),
+    'metashape': Format('interchange.export.xml_files:metashape_files', 0.5),
+    'mmvii': Format('interchange.export.xml_files:mmvii_files', 0.0),
+    'colmap': Format('interchange.export.colmap:colmap_files', 0.5, paths=True, control=False),
+    'opf': Format('interchange.export.opf:opf_files', 0.5, paths=True),
+    'odm': Format('interchange.export.tables:odm_files', 0.0),
+    'realitycapture': Format('interchange.export.tables:realitycapture_files', 0.5),
+    'csv': Format('interchange.export.tables:csv_files', 0.0, paths=True),
 }
 
 
@@ -89,7 +89,7 @@ class Export:
         self.check_names(image.path for image in images)
         kind = FORMATS[self.format]
         survey = make_survey(images, control if kind.control else None, kind.origin)
-        files = resolve_name(f'ahf_ros.interchange.export.{kind.writer}')(survey)
+        files = resolve_name(f'ahf_ros.{kind.writer}')(survey)
         for name, content in files.items():
             write_whole(self.folder / name, content)
         return tuple(self.folder / name for name in files)
