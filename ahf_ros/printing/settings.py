@@ -120,11 +120,6 @@ class SheetSettings:
         return 2 * HALF_SIDE if self.family in SQUARE_NAMES else 1.0
 
     @property
-    def has_pinhole(self) -> bool:
-        """Whether the dot has a hole."""
-        return self.pinhole > 0 and self.family != 'gsi' and self.family not in SQUARE_NAMES
-
-    @property
     def proportions(self) -> Proportions:
         """What all targets have in common, in radii of the dot."""
         return proportions(self.family, self.family_file)

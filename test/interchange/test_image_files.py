@@ -12,7 +12,6 @@ import pytest
 
 from ahf_ros.cli import main
 from ahf_ros.interchange.image_files import (
-    SUFFIXES,
     decode_bytes,
     read_header,
     read_image,
@@ -25,18 +24,19 @@ DARK = (GRAY // 4).astype(np.uint8)
 ORIENTATIONS = range(1, 9)
 
 
-@pytest.mark.parametrize('suffix', ['.png', '.tif', '.tiff', '.bmp'])
-def test_what_is_written_is_read(tmp_path, suffix):
-    write_image(tmp_path / 'deep' / f'image{suffix}', DARK)
-    np.testing.assert_array_equal(read_image(tmp_path / 'deep' / f'image{suffix}'), DARK)
-
-
-@pytest.mark.parametrize('suffix', ['.png', '.tif'])
-def test_16_bit(tmp_path, suffix):
-    write_image(tmp_path / f'image{suffix}', GRAY * 100)
-    read = read_image(tmp_path / f'image{suffix}')
-    assert read.dtype == np.uint16
-    np.testing.assert_array_equal(read, GRAY * 100)
+@pytest.mark.parametrize(
+    ('suffix', 'image'),
+    [
+        *((suffix, DARK) for suffix in ('.png', '.tif', '.tiff', '.bmp')),
+        *((suffix, GRAY * 100) for suffix in ('.png', '.tif')),
+    ],
+)
+def test_what_is_written_is_read(tmp_path, suffix, image):
+    file = tmp_path / 'deep' / f'Prüfkörper{suffix}'
+    write_image(file, image)
+    read = read_image(file)
+    assert read.dtype == image.dtype
+    np.testing.assert_array_equal(read, image)
 
 
 @pytest.mark.parametrize('suffix', ['.jpg', '.jpeg', '.png'])
@@ -54,11 +54,6 @@ def test_float_images_keep_their_values(tmp_path):
     image = GRAY.astype(np.float32) / 7
     cv2.imwrite(str(tmp_path / 'image.tif'), image)
     np.testing.assert_array_equal(read_image(tmp_path / 'image.tif'), image)
-
-
-def test_names_that_are_not_ascii(tmp_path):
-    write_image(tmp_path / 'Prüfkörper.png', GRAY)
-    np.testing.assert_array_equal(read_image(tmp_path / 'Prüfkörper.png'), GRAY)
 
 
 def test_files_that_are_no_images_are_named(tmp_path):
@@ -83,7 +78,6 @@ def test_images_that_cannot_be_written_are_named(tmp_path):
     (tmp_path / 'file').touch()
     with pytest.raises(ValueError, match=r'image.png cannot be written: '):
         write_image(tmp_path / 'file' / 'image.png', GRAY)
-    assert '.png' in SUFFIXES
 
 
 def tiff(pixels: np.ndarray, orientation: int, order: str = '<') -> bytes:
