@@ -2,8 +2,8 @@
 
 Size and orientation are read from the headers of PNG 1.2, JPEG (ITU-T T.81), TIFF 6.0, BigTIFF and
 BMP with Exif 2.3, before anything is decoded: OpenCV alone takes 1.1 GB for a PNG file of 0.5 MB.
-Pillow opens neither TIFF files of float64 nor colour ones of float32, does not say where in a file
-the orientation is, and would be a dependency that takes 0.16 s to import.
+Pillow, one more dependency, opens neither TIFF files of float64 nor colour ones of float32, and
+does not say where in a file the orientation is.
 """
 
 from __future__ import annotations
