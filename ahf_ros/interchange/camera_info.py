@@ -124,7 +124,8 @@ def undistorted(camera: Calibration, points: np.ndarray) -> np.ndarray:
     The inverse of the distortion is exact: `cv2.undistortPoints` stops after five iterations,
     0.05 px away at the edge of an ordinary image.
     """
-    sensor = _on_sensor(camera, points)
+    binning, offset = np.array(camera.binning), np.array(camera.offset)
+    sensor = (points + 0.5) * binning - 0.5 + offset
     focal, centre = camera.matrix[[0, 1], [0, 1]], camera.matrix[:2, 2]
     seen = (sensor - centre) / focal
     seen[:, 0] -= camera.matrix[0, 1] / focal[0] * seen[:, 1]
@@ -132,15 +133,7 @@ def undistorted(camera: Calibration, points: np.ndarray) -> np.ndarray:
     rays = np.column_stack((ideal, np.ones(len(ideal)))) @ camera.rotation.T
     rays[~(rays[:, 2] > 0)] = math.nan
     there = rays @ camera.projection.T
-    return _on_sensor(camera, there[:, :2] / there[:, 2:], inverse=True)
-
-
-def _on_sensor(camera: Calibration, points: np.ndarray, inverse: bool = False) -> np.ndarray:
-    """Return points of the image as points of the sensor, or the inverse."""
-    binning, offset = np.array(camera.binning), np.array(camera.offset)
-    if inverse:
-        return (points - offset + 0.5) / binning - 0.5
-    return (points + 0.5) * binning - 0.5 + offset
+    return (there[:, :2] / there[:, 2:] - offset + 0.5) / binning - 0.5
 
 
 def _distorted(camera: Calibration, points: np.ndarray) -> np.ndarray:

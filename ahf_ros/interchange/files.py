@@ -5,11 +5,13 @@ URLs are those of whatever storage fsspec reaches: https://, s3://, memory:// an
 
 from __future__ import annotations
 
+import csv
 import fcntl
+import io
 import os
 import re
 import time
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path, PurePath
 from typing import Any, BinaryIO
@@ -84,6 +86,13 @@ def write_whole(path: str | Path, content: bytes) -> None:
     """Write a file that is never there in part, as `whole_file` does."""
     with whole_file(path) as file:
         file.write(content)
+
+
+def csv_table(rows: Iterable[Sequence[object]]) -> bytes:
+    """Return rows as CSV in UTF-8."""
+    file = io.StringIO()
+    csv.writer(file, lineterminator='\n').writerows(rows)
+    return file.getvalue().encode()
 
 
 @contextmanager

@@ -55,18 +55,14 @@ def _encodings() -> dict[str, Encoding]:
         for name, code in patterns.items():
             encodings[f'bayer_{name}{bits}'] = Encoding(kind, 1, code)
     # Unnamed channels are blue, green, red, as in cv_bridge; the first of two is gray.
-    generic = {2: None, 3: cv2.COLOR_BGR2GRAY, 4: cv2.COLOR_BGRA2GRAY}
+    generic = {1: None, 2: None, 3: cv2.COLOR_BGR2GRAY, 4: cv2.COLOR_BGRA2GRAY}
     for name, kind in (('8U', 'u1'), ('16U', 'u2'), ('32F', 'f4'), ('64F', 'f8')):
-        encodings[f'{name}C1'] = Encoding(kind)
         for samples, to_gray in generic.items():
             encodings[f'{name}C{samples}'] = Encoding(kind, samples, to_gray)
-    for name in ('yuv422', 'uyvy'):
-        encodings[name] = Encoding('u1', 2, gray=1)
-    for name in ('yuv422_yuy2', 'yuyv'):
-        encodings[name] = Encoding('u1', 2)
+    encodings |= dict.fromkeys(('yuv422', 'uyvy'), Encoding('u1', 2, gray=1))
+    encodings |= dict.fromkeys(('yuv422_yuy2', 'yuyv'), Encoding('u1', 2))
     # Gray values come first, colours in planes behind them.
-    for name in ('nv21', 'nv24'):
-        encodings[name] = Encoding('u1')
+    encodings |= dict.fromkeys(('nv21', 'nv24'), Encoding('u1'))
     return encodings
 
 

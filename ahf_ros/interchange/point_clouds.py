@@ -31,12 +31,11 @@ def organised_points(message: Any) -> np.ndarray:
     A ValueError names the field if the cloud is not organised, a field is missing or of another
     type, or the sizes are inconsistent.
     """
-    if message.height < 2:
-        raise ValueError(
-            f'height is {message.height}, accepted is an integer of at least 2: an organised cloud'
-        )
-    if message.width < 2:
-        raise ValueError(f'width is {message.width}, accepted is an integer of at least 2')
+    for name, size in (('height', message.height), ('width', message.width)):
+        if size < 2:
+            raise ValueError(
+                f'{name} is {size}, accepted is an integer of at least 2: an organised cloud'
+            )
     row = message.width * message.point_step
     points = f'a row of {message.width} points of {message.point_step} bytes'
     check_rows(message, 'row_step', row, points)

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import csv
-import io
 import math
 from pathlib import Path
 from typing import Any
 
-from ahf_ros.interchange.files import checked_file_name, read_text, write_whole
+from ahf_ros.interchange.files import checked_file_name, csv_table, read_text, write_whole
 from ahf_ros.target import UNDECODED, TrueTarget, Truth
 from ahf_ros.target_check import MAXIMUM_ID, MAXIMUM_LENGTH_PX
 from ahf_ros.text import shown
@@ -59,9 +58,7 @@ def write_truth(path: str | Path, truth: Truth) -> None:
         for item in targets:
             place = [f'{item.x:.4f}', f'{item.y:.4f}']
             rows.append([name, str(item.id), *place, str(int(item.confirmed))])
-    table = io.StringIO()
-    csv.writer(table, lineterminator='\n').writerows(rows)
-    write_whole(path, table.getvalue().encode())
+    write_whole(path, csv_table(rows))
 
 
 def _target(row: dict[str, Any], where: str) -> TrueTarget:

@@ -39,13 +39,12 @@ class Page:
 
 @dataclass(frozen=True, slots=True)
 class LabelSheet:
-    """A sheet of round labels in a grid; lengths are in mm.
+    """A sheet of round labels in a grid on a letter page; lengths are in mm.
 
     `left` and `top` lead from the edges of the page to the first label, `pitch_x` and `pitch_y`
     from the centre of one label to the next one's.
     """
 
-    page: Page
     columns: int
     rows: int
     diameter: float
@@ -55,11 +54,8 @@ class LabelSheet:
     pitch_y: float
 
 
-_LETTER = Page('letter', *PAGES['letter'])
-
-
 def _inches(columns: int, rows: int, *lengths: float) -> LabelSheet:
-    return LabelSheet(_LETTER, columns, rows, *(25.4 * length for length in lengths))
+    return LabelSheet(columns, rows, *(25.4 * length for length in lengths))
 
 
 LABEL_SHEETS = {

@@ -8,7 +8,7 @@ from ahf_ros.codes.designs import HALF_SIDE, Proportions, proportions
 from ahf_ros.codes.families import FAMILY_NAMES, check_numbers, numbers_of
 from ahf_ros.codes.selection import select_ids
 from ahf_ros.codes.square import SQUARE_NAMES
-from ahf_ros.printing.paper import LABEL_SHEETS, LabelSheet, Page, length_in, page_in
+from ahf_ros.printing.paper import LABEL_SHEETS, Page, length_in, page_in
 from ahf_ros.settings.parameter import check_parameters, numbers_in, parameter
 
 _NO_LABELS = 'none'
@@ -76,7 +76,7 @@ class SheetSettings:
                 f'side is {self.side!r}, accepted is a length for a family of square markers and '
                 'without dot_radius'
             )
-        if self.labels != _NO_LABELS and (self.page or self.landscape):
+        if self.on_labels and (self.page or self.landscape):
             raise ValueError(
                 f'labels is {self.labels!r}, accepted with page and landscape is {_NO_LABELS}: '
                 'labels have their own page'
@@ -125,16 +125,14 @@ class SheetSettings:
         return proportions(self.family, self.family_file)
 
     @property
-    def sheet(self) -> LabelSheet | None:
-        """The sheet of labels, None where there is none."""
-        return LABEL_SHEETS.get(self.labels)
+    def on_labels(self) -> bool:
+        """Whether targets are printed on labels."""
+        return self.labels != _NO_LABELS
 
     @property
     def paper(self) -> Page:
         """The page."""
-        if self.sheet:
-            return self.sheet.page
-        page = page_in(self.page or 'A4')
+        page = page_in('letter' if self.on_labels else self.page or 'A4')
         if self.landscape:
             return Page(f'{page.name} landscape', page.height, page.width)
         return page

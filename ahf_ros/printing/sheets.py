@@ -12,7 +12,7 @@ from functools import cached_property
 
 from ahf_ros.codes.designs import circle, printed_design
 from ahf_ros.printing.drawing import Drawing, Ink, Line, Text, text_width
-from ahf_ros.printing.paper import LabelSheet
+from ahf_ros.printing.paper import LABEL_SHEETS
 from ahf_ros.printing.settings import SheetSettings
 from ahf_ros.text import counted
 
@@ -58,20 +58,18 @@ def page_layout(settings: SheetSettings, longest: int) -> Layout:
     A ValueError with the largest accepted size is raised if the page or the label is too small for
     a single target.
     """
-
-    def layout_of(radius: float) -> Layout | None:
-        if settings.sheet:
-            return _on_labels(settings, settings.sheet, radius, longest)
-        return _in_cells(settings, radius, longest)
-
-    layout = layout_of(settings.radius)
+    layout_of = _on_labels if settings.on_labels else _in_cells
+    layout = layout_of(settings, settings.radius, longest)
     if layout:
         return layout
     fits, too_large = 0.0, settings.radius
     for _ in range(_HALVINGS):
         middle = (fits + too_large) / 2
-        fits, too_large = (middle, too_large) if layout_of(middle) else (fits, middle)
-    where = f'labels of {settings.labels}' if settings.sheet else f'a page {settings.paper.name}'
+        fitting = layout_of(settings, middle, longest)
+        fits, too_large = (middle, too_large) if fitting else (fits, middle)
+    where = (
+        f'labels of {settings.labels}' if settings.on_labels else f'a page {settings.paper.name}'
+    )
     name, factor = ('side', settings.size_factor) if settings.side else ('dot_radius', 1.0)
     most = math.floor(100 * factor * fits) / 100
     raise ValueError(
@@ -114,10 +112,9 @@ def _in_cells(settings: SheetSettings, radius: float, longest: int) -> Layout | 
     return Layout(places[: settings.per_page or None], cuts_x, cuts_y, caption)
 
 
-def _on_labels(
-    settings: SheetSettings, sheet: LabelSheet, radius: float, longest: int
-) -> Layout | None:
+def _on_labels(settings: SheetSettings, radius: float, longest: int) -> Layout | None:
     """Return the middles of labels, None where a target and its caption do not fit on one."""
+    sheet = LABEL_SHEETS[settings.labels]
     zone, size = settings.proportions.quiet_zone * radius, _TEXT[0]
     reach = sheet.diameter / 2 - _LABEL_PAD
     height = zone + (_ABOVE + _BELOW) * size
@@ -126,7 +123,7 @@ def _on_labels(
             return None
     first = sheet.left + sheet.diameter / 2, sheet.top + sheet.diameter / 2
     places = tuple(
-        (first[0] + column * sheet.pitch_x, sheet.page.height - first[1] - row * sheet.pitch_y)
+        (first[0] + column * sheet.pitch_x, settings.paper.height - first[1] - row * sheet.pitch_y)
         for row in range(sheet.rows)
         for column in range(sheet.columns)
     )

@@ -133,8 +133,8 @@ def test_labels_are_where_the_maker_has_them() -> None:
     right = sheet.left + (sheet.columns - 1) * sheet.pitch_x + sheet.diameter
     bottom = sheet.top + (sheet.rows - 1) * sheet.pitch_y + sheet.diameter
     assert (sheet.columns * sheet.rows, sheet.diameter) == (63, 25.4)
-    assert right + sheet.left == pytest.approx(sheet.page.width)
-    assert bottom + sheet.top == pytest.approx(sheet.page.height)
+    assert right + sheet.left == pytest.approx(215.9)
+    assert bottom + sheet.top == pytest.approx(279.4)
     sheets = Sheets(SheetSettings(**SHEETS['labels']))
     first = next(sheets.targets())
     assert (first.x, first.y) == pytest.approx((0.875 * 25.4, 10 * 25.4))

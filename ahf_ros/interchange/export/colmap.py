@@ -12,8 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ahf_ros.interchange.export.survey import Survey
-from ahf_ros.interchange.export.tables import table
-from ahf_ros.interchange.files import file_errors
+from ahf_ros.interchange.files import csv_table, file_errors
 
 DATABASE = 'targets.db'
 
@@ -64,7 +63,7 @@ def colmap_files(survey: Survey) -> dict[str, bytes]:
         for number, mark in enumerate(photograph.marks)
     ]
     return {
-        'keypoints.csv': table([('image', 'keypoint', 'label'), *labels]),
+        'keypoints.csv': csv_table([('image', 'keypoint', 'label'), *labels]),
         DATABASE: _database(survey, names),
     }
 

@@ -20,9 +20,6 @@ from ahf_ros.text import shown
 MAXIMUM_SIDE = 2**15
 """Maximum side of an image, px."""
 
-LISTED = 10
-"""Number of labels that a message lists."""
-
 UNKNOWN_VARIANCE = 1.0
 """Variance of a coordinate of a mark whose covariance is not known, px^2."""
 
@@ -38,6 +35,11 @@ class MeasuredImage:
     width: int
     height: int
     targets: tuple[Target, ...]
+
+    @property
+    def name(self) -> str:
+        """Name of the file, without folders."""
+        return PurePath(self.path).name
 
 
 def read_measured_images(path: str | Path) -> tuple[MeasuredImage, ...]:
@@ -93,18 +95,10 @@ class Mark:
 
 
 @dataclass(frozen=True, slots=True)
-class Photograph:
-    """A photograph of `width` and `height` px, with its marks in the order of family and ID."""
+class Photograph(MeasuredImage):
+    """A measured image with its marks, in the order of family and ID."""
 
-    path: str
-    width: int
-    height: int
     marks: tuple[Mark, ...]
-
-    @property
-    def name(self) -> str:
-        """Name of the file, without folders."""
-        return PurePath(self.path).name
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,9 +167,9 @@ def notes_on(control: Control, survey: Survey) -> list[str]:
 
 
 def listed(labels: Sequence[str]) -> str:
-    """Return the first labels of a list, and the number of the others."""
-    more = f' and {len(labels) - LISTED} more' if len(labels) > LISTED else ''
-    return ', '.join(labels[:LISTED]) + more
+    """Return the first ten labels of a list, and the number of the others."""
+    more = f' and {len(labels) - 10} more' if len(labels) > 10 else ''
+    return ', '.join(labels[:10]) + more
 
 
 def _photograph(
@@ -194,7 +188,7 @@ def _photograph(
         label, x, y = labels[target.key], target.x + origin, target.y + origin
         marks[target.key] = Mark(label=label, x=x, y=y, covariance=known, target=target)
     ordered = tuple(marks[key] for key in sorted(marks))
-    return Photograph(image.path, image.width, image.height, ordered)
+    return Photograph(image.path, image.width, image.height, image.targets, ordered)
 
 
 def _control_points(

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import csv
-import io
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 from ahf_ros.interchange.export.survey import Mark, Survey
+from ahf_ros.interchange.files import csv_table
 
 
 def csv_files(survey: Survey) -> dict[str, bytes]:
@@ -26,7 +25,7 @@ def csv_files(survey: Survey) -> dict[str, bytes]:
             shape = [of.semi_major, of.semi_minor, of.angle, of.confidence]
             point = survey.control.get(mark.label, [''] * 3) if survey.control else []
             rows.append([photograph.path, mark.label, *found, *shape, *point])
-    return {'targets.csv': table(rows)}
+    return {'targets.csv': csv_table(rows)}
 
 
 def odm_files(survey: Survey) -> dict[str, bytes]:
@@ -64,18 +63,11 @@ def realitycapture_files(survey: Survey) -> dict[str, bytes]:
         for photograph in survey.photographs
         for mark in photograph.marks
     ]
-    files = {'control_points.csv': table([('#image', 'point', 'x', 'y'), *rows])}
+    files = {'control_points.csv': csv_table([('#image', 'point', 'x', 'y'), *rows])}
     if survey.control:
         ground = [(label, *map(float, point)) for label, point in survey.control.items()]
-        files['ground_control.csv'] = table([('#point', 'x', 'y', 'z'), *ground])
+        files['ground_control.csv'] = csv_table([('#point', 'x', 'y', 'z'), *ground])
     return files
-
-
-def table(rows: Iterable[Sequence[object]]) -> bytes:
-    """Return rows as CSV in UTF-8."""
-    file = io.StringIO()
-    csv.writer(file, lineterminator='\n').writerows(rows)
-    return file.getvalue().encode()
 
 
 def _place(mark: Mark) -> tuple[str, str]:
