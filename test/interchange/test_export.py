@@ -66,46 +66,47 @@ EXPECTED = {
 }
 
 
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with all exports, each of which has files of its own."""
+    folder = tmp_path_factory.mktemp('exports')
+    files = [file for name in FORMATS for file in Export(name, folder).write(IMAGES, CONTROL)]
+    assert len(set(files)) == len(files)
+    assert {it for it in folder.rglob('*') if it.is_file()} == set(files)
+    return folder
+
+
 @pytest.mark.parametrize('name', FORMATS)
-def test_places_are_those_of_the_images(name: str, tmp_path: Path) -> None:
-    Export(name, tmp_path).write(IMAGES, CONTROL)
-    found = {
-        (Path(image).name, label): it for (image, label), it in READERS[name](tmp_path).items()
-    }
+def test_places_are_those_of_the_images(name: str, folder: Path) -> None:
+    found = {(Path(image).name, label): it for (image, label), it in READERS[name](folder).items()}
     expected = {key: it for key, it in EXPECTED.items() if name != 'odm' or key[1] != '11'}
     assert found.keys() == expected.keys()
     for key, place in expected.items():
         assert math.dist(found[key], place) < 0.001
 
 
-def test_every_format_has_files_of_its_own_and_the_same_ones_again(tmp_path: Path) -> None:
-    files = [file for name in FORMATS for file in Export(name, tmp_path).write(IMAGES, CONTROL)]
-    assert len(set(files)) == len(files)
-    before = {file: file.read_bytes() for file in files}
-    for name in FORMATS:
-        Export(name, tmp_path).write(IMAGES, CONTROL)
-    assert {file: file.read_bytes() for file in files} == before
-    assert {it for it in tmp_path.rglob('*') if it.is_file()} == set(files)
+@pytest.mark.parametrize('name', FORMATS)
+def test_the_same_survey_gives_the_same_files(name: str, folder: Path, tmp_path: Path) -> None:
+    for file in Export(name, tmp_path).write(IMAGES, CONTROL):
+        assert file.read_bytes() == (folder / file.relative_to(tmp_path)).read_bytes()
 
 
-def test_control_points_go_along(tmp_path: Path) -> None:
-    for name in FORMATS:
-        Export(name, tmp_path).write(IMAGES, CONTROL)
+def test_control_points_go_along(folder: Path) -> None:
     seven = tuple(POINTS['007'])
-    root = ElementTree.parse(tmp_path / 'markers.xml').getroot()
+    root = ElementTree.parse(folder / 'markers.xml').getroot()
     marker = root.find("chunk/markers/marker[@label='7']/reference")
     assert tuple(float(marker.attrib[axis]) for axis in 'xyz') == seven
     assert root.find("chunk/markers/marker[@label='11']/reference") is None
-    file = tmp_path / 'MMVII-PhgrProj/ObjMesInstr/ahf/MesGCP-ahf.xml'
+    file = folder / 'MMVII-PhgrProj/ObjMesInstr/ahf/MesGCP-ahf.xml'
     items = ElementTree.parse(file).getroot().findall('Data/SetGCP/Measures/el')
     assert [item.findtext('Name') for item in items] == ['"7"', '"9"']
     assert tuple(map(float, items[0].findtext('Pt').split())) == seven
-    lines = (tmp_path / 'gcp_list.txt').read_text().splitlines()
+    lines = (folder / 'gcp_list.txt').read_text().splitlines()
     assert (lines[0], len(lines)) == ('EPSG:25832', 4)
     assert tuple(map(float, lines[1].split()[:3])) == seven
-    lines = (tmp_path / 'ground_control.csv').read_text().splitlines()
+    lines = (folder / 'ground_control.csv').read_text().splitlines()
     assert lines[1].split(',') == ['7', '0.1', '-2.5', '300000.0']
-    with (tmp_path / 'targets.csv').open(newline='') as table:
+    with (folder / 'targets.csv').open(newline='') as table:
         rows = {(row['image'], row['label']): row for row in csv.DictReader(table)}
     assert float(rows['in/deep/b.jpg', '7']['control_z']) == 3e5
     assert rows['in/deep/b.jpg', '11']['control_z'] == ''
@@ -233,13 +234,12 @@ class Camera(SimpleNamespace):
     __hash__ = object.__hash__
 
 
-def test_the_script_sets_the_markers(tmp_path: Path, monkeypatch, capsys) -> None:
-    Export('metashape', tmp_path).write(IMAGES, CONTROL)
+def test_the_script_sets_the_markers(folder: Path, monkeypatch, capsys) -> None:
     camera = Camera(label='b', photo=SimpleNamespace(path='C:\\photos\\b.jpg'))
     there = Marker('7')
     module = console([camera], [there])
     monkeypatch.setitem(sys.modules, 'Metashape', module)
-    runpy.run_path(str(tmp_path / 'metashape_console.py'), run_name='__main__')
+    runpy.run_path(str(folder / 'metashape_console.py'), run_name='__main__')
     assert capsys.readouterr().out == 'a-b&ü.jpg is not in the active chunk\n'
     assert there.projections == {camera: ((0.0, 20.5), True)}
     assert (there.reference.location, there.reference.enabled) == (tuple(POINTS['007']), True)
@@ -249,10 +249,9 @@ def test_the_script_sets_the_markers(tmp_path: Path, monkeypatch, capsys) -> Non
     assert chunk.markers[2].reference.location is None
 
 
-def test_colmap_reads_the_database(tmp_path: Path) -> None:
+def test_colmap_reads_the_database(folder: Path) -> None:
     pycolmap = pytest.importorskip('pycolmap', reason='pycolmap is a large download')
-    Export('colmap', tmp_path).write(IMAGES)
-    with pycolmap.Database.open(tmp_path / 'targets.db') as database:
+    with pycolmap.Database.open(folder / 'targets.db') as database:
         images = {image.name: image for image in database.read_all_images()}
         assert sorted(images) == ['a-b&ü.jpg', 'deep/b.jpg', 'deep/c.jpg']
         first, second = images['a-b&ü.jpg'], images['deep/b.jpg']
@@ -266,20 +265,18 @@ def test_colmap_reads_the_database(tmp_path: Path) -> None:
         assert geometry.inlier_matches.tolist() == [[0, 0]]
 
 
-def test_pairs_without_a_common_point_have_no_matches(tmp_path: Path) -> None:
-    Export('colmap', tmp_path).write(IMAGES)
-    connection = sqlite3.connect(tmp_path / 'targets.db')
+def test_pairs_without_a_common_point_have_no_matches(folder: Path) -> None:
+    connection = sqlite3.connect(folder / 'targets.db')
     assert connection.execute(
         'SELECT pair_id, rows, config FROM two_view_geometries'
     ).fetchall() == [(2147483647 + 2, 1, 3)]
     connection.close()
 
 
-def test_pyopf_reads_the_project(tmp_path: Path) -> None:
+def test_pyopf_reads_the_project(folder: Path) -> None:
     pyopf = pytest.importorskip('pyopf.io', reason='pyopf is not installed')
     resolve = pytest.importorskip('pyopf.resolve')
-    Export('opf', tmp_path).write(IMAGES, CONTROL)
-    project = resolve.resolve(pyopf.load(str(tmp_path / 'project.opf')))
+    project = resolve.resolve(pyopf.load(str(folder / 'project.opf')))
     (points,) = project.input_control_points_objs
     assert [(point.id, list(point.geolocation.sigmas)) for point in points.gcps] == [
         ('7', [0.02] * 3),

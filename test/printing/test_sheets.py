@@ -212,17 +212,16 @@ def test_pages() -> None:
         ({'labels': 'mine'}, "labels is 'mine', accepted is one of none, avery6450"),
         ({'polarity': 'auto'}, "polarity is 'auto', accepted is one of dark, bright"),
         ({'pinhole': 0.7}, 'pinhole is 0.7, accepted is a number from 0 to 0.5'),
+        pytest.param(
+            {'family': 'aruco_4x4_50', 'polarity': 'bright'},
+            "polarity is 'bright' and family is 'aruco_4x4_50'",
+            marks=needs_square_markers,
+        ),
     ],
 )
 def test_settings_that_are_not_accepted_are_named(values: dict, message: str) -> None:
     with pytest.raises(ValueError, match=re.escape(message)):
         SheetSettings(**values)
-
-
-@needs_square_markers
-def test_square_markers_are_dark() -> None:
-    with pytest.raises(ValueError, match="polarity is 'bright' and family is 'aruco_4x4_50'"):
-        SheetSettings(family='aruco_4x4_50', polarity='bright')
 
 
 @pytest.mark.parametrize(
