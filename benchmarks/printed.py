@@ -21,7 +21,7 @@ from ahf_ros import FAMILY_NAMES, create_detector
 from ahf_ros.codes.families import KINDS, numbers_of
 from ahf_ros.evaluation import Score, score, total
 from ahf_ros.printing.drawing import Drawing
-from ahf_ros.printing.pdf import pdf_bytes
+from ahf_ros.printing.files import pdf_bytes
 from ahf_ros.printing.settings import SheetSettings
 from ahf_ros.printing.sheets import Sheets
 from ahf_ros.target import TrueTarget

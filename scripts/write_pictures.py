@@ -40,7 +40,7 @@ from ahf_ros.filtering.homomorphic import HomomorphicFilter
 from ahf_ros.imaging.logarithm import logarithm
 from ahf_ros.imaging.stack import COMBINATIONS
 from ahf_ros.printing.drawing import Drawing, Ink
-from ahf_ros.printing.svg import svg_bytes
+from ahf_ros.printing.files import svg_bytes
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
 
 FOLDER = Path(__file__).resolve().parent.parent / 'docs' / 'pictures'

@@ -19,8 +19,14 @@ from shutil import copyfile
 from typing import Any
 
 from ahf_ros.batch.task import ImageOutcome, ImageTask
-from ahf_ros.interchange.files import RESULTS_FILE, file_errors, locked, read_bytes
-from ahf_ros.interchange.urls import is_url, url_fingerprint
+from ahf_ros.interchange.files import (
+    RESULTS_FILE,
+    file_errors,
+    is_url,
+    locked,
+    read_bytes,
+    url_fingerprint,
+)
 from ahf_ros.release import release
 from ahf_ros.settings.nested import flat_values
 

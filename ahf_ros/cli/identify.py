@@ -26,9 +26,8 @@ from ahf_ros.cli.options import settings_from
 from ahf_ros.cli.outcomes import overlay_path, print_outcome
 from ahf_ros.codes.families import AUTO, LISTED
 from ahf_ros.interchange.export.survey import MeasuredImage, measured_image
-from ahf_ros.interchange.files import read_text
+from ahf_ros.interchange.files import is_url, read_text, urls_named
 from ahf_ros.interchange.image_files import SUFFIXES
-from ahf_ros.interchange.urls import is_url, urls_named
 from ahf_ros.session import create_identifier
 from ahf_ros.session_settings import IdentificationSettings, StackSettings
 from ahf_ros.target import UNDECODED

@@ -41,7 +41,7 @@ class CyclicFamily:
         return int(self.ids(word)) or None
 
     def word(self, number: int) -> int:
-        """Return the canonical code word of the ID `number`; a ValueError if there is none."""
+        """Return the canonical code word of an ID; raise a ValueError if there is none."""
         if number not in self.numbers:
             raise ValueError(
                 f'number is {number!r}, accepted is an ID of {self.name} from '

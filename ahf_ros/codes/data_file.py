@@ -95,7 +95,7 @@ class Entry:
 def read_data_file(path: str | Path) -> Entry:
     """Return the content of a YAML or JSON file.
 
-    A ValueError names the line where it is neither, or says why the file cannot be read.
+    Raise a ValueError that names the line if it is neither, or says why it cannot be read.
     """
     source = str(path)
     if Path(path).exists() and not Path(path).is_file():

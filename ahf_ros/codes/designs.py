@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ahf_ros.codes.dots import DotFamily, dot_family
-from ahf_ros.codes.families import FAMILY_NAMES
-from ahf_ros.codes.gsi import PointFamily, point_family
-from ahf_ros.codes.ring import Family, family, sectors
+from ahf_ros.codes.dots import DotFamily
+from ahf_ros.codes.families import FAMILY_NAMES, code_family
+from ahf_ros.codes.gsi import PointFamily
+from ahf_ros.codes.ring import Family, sectors
 from ahf_ros.codes.square import SQUARE_NAMES, marker
 
 HALF_SIDE = 2.4
@@ -65,33 +65,28 @@ class PrintedDesign:
 
 
 def proportions(name: str, file: str = '') -> Proportions:
-    """Return what the targets of a family have in common.
-
-    `file` is the data file that describes the family, of `gsi` and `dots`; the usual one where
-    empty. A ValueError if there is no such family, or the data file is not accepted.
+    """Return what the targets of a family have in common; `file` is as for `code_family`.
 
     Examples
     --------
     >>> proportions('metashape12').radii
     {'dot': 1.0, 'band_inner': 2.25, 'band_outer': 3.5}
     """
-    radius, radii, quiet_zone = 1.0, {'dot': 1.0}, _QUIET_ZONE
     if name in SQUARE_NAMES:
-        reach, radius, radii = HALF_SIDE * 2**0.5, HALF_SIDE, {'half_side': HALF_SIDE}
-    elif name == 'gsi':
-        points = point_family(file)
-        reach = points.reach / points.dot_radius
-        radius = float(points.template_radii[points.reference] / points.dot_radius)
-        quiet_zone = reach + _MARGIN
-    elif name == 'dots':
-        dots = dot_family(file)
-        radii |= {'dot_circle': dots.dot_circle, 'small_dot': dots.dot_radius}
-        radii |= {'ground': dots.ground_radius, 'border': dots.border_radius}
-        reach = dots.border_radius
-        quiet_zone = reach + _MARGIN
+        reach, radii = HALF_SIDE * 2**0.5, {'half_side': HALF_SIDE}
+        return Proportions(reach=reach, radius=HALF_SIDE, quiet_zone=_QUIET_ZONE, radii=radii)
+    code, radius, radii = code_family(name, file), 1.0, {'dot': 1.0}
+    if isinstance(code, Family):
+        radii |= {'band_inner': code.band_inner, 'band_outer': code.band_outer}
+        reach, quiet_zone = code.band_outer, _QUIET_ZONE
+    elif isinstance(code, DotFamily):
+        radii |= {'dot_circle': code.dot_circle, 'small_dot': code.dot_radius}
+        radii |= {'ground': code.ground_radius, 'border': code.border_radius}
+        reach, quiet_zone = code.border_radius, code.border_radius + _MARGIN
     else:
-        inner, reach = family(name).band
-        radii |= {'band_inner': inner, 'band_outer': reach}
+        radius = float(code.template_radii[code.reference] / code.dot_radius)
+        reach = code.reach / code.dot_radius
+        quiet_zone = reach + _MARGIN
     return Proportions(reach=reach, radius=radius, quiet_zone=quiet_zone, radii=radii)
 
 
@@ -112,11 +107,11 @@ def relative_reach(name: str) -> float:
 
 
 def printed_design(name: str, number: int, pinhole: float, file: str = '') -> PrintedDesign:
-    """Return the print of the target of a family with an ID; `file` is as for `proportions`.
+    """Return the print of the target of a family with an ID; `file` is as for `code_family`.
 
     `pinhole` is the radius of the hole in the centre of the dot, in radii of the dot, 0 for none;
-    square markers and point-distributed targets have none. A ValueError if the family has no such
-    ID, too.
+    square markers and point-distributed targets have none. Raise a ValueError if the family has no
+    such ID, too.
 
     Examples
     --------
@@ -125,20 +120,14 @@ def printed_design(name: str, number: int, pinhole: float, file: str = '') -> Pr
     """
     if name in SQUARE_NAMES:
         return PrintedDesign(code=number, contours=tuple(_square_contours(name, number)))
-    if name == 'gsi':
-        points = point_family(file)
-        word = points.word(number)
-        return PrintedDesign(code=word, contours=tuple(_point_contours(points, word)))
+    code = code_family(name, file)
+    word = code.word(number)
+    if isinstance(code, PointFamily):
+        return PrintedDesign(code=word, contours=tuple(_point_contours(code, word)))
     centre = [circle(1.0)] + [circle(pinhole)] * (pinhole > 0)
-    if name == 'dots':
-        dots = dot_family(file)
-        word = dots.word(number)
-        around = _dot_ring_contours(dots, word)
-    else:
-        table = family(name)
-        word = table.word(number)
-        around = _band_contours(table, word)
-    return PrintedDesign(code=word, contours=(*centre, *around))
+    if isinstance(code, Family):
+        return PrintedDesign(code=word, contours=(*centre, *_band_contours(code, word)))
+    return PrintedDesign(code=word, contours=(*centre, *_dot_ring_contours(code, word)))
 
 
 def circle(radius: float, x: float = 0.0, y: float = 0.0) -> Contour:
@@ -187,10 +176,8 @@ def _outlines(cells: np.ndarray) -> list[list[tuple[int, int]]]:
     after: dict[tuple[int, int], list[tuple[int, int]]] = {}
     for row, column in np.argwhere(cells).tolist():
         corners = [(column, row), (column, row + 1), (column + 1, row + 1), (column + 1, row)]
-        beside = [(row + 1, column), (row + 2, column + 1), (row + 1, column + 2)]
-        beside.append((row, column + 1))
-        for index, neighbour in enumerate(beside):
-            if not padded[neighbour]:
+        for index, (down, right) in enumerate([(1, 0), (2, 1), (1, 2), (0, 1)]):
+            if not padded[row + down, column + right]:
                 after.setdefault(corners[index], []).append(corners[(index + 1) % 4])
     polygons = []
     while after:

@@ -53,10 +53,10 @@ class DotFamily(CyclicFamily):
 
 @lru_cache(maxsize=8)
 def dot_family(path: str = '') -> DotFamily:
-    """Return the family of rings of dots that a data file describes; our own where empty.
+    """Return the family of rings of dots in a data file; our own where empty.
 
-    The file is JSON or YAML, see docs/dots.md. A ValueError names the line and the field of what
-    is not accepted in it.
+    The file is JSON or YAML, see docs/dots.md. A ValueError names line and field of what is not
+    accepted.
 
     Examples
     --------

@@ -9,8 +9,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from itertools import combinations
+from typing import TYPE_CHECKING
 
 from ahf_ros.codes import APRILTAG_NAMES, ARUCO_NAMES, RING_NAMES, SQUARE_NAMES
+
+if TYPE_CHECKING:
+    from ahf_ros.codes.dots import DotFamily
+    from ahf_ros.codes.gsi import PointFamily
+    from ahf_ros.codes.ring import Family
 
 KINDS: dict[str, tuple[str, ...]] = {
     'ring': RING_NAMES,
@@ -43,8 +49,8 @@ _ALIKE = 0.65  # share of letters of a name that is suggested; tag36h11 and apri
 def families_in(text: str) -> tuple[str, ...]:
     """Return the different families that a text names, in its order.
 
-    It names a family, several ring families separated by commas, or 'auto' for all of them. A
-    ValueError if there is no family; if one is unknown or named twice; if two are of different
+    It names a family, several ring families separated by commas, or 'auto' for all of them. Raise
+    a ValueError if there is no family; if one is unknown or named twice; if two are of different
     kinds or have the same print; or if families of their kind are not read together.
 
     Examples
@@ -69,26 +75,32 @@ def families_in(text: str) -> tuple[str, ...]:
     return names
 
 
-def numbers_of(name: str, file: str = '') -> Sequence[int]:
-    """Return the IDs of a family, one of `FAMILY_NAMES`, ascending.
+def code_family(name: str, file: str = '') -> Family | DotFamily | PointFamily:
+    """Return the codes and the proportions of a family that is not of square markers.
 
     `file` is the data file that describes the family, of `gsi` and `dots`; the usual one where
-    empty. A ValueError if it is not accepted.
+    empty. Raise a ValueError if there is no such family, or the data file is not accepted.
     """
-    from ahf_ros.codes import dots, gsi, ring, square
+    from ahf_ros.codes import dots, gsi, ring
 
     if name == 'gsi':
-        return sorted(gsi.point_family(file).numbers.tolist())
+        return gsi.point_family(file)
+    return dots.dot_family(file) if name == 'dots' else ring.family(name)
+
+
+def numbers_of(name: str, file: str = '') -> Sequence[int]:
+    """Return the IDs of a family, ascending; `file` is as for `code_family`."""
+    from ahf_ros.codes import square
+
     if name in SQUARE_NAMES:
         return range(len(square.dictionary(name).bytesList))
-    code = dots.dot_family(file) if name == 'dots' else ring.family(name)
-    return sorted(code.numbers.tolist())
+    return sorted(code_family(name, file).numbers.tolist())
 
 
 def check_numbers(field: str, numbers: Iterable[int], families: Sequence[str], file: str) -> None:
     """Refuse numbers that are no ID of any of some families.
 
-    The ValueError calls them `field` and names them; `file` is as for `numbers_of`.
+    The ValueError calls them `field` and names them; `file` is as for `code_family`.
     """
     known = {name: numbers_of(name, file) for name in families}
     missing = sorted(set(numbers).difference(*known.values()))
@@ -132,8 +144,8 @@ def _check_list(names: Sequence[str], shown: str) -> None:
                 f'detector {kinds[second]}; accepted are families of one detector, which reads '
                 'them together'
             )
+        # Dictionaries with one number of cells begin with the same markers.
         if first in ARUCO_NAMES and first.rpartition('_')[0] == second.rpartition('_')[0]:
-            # Dictionaries with one number of cells begin with the same markers.
             raise ValueError(
                 f'{shown}, but targets of {first} and {second} have the same print; accepted is '
                 'one of them'

@@ -88,7 +88,7 @@ class PointFamily:
         return int(found[0]) if found.size else None
 
     def word(self, number: int) -> int:
-        """Return the value of the code with an ID; a ValueError if there is none."""
+        """Return the value of the code with an ID; raise a ValueError if there is none."""
         found = self.words[self.numbers == number]
         if not found.size:
             raise ValueError(
@@ -170,10 +170,10 @@ def valid_words(places: Mapping[int, Sequence[float]], rule: Rule) -> np.ndarray
 
 @lru_cache(maxsize=8)
 def point_family(path: str = '') -> PointFamily:
-    """Return the family of point-distributed targets of a data file; GSI's own where empty.
+    """Return the family of point-distributed targets in a data file; GSI's own where empty.
 
-    The file is JSON or YAML, see docs/gsi.md. A ValueError names the line and the field of what is
-    not accepted in it.
+    The file is JSON or YAML, see docs/gsi.md. A ValueError names line and field of what is not
+    accepted.
 
     Examples
     --------

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
@@ -142,7 +142,6 @@ def library_text(family: PointFamily) -> str:
             for name, point, radius in zip(names, points.tolist(), radii.tolist(), strict=True)
         }
 
-    rule = family.rule
     head = {
         'family': family.name,
         'source': family.source,
@@ -150,19 +149,14 @@ def library_text(family: PointFamily) -> str:
         'dot_radius': family.dot_radius,
         'reference': _reference_name(family),
     }
-    of_rule = {
-        'dots': rule.dots,
-        'minimum_distance': rule.minimum_distance,
-        'groups': [sorted(group) for group in rule.groups],
-        'first_own_number': rule.first_own_number,
-    }
+    rule = asdict(family.rule) | {'groups': [sorted(group) for group in family.rule.groups]}
     numbers = map(str, family.position_numbers.tolist())
     listed = {str(number): positions_of(word) for number, word in sorted(family.listed.items())}
     parts = [f'  {json.dumps(key)}: {json.dumps(value)}' for key, value in head.items() if value]
     parts += [
         block('template', dots(family.template_names, family.template, family.template_radii)),
         block('positions', dots(numbers, family.positions, family.position_radii)),
-        f'  "rule": {json.dumps({key: value for key, value in of_rule.items() if value})}',
+        f'  "rule": {json.dumps({key: value for key, value in rule.items() if value})}',
         block('codes', listed),
     ]
     return '{\n' + ',\n'.join(parts) + '\n}\n'

@@ -44,7 +44,7 @@ class Family(CyclicFamily):
 
 @cache
 def family(name: str) -> Family:
-    """Return a family of ring codes, one of `FAMILY_NAMES`; a ValueError if there is none.
+    """Return a family of ring codes by its name; raise a ValueError if there is none.
 
     The lists of metashape12, metashape14, aicon12 and aicon14 were compared with published tables
     and photographs.

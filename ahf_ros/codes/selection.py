@@ -12,9 +12,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from ahf_ros.codes.cyclic import CyclicFamily, mirrored_words, rotated_words
-from ahf_ros.codes.dots import dot_family
-from ahf_ros.codes.gsi import point_family
-from ahf_ros.codes.ring import FAMILY_NAMES, family
+from ahf_ros.codes.dots import DotFamily
+from ahf_ros.codes.families import code_family
+from ahf_ros.codes.gsi import PointFamily
 from ahf_ros.codes.square import SQUARE_NAMES, dictionary
 
 _STARTS = 4
@@ -106,7 +106,7 @@ def select_ids(name: str, ids: Sequence[int], count: int, file: str = '') -> lis
     No two of their words turn into each other by a cover in one colour, and the smallest Hamming
     distance between any two, over all rotations, is as large as a search finds it. They are the
     same ones in every run. `file` is the data file that describes the family, of `gsi` and `dots`;
-    the usual one where empty. A ValueError if no set of so many is found.
+    the usual one where empty. Raise a ValueError if no set of so many is found.
 
     Examples
     --------
@@ -135,28 +135,21 @@ def select_ids(name: str, ids: Sequence[int], count: int, file: str = '') -> lis
     )
 
 
-def _cyclic(name: str, file: str) -> CyclicFamily | None:
-    if name == 'dots':
-        return dot_family(file)
-    return family(name) if name in FAMILY_NAMES else None
-
-
 def _orbits(name: str, ids: np.ndarray, file: str) -> np.ndarray:
     """Return all words that are the code of each ID, ndarray of uint64, shape (n, k)."""
-    code = _cyclic(name, file)
-    if code is not None:
-        words = code.words_of(ids)
-        turned = [rotated_words(words, turn, code.bits) for turn in range(code.bits)]
-        if name == 'dots':
-            turned += [mirrored_words(words, code.bits) for words in turned]
-        return np.stack(turned, axis=1).astype(np.uint64)
     if name in SQUARE_NAMES:
         rotations = dictionary(name).bytesList[ids].transpose(0, 2, 1).astype(np.uint64)
         places = np.uint64(8) * np.arange(rotations.shape[2], dtype=np.uint64)
         orbits: np.ndarray = (rotations << places).sum(axis=2, dtype=np.uint64)
         return orbits
-    points = point_family(file)
-    return np.array([[points.word(number)] for number in ids.tolist()], np.uint64)
+    code = code_family(name, file)
+    words = np.array([code.word(number) for number in ids.tolist()])
+    if isinstance(code, PointFamily):
+        return words[:, None].astype(np.uint64)
+    turned = [rotated_words(words, turn, code.bits) for turn in range(code.bits)]
+    if isinstance(code, DotFamily):
+        turned += [mirrored_words(words, code.bits) for words in turned]
+    return np.stack(turned, axis=1).astype(np.uint64)
 
 
 def _distances(orbits: np.ndarray) -> np.ndarray:
@@ -177,8 +170,8 @@ def _confused(name: str, ids: np.ndarray, file: str) -> np.ndarray:
     An ID and itself may be such a pair.
     """
     confused = np.zeros((ids.size, ids.size), bool)
-    code = _cyclic(name, file)
-    if code is None:
+    code = None if name in SQUARE_NAMES else code_family(name, file)
+    if not isinstance(code, CyclicFamily):
         return confused
     words = code.words_of(ids)
     every = code.canonical(np.arange(1 << code.bits))

@@ -12,7 +12,7 @@ from ahf_ros.codes import SQUARE_NAMES
 def dictionary(name: str) -> Any:
     """Return a cv2.aruco.Dictionary by its name, one of `SQUARE_NAMES`.
 
-    A ValueError if there is no such dictionary, or this OpenCV has none at all.
+    Raise a ValueError if there is no such dictionary, or this OpenCV has none at all.
     """
     if name not in SQUARE_NAMES:
         raise ValueError(f'family is {name!r}, accepted is one of {", ".join(SQUARE_NAMES)}')
@@ -31,8 +31,8 @@ def dictionary(name: str) -> Any:
 def marker(name: str, number: int, cell: int) -> Any:
     """Return the print of a marker, ndarray of uint8, shape (side, side), 0 where there is ink.
 
-    It has its black border and no margin; a cell has `cell` px. A ValueError if there is no such
-    ID in the dictionary `name`.
+    It has its black border and no margin; a cell has `cell` px. Raise a ValueError if there is no
+    such ID in the dictionary `name`.
     """
     table = dictionary(name)
     count = table.bytesList.shape[0]

@@ -39,10 +39,7 @@ _MEDIAN = 0.6745 * 6  # of sizes of second differences both ways, in deviations 
 
 @dataclass(frozen=True, slots=True)
 class FaintPart:
-    """A part of an image, stretched: its first pixel there, and gray values from 0 to 255.
-
-    They are float32, shape (height, width).
-    """
+    """A stretched part of an image: its first pixel, and gray values from 0 to 255, float32."""
 
     x: int
     y: int

@@ -54,8 +54,9 @@ def sample_lattice(height: int, width: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the rows and the columns of the lattice of the output mapping, ascending."""
     # one at random per interval: even steps could coincide with projected stripes
     generator = np.random.default_rng(0)
-    lattice = []
-    for length, count in ((height, 32), (width, 1024)):
+
+    def places(length: int, count: int) -> np.ndarray:
         edges = np.linspace(0, length, min(length, count) + 1).astype(int)
-        lattice.append(generator.integers(edges[:-1], edges[1:]))
-    return lattice[0], lattice[1]
+        return generator.integers(edges[:-1], edges[1:])
+
+    return places(height, 32), places(width, 1024)

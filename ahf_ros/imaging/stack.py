@@ -69,24 +69,32 @@ class ImageStack:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the combinations, the most promising first; one where there is one image."""
-        return COMBINATIONS if len(self.images) > 1 else (SINGLE,)
+        """Names of the combinations, the most promising first; of one image empty, and itself."""
+        return COMBINATIONS if len(self.images) > 1 else ('',)
 
     def combined(self, name: str) -> np.ndarray:
         """Return a combination, of the size and the pixel type of the images.
 
-        A ValueError if `name` is none of `names`.
+        Parameters
+        ----------
+        name : str
+            One of `names`.
+
+        Raises
+        ------
+        ValueError
+            If there is no combination of this name.
         """
         if name not in self.names:
             raise ValueError(
                 f'combination is {name!r}, accepted is one of {", ".join(self.names)}'
             )
         first = self.images[0]
-        if name == SINGLE:
+        if not name:
             return first
         scale = max(map(brightest, self.images)) if first.dtype != np.uint8 else 255.0
         result = np.empty_like(first, order='C')
-        if name == EVEN_LIGHT:
+        if name == 'even_light':
             shares = (image.astype(np.float32) / np.float32(scale) for image in self.images)
             _store(even_light(shares) * np.float32(scale), result)
             return result
@@ -134,11 +142,6 @@ def _quotient(images: Sequence[np.ndarray]) -> np.ndarray:
     return 1 - (reduce(np.minimum, images) + floor) / (_largest(images) + floor)
 
 
-SINGLE = ''
-"""Name of the combination of one image, which is the image."""
-
-EVEN_LIGHT = 'even_light'
-
 _POINTWISE: dict[str, Callable[[Sequence[np.ndarray]], np.ndarray]] = {
     'largest': _largest,
     'mean_light': _mean_light,
@@ -146,7 +149,7 @@ _POINTWISE: dict[str, Callable[[Sequence[np.ndarray]], np.ndarray]] = {
     'quotient': _quotient,
 }
 
-COMBINATIONS: tuple[str, ...] = (EVEN_LIGHT, *_POINTWISE)
+COMBINATIONS: tuple[str, ...] = ('even_light', *_POINTWISE)
 """Names of the combinations of several images, the most promising first."""
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -37,24 +37,11 @@ _MARGIN = 0.5  # distance of the points that the derivatives at a centre come fr
 class Calibration:
     """How a camera projects, and which part of its sensor an image shows.
 
-    Attributes
-    ----------
-    frame : str
-        Coordinate frame of the camera.
-    size : tuple of 2 float
-        Width and height that its images have, px.
-    offset : tuple of 2 int
-        Column and row of the sensor where an image begins, px.
-    binning : tuple of 2 int
-        Columns and rows of the sensor that make a pixel.
-    matrix, projection : ndarray, shape (3, 3)
-        Camera matrices of the sensor and of the rectified image.
-    rotation : ndarray, shape (3, 3)
-        From the frame of the camera to the frame of the rectified image.
-    model : str
-        One of `MODELS`.
-    distortion : ndarray
-        Its coefficients.
+    `frame` is the coordinate frame of the camera, `size` the width and height that its images
+    have, px. An image begins at column and row `offset` of the sensor, and `binning` columns and
+    rows of it make a pixel. `matrix` and `projection`, of shape (3, 3), are the camera matrices of
+    the sensor and of the rectified image, and `rotation` leads from the frame of the camera to the
+    one of the rectified image. `model` is one of `MODELS`, `distortion` has its coefficients.
     """
 
     frame: str
@@ -68,13 +55,7 @@ class Calibration:
     distortion: np.ndarray
 
     def check(self, frame: str, width: int, height: int) -> None:
-        """Refuse an image that is not of this camera.
-
-        Raises
-        ------
-        ValueError
-            If frame or size differ.
-        """
+        """Raise a ValueError if the frame or the size of an image is not that of this camera."""
         if frame != self.frame:
             raise ValueError(
                 f'frame_id of camera_info is {self.frame!r}, accepted is that of the image, '
@@ -90,28 +71,10 @@ class Calibration:
 
 
 def calibration(message: Any) -> Calibration:
-    """Return the calibration that a message holds.
+    """Return the calibration that a sensor_msgs/CameraInfo holds.
 
-    Parameters
-    ----------
-    message : sensor_msgs/CameraInfo
-
-    Raises
-    ------
-    ValueError
-        If the camera is not calibrated or the distortion is of a model that is not accepted.
-
-    Examples
-    --------
-    >>> from types import SimpleNamespace as Message
-    >>> info = Message(
-    ...     header=Message(frame_id='camera'), width=640, height=480, binning_x=0, binning_y=0,
-    ...     roi=Message(x_offset=0, y_offset=0, width=0, height=0),
-    ...     k=[600, 0, 320, 0, 600, 240, 0, 0, 1], r=9 * [0], p=12 * [0],
-    ...     distortion_model='plumb_bob', d=[-0.3, 0.1, 0, 0, 0])
-    >>> undistorted(calibration(info), np.array([[0.0, 0.0], [320.0, 240.0]])).round(3)
-    array([[-54.521, -40.891],
-           [320.   , 240.   ]])
+    A ValueError is raised if the camera is not calibrated, or the model of distortion is none that
+    is accepted.
     """
     matrix = np.array(message.k, float).reshape(3, 3)
     if not (np.isfinite(matrix).all() and matrix[0, 0] > 0 and matrix[1, 1] > 0):
@@ -150,28 +113,19 @@ def calibration(message: Any) -> Calibration:
 
 
 def undistorted(camera: Calibration, points: np.ndarray) -> np.ndarray:
-    """Return where points of an image are in the rectified image.
+    """Return where points of an image, of shape (k, 2), are in the rectified image, px.
+
+    This is the image that `image_proc` calls `image_rect`: without distortion, with the rotation
+    `r` and the projection `p` of the message, and with the same region of interest and binning.
+    Binned pixels are taken to be means, so that the centre of the first one is the centre of all
+    pixels in it. A point is NaN if nothing that the camera sees is distorted to there, or if the
+    rectified image does not show it.
 
     The inverse of the distortion is exact: `cv2.undistortPoints` stops after five iterations,
     0.05 px away at the edge of an ordinary image.
-
-    This is the image that `image_proc` calls `image_rect`: without distortion,
-    with the rotation `r` and the projection `p` of the message. Binned pixels are taken to be
-    means, so that the centre of the first one is the centre of all pixels in it.
-
-    Parameters
-    ----------
-    camera : Calibration
-    points : ndarray, shape (k, 2)
-        x, y in the image as received, px.
-
-    Returns
-    -------
-    ndarray, shape (k, 2)
-        x, y in an image with the same region of interest and binning, px; NaN if nothing that the
-        camera sees is distorted to there, or if the rectified image does not show it.
     """
-    sensor = _on_sensor(camera, points)
+    binning, offset = np.array(camera.binning), np.array(camera.offset)
+    sensor = (points + 0.5) * binning - 0.5 + offset
     focal, centre = camera.matrix[[0, 1], [0, 1]], camera.matrix[:2, 2]
     seen = (sensor - centre) / focal
     seen[:, 0] -= camera.matrix[0, 1] / focal[0] * seen[:, 1]
@@ -179,23 +133,7 @@ def undistorted(camera: Calibration, points: np.ndarray) -> np.ndarray:
     rays = np.column_stack((ideal, np.ones(len(ideal)))) @ camera.rotation.T
     rays[~(rays[:, 2] > 0)] = math.nan
     there = rays @ camera.projection.T
-    return _on_sensor(camera, there[:, :2] / there[:, 2:], inverse=True)
-
-
-def undistorted_derivatives(camera: Calibration, points: np.ndarray) -> np.ndarray:
-    """Return the derivatives of `undistorted` at points, shape (k, 2, 2): of x, y by x, y."""
-    steps = _MARGIN * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])
-    around = (points[:, None] + steps).reshape(-1, 2)
-    right, left, below, above = np.moveaxis(undistorted(camera, around).reshape(-1, 4, 2), 1, 0)
-    return np.stack((right - left, below - above), axis=2) / (2 * _MARGIN)
-
-
-def _on_sensor(camera: Calibration, points: np.ndarray, inverse: bool = False) -> np.ndarray:
-    """Return points of the image as points of the sensor, or the inverse."""
-    binning, offset = np.array(camera.binning), np.array(camera.offset)
-    if inverse:
-        return (points - offset + 0.5) / binning - 0.5
-    return (points + 0.5) * binning - 0.5 + offset
+    return (there[:, :2] / there[:, 2:] - offset + 0.5) / binning - 0.5
 
 
 def _distorted(camera: Calibration, points: np.ndarray) -> np.ndarray:
@@ -220,7 +158,7 @@ def _inverse(camera: Calibration, seen: np.ndarray) -> np.ndarray:
         ideal *= (np.tan(np.minimum(angle, 1.5)) / np.maximum(angle, _STEP))[:, None]
     with np.errstate(all='ignore'):
         for _ in range(_STEPS):
-            (a, b), (c, d) = np.moveaxis(_slopes(camera, ideal), 0, -1)
+            (a, b), (c, d) = _slopes(camera, ideal)
             x, y = (_distorted(camera, ideal) - seen).T
             if not (np.abs((x, y)) > _ACCURACY / 10).any():
                 break
@@ -231,58 +169,38 @@ def _inverse(camera: Calibration, seen: np.ndarray) -> np.ndarray:
         # From the axis outwards up to the first fold, a model describes a lens.
         good = error < _ACCURACY
         for fraction in _FRACTIONS:
-            (a, b), (c, d) = np.moveaxis(_slopes(camera, fraction * ideal), 0, -1)
+            (a, b), (c, d) = _slopes(camera, fraction * ideal)
             good &= a * d > b * c
     return np.where(good[:, None], ideal, math.nan)
 
 
 def _slopes(camera: Calibration, points: np.ndarray) -> np.ndarray:
-    """Return the derivatives of `_distorted` at points, shape (k, 2, 2): of x, y by x, y."""
-    steps = _STEP * np.eye(2)
-    columns = [
-        (_distorted(camera, points + step) - _distorted(camera, points - step)) / (2 * _STEP)
-        for step in steps
-    ]
-    return np.stack(columns, axis=2)
+    """Return the derivatives of `_distorted` at points, shape (2, 2, k): of x, y by x, y."""
+    return np.moveaxis(_derivatives(_distorted, camera, points, _STEP), 0, -1)
+
+
+def _derivatives(
+    function: Callable[[Calibration, np.ndarray], np.ndarray],
+    camera: Calibration,
+    points: np.ndarray,
+    step: float,
+) -> np.ndarray:
+    """Return the derivatives of a function at points, shape (k, 2, 2): of x, y by x, y."""
+    steps = step * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])
+    around = function(camera, (points[:, None] + steps).reshape(-1, 2)).reshape(-1, 4, 2)
+    right, left, below, above = np.moveaxis(around, 1, 0)
+    return np.stack((right - left, below - above), axis=2) / (2 * step)
 
 
 def undistorted_targets(camera: Calibration, targets: Sequence[Target]) -> tuple[Target, ...]:
     """Return targets with centres, covariances and ellipses in the rectified image.
 
-    Parameters
-    ----------
-    camera : Calibration
-        Calibration of the camera of the image.
-    targets : sequence of Target
-        Targets in the image as received.
-
-    Returns
-    -------
-    tuple of Target
-        In the same order; x, y, covariance and ellipse are NaN where the calibration does not
-        reach, see `undistorted`.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from ahf_ros import Target
-    >>> half = np.diag([0.5, 0.5, 1.0])
-    >>> camera = Calibration(
-    ...     'camera', (640, 480), (0, 0), (1, 1), np.eye(3), half, np.eye(3), '', np.empty(0))
-    >>> target = Target(
-    ...     id=8, code=31, x=100, y=60, semi_major=8, semi_minor=6, covariance=(0.04, 0, 0, 0.04))
-    >>> moved, = undistorted_targets(camera, [target])
-    >>> moved.x, moved.y, round(moved.covariance[0], 3), round(moved.semi_major, 3)
-    (50.0, 30.0, 0.01, 4.0)
+    These are NaN where the calibration does not reach, see `undistorted`.
     """
     centres = np.array([(target.x, target.y) for target in targets]).reshape(-1, 2)
-    moved = undistorted(camera, centres)
-    return tuple(
-        _moved(target, centre, derivatives)
-        for target, centre, derivatives in zip(
-            targets, moved.tolist(), undistorted_derivatives(camera, centres), strict=True
-        )
-    )
+    moved = undistorted(camera, centres).tolist()
+    derivatives = _derivatives(undistorted, camera, centres, _MARGIN)
+    return tuple(map(_moved, targets, moved, derivatives))
 
 
 def _moved(target: Target, centre: list[float], derivatives: np.ndarray) -> Target:

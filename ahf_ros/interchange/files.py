@@ -1,34 +1,35 @@
-"""Files, read and written with errors that name them."""
+"""Files and URLs, read and written with errors that name them.
+
+URLs are those of whatever storage fsspec reaches: https://, s3://, memory:// and so on.
+"""
 
 from __future__ import annotations
 
+import csv
 import fcntl
+import io
 import os
+import re
 import time
-from collections.abc import Iterator
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from pathlib import Path
-from typing import BinaryIO
+from pathlib import Path, PurePath
+from typing import Any, BinaryIO
 
-from ahf_ros.interchange.urls import is_url, read_url
+from ahf_ros.text import reason_of, shown
 
 RESULTS_FILE = 'results.jsonl'
 """Name of the file in a folder that `ahf identify --output` writes."""
 
 _TRY_LOCK = 0.1  # s between two attempts
+_URL = re.compile(r'[a-z][a-z0-9+.-]*://', re.IGNORECASE)
+_CHANGED = ('mtime', 'LastModified', 'last_modified', 'updated', 'ETag', 'created')
+"""What storages call the time of the last change, or what stands for it."""
 
 
 @contextmanager
 def file_errors(path: str | Path, action: str) -> Iterator[None]:
-    """Turn errors of the operating system into a ValueError that names a file.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file.
-    action : str
-        'read' or 'written', for the message.
-    """
+    """Turn errors of the operating system into a ValueError: the file 'cannot be' `action`."""
     try:
         yield
     except OSError as error:
@@ -39,16 +40,7 @@ def file_errors(path: str | Path, action: str) -> Iterator[None]:
 def locked(folder: str | Path, lock_timeout: float = 0.0) -> Iterator[None]:
     """Lock a folder against other processes, until this process ends at the latest.
 
-    Parameters
-    ----------
-    folder : str or Path
-    lock_timeout : float
-        Time to wait for another process that has locked it, s.
-
-    Raises
-    ------
-    ValueError
-        If another process has locked it.
+    Raises a ValueError if another process still has locked it after `lock_timeout` s.
     """
     descriptor = os.open(folder, os.O_RDONLY)
     limit = time.monotonic() + lock_timeout
@@ -69,7 +61,8 @@ def locked(folder: str | Path, lock_timeout: float = 0.0) -> Iterator[None]:
 def read_bytes(path: str | Path) -> bytes:
     """Return the content of a file or URL, or raise a ValueError that names it."""
     if is_url(str(path)):
-        return read_url(str(path))
+        with _storage(str(path)) as (storage, place):
+            return bytes(storage.cat_file(place))
     with file_errors(path, 'read'):
         return Path(path).read_bytes()
 
@@ -82,49 +75,33 @@ def read_text(path: str | Path) -> str:
         raise ValueError(f'{path} is not in UTF-8, accepted is a text file') from error
 
 
+def checked_file_name(value: Any, name: str) -> str:
+    """Return the file name of a path without folders, or raise a ValueError that calls it so."""
+    if not isinstance(value, str) or not PurePath(value).name:
+        raise ValueError(f'{name} is {shown(value)}, accepted is the name of a file')
+    return PurePath(value).name
+
+
 def write_whole(path: str | Path, content: bytes) -> None:
-    """Write a file that is never there in part, whatever fails.
-
-    Parameters
-    ----------
-    path : str or Path
-        As for `whole_file`.
-    content : bytes
-
-    Raises
-    ------
-    ValueError
-        If the file cannot be written; the message names it.
-    """
+    """Write a file that is never there in part, as `whole_file` does."""
     with whole_file(path) as file:
         file.write(content)
+
+
+def csv_table(rows: Iterable[Sequence[object]]) -> bytes:
+    """Return rows as CSV in UTF-8."""
+    file = io.StringIO()
+    csv.writer(file, lineterminator='\n').writerows(rows)
+    return file.getvalue().encode()
 
 
 @contextmanager
 def whole_file(path: str | Path) -> Iterator[BinaryIO]:
     """Open a file to write that is never there in part, whatever fails.
 
-    Parameters
-    ----------
-    path : str or Path
-        The file; an existing one is replaced once the new one is complete, a missing folder is
-        created. What is no ordinary file, such as a pipe, is written to directly.
-
-    Raises
-    ------
-    ValueError
-        If the file cannot be written; the message names it.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     with whole_file(f'{folder}/a.txt') as file:
-    ...         _ = file.write(b'half')
-    ...         print([path.suffix for path in Path(folder).iterdir()])
-    ...     print([path.name for path in Path(folder).iterdir()])
-    ['.part']
-    ['a.txt']
+    An existing file is replaced once the new one is complete, a missing folder is created. What
+    is no ordinary file, such as a pipe, is written to directly. A ValueError names a file that
+    cannot be written.
     """
     with file_errors(path, 'written'):
         final = Path(path).resolve()
@@ -143,3 +120,48 @@ def whole_file(path: str | Path) -> Iterator[BinaryIO]:
             part.replace(final)
         finally:
             part.unlink(missing_ok=True)
+
+
+def is_url(name: str) -> bool:
+    """Return whether a name is a URL: 's3://bucket/a.jpg' is one, 'C:/a.jpg' is a path."""
+    return bool(_URL.match(name))
+
+
+def url_fingerprint(url: str) -> str:
+    """Return size and time of change of a file; what of them is not known is None."""
+    with _storage(url) as (storage, place):
+        found = storage.info(place)
+    changed = (found[name] for name in _CHANGED if found.get(name))
+    return f'{found.get("size")} {next(changed, None)}'
+
+
+def urls_named(url: str, suffixes: Collection[str]) -> list[str]:
+    """Return the URLs that a pattern with asterisks or a folder stands for, sorted.
+
+    In a folder, files with one of the endings `suffixes`, in small letters, are meant. A URL that
+    is neither a pattern nor a folder stands for itself.
+    """
+    with _storage(url) as (storage, place):
+        if '*' in place:
+            found = storage.glob(place)
+        elif not url.lower().startswith('http') and storage.isdir(place):
+            found = [it for it in storage.ls(place, detail=False) if it.lower().endswith(suffixes)]
+        else:
+            return [url]
+        return sorted(storage.unstrip_protocol(it) for it in found)
+
+
+@contextmanager
+def _storage(url: str) -> Iterator[tuple[Any, str]]:
+    """Open the storage of a URL, and turn what its driver raises into a ValueError with the URL.
+
+    A driver, or fsspec itself, may not be installed.
+    """
+    try:
+        try:
+            from fsspec.core import url_to_fs
+        except ModuleNotFoundError as error:
+            raise ModuleNotFoundError("fsspec: pip install 'ahf_ros[urls]'") from error
+        yield url_to_fs(url, use_listings_cache=False)
+    except Exception as error:
+        raise ValueError(f'{url} cannot be read: {reason_of(error)}') from error

@@ -12,24 +12,15 @@ from typing import Any
 import cv2
 import numpy as np
 
-from ahf_ros.interchange.fields import check_rows
 from ahf_ros.interchange.image_files import decode_bytes
 
 
 @dataclass(frozen=True, slots=True)
 class Encoding:
-    """Meaning of the bytes of a pixel.
+    """Meaning of the bytes of a pixel: `samples` numbers of the numpy type `kind`.
 
-    Attributes
-    ----------
-    kind : str
-        Numpy type of a sample.
-    samples : int
-        Samples per pixel in a row of the image.
-    to_gray : int or None
-        Code of `cv2.cvtColor` for the conversion to gray; None if one sample is the gray value.
-    gray : int
-        Index of that sample.
+    `to_gray` is the code of `cv2.cvtColor` for the conversion to gray; where it is None, the
+    sample with the index `gray` is the gray value.
     """
 
     kind: str
@@ -64,18 +55,14 @@ def _encodings() -> dict[str, Encoding]:
         for name, code in patterns.items():
             encodings[f'bayer_{name}{bits}'] = Encoding(kind, 1, code)
     # Unnamed channels are blue, green, red, as in cv_bridge; the first of two is gray.
-    generic = {2: None, 3: cv2.COLOR_BGR2GRAY, 4: cv2.COLOR_BGRA2GRAY}
+    generic = {1: None, 2: None, 3: cv2.COLOR_BGR2GRAY, 4: cv2.COLOR_BGRA2GRAY}
     for name, kind in (('8U', 'u1'), ('16U', 'u2'), ('32F', 'f4'), ('64F', 'f8')):
-        encodings[f'{name}C1'] = Encoding(kind)
         for samples, to_gray in generic.items():
             encodings[f'{name}C{samples}'] = Encoding(kind, samples, to_gray)
-    for name in ('yuv422', 'uyvy'):
-        encodings[name] = Encoding('u1', 2, gray=1)
-    for name in ('yuv422_yuy2', 'yuyv'):
-        encodings[name] = Encoding('u1', 2)
+    encodings |= dict.fromkeys(('yuv422', 'uyvy'), Encoding('u1', 2, gray=1))
+    encodings |= dict.fromkeys(('yuv422_yuy2', 'yuyv'), Encoding('u1', 2))
     # Gray values come first, colours in planes behind them.
-    for name in ('nv21', 'nv24'):
-        encodings[name] = Encoding('u1')
+    encodings |= dict.fromkeys(('nv21', 'nv24'), Encoding('u1'))
     return encodings
 
 
@@ -84,27 +71,16 @@ ENCODINGS = _encodings()
 
 
 def decode_image(message: Any) -> np.ndarray:
-    """Return the gray image of a message.
+    """Return the gray image of a sensor_msgs/Image, of shape (height, width).
 
-    Colours are weighted as in ITU-R BT.601, whether the values are linear or not.
+    It has one of `ENCODINGS`, in either byte order; rows may be padded (`step`). Colours are
+    weighted as in ITU-R BT.601, whether the values are linear or not. The image has the values and
+    the type that were sent, uint8, uint16, float32 or float64; for a gray message in the byte
+    order of the machine, it is a view of its data. Values that are not finite, with which scanners
+    mark missing pixels, are 0, unless the whole image is not finite.
 
-    Parameters
-    ----------
-    message : sensor_msgs/Image
-        Has one of `ENCODINGS`, in either byte order; rows may be padded (`step`).
-
-    Returns
-    -------
-    ndarray of uint8, uint16, float32 or float64, shape (height, width)
-        The values that were sent; for a gray message in the byte order of the machine, a view of
-        its data. Values that are not finite, with which scanners mark missing pixels, are 0,
-        unless the whole image is not finite.
-
-    Raises
-    ------
-    ValueError
-        If the encoding is not accepted, the image is empty, `step` is shorter than a row or
-        `data` is shorter than `step` times `height`; the message names the field.
+    A ValueError names the field if the encoding is not accepted, the image is empty, or `step` or
+    `data` is too short.
     """
     encoding = ENCODINGS.get(message.encoding)
     if encoding is None:
@@ -116,7 +92,29 @@ def decode_image(message: Any) -> np.ndarray:
             raise ValueError(f'{name} is {size}, accepted is an integer of at least 1')
     row = message.width * encoding.size
     check_rows(message, 'step', row, f'a row of {message.width} px of {message.encoding}')
-    return _finite(_gray(_samples(message, encoding), encoding))
+    image = _gray(_samples(message, encoding), encoding)
+    if image.dtype.kind == 'f':
+        finite = np.isfinite(image)
+        if finite.any() and not finite.all():
+            return np.where(finite, image, image.dtype.type(0))
+    return image
+
+
+def check_rows(message: Any, step: str, minimum: int, row: str) -> None:
+    """Raise a ValueError unless an Image or PointCloud2 has the bytes of all its rows.
+
+    The field `step` holds the distance of two rows; a `row`, as the error calls it, takes at least
+    `minimum` bytes.
+    """
+    value = getattr(message, step)
+    if value < minimum:
+        raise ValueError(f'{step} is {value}, accepted is an integer of at least {minimum}: {row}')
+    size = message.height * value
+    if len(message.data) < size:
+        raise ValueError(
+            f'data has {len(message.data)} bytes, accepted are at least {size}: '
+            f'{message.height} rows of {value} bytes'
+        )
 
 
 def _samples(message: Any, encoding: Encoding) -> np.ndarray:
@@ -143,32 +141,11 @@ def _gray(samples: np.ndarray, encoding: Encoding) -> np.ndarray:
     return cv2.cvtColor(np.ascontiguousarray(samples), encoding.to_gray)
 
 
-def _finite(image: np.ndarray) -> np.ndarray:
-    """Return an image with black for missing pixels."""
-    if image.dtype.kind != 'f':
-        return image
-    finite = np.isfinite(image)
-    if finite.all() or not finite.any():
-        return image
-    return np.where(finite, image, image.dtype.type(0))
-
-
 def decode_compressed(message: Any) -> np.ndarray:
-    """Return the gray image of a compressed message.
+    """Return the gray image of a sensor_msgs/CompressedImage, of shape (height, width).
 
-    Parameters
-    ----------
-    message : sensor_msgs/CompressedImage
-        JPEG, PNG of 8 or 16 bit, or another format that OpenCV reads.
-
-    Returns
-    -------
-    ndarray of uint8, uint16 or float32, shape (height, width)
-
-    Raises
-    ------
-    ValueError
-        If `data` is not an image.
+    It holds a file that OpenCV reads, such as a JPEG, or a PNG of 8 or 16 bit; if not, a
+    ValueError is raised.
     """
     return decode_bytes(message.data, f'data of format {message.format!r}')
 

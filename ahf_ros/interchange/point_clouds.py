@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ahf_ros.interchange.fields import check_rows
+from ahf_ros.interchange.image_messages import check_rows
 
 AXES = ('x', 'y', 'z')
 """Fields that a cloud must have."""
@@ -22,31 +22,20 @@ _KINDS = {FLOAT32: 'f4', FLOAT64: 'f8'}
 
 
 def organised_points(message: Any) -> np.ndarray:
-    """Return the points of an organised cloud, one per pixel of an image.
+    """Return the points of an organised sensor_msgs/PointCloud2, one per pixel of an image.
 
-    Parameters
-    ----------
-    message : sensor_msgs/PointCloud2
-        Has fields x, y and z of float32 or float64 at any offsets, in either byte order; may have
-        other fields and padded points or rows (`point_step`, `row_step`).
+    It has fields x, y and z of float32 or float64 at any offsets, in either byte order; it may
+    have other fields and padded points or rows (`point_step`, `row_step`). The result, of shape
+    (height, width) and with the fields x, y and z, is a view of the data in its byte order.
 
-    Returns
-    -------
-    ndarray of shape (height, width), with the fields x, y and z
-        A view of the data of the message, in its byte order.
-
-    Raises
-    ------
-    ValueError
-        If the cloud is not organised, a field is missing or of another type, or the sizes are
-        inconsistent; the message names the field, its value and what is accepted.
+    A ValueError names the field if the cloud is not organised, a field is missing or of another
+    type, or the sizes are inconsistent.
     """
-    if message.height < 2:
-        raise ValueError(
-            f'height is {message.height}, accepted is an integer of at least 2: an organised cloud'
-        )
-    if message.width < 2:
-        raise ValueError(f'width is {message.width}, accepted is an integer of at least 2')
+    for name, size in (('height', message.height), ('width', message.width)):
+        if size < 2:
+            raise ValueError(
+                f'{name} is {size}, accepted is an integer of at least 2: an organised cloud'
+            )
     row = message.width * message.point_step
     points = f'a row of {message.width} points of {message.point_step} bytes'
     check_rows(message, 'row_step', row, points)
@@ -60,32 +49,27 @@ def organised_points(message: Any) -> np.ndarray:
 
 def _point_type(message: Any) -> np.dtype:
     """Return the type of a point, with fields for its coordinates only."""
-    fields = {field.name: field for field in message.fields}
+    given = {field.name: field for field in message.fields}
     order = '>' if message.is_bigendian else '<'
-    formats, offsets = [], []
+    formats = []
     for name in AXES:
-        if name not in fields:
-            names = ', '.join(map(repr, fields)) or 'none'
+        if name not in given:
+            names = ', '.join(map(repr, given)) or 'none'
             raise ValueError(f'fields are {names}, accepted are those with x, y and z')
-        field = fields[name]
+        field = given[name]
         if field.datatype not in _KINDS:
             raise ValueError(
                 f'datatype of {name} is {field.datatype}, '
                 f'accepted is {FLOAT32} (FLOAT32) or {FLOAT64} (FLOAT64)'
             )
-        size = np.dtype(_KINDS[field.datatype]).itemsize
-        if field.offset + size > message.point_step:
+        kind = np.dtype(order + _KINDS[field.datatype])
+        if field.offset + kind.itemsize > message.point_step:
             raise ValueError(
                 f'offset of {name} is {field.offset}, accepted is an integer of at most '
-                f'point_step, {message.point_step}, minus {size} bytes'
+                f'point_step, {message.point_step}, minus {kind.itemsize} bytes'
             )
-        formats.append(order + _KINDS[field.datatype])
-        offsets.append(field.offset)
+        formats.append(kind)
+    offsets = [given[name].offset for name in AXES]
     return np.dtype(
-        {
-            'names': AXES,
-            'formats': formats,
-            'offsets': offsets,
-            'itemsize': message.point_step,
-        }
+        {'names': AXES, 'formats': formats, 'offsets': offsets, 'itemsize': message.point_step}
     )

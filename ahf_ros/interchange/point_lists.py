@@ -11,24 +11,12 @@ from ahf_ros.interchange.files import read_text
 
 
 def read_point_list(path: str | Path) -> dict[str, np.ndarray]:
-    """Return the coordinates of measured points by their labels.
+    """Return the coordinates of measured points, float64 of shape (3,), by their labels.
 
-    Parameters
-    ----------
-    path : str or Path
-        Text, one point a line: label, x, y, z, separated by commas or semicolons, as V-STARS
-        writes them. Columns after the fourth are left alone, as are empty lines, lines that start
-        with # and a first line of column names.
-
-    Returns
-    -------
-    dict of str to ndarray of float64, shape (3,)
-
-    Raises
-    ------
-    ValueError
-        If the file cannot be read, has a bad row or a label twice, naming line and field, or has
-        no point at all.
+    The file is text, one point a line: label, x, y, z, separated by commas or semicolons, as
+    V-STARS writes them. Columns after the fourth are left alone, as are empty lines, lines that
+    start with # and a first line of column names. A ValueError names the line and the field if a
+    row is bad or a label is there twice, and the file if it cannot be read or has no point at all.
     """
     points: dict[str, np.ndarray] = {}
     lines: dict[str, int] = {}

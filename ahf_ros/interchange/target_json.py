@@ -9,8 +9,7 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
-from ahf_ros.interchange.fields import checked_file_name
-from ahf_ros.interchange.files import RESULTS_FILE, read_text
+from ahf_ros.interchange.files import RESULTS_FILE, checked_file_name, read_text
 from ahf_ros.target import DottedTarget, Identification, SquareMarker, Target, UndecodedTarget
 from ahf_ros.target_check import (
     MAXIMUM_ID,
@@ -22,22 +21,11 @@ from ahf_ros.target_check import (
 )
 from ahf_ros.text import reason_of, shown
 
-_FIELDS = fields(Target)
-_ABSENT = {
-    'code': 0,
-    'semi_major': 0.0,
-    'semi_minor': 0.0,
-    'angle': 0.0,
-    'confidence': 1.0,
-    'covariance': (0.0, 0.0, 0.0, 0.0),
-    'family': '',
-    'edge_shift': None,
-}
-"""What the optional fields of a target are where they are not given."""
+_NAMES = [it.name for it in fields(Target)]
+_ABSENT = {'id': None, 'x': None, 'y': None, 'code': 0, 'semi_major': 0.0, 'semi_minor': 0.0}
+"""What the fields of a target without a default are where they are not given."""
 
-REASONS = ('unread', 'uncertain', 'contested')
-"""Why a target is not decoded, see `ahf_ros.target.UndecodedTarget`."""
-
+_REASONS = ('unread', 'uncertain', 'contested')  # see `ahf_ros.target.UndecodedTarget`
 _MAXIMUM_DOTS = 1000  # of one target
 
 
@@ -54,26 +42,12 @@ def to_json(
 ) -> dict[str, Any]:
     """Return the JSON object of an identification.
 
-    Parameters
-    ----------
-    identification : Identification
-        What was identified.
-    image : str
-        Path of the image, as the user wrote it.
-    shape : tuple of int
-        Height and width of the image, px.
-    family : str
-        What was looked for: a family, or several as the settings list them.
-    detector : str
-        Name of the detector.
-    stack : sequence of str
-        Paths of the images, where images are identified together; `image` is the first.
-    split : str
-        Why a stack was split before the first of these images; empty if it was not.
-    upright : bool
-        Whether images were turned as their orientation says.
-    mapping : mapping of str to float, optional
-        The other settings of the filter, see `ahf_ros.filtering.homomorphic.FilterSettings`.
+    `image` is the path of the image, as the user wrote it, and `shape` its height and width, px;
+    `family` is what was looked for, a family or several as the settings list them. Where images
+    are identified together, `stack` holds their paths, `image` is the first, and `split` says why
+    a stack was split before it. `upright` says whether images were turned as their orientation
+    says. `mapping` holds the other settings of the filter, see
+    `ahf_ros.filtering.homomorphic.FilterSettings`.
     """
     height, width = shape
     used = asdict(identification.filter) | dict(mapping or {})
@@ -106,55 +80,46 @@ def to_json(
 
 
 def targets_from_json(content: Any, name: str) -> list[Target]:
-    """Return the targets of a JSON object.
+    """Return the targets of a JSON object, whose list 'targets' holds them.
 
-    Parameters
-    ----------
-    content : dict
-        Has the list 'targets'. Each of them has 'id', 'x' and 'y' and may have the other fields
-        of `Target`, and those of `DottedTarget`, of `SquareMarker` or of `UndecodedTarget`.
-    name : str
-        What errors call the object.
-
-    Raises
-    ------
-    ValueError
-        If the object is not like that or a field is not accepted; the message names the field.
+    Each of them has 'id', 'x' and 'y' and may have the other fields of `Target`, and those of
+    `DottedTarget`, of `SquareMarker` or of `UndecodedTarget`. If not, a ValueError calls the
+    object `name` and names the field.
     """
     if not isinstance(content, dict) or not isinstance(content.get('targets'), list):
         raise ValueError(f'{name} is not an object with a list of targets')
-    targets = checked_targets(list(_targets(content['targets'], name)), name)
+    items = content['targets']
+    given = []
+    for item in items:
+        if not isinstance(item, dict):
+            raise ValueError(f'{name}: target is {shown(item)}, accepted is an object')
+        values = {field: item[field] for field in _NAMES if field in item}
+        given.append(Target(**_ABSENT | values))
     return [
         _of_its_kind(target, item, f'{name}: target {number}')
-        for number, (target, item) in enumerate(zip(targets, content['targets'], strict=True))
+        for number, (target, item) in enumerate(
+            zip(checked_targets(given, name), items, strict=True)
+        )
     ]
 
 
 def read_results(path: str | Path) -> dict[str, tuple[Target, ...]]:
-    """Return what was identified, from the output of `ahf identify --json`.
+    """Return what was identified in each image, by its name without folders.
 
-    Parameters
-    ----------
-    path : str or Path
-        A JSON object a line with 'image' and 'targets'; these need 'id', 'x' and 'y';
-        empty lines are ignored. With a list 'images', the targets are those of each of them. '-'
-        stands for standard input.
-
-    Returns
-    -------
-    dict of str to tuple of Target
-        By the name of the image, without folders.
-
-    Raises
-    ------
-    ValueError
-        If the file cannot be read, a line is not as described, or two lines are about images of
-        the same name; the message names both.
+    The file is the output of `ahf identify --json`, see `json_lines`: its objects have 'image'
+    and 'targets', see `targets_from_json`. With a list 'images', the targets are those of each of
+    them. A ValueError names a line that is not like that, or about an image of an earlier line.
     """
     results: dict[str, tuple[Target, ...]] = {}
     for where, content in json_lines(path):
         targets = tuple(targets_from_json(content, where))
-        for image in _image_names(content, where):
+        images = content.get('images', [content.get('image')])
+        if not isinstance(images, list) or not images:
+            raise ValueError(
+                f'{where}: images is {shown(images)}, accepted is a list of file names'
+            )
+        for file in images:
+            image = checked_file_name(file, f'{where}: image')
             if image in results:
                 raise ValueError(
                     f'{where}: {image} was on an earlier line, accepted is one an image'
@@ -166,21 +131,21 @@ def read_results(path: str | Path) -> dict[str, tuple[Target, ...]]:
 def json_lines(path: str | Path) -> Iterator[tuple[str, Any]]:
     """Yield what errors call each line of a file that is not empty, and the value of its JSON.
 
-    A folder stands for the `RESULTS_FILE` in it.
-
-    Raises
-    ------
-    ValueError
-        If the file, or standard input for '-', cannot be read, or a line is not JSON.
+    A folder stands for the `RESULTS_FILE` in it, '-' for standard input. A ValueError names what
+    cannot be read, or is not JSON.
     """
-    if path != '-' and Path(path).is_dir():
-        path = Path(path) / RESULTS_FILE
-    text = _standard_input() if path == '-' else read_text(path)
+    if path == '-':
+        try:
+            text = sys.stdin.read()
+        except (AttributeError, OSError, UnicodeDecodeError) as error:  # None where it is closed
+            raise ValueError(f'- cannot be read: {reason_of(error)}') from error
+    else:
+        path = Path(path) / RESULTS_FILE if Path(path).is_dir() else path
+        text = read_text(path)
     for number, line in enumerate(text.splitlines(), start=1):
-        if not line.strip():
-            continue
-        where = f'{path}, line {number}'
-        yield where, parsed_json(line, where)
+        if line.strip():
+            where = f'{path}, line {number}'
+            yield where, parsed_json(line, where)
 
 
 def parsed_json(text: str, where: str) -> Any:
@@ -191,69 +156,40 @@ def parsed_json(text: str, where: str) -> Any:
         raise ValueError(f'{where} is not JSON: {reason_of(error)}') from error
 
 
-def _standard_input() -> str:
-    try:
-        return sys.stdin.read()
-    except (AttributeError, OSError, UnicodeDecodeError) as error:  # None where it is closed
-        raise ValueError(f'- cannot be read: {reason_of(error)}') from error
-
-
-def _image_names(content: dict[str, Any], where: str) -> list[str]:
-    """Return the names of the image or of the images that a line is about."""
-    images = content.get('images', [content.get('image')])
-    if not isinstance(images, list) or not images:
-        raise ValueError(f'{where}: images is {shown(images)}, accepted is a list of file names')
-    return [checked_file_name(image, f'{where}: image') for image in images]
-
-
-def _targets(items: list[Any], name: str) -> Iterator[Target]:
-    """Yield targets whose fields are as they were read."""
-    for item in items:
-        if not isinstance(item, dict):
-            raise ValueError(f'{name}: target is {shown(item)}, accepted is an object')
-        values = {field.name: item.get(field.name, _ABSENT.get(field.name)) for field in _FIELDS}
-        yield Target(**values)
-
-
 def _of_its_kind(target: Target, item: dict[str, Any], name: str) -> Target:
     """Return a target with the fields of dotted, square or undecoded ones, if it has them."""
-    known = {field.name: getattr(target, field.name) for field in _FIELDS}
+    known = {field: getattr(target, field) for field in _NAMES}
     if item.get('dots'):
-        return DottedTarget(**known, **_dots(item, name))
+        dots = _rows(item, 'dots', 5, _MAXIMUM_DOTS, name)
+        template = checked_integer(
+            item.get('template_dots', 0), f'{name}: template_dots', 0, len(dots)
+        )
+        polarity = checked_integer(item.get('polarity', 1), f'{name}: polarity', -1, 1)
+        return DottedTarget(**known, dots=dots, template_dots=template, polarity=polarity)
     if item.get('corners'):
-        corners = tuple((x, y) for x, y in _rows(item, 'corners', 2, 4, name))
-        return SquareMarker(**known, corners=corners)
+        return SquareMarker(**known, corners=_rows(item, 'corners', 2, 4, name))
     if 'reason' not in item:
         return target
-    if item['reason'] not in REASONS:
+    if item['reason'] not in _REASONS:
         raise ValueError(
-            f'{name}: reason is {shown(item["reason"])}, accepted is one of {", ".join(REASONS)}'
+            f'{name}: reason is {shown(item["reason"])}, accepted is one of {", ".join(_REASONS)}'
         )
     likely = checked_integer(item.get('likely_id', -1), f'{name}: likely_id', -1, MAXIMUM_ID)
     family = checked_text(item.get('likely_family', ''), f'{name}: likely_family')
     return UndecodedTarget(**known, reason=item['reason'], likely_id=likely, likely_family=family)
 
 
-def _dots(item: dict[str, Any], name: str) -> dict[str, Any]:
-    dots = _rows(item, 'dots', 5, _MAXIMUM_DOTS, name)
-    count = checked_integer(item.get('template_dots', 0), f'{name}: template_dots', 0, len(dots))
-    polarity = checked_integer(item.get('polarity', 1), f'{name}: polarity', -1, 1)
-    return {'dots': tuple(dots), 'template_dots': count, 'polarity': polarity}
-
-
-def _rows(
-    item: dict[str, Any], field: str, width: int, most: int, name: str
-) -> list[tuple[float, ...]]:
-    """Return the rows of numbers in a field."""
+def _rows(item: dict[str, Any], field: str, width: int, most: int, name: str) -> Any:
+    """Return the rows of numbers in a field as a tuple of tuples of float."""
     rows = item[field]
     if not isinstance(rows, list) or len(rows) > most:
         raise ValueError(f'{name}: {field} is {shown(rows)}, accepted are at most {most} rows')
-    checked = []
     for row in rows:
         if not isinstance(row, list) or len(row) != width:
             raise ValueError(
                 f'{name}: {field} has {shown(row)}, accepted are rows of {width} numbers'
             )
-        limit = MAXIMUM_LENGTH_PX
-        checked.append(tuple(checked_number(it, f'{name}: {field}', -limit, limit) for it in row))
-    return checked
+    limit = MAXIMUM_LENGTH_PX
+    return tuple(
+        tuple(checked_number(it, f'{name}: {field}', -limit, limit) for it in row) for row in rows
+    )

@@ -28,25 +28,10 @@ def coded_target_array(
     header: Any,
     types: MessageTypes,
 ) -> Any:
-    """Return the message of an identification.
+    """Return the CodedTargetArray of an identification, of the classes in `types`.
 
-    Parameters
-    ----------
-    identification : Identification
-        The identification of one image.
-    family : str
-        What was looked for: a family, or several as the settings list them.
-    shape : tuple of int
-        Height and width of the image, px.
-    header : std_msgs/Header
-        Header of the image.
-    types : MessageTypes
-        Classes of the messages.
-
-    Returns
-    -------
-    CodedTargetArray
-        An instance of that class of `types`.
+    `family` is what was looked for, a family or several as the settings list them; `shape` is
+    height and width of the image, px, and `header` its header.
     """
     height, width = shape
     shift = identification.edge_shift
@@ -58,7 +43,10 @@ def coded_target_array(
         expected=identification.expected,
         estimated=identification.estimated,
         mirrored=identification.mirrored,
-        targets=[_coded_target(target, types) for target in identification.targets],
+        targets=[
+            types.CodedTarget(**_values(it) | {'covariance': np.array(it.covariance)})
+            for it in identification.targets
+        ],
         filter=types.FilterState(**asdict(identification.filter)),
         edge_shift=math.nan if shift is None else shift,
     )
@@ -80,11 +68,6 @@ def identification_from(message: Any) -> Identification:
         mirrored=message.mirrored,
         edge_shift=None if math.isnan(shift) else shift,
     )
-
-
-def _coded_target(target: Target, types: MessageTypes) -> Any:
-    """Return the message of a target, which may be of a class with more fields than `Target`."""
-    return types.CodedTarget(**_values(target) | {'covariance': np.array(target.covariance)})
 
 
 def _values(source: Any) -> dict[str, Any]:

@@ -3,34 +3,30 @@
 from __future__ import annotations
 
 import csv
-import io
+import math
 from pathlib import Path
 from typing import Any
 
-from ahf_ros.interchange.fields import checked_file_name, parsed_integer, parsed_number
-from ahf_ros.interchange.files import read_text, write_whole
+from ahf_ros.interchange.files import checked_file_name, csv_table, read_text, write_whole
 from ahf_ros.target import UNDECODED, TrueTarget, Truth
 from ahf_ros.target_check import MAXIMUM_ID, MAXIMUM_LENGTH_PX
+from ahf_ros.text import shown
+
+_LIMITS = {
+    'id': (UNDECODED, MAXIMUM_ID),
+    'x': (-MAXIMUM_LENGTH_PX, MAXIMUM_LENGTH_PX),
+    'y': (-MAXIMUM_LENGTH_PX, MAXIMUM_LENGTH_PX),
+    'confirmed': (0, 1),
+}
+"""Columns with numbers, and what is accepted in them: integers if the limits are integers."""
 
 
 def read_truth(path: str | Path) -> dict[str, tuple[TrueTarget, ...]]:
-    """Return the targets that images show, from a table.
+    """Return the targets that images show, from a CSV file in UTF-8.
 
-    Parameters
-    ----------
-    path : str or Path
-        CSV file in UTF-8. Its header names the columns image, id, x, y and, optionally, confirmed
-        (1 or 0), in any order; other columns are ignored, and so are the folders of an image.
-
-    Returns
-    -------
-    dict of str to tuple of TrueTarget
-        The targets of each image.
-
-    Raises
-    ------
-    ValueError
-        If the file cannot be read or a line is not as described; the message names both.
+    Its header names the columns image, id, x, y and, optionally, confirmed (1 or 0), in any order;
+    other columns are ignored, and so are the folders of an image. A ValueError names a file or
+    line that is not like that.
     """
     rows = csv.DictReader(read_text(path).splitlines())
     truth: dict[str, list[TrueTarget]] = {}
@@ -53,35 +49,32 @@ def read_truth(path: str | Path) -> dict[str, tuple[TrueTarget, ...]]:
 
 
 def write_truth(path: str | Path, truth: Truth) -> None:
-    """Write the targets that images show as a table for `read_truth`.
+    """Write the targets that images show for `read_truth`, as a file that is whole or not there.
 
-    Parameters
-    ----------
-    path : str or Path
-        The file; an existing one is replaced, a missing folder is created.
-    truth : mapping of str to sequence of TrueTarget
-        The targets of each image; coordinates are written to 0.0001 px.
-
-    Raises
-    ------
-    ValueError
-        If the file cannot be written.
+    Coordinates are written to 0.0001 px. A ValueError names a file that cannot be written.
     """
     rows = [['image', 'id', 'x', 'y', 'confirmed']]
     for name, targets in truth.items():
         for item in targets:
             place = [f'{item.x:.4f}', f'{item.y:.4f}']
             rows.append([name, str(item.id), *place, str(int(item.confirmed))])
-    table = io.StringIO()
-    csv.writer(table, lineterminator='\n').writerows(rows)
-    write_whole(path, table.getvalue().encode())
+    write_whole(path, csv_table(rows))
 
 
 def _target(row: dict[str, Any], where: str) -> TrueTarget:
-    place = -MAXIMUM_LENGTH_PX, MAXIMUM_LENGTH_PX
-    return TrueTarget(
-        parsed_integer(row['id'], f'{where}: id', UNDECODED, MAXIMUM_ID),
-        parsed_number(row['x'], f'{where}: x', *place),
-        parsed_number(row['y'], f'{where}: y', *place),
-        parsed_integer(row.get('confirmed', 1), f'{where}: confirmed', 0, 1) == 1,
-    )
+    values = {}
+    for name, (minimum, maximum) in _LIMITS.items():
+        text = row.get(name, 1)  # only `confirmed` may be missing
+        whole = isinstance(minimum, int)
+        try:
+            number = int(text) if whole else float(text)
+        except (TypeError, ValueError):
+            number = math.nan
+        if not minimum <= number <= maximum:
+            raise ValueError(
+                f'{where}: {name} is {shown(text)}, accepted is '
+                f'{"an integer" if whole else "a number"} from {minimum:.10g} to {maximum:.10g}'
+            )
+        values[name] = number
+    confirmed = values['confirmed'] == 1
+    return TrueTarget(int(values['id']), values['x'], values['y'], confirmed)

@@ -36,15 +36,9 @@ _WIDTHS = {letter: width / 1000 for width, letters in _LETTERS.items() for lette
 
 @dataclass(frozen=True, slots=True)
 class Ink:
-    """A target: what is inside an odd number of contours is black.
+    """A target named `name`: what is inside an odd number of contours is black.
 
-    Attributes
-    ----------
-    name : str
-        Of the target, unique on the page.
-    x, y, scale : float
-        Centre, and length of a unit of the contours.
-    contours : tuple of Contour
+    Its centre is at `x`, `y`, and `scale` is the length of a unit of the contours.
     """
 
     name: str
@@ -65,17 +59,10 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """A line of text.
+    """A line of text in letters of which one em is `size`.
 
-    Attributes
-    ----------
-    x, y : float
-        Where its baseline begins, or its middle where it is `centred`.
-    size : float
-        One em.
-    content : str
-    centred, upwards : bool
-        Whether it is centred at `x`, and whether it runs upwards, not to the right.
+    Its baseline begins at `x`, `y`, or has its middle there where it is `centred`. It runs to the
+    right, or upwards.
     """
 
     x: float
@@ -98,11 +85,5 @@ class Drawing:
 
 
 def text_width(content: str, size: float) -> float:
-    """Return the width of a line of ASCII text in Helvetica, by Adobe's metrics of the font.
-
-    Examples
-    --------
-    >>> text_width('100 mm', 10.0)
-    36.12
-    """
+    """Return the width of a line of ASCII text in Helvetica, by Adobe's metrics of the font."""
     return round(size * sum(_WIDTHS[letter] for letter in content), 6)

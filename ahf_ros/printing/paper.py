@@ -30,42 +30,21 @@ PAGES = {
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """A page.
-
-    Attributes
-    ----------
-    name : str
-        Its name, or its size as text.
-    width, height : float
-        In mm.
-    """
+    """A page of `width` and `height` mm; `name` is its name, or its size as text."""
 
     name: str
     width: float
     height: float
 
-    def turned(self) -> Page:
-        """Return the page with width and height exchanged."""
-        return Page(f'{self.name} landscape', self.height, self.width)
-
 
 @dataclass(frozen=True, slots=True)
 class LabelSheet:
-    """A sheet of round labels in a grid; lengths are in mm.
+    """A sheet of round labels in a grid on a letter page; lengths are in mm.
 
-    Attributes
-    ----------
-    page : Page
-    columns, rows : int
-    diameter : float
-        Of a label.
-    left, top : float
-        From the edges of the page to the first label.
-    pitch_x, pitch_y : float
-        From the centre of one label to the next one's.
+    `left` and `top` lead from the edges of the page to the first label, `pitch_x` and `pitch_y`
+    from the centre of one label to the next one's.
     """
 
-    page: Page
     columns: int
     rows: int
     diameter: float
@@ -75,11 +54,8 @@ class LabelSheet:
     pitch_y: float
 
 
-_LETTER = Page('letter', *PAGES['letter'])
-
-
 def _inches(columns: int, rows: int, *lengths: float) -> LabelSheet:
-    return LabelSheet(_LETTER, columns, rows, *(25.4 * length for length in lengths))
+    return LabelSheet(columns, rows, *(25.4 * length for length in lengths))
 
 
 LABEL_SHEETS = {
@@ -91,24 +67,10 @@ LABEL_SHEETS = {
 
 
 def length_in(field: str, text: str) -> float:
-    """Return a length in mm.
+    """Return the length, mm, that the text of a field stands for.
 
-    Parameters
-    ----------
-    field : str
-        What errors call the length.
-    text : str
-        A number above 0 with one of the units mm, cm, m, in, pt; mm where there is none.
-
-    Raises
-    ------
-    ValueError
-        If it is not such a length, or longer than any page.
-
-    Examples
-    --------
-    >>> length_in('dot_radius', '0.5 in')
-    12.7
+    It is a number above 0 with one of the units mm, cm, m, in, pt, or mm where there is none. A
+    ValueError is raised if it is not, or longer than any page.
     """
     found = re.fullmatch(f'{_NUMBER}({"|".join(_UNITS)})?\\s*', text)
     length = float(found[1]) * _UNITS[found[2] or 'mm'] if found else 0.0
@@ -121,22 +83,9 @@ def length_in(field: str, text: str) -> float:
 
 
 def page_in(text: str) -> Page:
-    """Return the page that a text names.
+    """Return the page that a text names, or raise a ValueError.
 
-    Parameters
-    ----------
-    text : str
-        One of `PAGES` in upper or lower case, or width x height with a unit, such as 210x297mm.
-
-    Raises
-    ------
-    ValueError
-        If there is no such page.
-
-    Examples
-    --------
-    >>> page_in('a4').height, page_in('8.5x11in').name
-    (297.0, '8.5x11in')
+    It is one of `PAGES` in upper or lower case, or width x height with a unit, such as 210x297mm.
     """
     for name, size in PAGES.items():
         if text.lower() == name.lower():

@@ -8,23 +8,15 @@ from ahf_ros.codes.designs import HALF_SIDE, Proportions, proportions
 from ahf_ros.codes.families import FAMILY_NAMES, check_numbers, numbers_of
 from ahf_ros.codes.selection import select_ids
 from ahf_ros.codes.square import SQUARE_NAMES
-from ahf_ros.printing.paper import LABEL_SHEETS, LabelSheet, Page, length_in, page_in
+from ahf_ros.printing.paper import LABEL_SHEETS, Page, length_in, page_in
 from ahf_ros.settings.parameter import check_parameters, numbers_in, parameter
 
 _NO_LABELS = 'none'
-_DEFAULT_PAGE = 'A4'
-_DEFAULT_RADIUS = '4mm'
 
 
 @dataclass(frozen=True, slots=True)
 class SheetSettings:
-    """Targets to print, and the pages that they are printed on.
-
-    Examples
-    --------
-    >>> SheetSettings(ids='1-3, 7', dot_radius='0.25in').numbers
-    [1, 2, 3, 7]
-    """
+    """Targets to print, and the pages that they are printed on."""
 
     family: str = parameter('metashape12', 'Family of the targets.', choices=FAMILY_NAMES)
     family_file: str = parameter(
@@ -70,13 +62,7 @@ class SheetSettings:
     )
 
     def __post_init__(self) -> None:
-        """Check each parameter, and that they fit each other.
-
-        Raises
-        ------
-        ValueError
-            If not; the message names the field, its value and what is accepted.
-        """
+        """Check each parameter, and that they fit each other."""
         check_parameters(self)
         check_numbers('ids', numbers_in('ids', self.ids), (self.family,), self.family_file)
         square = self.family in SQUARE_NAMES
@@ -90,7 +76,7 @@ class SheetSettings:
                 f'side is {self.side!r}, accepted is a length for a family of square markers and '
                 'without dot_radius'
             )
-        if self.labels != _NO_LABELS and (self.page or self.landscape):
+        if self.on_labels and (self.page or self.landscape):
             raise ValueError(
                 f'labels is {self.labels!r}, accepted with page and landscape is {_NO_LABELS}: '
                 'labels have their own page'
@@ -99,13 +85,7 @@ class SheetSettings:
 
     @property
     def numbers(self) -> list[int]:
-        """IDs of the targets, ascending.
-
-        Raises
-        ------
-        ValueError
-            If so many as `best` are not found.
-        """
+        """IDs of the targets, ascending; a ValueError if so many as `best` are not found."""
         given = numbers_in('ids', self.ids)
         every = sorted(given) if given else list(numbers_of(self.family, self.family_file))
         if not self.best:
@@ -122,7 +102,7 @@ class SheetSettings:
         """Radius of the dot, mm."""
         if self.side:
             return length_in('side', self.side) / (2 * HALF_SIDE)
-        return length_in('dot_radius', self.dot_radius or _DEFAULT_RADIUS)
+        return length_in('dot_radius', self.dot_radius or '4mm')
 
     @property
     def size(self) -> str:
@@ -140,24 +120,19 @@ class SheetSettings:
         return 2 * HALF_SIDE if self.family in SQUARE_NAMES else 1.0
 
     @property
-    def has_pinhole(self) -> bool:
-        """Whether the dot has a hole."""
-        return self.pinhole > 0 and self.family != 'gsi' and self.family not in SQUARE_NAMES
-
-    @property
     def proportions(self) -> Proportions:
         """What all targets have in common, in radii of the dot."""
         return proportions(self.family, self.family_file)
 
     @property
-    def sheet(self) -> LabelSheet | None:
-        """The sheet of labels, None where there is none."""
-        return LABEL_SHEETS.get(self.labels)
+    def on_labels(self) -> bool:
+        """Whether targets are printed on labels."""
+        return self.labels != _NO_LABELS
 
     @property
     def paper(self) -> Page:
         """The page."""
-        if self.sheet:
-            return self.sheet.page
-        page = page_in(self.page or _DEFAULT_PAGE)
-        return page.turned() if self.landscape else page
+        page = page_in('letter' if self.on_labels else self.page or 'A4')
+        if self.landscape:
+            return Page(f'{page.name} landscape', page.height, page.width)
+        return page

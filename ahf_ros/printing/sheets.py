@@ -12,7 +12,7 @@ from functools import cached_property
 
 from ahf_ros.codes.designs import circle, printed_design
 from ahf_ros.printing.drawing import Drawing, Ink, Line, Text, text_width
-from ahf_ros.printing.paper import LabelSheet, Page
+from ahf_ros.printing.paper import LABEL_SHEETS
 from ahf_ros.printing.settings import SheetSettings
 from ahf_ros.text import counted
 
@@ -39,17 +39,11 @@ _CUT_LENGTH = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """The places for targets on each page.
+    """The centres of the targets on each page, in the order in which they are filled.
 
-    Attributes
-    ----------
-    places : tuple of tuple of 2 float
-        Centres of the targets, in the order in which they are filled.
-    cuts_x, cuts_y : tuple of float
-        Where targets are cut out: the borders of columns, ascending, and of rows, descending;
-        empty where they are on labels.
-    caption : callable
-        From an ID to its caption about a centre at (0, 0).
+    Targets are cut out at `cuts_x` and `cuts_y`, the borders of columns, ascending, and of rows,
+    descending; they are empty where targets are on labels. `caption` leads from an ID to its
+    caption about a centre at (0, 0).
     """
 
     places: tuple[tuple[float, float], ...]
@@ -57,40 +51,25 @@ class Layout:
     cuts_y: tuple[float, ...]
     caption: Callable[[int], tuple[Text, ...]]
 
-    @property
-    def columns(self) -> int:
-        """Number of columns between cuts."""
-        return len(self.cuts_x) - 1
-
 
 def page_layout(settings: SheetSettings, longest: int) -> Layout:
-    """Return the places for targets on each page.
+    """Return the places for targets on each page, with room for the ID `longest`.
 
-    Parameters
-    ----------
-    settings : SheetSettings
-    longest : int
-        The ID that takes the most room.
-
-    Raises
-    ------
-    ValueError
-        If the page or the label is too small for a single target.
+    A ValueError with the largest accepted size is raised if the page or the label is too small for
+    a single target.
     """
-
-    def layout_of(radius: float) -> Layout | None:
-        if settings.sheet:
-            return _on_labels(settings, settings.sheet, radius, longest)
-        return _in_cells(settings, settings.paper, radius, longest)
-
-    layout = layout_of(settings.radius)
+    layout_of = _on_labels if settings.on_labels else _in_cells
+    layout = layout_of(settings, settings.radius, longest)
     if layout:
         return layout
     fits, too_large = 0.0, settings.radius
     for _ in range(_HALVINGS):
         middle = (fits + too_large) / 2
-        fits, too_large = (middle, too_large) if layout_of(middle) else (fits, middle)
-    where = f'labels of {settings.labels}' if settings.sheet else f'a page {settings.paper.name}'
+        fitting = layout_of(settings, middle, longest)
+        fits, too_large = (middle, too_large) if fitting else (fits, middle)
+    where = (
+        f'labels of {settings.labels}' if settings.on_labels else f'a page {settings.paper.name}'
+    )
     name, factor = ('side', settings.size_factor) if settings.side else ('dot_radius', 1.0)
     most = math.floor(100 * factor * fits) / 100
     raise ValueError(
@@ -99,9 +78,11 @@ def page_layout(settings: SheetSettings, longest: int) -> Layout:
     )
 
 
-def _in_cells(settings: SheetSettings, page: Page, radius: float, longest: int) -> Layout | None:
+def _in_cells(settings: SheetSettings, radius: float, longest: int) -> Layout | None:
     """Return a grid of cells side by side, None where there is not room for one."""
-    zone, size = settings.proportions.quiet_zone * radius, _text_size(radius)
+    page = settings.paper
+    zone = settings.proportions.quiet_zone * radius
+    size = min(max(_TEXT_SHARE * radius, _TEXT[0]), _TEXT[1])
     words = str(longest), settings.family, _any_size(settings)
     inner = max(2 * zone, *(text_width(word, size) for word in words))
     width = inner + 2 * _PAD
@@ -131,20 +112,18 @@ def _in_cells(settings: SheetSettings, page: Page, radius: float, longest: int) 
     return Layout(places[: settings.per_page or None], cuts_x, cuts_y, caption)
 
 
-def _on_labels(
-    settings: SheetSettings, sheet: LabelSheet, radius: float, longest: int
-) -> Layout | None:
+def _on_labels(settings: SheetSettings, radius: float, longest: int) -> Layout | None:
     """Return the middles of labels, None where a target and its caption do not fit on one."""
+    sheet = LABEL_SHEETS[settings.labels]
     zone, size = settings.proportions.quiet_zone * radius, _TEXT[0]
     reach = sheet.diameter / 2 - _LABEL_PAD
-
     height = zone + (_ABOVE + _BELOW) * size
     for words in (f'{longest}  {_any_size(settings)}', settings.family):
         if math.hypot(text_width(words, size) / 2, height) > reach:
             return None
     first = sheet.left + sheet.diameter / 2, sheet.top + sheet.diameter / 2
     places = tuple(
-        (first[0] + column * sheet.pitch_x, sheet.page.height - first[1] - row * sheet.pitch_y)
+        (first[0] + column * sheet.pitch_x, settings.paper.height - first[1] - row * sheet.pitch_y)
         for row in range(sheet.rows)
         for column in range(sheet.columns)
     )
@@ -161,11 +140,6 @@ def _any_size(settings: SheetSettings) -> str:
     return f'{settings.size_name} 00.00 mm'
 
 
-def _text_size(radius: float) -> float:
-    smallest, largest = _TEXT
-    return min(max(_TEXT_SHARE * radius, smallest), largest)
-
-
 def _wrapped(words: tuple[str, ...], size: float, width: float) -> list[str]:
     """Return words in as few lines as there is room for."""
     lines: list[str] = []
@@ -180,16 +154,7 @@ def _wrapped(words: tuple[str, ...], size: float, width: float) -> list[str]:
 
 @dataclass(frozen=True)
 class Placed:
-    """Where a target is printed.
-
-    Attributes
-    ----------
-    id, code : int
-    page : int
-        From 1 on.
-    x, y : float
-        Its centre from the lower left corner of the page, y upwards, mm.
-    """
+    """Where a target is printed: on which page, from 1 on, and where on it its centre is, mm."""
 
     id: int
     code: int
@@ -203,12 +168,6 @@ class Sheets:
     """The pages of a set of targets.
 
     A page or a label that is too small for a target raises a ValueError on the first use.
-
-    Examples
-    --------
-    >>> sheets = Sheets(SheetSettings(ids='1-54'))
-    >>> sheets.count, len(next(sheets.pages()).inks)
-    (2, 35)
     """
 
     settings: SheetSettings
@@ -281,12 +240,13 @@ class Sheets:
             length = _bar_length(side)
             if not length:
                 continue
-            marks = [((MARGIN, _BAR), (MARGIN + length, _BAR))]
+            ends = [(MARGIN, _BAR, MARGIN + length, _BAR)]
             for at in range(0, length + 1, 10):
                 tick = _BAR + (_TICK if at % length else _END)
-                marks.append(((MARGIN + at, _BAR), (MARGIN + at, tick)))
-            turned = [(_along(start, upwards), _along(end, upwards)) for start, end in marks]
-            lines += [Line(start, end, _THIN) for start, end in turned]
+                ends.append((MARGIN + at, _BAR, MARGIN + at, tick))
+            for x1, y1, x2, y2 in ends:
+                start, end = ((y1, x1), (y2, x2)) if upwards else ((x1, y1), (x2, y2))
+                lines.append(Line(start, end, _THIN))
             place = MARGIN + length + 1, _BAR
             if upwards:
                 place = _BAR + _BAR_TEXT * 0.75, MARGIN + length + 1
@@ -299,11 +259,8 @@ class Sheets:
         length = _bar_length(width)
         begin = MARGIN + length + 1 + text_width(f'{length} mm   ', _BAR_TEXT)
         number = f'page {page} of {self.count}'
-        for words in (
-            f'{self.title}, {number}. Print at 100 %.',
-            f'{self.title}, {number}',
-            number,
-        ):
+        long = f'{self.title}, {number}'
+        for words in (f'{long}. Print at 100 %.', long, number):
             if begin + text_width(words, _BAR_TEXT) <= width - MARGIN / 2:
                 return [Text(begin, _BAR, _BAR_TEXT, words, centred=False)]
         return []
@@ -315,18 +272,16 @@ def _bar_length(side: float) -> int:
     return next((length for length in BARS if length <= room), 0)
 
 
-def _along(point: tuple[float, float], upwards: bool) -> tuple[float, float]:
-    return (point[1], point[0]) if upwards else point
-
-
 def _cut_marks(layout: Layout, count: int) -> list[Line]:
     """Return a cross at each corner of the cells of the first `count` targets."""
+    columns = len(layout.cuts_x) - 1
+    if columns < 1:
+        return []
     corners = {
-        (column + right, row + down)
-        for row, column in (divmod(index, max(layout.columns, 1)) for index in range(count))
+        (index % columns + right, index // columns + down)
+        for index in range(count)
         for right in (0, 1)
         for down in (0, 1)
-        if layout.cuts_x
     }
     lines = []
     for column, row in sorted(corners):

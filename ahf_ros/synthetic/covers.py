@@ -11,10 +11,10 @@ import cv2
 import numpy as np
 
 from ahf_ros.codes.designs import HALF_SIDE, proportions
-from ahf_ros.codes.dots import DotFamily, dot_family
+from ahf_ros.codes.dots import DotFamily
+from ahf_ros.codes.families import code_family
 from ahf_ros.codes.gsi import PointFamily
-from ahf_ros.codes.gsi import point_family
-from ahf_ros.codes.ring import Family, family, sectors
+from ahf_ros.codes.ring import Family, sectors
 from ahf_ros.codes.square import SQUARE_NAMES, marker
 
 _CELL = 32  # side of a cell in the picture of a square marker, px
@@ -61,18 +61,15 @@ def design(
     """
     if name in SQUARE_NAMES:
         word, cover = number, square_cover(name, number, HALF_SIDE, turn, growth)
-    elif name == 'gsi':
-        points = point_family(file)
-        word = points.word(number)
-        cover = _point_cover(points, word, turn, growth)
-    elif name == 'dots':
-        dots = dot_family(file)
-        word = dots.word(number)
-        cover = _dot_ring_cover(dots, word, turn, pinhole, growth)
     else:
-        ring = family(name)
-        word = ring.word(number)
-        cover = ring_cover(ring, word, turn, pinhole, growth)
+        code = code_family(name, file)
+        word = code.word(number)
+        if isinstance(code, PointFamily):
+            cover = _point_cover(code, word, turn, growth)
+        elif isinstance(code, DotFamily):
+            cover = _dot_ring_cover(code, word, turn, pinhole, growth)
+        else:
+            cover = ring_cover(code, word, turn, pinhole, growth)
     common = proportions(name, file)
     return Design(
         code=word, cover=cover, reach=common.reach + max(growth, 0.0), radius=common.radius

@@ -40,9 +40,13 @@ def target(number: int, x: float, y: float, family: str = 'aicon14') -> Target:
     return Target(number, 19, x, y, 8.0, 7.5, 0.25, 0.99, covariance, family)
 
 
+def image(path: str, *targets: Target) -> list[MeasuredImage]:
+    return [MeasuredImage(path, 60, 40, targets)]
+
+
 IMAGES = (
     MeasuredImage(
-        'in/a b&ü.jpg'.replace(' ', '-'),
+        'in/a-b&ü.jpg',
         8000,
         6000,
         (
@@ -62,46 +66,47 @@ EXPECTED = {
 }
 
 
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with all exports, each of which has files of its own."""
+    folder = tmp_path_factory.mktemp('exports')
+    files = [file for name in FORMATS for file in Export(name, folder).write(IMAGES, CONTROL)]
+    assert len(set(files)) == len(files)
+    assert {it for it in folder.rglob('*') if it.is_file()} == set(files)
+    return folder
+
+
 @pytest.mark.parametrize('name', FORMATS)
-def test_places_are_those_of_the_images(name: str, tmp_path: Path) -> None:
-    Export(name, tmp_path).write(IMAGES, CONTROL)
-    found = {
-        (Path(image).name, label): it for (image, label), it in READERS[name](tmp_path).items()
-    }
+def test_places_are_those_of_the_images(name: str, folder: Path) -> None:
+    found = {(Path(image).name, label): it for (image, label), it in READERS[name](folder).items()}
     expected = {key: it for key, it in EXPECTED.items() if name != 'odm' or key[1] != '11'}
     assert found.keys() == expected.keys()
     for key, place in expected.items():
         assert math.dist(found[key], place) < 0.001
 
 
-def test_every_format_has_files_of_its_own_and_the_same_ones_again(tmp_path: Path) -> None:
-    files = [file for name in FORMATS for file in Export(name, tmp_path).write(IMAGES, CONTROL)]
-    assert len(set(files)) == len(files)
-    before = {file: file.read_bytes() for file in files}
-    for name in FORMATS:
-        Export(name, tmp_path).write(IMAGES, CONTROL)
-    assert {file: file.read_bytes() for file in files} == before
-    assert {it for it in tmp_path.rglob('*') if it.is_file()} == set(files)
+@pytest.mark.parametrize('name', FORMATS)
+def test_the_same_survey_gives_the_same_files(name: str, folder: Path, tmp_path: Path) -> None:
+    for file in Export(name, tmp_path).write(IMAGES, CONTROL):
+        assert file.read_bytes() == (folder / file.relative_to(tmp_path)).read_bytes()
 
 
-def test_control_points_go_along(tmp_path: Path) -> None:
-    for name in FORMATS:
-        Export(name, tmp_path).write(IMAGES, CONTROL)
+def test_control_points_go_along(folder: Path) -> None:
     seven = tuple(POINTS['007'])
-    root = ElementTree.parse(tmp_path / 'markers.xml').getroot()
+    root = ElementTree.parse(folder / 'markers.xml').getroot()
     marker = root.find("chunk/markers/marker[@label='7']/reference")
     assert tuple(float(marker.attrib[axis]) for axis in 'xyz') == seven
     assert root.find("chunk/markers/marker[@label='11']/reference") is None
-    file = tmp_path / 'MMVII-PhgrProj/ObjMesInstr/ahf/MesGCP-ahf.xml'
+    file = folder / 'MMVII-PhgrProj/ObjMesInstr/ahf/MesGCP-ahf.xml'
     items = ElementTree.parse(file).getroot().findall('Data/SetGCP/Measures/el')
     assert [item.findtext('Name') for item in items] == ['"7"', '"9"']
     assert tuple(map(float, items[0].findtext('Pt').split())) == seven
-    lines = (tmp_path / 'gcp_list.txt').read_text().splitlines()
+    lines = (folder / 'gcp_list.txt').read_text().splitlines()
     assert (lines[0], len(lines)) == ('EPSG:25832', 4)
     assert tuple(map(float, lines[1].split()[:3])) == seven
-    lines = (tmp_path / 'ground_control.csv').read_text().splitlines()
+    lines = (folder / 'ground_control.csv').read_text().splitlines()
     assert lines[1].split(',') == ['7', '0.1', '-2.5', '300000.0']
-    with (tmp_path / 'targets.csv').open(newline='') as table:
+    with (folder / 'targets.csv').open(newline='') as table:
         rows = {(row['image'], row['label']): row for row in csv.DictReader(table)}
     assert float(rows['in/deep/b.jpg', '7']['control_z']) == 3e5
     assert rows['in/deep/b.jpg', '11']['control_z'] == ''
@@ -117,31 +122,30 @@ def test_what_is_no_control_point_is_said() -> None:
 
 
 def test_labels_name_the_family_where_there_are_several() -> None:
-    mixed = MeasuredImage('a.jpg', 60, 40, (target(7, 1, 2), target(7, 3, 4, 'metashape12')))
-    assert make_survey([mixed]).labels == ('aicon14_7', 'metashape12_7')
+    mixed = image('a.jpg', target(7, 1, 2), target(7, 3, 4, 'metashape12'))
+    assert make_survey(mixed).labels == ('aicon14_7', 'metashape12_7')
     with pytest.raises(ValueError, match="'7' may be aicon14_7 or metashape12_7, accepted is"):
-        make_survey([mixed], Control({'7': np.zeros(3)}))
-    found = make_survey([mixed], Control({'metashape12_7': np.zeros(3)}))
+        make_survey(mixed, Control({'7': np.zeros(3)}))
+    found = make_survey(mixed, Control({'metashape12_7': np.zeros(3)}))
     assert list(found.control) == ['metashape12_7']
-
-
-def same_image(folder: str = 'other') -> tuple[MeasuredImage, ...]:
-    return (*IMAGES[1:], MeasuredImage(f'{folder}/b.jpg', 60, 40, ()))
 
 
 @pytest.mark.parametrize('name', FORMATS)
 def test_images_of_the_same_name(name: str, tmp_path: Path) -> None:
+    alike = [*IMAGES[1:], *image('other/b.jpg')]
     if FORMATS[name].paths:
-        Export(name, tmp_path).write(same_image())
-        with pytest.raises(
-            ValueError, match=r"'in/\./deep/b\.jpg' is there twice, accepted is one"
-        ):
-            Export(name, tmp_path).write(same_image('in/./deep'))
+        Export(name, tmp_path).write(alike)
+        with pytest.raises(ValueError, match=r"'in/\./deep/b\.jpg' is there twice, accepted is"):
+            Export(name, tmp_path).write([*IMAGES, *image('in/./deep/b.jpg')])
     else:
         message = f"{name} knows images by their names, 'other/b.jpg' and 'in/deep/b.jpg' have"
         with pytest.raises(ValueError, match=message):
-            Export(name, tmp_path).write(same_image(), CONTROL)
+            Export(name, tmp_path).write(alike, CONTROL)
         assert list(tmp_path.iterdir()) == []
+
+
+TWICE = Control({'7': np.ones(3), '07': np.ones(3)})
+SEVEN = target(7, 1, 1)
 
 
 @pytest.mark.parametrize(
@@ -149,46 +153,16 @@ def test_images_of_the_same_name(name: str, tmp_path: Path) -> None:
     [
         ('odm', IMAGES, Control(POINTS, 'UTM 32'), "is 'UTM 32', accepted is EPSG:CODE, WGS84"),
         ('odm', IMAGES, None, 'odm has only control points'),
-        (
-            'odm',
-            IMAGES,
-            Control(POINTS),
-            "odm has no local coordinates, control_crs is '', accep",
-        ),
+        ('odm', IMAGES, Control(POINTS), "odm has no local coordinates, control_crs is '', accep"),
+        ('odm', image('a b.jpg', SEVEN), CONTROL, "odm splits at blanks, .* without: 'a b.jpg'"),
         ('opf', IMAGES, Control(POINTS), 'opf has a standard deviation, accepted is a control si'),
         ('csv', IMAGES, Control({'5': np.zeros(3)}), 'the list has 5, the images show 7, 9, 11'),
-        (
-            'csv',
-            IMAGES,
-            Control({'7': np.ones(3), '07': np.ones(3)}),
-            'control point 7 is there t',
-        ),
+        ('csv', IMAGES, TWICE, 'control point 7 is there twice'),
         ('csv', IMAGES[2:], None, 'no image shows an identified target, accepted is at least one'),
-        (
-            'csv',
-            [MeasuredImage('a', 9, 9, (target(7, 1, 1), target(7, 2, 2)))],
-            None,
-            'a shows target 7 twice',
-        ),
-        ('csv', [MeasuredImage('\udc80', 9, 9, ())], None, 'accepted is a name that prints'),
-        (
-            'odm',
-            [MeasuredImage('a b.jpg', 9, 9, (target(7, 1, 1),))],
-            CONTROL,
-            "odm splits at blanks, accepted is an image without: 'a b.jpg'",
-        ),
-        (
-            'mmvii',
-            [MeasuredImage('a".jpg', 9, 9, (target(7, 1, 1),))],
-            None,
-            'accepted is a name without "',
-        ),
-        (
-            'mmvii',
-            [MeasuredImage('a.jpg', 9, 9, (target(7, 1, 1), target(7, 2, 2, 'my"own')))],
-            None,
-            'accepted is a label without "',
-        ),
+        ('csv', image('a', SEVEN, target(7, 2, 2)), None, 'a shows target 7 twice'),
+        ('csv', image('\udc80'), None, 'accepted is a name that prints'),
+        ('mmvii', image('a".jpg', SEVEN), None, 'accepted is a name without "'),
+        ('mmvii', image('a', SEVEN, target(7, 2, 2, 'my"own')), None, 'is a label without "'),
     ],
 )
 def test_what_a_format_cannot_hold_is_named(
@@ -260,13 +234,12 @@ class Camera(SimpleNamespace):
     __hash__ = object.__hash__
 
 
-def test_the_script_sets_the_markers(tmp_path: Path, monkeypatch, capsys) -> None:
-    Export('metashape', tmp_path).write(IMAGES, CONTROL)
+def test_the_script_sets_the_markers(folder: Path, monkeypatch, capsys) -> None:
     camera = Camera(label='b', photo=SimpleNamespace(path='C:\\photos\\b.jpg'))
     there = Marker('7')
     module = console([camera], [there])
     monkeypatch.setitem(sys.modules, 'Metashape', module)
-    runpy.run_path(str(tmp_path / 'metashape_console.py'), run_name='__main__')
+    runpy.run_path(str(folder / 'metashape_console.py'), run_name='__main__')
     assert capsys.readouterr().out == 'a-b&ü.jpg is not in the active chunk\n'
     assert there.projections == {camera: ((0.0, 20.5), True)}
     assert (there.reference.location, there.reference.enabled) == (tuple(POINTS['007']), True)
@@ -276,10 +249,9 @@ def test_the_script_sets_the_markers(tmp_path: Path, monkeypatch, capsys) -> Non
     assert chunk.markers[2].reference.location is None
 
 
-def test_colmap_reads_the_database(tmp_path: Path) -> None:
+def test_colmap_reads_the_database(folder: Path) -> None:
     pycolmap = pytest.importorskip('pycolmap', reason='pycolmap is a large download')
-    Export('colmap', tmp_path).write(IMAGES)
-    with pycolmap.Database.open(tmp_path / 'targets.db') as database:
+    with pycolmap.Database.open(folder / 'targets.db') as database:
         images = {image.name: image for image in database.read_all_images()}
         assert sorted(images) == ['a-b&ü.jpg', 'deep/b.jpg', 'deep/c.jpg']
         first, second = images['a-b&ü.jpg'], images['deep/b.jpg']
@@ -293,20 +265,18 @@ def test_colmap_reads_the_database(tmp_path: Path) -> None:
         assert geometry.inlier_matches.tolist() == [[0, 0]]
 
 
-def test_pairs_without_a_common_point_have_no_matches(tmp_path: Path) -> None:
-    Export('colmap', tmp_path).write(IMAGES)
-    connection = sqlite3.connect(tmp_path / 'targets.db')
+def test_pairs_without_a_common_point_have_no_matches(folder: Path) -> None:
+    connection = sqlite3.connect(folder / 'targets.db')
     assert connection.execute(
         'SELECT pair_id, rows, config FROM two_view_geometries'
     ).fetchall() == [(2147483647 + 2, 1, 3)]
     connection.close()
 
 
-def test_pyopf_reads_the_project(tmp_path: Path) -> None:
+def test_pyopf_reads_the_project(folder: Path) -> None:
     pyopf = pytest.importorskip('pyopf.io', reason='pyopf is not installed')
     resolve = pytest.importorskip('pyopf.resolve')
-    Export('opf', tmp_path).write(IMAGES, CONTROL)
-    project = resolve.resolve(pyopf.load(str(tmp_path / 'project.opf')))
+    project = resolve.resolve(pyopf.load(str(folder / 'project.opf')))
     (points,) = project.input_control_points_objs
     assert [(point.id, list(point.geolocation.sigmas)) for point in points.gcps] == [
         ('7', [0.02] * 3),

@@ -54,19 +54,14 @@ def message(encoding: str, pixels: np.ndarray, big: bool = NATIVE, padding: int 
         ('64FC1', np.float64),
     ],
 )
-def test_gray_keeps_its_values_and_its_type(encoding, kind, padding, big):
+def test_gray_keeps_its_values_and_its_type_without_a_copy(encoding, kind, padding, big):
     pixels = GRAY.astype(kind) * (37 if kind != np.uint8 else 1)
-    image = decode_image(message(encoding, pixels, big, padding))
+    sent = message(encoding, pixels, big, padding)
+    image = decode_image(sent)
     assert image.dtype == kind and image.dtype.isnative and image.flags.aligned
     assert np.array_equal(image, pixels)
-
-
-@pytest.mark.parametrize(
-    ('encoding', 'kind'), [('mono8', 'u1'), ('mono16', 'u2'), ('32FC1', 'f4')]
-)
-def test_gray_in_the_byte_order_of_the_machine_is_a_view(encoding, kind):
-    sent = message(encoding, GRAY.astype(kind))
-    assert np.shares_memory(decode_image(sent), sent.data)
+    if big == NATIVE and not padding:
+        assert np.shares_memory(image, sent.data)
 
 
 @pytest.mark.parametrize('big', [False, True])
@@ -106,20 +101,23 @@ def test_bayer_patterns_show_the_colour_that_they_are_of(pattern, bits):
     assert image[2:-2, 2:-2] == pytest.approx(0.299 * white, rel=0.02)
 
 
+NEUTRAL = np.full((12, 10), 128, np.uint8)
+
+
 @pytest.mark.parametrize(
-    ('encoding', 'first'),
-    [('yuv422', False), ('uyvy', False), ('yuv422_yuy2', True), ('yuyv', True)],
+    ('encoding', 'pixels'),
+    [
+        ('yuv422', np.dstack([NEUTRAL[:6], GRAY])),
+        ('uyvy', np.dstack([NEUTRAL[:6], GRAY])),
+        ('yuv422_yuy2', np.dstack([GRAY, NEUTRAL[:6]])),
+        ('yuyv', np.dstack([GRAY, NEUTRAL[:6]])),
+        ('nv21', np.concatenate([GRAY, NEUTRAL[:3]])),
+        ('nv24', np.concatenate([GRAY, NEUTRAL])),
+    ],
 )
-def test_brightness_of_yuv_in_both_orders(encoding, first):
-    colour = np.full_like(GRAY, 128)
-    pixels = np.dstack([GRAY, colour] if first else [colour, GRAY])
-    assert np.array_equal(decode_image(message(encoding, pixels, padding=3)), GRAY)
-
-
-@pytest.mark.parametrize(('encoding', 'more'), [('nv21', 3), ('nv24', 12)])
-def test_brightness_before_planes_of_colour(encoding, more):
-    planes = np.concatenate([GRAY, np.full((more, GRAY.shape[1]), 128, np.uint8)])
-    assert np.array_equal(decode_image(message(encoding, planes, height=len(GRAY))), GRAY)
+def test_brightness_of_yuv_beside_and_before_the_colours(encoding, pixels):
+    sent = message(encoding, pixels, padding=3, height=len(GRAY))
+    assert np.array_equal(decode_image(sent), GRAY)
 
 
 def test_pixels_without_a_value_are_black():
@@ -148,40 +146,36 @@ SCENE = render(SceneSettings(width=800, height=600, targets=6, seed=5))
 IDS = [target.id for target in SCENE.targets]
 
 
-def identified(sent) -> list[int]:
-    return [target.id for target in create_detector('ring')(decode_image(sent))]
-
-
 def with_hot_pixel(image: np.ndarray, value: float) -> np.ndarray:
     changed = image.copy()
     changed[7, 9] = value
     return changed
 
 
-@pytest.mark.parametrize('value', [65535, 4095])
-def test_photoneo_texture_of_12_bit_in_16(value):
-    """phoxi_camera publishes textures as mono16 or 32FC1, 12 bit of a 16-bit range."""
-    pixels = with_hot_pixel(SCENE.image.astype(np.uint16) * 16, value)
-    assert identified(message('mono16', pixels)) == IDS
+def with_holes(image: np.ndarray) -> np.ndarray:
+    changed = with_hot_pixel(image, 1e6)
+    changed[:50, :60] = np.nan
+    return changed
 
 
-def test_photoneo_texture_of_float_with_holes():
-    pixels = with_hot_pixel(SCENE.image.astype(np.float32) * 3.7, 1e6)
-    pixels[:50, :60] = np.nan
-    assert identified(message('32FC1', pixels)) == IDS
-
-
-def test_zivid_colour_image():
-    """zivid_camera publishes color/image_color as rgba8."""
-    pixels = np.dstack([SCENE.image] * 3 + [np.full_like(SCENE.image, 255)])
-    assert identified(message('rgba8', pixels)) == IDS
-
-
-def test_ensenso_raw_and_rectified_images():
-    """ensenso_camera publishes mono8, mono16 or rgb8, by camera and parameter set."""
-    assert identified(message('mono8', SCENE.image, padding=16)) == IDS
-    assert identified(message('mono16', SCENE.image.astype(np.uint16) * 256)) == IDS
-    assert identified(message('rgb8', np.dstack([SCENE.image] * 3))) == IDS
+@pytest.mark.parametrize(
+    ('encoding', 'pixels'),
+    [
+        # phoxi_camera publishes textures as mono16 or 32FC1, 12 bit of a 16-bit range.
+        ('mono16', with_hot_pixel(SCENE.image.astype(np.uint16) * 16, 65535)),
+        ('mono16', with_hot_pixel(SCENE.image.astype(np.uint16) * 16, 4095)),
+        ('32FC1', with_holes(SCENE.image.astype(np.float32) * 3.7)),
+        # zivid_camera publishes color/image_color as rgba8.
+        ('rgba8', np.dstack([SCENE.image] * 3 + [np.full_like(SCENE.image, 255)])),
+        # ensenso_camera publishes mono8, mono16 or rgb8, by camera and parameter set.
+        ('mono8', SCENE.image),
+        ('mono16', SCENE.image.astype(np.uint16) * 256),
+        ('rgb8', np.dstack([SCENE.image] * 3)),
+    ],
+)
+def test_targets_are_identified_in_what_scanners_publish(encoding, pixels):
+    sent = message(encoding, pixels, padding=16)
+    assert [target.id for target in create_detector('ring')(decode_image(sent))] == IDS
 
 
 @pytest.mark.parametrize('depth', [9, 10, 12, 16])
@@ -262,14 +256,3 @@ def compressed_images(draw: st.DrawFn) -> Fields:
 @given(compressed_images())
 def test_any_compressed_message_is_an_image_or_refused(fields):
     attempt(decode_compressed, fields)
-
-
-def test_a_compressed_header_of_too_many_pixels():
-    _, data = cv2.imencode('.bmp', GRAY)
-    data = data.ravel().copy()
-    data[25] = 127  # the highest byte of the height
-    told = SimpleNamespace(format='bmp', data=data)
-    with pytest.raises(
-        ValueError, match=r"data of format 'bmp' is [0-9]+ x [0-9]+ px, accepted are sides"
-    ):
-        decode_compressed(told)

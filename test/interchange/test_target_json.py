@@ -99,38 +99,33 @@ def test_standard_input_that_is_closed_or_no_text_is_named(monkeypatch, given):
         read_results('-')
 
 
+def result(*targets: str) -> str:
+    return f'{{"image": "a", "targets": [{", ".join(targets)}]}}'
+
+
 @pytest.mark.parametrize(
-    ('line', 'message'),
+    ('text', 'message'),
     [
         ('{"image": ', 'line 1 is not JSON'),
         ('[' * 100_000, 'line 1 is not JSON: RecursionError'),
-        (
-            f'{{"image": "a", "targets": [{{"id": 1, "x": {"9" * 400}, "y": 3}}]}}',
-            'line 1: target 0: x is',
-        ),
-        (f'{{"image": "a", "targets": [{{"id": {"9" * 5000}}}]}}', 'line 1 is not JSON'),
+        (result(f'{{"id": {"9" * 5000}}}'), 'line 1 is not JSON'),
         ('[]', 'line 1 is not an object with a list of targets'),
         ('{"image": "a", "targets": {}}', 'line 1 is not an object with a list of targets'),
         ('{"targets": []}', 'line 1: image is None, accepted is the name of a file'),
-        ('{"image": "a", "targets": [3]}', 'line 1: target is 3, accepted is an object'),
-        ('{"image": "a", "targets": [{"id": 1, "x": 2}]}', 'line 1: target 0: y is None'),
+        (result('3'), 'line 1: target is 3, accepted is an object'),
+        (result(f'{{"id": 1, "x": {"9" * 400}, "y": 3}}'), 'line 1: target 0: x is'),
+        (result('{"id": 1, "x": 2}'), 'line 1: target 0: y is None'),
+        (result('{"id": 1.5, "x": 2, "y": 3}'), 'line 1: target 0: id is 1.5'),
+        (result('{"id": 1, "x": NaN, "y": 3}'), 'line 1: target 0: x is nan'),
         (
-            '{"image": "a", "targets": [{"id": 1.5, "x": 2, "y": 3}]}',
-            'line 1: target 0: id is 1.5',
-        ),
-        ('{"image": "a", "targets": [{"id": 1, "x": NaN, "y": 3}]}', 'line 1: target 0: x is nan'),
-        (
-            '{"image": "a", "targets": [{"id": 1, "x": 2, "y": 3, "family": 4}]}',
+            result('{"id": 1, "x": 2, "y": 3, "family": 4}'),
             'line 1: target 0: family is 4, accepted is a printable text',
         ),
-        (
-            '{"image": "a", "targets": []}\n{"image": "b/a", "targets": []}',
-            'line 2: a was on',
-        ),
+        (f'{result()}\n{{"image": "b/a", "targets": []}}', 'line 2: a was on'),
     ],
 )
-def test_results_that_cannot_be_used_are_named(tmp_path, line, message):
-    (tmp_path / 'results.jsonl').write_text(line)
+def test_results_that_cannot_be_used_are_named(tmp_path, text, message):
+    (tmp_path / 'results.jsonl').write_text(text)
     with pytest.raises(ValueError, match=message) as caught:
         read_results(tmp_path / 'results.jsonl')
     assert str(tmp_path / 'results.jsonl') in str(caught.value)

@@ -33,10 +33,7 @@ def test_truth_in_another_order_with_folders_and_no_confirmed(tmp_path):
         ('image,id,x,y\na.png,1\n', 'line 2: x is None, accepted is a number'),
         ('image,id,x,y\n,1,2,3\n', "line 2: image is '', accepted is the name of a file"),
         ('image,id,x,y\ni/a,1,2,3\nj/a,1,2,3\n', 'line 3: a is in two folders'),
-        (
-            f'image,id,x,y\na,{"9" * 400},2,3\n',
-            "line 2: id is '999.*, accepted is an integer from",
-        ),
+        (f'image,id,x,y\na,{"9" * 400},2,3\n', "line 2: id is '999.*, .* an integer from -1 to"),
         (f'image,id,x,y\na,{"9" * 5000},2,3\n', "line 2: id is '999.*, accepted is an integer"),
         ('image,id,x,y\na,1,1e308,3\n', "line 2: x is '1e308', accepted is a number from -65536"),
         (f'image,id,x,y\na,1,{"1" * 200_000},3\n', 'line 2: field larger than field limit'),
@@ -55,9 +52,3 @@ def test_truth_that_is_no_text_is_named(tmp_path):
     (tmp_path / 'image.png').write_bytes(b'\x89PNG\r\n\xff')
     with pytest.raises(ValueError, match=r'image.png is not in UTF-8'):
         read_truth(tmp_path / 'image.png')
-
-
-def test_truth_that_cannot_be_written_is_named(tmp_path):
-    (tmp_path / 'file').touch()
-    with pytest.raises(ValueError, match=r'truth.csv cannot be written: '):
-        write_truth(tmp_path / 'file' / 'truth.csv', {})

@@ -47,7 +47,7 @@ def test_images_of_a_web_server_are_read(tmp_path: Path) -> None:
     pytest.importorskip('aiohttp', reason='aiohttp is not installed')
     write_image(tmp_path / 'image.png', IMAGE)
     with ThreadingHTTPServer(('127.0.0.1', 0), partial(Quiet, directory=tmp_path)) as server:
-        threading.Thread(target=server.serve_forever, daemon=True).start()
+        threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True).start()
         address = f'http://127.0.0.1:{server.server_address[1]}'
         np.testing.assert_array_equal(read_image(f'{address}/image.png'), IMAGE)
         with pytest.raises(ValueError, match=r'missing\.png cannot be read: FileNotFoundError'):

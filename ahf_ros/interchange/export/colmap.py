@@ -5,15 +5,14 @@ from __future__ import annotations
 import os
 import sqlite3
 import tempfile
-from collections.abc import Iterator
+from contextlib import closing
 from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 
-from ahf_ros.interchange.export.survey import Photograph, Survey
-from ahf_ros.interchange.export.tables import table
-from ahf_ros.interchange.files import file_errors
+from ahf_ros.interchange.export.survey import Survey
+from ahf_ros.interchange.files import csv_table, file_errors
 
 DATABASE = 'targets.db'
 
@@ -41,14 +40,9 @@ CREATE TABLE two_view_geometries (pair_id INTEGER PRIMARY KEY NOT NULL, rows INT
     qvec BLOB, tvec BLOB);
 """
 SIMPLE_RADIAL = 2
-UNCALIBRATED = 3
-"""Kind of geometry of two views whose matches are right and whose cameras are not known."""
-
-IMAGES = 2147483647
-"""Factor that makes one number of the two of a pair of images."""
-
-FOCAL_LENGTH = 1.2
-"""Focal length that COLMAP assumes without EXIF, as a share of the longer side."""
+FOCAL_LENGTH = 1.2  # that COLMAP assumes without EXIF, as a share of the longer side
+UNCALIBRATED = 3  # geometry of two views whose matches are right and whose cameras are not known
+IMAGES = 2147483647  # factor that makes one number of the two of a pair of images
 
 
 def colmap_files(survey: Survey) -> dict[str, bytes]:
@@ -58,28 +52,20 @@ def colmap_files(survey: Survey) -> dict[str, bytes]:
     whose parameters are for COLMAP to adjust. Points with the same label are matched between all
     images, as two-view geometries, so that no descriptors are needed.
 
-    Raises
-    ------
-    ValueError
-        If the database cannot be made, such as on a full disk.
+    A ValueError is raised if the database cannot be made, such as on a full disk.
     """
-    names = image_names(survey.photographs)
+    paths = [os.path.abspath(it.path) for it in survey.photographs]  # noqa: PTH100  need not exist
+    common = os.path.commonpath([os.path.dirname(path) for path in paths])  # noqa: PTH120
+    names = [Path(path).relative_to(common).as_posix() for path in paths]
     labels = [
         (name, number, mark.label)
         for name, photograph in zip(names, survey.photographs, strict=True)
         for number, mark in enumerate(photograph.marks)
     ]
     return {
-        'keypoints.csv': table([('image', 'keypoint', 'label'), *labels]),
+        'keypoints.csv': csv_table([('image', 'keypoint', 'label'), *labels]),
         DATABASE: _database(survey, names),
     }
-
-
-def image_names(photographs: tuple[Photograph, ...]) -> list[str]:
-    """Return the paths of photographs from the folder that they have in common."""
-    paths = [os.path.abspath(it.path) for it in photographs]  # noqa: PTH100  need not be there
-    common = os.path.commonpath([os.path.dirname(path) for path in paths])  # noqa: PTH120
-    return [Path(path).relative_to(common).as_posix() for path in paths]
 
 
 def _database(survey: Survey, names: list[str]) -> bytes:
@@ -87,13 +73,10 @@ def _database(survey: Survey, names: list[str]) -> bytes:
     with file_errors(DATABASE, 'written'), tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / DATABASE
         try:
-            connection = sqlite3.connect(path)
-            try:
-                with connection:
-                    connection.executescript(SCHEMA)
-                    _fill(connection, survey, names)
-            finally:
-                connection.close()
+            with closing(sqlite3.connect(path)) as connection, connection:
+                connection.execute('PRAGMA synchronous = OFF')  # of a temporary file
+                connection.executescript(SCHEMA)
+                _fill(connection, survey, names)
         except sqlite3.Error as error:
             raise ValueError(f'{DATABASE} cannot be written: {error}') from error
         return path.read_bytes()
@@ -101,6 +84,7 @@ def _database(survey: Survey, names: list[str]) -> bytes:
 
 def _fill(connection: sqlite3.Connection, survey: Survey, names: list[str]) -> None:
     cameras: dict[tuple[int, int], int] = {}
+    rows = []
     for number, photograph in enumerate(survey.photographs, start=1):
         size = photograph.width, photograph.height
         if size not in cameras:
@@ -113,25 +97,17 @@ def _fill(connection: sqlite3.Connection, survey: Survey, names: list[str]) -> N
         places = [(mark.x, mark.y) for mark in photograph.marks]
         keypoints = (number, len(places), 2, _blob(places, '<f4'))
         connection.execute('INSERT INTO keypoints VALUES (?, ?, ?, ?)', keypoints)
-    for first, second, shared in _pairs(survey.photographs):
-        row = (first * IMAGES + second, len(shared), 2, _blob(shared, '<u4'))
-        connection.execute('INSERT INTO matches VALUES (?, ?, ?, ?)', row)
-        connection.execute(
-            'INSERT INTO two_view_geometries (pair_id, rows, cols, data, config) '
-            'VALUES (?, ?, ?, ?, ?)',
-            (*row, UNCALIBRATED),
-        )
-
-
-def _pairs(
-    photographs: tuple[Photograph, ...],
-) -> Iterator[tuple[int, int, list[tuple[int, int]]]]:
-    """Yield the numbers of two images and of the keypoints of the points that both show."""
-    rows = [{mark.label: row for row, mark in enumerate(it.marks)} for it in photographs]
+        rows.append({mark.label: row for row, mark in enumerate(photograph.marks)})
     for (first, here), (second, there) in combinations(enumerate(rows, start=1), 2):
         shared = [(row, there[label]) for label, row in here.items() if label in there]
         if shared:
-            yield first, second, shared
+            match = (first * IMAGES + second, len(shared), 2, _blob(shared, '<u4'))
+            connection.execute('INSERT INTO matches VALUES (?, ?, ?, ?)', match)
+            connection.execute(
+                'INSERT INTO two_view_geometries (pair_id, rows, cols, data, config) '
+                'VALUES (?, ?, ?, ?, ?)',
+                (*match, UNCALIBRATED),
+            )
 
 
 def _blob(values: object, dtype: str) -> bytes:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import uuid
 from pathlib import Path
 from typing import Any
@@ -16,63 +17,54 @@ LOCAL_CRS = (
 )
 """Coordinate reference system of control points that come with none."""
 
-_FILES = {'camera_list': 'camera_list.json', 'input_control_points': 'input_control_points.json'}
-_PROJECT = 'project.opf'
-
 
 def opf_files(survey: Survey) -> dict[str, bytes]:
     """Return a project, the list of its cameras and the control points.
 
     Points without coordinates are manual tie points. The accuracy of a mark is its standard
-    deviation, px.
-
-    Raises
-    ------
-    ValueError
-        If there are control points of unknown standard deviation, which the format requires.
+    deviation, px. The format requires the one of control points: a ValueError is raised if it is
+    unknown.
     """
     if survey.control and not survey.sigma:
         raise ValueError('opf has a standard deviation, accepted is a control sigma above 0')
-    cameras = [
-        {'id': number, 'uri': Path(photograph.path).absolute().as_uri()}
-        for number, photograph in enumerate(survey.photographs, start=1)
-    ]
-    marks: dict[str, list[dict[str, Any]]] = {label: [] for label in survey.labels}
+    cameras = []
+    points: dict[str, dict[str, Any]] = {
+        label: {'id': label, 'is_checkpoint': False, 'marks': []} for label in survey.labels
+    }
     for number, photograph in enumerate(survey.photographs, start=1):
+        cameras.append({'id': number, 'uri': Path(photograph.path).absolute().as_uri()})
         for it in photograph.marks:
-            marks[it.label].append(
-                {'camera_id': number, 'position_px': [it.x, it.y], 'accuracy': it.sigma}
+            sigma = math.sqrt((it.covariance[0] + it.covariance[2]) / 2)
+            points[it.label]['marks'].append(
+                {'camera_id': number, 'position_px': [it.x, it.y], 'accuracy': sigma}
             )
-    fixed, tied = [], []
-    for label in survey.labels:
-        point = {'id': label, 'is_checkpoint': False, 'marks': marks[label]}
-        if label in survey.control:
-            fixed.append({**point, 'geolocation': _geolocation(survey, label)})
-        else:
-            tied.append(point)
+    for label, coordinates in survey.control.items():
+        points[label]['geolocation'] = {
+            'crs': {'definition': survey.crs or LOCAL_CRS},
+            'coordinates': [float(value) for value in coordinates],
+            'sigmas': [survey.sigma] * 3,
+        }
+    fixed = [point for point in points.values() if 'geolocation' in point]
+    tied = [point for point in points.values() if 'geolocation' not in point]
+    camera_list = _item('camera_list')
+    control = _item('input_control_points', {'id': camera_list['id'], 'type': 'camera_list'})
     return {
-        _PROJECT: _json('project', id=_uuid('project'), name='ahf', **_items()),
-        _FILES['camera_list']: _json('camera-list', cameras=cameras),
-        _FILES['input_control_points']: _json('input-control-points', gcps=fixed, mtps=tied),
+        'project.opf': _json(
+            'project',
+            id=_uuid('project'),
+            name='ahf',
+            description='Coded targets, identified by ahf_ros',
+            items=[camera_list, control],
+        ),
+        'camera_list.json': _json('camera-list', cameras=cameras),
+        'input_control_points.json': _json('input-control-points', gcps=fixed, mtps=tied),
     }
 
 
-def _geolocation(survey: Survey, label: str) -> dict[str, Any]:
-    return {
-        'crs': {'definition': survey.crs or LOCAL_CRS},
-        'coordinates': [float(value) for value in survey.control[label]],
-        'sigmas': [survey.sigma] * 3,
-    }
-
-
-def _items() -> dict[str, Any]:
-    """Return the items of the project, each with the file that holds it."""
-    items = []
-    for kind, file in _FILES.items():
-        resource = {'uri': file, 'format': _format(kind.replace('_', '-'))}
-        items.append({'id': _uuid(kind), 'type': kind, 'resources': [resource], 'sources': []})
-    items[1]['sources'] = [{'id': items[0]['id'], 'type': items[0]['type']}]
-    return {'description': 'Coded targets, identified by ahf_ros', 'items': items}
+def _item(kind: str, *sources: dict[str, str]) -> dict[str, Any]:
+    """Return an item of the project, with the file that holds it and the items it is made from."""
+    resource = {'uri': f'{kind}.json', 'format': _format(kind.replace('_', '-'))}
+    return {'id': _uuid(kind), 'type': kind, 'resources': [resource], 'sources': list(sources)}
 
 
 def _json(kind: str, **content: Any) -> bytes:

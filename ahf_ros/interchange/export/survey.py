@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 from typing import Any
 
 import numpy as np
 
-from ahf_ros.interchange.fields import checked_file_name, parsed_integer
+from ahf_ros.interchange.files import checked_file_name
 from ahf_ros.interchange.target_json import json_lines, targets_from_json
 from ahf_ros.target import UNDECODED, Target
+from ahf_ros.target_check import checked_integer
 from ahf_ros.text import shown
 
 MAXIMUM_SIDE = 2**15
 """Maximum side of an image, px."""
-
-LISTED = 10
-"""Number of labels that a message lists."""
 
 UNKNOWN_VARIANCE = 1.0
 """Variance of a coordinate of a mark whose covariance is not known, px^2."""
@@ -29,21 +26,9 @@ UNKNOWN_VARIANCE = 1.0
 
 @dataclass(frozen=True, slots=True)
 class MeasuredImage:
-    """What was identified in an image.
+    """What was identified in an image of `width` and `height` px, undecoded targets included.
 
-    Attributes
-    ----------
-    path : str
-        Path of the image, as the user wrote it.
-    width, height : int
-        Size of the image, px.
-    targets : tuple of Target
-        Undecoded ones may be among them.
-
-    Examples
-    --------
-    >>> MeasuredImage('photos/a.jpg', 6000, 4000, ()).targets
-    ()
+    `path` is as the user wrote it.
     """
 
     path: str
@@ -51,47 +36,30 @@ class MeasuredImage:
     height: int
     targets: tuple[Target, ...]
 
+    @property
+    def name(self) -> str:
+        """Name of the file, without folders."""
+        return PurePath(self.path).name
+
 
 def read_measured_images(path: str | Path) -> tuple[MeasuredImage, ...]:
-    """Return what was identified, from the output of `ahf identify --json`.
+    """Return what was identified, from the output of `ahf identify --json`, see `json_lines`.
 
-    Parameters
-    ----------
-    path : str or Path
-        A JSON object a line with 'image', 'width', 'height' and 'targets', whose 'id', 'x' and
-        'y' are required. A stack is measured once, in its first image. '-' stands for standard
-        input.
-
-    Returns
-    -------
-    tuple of MeasuredImage
-
-    Raises
-    ------
-    ValueError
-        If the file cannot be read or a line is not as described; the message names both.
+    A stack is measured once, in its first image. A ValueError names the file or line that cannot
+    be used.
     """
     return tuple(measured_image(content, where) for where, content in json_lines(path))
 
 
 def measured_image(content: Any, where: str) -> MeasuredImage:
-    """Return what a record of `ahf identify --json` says, see `read_measured_images`.
+    """Return what a record of `ahf identify --json` says, with 'image', 'width' and 'height'.
 
-    Parameters
-    ----------
-    content : dict
-    where : str
-        What errors call the record.
-
-    Raises
-    ------
-    ValueError
-        If the record is not as described.
+    Its targets are as for `targets_from_json`. A ValueError calls the record `where`.
     """
     targets = tuple(targets_from_json(content, where))
     checked_file_name(content.get('image'), f'{where}: image')
     width, height = (
-        parsed_integer(content.get(name), f'{where}: {name}', 1, MAXIMUM_SIDE)
+        checked_integer(content.get(name), f'{where}: {name}', 1, MAXIMUM_SIDE)
         for name in ('width', 'height')
     )
     return MeasuredImage(content['image'], width, height, targets)
@@ -99,16 +67,11 @@ def measured_image(content: Any, where: str) -> MeasuredImage:
 
 @dataclass(frozen=True, slots=True)
 class Control:
-    """Control points as they were given.
+    """Control points as they were given: coordinates, float64 of shape (3,), by their labels.
 
-    Attributes
-    ----------
-    points : mapping of str to ndarray of float64, shape (3,)
-        Coordinates by the label that the list has.
-    crs : str
-        Coordinate reference system, such as 'EPSG:25832'; empty for a local system in metres.
-    sigma : float
-        Standard deviation of a coordinate, in the unit of the coordinates; 0 where unknown.
+    `crs` is the coordinate reference system, such as 'EPSG:25832'; empty for a local system in
+    metres. `sigma` is the standard deviation of a coordinate, in the unit of the coordinates; 0
+    where unknown.
     """
 
     points: Mapping[str, np.ndarray] = field(default_factory=dict)
@@ -118,18 +81,10 @@ class Control:
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """A target in a photograph.
+    """A target in a photograph, at `x`, `y` px from the origin of the format.
 
-    Attributes
-    ----------
-    label : str
-        Name of the point, the same in all photographs.
-    x, y : float
-        Place, px, from the origin of the format.
-    covariance : tuple of 3 float
-        Variance of x, covariance, variance of y, px^2.
-    target : Target
-        What was identified, from our origin.
+    `label` is the name of the point, the same in all photographs; `covariance` is variance of x,
+    covariance, variance of y, px^2. `target` is what was identified, from our origin.
     """
 
     label: str
@@ -138,52 +93,20 @@ class Mark:
     covariance: tuple[float, float, float]
     target: Target
 
-    @property
-    def sigma(self) -> float:
-        """Standard deviation of a coordinate, px."""
-        return math.sqrt((self.covariance[0] + self.covariance[2]) / 2)
-
 
 @dataclass(frozen=True, slots=True)
-class Photograph:
-    """A photograph with its marks.
+class Photograph(MeasuredImage):
+    """A measured image with its marks, in the order of family and ID."""
 
-    Attributes
-    ----------
-    path : str
-        Path, as the user wrote it.
-    width, height : int
-        Size, px.
-    marks : tuple of Mark
-        In the order of their targets' family and ID.
-    """
-
-    path: str
-    width: int
-    height: int
     marks: tuple[Mark, ...]
-
-    @property
-    def name(self) -> str:
-        """Name of the file, without folders."""
-        return PurePath(self.path).name
 
 
 @dataclass(frozen=True, slots=True)
 class Survey:
-    """What is handed over.
+    """What is handed over: photographs, and the labels of all points that they show.
 
-    Attributes
-    ----------
-    photographs : tuple of Photograph
-    labels : tuple of str
-        Labels of all points that photographs show, in the order of their family and ID.
-    control : mapping of str to ndarray of float64, shape (3,)
-        Coordinates of those of the points that are control points, by our label.
-    crs : str
-        See `Control`.
-    sigma : float
-        See `Control`.
+    `control` has the coordinates of those of the points that are control points, by our label;
+    `crs` and `sigma` are those of `Control`. Points are in the order of their family and ID.
     """
 
     photographs: tuple[Photograph, ...]
@@ -199,31 +122,22 @@ def make_survey(
     """Return a survey of what was identified.
 
     A point is labelled with its ID; where the images show several families, with the family and
-    the ID, such as 'aicon14_7'. Undecoded targets are left out.
+    the ID, such as 'aicon14_7'. Undecoded targets are left out. Control points may be labelled
+    with an ID, also with leading zeros, or with our label. `origin` is added to our coordinates,
+    px: 0.5 where (0, 0) is the corner of the first pixel.
 
-    Parameters
-    ----------
-    images : sequence of MeasuredImage
-    control : Control, optional
-        The points may be labelled with an ID, also with leading zeros, or with our label.
-    origin : float
-        What is added to our coordinates, px; 0.5 where (0, 0) is the corner of the first pixel.
-
-    Raises
-    ------
-    ValueError
-        If an image is there twice, has a name that does not print, or shows a target twice, if no
-        image shows a target, or if the labels of the control points are ambiguous or none of them
-        is that of a point.
-
-    Examples
-    --------
-    >>> target = Target(id=7, code=19, x=10.5, y=20.0, semi_major=8.0, semi_minor=7.5)
-    >>> survey = make_survey([MeasuredImage('a.jpg', 60, 40, (target,))], origin=0.5)
-    >>> survey.labels, survey.photographs[0].marks[0].x
-    (('7',), 11.0)
+    A ValueError is raised if an image is there twice, has a name that does not print, or shows a
+    target twice, if no image shows a target, or if the labels of the control points are ambiguous
+    or none of them is that of a point.
     """
-    _check_paths(images)
+    seen = set()
+    for image in images:
+        if not image.path.isprintable():
+            raise ValueError(f'image is {shown(image.path)}, accepted is a name that prints')
+        path = os.path.abspath(image.path)  # noqa: PTH100  the file need not be there
+        if path in seen:
+            raise ValueError(f'{image.path!r} is there twice, accepted is one result an image')
+        seen.add(path)
     keys = sorted({it.key for image in images for it in image.targets if it.id != UNDECODED})
     if not keys:
         raise ValueError('no image shows an identified target, accepted is at least one')
@@ -253,33 +167,9 @@ def notes_on(control: Control, survey: Survey) -> list[str]:
 
 
 def listed(labels: Sequence[str]) -> str:
-    """Return the first labels of a list, and the number of the others."""
-    more = f' and {len(labels) - LISTED} more' if len(labels) > LISTED else ''
-    return ', '.join(labels[:LISTED]) + more
-
-
-def check_names(paths: Iterable[str], name: str) -> None:
-    """Raise a ValueError if two images have the same name, for a format that has only names."""
-    seen: dict[str, str] = {}
-    for path in paths:
-        file = PurePath(path).name
-        if file in seen:
-            raise ValueError(
-                f'{name} knows images by their names, {path!r} and {seen[file]!r} have the same, '
-                'accepted are different names'
-            )
-        seen[file] = path
-
-
-def _check_paths(images: Sequence[MeasuredImage]) -> None:
-    seen = set()
-    for image in images:
-        if not image.path.isprintable():
-            raise ValueError(f'image is {shown(image.path)}, accepted is a name that prints')
-        path = os.path.abspath(image.path)  # noqa: PTH100  the file need not be there
-        if path in seen:
-            raise ValueError(f'{image.path!r} is there twice, accepted is one result an image')
-        seen.add(path)
+    """Return the first ten labels of a list, and the number of the others."""
+    more = f' and {len(labels) - 10} more' if len(labels) > 10 else ''
+    return ', '.join(labels[:10]) + more
 
 
 def _photograph(
@@ -298,7 +188,7 @@ def _photograph(
         label, x, y = labels[target.key], target.x + origin, target.y + origin
         marks[target.key] = Mark(label=label, x=x, y=y, covariance=known, target=target)
     ordered = tuple(marks[key] for key in sorted(marks))
-    return Photograph(image.path, image.width, image.height, ordered)
+    return Photograph(image.path, image.width, image.height, image.targets, ordered)
 
 
 def _control_points(

@@ -2,47 +2,30 @@
 
 from __future__ import annotations
 
-import csv
-import io
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
-from ahf_ros.interchange.export.survey import Photograph, Survey
-
-COLUMNS = (
-    'image',
-    'label',
-    'id',
-    'family',
-    'x',
-    'y',
-    'variance_x',
-    'covariance_xy',
-    'variance_y',
-    'semi_major',
-    'semi_minor',
-    'angle',
-    'confidence',
-)
+from ahf_ros.interchange.export.survey import Mark, Survey
+from ahf_ros.interchange.files import csv_table
 
 
 def csv_files(survey: Survey) -> dict[str, bytes]:
-    """Return one table with a row for each mark, and the control coordinates where there are any.
-
-    Returns
-    -------
-    dict of str to bytes
-        Content by the name of the file.
-    """
-    with_control = ('control_x', 'control_y', 'control_z') if survey.control else ()
-    rows = []
+    """Return one table with a row for each mark, with its control coordinates if there are any."""
+    rows: list[Sequence[object]] = [
+        (
+            *('image', 'label', 'id', 'family', 'x', 'y'),
+            *('variance_x', 'covariance_xy', 'variance_y'),
+            *('semi_major', 'semi_minor', 'angle', 'confidence'),
+            *(('control_x', 'control_y', 'control_z') if survey.control else ()),
+        )
+    ]
     for photograph in survey.photographs:
         for mark in photograph.marks:
             of = mark.target
-            found = [of.id, of.family, *_place(mark.x, mark.y), *mark.covariance]
+            found = [of.id, of.family, *_place(mark), *mark.covariance]
             shape = [of.semi_major, of.semi_minor, of.angle, of.confidence]
-            point = list(survey.control.get(mark.label, [''] * 3)) if with_control else []
+            point = survey.control.get(mark.label, [''] * 3) if survey.control else []
             rows.append([photograph.path, mark.label, *found, *shape, *point])
-    return {'targets.csv': table([(*COLUMNS, *with_control), *rows])}
+    return {'targets.csv': csv_table(rows)}
 
 
 def odm_files(survey: Survey) -> dict[str, bytes]:
@@ -50,11 +33,8 @@ def odm_files(survey: Survey) -> dict[str, bytes]:
 
     Each row is x, y, z, then x and y in the image, its name, and a label that is ignored.
 
-    Raises
-    ------
-    ValueError
-        If there are no control points, if their coordinate reference system is none that the
-        readers know, or if an image has a name with blanks, at which they split.
+    A ValueError is raised if there are no control points, if their coordinate reference system is
+    none that the readers know, or if an image has a name with blanks, at which they split.
     """
     if not survey.control:
         raise ValueError('odm has only control points, accepted are results with control points')
@@ -72,31 +52,23 @@ def odm_files(survey: Survey) -> dict[str, bytes]:
         for mark in photograph.marks:
             if mark.label in survey.control:
                 point = [repr(float(value)) for value in survey.control[mark.label]]
-                cells = [*point, *_place(mark.x, mark.y), photograph.name, mark.label]
-                lines.append(' '.join(cells))
+                lines.append(' '.join([*point, *_place(mark), photograph.name, mark.label]))
     return {'gcp_list.txt': ''.join(f'{line}\n' for line in lines).encode()}
 
 
 def realitycapture_files(survey: Survey) -> dict[str, bytes]:
     """Return the measurements in images and the ground control of RealityCapture."""
-    rows = [row for photograph in survey.photographs for row in _measurements(photograph)]
-    files = {'control_points.csv': table([('#image', 'point', 'x', 'y'), *rows])}
+    rows = [
+        (photograph.name, mark.label, *_place(mark))
+        for photograph in survey.photographs
+        for mark in photograph.marks
+    ]
+    files = {'control_points.csv': csv_table([('#image', 'point', 'x', 'y'), *rows])}
     if survey.control:
         ground = [(label, *map(float, point)) for label, point in survey.control.items()]
-        files['ground_control.csv'] = table([('#point', 'x', 'y', 'z'), *ground])
+        files['ground_control.csv'] = csv_table([('#point', 'x', 'y', 'z'), *ground])
     return files
 
 
-def table(rows: Iterable[Sequence[object]]) -> bytes:
-    """Return rows as CSV in UTF-8."""
-    file = io.StringIO()
-    csv.writer(file, lineterminator='\n').writerows(rows)
-    return file.getvalue().encode()
-
-
-def _measurements(photograph: Photograph) -> list[Sequence[object]]:
-    return [(photograph.name, it.label, *_place(it.x, it.y)) for it in photograph.marks]
-
-
-def _place(x: float, y: float) -> tuple[str, str]:
-    return f'{x:.5f}', f'{y:.5f}'
+def _place(mark: Mark) -> tuple[str, str]:
+    return f'{mark.x:.5f}', f'{mark.y:.5f}'
