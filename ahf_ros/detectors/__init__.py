@@ -61,47 +61,27 @@ AUTO = 'auto'
 
 @dataclass(frozen=True, slots=True)
 class _Entry:
-    """A detector, its families, and how their targets are counted without being decoded.
-
-    `detector` and `estimate` are module and name, below `ahf_ros`.
-    """
+    """Module and name of a detector, below `ahf_ros.detectors`, and the families it identifies."""
 
     detector: str
     families: tuple[str, ...]
-    estimate: str = ''
     several: bool = False  # families at a time
-    own_ids: bool = False  # rather than the families'
 
     def reads(self, families: tuple[str, ...]) -> bool:
         return set(families) <= set(self.families) and (self.several or len(families) == 1)
 
-    def create(self, settings: DetectorSettings) -> Detector:
-        made: Detector = resolve_name(f'ahf_ros.{self.detector}')(settings)
-        return made
-
-    def count(self, image: np.ndarray, settings: DetectorSettings) -> int:
-        counted: int = resolve_name(f'ahf_ros.{self.estimate}')(image, settings)
-        return counted
-
 
 # The detector of a family is the first one that lists it.
 _ENTRIES = {
-    'ring': _Entry(
-        'detectors.ring.detector:RingDetector',
-        KINDS['ring'],
-        'detectors.ring.counting:estimate_count',
-        several=True,
-    ),
-    'traditional': _Entry('detectors.traditional.detector:TraditionalDetector', KINDS['ring']),
-    'aruco': _Entry('detectors.square.detector:SquareDetector', KINDS['aruco']),
-    'apriltag': _Entry('detectors.square.detector:SquareDetector', KINDS['apriltag']),
-    'gsi': _Entry('detectors.gsi.detector:GsiDetector', KINDS['gsi']),
-    'gsi_published': _Entry('detectors.gsi.published:PublishedGsiDetector', KINDS['gsi']),
-    'dots': _Entry('detectors.dots.detector:DotsDetector', KINDS['dots']),
-    'dots_published': _Entry('detectors.dots.published:PublishedDotsDetector', KINDS['dots']),
-    'command': _Entry(
-        'detectors.external.command:CommandDetector', FAMILY_NAMES, several=True, own_ids=True
-    ),
+    'ring': _Entry('ring.detector:RingDetector', KINDS['ring'], several=True),
+    'traditional': _Entry('traditional:TraditionalDetector', KINDS['ring']),
+    'aruco': _Entry('square.detector:SquareDetector', KINDS['aruco']),
+    'apriltag': _Entry('square.detector:SquareDetector', KINDS['apriltag']),
+    'gsi': _Entry('gsi.detector:GsiDetector', KINDS['gsi']),
+    'gsi_published': _Entry('gsi.published:PublishedGsiDetector', KINDS['gsi']),
+    'dots': _Entry('dots.detector:DotsDetector', KINDS['dots']),
+    'dots_published': _Entry('dots.published:PublishedDotsDetector', KINDS['dots']),
+    'command': _Entry('external.command:CommandDetector', FAMILY_NAMES, several=True),
 }
 
 _ADDED: dict[str, EntryPoint] = {
@@ -155,25 +135,16 @@ def create_detector(
         raise ValueError(f'settings is {shown(settings)}, accepted is a DetectorSettings')
     settings = updated(settings or DetectorSettings(), options)
     name = detector_name(name, settings.family)
-    if name in _ENTRIES:
-        return _ENTRIES[name].create(settings)
-    return _added(_ADDED[name], settings)
+    if name in _ADDED:
+        return _added(_ADDED[name], settings)
+    made: Detector = resolve_name(f'ahf_ros.detectors.{_ENTRIES[name].detector}')(settings)
+    return made
 
 
 def detector_name(name: str, family: str) -> str:
-    """Return the name of a detector that identifies a family.
+    """Return the name of a detector that identifies a family or several, see `families_in`.
 
-    Parameters
-    ----------
-    name : str
-        One of `DETECTOR_NAMES`, or 'auto' for the detector of the family.
-    family : str
-        One of `FAMILY_NAMES`, or several as `families_in` accepts them.
-
-    Raises
-    ------
-    ValueError
-        If there is no such detector, or it does not identify the family or several of them.
+    It raises a ValueError if there is no such detector, or it does not identify these families.
     """
     DETECTOR.check(name)
     families = families_in(family)
@@ -191,48 +162,31 @@ def detector_name(name: str, family: str) -> str:
 
 
 def check_expected_ids(ids: Iterable[int], name: str, settings: DetectorSettings) -> None:
-    """Refuse IDs that a detector cannot report.
+    """Refuse IDs that a detector cannot report, by a ValueError.
 
-    Parameters
-    ----------
-    ids : iterable of int
-    name : str
-        Name of the detector. One that is no part of this package may report any ID.
-    settings : DetectorSettings
-        What the targets look like.
-
-    Raises
-    ------
-    ValueError
-        If there are IDs that none of the families has.
+    Detectors that are no part of this package, also as a command, may report any.
     """
-    if name in _ENTRIES and not _ENTRIES[name].own_ids:
+    if name in _ENTRIES and name != 'command':
         check_numbers('expected_ids', ids, settings.families, settings.family_file)
 
 
 def estimator(settings: DetectorSettings) -> Callable[[np.ndarray], int]:
-    """Return the function that estimates how many targets of a family an image shows.
+    """Return the function that estimates how many targets an image shows, for rings only.
 
-    Parameters
-    ----------
-    settings : DetectorSettings
-        What the targets look like.
-
-    Raises
-    ------
-    ValueError
-        If targets of this family cannot be counted.
+    It raises a ValueError if targets of the family cannot be counted.
     """
-    entry = _ENTRIES[detector_name(AUTO, settings.family)]
-    if not entry.estimate:
-        counted = [
-            name for other in _ENTRIES.values() if other.estimate for name in other.families
-        ]
+    if detector_name(AUTO, settings.family) != 'ring':
         raise ValueError(
             f'estimate_expected is True and family is {settings.family!r}; accepted with this '
-            f'family is False, and True with one of {", ".join(counted)}'
+            f'family is False, and True with one of {", ".join(KINDS["ring"])}'
         )
-    return lambda image: entry.count(image, settings)
+
+    def count(image: np.ndarray) -> int:
+        from ahf_ros.detectors.ring.counting import estimate_count
+
+        return estimate_count(image, settings)
+
+    return count
 
 
 def _added(point: EntryPoint, settings: DetectorSettings) -> Detector:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 from ahf_ros.codes.families import ACCEPTED, families_in
@@ -232,16 +232,9 @@ class DetectorSettings:
 
 @dataclass(frozen=True, slots=True)
 class FamilyDetector(ABC):
-    """A detector of one family of targets.
+    """A detector of one family of targets, whose design is read from the settings.
 
-    Attributes
-    ----------
-    settings : DetectorSettings
-
-    Raises
-    ------
-    ValueError
-        If the family, or the data file that describes it, is not accepted.
+    It raises a ValueError if the family, or the data file that describes it, is not accepted.
     """
 
     settings: DetectorSettings = field(default_factory=DetectorSettings)
@@ -258,10 +251,22 @@ class FamilyDetector(ABC):
     @property
     @abstractmethod
     def design(self) -> Any:
-        """Printed design of the family.
+        """Printed design of the family."""
 
-        Raises
-        ------
-        ValueError
-            If it is not accepted.
-        """
+
+def moved_targets(
+    targets: Sequence[Target],
+    measured: Sequence[Target],
+    places: Sequence[dict[str, Any]],
+    good: np.ndarray,
+) -> list[Target]:
+    """Return targets, the measured ones with the fields of their new places where these are good.
+
+    `good` is an ndarray of bool, one for each measured target.
+    """
+    better = {
+        target: replace(target, **place)
+        for target, place, is_good in zip(measured, places, good, strict=True)
+        if is_good
+    }
+    return [better.get(target, target) for target in targets]

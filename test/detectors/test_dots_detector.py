@@ -12,10 +12,9 @@ import pytest
 
 from ahf_ros.codes.dots import DOTS_DESIGN, dot_family
 from ahf_ros.detectors import DetectorSettings, create_detector
-from ahf_ros.detectors.dots.confidence import WEIGHTS
 from ahf_ros.detectors.dots.detector import find_rings
 from ahf_ros.detectors.dots.discs import open_regions
-from ahf_ros.detectors.dots.rings import CERTAIN
+from ahf_ros.detectors.dots.rings import CERTAIN, WEIGHTS
 from ahf_ros.evaluation import score
 from ahf_ros.features.frame import ellipse_axes
 from ahf_ros.features.pyramid import image_pyramid
