@@ -16,7 +16,7 @@ from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes.dots import DotFamily, dot_family
 from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import DetectorSettings, FamilyDetector, moved_targets
-from ahf_ros.detectors.dots.discs import small_discs, voted_discs, whole_discs
+from ahf_ros.detectors.dots.discs import judged, small_discs, voted_discs, whole_discs
 from ahf_ros.detectors.dots.rings import CERTAIN, Rings, fit_targets, read_discs, report
 from ahf_ros.features.ellipse_targets import ellipse_fields
 from ahf_ros.features.frame import affine_frames, ellipse_axes
@@ -94,7 +94,8 @@ def find_rings(pyramid: ImagePyramid, settings: DetectorSettings, code: DotFamil
     found: list[Rings] = []
     known = np.zeros((0, 3, 3))
     for search in (whole_discs, voted_discs, small_discs):
-        rings = read_discs(pyramid, search(pyramid, settings, code, known), code)
+        discs = judged(pyramid, search(pyramid, settings, code, known), known, code)
+        rings = read_discs(pyramid, discs, code)
         known = np.concatenate([known, rings.frames[rings.of_word >= CERTAIN]])
         found.append(rings)
     return Rings.joined(found)

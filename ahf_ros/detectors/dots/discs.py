@@ -18,7 +18,7 @@ from ahf_ros.codes.dots import DotFamily
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.features.dot_search import voted_dots, whole_dots
 from ahf_ros.features.dots import NO_DOTS, Dots, distinct
-from ahf_ros.features.frame import circle_outlines, circle_points, ellipse_axes, enlarged
+from ahf_ros.features.frame import circle_outlines, circle_points, ellipse_axes, enlarged, scaled
 from ahf_ros.features.log_edges import LOG_SCALE, LogEdges, mask_of
 from ahf_ros.features.pyramid import ImagePyramid
 from ahf_ros.features.sampling import sample
@@ -73,7 +73,7 @@ def open_regions(edges: LogEdges, outlines: np.ndarray) -> list[tuple[slice, sli
 def whole_discs(
     pyramid: ImagePyramid, settings: DetectorSettings, code: DotFamily, _known: np.ndarray
 ) -> Dots:
-    """Return discs with a whole outline, or whose border has one."""
+    """Return dots with a whole outline, which may be a disc or the border of one."""
     low, high = settings.radii
     circles = whole_dots(pyramid, low, high * code.border_radius, (1, -1))
     found = []
@@ -81,31 +81,32 @@ def whole_discs(
     for radius, side in ((1.0, 1), (code.border_radius, 1), (code.ground_radius, -1)):
         frames = circles.frames.copy()
         frames[:, :2, :2] /= radius
-        found.append(Dots(frames, side * circles.polarity, circles.share))
-    return judged(pyramid, _of_kind(Dots.joined(found), settings), code)
+        found.append(replace(circles, frames=frames, polarity=side * circles.polarity))
+    dots = Dots.joined(found)
+    major = ellipse_axes(dots.frames)[0]
+    of_size = (major >= _TOLERANCE * low) & (major <= high / _TOLERANCE)
+    return dots.select(of_size & np.isin(dots.polarity, settings.polarities))
 
 
 def voted_discs(
     pyramid: ImagePyramid, settings: DetectorSettings, code: DotFamily, known: np.ndarray
 ) -> Dots:
-    """Return discs whose outline edges of light interrupt, outside of known targets' frames."""
+    """Return dots whose outline edges of light interrupt, outside of known targets."""
     outlines = _outlines(known, code, _MARGIN)
-    voted = voted_dots(pyramid, *settings.radii, settings.polarities, outlines)
-    return judged(pyramid, voted.select(~_inside(voted, known, code)), code)
+    return voted_dots(pyramid, *settings.radii, settings.polarities, outlines)
 
 
 def small_discs(
     pyramid: ImagePyramid, settings: DetectorSettings, code: DotFamily, known: np.ndarray
 ) -> Dots:
-    """Return small discs, and those seen at steep angles, as `voted_discs` does."""
+    """Return small dots, and those seen at steep angles, where edges are left to explain."""
     # Edges of light end at a target, and look like no straight ones there.
     margin = 2 * _STRAIGHT / np.maximum(ellipse_axes(known)[1], 1)
     outlines = (_outlines(known, code, margin) + 0.5) / 2 - 0.5
     found = [NO_DOTS]
     for region in open_regions(pyramid.edges[0], outlines):
         found += _blobs(pyramid, region, settings)
-    blobs = Dots.joined(found)
-    return judged(pyramid, blobs.select(~_inside(blobs, known, code)), code)
+    return Dots.joined(found)
 
 
 def _outlines(known: np.ndarray, code: DotFamily, margin: float | np.ndarray) -> np.ndarray:
@@ -133,37 +134,24 @@ def _blobs(
     return found
 
 
-def _inside(dots: Dots, known: np.ndarray, code: DotFamily) -> np.ndarray:
-    """Return whether the centres of dots lie in known targets, shape (k,)."""
-    inside = np.zeros(len(dots.frames), bool)
-    homogeneous = dots.frames[:, :, 2]
-    for back in np.linalg.inv(known):
-        x, y, depth = back @ homogeneous.T
-        inside |= x * x + y * y < (code.border_radius * depth) ** 2
-    return inside
+def judged(pyramid: ImagePyramid, dots: Dots, known: np.ndarray, code: DotFamily) -> Dots:
+    """Return the dots outside of known targets about which a border is seen.
 
-
-def _of_kind(dots: Dots, settings: DetectorSettings) -> Dots:
-    """Return the dots of the polarities and about the radii that are looked for."""
-    low, high = settings.radii
-    major = ellipse_axes(dots.frames)[0]
-    of_size = (major >= _TOLERANCE * low) & (major <= high / _TOLERANCE)
-    return dots.select(of_size & np.isin(dots.polarity, settings.polarities))
-
-
-def judged(pyramid: ImagePyramid, dots: Dots, code: DotFamily) -> Dots:
-    """Return the discs about which a border is seen, with the radius that fits both best.
-
-    No two of them are the same; their share is the share of the expected steps.
+    Their radius is the one that fits disc and border best, their share that of the expected steps.
+    No two of them are the same.
     """
+    outside = np.ones(len(dots.frames), bool)
+    for back in np.linalg.inv(known):
+        x, y, depth = back @ dots.frames[:, :, 2].T
+        outside &= x * x + y * y >= (code.border_radius * depth) ** 2
+    dots = dots.select(outside)
     scores = border_steps(pyramid.logs[0], dots.frames, dots.polarity, code, _SCALES)
     smooth = scores.copy()
     smooth[:, 1:-1] = (scores[:, :-2] + 2 * scores[:, 1:-1] + scores[:, 2:]) / 4
     best = smooth.argmax(axis=1)
     share = scores[np.arange(len(best)), best]
-    frames = dots.frames.copy()
-    frames[:, :2, :2] *= _SCALES[best][:, None, None]
     good = share > _MINIMUM_SHARE
+    frames = scaled(dots.frames, _SCALES[best])
     return distinct(Dots(frames[good], dots.polarity[good], share[good]))
 
 

@@ -51,7 +51,6 @@ from ahf_ros.features.small_dots import small_dots
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, DottedTarget, Target, sorted_targets
 
-_FAMILY = 'gsi'  # whichever data file describes it
 _MARGIN = 0.5  # about the dots of certain targets, dot radii
 _WHOLE_MARGIN = 0.4  # about a dot whose outline is whole, dot radii
 _SMALL = 12.0  # radius up to which dots are looked for as blobs, px
@@ -217,7 +216,7 @@ def report(hypotheses: Hypotheses, code: PointFamily) -> list[Target]:
             id=code.number(word) or 0,
             code=word,
             confidence=confidence,
-            family=_FAMILY,
+            family='gsi',  # whichever data file describes it
             template_dots=len(code.template),
             polarity=polarity,
             **place,

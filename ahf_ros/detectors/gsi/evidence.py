@@ -103,7 +103,7 @@ def find_evidence(
     ratio = dot_evidence(steps / expected, frames, _NOISE / expected)
     levels = np.concatenate([sides, farther], axis=2)
     ratio[:, count:] += _level_evidence(levels, frames, count)
-    return Evidence(np.where(inside, ratio, 0.0), inside)
+    return Evidence(ratio=np.where(inside, ratio, 0.0), inside=inside)
 
 
 def _expected_steps(sides: np.ndarray, polarity: np.ndarray, count: int) -> np.ndarray:
