@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.detectors import DetectorSettings, create_detector
-from ahf_ros.detectors.external import program
+from ahf_ros.detectors.external import command as module
 from ahf_ros.session import identify
 
 IMAGE = np.arange(400, dtype=np.uint8).reshape(20, 20)
@@ -80,7 +80,7 @@ def test_a_program_that_hangs_is_ended_with_all_that_it_started(tmp_path, monkey
     pid = tmp_path / 'pid'
     # The time limit is over once the program has got that far, however slow the machine is.
     clock = SimpleNamespace(monotonic=lambda: 3.0 if pid.exists() else 0.0)
-    monkeypatch.setattr(program, 'time', clock)
+    monkeypatch.setattr(module, 'time', clock)
     script = (
         'import os, subprocess, sys, time\n'
         'child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])\n'
@@ -98,7 +98,7 @@ def test_a_program_that_hangs_is_ended_with_all_that_it_started(tmp_path, monkey
 
 
 def test_a_program_that_writes_without_end_is_ended(tmp_path, monkeypatch):
-    monkeypatch.setattr(program, 'MAXIMUM_OUTPUT', 2**20)
+    monkeypatch.setattr(module, 'MAXIMUM_OUTPUT', 2**20)
     script = 'import os\nwhile True:\n    os.write(1, bytes(2**16))\n'
     with pytest.raises(ValueError, match='bytes, accepted are at most 1048576'):
         detector(tmp_path, script)(IMAGE)

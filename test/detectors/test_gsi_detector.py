@@ -11,9 +11,8 @@ import pytest
 from ahf_ros.codes.gsi import positions_of, value_of
 from ahf_ros.codes.gsi_library import GSI_LIBRARY, point_family
 from ahf_ros.detectors import create_detector
-from ahf_ros.detectors.gsi.evidence import Evidence, seen_templates
+from ahf_ros.detectors.gsi.evidence import Evidence, read_codes, seen_templates
 from ahf_ros.detectors.gsi.grouping import Templates, find_templates
-from ahf_ros.detectors.gsi.reading import read_codes
 from ahf_ros.drawing.colours import DECODED_COLOUR, DECODING_DOT_COLOUR
 from ahf_ros.drawing.overlay import draw
 from ahf_ros.evaluation import score

@@ -229,9 +229,7 @@ def _targets(rings: Rings, ids: np.ndarray, code: DotFamily) -> list[DottedTarge
     ]
 
 
-def _ellipses(
-    frame: np.ndarray, word: int, phase: float, radius: float, code: DotFamily
-) -> tuple[tuple[float, ...], ...]:
+def _ellipses(frame: np.ndarray, word: int, phase: float, radius: float, code: DotFamily) -> tuple:
     """Return the ellipses of disc, border and dots of one ring as `DottedTarget` has them."""
     which = np.flatnonzero(word >> np.arange(code.bits) & 1)
     points = dot_points(phase - 2 * np.pi * which / code.bits, code)
