@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cache
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -13,8 +10,9 @@ from ahf_ros.detectors import create_detector
 from ahf_ros.detectors.gsi.published import decode
 from ahf_ros.evaluation import score
 from ahf_ros.session import identify
-from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
-from ahf_ros.target import UNDECODED, DottedTarget
+from ahf_ros.synthetic.scene import Rendering
+from ahf_ros.target import DottedTarget
+from support.scenes import rendering
 
 GSI = point_family()
 SIZE = {'family': 'gsi', 'width': 1000, 'height': 700, 'targets': 4, 'dot_radius': 6.0, 'seed': 3}
@@ -32,9 +30,8 @@ TABLE_3 = [
 ]
 
 
-@cache
-def rendering(**changes: object) -> Rendering:
-    return render(SceneSettings(**{**SIZE, **changes}))
+def scene(**changes: object) -> Rendering:
+    return rendering(**SIZE | changes)
 
 
 def test_the_worked_example_is_code_18_and_not_its_mirror_image() -> None:
@@ -56,7 +53,7 @@ def test_too_few_points_are_no_target() -> None:
     'changes', [{}, {'polarity': 'bright'}, {'tilt': 50.0, 'polarity': 'bright'}]
 )
 def test_even_light_is_enough_for_the_published_method(changes: dict) -> None:
-    shown = rendering(**changes)
+    shown = scene(**changes)
     found = create_detector('gsi_published', family='gsi')(shown.image)
     figures = score(shown.targets, found)
     assert (figures.right, figures.wrong, figures.false_positives) == (4, 0, 0)
@@ -69,9 +66,7 @@ def test_even_light_is_enough_for_the_published_method(changes: dict) -> None:
 
 
 def test_a_filter_that_ahf_finds_makes_up_for_uneven_light() -> None:
-    shown = rendering(
-        light='stripe', ambient=0.12, dot_radius=9.0, targets=1, width=700, height=500
-    )
+    shown = scene(light='stripe', ambient=0.12, dot_radius=9.0, targets=1, width=700, height=500)
     detector = create_detector('gsi_published', family='gsi')
     assert score(shown.targets, detector(shown.image)).right == 0
     found = identify(
@@ -79,29 +74,3 @@ def test_a_filter_that_ahf_finds_makes_up_for_uneven_light() -> None:
     )
     assert found.filter.applied
     assert score(shown.targets, found.targets).right == 1
-
-
-def test_dots_of_no_target_are_reported_on_request() -> None:
-    shown = rendering(distractors=8, targets=2)
-    plain = create_detector('gsi_published', family='gsi')(shown.image)
-    found = create_detector('gsi_published', family='gsi', report_undecoded=True)(shown.image)
-    decoded = [target for target in found if target.id != UNDECODED]
-    others = [target for target in found if target.id == UNDECODED]
-    assert decoded == plain and len(plain) == 2
-    assert others
-    for target in plain:
-        assert isinstance(target, DottedTarget)
-        for x, y, radius, *_ in target.dots:
-            assert all(np.hypot(it.x - x, it.y - y) > radius for it in others)
-
-
-def test_families_without_such_a_template_are_refused(tmp_path: Path) -> None:
-    path = tmp_path / 'four.yaml'
-    path.write_text(
-        'family: four\nunit: mm\ndot_radius: 1\nreference: a\n'
-        'template: {a: [0, 0, 2], b: [10, 0, 2], c: [0, 14, 2], d: [10, 12, 2]}\n'
-        'positions:\n  0: [5, 0]\n  1: [5, 6]\n  2: [5, 12]\n'
-        'rule: {dots: 2}\ncodes:\n  7: [0, 1]\n'
-    )
-    with pytest.raises(ValueError, match="the family is 'four', accepted by gsi_published is one"):
-        create_detector('gsi_published', family='gsi', family_file=str(path))

@@ -33,19 +33,35 @@ from support.square_markers import needs_square_markers
 SQUARES = {'aruco': 'aruco_4x4_50', 'apriltag': 'apriltag_36h11'}
 
 
-@pytest.mark.parametrize(
-    'name',
-    [
-        pytest.param(name, marks=needs_square_markers if name in SQUARES else ())
-        for name in DETECTOR_NAMES
-    ],
-)
-def test_every_detector_is_called_as_it_is_registered(name):
+ALL = [
+    pytest.param(name, marks=needs_square_markers if name in SQUARES else ())
+    for name in DETECTOR_NAMES
+]
+
+
+def made(name: str) -> Detector:
+    """Return a detector of a family that it identifies."""
     kind = name.partition('_')[0]
     family = SQUARES.get(name) or (kind if kind in ('gsi', 'dots') else 'metashape12')
-    made = create_detector(name, family=family, command='program')
-    assert made.name == name
-    assert made.family == family
+    detector = create_detector(name, family=family, command='program')
+    assert (detector.name, detector.family) == (name, family)
+    return detector
+
+
+@pytest.mark.parametrize('name', ALL)
+@pytest.mark.parametrize(
+    ('image', 'message'),
+    [
+        (np.zeros((0, 0), np.uint8), 'image'),
+        (np.zeros((1, 1), np.uint8), 'image'),
+        (np.full((50, 50), 7, np.uint8), 'constant'),
+        (np.full((50, 50), np.nan), 'NaN'),
+        (np.zeros((50, 50, 3), np.uint8), 'shape'),
+    ],
+)
+def test_every_detector_is_called_as_registered_and_refuses_what_is_no_image(name, image, message):
+    with pytest.raises(ValueError, match=message):
+        made(name)(image)
 
 
 def test_every_family_chooses_a_detector():
@@ -89,22 +105,13 @@ def test_only_families_that_can_be_counted_are_estimated():
         IdentificationSettings(estimate_expected=True, detection=square)
 
 
-def test_refinement_and_drafts_are_part_of_the_contract():
-    ring = create_detector('ring')
-    assert isinstance(ring, Detector) and isinstance(ring, Refiner)
-    assert not isinstance(ring, Drafter)
-    assert isinstance(create_detector('traditional'), Drafter)
-    assert not isinstance(create_detector('command', command='program'), Refiner)
-
-
-@pytest.mark.parametrize(
-    'name', ['ring', 'traditional', 'gsi', 'gsi_published', 'dots', 'command']
-)
-def test_only_detectors_that_hardly_need_a_filter_have_a_patience(name):
-    kind = name.partition('_')[0]
-    family = kind if kind in ('gsi', 'dots') else 'metashape12'
-    made = create_detector(name, family=family, command='program')
-    assert isinstance(made, EarlyStopping) == (name in ('ring', 'gsi', 'dots'))
+@pytest.mark.parametrize('name', ALL)
+def test_refinement_drafts_and_patience_are_part_of_the_contract(name):
+    detector = made(name)
+    assert isinstance(detector, Refiner) == (not name.endswith('_published') and name != 'command')
+    assert isinstance(detector, Drafter) == (name in ('traditional', *SQUARES))
+    # Only detectors that hardly need a filter have a patience.
+    assert isinstance(detector, EarlyStopping) == (name in ('ring', 'gsi', 'dots'))
 
 
 def test_an_unknown_detector_is_refused_by_name():
@@ -190,11 +197,8 @@ class MyDetector:
 )
 def test_a_detector_of_another_package_may_fail_and_hang(tmp_path, monkeypatch, gray, words):
     registry = added(tmp_path, monkeypatch, f'package_that_fails_{gray}', FAILING)
-    patient = registry['create_detector'](
-        'mine', settings=DetectorSettings(detector_timeout=600.0)
-    )
-    impatient = registry['create_detector'](
-        'mine', settings=DetectorSettings(detector_timeout=0.2)
+    patient, impatient = (
+        registry['create_detector']('mine', detector_timeout=limit) for limit in (600.0, 0.2)
     )
     image = np.full((20, 20), gray, np.uint8)
     image[0] = 0
@@ -297,8 +301,7 @@ def test_a_search_ends_when_a_detector_hangs_in_it(tmp_path, monkeypatch):
     body = FAILING.replace('image.max() == 1', 'image.max() > 100')
     registry = added(tmp_path, monkeypatch, 'package_that_hangs', body)
     patient, impatient = (
-        registry['create_detector']('mine', settings=DetectorSettings(detector_timeout=limit))
-        for limit in (600.0, 0.2)
+        registry['create_detector']('mine', detector_timeout=limit) for limit in (600.0, 0.2)
     )
     image = np.full((20, 20), 60, np.uint8)
     image[0] = 0
