@@ -9,10 +9,9 @@ that makes it from `DetectorSettings`.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
 from pkgutil import resolve_name
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from ahf_ros.codes.families import FAMILY_NAMES, KINDS, check_numbers, families_in
 from ahf_ros.deprecation import deprecated_arguments
@@ -59,16 +58,10 @@ AUTO = 'auto'
 """Stands for the detector of the family."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Entry:
-    """Module and name of a detector, below `ahf_ros.detectors`, and the families it identifies."""
-
-    detector: str
+class _Entry(NamedTuple):
+    detector: str  # its module and name, below `ahf_ros.detectors`
     families: tuple[str, ...]
     several: bool = False  # families at a time
-
-    def reads(self, families: tuple[str, ...]) -> bool:
-        return set(families) <= set(self.families) and (self.several or len(families) == 1)
 
 
 # The detector of a family is the first one that lists it.
@@ -148,7 +141,11 @@ def detector_name(name: str, family: str) -> str:
     """
     DETECTOR.check(name)
     families = families_in(family)
-    fitting = [of for of, entry in _ENTRIES.items() if entry.reads(families)]
+    fitting = [
+        fit
+        for fit, entry in _ENTRIES.items()
+        if set(families) <= set(entry.families) and (entry.several or len(families) == 1)
+    ]
     if name == AUTO:
         return fitting[0]
     if name in _ENTRIES and name not in fitting:

@@ -175,14 +175,20 @@ def _read(
     pyramid: ImagePyramid, templates: Templates, code: PointFamily, *, obvious: bool
 ) -> Hypotheses:
     templates = seen_templates(pyramid.logs[0], templates, code)
+    if not len(templates.polarity):
+        return NO_HYPOTHESES
     evidence = find_evidence(
         pyramid.logs[0], templates.homographies, templates.polarity, templates.scale, code
     )
     readings = read_codes(evidence, templates.scale, code)
     which = plausible(templates, readings, code, obvious=obvious)
+    if not len(which):
+        return NO_HYPOTHESES
     words = readings.words[which]
     first = _placed(pyramid, templates.select(which), words, code)
     again = np.flatnonzero((first.words != words) & (first.support >= _PROMISING))
+    if not len(again):
+        return first
     found = first.select(again)
     return first.replaced(again, _placed(pyramid, found, found.words, code))
 

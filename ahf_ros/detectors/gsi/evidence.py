@@ -13,7 +13,6 @@ import numpy as np
 
 from ahf_ros.codes.gsi import PointFamily
 from ahf_ros.detectors.gsi.grouping import Templates
-from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.dot_evidence import circle_sides, dot_evidence, independent_rays
 from ahf_ros.features.frame import ellipse_axes
 from ahf_ros.features.homography import local_frames
@@ -43,7 +42,7 @@ _CLEAREST = 20.0  # that it may say for a dot on which one
 
 
 @dataclass(frozen=True, slots=True)
-class Evidence(ArrayRecord):
+class Evidence:
     """Evidence at the places of k targets; the template dots come before the positions.
 
     Attributes
@@ -161,7 +160,7 @@ def _densities(values: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True, slots=True)
-class Readings(ArrayRecord):
+class Readings:
     """What k groups of dots were read as.
 
     Attributes

@@ -238,15 +238,22 @@ def find_templates(dots: Dots, family: PointFamily, *, obvious: bool = False) ->
     other dots about them are not looked for.
     """
     places = family.places[: len(family.template)]
-    templates = [_fitted(dots, np.zeros((0, len(places)), int), family)]
+    nothing = Templates(
+        homographies=np.zeros((0, 3, 3)),
+        members=np.zeros((0, len(places)), int),
+        polarity=np.zeros(0, int),
+        scale=np.zeros(0),
+        misfit=np.zeros(0),
+    )
     if len(dots.frames) < len(places) - 1:
-        return templates[0]
+        return nothing
     centres, smallest = dots.frames[:, :2, 2], frame.ellipse_axes(dots.frames)[1].min()
     few = len(centres) <= FEW
     triples = _triples(places, family.reference, few)
     error = _LENGTH_ERROR if few else _LENGTH_ERROR_OF_MANY
     pairs = neighbours(dots, family, triples, error, obvious=obvious)
     nearest = cache(partial(NearestDots.of, centres, smallest / 3))
+    templates = [nothing]
     for triple in triples:
         members = _members(dots, pairs, nearest, family, triple)
         if len(members):

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.circle_fit import ENOUGH
 from ahf_ros.features.circles import dot_circles
 from ahf_ros.features.dots import Dots
@@ -35,7 +34,7 @@ _LEVEL_RADII = np.array([0.0, 1.8])  # where the levels of a dot and of its grou
 
 
 @dataclass(frozen=True, slots=True)
-class Placement(ArrayRecord):
+class Placement:
     """Where k targets are.
 
     Attributes
@@ -64,7 +63,7 @@ class Placement(ArrayRecord):
 
 
 @dataclass(frozen=True, slots=True)
-class MeasuredDots(ArrayRecord):
+class MeasuredDots:
     """Dots, and what their edges say.
 
     Attributes
