@@ -59,22 +59,22 @@ AUTO = 'auto'
 
 
 class _Entry(NamedTuple):
-    detector: str  # its module and name, below `ahf_ros.detectors`
+    detector: str  # its module and name, below `ahf_ros`
     families: tuple[str, ...]
     several: bool = False  # families at a time
 
 
 # The detector of a family is the first one that lists it.
 _ENTRIES = {
-    'ring': _Entry('ring.detector:RingDetector', KINDS['ring'], several=True),
-    'traditional': _Entry('traditional:TraditionalDetector', KINDS['ring']),
-    'aruco': _Entry('square.detector:SquareDetector', KINDS['aruco']),
-    'apriltag': _Entry('square.detector:SquareDetector', KINDS['apriltag']),
-    'gsi': _Entry('gsi.detector:GsiDetector', KINDS['gsi']),
-    'gsi_published': _Entry('gsi.published:PublishedGsiDetector', KINDS['gsi']),
-    'dots': _Entry('dots.detector:DotsDetector', KINDS['dots']),
-    'dots_published': _Entry('dots.published:PublishedDotsDetector', KINDS['dots']),
-    'command': _Entry('external.command:CommandDetector', FAMILY_NAMES, several=True),
+    'ring': _Entry('detectors.ring.detector:RingDetector', KINDS['ring'], several=True),
+    'traditional': _Entry('detectors.traditional:TraditionalDetector', KINDS['ring']),
+    'aruco': _Entry('detectors.square.detector:SquareDetector', KINDS['aruco']),
+    'apriltag': _Entry('detectors.square.detector:SquareDetector', KINDS['apriltag']),
+    'gsi': _Entry('detectors.gsi.detector:GsiDetector', KINDS['gsi']),
+    'gsi_published': _Entry('detectors.gsi.published:PublishedGsiDetector', KINDS['gsi']),
+    'dots': _Entry('detectors.dots.detector:DotsDetector', KINDS['dots']),
+    'dots_published': _Entry('detectors.dots.published:PublishedDotsDetector', KINDS['dots']),
+    'command': _Entry('detectors.external.command:CommandDetector', FAMILY_NAMES, several=True),
 }
 
 _ADDED: dict[str, EntryPoint] = {
@@ -130,7 +130,7 @@ def create_detector(
     name = detector_name(name, settings.family)
     if name in _ADDED:
         return _added(_ADDED[name], settings)
-    made: Detector = resolve_name(f'ahf_ros.detectors.{_ENTRIES[name].detector}')(settings)
+    made: Detector = resolve_name(f'ahf_ros.{_ENTRIES[name].detector}')(settings)
     return made
 
 
