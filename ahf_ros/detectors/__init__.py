@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from ahf_ros.options import DetectorOptions
 
 __all__ = [
-    'AUTO',
     'DETECTOR',
     'DETECTOR_NAMES',
     'FAMILY_NAMES',
@@ -54,8 +53,7 @@ __all__ = [
 GROUP = 'ahf_ros.detectors'
 """Group of the entry points by which other packages add detectors."""
 
-AUTO = 'auto'
-"""Stands for the detector of the family."""
+_AUTO = 'auto'  # stands for the detector of the family
 
 
 class _Entry(NamedTuple):
@@ -78,7 +76,9 @@ _ENTRIES = {
 }
 
 _ADDED: dict[str, EntryPoint] = {
-    point.name: point for point in entry_points(group=GROUP) if point.name not in (AUTO, *_ENTRIES)
+    point.name: point
+    for point in entry_points(group=GROUP)
+    if point.name not in (_AUTO, *_ENTRIES)
 }
 
 DETECTOR_NAMES = (*_ENTRIES, *sorted(_ADDED))
@@ -86,16 +86,16 @@ DETECTOR_NAMES = (*_ENTRIES, *sorted(_ADDED))
 
 DETECTOR = Parameter(
     'detector',
-    AUTO,
+    _AUTO,
     'How targets are identified; auto is the detector of the family.',
-    choices=(AUTO, *DETECTOR_NAMES),
+    choices=(_AUTO, *DETECTOR_NAMES),
 )
 """The choice of a detector."""
 
 
 @deprecated_arguments(positions=('settings',))
 def create_detector(
-    name: str = AUTO,
+    name: str = _AUTO,
     *,
     settings: DetectorSettings | None = None,
     **options: Unpack[DetectorOptions],
@@ -146,13 +146,13 @@ def detector_name(name: str, family: str) -> str:
         for fit, entry in _ENTRIES.items()
         if set(families) <= set(entry.families) and (entry.several or len(families) == 1)
     ]
-    if name == AUTO:
+    if name == _AUTO:
         return fitting[0]
     if name in _ENTRIES and name not in fitting:
         several = ', alone or together' if _ENTRIES[name].several else ''
         raise ValueError(
             f'detector is {name!r} and family is {family!r}; accepted with this family is one of '
-            f'{", ".join((AUTO, *fitting, *_ADDED))}, and with this detector one of '
+            f'{", ".join((_AUTO, *fitting, *_ADDED))}, and with this detector one of '
             f'{", ".join(_ENTRIES[name].families)}{several}'
         )
     return name
@@ -172,7 +172,7 @@ def estimator(settings: DetectorSettings) -> Callable[[np.ndarray], int]:
 
     It raises a ValueError if targets of the family cannot be counted.
     """
-    if detector_name(AUTO, settings.family) != 'ring':
+    if detector_name(_AUTO, settings.family) != 'ring':
         raise ValueError(
             f'estimate_expected is True and family is {settings.family!r}; accepted with this '
             f'family is False, and True with one of {", ".join(KINDS["ring"])}'

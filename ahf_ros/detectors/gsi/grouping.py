@@ -53,6 +53,14 @@ _STRAY = 3  # dots at the positions of a target that do not belong to it
 _CELL = 2.0  # smallest one of the map of the nearest dots, px
 
 
+Nearest = Callable[[np.ndarray, np.ndarray, float], tuple[np.ndarray, np.ndarray]]
+"""From places, shape (n, 2), units and a reach to the nearest dots and their distances.
+
+Units, shape (n, 2, 2), are the maps from the unit of the reach to px at each place. Beyond the
+reach a dot is -1.
+"""
+
+
 @dataclass(frozen=True, slots=True)
 class Pairs:
     """Ordered pairs of neighbours, sorted by the first one, then by their length.
@@ -153,57 +161,33 @@ def neighbours(
     return Pairs(first=first, second=second, offset=offset, crowd=limit[first], error=error)
 
 
-@dataclass(frozen=True, slots=True)
-class NearestDots:
-    """A map that says for every place in the image which dot is nearest.
+def nearest_dots(centres: np.ndarray, error: float) -> Nearest:
+    """Return a function that finds the dots nearest to places; see `Nearest`.
 
-    Attributes
-    ----------
-    centres : ndarray of float64, shape (k, 2)
-        px.
-    corner : ndarray of float64, shape (2,)
-        Place of the first cell, px.
-    cell : float
-        Its side, px.
-    index : ndarray of int32, shape (rows, columns)
+    It looks them up in a map of the image. A dot may be farther away than the nearest one by the
+    error, px.
     """
+    cell = max(error, _CELL)
+    corner = centres.min(axis=0)
+    cells = np.rint((centres - corner) / cell).astype(int)
+    last = cells.max(axis=0)
+    empty = np.full(last[::-1] + 1, 255, np.uint8)
+    empty[cells[:, 1], cells[:, 0]] = 0
+    _, labels = cv2.distanceTransformWithLabels(
+        empty, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    dot = np.zeros(labels.max() + 1, np.int32)
+    dot[labels[cells[:, 1], cells[:, 0]]] = np.arange(len(cells))
+    nearest = dot[labels]
 
-    centres: np.ndarray
-    corner: np.ndarray
-    cell: float
-    index: np.ndarray
-
-    @classmethod
-    def of(cls, centres: np.ndarray, error: float) -> NearestDots:
-        """Return the map of at least one dot.
-
-        `error` says by how much a dot may be farther away than the nearest one, px.
-        """
-        cell = max(error, _CELL)
-        corner = centres.min(axis=0)
-        cells = np.rint((centres - corner) / cell).astype(int)
-        empty = np.full(cells.max(axis=0)[::-1] + 1, 255, np.uint8)
-        empty[cells[:, 1], cells[:, 0]] = 0
-        _, labels = cv2.distanceTransformWithLabels(
-            empty, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
-        )
-        dot = np.zeros(labels.max() + 1, np.int32)
-        dot[labels[cells[:, 1], cells[:, 0]]] = np.arange(len(cells))
-        return cls(centres, corner, cell, dot[labels])
-
-    def within(
-        self, places: np.ndarray, units: np.ndarray, reach: float
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the dots nearest to places, -1 where none is near, and their distances.
-
-        Units, shape (n, 2, 2), are the maps from the unit of the reach to px at each place.
-        """
-        last = np.array(self.index.shape[::-1]) - 1
-        column, row = np.clip(np.rint((places - self.corner) / self.cell), 0, last).astype(int).T
-        found = self.index[row, column]
-        gap = np.linalg.inv(units) @ (self.centres[found] - places)[..., None]
+    def find(places: np.ndarray, units: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
+        column, row = np.clip(np.rint((places - corner) / cell), 0, last).astype(int).T
+        found = nearest[row, column]
+        gap = np.linalg.inv(units) @ (centres[found] - places)[..., None]
         distance = np.hypot(gap[:, 0, 0], gap[:, 1, 0])
         return np.where(distance < reach, found, -1), distance
+
+    return find
 
 
 @dataclass(frozen=True, slots=True)
@@ -252,7 +236,7 @@ def find_templates(dots: Dots, family: PointFamily, *, obvious: bool = False) ->
     triples = _triples(places, family.reference, few)
     error = _LENGTH_ERROR if few else _LENGTH_ERROR_OF_MANY
     pairs = neighbours(dots, family, triples, error, obvious=obvious)
-    nearest = cache(partial(NearestDots.of, centres, smallest / 3))
+    nearest = cache(partial(nearest_dots, centres, smallest / 3))
     templates = [nothing]
     for triple in triples:
         members = _members(dots, pairs, nearest, family, triple)
@@ -281,7 +265,7 @@ def _triples(places: np.ndarray, reference: int, thorough: bool) -> list[tuple[i
 def _members(
     dots: Dots,
     pairs: Pairs,
-    nearest: Callable[[], NearestDots],
+    nearest: Callable[[], Nearest],
     family: PointFamily,
     triple: tuple[int, int, int],
 ) -> np.ndarray:
@@ -324,7 +308,7 @@ def _members(
         for index in np.setdiff1d(np.arange(len(places)), (role, partner, third)):
             expected = origin + affine @ arms[index]
             reach = _PREDICTED + _PERSPECTIVE * lengths[index]
-            members[:, index], gap = nearest().within(expected, affine, reach)
+            members[:, index], gap = nearest()(expected, affine, reach)
             error += np.where(members[:, index] < 0, 1, (gap / reach) ** 2)
         members[(members < 0).sum(axis=1) > 1] = -1
         kept = np.argsort(error, kind='stable')[:_MAXIMUM_GROUPS]
@@ -423,12 +407,12 @@ def _fitted(dots: Dots, members: np.ndarray, family: PointFamily) -> Templates:
     ).select(good)
 
 
-def _mostly_empty(templates: Templates, nearest: NearestDots, family: PointFamily) -> np.ndarray:
+def _mostly_empty(templates: Templates, nearest: Nearest, family: PointFamily) -> np.ndarray:
     """Return where not many more positions than those of a code have a dot nearby."""
     count = len(family.template)
     frames = local_frames(templates.homographies, family.places[count:], family.radii[count:])
     single = frames.reshape(-1, 3, 3)
-    found, _ = nearest.within(single[:, :2, 2], single[:, :2, :2], 1.0)
+    found, _ = nearest(single[:, :2, 2], single[:, :2, :2], 1.0)
     found = np.sort(found.reshape(frames.shape[:2]), axis=1)
     different = (np.diff(found, axis=1, prepend=-1) > 0).sum(axis=1)
     empty: np.ndarray = different <= family.rule.dots + _STRAY
