@@ -29,6 +29,13 @@ def errors(shown: Rendering, found: Sequence[Target]) -> np.ndarray:
     return np.array([(it.x - true[it.id].x, it.y - true[it.id].y) for it in found])
 
 
+def relative_errors(shown: Rendering, found: Sequence[Target]) -> np.ndarray:
+    """Return the squares of the errors of centres by their covariances, shape (k,)."""
+    covariances = np.array([it.covariance for it in found]).reshape(-1, 2, 2)
+    error = errors(shown, found)[..., None]
+    return (error.swapaxes(1, 2) @ np.linalg.solve(covariances, error))[:, 0, 0]
+
+
 def around(x: float, y: float, half: float) -> tuple[slice, slice]:
     """Return rows and columns of a square about a place, px."""
     column, row, half = round(x), round(y), round(half)

@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ahf_ros.detectors import DetectorSettings, create_detector
+from ahf_ros.detectors import create_detector
 from ahf_ros.detectors.external import command as module
 from ahf_ros.session import identify
 
@@ -23,8 +23,7 @@ def detector(tmp_path, script: str, words: str = '', timeout: float = 600.0):
     path = tmp_path / 'program.py'
     path.write_text(script)
     command = f'{sys.executable} {path} {words}'
-    settings = DetectorSettings(command=command, detector_timeout=timeout)
-    return create_detector('command', settings=settings)
+    return create_detector('command', command=command, detector_timeout=timeout)
 
 
 def printing(text: str) -> str:
@@ -117,17 +116,12 @@ def _runs(pid: int) -> bool:
     [
         ('', "command '' is empty, accepted is a program"),
         ('"open', 'cannot be split into words'),
+        ('/nowhere/nothing', 'cannot be started: No such file'),
     ],
 )
 def test_a_command_that_is_none(command, message):
     with pytest.raises(ValueError, match=message):
-        create_detector('command', settings=DetectorSettings(command=command))
-
-
-def test_a_program_that_is_not_there(tmp_path):
-    settings = DetectorSettings(command=str(tmp_path / 'nothing'))
-    with pytest.raises(ValueError, match='cannot be started: No such file'):
-        create_detector('command', settings=settings)(IMAGE)
+        create_detector('command', command=command)(IMAGE)
 
 
 def test_several_threads_at_once_and_no_file_left(tmp_path, monkeypatch):
