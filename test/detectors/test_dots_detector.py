@@ -70,9 +70,12 @@ def test_a_target_and_its_mirror_image_are_one_code() -> None:
     assert [target.id for target in found] == [target.id for target in shown.targets]
 
 
-@pytest.mark.parametrize('light', ['normal', 'stripe'])
-def test_marks_that_are_no_targets_are_not_reported(light: str) -> None:
-    assert detect(scene(targets=0, distractors=25, light=light).image) == []
+@pytest.mark.parametrize(
+    ('name', 'light'), [('dots', 'normal'), ('dots', 'stripe'), ('dots_published', 'normal')]
+)
+def test_marks_that_are_no_targets_are_not_reported(name: str, light: str) -> None:
+    shown = scene(targets=0, distractors=25, light=light)
+    assert create_detector(name, family='dots')(shown.image) == []
 
 
 def test_rings_without_a_code_are_reported_on_request() -> None:

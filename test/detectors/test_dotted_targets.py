@@ -9,7 +9,9 @@ import pytest
 
 from ahf_ros.codes.dots import DOTS_DESIGN
 from ahf_ros.detectors import create_detector
+from ahf_ros.evaluation import score
 from ahf_ros.filtering.homomorphic import HomomorphicFilter
+from ahf_ros.session import identify
 from ahf_ros.synthetic.scene import Rendering
 from support.scenes import counted, errors, rendering
 
@@ -77,8 +79,7 @@ def test_targets_are_identified_and_placed(family: str, changes: dict, bound: fl
     found = create_detector(family=family)(shown.image)
     assert counted(shown, found) == (len(shown.targets), 0, 0)
     assert np.sqrt((errors(shown, found) ** 2).mean()) < bound
-    codes = {target.id: target.code for target in shown.targets}
-    assert all(target.code == codes[target.id] for target in found)
+    assert [it.code for it in found] == [it.code for it in shown.targets]
     assert all(0.95 <= target.confidence <= 1 for target in found)
 
 
@@ -100,6 +101,54 @@ def test_places_come_from_the_image_as_received(
     assert [target.id for target in refined] == [target.id for target in found]
     assert np.hypot(*errors(shown, refined).T).max() < bound
     assert detector.refine(shown.image, []) == []
+
+
+@pytest.mark.parametrize(
+    ('family', 'changes', 'bound'),
+    [
+        ('gsi', {}, 0.3),
+        ('gsi', {'polarity': 'bright'}, 0.3),
+        ('gsi', {'tilt': 50.0, 'polarity': 'bright'}, 0.3),
+        ('dots', {}, 0.15),
+        ('dots', {'dot_radius': 3.8}, 0.15),
+        ('dots', {'dot_radius': 14.0}, 0.15),
+        ('dots', {'polarity': 'bright'}, 0.15),
+        ('dots', {'tilt': 50.0}, 0.35),  # with the bias of the ellipse under perspective
+    ],
+)
+def test_even_light_is_enough_for_the_published_methods(
+    family: str, changes: dict, bound: float
+) -> None:
+    shown = scene(family, **changes)
+    found = create_detector(f'{family}_published', family=family)(shown.image)
+    assert counted(shown, found) == (len(shown.targets), 0, 0)
+    assert score(shown, found).rmse[2] < bound
+    assert [it.code for it in found] == [it.code for it in shown.targets]
+    assert all(0 < target.confidence <= 1 for target in found)
+
+
+@pytest.mark.parametrize(
+    ('family', 'changes', 'options', 'least'),
+    [
+        (
+            'gsi',
+            {'ambient': 0.12, 'dot_radius': 9.0, 'targets': 1, 'width': 700, 'height': 500},
+            {'population': 8, 'max_evaluations': 24},
+            1,
+        ),
+        ('dots', {}, {}, 4),
+    ],
+)
+def test_stripes_defeat_the_published_methods_and_ahf_brings_the_targets_back(
+    family: str, changes: dict, options: dict, least: int
+) -> None:
+    shown = scene(family, light='stripe', **changes)
+    detector = create_detector(f'{family}_published', family=family)
+    without = score(shown, detector(shown.image)).right
+    expected = len(shown.targets)
+    found = identify(shown.image, detector=detector, expected_targets=expected, **options)
+    assert found.filter.applied
+    assert score(shown, found).right >= max(3 * without, least)
 
 
 @pytest.mark.parametrize(
