@@ -20,8 +20,8 @@ import numpy as np
 
 from ahf_ros.codes.dots import dot_family
 from ahf_ros.detectors.contract import DetectorSettings
-from ahf_ros.detectors.dots.confidence import WEIGHTS, target_probability, word_probability
 from ahf_ros.detectors.dots.detector import find_rings
+from ahf_ros.detectors.dots.rings import WEIGHTS, target_probability, word_probability
 from ahf_ros.features.pyramid import image_pyramid
 from ahf_ros.imaging.image import as_gray
 from ahf_ros.synthetic.patterns import LIGHT_NAMES

@@ -23,9 +23,8 @@ import numpy as np
 
 from ahf_ros.codes.gsi import GSI_LIBRARY, point_family
 from ahf_ros.detectors import DetectorSettings, create_detector
-from ahf_ros.detectors.gsi.confidence import WEIGHTS, probability
 from ahf_ros.detectors.gsi.detector import find_hypotheses
-from ahf_ros.detectors.gsi.hypotheses import Hypotheses
+from ahf_ros.detectors.gsi.hypotheses import WEIGHTS, Hypotheses, probability
 from ahf_ros.features.pyramid import image_pyramid
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render

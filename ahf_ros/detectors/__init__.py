@@ -9,10 +9,9 @@ that makes it from `DetectorSettings`.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
 from pkgutil import resolve_name
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from ahf_ros.codes.families import FAMILY_NAMES, KINDS, check_numbers, families_in
 from ahf_ros.deprecation import deprecated_arguments
@@ -35,7 +34,6 @@ if TYPE_CHECKING:
     from ahf_ros.options import DetectorOptions
 
 __all__ = [
-    'AUTO',
     'DETECTOR',
     'DETECTOR_NAMES',
     'FAMILY_NAMES',
@@ -55,57 +53,32 @@ __all__ = [
 GROUP = 'ahf_ros.detectors'
 """Group of the entry points by which other packages add detectors."""
 
-AUTO = 'auto'
-"""Stands for the detector of the family."""
+_AUTO = 'auto'  # stands for the detector of the family
 
 
-@dataclass(frozen=True, slots=True)
-class _Entry:
-    """A detector, its families, and how their targets are counted without being decoded.
-
-    `detector` and `estimate` are module and name, below `ahf_ros`.
-    """
-
-    detector: str
+class _Entry(NamedTuple):
+    detector: str  # its module and name, below `ahf_ros`
     families: tuple[str, ...]
-    estimate: str = ''
     several: bool = False  # families at a time
-    own_ids: bool = False  # rather than the families'
-
-    def reads(self, families: tuple[str, ...]) -> bool:
-        return set(families) <= set(self.families) and (self.several or len(families) == 1)
-
-    def create(self, settings: DetectorSettings) -> Detector:
-        made: Detector = resolve_name(f'ahf_ros.{self.detector}')(settings)
-        return made
-
-    def count(self, image: np.ndarray, settings: DetectorSettings) -> int:
-        counted: int = resolve_name(f'ahf_ros.{self.estimate}')(image, settings)
-        return counted
 
 
 # The detector of a family is the first one that lists it.
 _ENTRIES = {
-    'ring': _Entry(
-        'detectors.ring.detector:RingDetector',
-        KINDS['ring'],
-        'detectors.ring.counting:estimate_count',
-        several=True,
-    ),
-    'traditional': _Entry('detectors.traditional.detector:TraditionalDetector', KINDS['ring']),
+    'ring': _Entry('detectors.ring.detector:RingDetector', KINDS['ring'], several=True),
+    'traditional': _Entry('detectors.traditional:TraditionalDetector', KINDS['ring']),
     'aruco': _Entry('detectors.square.detector:SquareDetector', KINDS['aruco']),
     'apriltag': _Entry('detectors.square.detector:SquareDetector', KINDS['apriltag']),
     'gsi': _Entry('detectors.gsi.detector:GsiDetector', KINDS['gsi']),
     'gsi_published': _Entry('detectors.gsi.published:PublishedGsiDetector', KINDS['gsi']),
     'dots': _Entry('detectors.dots.detector:DotsDetector', KINDS['dots']),
     'dots_published': _Entry('detectors.dots.published:PublishedDotsDetector', KINDS['dots']),
-    'command': _Entry(
-        'detectors.external.command:CommandDetector', FAMILY_NAMES, several=True, own_ids=True
-    ),
+    'command': _Entry('detectors.external.command:CommandDetector', FAMILY_NAMES, several=True),
 }
 
 _ADDED: dict[str, EntryPoint] = {
-    point.name: point for point in entry_points(group=GROUP) if point.name not in (AUTO, *_ENTRIES)
+    point.name: point
+    for point in entry_points(group=GROUP)
+    if point.name not in (_AUTO, *_ENTRIES)
 }
 
 DETECTOR_NAMES = (*_ENTRIES, *sorted(_ADDED))
@@ -113,16 +86,16 @@ DETECTOR_NAMES = (*_ENTRIES, *sorted(_ADDED))
 
 DETECTOR = Parameter(
     'detector',
-    AUTO,
+    _AUTO,
     'How targets are identified; auto is the detector of the family.',
-    choices=(AUTO, *DETECTOR_NAMES),
+    choices=(_AUTO, *DETECTOR_NAMES),
 )
 """The choice of a detector."""
 
 
 @deprecated_arguments(positions=('settings',))
 def create_detector(
-    name: str = AUTO,
+    name: str = _AUTO,
     *,
     settings: DetectorSettings | None = None,
     **options: Unpack[DetectorOptions],
@@ -155,84 +128,62 @@ def create_detector(
         raise ValueError(f'settings is {shown(settings)}, accepted is a DetectorSettings')
     settings = updated(settings or DetectorSettings(), options)
     name = detector_name(name, settings.family)
-    if name in _ENTRIES:
-        return _ENTRIES[name].create(settings)
-    return _added(_ADDED[name], settings)
+    if name in _ADDED:
+        return _added(_ADDED[name], settings)
+    made: Detector = resolve_name(f'ahf_ros.{_ENTRIES[name].detector}')(settings)
+    return made
 
 
 def detector_name(name: str, family: str) -> str:
-    """Return the name of a detector that identifies a family.
+    """Return the name of a detector that identifies a family or several, see `families_in`.
 
-    Parameters
-    ----------
-    name : str
-        One of `DETECTOR_NAMES`, or 'auto' for the detector of the family.
-    family : str
-        One of `FAMILY_NAMES`, or several as `families_in` accepts them.
-
-    Raises
-    ------
-    ValueError
-        If there is no such detector, or it does not identify the family or several of them.
+    It raises a ValueError if there is no such detector, or it does not identify these families.
     """
     DETECTOR.check(name)
     families = families_in(family)
-    fitting = [of for of, entry in _ENTRIES.items() if entry.reads(families)]
-    if name == AUTO:
+    fitting = [
+        fit
+        for fit, entry in _ENTRIES.items()
+        if set(families) <= set(entry.families) and (entry.several or len(families) == 1)
+    ]
+    if name == _AUTO:
         return fitting[0]
     if name in _ENTRIES and name not in fitting:
         several = ', alone or together' if _ENTRIES[name].several else ''
         raise ValueError(
             f'detector is {name!r} and family is {family!r}; accepted with this family is one of '
-            f'{", ".join((AUTO, *fitting, *_ADDED))}, and with this detector one of '
+            f'{", ".join((_AUTO, *fitting, *_ADDED))}, and with this detector one of '
             f'{", ".join(_ENTRIES[name].families)}{several}'
         )
     return name
 
 
 def check_expected_ids(ids: Iterable[int], name: str, settings: DetectorSettings) -> None:
-    """Refuse IDs that a detector cannot report.
+    """Refuse IDs that a detector cannot report, by a ValueError.
 
-    Parameters
-    ----------
-    ids : iterable of int
-    name : str
-        Name of the detector. One that is no part of this package may report any ID.
-    settings : DetectorSettings
-        What the targets look like.
-
-    Raises
-    ------
-    ValueError
-        If there are IDs that none of the families has.
+    Detectors that are no part of this package, also as a command, may report any.
     """
-    if name in _ENTRIES and not _ENTRIES[name].own_ids:
+    if name in _ENTRIES and name != 'command':
         check_numbers('expected_ids', ids, settings.families, settings.family_file)
 
 
 def estimator(settings: DetectorSettings) -> Callable[[np.ndarray], int]:
-    """Return the function that estimates how many targets of a family an image shows.
+    """Return the function that estimates how many targets an image shows, for rings only.
 
-    Parameters
-    ----------
-    settings : DetectorSettings
-        What the targets look like.
-
-    Raises
-    ------
-    ValueError
-        If targets of this family cannot be counted.
+    It raises a ValueError if targets of the family cannot be counted.
     """
-    entry = _ENTRIES[detector_name(AUTO, settings.family)]
-    if not entry.estimate:
-        counted = [
-            name for other in _ENTRIES.values() if other.estimate for name in other.families
-        ]
+    if detector_name(_AUTO, settings.family) != 'ring':
         raise ValueError(
             f'estimate_expected is True and family is {settings.family!r}; accepted with this '
-            f'family is False, and True with one of {", ".join(counted)}'
+            f'family is False, and True with one of {", ".join(KINDS["ring"])}'
         )
-    return lambda image: entry.count(image, settings)
+
+    def count(image: np.ndarray) -> int:
+        from ahf_ros.detectors.ring.counting import estimate_count
+
+        return estimate_count(image, settings)
+
+    return count
 
 
 def _added(point: EntryPoint, settings: DetectorSettings) -> Detector:

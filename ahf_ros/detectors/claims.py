@@ -23,14 +23,9 @@ _Target = TypeVar('_Target', bound=Target)
 
 
 def owners(count: int, rivals: Rivals) -> np.ndarray:
-    """Return which claims are no rival of an owner before them, ndarray of bool, shape (k,).
+    """Return which of `count` claims, the best first, are no rival of an owner before them.
 
-    Parameters
-    ----------
-    count : int
-        Of claims, the best first.
-    rivals : callable
-        See `Rivals`.
+    ndarray of bool, shape (k,).
     """
     owning = np.ones(count, bool)
     for index in range(count):
@@ -40,16 +35,9 @@ def owners(count: int, rivals: Rivals) -> np.ndarray:
 
 
 def leading(scores: np.ndarray, certain: np.ndarray, rivals: Rivals, times: float) -> np.ndarray:
-    """Return which certain claims lead all certain rivals, ndarray of bool, shape (k,).
+    """Return which certain claims have at least some times the score of any certain rival.
 
-    Parameters
-    ----------
-    scores : ndarray of float, shape (k,)
-    certain : ndarray of bool, shape (k,)
-    rivals : callable
-        See `Rivals`.
-    times : float
-        The score of a rival that a leading claim has at least.
+    Arrays have the shape (k,).
     """
     ahead = certain.copy()
     for index in np.flatnonzero(certain).tolist():
@@ -62,11 +50,7 @@ def leading(scores: np.ndarray, certain: np.ndarray, rivals: Rivals, times: floa
 def best_targets(targets: Sequence[_Target], reach: float = 0.0) -> list[_Target]:
     """Return the most certain target of each place and each ID, decoded ones first.
 
-    Parameters
-    ----------
-    targets : sequence of Target
-    reach : float
-        Radius of a target, in radii of its dot; no other lies in it. Only IDs count where it is 0.
+    No other lies in the reach of a target, in radii of its dot. Where it is 0 only IDs count.
     """
     order = sorted(targets, key=lambda it: (it.id == UNDECODED, -it.confidence, it.y, it.x))
     x, y, minor = np.array([(it.x, it.y, it.semi_minor) for it in order]).reshape(-1, 3).T

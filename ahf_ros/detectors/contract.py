@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 from ahf_ros.codes.families import ACCEPTED, families_in
@@ -17,8 +17,7 @@ if TYPE_CHECKING:
 _MINIMUM_RADIUS = 4.0  # of a dot, px, where the user sets none
 _MINIMUM_RADII = {'gsi': 2.0, 'dots': 2.5}  # of families whose dot is small beside the target
 
-POLARITIES = ('auto', 'dark', 'bright')
-"""Colour of the dot against its surroundings; 'auto' accepts both in one image."""
+_SIGNS = {'auto': (1, -1), 'dark': (1,), 'bright': (-1,)}  # of the colour of dots
 
 
 class Unavailable(ValueError):
@@ -146,7 +145,7 @@ class DetectorSettings:
     family_file : str
         Path of a data file that describes the family `gsi` or `dots`; empty for the usual design.
     polarity : str
-        One of `POLARITIES`.
+        Colour of the dot against its surroundings, 'dark', 'bright', or 'auto' for both.
     min_radius, max_radius : float
         Bounds of the semi-major axis of the dot, px; `radii` has them with the minimum of the
         family in the place of 0.
@@ -175,7 +174,9 @@ class DetectorSettings:
         read_only=True,
     )
     polarity: str = parameter(
-        'auto', 'Colour of the dot: dark on bright, bright on dark, or either.', choices=POLARITIES
+        'auto',
+        'Colour of the dot: dark on bright, bright on dark, or either.',
+        choices=tuple(_SIGNS),
     )
     min_radius: float = parameter(
         0.0,
@@ -227,21 +228,14 @@ class DetectorSettings:
     @property
     def polarities(self) -> tuple[int, ...]:
         """1 where dots may be dark, -1 where they may be bright."""
-        return {'auto': (1, -1), 'dark': (1,), 'bright': (-1,)}[self.polarity]
+        return _SIGNS[self.polarity]
 
 
 @dataclass(frozen=True, slots=True)
 class FamilyDetector(ABC):
-    """A detector of one family of targets.
+    """A detector of one family of targets, whose design is read from the settings.
 
-    Attributes
-    ----------
-    settings : DetectorSettings
-
-    Raises
-    ------
-    ValueError
-        If the family, or the data file that describes it, is not accepted.
+    It raises a ValueError if the family, or the data file that describes it, is not accepted.
     """
 
     settings: DetectorSettings = field(default_factory=DetectorSettings)
@@ -258,10 +252,22 @@ class FamilyDetector(ABC):
     @property
     @abstractmethod
     def design(self) -> Any:
-        """Printed design of the family.
+        """Printed design of the family."""
 
-        Raises
-        ------
-        ValueError
-            If it is not accepted.
-        """
+
+def moved_targets(
+    targets: Sequence[Target],
+    measured: Sequence[Target],
+    places: Sequence[dict[str, Any]],
+    good: np.ndarray,
+) -> list[Target]:
+    """Return targets, the measured ones with the fields of their new places where these are good.
+
+    `good` is an ndarray of bool, one for each measured target.
+    """
+    better = {
+        target: replace(target, **place)
+        for target, place, is_good in zip(measured, places, good, strict=True)
+        if is_good
+    }
+    return [better.get(target, target) for target in targets]

@@ -11,8 +11,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ahf_ros.detectors import DetectorSettings, create_detector
-from ahf_ros.detectors.external import program
+from ahf_ros.detectors import create_detector
+from ahf_ros.detectors.external import command as module
 from ahf_ros.session import identify
 
 IMAGE = np.arange(400, dtype=np.uint8).reshape(20, 20)
@@ -23,8 +23,7 @@ def detector(tmp_path, script: str, words: str = '', timeout: float = 600.0):
     path = tmp_path / 'program.py'
     path.write_text(script)
     command = f'{sys.executable} {path} {words}'
-    settings = DetectorSettings(command=command, detector_timeout=timeout)
-    return create_detector('command', settings=settings)
+    return create_detector('command', command=command, detector_timeout=timeout)
 
 
 def printing(text: str) -> str:
@@ -80,7 +79,7 @@ def test_a_program_that_hangs_is_ended_with_all_that_it_started(tmp_path, monkey
     pid = tmp_path / 'pid'
     # The time limit is over once the program has got that far, however slow the machine is.
     clock = SimpleNamespace(monotonic=lambda: 3.0 if pid.exists() else 0.0)
-    monkeypatch.setattr(program, 'time', clock)
+    monkeypatch.setattr(module, 'time', clock)
     script = (
         'import os, subprocess, sys, time\n'
         'child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])\n'
@@ -98,7 +97,7 @@ def test_a_program_that_hangs_is_ended_with_all_that_it_started(tmp_path, monkey
 
 
 def test_a_program_that_writes_without_end_is_ended(tmp_path, monkeypatch):
-    monkeypatch.setattr(program, 'MAXIMUM_OUTPUT', 2**20)
+    monkeypatch.setattr(module, 'MAXIMUM_OUTPUT', 2**20)
     script = 'import os\nwhile True:\n    os.write(1, bytes(2**16))\n'
     with pytest.raises(ValueError, match='bytes, accepted are at most 1048576'):
         detector(tmp_path, script)(IMAGE)
@@ -117,17 +116,12 @@ def _runs(pid: int) -> bool:
     [
         ('', "command '' is empty, accepted is a program"),
         ('"open', 'cannot be split into words'),
+        ('/nowhere/nothing', 'cannot be started: No such file'),
     ],
 )
 def test_a_command_that_is_none(command, message):
     with pytest.raises(ValueError, match=message):
-        create_detector('command', settings=DetectorSettings(command=command))
-
-
-def test_a_program_that_is_not_there(tmp_path):
-    settings = DetectorSettings(command=str(tmp_path / 'nothing'))
-    with pytest.raises(ValueError, match='cannot be started: No such file'):
-        create_detector('command', settings=settings)(IMAGE)
+        create_detector('command', command=command)(IMAGE)
 
 
 def test_several_threads_at_once_and_no_file_left(tmp_path, monkeypatch):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from functools import cache
 from pathlib import Path
 
 import cv2
@@ -12,56 +11,21 @@ import pytest
 
 from ahf_ros.codes.dots import DOTS_DESIGN, dot_family
 from ahf_ros.detectors import DetectorSettings, create_detector
-from ahf_ros.detectors.dots.confidence import WEIGHTS
 from ahf_ros.detectors.dots.detector import find_rings
 from ahf_ros.detectors.dots.discs import open_regions
-from ahf_ros.detectors.dots.rings import CERTAIN
-from ahf_ros.evaluation import score
+from ahf_ros.detectors.dots.rings import CERTAIN, WEIGHTS
 from ahf_ros.features.frame import ellipse_axes
 from ahf_ros.features.pyramid import image_pyramid
-from ahf_ros.filtering.homomorphic import HomomorphicFilter
-from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
+from ahf_ros.synthetic.scene import Rendering
 from ahf_ros.target import UNDECODED, DottedTarget
+from support.scenes import counted, rendering
 
-SIZE = {'family': 'dots', 'width': 800, 'height': 600, 'targets': 6, 'dot_radius': 10.0}
-
-
-@cache
-def rendering(**changes: object) -> Rendering:
-    return render(SceneSettings(**{**SIZE, 'seed': 4, **changes}))
+SIZE = {'family': 'dots', 'width': 800, 'height': 600, 'targets': 6, 'dot_radius': 10.0, 'seed': 4}
+detect = create_detector(family='dots')
 
 
-def errors(shown: Rendering, targets: list) -> np.ndarray:
-    true = {target.id: target for target in shown.targets}
-    return np.array([(it.x - true[it.id].x, it.y - true[it.id].y) for it in targets])
-
-
-@pytest.mark.parametrize(
-    ('changes', 'bound'),
-    [
-        ({}, 0.02),
-        ({'polarity': 'bright'}, 0.02),
-        ({'dot_radius': 5.0}, 0.05),
-        ({'dot_radius': 3.75, 'radius_spread': 0.0, 'targets': 20}, 0.15),
-        ({'dot_radius': 20.0, 'targets': 4}, 0.02),
-        ({'tilt': 65.0, 'focal_length': 3.0, 'targets': 4}, 0.05),
-        ({'blur': 1.5}, 0.05),
-        ({'tilt': 40.0}, 0.02),
-        ({'light': 'stripe', 'dot_radius': 14.0}, 0.05),
-        ({'light': 'stripe', 'ambient': 0.12, 'dot_radius': 14.0}, 0.05),
-        ({'light': 'lattice', 'ambient': 0.12, 'dot_radius': 14.0}, 0.1),
-    ],
-)
-def test_targets_are_identified_and_placed(changes: dict, bound: float) -> None:
-    shown = rendering(**changes)
-    found = create_detector(family='dots')(shown.image)
-    figures = score(shown, found)
-    assert figures.right == len(shown.targets)
-    assert figures.wrong == figures.false_positives == 0
-    assert np.sqrt((errors(shown, found) ** 2).mean()) < bound
-    codes = {target.id: target.code for target in shown.targets}
-    assert all(target.code == codes[target.id] for target in found)
-    assert all(CERTAIN <= target.confidence <= 1 for target in found)
+def scene(**changes: object) -> Rendering:
+    return rendering(**SIZE | changes)
 
 
 def design(folder: Path, pixels: float, shift: float, radius: float) -> tuple[str, float]:
@@ -86,7 +50,7 @@ def test_edges_that_moved_and_dots_of_other_radii_are_read(
 ) -> None:
     path, pixels = design(tmp_path, 14.0, shift, radius)
     own = {'family_file': path, 'dot_radius': pixels, 'radius_spread': 0.0, 'gamma': 1.0}
-    shown = render(SceneSettings(**SIZE | own, light=light, seed=6))
+    shown = scene(**own, light=light, seed=6)
     found = find_rings(image_pyramid(shown.image, 60.0), DetectorSettings(), dot_family())
     certain = found.select(found.of_word >= CERTAIN)
     assert set(dot_family().ids(certain.words)) == {target.id for target in shown.targets}
@@ -95,26 +59,27 @@ def test_edges_that_moved_and_dots_of_other_radii_are_read(
         np.full(len(certain.words), radius + shift / 14), rel=0.25
     )
     assert ellipse_axes(certain.frames)[0] == pytest.approx(14.0, rel=0.01)
-    reported = create_detector(family='dots')(shown.image)
-    figures = score(shown, reported)
-    assert (figures.right, figures.wrong, figures.false_positives) == (6, 0, 0)
+    reported = detect(shown.image)
+    assert counted(shown, reported) == (6, 0, 0)
     assert all(target.edge_shift == pytest.approx(shift, abs=0.1) for target in reported)
 
 
 def test_a_target_and_its_mirror_image_are_one_code() -> None:
-    shown = rendering()
-    found = create_detector(family='dots')(np.ascontiguousarray(shown.image[:, ::-1]))
+    shown = scene()
+    found = detect(np.ascontiguousarray(shown.image[:, ::-1]))
     assert [target.id for target in found] == [target.id for target in shown.targets]
 
 
-def test_marks_that_are_no_targets_are_not_reported() -> None:
-    for light in ('normal', 'stripe'):
-        shown = rendering(targets=0, distractors=25, light=light)
-        assert create_detector(family='dots')(shown.image) == []
+@pytest.mark.parametrize(
+    ('name', 'light'), [('dots', 'normal'), ('dots', 'stripe'), ('dots_published', 'normal')]
+)
+def test_marks_that_are_no_targets_are_not_reported(name: str, light: str) -> None:
+    shown = scene(targets=0, distractors=25, light=light)
+    assert create_detector(name, family='dots')(shown.image) == []
 
 
 def test_rings_without_a_code_are_reported_on_request() -> None:
-    shown = rendering(targets=1)
+    shown = scene(targets=1)
     (target,) = shown.targets
     family = dot_family()
     image = shown.image.astype(float)
@@ -123,48 +88,16 @@ def test_rings_without_a_code_are_reported_on_request() -> None:
     ring = np.abs(distance - family.dot_circle) < 1.6 * family.dot_radius
     image[ring] = np.percentile(image[ring], 95)
     blank = image.astype(np.uint8)
-    assert create_detector(family='dots')(blank) == []
+    assert detect(blank) == []
     (found,) = create_detector(family='dots', report_undecoded=True)(blank)
     assert (found.id, found.code, found.confidence) == (UNDECODED, 0, 0.0)
     assert (found.x, found.y) == pytest.approx((target.x, target.y), abs=0.05)
 
 
-def test_places_come_from_the_image_as_received() -> None:
-    shown = rendering(light='stripe', dot_radius=14.0)
-    detector = create_detector(family='dots')
-    found = detector(HomomorphicFilter(shown.image).filtered(1.2, 0.4))
-    assert len(found) >= 4
-    refined = detector.refine(shown.image, found)
-    assert [target.id for target in refined] == [target.id for target in found]
-    assert np.hypot(*errors(shown, refined).T).max() < 0.1
-    assert detector.refine(shown.image, []) == []
-
-
-def test_a_design_of_ones_own_is_printed_and_identified(tmp_path: Path) -> None:
-    path = tmp_path / 'eight.json'
-    path.write_text(
-        DOTS_DESIGN.read_text()
-        .replace('"bits": 10', '"bits": 8')
-        .replace('"border_radius": 3.2', '"border_radius": 3.4')
-    )
-    scene = SceneSettings(**SIZE, family_file=str(path), seed=5)
-    shown = render(scene)
-    found = create_detector(family='dots', family_file=str(path))(shown.image)
-    figures = score(shown, found)
-    assert (figures.right, figures.wrong, figures.false_positives) == (6, 0, 0)
-
-
-def test_a_bad_design_is_refused_when_the_detector_is_made(tmp_path: Path) -> None:
-    path = tmp_path / 'bad.json'
-    path.write_text(DOTS_DESIGN.read_text().replace('"bits": 10', '"bits": 2'))
-    with pytest.raises(ValueError, match=r'bad\.json, line 4: bits is 2'):
-        create_detector(family='dots', family_file=str(path))
-
-
 def test_disc_border_and_dots_come_with_every_target() -> None:
-    shown = rendering(dot_radius=14.0, targets=4)
+    shown = scene(dot_radius=14.0, targets=4)
     family = dot_family()
-    for target in create_detector(family='dots')(shown.image):
+    for target in detect(shown.image):
         assert isinstance(target, DottedTarget)
         assert (target.template_dots, target.polarity) == (2, 1)
         assert len(target.dots) == 2 + bin(target.code).count('1')

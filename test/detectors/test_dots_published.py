@@ -1,75 +1,30 @@
-"""Rings of dots as published: right in even light, defeated by stripes, helped by AHF."""
+"""Rings of dots as published: the threshold, and what is no code."""
 
 from __future__ import annotations
-
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from ahf_ros.codes.dots import DOTS_DESIGN
 from ahf_ros.detectors import create_detector
-from ahf_ros.detectors.dots.published import PublishedDotsDetector, local_otsu, otsu
-from ahf_ros.evaluation import score
-from ahf_ros.session import identify
-from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.detectors.dots.published import local_otsu, otsu
 from ahf_ros.target import UNDECODED
-
-SIZE = {'family': 'dots', 'width': 800, 'height': 600, 'targets': 6, 'dot_radius': 10.0}
-
-
-def scene(**changes: object) -> SceneSettings:
-    return SceneSettings(**{**SIZE, 'seed': 4, **changes})
-
-
-def published(**changes: object) -> PublishedDotsDetector:
-    return create_detector('dots_published', family='dots', **changes)
-
-
-@pytest.mark.parametrize(
-    'changes',
-    [{}, {'dot_radius': 3.8}, {'dot_radius': 14.0}, {'polarity': 'bright'}, {'tilt': 50.0}],
-)
-def test_all_targets_are_identified_in_even_light(changes: dict) -> None:
-    bias = 0.2 if 'tilt' in changes else 0.0  # of the ellipse, under perspective
-    shown = render(scene(**changes))
-    found = published()(shown.image)
-    figures = score(shown, found)
-    assert (figures.right, figures.wrong, figures.false_positives) == (6, 0, 0)
-    assert figures.rmse is not None and figures.rmse[2] < 0.15 + bias
-    codes = {target.id: target.code for target in shown.targets}
-    assert all(target.code == codes[target.id] for target in found)
-
-
-def test_stripes_defeat_it_and_ahf_brings_the_targets_back() -> None:
-    shown = render(scene(light='stripe'))
-    without = score(shown, published()(shown.image))
-    found = identify(shown.image, detector=published(), expected_targets=6)
-    assert found.filter.applied
-    assert score(shown, found.targets).right >= max(3 * without.right, 4)
+from support.scenes import rendering
 
 
 def test_a_place_that_is_neither_dot_nor_ground_leaves_a_ring_undecoded() -> None:
-    shown = render(scene(targets=1))
+    shown = rendering(family='dots', width=800, height=600, targets=1, dot_radius=10.0, seed=4)
     (target,) = shown.targets
     y, x = np.mgrid[: shown.image.shape[0], : shown.image.shape[1]]
     across, down = (x - target.x) / target.semi_major, (y - target.y) / target.semi_major
     image = shown.image.copy()
     image[(np.hypot(across - 2.3, down) < 0.2)] = image.min()
-    assert published()(image) == []
-    (found,) = published(report_undecoded=True)(image)
+    plain, all_rings = (
+        create_detector('dots_published', family='dots', report_undecoded=undecoded)
+        for undecoded in (False, True)
+    )
+    assert plain(image) == []
+    (found,) = all_rings(image)
     assert (found.id, found.code, found.confidence) == (UNDECODED, 0, 0.0)
-
-
-def test_marks_that_are_no_targets_are_not_reported() -> None:
-    assert published()(render(scene(targets=0, distractors=25)).image) == []
-
-
-def test_a_bad_design_is_refused_when_the_detector_is_made(tmp_path: Path) -> None:
-    path = tmp_path / 'bad.json'
-    path.write_text(DOTS_DESIGN.read_text().replace('"bits": 10', '"bits": 2'))
-    with pytest.raises(ValueError, match=r'bad\.json, line 4: bits is 2'):
-        published(family_file=str(path))
 
 
 def test_otsu_parts_two_values_halfway() -> None:

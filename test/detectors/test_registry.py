@@ -27,25 +27,43 @@ from ahf_ros.detectors import (
 from ahf_ros.detectors.external.guarded import guarded
 from ahf_ros.session import identify
 from ahf_ros.session_settings import IdentificationSettings
+from ahf_ros.target import Target
 from support.packages import EXAMPLE, write_package
 from support.square_markers import needs_square_markers
 
+RAMP = np.arange(60, dtype=np.uint8) + np.zeros((20, 1), np.uint8)
 SQUARES = {'aruco': 'aruco_4x4_50', 'apriltag': 'apriltag_36h11'}
 
 
-@pytest.mark.parametrize(
-    'name',
-    [
-        pytest.param(name, marks=needs_square_markers if name in SQUARES else ())
-        for name in DETECTOR_NAMES
-    ],
-)
-def test_every_detector_is_called_as_it_is_registered(name):
+ALL = [
+    pytest.param(name, marks=needs_square_markers if name in SQUARES else ())
+    for name in DETECTOR_NAMES
+]
+
+
+def made(name: str) -> Detector:
+    """Return a detector of a family that it identifies."""
     kind = name.partition('_')[0]
     family = SQUARES.get(name) or (kind if kind in ('gsi', 'dots') else 'metashape12')
-    made = create_detector(name, family=family, command='program')
-    assert made.name == name
-    assert made.family == family
+    detector = create_detector(name, family=family, command='program')
+    assert (detector.name, detector.family) == (name, family)
+    return detector
+
+
+@pytest.mark.parametrize('name', ALL)
+@pytest.mark.parametrize(
+    ('image', 'message'),
+    [
+        (np.zeros((0, 0), np.uint8), 'image'),
+        (np.zeros((1, 1), np.uint8), 'image'),
+        (np.full((50, 50), 7, np.uint8), 'constant'),
+        (np.full((50, 50), np.nan), 'NaN'),
+        (np.zeros((50, 50, 3), np.uint8), 'shape'),
+    ],
+)
+def test_every_detector_is_called_as_registered_and_refuses_what_is_no_image(name, image, message):
+    with pytest.raises(ValueError, match=message):
+        made(name)(image)
 
 
 def test_every_family_chooses_a_detector():
@@ -89,22 +107,13 @@ def test_only_families_that_can_be_counted_are_estimated():
         IdentificationSettings(estimate_expected=True, detection=square)
 
 
-def test_refinement_and_drafts_are_part_of_the_contract():
-    ring = create_detector('ring')
-    assert isinstance(ring, Detector) and isinstance(ring, Refiner)
-    assert not isinstance(ring, Drafter)
-    assert isinstance(create_detector('traditional'), Drafter)
-    assert not isinstance(create_detector('command', command='program'), Refiner)
-
-
-@pytest.mark.parametrize(
-    'name', ['ring', 'traditional', 'gsi', 'gsi_published', 'dots', 'command']
-)
-def test_only_detectors_that_hardly_need_a_filter_have_a_patience(name):
-    kind = name.partition('_')[0]
-    family = kind if kind in ('gsi', 'dots') else 'metashape12'
-    made = create_detector(name, family=family, command='program')
-    assert isinstance(made, EarlyStopping) == (name in ('ring', 'gsi', 'dots'))
+@pytest.mark.parametrize('name', ALL)
+def test_refinement_drafts_and_patience_are_part_of_the_contract(name):
+    detector = made(name)
+    assert isinstance(detector, Refiner) == (not name.endswith('_published') and name != 'command')
+    assert isinstance(detector, Drafter) == (name in ('traditional', *SQUARES))
+    # Only detectors that hardly need a filter have a patience.
+    assert isinstance(detector, EarlyStopping) == (name in ('ring', 'gsi', 'dots'))
 
 
 def test_an_unknown_detector_is_refused_by_name():
@@ -145,7 +154,8 @@ def added(tmp_path, monkeypatch, module: str, body: str):
 def test_a_detector_of_another_package(tmp_path, monkeypatch):
     registry = added(tmp_path, monkeypatch, 'package_with_detector', EXAMPLE.read_text())
     assert registry['DETECTOR_NAMES'] == (*DETECTOR_NAMES, 'mine')
-    detector = registry['create_detector']('mine', settings=DetectorSettings(min_radius=5.0))
+    detector = registry['create_detector']('mine', min_radius=5.0, detector_timeout=600.0)
+    assert detector.timeout == 600.0
     image = np.full((100, 120), 200, np.uint8)
     cv2.circle(image, (40, 50), 8, 20, -1)
     (target,) = detector(image)
@@ -160,71 +170,13 @@ def test_a_detector_of_another_package_that_cannot_be_imported(tmp_path, monkeyp
         registry['create_detector']('mine')
 
 
-FAILING = """
-import time
-import numpy as np
-class MyDetector:
-    name = family = 'mine'
-    def __init__(self, settings):
-        pass
-    def __call__(self, image):
-        if image.max() == 1:
-            time.sleep(3600)
-        if image.max() == 2:
-            raise KeyError('weights')
-        if image.max() == 3:
-            raise ValueError('image is too dark')
-        return []
-    def refine(self, image, targets):
-        raise RuntimeError('no GPU')
-"""
-
-
-@pytest.mark.parametrize(
-    ('gray', 'words'),
-    [
-        (1, "detector 'mine' took longer than detector_timeout, 0.2 s"),
-        (2, "detector 'mine' failed: KeyError: 'weights'"),
-        (3, "detector 'mine' failed: ValueError: image is too dark"),
-    ],
-)
-def test_a_detector_of_another_package_may_fail_and_hang(tmp_path, monkeypatch, gray, words):
-    registry = added(tmp_path, monkeypatch, f'package_that_fails_{gray}', FAILING)
-    patient = registry['create_detector'](
-        'mine', settings=DetectorSettings(detector_timeout=600.0)
-    )
-    impatient = registry['create_detector'](
-        'mine', settings=DetectorSettings(detector_timeout=0.2)
-    )
-    image = np.full((20, 20), gray, np.uint8)
-    image[0] = 0
-    with pytest.raises(ValueError) as raised:
-        identify(image, detector=impatient if gray == 1 else patient, expected_targets=0)
-    assert str(raised.value) == words
-    with pytest.raises(ValueError, match="detector 'mine' failed: RuntimeError: no GPU"):
-        patient.refine(image, [])
-
-
 HOSTILE = """
 import sys
-from ahf_ros import Target
 class MyDetector:
     name, family = 'mine', {family}
     def __init__(self, settings):
         {made}
-    def __call__(self, image):
-        image[:] = 0
-        {called}
 """
-ENDLESS = """class Endless(list):
-            def __iter__(self):
-                while True:
-                    yield Target(7, 19, 1.0, 2.0, 4.0, 3.0)
-        return Endless()"""
-RAISING = """class Raising(Target):
-            def __getattribute__(self, name):
-                raise RuntimeError('no fields')
-        return [Raising(7, 19, 1.0, 2.0, 4.0, 3.0)]"""
 
 
 @pytest.mark.parametrize(
@@ -242,49 +194,86 @@ def test_a_detector_of_another_package_that_cannot_be_made(
     tmp_path, monkeypatch, number, family, made, reason
 ):
     module = f'package_not_made_{number}'
-    body = HOSTILE.format(family=family, made=made, called='pass')
-    registry = added(tmp_path, monkeypatch, module, body)
+    registry = added(tmp_path, monkeypatch, module, HOSTILE.format(family=family, made=made))
     with pytest.raises(ValueError) as raised:
         registry['create_detector']('mine')
     expected = f"detector is 'mine', but {module}:MyDetector cannot be loaded: {reason}"
     assert str(raised.value).startswith(expected)
 
 
+class Plugin:
+    """A detector of another package, which returns what a function makes of an image."""
+
+    name = family = 'mine'
+
+    def __init__(self, call):
+        self._call = call
+
+    def __call__(self, image):
+        try:
+            return self._call(image)
+        finally:
+            image[:] = 0
+
+    def refine(self, image, targets):
+        raise RuntimeError('no GPU')
+
+
+class Endless(list):
+    def __iter__(self):
+        while True:
+            yield Target(7, 19, 1.0, 2.0, 4.0, 3.0)
+
+
+class Raising(Target):
+    def __getattribute__(self, name):
+        raise RuntimeError('no fields')
+
+
+def failing(error):
+    def fail(image):
+        raise error
+
+    return fail
+
+
 @pytest.mark.parametrize(
-    ('number', 'called', 'message'),
+    ('call', 'message'),
     [
-        (0, ENDLESS, "detector 'mine' returned more targets than are accepted, at most 100000"),
-        (1, RAISING, "detector 'mine' failed: RuntimeError: no fields"),
-        (2, 'sys.exit(0)', "detector 'mine' failed: SystemExit: 0"),
+        (lambda _: time.sleep(3600), 'took longer than detector_timeout, 0.2 s'),
+        (failing(KeyError('weights')), "failed: KeyError: 'weights'"),
+        (failing(ValueError('image is too dark')), 'failed: ValueError: image is too dark'),
+        (failing(SystemExit(0)), 'failed: SystemExit: 0'),
+        (Endless, 'returned more targets than are accepted, at most 100000'),
+        (lambda _: [Raising(7, 19, 1.0, 2.0, 4.0, 3.0)], 'failed: RuntimeError: no fields'),
     ],
 )
-def test_no_result_of_another_package_gets_past_its_guard(
-    tmp_path, monkeypatch, number, called, message
-):
-    body = HOSTILE.format(family="'mine'", made='pass', called=called)
-    registry = added(tmp_path, monkeypatch, f'package_with_results_{number}', body)
-    image = np.full((20, 20), 9, np.uint8)
+def test_no_failure_and_no_result_of_another_package_gets_past_its_guard(call, message):
+    detector = guarded(Plugin(call), 0.2 if 'longer' in message else 600.0)
+    image = RAMP.copy()
     with pytest.raises(ValueError) as raised:
-        registry['create_detector']('mine')(image)
-    assert str(raised.value) == message
-    assert (image == 9).all()
+        identify(image, detector=detector, expected_targets=0)
+    assert str(raised.value) == f"detector 'mine' {message}"
+    assert (image == RAMP).all()
+
+
+def test_a_refinement_that_fails():
+    with pytest.raises(ValueError, match="detector 'mine' failed: RuntimeError: no GPU"):
+        guarded(Plugin(list), 600.0).refine(RAMP, [])
 
 
 def test_no_image_that_a_detector_failed_on_stays_in_memory():
     images = []
 
-    class Failing:
-        name = family = 'failing'
-
-        def __call__(self, image):
-            images.append(weakref.ref(image))
-            raise RuntimeError('no')
+    def fail(image):
+        images.append(weakref.ref(image))
+        raise RuntimeError('no')
 
     gc.collect()
     gc.disable()
     try:
-        with pytest.raises(ValueError, match="detector 'failing' failed: RuntimeError: no"):
-            guarded(Failing(), 60.0)(np.zeros((20, 20), np.uint8))
+        with pytest.raises(ValueError, match="detector 'mine' failed: RuntimeError: no"):
+            guarded(Plugin(fail), 60.0)(RAMP)
         limit = time.monotonic() + 60
         while images[0]() is not None:  # until the thread has ended, too
             assert time.monotonic() < limit
@@ -293,15 +282,8 @@ def test_no_image_that_a_detector_failed_on_stays_in_memory():
         gc.enable()
 
 
-def test_a_search_ends_when_a_detector_hangs_in_it(tmp_path, monkeypatch):
-    body = FAILING.replace('image.max() == 1', 'image.max() > 100')
-    registry = added(tmp_path, monkeypatch, 'package_that_hangs', body)
-    patient, impatient = (
-        registry['create_detector']('mine', settings=DetectorSettings(detector_timeout=limit))
-        for limit in (600.0, 0.2)
-    )
-    image = np.full((20, 20), 60, np.uint8)
-    image[0] = 0
-    assert identify(image, detector=patient, expected_targets=0).targets == ()
+def test_a_search_ends_when_a_detector_hangs_in_it():
+    plugin = Plugin(lambda image: time.sleep(3600) if image.max() > 100 else [])
+    assert identify(RAMP, detector=guarded(plugin, 600.0), expected_targets=0).targets == ()
     with pytest.raises(ValueError, match='took longer than detector_timeout'):
-        identify(image, detector=impatient, expected_targets=5)
+        identify(RAMP, detector=guarded(plugin, 0.2), expected_targets=5)

@@ -2,82 +2,70 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from functools import lru_cache
-
 import cv2
 import numpy as np
 import pytest
 
-from ahf_ros.detectors import DetectorSettings, create_detector
-from ahf_ros.evaluation import Score, score
+from ahf_ros.detectors import create_detector
+from ahf_ros.evaluation import score
 from ahf_ros.filtering.homomorphic import HomomorphicFilter
 from ahf_ros.interchange.image_files import read_image
 from ahf_ros.interchange.truth_files import read_truth
-from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
+from ahf_ros.synthetic.scene import Rendering
 from ahf_ros.target import UNDECODED, Target
 from support.photographs import PANEL, needs_photographs
+from support.scenes import counted, relative_errors, rendering
 
-SMALL = SceneSettings(width=640, height=480, targets=6, dot_radius=10.0, seed=3)
+SIZE = {'width': 640, 'height': 480, 'targets': 6, 'dot_radius': 10.0, 'seed': 3}
 
-rendered = lru_cache(render)
+
+def scene(**changes: object) -> Rendering:
+    return rendering(**SIZE | changes)
 
 
 def identified(image: np.ndarray, **settings: object) -> list[Target]:
-    return create_detector('traditional', settings=DetectorSettings(**settings))(image)
-
-
-def scored(rendering: Rendering, targets: list[Target]) -> Score:
-    return score(rendering, targets)
+    return create_detector('traditional', **settings)(image)
 
 
 @pytest.mark.parametrize('polarity', ['dark', 'bright'])
 def test_a_draft_shows_the_same_ids_and_refinement_starts_from_it(polarity):
-    rendering = rendered(replace(SMALL, polarity=polarity, light='stripe', ambient=1.0))
+    shown = scene(polarity=polarity, light='stripe', ambient=1.0)
     detector = create_detector('traditional')
-    draft = detector.draft(rendering.image)
-    assert [it.id for it in draft] == [it.id for it in detector(rendering.image)]
-    assert scored(rendering, draft).rmse[2] < 1.0
-    assert scored(rendering, detector.refine(rendering.image, draft)).rmse[2] < 0.05
+    draft = detector.draft(shown.image)
+    assert [it.id for it in draft] == [it.id for it in detector(shown.image)]
+    assert score(shown, draft).rmse[2] < 1.0
+    assert score(shown, detector.refine(shown.image, draft)).rmse[2] < 0.05
 
 
 @pytest.mark.parametrize(
-    'scene',
+    'changes',
     [
-        replace(SMALL, dot_radius=5.0, targets=12),
-        replace(SMALL, dot_radius=30.0, targets=2, width=800),
-        replace(SMALL, tilt=60.0, dot_radius=14.0, targets=4),
+        {'dot_radius': 5.0, 'targets': 12},
+        {'dot_radius': 30.0, 'targets': 2, 'width': 800},
+        {'tilt': 60.0, 'dot_radius': 14.0, 'targets': 4},
     ],
     ids=['small', 'large', 'oblique'],
 )
-def test_sizes_and_views(scene):
-    rendering = rendered(scene)
-    figures = scored(rendering, identified(rendering.image))
-    assert (figures.right, figures.wrong, figures.false_positives) == (scene.targets, 0, 0)
-    assert figures.rmse[2] < 0.08
+def test_sizes_and_views(changes):
+    shown = scene(**changes)
+    found = identified(shown.image)
+    assert counted(shown, found) == (changes['targets'], 0, 0)
+    assert score(shown, found).rmse[2] < 0.08
 
 
 def test_the_centre_is_the_physical_one_and_the_covariance_honest():
-    scene = replace(SMALL, width=2000, height=1500, targets=40, tilt=55.0, dot_radius=16.0)
-    rendering = rendered(scene)
-    true = {target.id: np.array((target.x, target.y)) for target in rendering.targets}
-    squares = []
-    for target in identified(rendering.image):
-        error = np.array((target.x, target.y)) - true[target.id]
-        squares.append(error @ np.linalg.inv(np.reshape(target.covariance, (2, 2))) @ error)
+    shown = scene(width=2000, height=1500, targets=40, tilt=55.0, dot_radius=16.0)
+    squares = relative_errors(shown, identified(shown.image))
     assert len(squares) >= 38
     assert 1 < np.mean(squares) < 4
 
 
 def test_stripes_defeat_it_and_the_filter_restores_it():
-    rendering = rendered(
-        SceneSettings(width=1600, height=1200, targets=12, light='stripe', ambient=0.3, seed=1)
-    )
-    unfiltered = scored(rendering, identified(rendering.image))
-    filtered = HomomorphicFilter(rendering.image).filtered(1.2, 0.25)
-    restored = scored(rendering, identified(filtered))
-    assert unfiltered.right <= 4
-    assert (restored.right, restored.wrong, restored.false_positives) == (12, 0, 0)
+    size = {'width': 1600, 'height': 1200, 'targets': 12, 'seed': 1}
+    shown = rendering(**size, light='stripe', ambient=0.3)
+    assert score(shown, identified(shown.image)).right <= 4
+    filtered = HomomorphicFilter(shown.image).filtered(1.2, 0.25)
+    assert counted(shown, identified(filtered)) == (12, 0, 0)
 
 
 @pytest.mark.parametrize(
@@ -85,7 +73,7 @@ def test_stripes_defeat_it_and_the_filter_restores_it():
     [{'polarity': 'bright'}, {'min_radius': 12.0}, {'max_radius': 8.0}, {'family': 'metashape14'}],
 )
 def test_what_is_not_asked_for_is_not_reported(settings):
-    assert identified(rendered(SMALL).image, **settings) == []
+    assert identified(scene().image, **settings) == []
 
 
 def test_dots_without_a_code_are_reported_on_request():
@@ -101,51 +89,32 @@ def test_dots_without_a_code_are_reported_on_request():
 
 
 def test_sectors_of_a_decoded_target_are_not_reported():
-    rendering = rendered(replace(SMALL, dot_radius=14.0, targets=4))
-    found = identified(rendering.image, report_undecoded=True)
-    assert [target.id for target in found] == [target.id for target in rendering.targets]
+    shown = scene(dot_radius=14.0, targets=4)
+    found = identified(shown.image, report_undecoded=True)
+    assert [target.id for target in found] == [target.id for target in shown.targets]
 
 
 def test_an_id_is_reported_once():
-    rendering = rendered(SMALL)
-    twice = np.hstack([rendering.image, rendering.image])
+    shown = scene()
+    twice = np.hstack([shown.image, shown.image])
     ids = [target.id for target in identified(twice)]
-    assert ids == [target.id for target in rendering.targets]
+    assert ids == [target.id for target in shown.targets]
     found = identified(twice, report_undecoded=True)
     assert [target.id for target in found] == [UNDECODED] * 6 + ids
 
 
 def test_a_target_cut_by_the_frame_is_not_decoded():
-    rendering = rendered(SMALL)
-    cut = min(rendering.targets, key=lambda target: target.x)
-    image = rendering.image[:, round(cut.x - 2.5 * cut.semi_major) :]
+    shown = scene()
+    cut = min(shown.targets, key=lambda target: target.x)
+    image = shown.image[:, round(cut.x - 2.5 * cut.semi_major) :]
     assert cut.id not in {target.id for target in identified(image)}
 
 
 def test_noise_shows_no_targets():
     noise = np.random.default_rng(0).integers(0, 256, (600, 800)).astype(np.uint8)
+    assert identified(noise[:16, :16]) == []  # the smallest image
     assert identified(noise, report_undecoded=True) == []
     assert identified(cv2.GaussianBlur(noise, (0, 0), 5) * 4) == []
-
-
-@pytest.mark.parametrize(
-    ('image', 'message'),
-    [
-        (np.zeros((0, 0), np.uint8), 'image'),
-        (np.zeros((1, 1), np.uint8), 'image'),
-        (np.full((50, 50), 7, np.uint8), 'constant'),
-        (np.full((50, 50), np.nan), 'NaN'),
-        (np.zeros((50, 50, 3), np.uint8), 'shape'),
-    ],
-)
-def test_what_is_no_image_is_refused(image, message):
-    with pytest.raises(ValueError, match=message):
-        identified(image)
-
-
-def test_the_smallest_image():
-    image = np.random.default_rng(0).integers(0, 256, (16, 16)).astype(np.uint8)
-    assert identified(image) == []
 
 
 @needs_photographs

@@ -15,8 +15,8 @@ import numpy as np
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes.dots import DotFamily, dot_family
 from ahf_ros.detectors.claims import best_targets
-from ahf_ros.detectors.contract import DetectorSettings, FamilyDetector
-from ahf_ros.detectors.dots.discs import small_discs, voted_discs, whole_discs
+from ahf_ros.detectors.contract import DetectorSettings, FamilyDetector, moved_targets
+from ahf_ros.detectors.dots.discs import judged, small_discs, voted_discs, whole_discs
 from ahf_ros.detectors.dots.rings import CERTAIN, Rings, fit_targets, read_discs, report
 from ahf_ros.features.ellipse_targets import ellipse_fields
 from ahf_ros.features.frame import affine_frames, ellipse_axes
@@ -31,17 +31,7 @@ _MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE = 1.0, 0.2  # that a centre is moved: px, rad
 
 @dataclass(frozen=True, slots=True)
 class DotsDetector(FamilyDetector):
-    """Identify rings of dots.
-
-    Attributes
-    ----------
-    settings : DetectorSettings
-
-    Raises
-    ------
-    ValueError
-        If the data file of the family is not accepted.
-    """
+    """Identify rings of dots."""
 
     name: ClassVar[str] = 'dots'
     patience: ClassVar[int] = 3
@@ -62,9 +52,34 @@ class DotsDetector(FamilyDetector):
 
     @one_blas_thread()
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
-        """Return targets with their places in an image; see `refined`."""
+        """Return targets with the places that disc and border have in an image; see `Refiner`.
+
+        Targets other than `DottedTarget`, and those whose disc and border are not found near to
+        where they should be, stay as they are.
+        """
         check_image(image)
-        return refined(as_gray(image), targets, self.design)
+        dotted = [target for target in targets if isinstance(target, DottedTarget)]
+        if not dotted:
+            return list(targets)
+        columns = [(it.x, it.y, it.semi_major, it.semi_minor, it.angle) for it in dotted]
+        start = affine_frames(*np.array(columns).T)
+        polarity = np.array([target.polarity for target in dotted])
+        gray = as_gray(image).astype(np.float32, copy=False)
+        fit = fit_targets(gray, start, polarity, self.design)
+        moved = np.hypot(*(fit.frames[:, :2, 2] - start[:, :2, 2]).T)
+        reach = np.maximum(_MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE * ellipse_axes(start)[1])
+        good = (fit.share >= _PLAUSIBLE) & (moved <= reach)
+        changes = fit.frames @ np.linalg.inv(start)
+        places = [
+            {**place, 'dots': _moved(target, change)}
+            for target, change, place in zip(
+                dotted,
+                changes,
+                ellipse_fields(fit.frames, fit.covariance, fit.edge_shift),
+                strict=True,
+            )
+        ]
+        return moved_targets(targets, dotted, places, good)
 
     def _identify(self, octave: Octave) -> list[DottedTarget]:
         """Return the targets of an octave, in its pixels."""
@@ -75,53 +90,15 @@ class DotsDetector(FamilyDetector):
 
 
 def find_rings(pyramid: ImagePyramid, settings: DetectorSettings, code: DotFamily) -> Rings:
-    """Return all rings of dots that an image may show, before any decision.
-
-    Parameters
-    ----------
-    pyramid : ImagePyramid
-    settings : DetectorSettings
-    code : DotFamily
-    """
+    """Return all rings of dots that an image may show, before any decision."""
     found: list[Rings] = []
     known = np.zeros((0, 3, 3))
     for search in (whole_discs, voted_discs, small_discs):
-        rings = read_discs(pyramid, search(pyramid, settings, code, known), code)
+        discs = judged(pyramid, search(pyramid, settings, code, known), known, code)
+        rings = read_discs(pyramid, discs, code)
         known = np.concatenate([known, rings.frames[rings.of_word >= CERTAIN]])
         found.append(rings)
     return Rings.joined(found)
-
-
-def refined(gray: np.ndarray, targets: Sequence[Target], code: DotFamily) -> list[Target]:
-    """Return targets with the places that disc and border have in an image.
-
-    Parameters
-    ----------
-    gray : ndarray of uint8 or float32, shape (height, width)
-        Gray values from 0 to 255.
-    targets : sequence of Target
-        Those other than `DottedTarget` stay as they are, and so do those whose disc and border
-        are not found near to where they should be.
-    code : DotFamily
-    """
-    dotted = [target for target in targets if isinstance(target, DottedTarget)]
-    if not dotted:
-        return list(targets)
-    columns = [(it.x, it.y, it.semi_major, it.semi_minor, it.angle) for it in dotted]
-    start = affine_frames(*np.array(columns).T)
-    polarity = np.array([target.polarity for target in dotted])
-    fit = fit_targets(gray.astype(np.float32, copy=False), start, polarity, code)
-    moved = np.hypot(*(fit.frames[:, :2, 2] - start[:, :2, 2]).T)
-    reach = np.maximum(_MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE * ellipse_axes(start)[1])
-    good = (fit.share >= _PLAUSIBLE) & (moved <= reach)
-    changes = fit.frames @ np.linalg.inv(start)
-    places = ellipse_fields(fit.frames, fit.covariance, fit.edge_shift)
-    better: dict[Target, Target] = {
-        target: replace(target, dots=_moved(target, change), **place)
-        for target, change, place, is_good in zip(dotted, changes, places, good, strict=True)
-        if is_good
-    }
-    return [better.get(target, target) for target in targets]
 
 
 def _moved(target: DottedTarget, change: np.ndarray) -> tuple:

@@ -3,6 +3,8 @@
 Any dot may be a disc, and any circle one of the edges of a border. Most are not: of the steps of
 ln I at disc and border, as the design has them, only targets show nearly all. Discs are looked for
 where edges are left that no known target explains and that are not straight.
+
+Any light has steps. Those of a target lie on three circles at once and have one height.
 """
 
 from __future__ import annotations
@@ -14,17 +16,15 @@ import numpy as np
 
 from ahf_ros.codes.dots import DotFamily
 from ahf_ros.detectors.contract import DetectorSettings
-from ahf_ros.detectors.dots.border_steps import border_steps
 from ahf_ros.features.dot_search import voted_dots, whole_dots
 from ahf_ros.features.dots import NO_DOTS, Dots, distinct
-from ahf_ros.features.frame import circle_outlines, ellipse_axes, enlarged
+from ahf_ros.features.frame import circle_outlines, circle_points, ellipse_axes, enlarged, scaled
 from ahf_ros.features.log_edges import LOG_SCALE, LogEdges, mask_of
 from ahf_ros.features.pyramid import ImagePyramid
+from ahf_ros.features.sampling import sample
 from ahf_ros.features.small_dots import small_dots
 
-STRAIGHT = 8.0
-"""Length of an edge that is no small dot's, px of the image at half its size."""
-
+_STRAIGHT = 8.0  # length of an edge that is no small dot's, px of the image at half its size
 _TILE = 64  # side, px of the image at half its size
 _MINIMUM_EDGES = 20  # of four tiles, px; disc and border of the smallest target have twice as many
 _MAXIMUM_SHARE = 0.7  # share of the image, beyond which all of it is one region
@@ -36,24 +36,21 @@ _SMALL = 12.0  # largest radius of discs that are looked for as blobs of the who
 _SMALLER = 0.8  # of the smallest radius, of a blob whose edge is blurred
 _TOLERANCE = 0.9  # the same, of a disc whose border has a whole outline
 
+_RAYS = 20
+_ANGLES = 2 * np.pi * np.arange(_RAYS) / _RAYS
+_MINIMUM_STEP = 0.12  # step of ln of a disc
+_EDGE_SIDES = 5  # radii between which the edges lie
+_PART = 2_000_000  # samples at a time, which bounds the memory
+
 
 def open_regions(edges: LogEdges, outlines: np.ndarray) -> list[tuple[slice, slice]]:
-    """Return the regions that hold edges which nothing explains.
+    """Return the regions that hold edges which nothing explains, rows and columns of each.
 
-    Parameters
-    ----------
-    edges : LogEdges
-        Of the image at half its size.
-    outlines : ndarray of float, shape (k, m, 2)
-        Of what is known, px of the image at half its size.
-
-    Returns
-    -------
-    list of tuple of 2 slice
-        Rows and columns of the image at half its size; regions may overlap.
+    Edges, outlines of what is known, shape (k, m, 2), and regions, which may overlap, are in px of
+    the image at half its size.
     """
     height, width = edges.marked.shape
-    rest = edges.unmasked(mask_of(outlines, edges.marked.shape)).curved(STRAIGHT)
+    rest = edges.unmasked(mask_of(outlines, edges.marked.shape)).curved(_STRAIGHT)
     rows, columns = -(-height // _TILE), -(-width // _TILE)
     of_tiles = np.bincount(
         rest.y // _TILE * columns + rest.x // _TILE, minlength=rows * columns
@@ -76,14 +73,7 @@ def open_regions(edges: LogEdges, outlines: np.ndarray) -> list[tuple[slice, sli
 def whole_discs(
     pyramid: ImagePyramid, settings: DetectorSettings, code: DotFamily, _known: np.ndarray
 ) -> Dots:
-    """Return discs with a whole outline, or whose border has one.
-
-    Parameters
-    ----------
-    pyramid : ImagePyramid
-    settings : DetectorSettings
-    code : DotFamily
-    """
+    """Return dots with a whole outline, which may be a disc or the border of one."""
     low, high = settings.radii
     circles = whole_dots(pyramid, low, high * code.border_radius, (1, -1))
     found = []
@@ -91,40 +81,32 @@ def whole_discs(
     for radius, side in ((1.0, 1), (code.border_radius, 1), (code.ground_radius, -1)):
         frames = circles.frames.copy()
         frames[:, :2, :2] /= radius
-        found.append(Dots(frames, side * circles.polarity, circles.share))
-    return judged(pyramid, _of_kind(Dots.joined(found), settings), code)
+        found.append(replace(circles, frames=frames, polarity=side * circles.polarity))
+    dots = Dots.joined(found)
+    major = ellipse_axes(dots.frames)[0]
+    of_size = (major >= _TOLERANCE * low) & (major <= high / _TOLERANCE)
+    return dots.select(of_size & np.isin(dots.polarity, settings.polarities))
 
 
 def voted_discs(
     pyramid: ImagePyramid, settings: DetectorSettings, code: DotFamily, known: np.ndarray
 ) -> Dots:
-    """Return discs whose outline edges of light interrupt, outside of targets that are known.
-
-    Parameters
-    ----------
-    pyramid : ImagePyramid
-    settings : DetectorSettings
-    code : DotFamily
-    known : ndarray of float64, shape (k, 3, 3)
-        Frames of the targets that are known.
-    """
+    """Return dots whose outline edges of light interrupt, outside of known targets."""
     outlines = _outlines(known, code, _MARGIN)
-    voted = voted_dots(pyramid, *settings.radii, settings.polarities, outlines)
-    return judged(pyramid, voted.select(~_inside(voted, known, code)), code)
+    return voted_dots(pyramid, *settings.radii, settings.polarities, outlines)
 
 
 def small_discs(
     pyramid: ImagePyramid, settings: DetectorSettings, code: DotFamily, known: np.ndarray
 ) -> Dots:
-    """Return small discs, and those seen at steep angles, as `voted_discs` does."""
+    """Return small dots, and those seen at steep angles, where edges are left to explain."""
     # Edges of light end at a target, and look like no straight ones there.
-    margin = 2 * STRAIGHT / np.maximum(ellipse_axes(known)[1], 1)
+    margin = 2 * _STRAIGHT / np.maximum(ellipse_axes(known)[1], 1)
     outlines = (_outlines(known, code, margin) + 0.5) / 2 - 0.5
     found = [NO_DOTS]
     for region in open_regions(pyramid.edges[0], outlines):
         found += _blobs(pyramid, region, settings)
-    blobs = Dots.joined(found)
-    return judged(pyramid, blobs.select(~_inside(blobs, known, code)), code)
+    return Dots.joined(found)
 
 
 def _outlines(known: np.ndarray, code: DotFamily, margin: float | np.ndarray) -> np.ndarray:
@@ -152,44 +134,81 @@ def _blobs(
     return found
 
 
-def _inside(dots: Dots, known: np.ndarray, code: DotFamily) -> np.ndarray:
-    """Return whether the centres of dots lie in known targets, shape (k,)."""
-    inside = np.zeros(len(dots.frames), bool)
-    homogeneous = dots.frames[:, :, 2]
-    for back in np.linalg.inv(known):
-        x, y, depth = back @ homogeneous.T
-        inside |= x * x + y * y < (code.border_radius * depth) ** 2
-    return inside
+def judged(pyramid: ImagePyramid, dots: Dots, known: np.ndarray, code: DotFamily) -> Dots:
+    """Return the dots outside of known targets about which a border is seen.
 
-
-def _of_kind(dots: Dots, settings: DetectorSettings) -> Dots:
-    """Return the dots of the polarities and about the radii that are looked for."""
-    low, high = settings.radii
-    major = ellipse_axes(dots.frames)[0]
-    of_size = (major >= _TOLERANCE * low) & (major <= high / _TOLERANCE)
-    return dots.select(of_size & np.isin(dots.polarity, settings.polarities))
-
-
-def judged(pyramid: ImagePyramid, dots: Dots, code: DotFamily) -> Dots:
-    """Return the discs about which a border is seen, with the radius that fits both best.
-
-    Parameters
-    ----------
-    pyramid : ImagePyramid
-    dots : Dots
-    code : DotFamily
-
-    Returns
-    -------
-    Dots
-        No two of them the same; their share is the share of the expected steps.
+    Their radius is the one that fits disc and border best, their share that of the expected steps.
+    No two of them are the same.
     """
+    outside = np.ones(len(dots.frames), bool)
+    for back in np.linalg.inv(known):
+        x, y, depth = back @ dots.frames[:, :, 2].T
+        outside &= x * x + y * y >= (code.border_radius * depth) ** 2
+    dots = dots.select(outside)
     scores = border_steps(pyramid.logs[0], dots.frames, dots.polarity, code, _SCALES)
     smooth = scores.copy()
     smooth[:, 1:-1] = (scores[:, :-2] + 2 * scores[:, 1:-1] + scores[:, 2:]) / 4
     best = smooth.argmax(axis=1)
     share = scores[np.arange(len(best)), best]
-    frames = dots.frames.copy()
-    frames[:, :2, :2] *= _SCALES[best][:, None, None]
     good = share > _MINIMUM_SHARE
+    frames = scaled(dots.frames, _SCALES[best])
     return distinct(Dots(frames[good], dots.polarity[good], share[good]))
+
+
+def border_steps(
+    log: np.ndarray,
+    frames: np.ndarray,
+    polarity: np.ndarray,
+    code: DotFamily,
+    scales: np.ndarray,
+) -> np.ndarray:
+    """Return the mean step of ln I at the edges of disc and border, in steps of the disc.
+
+    Parameters
+    ----------
+    log : ndarray of int16, shape (height, width)
+        LOG_SCALE ln(I + 8).
+    frames : ndarray of float64, shape (k, 3, 3)
+        Of the discs.
+    polarity : ndarray of int, shape (k,)
+    code : DotFamily
+    scales : ndarray of float, shape (n,)
+        Radii that the discs may have, in radii of the frames.
+
+    Returns
+    -------
+    ndarray of float64, shape (k, n)
+        At most 1.
+    """
+    gap = (code.dot_circle - code.dot_radius - 1) / 2
+    ground = (code.dot_circle + code.dot_radius + code.ground_radius) / 2
+    ink = (code.ground_radius + code.border_radius) / 2
+    beside = np.array([1 - gap, 1 + gap, ground, ink, 2 * code.border_radius - ink])
+    points = circle_points(_ANGLES, (scales[:, None] * beside).ravel())
+    count = max(_PART // points[..., 0].size, 1)
+    parts = [
+        _mean_steps(sample(log, _project(frames[part], points)), polarity[part], len(scales))
+        for part in (slice(it, it + count) for it in range(0, max(len(frames), 1), count))
+    ]
+    return np.concatenate(parts)
+
+
+def _project(frames: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return the images of points, shape (m, n, 2), in frames, shape (k, m, n, 2), as float32.
+
+    That is exact enough for samples, and much faster than `project`.
+    """
+    flat = np.concatenate([points.reshape(-1, 2), np.ones((points[..., 0].size, 1))], axis=1)
+    images = flat.astype(np.float32) @ frames.transpose(0, 2, 1).astype(np.float32)
+    pixels: np.ndarray = images[..., :2] / images[..., 2:]
+    return pixels.reshape(-1, *points.shape)
+
+
+def _mean_steps(values: np.ndarray, polarity: np.ndarray, count: int) -> np.ndarray:
+    """Return the mean steps from values of the log on rays, shape (k, rays, 5 count)."""
+    values = values.reshape(len(values), _RAYS, count, _EDGE_SIDES).astype(np.float32)
+    steps = values[..., [1, 2, 4]] - values[..., [0, 3, 3]]
+    steps *= (polarity / LOG_SCALE)[:, None, None, None]
+    usual = np.maximum(np.median(steps[..., 0], axis=1), _MINIMUM_STEP)
+    means: np.ndarray = np.clip(steps / usual[:, None, :, None], -1, 1).mean(axis=(1, 3))
+    return means.astype(np.float64)

@@ -44,20 +44,10 @@ _CONTOUR_ERROR = 0.5  # standard deviation of a point of a contour, px
 
 
 def local_otsu(gray: np.ndarray, side: int) -> np.ndarray:
-    """Return a threshold for every pixel.
+    """Return Otsu's threshold for every pixel, ndarray of float32, shape (height, width).
 
-    Blocks overlap by half. One that has no contrast takes the thresholds of those about it.
-
-    Parameters
-    ----------
-    gray : ndarray of uint8, shape (height, width)
-    side : int
-        Of a block, px, at least 2.
-
-    Returns
-    -------
-    ndarray of float32, shape (height, width)
-        Gray values.
+    Blocks overlap by half. One that has no contrast takes the thresholds of those about it. The
+    side of a block is at least 2 px.
 
     References
     ----------
@@ -89,15 +79,8 @@ def local_otsu(gray: np.ndarray, side: int) -> np.ndarray:
 def otsu(histograms: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the thresholds that part histograms best, and the distance of the two means.
 
-    Parameters
-    ----------
-    histograms : ndarray of int, shape (..., n)
-        Counts of the values 0 to n - 1.
-
-    Returns
-    -------
-    thresholds, contrast : ndarray of float64, shape (...)
-        The threshold is halfway between the means of the two classes.
+    Histograms, shape (..., n), count the values 0 to n - 1. The threshold is halfway between the
+    means of the two classes. Both are ndarray of float64, shape (...).
     """
     levels = np.arange(histograms.shape[-1])
     below = np.cumsum(histograms, axis=-1).astype(np.float64)
@@ -129,17 +112,7 @@ def _filled(thresholds: np.ndarray, valid: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, slots=True)
 class PublishedDotsDetector(FamilyDetector):
-    """The detector `dots_published`; call it with an image.
-
-    Attributes
-    ----------
-    settings : DetectorSettings
-
-    Raises
-    ------
-    ValueError
-        If the data file of the family is not accepted.
-    """
+    """The detector `dots_published`; call it with an image."""
 
     name: ClassVar[str] = 'dots_published'
 
@@ -176,19 +149,8 @@ def _concentric(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the targets that regions of a mask look like.
 
-    Parameters
-    ----------
-    mask : ndarray of bool, shape (height, width)
-        Whether a pixel has the colour of the disc.
-    settings : DetectorSettings
-    code : DotFamily
-
-    Returns
-    -------
-    frames : ndarray of float64, shape (k, 3, 3)
-        Of the discs, from the ellipses of the outer circles.
-    points : ndarray of int, shape (k,)
-        Number of points on the contour of each.
+    The mask is true where a pixel has the colour of the disc. Of each target: the frame of the
+    disc, from the ellipse of the outer circle, and the number of points on its contour.
     """
     contours, hierarchy = cv2.findContours(
         mask.astype(np.uint8), cv2.RETR_TREE, cv2.CHAIN_APPROX_NONE
@@ -238,13 +200,8 @@ def _identified(
 ) -> list[Target]:
     """Return the targets that a threshold shows, undecoded where a place is neither 01 nor 11.
 
-    Parameters
-    ----------
-    height : ndarray of float32, shape (height, width)
-        Negative where a pixel has the colour of the disc.
-    frames : ndarray of float64, shape (k, 3, 3)
-    points : ndarray of int, shape (k,)
-    code : DotFamily
+    `height` is negative where a pixel has the colour of the disc, `points` the number of points on
+    each contour.
     """
     words, clarity, inside = _develop(height, frames, code)
     ids = np.where(clarity >= _MINIMUM_SHARE, code.ids(words), 0)
@@ -281,7 +238,9 @@ def _develop(
     folded = dark[..., 0].reshape(-1, code.bits, _DIRECTIONS).sum(axis=1)
     turns = np.exp(2j * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS)
     middle = np.angle(folded @ turns) / (2 * np.pi) * _DIRECTIONS
-    half = max(round(_DIRECTIONS * _place_share(code) / 2), 1)
+    # The inner half of a dot, as a share of the distance from dot to dot.
+    share = code.dot_radius / code.dot_circle / (2 * np.pi / code.bits)
+    half = max(round(_DIRECTIONS * share / 2), 1)
     window = np.arange(-half, half + 1) + _DIRECTIONS * np.arange(code.bits)[:, None]
     columns = (np.rint(middle).astype(int)[:, None, None] + window) % count
     rows = np.arange(len(frames))[:, None, None]
@@ -289,8 +248,3 @@ def _develop(
     words = (dots > 0.5) @ (1 << np.arange(code.bits, dtype=np.int64))
     clarity = np.minimum(np.maximum(dots, 1 - dots), clear.mean(axis=2)).min(axis=1)
     return words, clarity, inside
-
-
-def _place_share(code: DotFamily) -> float:
-    """Return the share of the distance from dot to dot that the inner half of a dot takes."""
-    return code.dot_radius / code.dot_circle / (2 * np.pi / code.bits)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ahf_ros.codes.dots import DotFamily
-from ahf_ros.detectors.dots.border_steps import border_steps
+from ahf_ros.detectors.dots.discs import border_steps
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.circle_fit import Fit
 from ahf_ros.features.dot_evidence import PIXELS_ASIDE, circle_sides, dot_evidence
@@ -60,23 +60,16 @@ class Readings(ArrayRecord):
 
 
 def read_rings(log: np.ndarray, fit: Fit, code: DotFamily) -> Readings:
-    """Read rings of dots.
-
-    Parameters
-    ----------
-    log : ndarray of int16, shape (height, width)
-        LOG_SCALE ln(I + 8).
-    fit : Fit
-        Of disc and border of k targets.
-    code : DotFamily
-    """
+    """Read the rings of fitted discs and borders; `log` is LOG_SCALE ln(I + 8), int16."""
     count, bits, polarity = len(fit.frames), code.bits, fit.polarity
     disc = np.diff(circle_sides(log, fit.frames)[0])[..., 0]
     usual = np.maximum(np.median(disc * polarity[:, None], axis=1), _MINIMUM_STEP)
     phases = 2 * np.pi / bits * np.arange(_PHASES) / _PHASES
     points = dot_points((phases[:, None] - 2 * np.pi * np.arange(bits) / bits).ravel(), code)
     aside = np.repeat(np.maximum(PIXELS_ASIDE, _ASIDE * fit.blur), _PHASES * bits)
-    radii = _radii(code)
+    room = min(code.dot_circle - 1, code.ground_radius - code.dot_circle)
+    widest = _FULLEST * min(room, code.dot_circle * np.sin(np.pi / bits))
+    radii = np.append(code.dot_radius * _SHRUNK, np.minimum(code.dot_radius * _GROWN, widest))
     shape = (len(radii), count, _PHASES, bits)
     small = np.stack([local_frames(fit.frames, points, np.full(len(points), r)) for r in radii])
     single = small.reshape(len(radii), -1, 3, 3)
@@ -111,17 +104,10 @@ def read_rings(log: np.ndarray, fit: Fit, code: DotFamily) -> Readings:
         between=between,
         phase=phases[best],
         radius=radii[own],
-        seen=border_steps(log, fit.frames, polarity, code)[:, 0],
+        seen=border_steps(log, fit.frames, polarity, code, np.ones(1))[:, 0],
         height=highest / faintest,
         inside=inside,
     )
-
-
-def _radii(code: DotFamily) -> np.ndarray:
-    """Return the radii that small dots may have, in radii of the disc."""
-    room = min(code.dot_circle - 1, code.ground_radius - code.dot_circle)
-    widest = _FULLEST * min(room, code.dot_circle * np.sin(np.pi / code.bits))
-    return np.append(code.dot_radius * _SHRUNK, np.minimum(code.dot_radius * _GROWN, widest))
 
 
 def dot_points(angles: np.ndarray, code: DotFamily) -> np.ndarray:

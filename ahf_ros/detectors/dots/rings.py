@@ -2,26 +2,23 @@
 
 The edges of disc and border give the frames: circles of three radii separate the image of the
 physical centre from the centres of ellipses.
+
+There has to be a target, no pattern of light that resembles one, and its word has to be right.
+Each is a logistic regression on rendered scenes, whose weights are in `fitted_weights.json`.
+`benchmarks.dots_confidence` fits them, and shows how far the result can be trusted.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
 
 import numpy as np
 
 from ahf_ros.codes.dots import DotFamily
 from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import DetectorSettings
-from ahf_ros.detectors.dots.confidence import (
-    MAXIMUM_SHARE,
-    target_features,
-    target_probability,
-    word_features,
-    word_probability,
-)
-from ahf_ros.detectors.dots.reading import dot_points, read_rings
+from ahf_ros.detectors.dots.reading import Readings, dot_points, read_rings
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.circle_fit import Fit
 from ahf_ros.features.circles import Circles
@@ -29,6 +26,7 @@ from ahf_ros.features.dots import Dots
 from ahf_ros.features.ellipse_targets import ellipse_fields
 from ahf_ros.features.frame import ellipse_axes, mean_radii
 from ahf_ros.features.homography import local_frames
+from ahf_ros.features.logistic import logistic, read_weights
 from ahf_ros.features.pyramid import ImagePyramid
 from ahf_ros.features.soft_edges import fit_circles_of_any_blur
 from ahf_ros.target import UNDECODED, DottedTarget
@@ -37,11 +35,9 @@ _RAYS = 40  # round each circle
 _REACH = 0.3  # how far from a circle its edge is looked for, radii of the disc: half the border
 _MINIMUM_REACH = 1.35  # the same of small discs, px: what a profile needs
 
-FAMILY = 'dots'
-"""Name of the family, whichever data file describes it."""
-
-CERTAIN = 0.95
-"""Confidence from which a target is reported."""
+FAMILY = 'dots'  # whichever data file describes it
+CERTAIN = 0.95  # confidence from which a target is reported
+WEIGHTS = Path(__file__).with_name('fitted_weights.json')
 
 _PART = 512  # discs fitted at a time, which bounds the memory
 _PLAUSIBLE = 0.4  # share of the edges of disc and border, for the ring to be read
@@ -50,42 +46,23 @@ _OF_BLUR = 2.0  # share of the steps that blur hides, in its radii of the disc
 _BETWEEN = 2.0  # evidence for a dot halfway between places, where targets have none
 _MAXIMUM_CONTRAST = 0.85  # contrast of a disc, dark over bright
 
+_MAXIMUM_SHARE = 0.85
+# Of the steps at disc and border, and of their edges, for a target in good light.
+_MAXIMUM_HEIGHT = 0.5  # beyond which it says no more, of a dot, in the one that the blur leaves it
+_MINIMUM_DOUBT = -6.0  # below which it says no more, ln of the odds that a place misleads
+_OF_TARGET, _OF_WORD = read_weights(WEIGHTS, 'dots_confidence', 'target', 'word')
+
 
 def fit_targets(
     gray: np.ndarray, frames: np.ndarray, polarity: np.ndarray, code: DotFamily
 ) -> Fit:
-    """Fit the edges of disc and border.
-
-    Parameters
-    ----------
-    gray : ndarray of float32, shape (height, width)
-        Gray values from 0 to 255.
-    frames : ndarray of float64, shape (k, 3, 3)
-        Of the discs, to about a pixel.
-    polarity : ndarray of int, shape (k,)
-        1 for dark targets, -1 for bright ones.
-    code : DotFamily
-    """
-    reach = np.maximum(_REACH, _MINIMUM_REACH / mean_radii(frames))[:, None]
-    circles = target_circles(polarity, code)
-    return fit_circles_of_any_blur(gray, frames, circles, reach=reach, projective=True, rounds=3)
-
-
-def target_circles(polarity: np.ndarray, code: DotFamily) -> Circles:
-    """Return the edges of disc and border.
-
-    Parameters
-    ----------
-    polarity : ndarray of int, shape (k,)
-        1 for dark targets, -1 for bright ones.
-    code : DotFamily
-    """
+    """Fit the edges of disc and border; the frames of the discs are known to about a pixel."""
     angles = 2 * np.pi * np.arange(_RAYS) / _RAYS
-    radii = np.array([1.0, code.ground_radius, code.border_radius])
-    signs = np.repeat([1, -1, 1], _RAYS)
-    group = np.repeat([0, 1, 1], _RAYS)
-    of_points = polarity[:, None] * signs
-    return Circles(np.tile(angles, 3), np.repeat(radii, _RAYS), group, of_points)
+    radii = np.repeat([1.0, code.ground_radius, code.border_radius], _RAYS)
+    group, signs = np.repeat([0, 1, 1], _RAYS), np.repeat([1, -1, 1], _RAYS)
+    circles = Circles(np.tile(angles, 3), radii, group, polarity[:, None] * signs)
+    reach = np.maximum(_REACH, _MINIMUM_REACH / mean_radii(frames))[:, None]
+    return fit_circles_of_any_blur(gray, frames, circles, reach=reach, projective=True, rounds=3)
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +84,7 @@ class Rings(ArrayRecord):
     radius : ndarray of float64, shape (k,)
         Of the small dots as seen, in radii of the disc.
     target_features, word_features : ndarray of float64, shape (k, n) and (k, m)
-        As `confidence` weighs them.
+        What the probabilities of target and word depend on.
     """
 
     frames: np.ndarray
@@ -128,7 +105,7 @@ class Rings(ArrayRecord):
     @property
     def whole(self) -> np.ndarray:
         """Whether disc and border are seen as in good light, shape (k,)."""
-        return np.asarray((self.target_features[:, :2] >= MAXIMUM_SHARE).all(axis=1))
+        return np.asarray((self.target_features[:, :2] >= _MAXIMUM_SHARE).all(axis=1))
 
     @property
     def of_word(self) -> np.ndarray:
@@ -136,15 +113,48 @@ class Rings(ArrayRecord):
         return self.of_target * word_probability(self.word_features)
 
 
-def read_discs(pyramid: ImagePyramid, discs: Dots, code: DotFamily) -> Rings:
-    """Return the rings of dots about discs, as far as they lie in the image.
+def target_features(readings: Readings, fit: Fit) -> np.ndarray:
+    """Return what separates targets from other things, shape (k, 3).
 
-    Parameters
-    ----------
-    pyramid : ImagePyramid
-    discs : Dots
-    code : DotFamily
+    The share of the steps of ln I at disc and border; the share of the edges in their place; the
+    step of the dot that is seen best, in the one that the blur leaves it. All limited.
     """
+    return np.stack(
+        [
+            np.minimum(readings.seen, _MAXIMUM_SHARE),
+            np.minimum(fit.share, _MAXIMUM_SHARE),
+            np.clip(readings.height, 0, _MAXIMUM_HEIGHT),
+        ],
+        axis=1,
+    )
+
+
+def word_features(readings: Readings, fit: Fit) -> np.ndarray:
+    """Return what separates right words from wrong ones, shape (k, 4).
+
+    ln of the odds that the evidence at any one place misleads, limited; then `target_features`.
+    """
+    doubt = np.log(np.exp(-np.abs(readings.evidence)).sum(axis=1))
+    return np.column_stack([np.maximum(doubt, _MINIMUM_DOUBT), target_features(readings, fit)])
+
+
+def target_probability(features: np.ndarray) -> np.ndarray:
+    """Return the probabilities that there are targets, shape (k,)."""
+    return logistic(features, _OF_TARGET)
+
+
+def word_probability(features: np.ndarray) -> np.ndarray:
+    """Return the probabilities that the words of targets are right, shape (k,).
+
+    They are at most those that no place misleads. The regression alone makes good edges outweigh
+    a place that shows little, which they do not: half of the wrong IDs came from that.
+    """
+    not_misled = 1 / (1 + np.exp(features[:, 0]))
+    return np.minimum(logistic(features, _OF_WORD), not_misled)
+
+
+def read_discs(pyramid: ImagePyramid, discs: Dots, code: DotFamily) -> Rings:
+    """Return the rings of dots about discs, as far as they lie in the image."""
     count = max(len(discs.frames), 1)
     return Rings.joined(
         [
@@ -176,14 +186,7 @@ def _read_part(pyramid: ImagePyramid, discs: Dots, code: DotFamily) -> Rings:
 
 
 def report(rings: Rings, settings: DetectorSettings, code: DotFamily) -> list[DottedTarget]:
-    """Return one target for each place and each ID, the most certain one.
-
-    Parameters
-    ----------
-    rings : Rings
-    settings : DetectorSettings
-    code : DotFamily
-    """
+    """Return one target for each place and each ID, the most certain one."""
     major = ellipse_axes(rings.frames)[0]
     minimum, maximum = settings.radii
     ids = code.ids(rings.words)
@@ -207,7 +210,8 @@ def _targets(rings: Rings, ids: np.ndarray, code: DotFamily) -> list[DottedTarge
             confidence=sure,
             polarity=sign,
             family='' if identifier == UNDECODED else FAMILY,
-            **ellipses(frame[None], word, phase, radius, code),
+            dots=_ellipses(frame, word, phase, radius, code),
+            template_dots=2,
             **place,
         )
         for identifier, of_code, sure, sign, frame, word, phase, radius, place in zip(
@@ -225,26 +229,12 @@ def _targets(rings: Rings, ids: np.ndarray, code: DotFamily) -> list[DottedTarge
     ]
 
 
-def ellipses(
-    frame: np.ndarray, word: int, phase: float, radius: float, code: DotFamily
-) -> dict[str, Any]:
-    """Return the ellipses of disc, border and dots as `DottedTarget` has them.
-
-    Parameters
-    ----------
-    frame : ndarray of float64, shape (1, 3, 3)
-    word : int
-        As read from the first place, counter-clockwise in the image.
-    phase : float
-        Direction of that place in the frame, rad clockwise from +x.
-    radius : float
-        Of the small dots, in radii of the disc.
-    code : DotFamily
-    """
+def _ellipses(frame: np.ndarray, word: int, phase: float, radius: float, code: DotFamily) -> tuple:
+    """Return the ellipses of disc, border and dots of one ring as `DottedTarget` has them."""
     which = np.flatnonzero(word >> np.arange(code.bits) & 1)
     points = dot_points(phase - 2 * np.pi * which / code.bits, code)
     points = np.concatenate([np.zeros((2, 2)), points])
     radii = np.array([1.0, code.border_radius] + [radius] * len(which))
-    frames = local_frames(frame, points, radii)[0]
+    frames = local_frames(frame[None], points, radii)[0]
     columns = (frames[:, 0, 2], frames[:, 1, 2], *ellipse_axes(frames))
-    return {'dots': tuple(zip(*(of.tolist() for of in columns), strict=True)), 'template_dots': 2}
+    return tuple(zip(*(of.tolist() for of in columns), strict=True))

@@ -1,22 +1,39 @@
-"""A detector that is another program: it gets an image file and prints what it found as JSON."""
+"""A detector that is another program: it gets an image file and prints what it found as JSON.
+
+A program has limits of time and output, and ends with this process.
+"""
 
 from __future__ import annotations
 
 import json
+import os
 import shlex
+import signal
+import subprocess
 import tempfile
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import IO, Any, ClassVar
 
 import cv2
 import numpy as np
 
-from ahf_ros.detectors.contract import DetectorSettings
-from ahf_ros.detectors.external.program import check_running, output_of
+from ahf_ros import ending
+from ahf_ros.detectors.contract import DetectorSettings, Unavailable
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.interchange.target_json import targets_from_json
 from ahf_ros.target import Target, sorted_targets
-from ahf_ros.text import printable, reason_of
+from ahf_ros.text import MAXIMUM_LENGTH, printable, reason_of
+
+MAXIMUM_OUTPUT = 64 * 2**20
+"""Bytes that a program may write to standard output or standard error."""
+
+_running: set[subprocess.Popen[Any]] = set()
+_lock = threading.RLock()  # a signal handler may interrupt its own thread
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,26 +45,15 @@ class CommandDetector:
     of a target further fields of `Target` are accepted, and others of the object left out. So
     `ahf identify --json` is such a program itself.
 
-    Attributes
-    ----------
-    settings : DetectorSettings
-
-    Raises
-    ------
-    ValueError
-        If there is no command, or it cannot be split into words.
+    A ValueError says if there is no command, or it cannot be split into words.
     """
 
     settings: DetectorSettings = field(default_factory=DetectorSettings)
+    name: ClassVar[str] = 'command'
 
     def __post_init__(self) -> None:
         """Refuse a command that is none."""
         self._words('image.png')
-
-    @property
-    def name(self) -> str:
-        """Name in the registry."""
-        return 'command'
 
     @property
     def family(self) -> str:
@@ -66,13 +72,13 @@ class CommandDetector:
             its time limit, ends with another status than 0, or prints what is not accepted.
         """
         check_image(image)
-        check_running(self._named)
+        _check_running(self._named)
         with tempfile.TemporaryDirectory(prefix='ahf_') as folder:
             path = Path(folder, 'image.png')
             cv2.imwrite(str(path), as_gray(image).astype(np.uint8, copy=False))
             words = self._words(str(path))
             timeout = self.settings.detector_timeout
-            printed = output_of(words, Path(folder), timeout, self._named)
+            printed = _output_of(words, Path(folder), timeout, self._named)
         try:
             record = json.loads(printed)
         except (ValueError, RecursionError) as error:
@@ -96,3 +102,85 @@ class CommandDetector:
         if not any('{image}' in word for word in words):
             words.append('{image}')
         return [word.replace('{image}', image) for word in words]
+
+
+def _check_running(name: str) -> None:
+    """Refuse to run a program, called by its name, while this process ends."""
+    if ending.has_begun():
+        raise ValueError(f'{name} was ended with this process')
+
+
+def _output_of(words: list[str], folder: Path, timeout: float, name: str) -> str:
+    """Run a program and return what it writes to standard output, by way of files in a folder."""
+    output, errors = folder / 'output', folder / 'errors'
+    with output.open('wb') as out, errors.open('wb') as err:
+        try:
+            # A signal interrupts the main thread only: what another one starts is always known.
+            with ThreadPoolExecutor(1) as starter:
+                process = starter.submit(_started, words, out, err).result()
+        except (OSError, ValueError) as error:  # ValueError: a zero byte in a word
+            reason = error.strerror if isinstance(error, OSError) else error
+            raise Unavailable(f'{name} cannot be started: {reason}') from error
+        try:
+            status = _awaited(process, (output, errors), timeout, name)
+        finally:
+            with _lock:
+                _running.discard(process)
+            _kill(process)
+            process.wait()
+    if status:
+        with errors.open('rb') as file:
+            file.seek(max(errors.stat().st_size - MAXIMUM_LENGTH, 0))
+            said = printable(file.read().decode(errors='replace').strip())
+        how = f'with status {status}' if status > 0 else f'by signal {-status}'
+        raise ValueError(f'{name} ended {how}: {said!r}')
+    return output.read_text(encoding='utf-8', errors='replace')
+
+
+def _started(words: list[str], out: IO[bytes], err: IO[bytes]) -> subprocess.Popen[Any]:
+    """Start a program that ends with this process, whenever that begins to end."""
+    with _lock:
+        process = subprocess.Popen(
+            words, stdin=subprocess.DEVNULL, stdout=out, stderr=err, start_new_session=True
+        )
+        _running.add(process)
+    if ending.has_begun():
+        _kill(process)
+    return process
+
+
+def _awaited(
+    process: subprocess.Popen[Any], files: tuple[Path, ...], timeout: float, name: str
+) -> int:
+    """Return the status of a program, or raise a ValueError as soon as it breaks a limit."""
+    limit = time.monotonic() + timeout
+    status = None
+    while status is None:
+        _check_running(name)
+        remaining = limit - time.monotonic()
+        with suppress(subprocess.TimeoutExpired):
+            status = process.wait(max(min(ending.POLL, remaining), 0))
+        if status is None and remaining <= 0:
+            raise ValueError(f'{name} took longer than detector_timeout, {timeout:g} s')
+        size = max(file.stat().st_size for file in files)
+        if size > MAXIMUM_OUTPUT:
+            raise ValueError(f'{name} wrote {size} bytes, accepted are at most {MAXIMUM_OUTPUT}')
+    return status
+
+
+def _kill_running() -> None:
+    with _lock:
+        running = list(_running)
+    for process in running:
+        _kill(process)
+
+
+def _kill(process: subprocess.Popen[Any]) -> None:
+    """End a process that has not, and all that it started."""
+    try:
+        os.killpg(process.pid, signal.SIGKILL)
+    except ProcessLookupError:
+        return
+
+
+ending.at_begin(_kill_running)

@@ -24,14 +24,8 @@ Result = TypeVar('Result')
 class GuardedDetector:
     """A detector with a time limit, all of whose errors are a ValueError; `guarded` makes it.
 
-    Attributes
-    ----------
-    detector : Detector
-    timeout : float
-        Time limit for one image, s. A call that takes longer goes on in its thread, which cannot
-        be stopped and ends with the process.
-    name, family : str
-        Name of the detector and family of its targets.
+    A call that takes longer than the limit, s, goes on in its thread, which cannot be stopped and
+    ends with the process.
     """
 
     detector: Detector
@@ -52,12 +46,13 @@ class GuardedDetector:
 
     def expecting(self, ids: frozenset[int]) -> GuardedDetector:
         """Return the same for a detector that was told the IDs, if it is `Expecting`."""
-        return self._awaited(lambda: self._told(ids))
 
-    def _told(self, ids: frozenset[int]) -> GuardedDetector:
-        if not isinstance(self.detector, Expecting):
-            return self
-        return guarded(self._of(self.detector.expecting, ids), self.timeout)
+        def told() -> GuardedDetector:
+            if not isinstance(self.detector, Expecting):
+                return self
+            return guarded(self._of(self.detector.expecting, ids), self.timeout)
+
+        return self._awaited(told)
 
     def _targets(self, call: Callable[..., Any], image: np.ndarray, *more: Any) -> list[Target]:
         copied = image.copy()
@@ -124,21 +119,18 @@ class GuardedRefiner(GuardedDetector):
 
     def draft(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image, if possible as a `Drafter` does."""
-        return self._targets(self._drafted, image)
 
-    def _drafted(self, image: np.ndarray) -> list[Target]:
-        return (self.detector.draft if isinstance(self.detector, Drafter) else self.detector)(
-            image
-        )
+        def drafted(copied: np.ndarray) -> list[Target]:
+            called = self.detector
+            return called.draft(copied) if isinstance(called, Drafter) else called(copied)
+
+        return self._targets(drafted, image)
 
 
 def guarded(detector: Detector, timeout: float) -> GuardedDetector:
     """Return a detector with a time limit, in s, that is a `Refiner` if `detector` is one.
 
-    Raises
-    ------
-    ValueError
-        If its name or its family is not a printable text.
+    A ValueError says if its name or its family is not a printable text.
     """
     try:
         name, family = (checked_text(getattr(detector, it), it) for it in ('name', 'family'))

@@ -19,20 +19,25 @@ import numpy as np
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes.gsi import PointFamily, point_family
 from ahf_ros.detectors.claims import best_targets
-from ahf_ros.detectors.contract import DetectorSettings, FamilyDetector
-from ahf_ros.detectors.gsi.confidence import confidence_features
-from ahf_ros.detectors.gsi.evidence import find_evidence, seen_templates
+from ahf_ros.detectors.contract import DetectorSettings, FamilyDetector, moved_targets
+from ahf_ros.detectors.gsi.evidence import find_evidence, read_codes, seen_templates
 from ahf_ros.detectors.gsi.grouping import FEW, Templates, find_templates
 from ahf_ros.detectors.gsi.hypotheses import (
+    NO_HYPOTHESES,
     OBVIOUS,
     Hypotheses,
+    confidence_features,
     inside,
-    no_hypotheses,
     plausible,
     resolve,
 )
-from ahf_ros.detectors.gsi.reading import read_codes
-from ahf_ros.detectors.gsi.refinement import dot_frames, measure_dots, place_targets, resized
+from ahf_ros.detectors.gsi.refinement import (
+    Placement,
+    dot_frames,
+    measure_dots,
+    place_targets,
+    resized,
+)
 from ahf_ros.features import frame
 from ahf_ros.features.dot_search import voted_dots, whole_dots
 from ahf_ros.features.dots import Dots, distinct
@@ -45,7 +50,6 @@ from ahf_ros.features.small_dots import small_dots
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, DottedTarget, Target, sorted_targets
 
-_FAMILY = 'gsi'  # whichever data file describes it
 _MARGIN = 0.5  # about the dots of certain targets, dot radii
 _WHOLE_MARGIN = 0.4  # about a dot whose outline is whole, dot radii
 _SMALL = 12.0  # radius up to which dots are looked for as blobs, px
@@ -56,17 +60,7 @@ _FARTHEST = 1.0  # that the reference point is moved by a refinement, px, or dot
 
 @dataclass(frozen=True, slots=True)
 class GsiDetector(FamilyDetector):
-    """Identify point-distributed targets: GSI's, or those that a data file describes.
-
-    Attributes
-    ----------
-    settings : DetectorSettings
-
-    Raises
-    ------
-    ValueError
-        If the data file of the family is not accepted.
-    """
+    """Identify point-distributed targets: GSI's, or those that a data file describes."""
 
     name: ClassVar[str] = 'gsi'
     patience: ClassVar[int] = 3
@@ -110,25 +104,15 @@ class GsiDetector(FamilyDetector):
         if not dotted:
             return list(targets)
         gray = as_gray(image).astype(np.float32, copy=False)
+        words = np.array([it.code for it in dotted])
+        polarity = np.array([it.polarity for it in dotted])
         ellipses = np.array([it.dots for it in dotted])
         frames = frame.affine_frames(*ellipses.reshape(-1, 5).T).reshape(*ellipses.shape[:2], 3, 3)
-        which = _dots_of(np.array([it.code for it in dotted]), code)
-        polarity = np.array([it.polarity for it in dotted])
-        placed = place_targets(
-            gray, frames, polarity, code.places[which], code.radii[which], code.reach
-        )
+        placed = place_targets(gray, frames, polarity, *_printed(words, code), code.reach)
         moved = np.hypot(*(placed.homographies[:, :2, 2] - [(it.x, it.y) for it in dotted]).T)
         reach = np.maximum(_FARTHEST, _FARTHEST * np.array([it.semi_minor for it in dotted]))
-        words = np.array([it.code for it in dotted])
-        places = _fields(placed.homographies, placed.covariance, placed.scale, words, code)
-        better: dict[Target, Target] = {
-            target: replace(target, **place)
-            for target, place, good in zip(
-                dotted, places, (moved <= reach) & (placed.share >= 0.5), strict=True
-            )
-            if good
-        }
-        return [better.get(it, it) for it in targets]
+        good = (moved <= reach) & (placed.share >= 0.5)
+        return moved_targets(targets, dotted, _fields(placed, words, code), good)
 
 
 def find_hypotheses(
@@ -138,20 +122,12 @@ def find_hypotheses(
 
     Dots whose outlines are whole cost little. Where they make obvious targets, no others are
     looked for.
-
-    Parameters
-    ----------
-    pyramid : ImagePyramid
-    settings : DetectorSettings
-        What the targets look like.
-    code : PointFamily
     """
     kind = (*settings.radii, settings.polarities)
     whole = resized(pyramid.gray, whole_dots(pyramid, *kind))
-    first = read_targets(pyramid, whole, code, no_hypotheses(), obvious=True)
+    first = read_targets(pyramid, whole, code, NO_HYPOTHESES, obvious=True)
     certain = first.select(resolve(first, code, OBVIOUS))
-    which = _dots_of(certain.words, code)
-    places, radii = code.places[which], code.radii[which] * certain.scale[:, None]
+    places, radii = _printed(certain.words, code, certain.scale)
     rest, explained = np.ones(len(whole.frames), bool), []
     for frames in dot_frames(certain.homographies, places, (1 + _MARGIN) * radii):
         rest &= ~inside(whole.frames[:, :2, 2], frames)
@@ -179,20 +155,10 @@ def _with_others(
 def read_targets(
     pyramid: ImagePyramid, dots: Dots, code: PointFamily, known: Hypotheses, *, obvious: bool
 ) -> Hypotheses:
-    """Return hypotheses, and the groups of dots that may be targets, read as codes.
+    """Return known hypotheses, and the groups of dots that may be targets, read as codes.
 
     The polarity with fewer dots comes first. Prints in one image are alike: if there are certain
     targets, but none of the other polarity, its dots, where they are many, are those of light.
-
-    Parameters
-    ----------
-    pyramid : ImagePyramid
-    dots : Dots
-    code : PointFamily
-    known : Hypotheses
-        Those that there are already.
-    obvious : bool
-        As for `plausible`.
     """
     polarities = [np.flatnonzero(dots.polarity == polarity) for polarity in (1, -1)]
     for which in sorted(polarities, key=len):
@@ -208,38 +174,31 @@ def _read(
     pyramid: ImagePyramid, templates: Templates, code: PointFamily, *, obvious: bool
 ) -> Hypotheses:
     templates = seen_templates(pyramid.logs[0], templates, code)
-    if not len(templates.homographies):
-        return no_hypotheses()
+    if not len(templates.polarity):
+        return NO_HYPOTHESES
     evidence = find_evidence(
         pyramid.logs[0], templates.homographies, templates.polarity, templates.scale, code
     )
     readings = read_codes(evidence, templates.scale, code)
     which = plausible(templates, readings, code, obvious=obvious)
     if not len(which):
-        return no_hypotheses()
-    some, words = templates.select(which), readings.words[which]
-    first = _placed(pyramid, some.homographies, some.polarity, some.scale, words, code)
+        return NO_HYPOTHESES
+    words = readings.words[which]
+    first = _placed(pyramid, templates.select(which), words, code)
     again = np.flatnonzero((first.words != words) & (first.support >= _PROMISING))
     if not len(again):
         return first
     found = first.select(again)
-    second = _placed(pyramid, found.homographies, found.polarity, found.scale, found.words, code)
-    return first.replaced(again, second)
+    return first.replaced(again, _placed(pyramid, found, found.words, code))
 
 
 def _placed(
-    pyramid: ImagePyramid,
-    homographies: np.ndarray,
-    polarity: np.ndarray,
-    scale: np.ndarray,
-    words: np.ndarray,
-    code: PointFamily,
+    pyramid: ImagePyramid, groups: Templates | Hypotheses, words: np.ndarray, code: PointFamily
 ) -> Hypotheses:
     """Return hypotheses with homographies through all of their dots, read once more."""
-    dots = _dots_of(words, code)
-    places, radii = code.places[dots], code.radii[dots]
-    frames = dot_frames(homographies, places, radii * scale[:, None])
-    placement = place_targets(pyramid.gray, frames, polarity, places, radii, code.reach)
+    polarity = groups.polarity
+    frames = dot_frames(groups.homographies, *_printed(words, code, groups.scale))
+    placement = place_targets(pyramid.gray, frames, polarity, *_printed(words, code), code.reach)
     evidence = find_evidence(
         pyramid.logs[0], placement.homographies, polarity, placement.scale, code
     )
@@ -257,19 +216,22 @@ def _placed(
 def report(hypotheses: Hypotheses, code: PointFamily) -> list[Target]:
     """Return the targets whose codes are certain, each ID once."""
     some = hypotheses.select(resolve(hypotheses, code))
-    fields = _fields(some.homographies, some.covariance, some.scale, some.words, code)
     return [
         DottedTarget(
-            id=code.number(int(word)) or 0,
-            code=int(word),
-            confidence=float(confidence),
-            family=_FAMILY,
+            id=code.number(word) or 0,
+            code=word,
+            confidence=confidence,
+            family='gsi',  # whichever data file describes it
             template_dots=len(code.template),
-            polarity=int(polarity),
-            **of_target,
+            polarity=polarity,
+            **place,
         )
-        for word, confidence, polarity, of_target in zip(
-            some.words, some.confidence, some.polarity, fields, strict=True
+        for word, confidence, polarity, place in zip(
+            some.words.tolist(),
+            some.confidence.tolist(),
+            some.polarity.tolist(),
+            _fields(some, some.words, code),
+            strict=True,
         )
     ]
 
@@ -277,16 +239,7 @@ def report(hypotheses: Hypotheses, code: PointFamily) -> list[Target]:
 def uncoded(
     gray: np.ndarray, dots: Dots, targets: Sequence[Target], settings: DetectorSettings
 ) -> list[Target]:
-    """Return the dots that belong to no target, as targets that are not decoded.
-
-    Parameters
-    ----------
-    gray : ndarray of float32, shape (height, width)
-    dots : Dots
-    targets : sequence of Target
-        Those that were identified.
-    settings : DetectorSettings
-    """
+    """Return the dots that belong to none of the targets, as targets that are not decoded."""
     measured = measure_dots(gray, dots.frames, dots.polarity)
     frames, found = measured.frames, measured.near.copy()
     major = frame.ellipse_axes(frames)[0]
@@ -301,30 +254,33 @@ def uncoded(
     )
 
 
-def _dots_of(words: np.ndarray, code: PointFamily) -> np.ndarray:
-    """Return the indices of the dots of targets among the places of the design, shape (k, n)."""
+def _printed(
+    words: np.ndarray, code: PointFamily, scale: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return places and radii of the dots of k targets in the design, shapes (k, n, 2), (k, n).
+
+    The radii are those of the image where their scale, shape (k,), is given.
+    """
     count = len(code.template)
-    rows = [[*range(count), *(count + code.decoding_dots(int(word)))] for word in words]
-    return np.array(rows, int).reshape(len(words), count + code.rule.dots)
+    rows = [[*range(count), *(count + code.decoding_dots(word))] for word in words.tolist()]
+    which = np.array(rows, int).reshape(len(words), count + code.rule.dots)
+    radii = code.radii[which]
+    return code.places[which], radii if scale is None else radii * scale[:, None]
 
 
 def _fields(
-    homographies: np.ndarray,
-    covariance: np.ndarray,
-    scale: np.ndarray,
-    words: np.ndarray,
-    code: PointFamily,
+    placed: Placement | Hypotheses, words: np.ndarray, code: PointFamily
 ) -> list[dict[str, Any]]:
     """Return the fields of targets that say where they and their dots are."""
-    which = _dots_of(words, code)
-    places, radii = code.places[which], code.radii[which] * scale[:, None]
+    places, radii = _printed(words, code, placed.scale)
     own = [code.reference]
-    references = local_frames(homographies, places[:, own], radii[:, own])[:, 0]
-    fields = ellipse_fields(references, covariance)
-    frames = dot_frames(homographies, places, radii)
+    references = local_frames(placed.homographies, places[:, own], radii[:, own])[:, 0]
+    frames = dot_frames(placed.homographies, places, radii)
     axes = np.stack(frame.ellipse_axes(frames.reshape(-1, 3, 3)), axis=1)
-    ellipses = np.concatenate([frames[..., :2, 2], axes.reshape(*which.shape, 3)], axis=2)
+    ellipses = np.concatenate([frames[..., :2, 2], axes.reshape(*radii.shape, 3)], axis=2)
     return [
         {**place, 'dots': tuple(map(tuple, of_target))}
-        for place, of_target in zip(fields, ellipses.tolist(), strict=True)
+        for place, of_target in zip(
+            ellipse_fields(references, placed.covariance), ellipses.tolist(), strict=True
+        )
     ]

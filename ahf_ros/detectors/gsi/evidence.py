@@ -1,4 +1,4 @@
-"""Evidence for and against a dot at each place of a target.
+"""Evidence for and against a dot at each place of a target, and the codes it speaks for.
 
 The template dots tell how dark ink is beside paper. Where little light falls, ln(I + 8) has
 smaller steps than that. The brighter side of an edge tells how small; noise counts for more.
@@ -7,12 +7,12 @@ smaller steps than that. The brighter side of an edge tells how small; noise cou
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
 from ahf_ros.codes.gsi import PointFamily
 from ahf_ros.detectors.gsi.grouping import Templates
-from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.dot_evidence import circle_sides, dot_evidence, independent_rays
 from ahf_ros.features.frame import ellipse_axes
 from ahf_ros.features.homography import local_frames
@@ -36,9 +36,13 @@ _SMOOTHING /= _SMOOTHING.sum(axis=1, keepdims=True)
 _CONTRADICTED = -6.0  # evidence at a place of a template dot that nearly rules one out
 _HIDDEN = 1  # dots that are found and nevertheless so contradicted, in deep shadow
 
+_MOST_FOR, _MOST_AGAINST = 8.0, 6.0  # that one place may say on whether there is a target
+_GREATEST_MARGIN = 14.0  # of one code over the next, beyond which it says no more
+_CLEAREST = 20.0  # that it may say for a dot on which one
+
 
 @dataclass(frozen=True, slots=True)
-class Evidence(ArrayRecord):
+class Evidence:
     """Evidence at the places of k targets; the template dots come before the positions.
 
     Attributes
@@ -58,13 +62,6 @@ def seen_templates(log: np.ndarray, templates: Templates, family: PointFamily) -
 
     Of the dots that were found, light may hide one. Where none was found, nothing may speak
     against it: four dots of any lattice are the corners of a template.
-
-    Parameters
-    ----------
-    log : ndarray of int16, shape (height, width)
-        LOG_SCALE ln(I + 8).
-    templates : Templates
-    family : PointFamily
     """
     alone = replace(family, positions=family.positions[:0], position_radii=np.zeros(0))
     evidence = find_evidence(
@@ -83,17 +80,10 @@ def find_evidence(
     scale: np.ndarray,
     family: PointFamily,
 ) -> Evidence:
-    """Return the evidence for dots at all places of targets.
+    """Return the evidence for dots at all places of k targets.
 
-    Parameters
-    ----------
-    log : ndarray of int16, shape (height, width)
-        LOG_SCALE ln(I + 8).
-    homographies : ndarray of float64, shape (k, 3, 3)
-    polarity : ndarray of int, shape (k,)
-    scale : ndarray of float64, shape (k,)
-        Radius of the dots in that of the printed design.
-    family : PointFamily
+    `log` is LOG_SCALE ln(I + 8), int16; `scale` the radius of the dots of each target in that of
+    the printed design.
     """
     shape, count = (len(homographies), len(family.places)), len(family.template)
     frames = local_frames(homographies, family.places, family.radii * scale[:, None])
@@ -105,13 +95,14 @@ def find_evidence(
     lift = black_lift(*_ink_and_light(farther, polarity, count))
     black = np.flatnonzero(lift > 0)
     for of in (sides, farther):
-        of[black] = _lifted(of[black], lift[black, None, None, None])
+        moved = lifted(_gray(of[black]), lift[black, None, None, None])
+        of[black] = np.log(moved + LOG_OFFSET)
     steps = (sides[..., 1] - sides[..., 0]) * polarity[:, None, None]
     expected = _expected_steps(sides, polarity, count)
     ratio = dot_evidence(steps / expected, frames, _NOISE / expected)
     levels = np.concatenate([sides, farther], axis=2)
     ratio[:, count:] += _level_evidence(levels, frames, count)
-    return Evidence(np.where(inside, ratio, 0.0), inside)
+    return Evidence(ratio=np.where(inside, ratio, 0.0), inside=inside)
 
 
 def _expected_steps(sides: np.ndarray, polarity: np.ndarray, count: int) -> np.ndarray:
@@ -142,12 +133,6 @@ def _gray(logarithm: np.ndarray) -> np.ndarray:
     return gray
 
 
-def _lifted(logarithm: np.ndarray, lift: np.ndarray) -> np.ndarray:
-    """Return ln(I + 8) where black is lifted."""
-    moved: np.ndarray = np.log(lifted(_gray(logarithm), lift) + LOG_OFFSET)
-    return moved
-
-
 def _level_evidence(sides: np.ndarray, frames: np.ndarray, count: int) -> np.ndarray:
     """Return the evidence for dots at positions from the levels of ink and paper.
 
@@ -162,8 +147,7 @@ def _level_evidence(sides: np.ndarray, frames: np.ndarray, count: int) -> np.nda
 
 def _bins(values: np.ndarray) -> np.ndarray:
     """Return the numbers of the bins of values of ln(I + 8)."""
-    bins = ((values - np.log(LOG_OFFSET)) / _BIN).astype(int)
-    return np.clip(bins, 0, _BINS - 1)
+    return np.clip(((values - np.log(LOG_OFFSET)) / _BIN).astype(int), 0, _BINS - 1)
 
 
 def _densities(values: np.ndarray) -> np.ndarray:
@@ -173,3 +157,73 @@ def _densities(values: np.ndarray) -> np.ndarray:
     counts = np.bincount(bins.ravel(), minlength=_BINS * count).reshape(count, _BINS)
     densities: np.ndarray = counts @ _SMOOTHING / (bins[0].size * _BIN if count else 1.0)
     return densities
+
+
+@dataclass(frozen=True, slots=True)
+class Readings:
+    """What k groups of dots were read as.
+
+    Attributes
+    ----------
+    words : ndarray of int64, shape (k,)
+        Value of the best code.
+    margin : ndarray of float64, shape (k,)
+        Evidence for it over that for the second best, in ln.
+    support : ndarray of float64, shape (k,)
+        Evidence for a target with this code: for its dots, and against dots at all other places,
+        as a share of the most there may be.
+    weakest : ndarray of float64, shape (k,)
+        The second lowest evidence for one of its dots, as light may hide one.
+    """
+
+    words: np.ndarray
+    margin: np.ndarray
+    support: np.ndarray
+    weakest: np.ndarray
+
+
+def read_codes(evidence: Evidence, scale: np.ndarray, family: PointFamily) -> Readings:
+    """Return the codes that the evidence speaks for.
+
+    `scale`, shape (k,), is the radius of the dots in that of the printed design. What is seen at
+    places nearer to dots than two radii is these dots, and tells nothing new.
+    """
+    count = len(family.template)
+    limited = np.clip(evidence.ratio, -_MOST_AGAINST, _MOST_FOR)
+    template, positions = limited[:, :count], limited[:, count:]
+    incidence = _incidence(family)
+    scores = np.clip(evidence.ratio[:, count:], -_MOST_AGAINST, _CLEAREST) @ incidence.T
+    rows, best = np.arange(len(scores)), scores.argmax(axis=1)
+    highest = scores[rows, best]
+    scores[rows, best] = highest - _GREATEST_MARGIN
+    margin = highest - scores.max(axis=1)
+    marked = incidence[best] > 0
+    empty = ~marked & ~_covered(marked, scale, family)
+    of_dots = np.concatenate([template, np.where(marked, positions, _MOST_FOR)], axis=1)
+    against = np.where(empty, -positions, 0.0).sum(axis=1)
+    dots = template.sum(axis=1) + np.where(marked, positions, 0.0).sum(axis=1)
+    empty &= evidence.inside[:, count:]
+    most = (count + marked.sum(axis=1)) * _MOST_FOR + empty.sum(axis=1) * _MOST_AGAINST
+    return Readings(
+        words=family.words[best],
+        margin=margin,
+        support=(dots + against) / most,
+        weakest=np.sort(of_dots, axis=1)[:, 1],
+    )
+
+
+def _covered(marked: np.ndarray, scale: np.ndarray, family: PointFamily) -> np.ndarray:
+    """Return which positions lie within two radii of a dot, shape (k, positions)."""
+    count, places, radii = len(family.template), family.places, family.radii
+    gaps = np.hypot(*(places[:, None] - places[count:]).transpose(2, 0, 1))
+    near = gaps / (radii[:, None] + radii[count:]) < scale[:, None, None]
+    shown = np.concatenate([np.ones((len(marked), count), bool), marked], axis=1)
+    covered: np.ndarray = (near & shown[:, :, None]).any(axis=1)
+    return covered
+
+
+@lru_cache(maxsize=8)
+def _incidence(family: PointFamily) -> np.ndarray:
+    """Return which positions each code has dots at, 0 or 1, shape (codes, positions)."""
+    bits = family.words[:, None] >> family.position_numbers & 1
+    return bits.astype(np.float64)

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 from functools import cache, partial
 from itertools import pairwise
 
+import cv2
 import numpy as np
 
 from ahf_ros.codes.gsi import PointFamily
-from ahf_ros.detectors.gsi.nearest_dots import NearestDots
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.dots import Dots
@@ -25,9 +25,9 @@ from ahf_ros.features.homography import fit_homographies, local_frames
 from ahf_ros.features.neighbours import pairs_within
 from ahf_ros.features.robust import median
 
-PART = 400_000
-"""Pairs or triples of dots at a time, which bounds the memory."""
+FEW = 600  # dots of one polarity, up to which all template dots are tried in all roles
 
+_PART = 400_000  # pairs or triples of dots at a time, which bounds the memory
 _RADII = (0.065, 0.43)
 # Of dots, in the least distance of two template dots: 1.0 to 3.6 mm where these are 11 mm apart,
 # and a third more for bright ones that bloom.
@@ -50,8 +50,15 @@ _WELL = 0.25  # share of what is accepted, of a template that fits well
 _MAXIMUM_GROUPS = 2000  # of one part, for a homography to be fitted
 _MAXIMUM_TEMPLATES = 2000  # of one polarity, those that fit best
 _STRAY = 3  # dots at the positions of a target that do not belong to it
-FEW = 600
-"""Dots of one polarity, up to which all template dots are tried in all roles."""
+_CELL = 2.0  # smallest one of the map of the nearest dots, px
+
+
+Nearest = Callable[[np.ndarray, np.ndarray, float], tuple[np.ndarray, np.ndarray]]
+"""From places, shape (n, 2), units and a reach to the nearest dots and their distances.
+
+Units, shape (n, 2, 2), are the maps from the unit of the reach to px at each place. Beyond the
+reach a dot is -1.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,19 +114,10 @@ def neighbours(
     *,
     obvious: bool,
 ) -> Pairs:
-    """Return the pairs of dots of similar size that one template may hold in some roles.
+    """Return the pairs of dots of one polarity and similar size that one template may hold.
 
-    Parameters
-    ----------
-    dots : Dots
-        Of one polarity.
-    family : PointFamily
-    triples : sequence of tuple of 3 int
-        Template dots: the role of the first dot of a pair, and those of the second.
-    error : tuple of 2 float
-        As in `Pairs`.
-    obvious : bool
-        Whether only targets without many other dots about them are looked for.
+    Triples of template dots are the role of the first dot of a pair, and those of the second.
+    Where targets are to be obvious, those with many other dots about them are not looked for.
     """
     places = family.places[: len(family.template)]
     smallest, largest = radius_scales(family)
@@ -140,7 +138,7 @@ def neighbours(
     parts = [(np.zeros(0, int), np.zeros(0, int), np.zeros(0, complex))]
     for reach in np.geomspace(nearest, farthest, _STEPS):
         alone = np.isinf(limit)
-        for first, second in pairs_within(centres, np.where(alone, reach * major, 0.0), PART):
+        for first, second in pairs_within(centres, np.where(alone, reach * major, 0.0), _PART):
             near = np.abs(np.log(major[second] / major[first])) < _SIZE_RATIO + widest
             first, second = first[near], second[near]
             difference = centres[second] - centres[first]
@@ -161,6 +159,35 @@ def neighbours(
     order = np.argsort(first, kind='stable')
     first, second, offset = first[order], second[order], offset[order]
     return Pairs(first=first, second=second, offset=offset, crowd=limit[first], error=error)
+
+
+def nearest_dots(centres: np.ndarray, error: float) -> Nearest:
+    """Return a function that finds the dots nearest to places; see `Nearest`.
+
+    It looks them up in a map of the image. A dot may be farther away than the nearest one by the
+    error, px.
+    """
+    cell = max(error, _CELL)
+    corner = centres.min(axis=0)
+    cells = np.rint((centres - corner) / cell).astype(int)
+    last = cells.max(axis=0)
+    empty = np.full(last[::-1] + 1, 255, np.uint8)
+    empty[cells[:, 1], cells[:, 0]] = 0
+    _, labels = cv2.distanceTransformWithLabels(
+        empty, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    dot = np.zeros(labels.max() + 1, np.int32)
+    dot[labels[cells[:, 1], cells[:, 0]]] = np.arange(len(cells))
+    nearest = dot[labels]
+
+    def find(places: np.ndarray, units: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
+        column, row = np.clip(np.rint((places - corner) / cell), 0, last).astype(int).T
+        found = nearest[row, column]
+        gap = np.linalg.inv(units) @ (centres[found] - places)[..., None]
+        distance = np.hypot(gap[:, 0, 0], gap[:, 1, 0])
+        return np.where(distance < reach, found, -1), distance
+
+    return find
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,32 +216,28 @@ class Templates(ArrayRecord):
 
 
 def find_templates(dots: Dots, family: PointFamily, *, obvious: bool = False) -> Templates:
-    """Return the groups of dots that look like templates, no group twice.
+    """Return the groups of dots that look like templates, best first, no group twice.
 
-    Parameters
-    ----------
-    dots : Dots
-        Of one polarity.
-    family : PointFamily
-        Printed design.
-    obvious : bool
-        Whether only targets without many other dots about them are looked for.
-
-    Returns
-    -------
-    Templates
-        Best first. They may share dots.
+    Dots are of one polarity; groups may share them. If targets are to be obvious, those with many
+    other dots about them are not looked for.
     """
     places = family.places[: len(family.template)]
+    nothing = Templates(
+        homographies=np.zeros((0, 3, 3)),
+        members=np.zeros((0, len(places)), int),
+        polarity=np.zeros(0, int),
+        scale=np.zeros(0),
+        misfit=np.zeros(0),
+    )
     if len(dots.frames) < len(places) - 1:
-        return _nothing(len(places))
+        return nothing
     centres, smallest = dots.frames[:, :2, 2], frame.ellipse_axes(dots.frames)[1].min()
     few = len(centres) <= FEW
     triples = _triples(places, family.reference, few)
     error = _LENGTH_ERROR if few else _LENGTH_ERROR_OF_MANY
     pairs = neighbours(dots, family, triples, error, obvious=obvious)
-    nearest = cache(partial(NearestDots.of, centres, smallest / 3))
-    templates = [_nothing(len(places))]
+    nearest = cache(partial(nearest_dots, centres, smallest / 3))
+    templates = [nothing]
     for triple in triples:
         members = _members(dots, pairs, nearest, family, triple)
         if len(members):
@@ -239,21 +262,10 @@ def _triples(places: np.ndarray, reference: int, thorough: bool) -> list[tuple[i
     return triples
 
 
-def _nothing(count: int) -> Templates:
-    nobody = np.zeros((0, count), int)
-    return Templates(
-        homographies=np.zeros((0, 3, 3)),
-        members=nobody,
-        polarity=np.zeros(0, int),
-        scale=np.zeros(0),
-        misfit=np.zeros(0),
-    )
-
-
 def _members(
     dots: Dots,
     pairs: Pairs,
-    nearest: Callable[[], NearestDots],
+    nearest: Callable[[], Nearest],
     family: PointFamily,
     triple: tuple[int, int, int],
 ) -> np.ndarray:
@@ -274,7 +286,7 @@ def _members(
         pairs.first[partners], apart[partners] * lengths[third] / lengths[partner]
     )
     total = np.cumsum(end - begin)
-    parts = np.searchsorted(total, np.arange(0, total[-1:].sum() + PART, PART))
+    parts = np.searchsorted(total, np.arange(0, total[-1:].sum() + _PART, _PART))
     found = [np.zeros((0, len(places)), int)]
     for low, high in pairwise(parts):
         of_part = slice(low, high)
@@ -296,7 +308,7 @@ def _members(
         for index in np.setdiff1d(np.arange(len(places)), (role, partner, third)):
             expected = origin + affine @ arms[index]
             reach = _PREDICTED + _PERSPECTIVE * lengths[index]
-            members[:, index], gap = nearest().within(expected, affine, reach)
+            members[:, index], gap = nearest()(expected, affine, reach)
             error += np.where(members[:, index] < 0, 1, (gap / reach) ** 2)
         members[(members < 0).sum(axis=1) > 1] = -1
         kept = np.argsort(error, kind='stable')[:_MAXIMUM_GROUPS]
@@ -395,12 +407,12 @@ def _fitted(dots: Dots, members: np.ndarray, family: PointFamily) -> Templates:
     ).select(good)
 
 
-def _mostly_empty(templates: Templates, nearest: NearestDots, family: PointFamily) -> np.ndarray:
+def _mostly_empty(templates: Templates, nearest: Nearest, family: PointFamily) -> np.ndarray:
     """Return where not many more positions than those of a code have a dot nearby."""
     count = len(family.template)
     frames = local_frames(templates.homographies, family.places[count:], family.radii[count:])
     single = frames.reshape(-1, 3, 3)
-    found, _ = nearest.within(single[:, :2, 2], single[:, :2, :2], 1.0)
+    found, _ = nearest(single[:, :2, 2], single[:, :2, :2], 1.0)
     found = np.sort(found.reshape(frames.shape[:2]), axis=1)
     different = (np.diff(found, axis=1, prepend=-1) > 0).sum(axis=1)
     empty: np.ndarray = different <= family.rule.dots + _STRAY

@@ -1,24 +1,33 @@
-"""Hypotheses on targets: how probable each is, and which of those that contradict each other."""
+"""Hypotheses on targets: how probable each is, and which of those that contradict each other.
+
+The probability is a logistic regression, whose weights are in `fitted_weights.json`.
+`benchmarks.gsi_confidence` fits them, and shows how far the result can be trusted.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from ahf_ros.codes.gsi import PointFamily
 from ahf_ros.detectors.claims import owners
-from ahf_ros.detectors.gsi.confidence import FEATURES, SUPPORT, probability
+from ahf_ros.detectors.gsi.evidence import Readings
 from ahf_ros.detectors.gsi.grouping import Templates
-from ahf_ros.detectors.gsi.reading import Readings
+from ahf_ros.detectors.gsi.refinement import Placement
 from ahf_ros.features.array_record import ArrayRecord
+from ahf_ros.features.frame import ellipse_axes
 from ahf_ros.features.homography import reference_frames
+from ahf_ros.features.logistic import logistic, read_weights
 
-CERTAIN = 0.95
-"""Confidence from which a target is reported."""
+WEIGHTS = Path(__file__).with_name('fitted_weights.json')
+CERTAIN = 0.95  # confidence from which a target is reported
+OBVIOUS = 0.99  # confidence from which a target is not weighed against others in its place
 
-OBVIOUS = 0.99
-"""Confidence from which a target is not weighed against others in its place."""
+_UNEVEN = (0.005, 0.05)  # difference of radii that counts as 1, in ln: of any dot, and in px
+_PERSPECTIVE = 0.08  # change of depth from the centre to the edge of a target, that counts as 1
+_MOST = 6.0  # of both
 
 _PLAUSIBLE = 0.75  # support of a hypothesis that is followed up
 _CLEAR = 0.95  # the same, where only obvious targets are looked for; these have 1
@@ -28,6 +37,8 @@ _EQUAL = 1.0  # distance of the reference points of equal hypotheses, dot radii
 _APART = 0.8  # distance of the reference points of different targets, in their reach
 _CLEARLY = 0.12  # support by which the better one of two groups that lie closer is better
 _SAME = 0.4  # distance of the reference points of the same target in its reach
+
+(_OF_TARGET,) = read_weights(WEIGHTS, 'gsi_confidence', 'weights')
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +69,7 @@ class Hypotheses(ArrayRecord):
     @property
     def support(self) -> np.ndarray:
         """Support of the code, as in `Readings`, shape (k,)."""
-        return self.features[:, SUPPORT]
+        return self.features[:, 0]
 
     @property
     def confidence(self) -> np.ndarray:
@@ -66,18 +77,47 @@ class Hypotheses(ArrayRecord):
         return probability(self.features)
 
 
-def no_hypotheses() -> Hypotheses:
-    """Return the record of none."""
-    nobody = np.zeros(0, int)
-    nowhere, unmeasured = np.zeros((0, 3, 3)), np.zeros((0, 2, 2))
-    return Hypotheses(
-        homographies=nowhere,
-        covariance=unmeasured,
-        polarity=nobody,
-        scale=np.zeros(0),
-        words=nobody,
-        features=np.zeros((0, FEATURES)),
+NO_HYPOTHESES = Hypotheses(
+    homographies=np.zeros((0, 3, 3)),
+    covariance=np.zeros((0, 2, 2)),
+    polarity=np.zeros(0, int),
+    scale=np.zeros(0),
+    words=np.zeros(0, int),
+    features=np.zeros((0, len(_OF_TARGET) - 1)),
+)
+
+
+def confidence_features(
+    placement: Placement, readings: Readings, family: PointFamily
+) -> np.ndarray:
+    """Return what tells targets from chance arrangements, and right codes from wrong ones.
+
+    Support, weakest dot and margin of the reading at the places of the placement; the
+    misplacement; the differences of the radii of dots, and the perspective, both up to a bound;
+    and the share of the dots whose edges were found where they should be, shape (k, 7).
+    """
+    radius = float(family.template_radii[family.reference])
+    minor = ellipse_axes(reference_frames(placement.homographies, radius))[1] * placement.scale
+    always, of_pixel = _UNEVEN
+    uneven = placement.unevenness / (always + of_pixel / np.maximum(minor, 0.1))
+    perspective = placement.homographies[:, 2, :2] * family.reach / _PERSPECTIVE
+    return np.stack(
+        [
+            readings.support,
+            readings.weakest,
+            readings.margin,
+            placement.misplacement,
+            np.minimum(uneven, _MOST),
+            np.minimum(np.hypot(*perspective.T), _MOST),
+            placement.share,
+        ],
+        axis=1,
     )
+
+
+def probability(features: np.ndarray) -> np.ndarray:
+    """Return the probabilities that hypotheses are right, shape (k,), by their features."""
+    return logistic(features, _OF_TARGET)
 
 
 def plausible(
@@ -85,15 +125,8 @@ def plausible(
 ) -> np.ndarray:
     """Return the indices of the groups that are followed up, of equal ones one.
 
-    Parameters
-    ----------
-    templates : Templates
-    readings : Readings
-        Of the templates.
-    family : PointFamily
-    obvious : bool
-        Whether only groups that may be obvious targets are followed up. Otherwise so are several
-        groups that lie too close for all to be targets.
+    Of several groups that lie too close for all to be targets, those that are clearly worse are
+    left out; all but the best one, if only obvious targets are looked for.
     """
     rank = readings.support - _MISFIT * templates.misfit
     order = np.argsort(-rank, kind='stable')
@@ -114,12 +147,7 @@ def plausible(
 def resolve(hypotheses: Hypotheses, family: PointFamily, minimum: float = CERTAIN) -> np.ndarray:
     """Return the indices of the certain hypotheses, of each target and each code the best one.
 
-    Parameters
-    ----------
-    hypotheses : Hypotheses
-    family : PointFamily
-    minimum : float
-        Of their confidence.
+    They have at least the minimum of confidence.
     """
     confidence = hypotheses.confidence
     order = np.argsort(-confidence, kind='stable')
@@ -130,15 +158,7 @@ def resolve(hypotheses: Hypotheses, family: PointFamily, minimum: float = CERTAI
 
 
 def inside(points: np.ndarray, frames: np.ndarray) -> np.ndarray:
-    """Return which points lie in at least one of some circles.
-
-    Parameters
-    ----------
-    points : ndarray of float64, shape (n, 2)
-        px.
-    frames : ndarray of float64, shape (k, 3, 3)
-        Affine, of the circles.
-    """
+    """Return which points, shape (n, 2), lie in at least one of some circles, by affine frames."""
     offset = points - frames[:, None, :2, 2]
     relative = offset @ np.linalg.inv(frames[:, :2, :2]).swapaxes(1, 2)
     return np.asarray(((relative**2).sum(axis=2) < 1).any(axis=0))

@@ -38,16 +38,14 @@ from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, DottedTarget, Target, sorted_targets
 
-LARGEST_BIAS = 1.0
-"""Distance h of a dot from its position that is accepted, in the unit of the printed design, mm"""
-
+_LARGEST_BIAS = 1.0
+# Distance h of a dot from its position that is accepted, in the unit of the printed design, mm.
 _DOTS = 8  # of a target
 _DISTANCE_RATIO = 2.5  # beta, of the longer half of the line of three dots to the shorter one
 _OFF_LINE = 0.05  # distance of the middle dot from the line, in the line's length
 _INVARIANT_ERROR = 0.1
 _PART = 1_000_000  # distances at a time, which bounds the memory
 
-_FAMILY = 'gsi'  # whichever data file describes it
 _THRESHOLD = 100  # gray value between dots and ground
 _AREA = (30.0, 1000.0)  # of a dot, px
 _PERIMETER = (20.0, 500.0)  # px
@@ -57,22 +55,14 @@ _CONTOUR_ERROR = 0.2  # standard deviation of the centre of an ellipse, px
 
 
 def p2_invariant(ratio: Any) -> np.ndarray:
-    """Return J of cross ratios.
+    """Return J of cross ratios l.
 
     J = J2 / J1, with
 
         J1 = (l^6 - 3 l^5 + 3 l^4 - l^3 + 3 l^2 - 3 l + 1) / (l^2 (l - 1)^2),
         J2 = (2 l^6 - 6 l^5 + 9 l^4 - 8 l^3 + 9 l^2 - 6 l + 2) / (l^2 (l - 1)^2).
 
-    Parameters
-    ----------
-    ratio : array_like of float
-        Cross ratios l, of any order of their points.
-
-    Returns
-    -------
-    ndarray of float64, shape of `ratio`
-        From 2 to 14/5; NaN where l is not finite.
+    It is from 2 to 14/5 for any order of the four points; NaN where l is not finite.
 
     Examples
     --------
@@ -92,25 +82,13 @@ def p2_invariant(ratio: Any) -> np.ndarray:
 def area_cross_ratio(pivot: Any, points: Any) -> np.ndarray:
     """Return the cross ratio of the lines from a pivot to four points, by areas of triangles.
 
-    Parameters
-    ----------
-    pivot : array_like of float, shape (..., 2)
-    points : array_like of float, shape (..., 4, 2)
-
-    Returns
-    -------
-    ndarray of float64, shape (...)
-        Infinite or NaN where three of the points are collinear with the pivot.
+    The pivot has the shape (..., 2), points have (..., 4, 2). It is infinite or NaN where three of
+    the points are collinear with the pivot.
     """
     arms = np.asarray(points, np.float64) - np.asarray(pivot, np.float64)[..., None, :]
     one, two, three, four = np.moveaxis(arms, -2, 0)
-
-    def area(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        twice: np.ndarray = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
-        return twice
-
     with np.errstate(divide='ignore', invalid='ignore'):
-        ratio = area(one, three) * area(two, four) / (area(one, four) * area(two, three))
+        ratio = _cross(one, three) * _cross(two, four) / (_cross(one, four) * _cross(two, three))
     return np.asarray(ratio)
 
 
@@ -118,17 +96,8 @@ def template_invariant(points: Any) -> np.ndarray:
     """Return the P2-invariant of five template points, three of them collinear.
 
     It is the larger one of those at the two points that are not on the line; the others have
-    none.
-
-    Parameters
-    ----------
-    points : array_like of float, shape (..., 5, 2)
-        A, B, C, D, E, with C, E, A on a line. Exchanging B and D changes nothing.
-
-    Returns
-    -------
-    ndarray of float64, shape (...)
-        2.474 for the printed design of GSI.
+    none. The points, shape (..., 5, 2), are A, B, C, D, E, with C, E, A on a line; exchanging B
+    and D changes nothing. The printed design of GSI has 2.474.
     """
     a, b, c, d, e = np.moveaxis(np.asarray(points, np.float64), -2, 0)
     at_d = area_cross_ratio(d, np.stack([b, c, e, a], axis=-2))
@@ -156,30 +125,10 @@ class Decoded(ArrayRecord):
     bias: np.ndarray
 
 
-def check_family(code: PointFamily) -> None:
-    """Raise a ValueError unless the design has what the method rests on."""
-    names = sorted(code.template_names)
-    good = names == list('ABCDE') and code.rule.dots == _DOTS - 5
-    if good:
-        c, e, a = (code.template[code.template_names.index(name)] for name in 'CEA')
-        good = bool(abs(_cross(a - c, e - c)) < 1e-3 * ((a - c) ** 2).sum())
-        good &= code.template_names[code.reference] == 'E'
-    if not good:
-        raise ValueError(
-            f'the family is {code.name!r}, accepted by gsi_published is one with the template '
-            'dots A, B, C, D and E, the last of which is the reference and on the line from C to '
-            'A, and with three decoding dots'
-        )
-
-
 def decode(points: np.ndarray, code: PointFamily) -> Decoded:
-    """Return the targets that points belong to, of those with the same middle dot the best one.
+    """Return the targets that points, shape (k, 2), px, belong to.
 
-    Parameters
-    ----------
-    points : ndarray of float64, shape (k, 2)
-        Centres of dots, px.
-    code : PointFamily
+    Of those with the same middle dot it is the one that fits best.
     """
     groups = _nearest(points)
     members = np.concatenate([np.zeros((0, _DOTS), int), *_templates(points, groups, code)])
@@ -193,7 +142,7 @@ def decode(points: np.ndarray, code: PointFamily) -> Decoded:
     bias = distance.min(axis=2).max(axis=1, initial=0.0)
     words = np.bitwise_or.reduce(np.int64(1) << code.position_numbers[nearest], axis=1)
     order = np.lexsort((bias, members[:, code.reference]))
-    order = order[(bias[order] <= LARGEST_BIAS) & np.isin(words[order], code.words)]
+    order = order[(bias[order] <= _LARGEST_BIAS) & np.isin(words[order], code.words)]
     _, first = np.unique(members[order, code.reference], return_index=True)
     return Decoded(words, members, bias).select(order[first])
 
@@ -256,27 +205,26 @@ def _cross(first: np.ndarray, second: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, slots=True)
 class PublishedGsiDetector(FamilyDetector):
-    """The detector `gsi_published`; call it with an image.
-
-    Attributes
-    ----------
-    settings : DetectorSettings
-
-    Raises
-    ------
-    ValueError
-        If the data file of the family is not accepted, or its template has not five dots A to E
-        with C, E and A on a line.
-    """
+    """The detector `gsi_published`; call it with an image."""
 
     name: ClassVar[str] = 'gsi_published'
 
     @property
     def design(self) -> PointFamily:
-        """Printed design of the family, of those that the method can identify."""
-        family = point_family(self.settings.family_file)
-        check_family(family)
-        return family
+        """Printed design of the family, which has to have what the method rests on."""
+        code = point_family(self.settings.family_file)
+        good = sorted(code.template_names) == list('ABCDE') and code.rule.dots == _DOTS - 5
+        if good:
+            c, e, a = (code.template[code.template_names.index(name)] for name in 'CEA')
+            good = bool(abs(_cross(a - c, e - c)) < 1e-3 * ((a - c) ** 2).sum())
+            good &= code.template_names[code.reference] == 'E'
+        if not good:
+            raise ValueError(
+                f'the family is {code.name!r}, accepted by gsi_published is one with the template '
+                'dots A, B, C, D and E, the last of which is the reference and on the line from C '
+                'to A, and with three decoding dots'
+            )
+        return code
 
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image; see `Detector`.
@@ -292,28 +240,32 @@ class PublishedGsiDetector(FamilyDetector):
         for polarity in settings.polarities:
             dots = find_dots(gray, polarity, settings.min_radius, settings.max_radius)
             decoded = decode(dots[:, :2], code)
-            found += _targets(dots, decoded, polarity, code)
+            for word, members, bias in zip(
+                decoded.words.tolist(), decoded.members, decoded.bias.tolist(), strict=True
+            ):
+                found.append(
+                    DottedTarget(
+                        id=code.number(word) or 0,
+                        code=word,
+                        confidence=1 - bias / _LARGEST_BIAS,
+                        family='gsi',  # whichever data file describes it
+                        dots=tuple(map(tuple, dots[members].tolist())),
+                        template_dots=len(code.template),
+                        polarity=polarity,
+                        **_place(dots[members[code.reference]]),
+                    )
+                )
             if settings.report_undecoded:
-                single += _undecoded(np.delete(dots, decoded.members, axis=0))
+                rest = np.delete(dots, decoded.members, axis=0)
+                single += [Target(id=UNDECODED, code=0, **_place(dot)) for dot in rest]
         return sorted_targets([*best_targets(found), *single])
 
 
 def find_dots(gray: np.ndarray, polarity: int, min_radius: float, max_radius: float) -> np.ndarray:
     """Return the ellipses of dots: steps 1 and 2.
 
-    Parameters
-    ----------
-    gray : ndarray of uint8 or float32, shape (height, width)
-        Gray values from 0 to 255.
-    polarity : int
-        1 for dark dots, -1 for bright ones.
-    min_radius, max_radius : float
-        Bounds of the semi-major axis, px.
-
-    Returns
-    -------
-    ndarray of float64, shape (k, 5)
-        Centre x and y, semi-major and semi-minor axis, px, and direction, rad.
+    Dark dots have the polarity 1, bright ones -1; radii bound the semi-major axis, px. An ellipse
+    is centre x and y, semi-major and semi-minor axis, px, and direction, rad: shape (k, 5).
     """
     mask = (gray <= _THRESHOLD if polarity > 0 else gray > _THRESHOLD).astype(np.uint8)
     contours, _ = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
@@ -337,46 +289,9 @@ def find_dots(gray: np.ndarray, polarity: int, min_radius: float, max_radius: fl
     return np.array(ellipses).reshape(-1, 5)
 
 
-def _targets(
-    dots: np.ndarray, decoded: Decoded, polarity: int, code: PointFamily
-) -> list[DottedTarget]:
-    """Return the targets of one polarity."""
-    targets = []
-    for word, members, bias in zip(decoded.words, decoded.members, decoded.bias, strict=True):
-        x, y, major, minor, angle = dots[members[code.reference]].tolist()
-        targets.append(
-            DottedTarget(
-                id=code.number(int(word)) or 0,
-                code=int(word),
-                x=x,
-                y=y,
-                semi_major=major,
-                semi_minor=minor,
-                angle=angle,
-                covariance=(_CONTOUR_ERROR**2, 0.0, 0.0, _CONTOUR_ERROR**2),
-                confidence=float(1 - bias / LARGEST_BIAS),
-                family=_FAMILY,
-                dots=tuple(map(tuple, dots[members].tolist())),
-                template_dots=len(code.template),
-                polarity=polarity,
-            )
-        )
-    return targets
-
-
-def _undecoded(dots: np.ndarray) -> list[Target]:
-    """Return the dots that belong to no target."""
-    spread = (_CONTOUR_ERROR**2, 0.0, 0.0, _CONTOUR_ERROR**2)
-    return [
-        Target(
-            id=UNDECODED,
-            code=0,
-            x=x,
-            y=y,
-            semi_major=major,
-            semi_minor=minor,
-            angle=angle,
-            covariance=spread,
-        )
-        for x, y, major, minor, angle in dots.tolist()
-    ]
+def _place(ellipse: np.ndarray) -> dict[str, Any]:
+    """Return the fields of a target that say where and how large it is."""
+    names = ('x', 'y', 'semi_major', 'semi_minor', 'angle')
+    variance = _CONTOUR_ERROR**2
+    place = dict(zip(names, ellipse.tolist(), strict=True))
+    return {**place, 'covariance': (variance, 0.0, 0.0, variance)}

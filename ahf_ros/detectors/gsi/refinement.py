@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.circle_fit import ENOUGH
 from ahf_ros.features.circles import dot_circles
 from ahf_ros.features.dots import Dots
@@ -35,7 +34,7 @@ _LEVEL_RADII = np.array([0.0, 1.8])  # where the levels of a dot and of its grou
 
 
 @dataclass(frozen=True, slots=True)
-class Placement(ArrayRecord):
+class Placement:
     """Where k targets are.
 
     Attributes
@@ -64,7 +63,7 @@ class Placement(ArrayRecord):
 
 
 @dataclass(frozen=True, slots=True)
-class MeasuredDots(ArrayRecord):
+class MeasuredDots:
     """Dots, and what their edges say.
 
     Attributes
@@ -86,16 +85,7 @@ class MeasuredDots(ArrayRecord):
 
 
 def measure_dots(gray: np.ndarray, frames: np.ndarray, polarity: np.ndarray) -> MeasuredDots:
-    """Fit the edges of dots.
-
-    Parameters
-    ----------
-    gray : ndarray of float32, shape (height, width)
-        Gray values from 0 to 255.
-    frames : ndarray of float64, shape (n, 3, 3)
-        Affine, to about a pixel.
-    polarity : ndarray of int, shape (n,)
-    """
+    """Fit the edges of dots, whose affine frames, shape (n, 3, 3), are known to about a pixel."""
     minor = ellipse_axes(frames)[1]
     fitted = frames.copy()
     covariance = np.tile(_UNMEASURED**2 * np.eye(2), (len(frames), 1, 1))
@@ -112,7 +102,7 @@ def measure_dots(gray: np.ndarray, frames: np.ndarray, polarity: np.ndarray) -> 
         good &= moved <= np.maximum(_FARTHEST, _FARTHEST_SHARE * minor[which])
         near[which] = good
         covariance[which[good]] = fit.covariance[good] + _MINIMUM_ERROR**2 * np.eye(2)
-    return MeasuredDots(fitted, covariance, found, near)
+    return MeasuredDots(frames=fitted, covariance=covariance, found=found, near=near)
 
 
 def resized(gray: np.ndarray, dots: Dots) -> Dots:
@@ -120,12 +110,6 @@ def resized(gray: np.ndarray, dots: Dots) -> Dots:
 
     There the edges in the logarithm of the image, by which dots are found, lie elsewhere, by more
     than templates allow for.
-
-    Parameters
-    ----------
-    gray : ndarray of float32, shape (height, width)
-        Gray values from 0 to 255.
-    dots : Dots
     """
     levels = np.median(sample_circles(gray, dots.frames, _LEVEL_ANGLES, _LEVEL_RADII), axis=1)
     dark, bright = levels.min(axis=1), np.maximum(levels.max(axis=1), 1.0)
@@ -154,10 +138,9 @@ def place_targets(
     frames : ndarray of float64, shape (k, n, 3, 3)
         Of the dots of k targets, to about a pixel.
     polarity : ndarray of int, shape (k,)
-    places : ndarray of float64, shape (k, n, 2)
-        Of the dots in the printed design, about the reference point.
-    radii : ndarray of float64, shape (k, n)
-        Printed ones; those in the image may all be larger or smaller by one factor.
+    places, radii : ndarray of float64, shape (k, n, 2) and (k, n)
+        Of the dots in the printed design, about the reference point. Those in the image may all
+        be larger or smaller by one factor.
     reach : float
         Size of the printed design.
     """
@@ -208,21 +191,10 @@ def dot_frames(homographies: np.ndarray, places: np.ndarray, radii: np.ndarray) 
 
 
 def ellipse_centres(homographies: np.ndarray, points: np.ndarray, radii: np.ndarray) -> np.ndarray:
-    """Return the centres of the ellipses that circles are seen as.
+    """Return the centres of the ellipses that circles are seen as, px, shape (k, m, 2).
 
-    Under perspective that is not the image of the centre of the circle.
-
-    Parameters
-    ----------
-    homographies : ndarray of float64, shape (k, 3, 3)
-    points : ndarray of float, shape (m, 2) or (k, m, 2)
-        Centres of the circles in the plane of the object.
-    radii : ndarray of float, shape (m,) or (k, m)
-
-    Returns
-    -------
-    ndarray of float64, shape (k, m, 2)
-        px.
+    Under perspective that is not the image of the centre of the circle. Points, shape (m, 2) or
+    (k, m, 2), and radii are those of the circles in the plane of the object.
     """
     count = len(homographies)
     points = np.broadcast_to(points, (count, *points.shape[-2:]))

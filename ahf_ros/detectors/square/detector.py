@@ -8,12 +8,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil, isnan, log2
+from typing import Any
 
 import cv2
 import numpy as np
 
 from ahf_ros.codes.square import dictionary
-from ahf_ros.detectors.contract import FamilyDetector
+from ahf_ros.detectors.contract import FamilyDetector, moved_targets
 from ahf_ros.detectors.square.sides import centres, fit_sides
 from ahf_ros.features.frame import reduced
 from ahf_ros.features.pyramid import halved
@@ -29,17 +30,7 @@ _LARGE = 120.0  # side of a marker whose contour gives its corners to about two 
 
 @dataclass(frozen=True, slots=True)
 class SquareDetector(FamilyDetector):
-    """Identify the markers of one family.
-
-    Attributes
-    ----------
-    settings : DetectorSettings
-
-    Raises
-    ------
-    ValueError
-        If it is not a family of square markers, or OpenCV does not have it.
-    """
+    """Identify the markers of one family."""
 
     @property
     def design(self) -> cv2.aruco.Dictionary:
@@ -67,35 +58,19 @@ class SquareDetector(FamilyDetector):
         if not corners:
             return []
         covariances = np.tile(_DRAFT_DEVIATION**2 * np.eye(2), (len(numbers), 1, 1))
-        found = _markers(
-            numbers.ravel(),
-            np.reshape(corners, (-1, 4, 2)),
-            covariances,
-            self.family,
-            np.full(len(numbers), np.nan),
+        places = _places(
+            np.reshape(corners, (-1, 4, 2)), covariances, np.full(len(numbers), np.nan)
         )
-        return sorted_targets(found)
+        return sorted_targets(
+            SquareMarker(id=number, code=number, family=self.family, **place)
+            for number, place in zip(numbers.ravel().tolist(), places, strict=True)
+        )
 
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
-        """Return markers with corners and centres fitted to their sides in an image.
+        """Return markers with corners and centres fitted to their sides; see `Refiner`.
 
-        Parameters
-        ----------
-        image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
-            The image as received.
-        targets : sequence of Target
-            Targets of this detector, to about two pixels. Markers without sides in this image, and
-            targets that are no `SquareMarker`, stay unchanged.
-
-        Returns
-        -------
-        list of Target
-            In the order of `targets`.
-
-        Raises
-        ------
-        ValueError
-            If `image` is not an image, see `ahf_ros.imaging.image.check_image`.
+        Corners are known to about two pixels. Markers without sides in this image, and targets
+        that are no `SquareMarker`, stay unchanged.
         """
         check_image(image)
         markers = [it for it in targets if isinstance(it, SquareMarker)]
@@ -105,14 +80,8 @@ class SquareDetector(FamilyDetector):
         cells = self.design.markerSize + _BORDER
         corners = _from_halves(gray, np.array([it.corners for it in markers]), cells)
         sides = fit_sides(gray, corners, cells)
-        numbers = np.array([it.id for it in markers])
-        moved = _markers(numbers, sides.corners, sides.covariance, self.family, sides.edge_shift)
-        better: dict[Target, Target] = {
-            marker: by_sides
-            for marker, by_sides, share in zip(markers, moved, sides.share, strict=True)
-            if share >= _MINIMUM_SHARE
-        }
-        return [better.get(it, it) for it in targets]
+        places = _places(sides.corners, sides.covariance, sides.edge_shift)
+        return moved_targets(targets, markers, places, sides.share >= _MINIMUM_SHARE)
 
 
 def _from_halves(gray: np.ndarray, corners: np.ndarray, cells: int) -> np.ndarray:
@@ -132,42 +101,29 @@ def _from_halves(gray: np.ndarray, corners: np.ndarray, cells: int) -> np.ndarra
     return corners
 
 
-def _markers(
-    numbers: np.ndarray,
-    corners: np.ndarray,
-    covariances: np.ndarray,
-    family: str,
-    shifts: np.ndarray,
-) -> list[SquareMarker]:
-    """Return the markers with given corners, shape (k, 4, 2), in the order of `SquareMarker`."""
+def _places(
+    corners: np.ndarray, covariances: np.ndarray, shifts: np.ndarray
+) -> list[dict[str, Any]]:
+    """Return the fields of markers that say where they are, from corners, shape (k, 4, 2)."""
     corners = corners.astype(np.float64)
     first, second, third, fourth = np.moveaxis(corners, 1, 0)
     across = (second + third - first - fourth) / 4
     down = (third + fourth - first - second) / 4
     vectors, axes, _ = np.linalg.svd(np.stack([across, down], axis=2))
     angles = np.arctan(np.tan(np.arctan2(vectors[:, 1, 0], vectors[:, 0, 0])))
+    columns = (centres(corners), axes, angles, covariances.reshape(-1, 4), corners, shifts)
     return [
-        SquareMarker(
-            id=int(number),
-            code=int(number),
-            x=float(x),
-            y=float(y),
-            semi_major=float(major),
-            semi_minor=float(minor),
-            angle=float(angle),
-            covariance=tuple(covariance.ravel().tolist()),
-            family=family,
-            edge_shift=None if isnan(shift) else shift,
-            corners=tuple((float(u), float(v)) for u, v in of_marker),
-        )
-        for number, (x, y), (major, minor), angle, covariance, of_marker, shift in zip(
-            numbers,
-            centres(corners),
-            axes,
-            angles,
-            covariances,
-            corners,
-            shifts.tolist(),
-            strict=True,
+        {
+            'x': x,
+            'y': y,
+            'semi_major': major,
+            'semi_minor': minor,
+            'angle': angle,
+            'covariance': tuple(covariance),
+            'edge_shift': None if isnan(shift) else shift,
+            'corners': tuple(map(tuple, of_marker)),
+        }
+        for (x, y), (major, minor), angle, covariance, of_marker, shift in zip(
+            *(column.tolist() for column in columns), strict=True
         )
     ]

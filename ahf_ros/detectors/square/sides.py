@@ -53,6 +53,11 @@ _MINIMUM_INNER_EDGES = 6  # such edges; the usual one has the shift of all edges
 _THICK = 4.0  # width of a border whose two edges can be separated, blurs
 _SYSTEMATIC = 0.003  # standard deviation of the effects of lens distortion and pixels, px
 
+_ALONG = np.linspace(_ENDS, 1 - _ENDS, _PROFILES)  # positions of profiles along a side, 0 to 1
+_BASIS = np.stack([1 - _ALONG, _ALONG], axis=1)  # of a line, by its offsets at the ends of a side
+_INDEX = np.arange(_PROFILES)
+_WINDOW = np.exp(-0.5 * ((_INDEX[:, None] - _INDEX) / _LIGHT_REACH) ** 2)
+
 
 @dataclass(frozen=True, slots=True)
 class Sides:
@@ -78,18 +83,7 @@ class Sides:
 
 
 def centres(corners: np.ndarray) -> np.ndarray:
-    """Return the intersections of the diagonals of markers, the images of their centres.
-
-    Parameters
-    ----------
-    corners : ndarray of float64, shape (k, 4, 2)
-        Corners, px.
-
-    Returns
-    -------
-    ndarray of float64, shape (k, 2)
-        Centres, px.
-    """
+    """Return the intersections of the diagonals, the images of the centres, shape (k, 2)."""
     return _meet(corners[:, 0], corners[:, 2], corners[:, 1], corners[:, 3])
 
 
@@ -101,21 +95,16 @@ def fit_sides(gray: np.ndarray, corners: np.ndarray, cells: int) -> Sides:
     gray : ndarray of float32, shape (height, width)
         Gray values from 0 to 255.
     corners : ndarray of float64, shape (k, 4, 2)
-        Corners to about two pixels, clockwise in the image. The border of a marker is dark.
+        To about two pixels, clockwise in the image. The border of a marker is dark.
     cells : int
         Number of cells along a side, including the border.
-
-    Returns
-    -------
-    Sides
     """
     blur, contrast = np.full(len(corners), USUAL_BLUR), np.ones(len(corners))
     share, covariance = np.zeros(len(corners)), np.zeros((len(corners), 2, 2))
     for _ in range(_MEASUREMENTS if len(corners) else 0):
         starts, ends = corners, np.roll(corners, -1, axis=1)
         normals = _normals(starts, ends)
-        points, along = _outlines(starts, ends, normals, cells)
-        edges = measure_outlines(gray, points, blur, reach=1.0)
+        edges = measure_outlines(gray, _outlines(starts, ends, normals, cells), blur, reach=1.0)
         blur = np.clip(blur + median(edges.softness, edges.visible, 0.0), *BLURS)
         own = weigh_edges(edges)
         contrast = own.contrast
@@ -123,7 +112,6 @@ def fit_sides(gray: np.ndarray, corners: np.ndarray, cells: int) -> Sides:
         of_side = (len(corners), 4, _PROFILES)
         slopes, uneven = _slopes(edges, own.weights)
         lines = _fit_lines(
-            along,
             (edges.offset - edges.sensitivity * slopes).reshape(of_side),
             (own.weights * step**2).reshape(of_side),
             own.seen.reshape(of_side),
@@ -141,7 +129,8 @@ def fit_sides(gray: np.ndarray, corners: np.ndarray, cells: int) -> Sides:
     back = np.where(np.isfinite(shift), -shift, 0.0)[:, None, None]
     ends = np.roll(corners, -1, axis=1)
     moved = back * _normals(corners, ends)
-    return Sides(_met(corners + moved, ends + moved), share, covariance, shift)
+    corners = _met(corners + moved, ends + moved)
+    return Sides(corners=corners, share=share, covariance=covariance, edge_shift=shift)
 
 
 def _edge_shift(
@@ -149,14 +138,8 @@ def _edge_shift(
 ) -> np.ndarray:
     """Return by how much dark areas have grown, shape (k,), from both edges of the borders.
 
-    Parameters
-    ----------
-    gray, corners, cells
-        As for `fit_sides`; corners are where the sides that were measured meet.
-    blur : ndarray of float64, shape (k,)
-        Of the edges, standard deviation in px.
-    contrast : ndarray of float64, shape (k,)
-        Ratio of the gray values of ink and paper.
+    Corners are where the sides that were measured meet. The blur of edges is a standard deviation,
+    px, the contrast the ratio of the gray values of ink and paper, both of shape (k,).
     """
     along = np.add.outer(np.arange(1, cells - 1), _IN_CELL).ravel() / cells
     side = np.stack([along, np.full(along.size, 1 / cells)], axis=1) - 0.5
@@ -191,17 +174,11 @@ def _edge_shift(
 def _slopes(edges: Edges, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the slope of the light across edges, smoothed along each side, and its unevenness.
 
-    Returns
-    -------
-    slopes : ndarray of float64, shape (k, m)
-        As a share of the light, 1/px.
-    uneven : ndarray of float64, shape (k,)
+    Slopes, shape (k, m), are shares of the light, 1/px; the unevenness has the shape (k,).
     """
     slopes = edges.slope - common_slope(edges.slope, np.ones_like(edges.slope), weights)
-    index = np.arange(_PROFILES)
-    window = np.exp(-0.5 * ((index[:, None] - index) / _LIGHT_REACH) ** 2)
     of_sides = (slopes.reshape(-1, _PROFILES), weights.reshape(-1, _PROFILES))
-    light = smooth_slopes(*of_sides, window, _LIGHT_PRIOR, rounds=1)
+    light = smooth_slopes(*of_sides, _WINDOW, _LIGHT_PRIOR, rounds=1)
     errors = light.errors.reshape(slopes.shape)
     return light.slope.reshape(slopes.shape), unevenness(errors, weights)
 
@@ -215,27 +192,20 @@ def _normals(starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
 
 def _outlines(
     starts: np.ndarray, ends: np.ndarray, normals: np.ndarray, cells: int
-) -> tuple[OutlinePoints, np.ndarray]:
-    """Return the expected edges of the sides, and their positions along a side, 0 to 1."""
+) -> OutlinePoints:
+    """Return the expected edges of the sides."""
     count = len(starts)
-    along = np.linspace(_ENDS, 1 - _ENDS, _PROFILES)
-    points = starts[:, :, None] + along[:, None] * (ends - starts)[:, :, None]
+    points = starts[:, :, None] + _ALONG[:, None] * (ends - starts)[:, :, None]
     lengths = np.linalg.norm(ends - starts, axis=2)
     depth = np.minimum(np.roll(lengths, 1, axis=1), np.roll(lengths, -1, axis=1))
-    reach = _REACH_IN_CELLS * depth / cells
-
-    def repeated(of_sides: np.ndarray) -> np.ndarray:
-        return np.repeat(of_sides, _PROFILES, axis=1)
-
-    outlines = OutlinePoints(
+    return OutlinePoints(
         points=points.reshape(count, -1, 2),
-        normals=repeated(normals),
+        normals=np.repeat(normals, _PROFILES, axis=1),
         polarity=np.ones((count, 4 * _PROFILES), int),
-        scale=repeated(reach),
-        spacing=repeated(lengths * (along[1] - along[0])),
+        scale=np.repeat(_REACH_IN_CELLS * depth / cells, _PROFILES, axis=1),
+        spacing=np.repeat(lengths * (_ALONG[1] - _ALONG[0]), _PROFILES, axis=1),
         curvature=np.zeros((count, 4 * _PROFILES)),
     )
-    return outlines, along
 
 
 @dataclass(frozen=True, slots=True)
@@ -248,42 +218,35 @@ class _Lines:
 
 
 def _fit_lines(
-    along: np.ndarray,
-    offsets: np.ndarray,
-    weights: np.ndarray,
-    seen: np.ndarray,
-    spacing: np.ndarray,
+    offsets: np.ndarray, weights: np.ndarray, seen: np.ndarray, spacing: np.ndarray
 ) -> _Lines:
     """Fit lines to the offsets of edges, shape (k, 4, n), by robust least squares."""
-    basis = np.stack([1 - along, along], axis=1)
-    flat = (-1, len(along))
+    products = (_BASIS[:, :, None] * _BASIS[:, None]).reshape(-1, 4)
+    flat = (-1, _PROFILES)
 
     def solve(robust: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
-        normal = (robust @ _products(basis)).reshape(*robust.shape[:2], 2, 2)
+        normal = (robust @ products).reshape(*robust.shape[:2], 2, 2)
         inverse = np.linalg.inv(normal + _WEAK_PRIOR * np.eye(2))
-        unknowns = (inverse @ ((robust * offsets) @ basis)[..., None])[..., 0]
-        return (unknowns, inverse), np.abs(offsets - unknowns @ basis.T)
+        unknowns = (inverse @ ((robust * offsets) @ _BASIS)[..., None])[..., 0]
+        return (unknowns, inverse), np.abs(offsets - unknowns @ _BASIS.T)
 
     def scale(errors: np.ndarray) -> np.ndarray:
         usual = spread(errors.reshape(flat), seen.reshape(flat), _MINIMUM_DISTANCE)
         return _OUTLIER * usual.reshape(*errors.shape[:2], 1)
 
     (unknowns, inverse), _, robust = reweight(solve, weights, scale, _ROUNDS)
-    errors = offsets - unknowns @ basis.T
+    errors = offsets - unknowns @ _BASIS.T
     share = (seen & (np.abs(errors) < _PLACED)).mean(axis=2)
-    influence = (robust[..., None] * basis) @ inverse
+    influence = (robust[..., None] * _BASIS) @ inverse
     together = np.maximum(CORRELATION / spacing, 1.0)
     squares = np.maximum((robust**2 * together).sum(axis=2), _NO_WEIGHT)
     count = np.maximum(robust.sum(axis=2) ** 2 / squares, _MINIMUM_EDGES)
-    common = common_errors((robust * errors).reshape(flat), np.zeros(len(along)))
+    common = common_errors((robust * errors).reshape(flat), np.zeros(_PROFILES))
     shared = common.reshape(*count.shape)
     growth = together * (_OF_COMMON * shared**2 * count / (count - 2))[..., None]
     parts = influence * (errors * np.sqrt(growth))[..., None]
-    return _Lines(unknowns, np.swapaxes(parts, 2, 3) @ parts, share)
-
-
-def _products(basis: np.ndarray) -> np.ndarray:
-    return (basis[:, :, None] * basis[:, None]).reshape(len(basis), 4)
+    covariance = np.swapaxes(parts, 2, 3) @ parts
+    return _Lines(offsets=unknowns, covariance=covariance, share=share)
 
 
 def _corners(
@@ -298,9 +261,8 @@ def _corners(
     middle = centres(corners)
     covariance = np.tile(_SYSTEMATIC**2 * np.eye(2), (len(corners), 1, 1))
     for side in range(4):
-        changes = _DIFFERENCE * np.eye(2)
         moved = np.repeat(lines.offsets[None], 2, axis=0)
-        moved[:, :, side] += changes[:, None]
+        moved[:, :, side] += _DIFFERENCE * np.eye(2)[:, None]
         change = np.stack([centres(met(of)) - middle for of in moved], axis=2) / _DIFFERENCE
         covariance += change @ lines.covariance[:, side] @ change.transpose(0, 2, 1)
     return corners, covariance

@@ -17,7 +17,8 @@ References
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import cv2
 import numpy as np
@@ -25,13 +26,14 @@ import numpy as np
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes.ring import Family, family
 from ahf_ros.detectors.claims import best_targets
-from ahf_ros.detectors.contract import DetectorSettings
+from ahf_ros.detectors.contract import DetectorSettings, FamilyDetector
 from ahf_ros.detectors.ring.circles import REACH, target_circles
 from ahf_ros.detectors.ring.refinement import refine_centres
-from ahf_ros.detectors.traditional.grey_gradient import BandReadings, read_by_gradient
-from ahf_ros.features.circle_fit import Fit, fit_circles, fit_dots
+from ahf_ros.features.array_record import ArrayRecord
+from ahf_ros.features.circle_fit import fit_circles, fit_dots
 from ahf_ros.features.ellipse_targets import targets_from_frames
-from ahf_ros.features.frame import affine_frames, ellipse_axes
+from ahf_ros.features.frame import affine_frames, circle_points, ellipse_axes, project
+from ahf_ros.features.sampling import sample, within
 from ahf_ros.imaging.image import as_gray, check_image, stretched_to_8_bit
 from ahf_ros.target import UNDECODED, Target, sorted_targets
 
@@ -50,17 +52,28 @@ _MINIMUM_SHARE = 0.75  # of its edges, that a dot shows in their place
 _CONTOUR_ERROR = 1.0  # standard deviation of the centre of a contour, px
 _PART = 1024  # dots measured at a time, which bounds the memory
 
+_DIRECTIONS = 12  # in which a sector is sampled
+_DOT_RADIUS = 0.6  # where the dot is read, dot radii
+_GAP_DEPTHS = (0.4, 0.6)  # shares of the width of the gap, where it is read
+_BAND_DEPTHS = (0.3, 0.5, 0.7)  # shares of the width of the band, where it is read
+_MARGIN = 0.5  # distance from the band at which the margin of a target is read, dot radii
+_DOT_PERCENTILE, _GROUND_PERCENTILE = 10, 90  # of the readings, the dot being the larger
+# The dot has the level 1, the ground 0. They part below a half, because the gap shows
+# the ground in all directions, the darkest included, but the dot shows its colour in one place.
+_LEVEL = 0.4
+_STEEPNESS = 4.0  # of the profile about that level
+_MINIMUM_MARGIN = 0.85  # share of the margin that has to have the colour of the ground
+_MINIMUM_CLARITY = 0.15  # distance of a sector's mean from the level halfway
+_MINIMUM_COHERENCE = 0.6  # agreement of the grey gradient with one division into sectors, 0 to 1
+_MINIMUM_DEVIATION = 0.1  # of samples from 0 or 1, from which certainties are computed
+_NO_GRADIENT = 1e-9  # instead of a sum of none
+
 
 def masks(gray: np.ndarray, polarities: Sequence[int]) -> Iterator[tuple[int, np.ndarray]]:
     """Yield 1 and the mask of the dark pixels of an image, then -1 and of the bright ones.
 
-    The threshold is Bernsen's, halfway between the extremes of the neighbourhood.
-
-    Parameters
-    ----------
-    gray : ndarray of uint8, shape (height, width)
-    polarities : sequence of int
-        1 for the dark pixels, -1 for the bright ones.
+    The threshold is Bernsen's, halfway between the extremes of the neighbourhood. The image is
+    uint8; only the given polarities are looked at.
     """
     height, width = gray.shape
     size = (-(-width // _REDUCTION), -(-height // _REDUCTION))
@@ -85,17 +98,7 @@ def masks(gray: np.ndarray, polarities: Sequence[int]) -> Iterator[tuple[int, np
 def blob_frames(mask: np.ndarray, min_radius: float, max_radius: float) -> np.ndarray:
     """Return the frames of the blobs with the perimeter, roundness and ellipse of a dot.
 
-    Parameters
-    ----------
-    mask : ndarray of uint8, shape (height, width)
-        Not zero in blobs.
-    min_radius, max_radius : float
-        Of the dots, px.
-
-    Returns
-    -------
-    ndarray of float64, shape (k, 3, 3)
-        To about a pixel.
+    They are known to about a pixel, as are the radii of the dots, px.
     """
     contours, hierarchy = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     shortest = max(_MINIMUM_PERIMETER, _CHORD * min_radius)
@@ -115,25 +118,15 @@ def blob_frames(mask: np.ndarray, min_radius: float, max_radius: float) -> np.nd
 
 
 @dataclass(frozen=True, slots=True)
-class TraditionalDetector:
-    """The detector `traditional`; call it with an image.
+class TraditionalDetector(FamilyDetector):
+    """The detector `traditional`; call it with an image."""
 
-    Attributes
-    ----------
-    settings : DetectorSettings
-    """
-
-    settings: DetectorSettings = field(default_factory=DetectorSettings)
+    name: ClassVar[str] = 'traditional'
 
     @property
-    def name(self) -> str:
-        """Name in the registry."""
-        return 'traditional'
-
-    @property
-    def family(self) -> str:
-        """Family of the codes."""
-        return self.settings.family
+    def design(self) -> Family:
+        """Words and radii of the family."""
+        return family(self.family)
 
     @one_blas_thread()
     def __call__(self, image: np.ndarray) -> list[Target]:
@@ -153,7 +146,7 @@ class TraditionalDetector:
     @one_blas_thread()
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
         """Return targets with their centres in an image; see `refine_centres`."""
-        return refine_centres(image, targets, family(self.family), self.settings.polarities)
+        return refine_centres(image, targets, self.design, self.settings.polarities)
 
     def _identify(self, image: np.ndarray, fine: bool) -> list[Target]:
         check_image(image)
@@ -164,7 +157,7 @@ class TraditionalDetector:
             for start in range(0, len(frames), _PART):
                 part = frames[start : start + _PART]
                 targets += _identify_dots(gray, part, polarity, settings, fine)
-        targets = _resolve(targets, family(self.family))
+        targets = _resolve(targets, self.design)
         if not settings.report_undecoded:
             targets = [target for target in targets if target.id != UNDECODED]
         return sorted_targets(targets)
@@ -182,7 +175,7 @@ def _identify_dots(
         frames, covariance = fit.frames, fit.covariance
     if not len(frames):
         return []
-    readings = read_by_gradient(gray, frames, polarity, code)
+    readings = _read_by_gradient(gray, frames, polarity, code)
     ids = np.array(
         [
             (code.number(int(word)) if certainty else None) or UNDECODED
@@ -190,7 +183,12 @@ def _identify_dots(
         ]
     )
     if fine:
-        fit = _fit_decoded(gray, fit, readings, np.flatnonzero(ids != UNDECODED), code)
+        decoded = np.flatnonzero(ids != UNDECODED)
+        read, dots = readings.select(decoded), fit.select(decoded)
+        circles = target_circles(read.words, read.starts, dots.polarity, _SAMPLES, code)
+        joint = fit_circles(gray, dots.frames, circles, reach=REACH, projective=True)
+        good = joint.share >= _MINIMUM_SHARE
+        fit = fit.replaced(decoded[good], joint.select(good))
         frames, covariance = fit.frames, fit.covariance
     major, _, _ = ellipse_axes(frames)
     minimum, maximum = settings.radii
@@ -200,17 +198,6 @@ def _identify_dots(
     return targets_from_frames(
         frames[shown], covariance[shown], ids[shown], codes[shown], confidence[shown], code.name
     )
-
-
-def _fit_decoded(
-    gray: np.ndarray, fit: Fit, readings: BandReadings, decoded: np.ndarray, code: Family
-) -> Fit:
-    """Return fits of dots, of decoded targets with their bands."""
-    read, dots = readings.select(decoded), fit.select(decoded)
-    circles = target_circles(read.words, read.starts, dots.polarity, _SAMPLES, code)
-    joint = fit_circles(gray, dots.frames, circles, reach=REACH, projective=True)
-    good = joint.share >= _MINIMUM_SHARE
-    return fit.replaced(decoded[good], joint.select(good))
 
 
 def _resolve(targets: list[Target], code: Family) -> list[Target]:
@@ -226,3 +213,99 @@ def _resolve(targets: list[Target], code: Family) -> list[Target]:
         for it in targets
         if it.id != UNDECODED or (np.hypot(x - it.x, y - it.y) > code.band_outer * major).all()
     ]
+
+
+@dataclass(frozen=True, slots=True)
+class BandReadings(ArrayRecord):
+    """The words read from k bands.
+
+    Attributes
+    ----------
+    surrounded : ndarray of bool, shape (k,)
+        Whether a gap of one colour lies round the dot, in the image.
+    words : ndarray of int64, shape (k,)
+        The words read, in any rotation.
+    starts : ndarray of float64, shape (k,)
+        Where the sector of the lowest bit starts, rad counter-clockwise from +x of the frame.
+    certainty : ndarray of float64, shape (k,)
+        Probability that the word is right if the target is one, sectors being two gray values
+        with normal errors; 0 where gap, band or margin do not look like a target's.
+    """
+
+    surrounded: np.ndarray
+    words: np.ndarray
+    starts: np.ndarray
+    certainty: np.ndarray
+
+
+def _read_by_gradient(
+    gray: np.ndarray, frames: np.ndarray, polarity: int, code: Family
+) -> BandReadings:
+    """Read the bands of targets of one polarity, by their grey gradient.
+
+    It takes light that is even across a target.
+    """
+    inner, outer = code.band_inner, code.band_outer
+    gap = 1 + (inner - 1) * np.array(_GAP_DEPTHS)
+    band = inner + (outer - inner) * np.array(_BAND_DEPTHS)
+    angles = -2 * np.pi * np.arange(_DIRECTIONS * code.bits) / (_DIRECTIONS * code.bits)
+    radii = np.concatenate([[_DOT_RADIUS], gap, band, [outer + _MARGIN]])
+    pixels = project(frames, circle_points(angles, radii))
+    values = -polarity * sample(gray, pixels)  # the larger, the more like the dot
+    of_dot, of_gap, of_band, of_margin = np.split(
+        values, np.cumsum([1, len(gap), len(band)]), axis=2
+    )
+    inside = np.all(within(pixels, gray.shape), axis=1)
+
+    dot = np.percentile(of_dot[..., 0], _DOT_PERCENTILE, axis=1)
+    ground = np.percentile(of_gap, _GROUND_PERCENTILE, axis=(1, 2))
+    contrast = np.where(dot > ground, dot - ground, np.inf)[:, None, None]
+    ground = ground[:, None, None]
+    surrounded = (dot > ground[:, 0, 0]) & inside[:, len(gap)]
+    margin = ((of_margin - ground) / contrast < _LEVEL)[..., 0].mean(axis=1)
+    levels = ((of_band - ground) / contrast).mean(axis=2)
+    profiles = np.clip(_STEEPNESS * (levels - _LEVEL) + 0.5, 0, 1)
+    means, starts, deviation, coherence = _sectors(profiles, code.bits)
+    words = (means > 0.5) @ (1 << np.arange(code.bits))
+    spread = np.maximum(deviation, _MINIMUM_DEVIATION)[:, None]
+    odds = np.abs(2 * means - 1) / (2 * spread**2)
+    certainty = np.prod(1 / (1 + np.exp(-odds)), axis=1)
+    whole = surrounded & inside[:, len(gap) + len(band)] & (margin > _MINIMUM_MARGIN)
+    whole &= np.abs(means - 0.5).min(axis=1) > _MINIMUM_CLARITY
+    whole &= coherence > _MINIMUM_COHERENCE
+    certainty = np.where(whole, certainty, 0.0)
+    return BandReadings(surrounded=surrounded, words=words, starts=starts, certainty=certainty)
+
+
+def _sectors(profiles: np.ndarray, bits: int) -> tuple[np.ndarray, ...]:
+    """Divide the profiles of n bands into sectors at the phase of their grey gradient.
+
+    Profiles, shape (n, _DIRECTIONS * bits), are 0 where the band has the colour of the ground, 1
+    where it has the dot's.
+
+    Returns
+    -------
+    means : ndarray, shape (n, bits)
+        Mean of the middle half of each sector, counter-clockwise.
+    starts : ndarray, shape (n,)
+        Where the first sector starts, rad counter-clockwise.
+    deviation : ndarray, shape (n,)
+        RMS distance of the samples there from 0 or 1, whichever is nearer to the mean.
+    coherence : ndarray, shape (n,)
+        1 where the gradient lies at the edges of the sectors alone, 0 where it lies anywhere.
+    """
+    count, samples = profiles.shape
+    gradient = np.abs(profiles - np.roll(profiles, 1, axis=1))
+    turn = 2 * np.pi * (np.arange(samples) - 0.5) / _DIRECTIONS
+    resultant = gradient @ np.exp(1j * turn)
+    coherence = np.abs(resultant) / np.maximum(gradient.sum(axis=1), _NO_GRADIENT)
+    first = np.rint(np.angle(resultant) / (2 * np.pi) * _DIRECTIONS).astype(int)
+    quarter = _DIRECTIONS // 4
+    middle = np.arange(quarter, _DIRECTIONS - quarter + 1)
+    angles = (np.arange(bits) * _DIRECTIONS)[:, None] + middle
+    angles = (first[:, None] + angles.ravel()) % samples
+    sectors = np.take_along_axis(profiles, angles, axis=1).reshape(count, bits, middle.size)
+    means = sectors.mean(axis=2)
+    errors = sectors - (means > 0.5)[:, :, None]
+    deviation = np.sqrt((errors**2).mean(axis=(1, 2)))
+    return means, 2 * np.pi * first / samples, deviation, coherence

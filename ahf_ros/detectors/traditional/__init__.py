@@ -1,1 +1,0 @@
-"""Traditional identification of ring targets, as the paper compares it."""

@@ -1,0 +1,42 @@
+"""Scenes that are rendered once for several tests, and what is found in them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+
+import numpy as np
+
+from ahf_ros.evaluation import score
+from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
+from ahf_ros.target import Target
+
+
+@cache
+def rendering(**settings: object) -> Rendering:
+    return render(SceneSettings(**settings))
+
+
+def counted(shown: Rendering, found: Sequence[Target]) -> tuple[int, int, int]:
+    """Return how many targets are right, wrong, and false positives."""
+    figures = score(shown, found)
+    return figures.right, figures.wrong, figures.false_positives
+
+
+def errors(shown: Rendering, found: Sequence[Target]) -> np.ndarray:
+    """Return the errors of centres, px, shape (k, 2)."""
+    true = {target.id: target for target in shown.targets}
+    return np.array([(it.x - true[it.id].x, it.y - true[it.id].y) for it in found])
+
+
+def relative_errors(shown: Rendering, found: Sequence[Target]) -> np.ndarray:
+    """Return the squares of the errors of centres by their covariances, shape (k,)."""
+    covariances = np.array([it.covariance for it in found]).reshape(-1, 2, 2)
+    error = errors(shown, found)[..., None]
+    return (error.swapaxes(1, 2) @ np.linalg.solve(covariances, error))[:, 0, 0]
+
+
+def around(x: float, y: float, half: float) -> tuple[slice, slice]:
+    """Return rows and columns of a square about a place, px."""
+    column, row, half = round(x), round(y), round(half)
+    return np.s_[row - half : row + half + 1, column - half : column + half + 1]
