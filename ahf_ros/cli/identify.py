@@ -24,7 +24,8 @@ from ahf_ros.cli.export_options import check_control
 from ahf_ros.cli.identify_options import stacked
 from ahf_ros.cli.options import settings_from
 from ahf_ros.cli.outcomes import overlay_path, print_outcome
-from ahf_ros.codes.families import AUTO, LISTED
+from ahf_ros.codes import VENDOR_NAMES
+from ahf_ros.codes.families import AUTO
 from ahf_ros.interchange.export.survey import MeasuredImage, measured_image
 from ahf_ros.interchange.files import is_url, read_text, urls_named
 from ahf_ros.interchange.image_files import SUFFIXES
@@ -111,7 +112,7 @@ def _hint(settings: IdentificationSettings, identified: int) -> str:
     family = settings.detection.family
     if not identified and family == AUTO:
         return (
-            f'--family {AUTO} looks for rings only, {", ".join(LISTED)}; other families have to '
+            f'--family {AUTO} looks for rings only, {", ".join(VENDOR_NAMES)}; other families have to '
             'be named\n'
         )
     if not identified:

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
+from string import digits
 
 RING_FOLDER = Path(__file__).with_name('ring_families')
 """The data files of the families of ring targets."""
 
 
-def _vendor_and_bits(name: str) -> tuple[str, int]:
-    vendor, bits = re.fullmatch(r'(\D+)(\d+)', name).groups()
-    return vendor, int(bits)
+def _order(name: str) -> tuple[int, int]:
+    vendor = name.rstrip(digits)
+    return ('metashape', 'aicon').index(vendor) if vendor != 'cct' else 2, int(name[len(vendor) :])
 
 
-RING_NAMES = tuple(
-    sorted((path.stem for path in RING_FOLDER.glob('*.json')), key=_vendor_and_bits)
-)
-"""Families of ring targets: vendor, and number of sectors."""
+RING_NAMES = tuple(sorted((path.stem for path in RING_FOLDER.glob('*.json')), key=_order))
+"""Families of ring targets: vendor or program, and number of sectors."""
+
+VENDOR_NAMES = tuple(name for name in RING_NAMES if not name.startswith('cct'))
+"""Those that vendors print, which `auto` stands for. The others have nearly every word."""
 
 ARUCO_NAMES = (
     *(f'aruco_{side}x{side}_{count}' for side in (4, 5, 6, 7) for count in (50, 100, 250, 1000)),

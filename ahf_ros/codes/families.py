@@ -11,7 +11,7 @@ from difflib import get_close_matches
 from itertools import combinations
 from typing import TYPE_CHECKING
 
-from ahf_ros.codes import APRILTAG_NAMES, ARUCO_NAMES, RING_NAMES, SQUARE_NAMES
+from ahf_ros.codes import APRILTAG_NAMES, ARUCO_NAMES, RING_NAMES, SQUARE_NAMES, VENDOR_NAMES
 
 if TYPE_CHECKING:
     from ahf_ros.codes.dots import DotFamily
@@ -31,14 +31,14 @@ FAMILY_NAMES = tuple(name for names in KINDS.values() for name in names)
 """The families that `family` accepts."""
 
 AUTO = 'auto'
-"""Stands for all families of `LISTED`."""
+"""Stands for all families of `VENDOR_NAMES`."""
 
 LISTED = KINDS['ring']
 """Families that may be given together, separated by commas: they are read together."""
 
 ACCEPTED = (
     f'one of {", ".join(FAMILY_NAMES)}; several of {", ".join(LISTED)}, separated by commas; or '
-    f'{AUTO} for all of these, which are rings, and no others'
+    f'{AUTO} for {", ".join(VENDOR_NAMES)}, which are rings, and no others'
 )
 """Description of what `family` accepts."""
 
@@ -49,7 +49,7 @@ _ALIKE = 0.65  # share of letters of a name that is suggested; tag36h11 and apri
 def families_in(text: str) -> tuple[str, ...]:
     """Return the different families that a text names, in its order.
 
-    It names a family, several ring families separated by commas, or 'auto' for all of them. Raise
+    It names a family, several ring families separated by commas, or 'auto' for those of vendors. Raise
     a ValueError if there is no family; if one is unknown or named twice; if two are of different
     kinds or have the same print; or if families of their kind are not read together.
 
@@ -57,11 +57,11 @@ def families_in(text: str) -> tuple[str, ...]:
     --------
     >>> families_in('metashape12, aicon14')
     ('metashape12', 'aicon14')
-    >>> families_in('auto') == LISTED
+    >>> families_in('auto') == VENDOR_NAMES
     True
     """
     if text == AUTO:
-        return LISTED
+        return VENDOR_NAMES
     names = tuple(part.strip() for part in text.split(','))
     shown = f'family is {text!r}'
     for name in names:

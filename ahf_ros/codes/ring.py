@@ -18,12 +18,12 @@ from pathlib import Path
 
 import numpy as np
 
-from ahf_ros.codes import RING_FOLDER, RING_NAMES
+from ahf_ros.codes import RING_FOLDER, RING_NAMES, VENDOR_NAMES
 from ahf_ros.codes.cyclic import CyclicFamily, mirrored_words, smallest_rotation
 from ahf_ros.codes.data_file import Entry, read_data_file
 
-FAMILY_NAMES = RING_NAMES
-"""The ring code families that `family` knows."""
+FAMILY_NAMES = VENDOR_NAMES
+"""The ring code families that vendors print."""
 
 _BITS = (6, 24)
 _MAXIMUM_RADIUS = 12.0  # of a band, dot radii
@@ -56,8 +56,8 @@ def family(name: str) -> Family:
     >>> family('metashape12').number(0b100011100000)
     1
     """
-    if name not in FAMILY_NAMES:
-        raise ValueError(f'family is {name!r}, accepted is one of {", ".join(FAMILY_NAMES)}')
+    if name not in RING_NAMES:
+        raise ValueError(f'family is {name!r}, accepted is one of {", ".join(RING_NAMES)}')
     return ring_family(RING_FOLDER / f'{name}.json')
 
 
