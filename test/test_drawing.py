@@ -5,14 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ahf_ros.drawing.colours import (
+from ahf_ros.drawing.overlay import (
     DECODED_COLOUR,
     DOUBTFUL_COLOUR,
     MISSED_COLOUR,
     UNDECODED_COLOUR,
     WRONG_COLOUR,
+    Label,
+    draw,
+    overlay,
+    place_labels,
+    summary,
 )
-from ahf_ros.drawing.overlay import Label, draw, overlay, place_labels, summary
 from ahf_ros.drawing.tiles import Tile, side_by_side
 from ahf_ros.target import (
     UNDECODED,

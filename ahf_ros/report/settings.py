@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ahf_ros.drawing.colours import DOUBTFUL_BELOW
+from ahf_ros.drawing.overlay import DOUBTFUL_BELOW
 from ahf_ros.settings.parameter import check_parameters, parameter
 
 

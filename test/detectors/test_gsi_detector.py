@@ -14,8 +14,7 @@ from ahf_ros.detectors import create_detector
 from ahf_ros.detectors.gsi.evidence import Evidence, seen_templates
 from ahf_ros.detectors.gsi.grouping import Templates, find_templates
 from ahf_ros.detectors.gsi.reading import read_codes
-from ahf_ros.drawing.colours import DECODED_COLOUR, DECODING_DOT_COLOUR
-from ahf_ros.drawing.overlay import draw
+from ahf_ros.drawing.overlay import DECODED_COLOUR, DECODING_DOT_COLOUR, draw
 from ahf_ros.evaluation import score
 from ahf_ros.features.dots import Dots
 from ahf_ros.features.frame import affine_frames
