@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterator, Sequence
 from contextlib import closing, redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 
 from ahf_ros.batch.engine import EngineLost, TaskFailed, finished_tasks
 from ahf_ros.batch.processes import SHUTDOWN_TIMEOUT
-from ahf_ros.cli.engines import create_engine, shared_settings
+from ahf_ros.cli import tell
+from ahf_ros.cli.engines import create_engine, progress_bar, shared_settings
 from ahf_ros.cli.options import (
+    add_engine_options,
     add_option,
     add_options,
-    add_scheduler_argument,
     add_search_options,
     add_target_options,
     settings_from,
@@ -71,42 +70,39 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--debug-images', action='store_true', help='Also write annotated images, as JPEG.'
     )
-    add_option(parser, JOBS)
-    add_scheduler_argument(parser)
+    add_engine_options(parser, JOBS)
     add_target_options(parser)
     add_options(parser.add_argument_group('stacks'), StackSettings)
     add_search_options(parser)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Process all bags.
-
-    Returns
-    -------
-    int
-        0, or 1 if a bag could not be read completely or written, or an image was refused.
-
-    Raises
-    ------
-    ValueError
-        If options contradict each other.
-    """
+    """Process all bags; the status is 1 as well if an image was refused or a bag is damaged."""
     tasks = _tasks(options)
+    jobs = min(options.jobs, len(tasks))
+    columns = TextColumn('{task.description}'), BarColumn(), MofNCompleteColumn()
     failed = False
-    with _progress() as progress:
+    with progress_bar(sys.stderr.isatty(), *columns, TimeRemainingColumn()) as progress:
         bars = [progress.add_task(task.source.name, total=None) for task in tasks]
 
         def report(number: int, done: int, total: int, remark: str) -> None:
             progress.update(bars[number], completed=done, total=max(total, done))
             if remark:
-                print(f'ahf bag: {tasks[number].source}: {remark}', file=sys.stderr)
+                tell('bag', f'{tasks[number].source}: {remark}')
 
+        engine = create_engine('bag', _attempt, jobs, options.scheduler, _with_machine, report)
         try:
-            for task, outcome in _outcomes(tasks, options.jobs, options.scheduler, report):
-                _report(task, outcome)
-                failed |= isinstance(outcome, ValueError) or bool(outcome.refused or outcome.lost)
+            with closing(engine):
+                for item in finished_tasks(engine, tasks):
+                    outcome = item.result
+                    if isinstance(outcome, TaskFailed):
+                        outcome = ValueError(f'{item.task.source}: {outcome.reason}')
+                    _report(item.task, outcome)
+                    failed |= isinstance(outcome, ValueError) or bool(
+                        outcome.refused or outcome.lost
+                    )
         except EngineLost as error:
-            print(f'ahf bag: {error}', file=sys.stderr)
+            tell('bag', error)
             failed = True
     return int(failed)
 
@@ -145,21 +141,6 @@ def _tasks(options: argparse.Namespace) -> list[BagTask]:
     ]
 
 
-def _outcomes(
-    tasks: Sequence[BagTask], jobs: int, scheduler: str, report: Any
-) -> Iterator[tuple[BagTask, Outcome | ValueError]]:
-    """Yield the outcome of each bag, or the error that ended it, as soon as it is known."""
-    engine = create_engine(
-        'bag', _attempt, min(jobs, len(tasks)), scheduler, _with_machine, report
-    )
-    with closing(engine):
-        for item in finished_tasks(engine, tasks):
-            outcome = item.result
-            if isinstance(outcome, TaskFailed):
-                outcome = ValueError(f'{item.task.source}: {outcome.reason}')
-            yield item.task, outcome
-
-
 def _with_machine(outcome: Outcome | ValueError, machine: str) -> Outcome | ValueError:
     if isinstance(outcome, ValueError):
         return ValueError(f'{outcome} (on {machine})')
@@ -178,34 +159,20 @@ def _attempt(task: BagTask, report: Any) -> Outcome | ValueError:
         return ValueError(f'{task.output} cannot be written: {error}')
 
 
-def _progress() -> Progress:
-    shown = sys.stderr.isatty()
-    return Progress(
-        TextColumn('{task.description}'),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        console=Console(stderr=True, quiet=not shown),
-        transient=True,
-        redirect_stdout=False,
-        disable=not shown,
-    )
-
-
 def _report(task: BagTask, outcome: Outcome | ValueError) -> None:
     """Report the outcome of a bag on standard error."""
     if isinstance(outcome, ValueError):
-        print(f'ahf bag: {outcome}', file=sys.stderr)
+        tell('bag', outcome)
         return
     refused = f', {outcome.refused} of them not accepted' if outcome.refused else ''
     print(f'{task.output}: {outcome.images} images answered{refused}', file=sys.stderr)
     for lost in outcome.lost:
-        print(f'ahf bag: {task.source}: missing: {lost}', file=sys.stderr)
+        tell('bag', f'{task.source}: missing: {lost}')
     for left_out in outcome.left_out:
-        print(f'ahf bag: {task.source}: left out: {left_out}', file=sys.stderr)
+        tell('bag', f'{task.source}: left out: {left_out}')
     if outcome.refused or outcome.lost:
-        print(
-            f'ahf bag: {task.output}: what was not accepted or is missing is not tried again; '
-            'to do so, remove this bag or name another one',
-            file=sys.stderr,
+        tell(
+            'bag',
+            f'{task.output}: what was not accepted or is missing is not tried again; to do so, '
+            'remove this bag or name another one',
         )
