@@ -13,17 +13,23 @@ from ahf_ros.cli import tell
 from ahf_ros.release import release
 
 COMMANDS = {
-    'identify': 'Identify the coded targets in images.',
-    'watch': 'Identify the coded targets in images as they arrive.',
-    'bag': 'Identify the coded targets in the images of ROS 1 and ROS 2 bags.',
-    'render': 'Render images of targets under projected light, with their truth.',
-    'evaluate': 'Compare the output of `ahf identify --json` with the truth.',
-    'export': 'Hand the output of `ahf identify --json` to other photogrammetric software.',
-    'report': 'Make one page to look at of the output of `ahf identify --json`.',
-    'learn-family': 'Learn template, positions and numbers of point-distributed targets from a '
-    'survey.',
-    'targets': 'Print targets, true to scale, with their geometry.',
+    'identify': ('cli.identify', 'Identify the coded targets in images.'),
+    'watch': ('cli.watch', 'Identify the coded targets in images as they arrive.'),
+    'bag': ('cli.bag', 'Identify the coded targets in the images of ROS 1 and ROS 2 bags.'),
+    'render': ('cli.render', 'Render images of targets under projected light, with their truth.'),
+    'evaluate': ('cli.evaluate', 'Compare the output of `ahf identify --json` with the truth.'),
+    'export': (
+        'cli.export',
+        'Hand the output of `ahf identify --json` to other photogrammetric software.',
+    ),
+    'report': ('cli.report', 'Make one page to look at of the output of `ahf identify --json`.'),
+    'learn-family': (
+        'cli.learn_family',
+        'Learn template, positions and numbers of point-distributed targets from a survey.',
+    ),
+    'targets': ('cli.targets', 'Print targets, true to scale, with their geometry.'),
 }
+"""Module below `ahf_ros` and description of each command."""
 
 
 def run(arguments: Sequence[str] | None) -> int:
@@ -48,7 +54,7 @@ def run(arguments: Sequence[str] | None) -> int:
 
 
 def _module(command: str) -> ModuleType:
-    return import_module(f'ahf_ros.cli.{command.replace("-", "_")}')
+    return import_module(f'ahf_ros.{COMMANDS[command][0]}')
 
 
 def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
@@ -59,7 +65,7 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
     )
     parser.add_argument('--version', action='version', version=release())
     commands = parser.add_subparsers(dest='subcommand', metavar='COMMAND', required=True)
-    for name, text in COMMANDS.items():
+    for name, (_, text) in COMMANDS.items():
         command = commands.add_parser(name, description=text, help=text)
         if name == called:
             _module(name).add_arguments(command)
