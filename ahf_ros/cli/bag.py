@@ -28,16 +28,6 @@ from ahf_ros.settings.parameter import Parameter
 if TYPE_CHECKING:
     from ahf_ros.bag.run import BagTask, Outcome
 
-JOBS = Parameter('jobs', 1, 'Number of bags processed at the same time.', minimum=1)
-OUTPUT_TOPIC = Parameter(
-    'output_topic',
-    'coded_targets',
-    'Topic of the answers, relative to the topic of the images unless it begins with a slash.',
-)
-STORAGE = Parameter(
-    'storage', 'mcap', 'Storage format of the output bag.', choices=('mcap', 'sqlite3')
-)
-
 # A process outlives its killed worker of a cluster by at most `SHUTDOWN_TIMEOUT`.
 _LOCK_TIMEOUT = 2 * SHUTDOWN_TIMEOUT  # s
 
@@ -65,12 +55,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='TOPIC',
         help='Topic of images; may be repeated. Default: all image topics.',
     )
-    add_option(parser, OUTPUT_TOPIC)
-    add_option(parser, STORAGE)
+    text = (
+        'Topic of the answers, relative to the topic of the images unless it begins with a slash.'
+    )
+    add_option(parser, Parameter('output_topic', 'coded_targets', text))
+    storages = 'mcap', 'sqlite3'
+    text = 'Storage format of the output bag.'
+    add_option(parser, Parameter('storage', 'mcap', text, choices=storages))
     parser.add_argument(
         '--debug-images', action='store_true', help='Also write annotated images, as JPEG.'
     )
-    add_engine_options(parser, JOBS)
+    text = 'Number of bags processed at the same time.'
+    add_engine_options(parser, Parameter('jobs', 1, text, minimum=1))
     add_target_options(parser)
     add_options(parser.add_argument_group('stacks'), StackSettings)
     add_search_options(parser)
@@ -97,10 +93,7 @@ def run(options: argparse.Namespace) -> int:
                     outcome = item.result
                     if isinstance(outcome, TaskFailed):
                         outcome = ValueError(f'{item.task.source}: {outcome.reason}')
-                    _report(item.task, outcome)
-                    failed |= isinstance(outcome, ValueError) or bool(
-                        outcome.refused or outcome.lost
-                    )
+                    failed |= not _report(item.task, outcome)
         except EngineLost as error:
             tell('bag', error)
             failed = True
@@ -159,20 +152,22 @@ def _attempt(task: BagTask, report: Any) -> Outcome | ValueError:
         return ValueError(f'{task.output} cannot be written: {error}')
 
 
-def _report(task: BagTask, outcome: Outcome | ValueError) -> None:
-    """Report the outcome of a bag on standard error."""
+def _report(task: BagTask, outcome: Outcome | ValueError) -> bool:
+    """Report the outcome of a bag on standard error; return whether all of it was processed."""
     if isinstance(outcome, ValueError):
         tell('bag', outcome)
-        return
+        return False
     refused = f', {outcome.refused} of them not accepted' if outcome.refused else ''
     print(f'{task.output}: {outcome.images} images answered{refused}', file=sys.stderr)
     for lost in outcome.lost:
         tell('bag', f'{task.source}: missing: {lost}')
     for left_out in outcome.left_out:
         tell('bag', f'{task.source}: left out: {left_out}')
-    if outcome.refused or outcome.lost:
-        tell(
-            'bag',
-            f'{task.output}: what was not accepted or is missing is not tried again; to do so, '
-            'remove this bag or name another one',
-        )
+    if not outcome.refused and not outcome.lost:
+        return True
+    tell(
+        'bag',
+        f'{task.output}: what was not accepted or is missing is not tried again; to do so, '
+        'remove this bag or name another one',
+    )
+    return False

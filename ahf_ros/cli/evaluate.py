@@ -15,10 +15,6 @@ from ahf_ros.interchange.truth_files import read_truth
 from ahf_ros.settings.parameter import Parameter
 from ahf_ros.text import printable
 
-_TOLERANCE = Parameter(
-    'tolerance', TOLERANCE, 'Maximum distance between a target and the truth, px.', minimum=1e-3
-)
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Give a parser the arguments of the command."""
@@ -31,7 +27,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action='store_true',
         help='Print one JSON object per image on standard output, and a last one for all images.',
     )
-    add_option(parser, _TOLERANCE)
+    text = 'Maximum distance between a target and the truth, px.'
+    add_option(parser, Parameter('tolerance', TOLERANCE, text, minimum=1e-3))
 
 
 def run(options: argparse.Namespace) -> int:

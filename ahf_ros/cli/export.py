@@ -19,18 +19,6 @@ from ahf_ros.text import counted
 if TYPE_CHECKING:
     from ahf_ros.interchange.export.survey import Control, MeasuredImage
 
-CONTROL_CRS = Parameter(
-    'control_crs',
-    '',
-    'Coordinate reference system of the control points, such as EPSG:25832; empty for local '
-    'coordinates.',
-)
-CONTROL_SIGMA = Parameter(
-    'control_sigma',
-    0.0,
-    'Standard deviation of the coordinates of control points, in their unit; 0: unknown.',
-    minimum=0.0,
-)
 _FOLDER = f'to a folder as other software reads them: {", ".join(FORMATS)}.'
 
 
@@ -66,8 +54,13 @@ def _add_control_arguments(parser: Group) -> None:
     parser.add_argument(
         '--control', metavar='POINTS.csv', help='Control points to export: ID, x, y, z.'
     )
-    add_option(parser, CONTROL_CRS)
-    add_option(parser, CONTROL_SIGMA)
+    text = (
+        'Coordinate reference system of the control points, such as EPSG:25832; empty for local '
+        'coordinates.'
+    )
+    add_option(parser, Parameter('control_crs', '', text))
+    text = 'Standard deviation of the coordinates of control points, in their unit; 0: unknown.'
+    add_option(parser, Parameter('control_sigma', 0.0, text, minimum=0.0))
 
 
 def run(options: argparse.Namespace) -> int:

@@ -24,16 +24,6 @@ _FORMER = {'expected_targets': '--expected'}
 Group = argparse._ArgumentGroup | argparse.ArgumentParser
 """What takes options: a parser, or a group of its options."""
 
-_JOBS = Parameter(
-    'jobs',
-    0,
-    'Number of images or stacks that are identified at the same time, each in a process of its '
-    'own; 0: one per processor core, and none for fewer than 4 images, which are faster without. '
-    'The result is the same.',
-    minimum=0,
-    maximum=256,
-)
-
 
 def add_target_options(parser: argparse.ArgumentParser) -> None:
     """Give a parser the options that say which targets are identified, and by which detector."""
@@ -57,7 +47,12 @@ def add_image_options(parser: Group) -> None:
         help='Turn images as their orientation says. Coordinates then count in the upright '
         'image, otherwise in the pixels as they are stored.',
     )
-    add_engine_options(parser, _JOBS)
+    text = (
+        'Number of images or stacks that are identified at the same time, each in a process of '
+        'its own; 0: one per processor core, and none for fewer than 4 images, which are faster '
+        'without. The result is the same.'
+    )
+    add_engine_options(parser, Parameter('jobs', 0, text, minimum=0, maximum=256))
 
 
 def add_engine_options(parser: Group, jobs: Parameter) -> None:

@@ -18,10 +18,6 @@ from ahf_ros.settings.parameter import Parameter
 from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import TrueTarget
 
-COUNT = Parameter(
-    'count', 1, 'Number of images for each light, with consecutive seeds.', minimum=1
-)
-
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Give a parser the arguments of the command."""
@@ -32,7 +28,8 @@ def add_arguments(parser: ArgumentParser) -> None:
         help='Folder for LIGHT_AMBIENT_SEED.png, or LIGHT_AMBIENT_SEED_PHASE.png with several '
         'phases, and truth.csv; created if it does not exist.',
     )
-    add_option(parser, COUNT)
+    text = 'Number of images for each light, with consecutive seeds.'
+    add_option(parser, Parameter('count', 1, text, minimum=1))
     for item in flat_parameters(SceneSettings):
         if item.name == 'light':
             add_option(parser, item, nargs='+', default=[item.default])

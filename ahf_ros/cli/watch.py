@@ -7,7 +7,6 @@ import sys
 from contextlib import closing, redirect_stdout
 from functools import partial
 from pathlib import Path
-from typing import TextIO
 
 from ahf_ros.batch.engine import EngineLost, available_cores
 from ahf_ros.batch.identification import identify_images
@@ -30,17 +29,6 @@ from ahf_ros.interchange.image_files import SUFFIXES
 from ahf_ros.session_settings import IdentificationSettings
 from ahf_ros.settings.parameter import Parameter
 
-SETTLING = Parameter(
-    'settling',
-    1.0,
-    'Time for which size and time of change of a file have to stay the same before it is read, s.',
-    minimum=0.0,
-    maximum=3600.0,
-)
-INTERVAL = Parameter(
-    'interval', 1.0, 'Time between two looks at the folder, s.', minimum=0.1, maximum=3600.0
-)
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Give a parser the arguments of the command."""
@@ -56,8 +44,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--recursive', action='store_true', help='Look at the folders in the folder, too.'
     )
-    add_option(parser, SETTLING)
-    add_option(parser, INTERVAL)
+    text = (
+        'Time for which size and time of change of a file have to stay the same before it is '
+        'read, s.'
+    )
+    add_option(parser, Parameter('settling', 1.0, text, minimum=0.0, maximum=3600.0))
+    text = 'Time between two looks at the folder, s.'
+    add_option(parser, Parameter('interval', 1.0, text, minimum=0.1, maximum=3600.0))
     add_image_options(parser)
     add_target_options(parser)
     add_output_options(parser.add_argument_group('output'))
@@ -67,14 +60,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Identify images as they arrive, until a signal ends this process or results are lost."""
     output = sys.stdout if options.json else None
-    with redirect_stdout(sys.stderr):  # what other detectors print is not JSON
-        return _run(options, output)
-
-
-def _run(options: argparse.Namespace, output: TextIO | None) -> int:
     settings = settings_from(options, IdentificationSettings)
     _check_overlay(options)
-    check_settings(settings)
     jobs = options.jobs or available_cores()
     shared = shared_settings(settings, jobs, options.scheduler)
 
@@ -82,16 +69,18 @@ def _run(options: argparse.Namespace, output: TextIO | None) -> int:
         return image_task(options, [path], shared)
 
     say = partial(tell, 'watch')
-    engine = create_engine(
-        'watch', identify_images, jobs, options.scheduler, with_machine, isolated=True
-    )
     arrivals = Arrivals(options.folder, SUFFIXES, options.recursive, options.settling)
-    try:
-        with closing(Results(options.output)) as results, closing(engine):
-            for outcome in watch(engine, arrivals, results, task_of, options.interval, say):
-                print_outcome('watch', outcome, output, options.quiet)
-    except (EngineLost, Unwritable) as error:
-        say(error)
+    with redirect_stdout(sys.stderr):  # what other detectors print is not JSON
+        check_settings(settings)
+        engine = create_engine(
+            'watch', identify_images, jobs, options.scheduler, with_machine, isolated=True
+        )
+        try:
+            with closing(Results(options.output)) as results, closing(engine):
+                for outcome in watch(engine, arrivals, results, task_of, options.interval, say):
+                    print_outcome('watch', outcome, output, options.quiet)
+        except (EngineLost, Unwritable) as error:
+            say(error)
     return 1
 
 
