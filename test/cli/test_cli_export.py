@@ -93,22 +93,18 @@ def test_an_export_that_fails_leaves_the_others(identified, tmp_path, capsys):
 @pytest.mark.parametrize(
     ('options', 'status', 'message'),
     [
-        (
-            ('--export', 'photomodeler=out'),
-            2,
-            "export is 'photomodeler=out', accepted is FORMAT=D",
-        ),
-        (('--export', 'odm=out'), 2, "odm knows images by their names, 'other/a.png' and 'a.png'"),
-        (('--control', 'points.csv'), 2, 'control is given without export, accepted is both'),
-        (('--export', 'csv=out', '--control-crs', 'EPSG:4326'), 2, 'given without control, accep'),
-        (('--export', 'csv=out', '--upright'), 2, 'upright is given with export, accepted is one'),
-        (('--export', 'csv=out', '--control', 'missing'), 1, 'missing cannot be read: No such'),
-        (('--export', 'csv=out', '--control-sigma', '-1'), 2, 'control_sigma is '),
+        ('--export photomodeler=out', 2, "export is 'photomodeler=out', accepted is FORMAT=D"),
+        ('--export odm=out', 2, "odm knows images by their names, 'other/a.png' and 'a.png'"),
+        ('--control points.csv', 2, 'control is given without export, accepted is both'),
+        ('--export csv=out --control-crs EPSG:4326', 2, 'given without control, accep'),
+        ('--export csv=out --upright', 2, 'upright is given with export, accepted is one'),
+        ('--export csv=out --control missing', 1, 'missing cannot be read: No such'),
+        ('--export csv=out --control-sigma -1', 2, 'control_sigma is '),
     ],
 )
 def test_what_does_not_fit_is_refused_before_any_image(options, status, message, capsys):
     try:
-        found = main(['identify', 'a.png', 'other/a.png', *options])
+        found = main(['identify', 'a.png', 'other/a.png', *options.split()])
     except SystemExit as left:
         found = int(left.code or 0)
     assert (found, message in capsys.readouterr().err) == (status, True)
