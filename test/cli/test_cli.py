@@ -13,13 +13,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ahf_ros.cli import main
 from ahf_ros.interchange.image_files import read_image, write_image
 from ahf_ros.interchange.truth_files import read_truth
 from ahf_ros.session_settings import IdentificationSettings
 from ahf_ros.settings.nested import flat_parameters
 from ahf_ros.synthetic.scene import SceneSettings
-from support.command_line import ahf
+from support.command_line import ahf, status
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENE = ['--width', '640', '--height', '480', '--targets', '6', '--dot-radius', '10']
@@ -30,14 +29,6 @@ KEYS = (
     'applied gamma_high gamma_low cutoff attenuation evaluations generations log_offset '
     'black_percentile white_percentile',
 )
-
-
-def status(*arguments: object) -> int:
-    """Return the exit status of the command line in this process."""
-    try:
-        return main([str(argument) for argument in arguments])
-    except SystemExit as left:
-        return int(left.code or 0)
 
 
 @pytest.fixture(scope='module')

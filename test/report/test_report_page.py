@@ -7,14 +7,15 @@ import os
 import re
 import sys
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from ahf_ros.cli import main
 from ahf_ros.target import SquareMarker
 from support.browser import opened
+from support.command_line import status
 from support.results import record, save_image, save_lines, searched, target, undecoded
 
 pytest.importorskip('jinja2', reason='pages are written with jinja2')
@@ -23,8 +24,7 @@ HOSTILE = '</script><script>document.title="taken"<!--.png'
 MANY = 40
 
 
-def report(*arguments: object) -> int:
-    return main(['report', *map(str, arguments)])
+report = partial(status, 'report')
 
 
 @pytest.fixture(scope='module')
