@@ -94,7 +94,7 @@ class MyDetector:
 """
 
 
-def test_an_image_that_kills_its_process_costs_only_itself(tmp_path: Path) -> None:
+def test_images_that_kill_and_detectors_that_print_do_no_harm(tmp_path: Path) -> None:
     packages.write_package(tmp_path, 'killing', KILLER)
     paths = [tmp_path / name for name in ('a.png', 'killer.png', 'b.png', 'missing.png', 'c.png')]
     for path, height in zip(paths, (30, 31, 33, 0, 35), strict=True):
@@ -213,15 +213,6 @@ def test_a_signal_that_an_import_would_lose_ends_the_command(tmp_path: Path, ima
     assert end_of(process) == (130, b'', b'')
 
 
-def test_what_a_detector_prints_is_not_in_the_json(tmp_path: Path, image: Path) -> None:
-    body = packages.EXAMPLE.read_text().replace('radii = np', "print('noise')\n        radii = np")
-    packages.write_package(tmp_path, 'printing', body)
-    process = start('identify', '--json', image, '--detector', 'mine', path=tmp_path)
-    _, output, errors = end_of(process)
-    assert b'noise' in errors
-    assert json.loads(output)['detector'] == 'mine'
-
-
 def test_workers_end_with_their_parent_and_a_rerun_is_accepted(tmp_path: Path) -> None:
     images = [RAMP, RAMP + 1]
     sources = [
@@ -264,6 +255,15 @@ def test_a_full_disk_behind_standard_output_is_named(image: Path) -> None:
         status, _, errors = end_of(process)
     assert status == 1
     assert b'No space left on device' in errors
+
+
+def test_a_reader_that_stops_reading_is_no_error_to_see(image: Path) -> None:
+    process = start('identify', '--json', '--detector', 'traditional', *[image] * 3)
+    assert process.stdout and process.stderr
+    process.stdout.close()
+    errors = process.stderr.read()
+    assert process.wait(LIMIT) == 1
+    assert b'Traceback' not in errors and b'Exception ignored' not in errors
 
 
 @pytest.mark.parametrize('closed', ['2>&-', '>&-', '2>/dev/full'])
