@@ -78,7 +78,7 @@ def run(options: argparse.Namespace) -> int:
     jobs = min(options.jobs, len(tasks))
     columns = TextColumn('{task.description}'), BarColumn(), MofNCompleteColumn()
     failed = False
-    with progress_bar(sys.stderr.isatty(), *columns, TimeRemainingColumn()) as progress:
+    with progress_bar(True, *columns, TimeRemainingColumn()) as progress:
         bars = [progress.add_task(task.source.name, total=None) for task in tasks]
 
         def report(number: int, done: int, total: int, remark: str) -> None:

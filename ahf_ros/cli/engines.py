@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -65,7 +66,7 @@ def _threads_each(jobs: int) -> int:
 
 
 def progress_bar(shown: bool, *columns: ProgressColumn) -> Progress:
-    """Return a bar on standard error that is gone when all is done, or nothing of it."""
+    """Return a bar on standard error that is gone when all is done; it needs a terminal."""
     from rich.console import Console
     from rich.progress import Progress
 
@@ -75,5 +76,5 @@ def progress_bar(shown: bool, *columns: ProgressColumn) -> Progress:
         console=Console(stderr=True),
         transient=True,
         redirect_stdout=False,
-        disable=not shown,
+        disable=not (shown and sys.stderr.isatty()),
     )

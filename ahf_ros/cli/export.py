@@ -74,7 +74,7 @@ def run(options: argparse.Namespace) -> int:
     except ValueError as error:
         tell('export', error)
         return 1
-    return write_exports('export', options.export, images, control)
+    return int(not write_exports('export', options.export, images, control))
 
 
 def check_control(options: argparse.Namespace) -> None:
@@ -107,20 +107,20 @@ def write_exports(
     images: Sequence[MeasuredImage],
     control: Control | None,
     quiet: bool = False,
-) -> int:
-    """Write exports, each independently of the others, and report them on standard error.
+) -> bool:
+    """Write exports, each independently of the others, and return whether all are written.
 
-    With `quiet`, only problems are reported. Return 0, or 1 if one of them could not be written.
+    They are reported on standard error; with `quiet`, only problems are.
     """
     from ahf_ros.interchange.export.survey import make_survey, notes_on
 
-    failed = False
+    written = True
     for export in exports:
         try:
             files = export.write(images, control)
         except ValueError as error:
             tell(command, f'{export.format}: {error}')
-            failed = True
+            written = False
             continue
         if quiet:
             continue
@@ -128,7 +128,7 @@ def write_exports(
         print(f'{export.folder}: {export.format}, {count}', file=sys.stderr)
         if control and not FORMATS[export.format].control:
             print(f'{export.folder}: {export.format} has no control points', file=sys.stderr)
-    if control and exports and not failed and not quiet:
+    if control and exports and written and not quiet:
         for note in notes_on(control, make_survey(images, control)):
             print(note, file=sys.stderr)
-    return int(failed)
+    return written

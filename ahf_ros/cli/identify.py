@@ -116,8 +116,7 @@ def _run(options: argparse.Namespace, output: TextIO | None) -> int:
     results = identified = 0
     measured: list[MeasuredImage] = []
     engine = create_engine('identify', identify_images, jobs, options.scheduler, with_machine)
-    bar = len(tasks) > 1 and sys.stderr.isatty() and not options.quiet
-    with closing(engine), progress_bar(bar) as progress:
+    with closing(engine), progress_bar(len(tasks) > 1 and not options.quiet) as progress:
         outcomes = _outcomes(engine, tasks, options)
         try:
             for outcome in progress.track(outcomes, total=len(tasks), description='identify'):
@@ -133,9 +132,8 @@ def _run(options: argparse.Namespace, output: TextIO | None) -> int:
             return 1
     if results and not options.quiet:
         print(_hint(settings, identified), end='', file=sys.stderr)
-    failed |= bool(
-        write_exports('identify', options.export, measured, control, quiet=options.quiet)
-    )
+    if not write_exports('identify', options.export, measured, control, options.quiet):
+        failed = True
     return int(failed)
 
 

@@ -58,9 +58,8 @@ def run(options: argparse.Namespace) -> int:
         tell('report', 'there is no result, accepted is at least one')
         return 1
     title = ', '.join(Path(name).name for name in options.results)
-    shown = sys.stderr.isatty() and not options.quiet and len(results) > 1
     try:
-        with progress_bar(shown) as progress:
+        with progress_bar(len(results) > 1 and not options.quiet) as progress:
             track = partial(progress.track, total=len(results), description='report')
             lost = write_page(
                 options.output, results, settings, title, truth, options.images, track

@@ -66,10 +66,7 @@ class ReportSettings:
         maximum=1.0,
     )
     threads: int = parameter(
-        0,
-        'Number of images that are read at a time; 0: one per core.',
-        minimum=0,
-        maximum=1024,
+        0, 'Number of images that are read at a time; 0: one per core.', minimum=0, maximum=1024
     )
 
     def __post_init__(self) -> None:
@@ -83,9 +80,9 @@ def row(
     doubtful_below: float,
     truth: Sequence[TrueTarget] | None = None,
 ) -> dict[str, Any]:
-    """Return what the page knows about an image, which shows the truth.
+    """Return what the page knows about an image; `truth` is what it shows.
 
-    Targets have the indices of their families.
+    Targets have the indices of their families, and are doubtful below a confidence.
     """
     decoded = [target for target in result.targets if target.id != UNDECODED]
     undecoded = [target for target in result.targets if target.id == UNDECODED]
@@ -228,8 +225,8 @@ def write_page(
 
     The settings may have another title. The truth is by the names of images without folders, which
     may be in other `folders` now, see `ahf_ros.report.images.find_image`. `track` follows the
-    images as they are done. What is returned is wrong with images. A ValueError says so if the
-    file cannot be written, or jinja2 is not installed.
+    images as they are done. The texts that are returned say what is wrong with images. A
+    ValueError says so if the file cannot be written, or jinja2 is not installed.
     """
     template = _template()
     families = families_of(results)

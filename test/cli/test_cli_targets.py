@@ -81,13 +81,12 @@ def test_the_bars_are_100_mm_long(folder: Path) -> None:
     assert width > 4000
 
 
-def test_the_geometry_has_every_target(folder: Path) -> None:
+def test_the_geometry_has_every_target_and_sheets_repeat_themselves(
+    folder: Path, tmp_path: Path
+) -> None:
     geometry = json.loads((folder / 'sheet.json').read_text())
     assert (geometry['pages'], geometry['radii']['band_outer']) == (2, 14.0)
     assert [target['id'] for target in geometry['targets']] == list(range(1, 55))
-
-
-def test_the_same_sheet_is_the_same_file(folder: Path, tmp_path: Path) -> None:
     assert targets('--ids', '1-54', '-o', tmp_path / 'again.pdf') == 0
     assert (tmp_path / 'again.pdf').read_bytes() == (folder / 'sheet.pdf').read_bytes()
 
