@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from pathlib import Path
 
 import numpy as np
@@ -20,13 +20,11 @@ from ahf_ros.bag import run
 from ahf_ros.bag.definitions import typestore
 from ahf_ros.cli import main
 from ahf_ros.interchange.image_files import write_image
-from support import bags, packages
+from support import ROOT, bags, packages
+from support.command_line import status as status_of
 
-ROOT = Path(__file__).resolve().parents[2]
 LIMIT = 300.0
 SLOW = 'import pathlib, sys, time; pathlib.Path({mark!r}).touch(); time.sleep(600)'
-
-
 RAMP = np.tile(np.arange(40, dtype=np.uint8), (30, 1))
 
 
@@ -65,18 +63,13 @@ def wait_for(condition: object) -> None:
         time.sleep(0.02)
 
 
-def running(mark: Path) -> list[int]:
-    """Return the processes on whose command line a path is."""
-    found = []
-    for folder in Path('/proc').iterdir():
-        try:
-            line = (folder / 'cmdline').read_bytes() if folder.name.isdigit() else b''
-            state = (folder / 'stat').read_text().rpartition(')')[2].split()[0] if line else 'Z'
-        except OSError:
-            continue
-        if str(mark).encode() in line and state != 'Z' and int(folder.name) != os.getpid():
-            found.append(int(folder.name))
-    return found
+def is_running(mark: Path) -> bool:
+    """Return whether a path is on the command line of another process."""
+    for line in Path('/proc').glob('[0-9]*/cmdline'):  # empty for a zombie
+        with suppress(OSError):
+            if line.parent.name != str(os.getpid()) and str(mark).encode() in line.read_bytes():
+                return True
+    return False
 
 
 KILLER = """
@@ -140,17 +133,8 @@ def slow_command(tmp_path: Path) -> tuple[str, Path]:
     return f'{sys.executable} {tmp_path / "slow.py"} {{image}}', mark
 
 
-@pytest.mark.parametrize(
-    ('number', 'status'),
-    [
-        (signal.SIGINT, 130),
-        (signal.SIGTERM, 128 + signal.SIGTERM),
-        (signal.SIGHUP, 128 + signal.SIGHUP),
-    ],
-)
-def test_a_signal_ends_the_command_and_its_files(
-    tmp_path: Path, number: signal.Signals, status: int
-) -> None:
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_ends_the_command_and_its_files(tmp_path: Path, number: signal.Signals) -> None:
     images = ['a.png', 'b.png'][: 2 if number == signal.SIGINT else 1]  # two workers, or none
     for name in images:
         write_image(tmp_path / name, RAMP)
@@ -165,9 +149,9 @@ def test_a_signal_ends_the_command_and_its_files(
     for _ in range(2):  # a terminal and a launcher both send one
         process.send_signal(number)
         time.sleep(0.005)
-    found, _, errors = end_of(process)
-    assert found == status, errors
-    wait_for(lambda: not running(tmp_path / 'slow.py'))
+    status, _, errors = end_of(process)
+    assert status == 128 + number, errors
+    wait_for(lambda: not is_running(tmp_path / 'slow.py'))
     assert list((tmp_path / 'scratch').iterdir()) == []
 
 
@@ -228,7 +212,7 @@ def test_workers_end_with_their_parent_and_a_rerun_is_accepted(tmp_path: Path) -
     wait_for(mark.exists)
     os.kill(process.pid, signal.SIGKILL)
     process.wait()
-    wait_for(lambda: not running(tmp_path) and all(is_free(target / name) for name in 'ab'))
+    wait_for(lambda: not is_running(tmp_path) and all(is_free(target / name) for name in 'ab'))
     (tmp_path / 'slow.py').write_text('print(\'{"targets": []}\')')
     assert end_of(start(*arguments))[0] == 0
     for name in 'ab':
@@ -240,12 +224,12 @@ def test_a_command_that_was_missing_is_tried_again(
 ) -> None:
     source = bags.write_ros2(tmp_path / 'in', bags.recorded(typestore(), [RAMP]))
     program = tmp_path / 'program'
-    arguments = ['bag', source, tmp_path / 'out', '--detector', 'command', '--command', program]
-    assert main([*map(str, arguments)]) == 1
+    arguments = ('bag', source, tmp_path / 'out', '--detector', 'command', '--command', program)
+    assert status_of(*arguments) == 1
     assert 'cannot be started: No such file or directory' in capfd.readouterr().err
     program.write_text(f'#!{sys.executable}\nprint(\'{{"targets": []}}\')')
     program.chmod(0o755)
-    assert main([*map(str, arguments)]) == 0
+    assert status_of(*arguments) == 0
     assert len(bags.answers(tmp_path / 'out')) == 1
 
 
