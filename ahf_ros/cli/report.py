@@ -13,6 +13,7 @@ from ahf_ros.cli.options import add_options, add_quiet, settings_from
 from ahf_ros.interchange.truth_files import read_truth
 from ahf_ros.report.page import ReportSettings, write_page
 from ahf_ros.report.results import read_results
+from ahf_ros.text import counted
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -46,19 +47,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Write the page; what could be read is on it, whatever could not."""
     settings = settings_from(options, ReportSettings)
-    try:
-        truth = read_truth(options.truth) if options.truth else None
-    except ValueError as error:
-        tell('report', error)
-        return 1
-    results, problems = read_results(options.results)
-    for problem in problems:
-        tell('report', problem)
-    if not results:
-        tell('report', 'there is no result, accepted is at least one')
-        return 1
     title = ', '.join(Path(name).name for name in options.results)
     try:
+        truth = read_truth(options.truth) if options.truth else None
+        results, problems = read_results(options.results)
+        for problem in problems:
+            tell('report', problem)
+        if not results:
+            raise ValueError('there is no result, accepted is at least one')
         with progress_bar(len(results) > 1 and not options.quiet) as progress:
             track = partial(progress.track, total=len(results), description='report')
             lost = write_page(
@@ -71,6 +67,6 @@ def run(options: argparse.Namespace) -> int:
         tell('report', problem)
     if not options.quiet:
         size = options.output.stat().st_size / 1e6
-        count = f'{len(results)} image' + 's' * (len(results) > 1)
+        count = counted(len(results), 'image')
         print(f'{options.output}: {count}, {size:.1f} MB', file=sys.stderr)
     return int(bool(problems or lost))
