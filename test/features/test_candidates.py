@@ -10,8 +10,8 @@ import pytest
 
 from ahf_ros.features import candidates, frame
 from ahf_ros.features.candidates import MAXIMUM_CANDIDATES
+from ahf_ros.features.dot_search import whole_outlines
 from ahf_ros.features.log_edges import LOG_SCALE, LogEdges, find_edges, mask_of
-from ahf_ros.features.outlines import whole_outlines
 from ahf_ros.features.pyramid import halved, image_pyramid, log_image
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 from ahf_ros.synthetic.scene import SceneSettings, render
@@ -213,6 +213,6 @@ def test_more_dots_than_are_looked_at_are_said_and_the_roundest_stay(monkeypatch
     monkeypatch.setattr('ahf_ros.features.dots._LOG', log)
     assert len(whole_outlines(edges, 4.0, 20.0).frames) == 100
     assert messages == []
-    monkeypatch.setattr('ahf_ros.features.outlines.MAXIMUM_OUTLINES', 30)
+    monkeypatch.setattr('ahf_ros.features.dot_search.MAXIMUM_OUTLINES', 30)
     assert len(whole_outlines(edges, 4.0, 20.0).frames) == 30
     assert messages == ['100 whole ellipses; the 30 best are looked at']

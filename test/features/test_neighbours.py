@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ahf_ros.features.neighbours import pairs_within
+from ahf_ros.features.dots import pairs_within
 
 
 @pytest.mark.parametrize('part', [7, 100_000])

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from ahf_ros.features import frame
-from ahf_ros.features.circles import Circles, dot_circles
-from ahf_ros.features.profiles import Edges, edge_points, measure_edges
+from ahf_ros.features.circles import Circles, dot_circles, edge_points
+from ahf_ros.features.profiles import Edges, measure_outlines
 
 WIDE = 1000.0
 """Radius of a circle that is straight as far as a profile sees, px."""
@@ -33,7 +33,8 @@ def measured(image: np.ndarray, blur: float, polarity: int = 1) -> Edges:
     """Measure the one point of a wide circle that is vertical at MIDDLE."""
     frames = frame.affine_frames([MIDDLE[0] - WIDE], [MIDDLE[1]], [WIDE], [WIDE], [0.0])
     point = Circles(np.zeros(1), np.ones(1), np.zeros(1, int), np.full((1, 1), polarity))
-    return measure_edges(image, frames, point, np.array([blur]), reach=2.5 / WIDE)
+    outline = edge_points(frames, point)
+    return measure_outlines(image, outline, np.array([blur]), reach=2.5 / WIDE)
 
 
 @pytest.mark.parametrize('blur', [0.6, 0.8, 1.2])
@@ -94,19 +95,16 @@ def test_the_curve_of_a_small_circle_is_taken_into_account():
     # Samples at the centres of pixels, between the two finer ones beside them.
     image = sum(image[i::scale, j::scale] for i in (3, 4) for j in (3, 4)) / 4
     frames = frame.affine_frames([30.3], [20.4], [radius], [radius], [0.0])
-    edges = measure_edges(
-        image.astype(np.float32), frames, dot_circles([1], 48), np.array([0.9]), reach=0.45
-    )
+    outline = edge_points(frames, dot_circles([1], 48))
+    edges = measure_outlines(image.astype(np.float32), outline, np.array([0.9]), reach=0.45)
     assert edges.offset.mean() == pytest.approx(0, abs=0.01)
     assert np.abs(edges.offset).max() < 0.05
 
 
 def test_profiles_beyond_the_image_are_not_visible():
     frames = frame.affine_frames([2.0], [20.0], [8.0], [8.0], [0.0])
-    edges = measure_edges(
-        step_image(0, 0.8), frames, dot_circles([1], 16), np.array([0.8]), reach=0.45
-    )
     geometry = edge_points(frames, dot_circles([1], 16))
+    edges = measure_outlines(step_image(0, 0.8), geometry, np.array([0.8]), reach=0.45)
     assert not edges.visible[geometry.points[..., 0] < 0].any()
     assert edges.visible[geometry.points[..., 0] > 4].all()
     assert not edges.offset[~edges.visible].any()

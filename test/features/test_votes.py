@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ahf_ros.features.votes import find_peaks, highest
+from ahf_ros.features.candidates import find_peaks, highest
 
 SHAPE = (2, 40, 60)
 

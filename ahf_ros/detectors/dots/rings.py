@@ -23,14 +23,13 @@ from ahf_ros.detectors.dots.confidence import (
 )
 from ahf_ros.detectors.dots.reading import dot_points, read_rings
 from ahf_ros.features.array_record import ArrayRecord
-from ahf_ros.features.circle_fit import Fit
+from ahf_ros.features.circle_fit import Fit, fit_circles_of_any_blur
 from ahf_ros.features.circles import Circles
 from ahf_ros.features.dots import Dots
 from ahf_ros.features.ellipse_targets import ellipse_fields
 from ahf_ros.features.frame import ellipse_axes, mean_radii
 from ahf_ros.features.homography import local_frames
 from ahf_ros.features.pyramid import ImagePyramid
-from ahf_ros.features.soft_edges import fit_circles_of_any_blur
 from ahf_ros.target import UNDECODED, DottedTarget
 
 _RAYS = 40  # round each circle
