@@ -39,25 +39,11 @@ def small_dots(
     log_scale: float,
     explained: Sequence[np.ndarray] | np.ndarray = (),
 ) -> Dots:
-    """Return the dots that stand out of an even ground all the way round.
+    """Return the dots that stand out of an even ground all the way round, to a few tenths of a px.
 
-    Parameters
-    ----------
-    log : ndarray of int16, shape (height, width)
-        `log_scale` ln(I + 8).
-    min_radius, max_radius : float
-        Bounds of the semi-major axis, px.
-    polarities : sequence of int
-        1 to find dark dots, -1 to find bright ones.
-    log_scale : float
-        Units of `log` in one unit of ln.
-    explained : sequence of ndarray of float, each of shape (m, 2)
-        Outlines of objects that are known already, px. No dots are looked for inside.
-
-    Returns
-    -------
-    Dots
-        To a few tenths of a pixel.
+    The image is `log_scale` ln(I + 8), int16. The bounds are those of the semi-major axis, px. The
+    polarities are 1 to find dark dots, -1 to find bright ones. No dots are looked for inside the
+    outlines of objects that are explained already, px, each of shape (m, 2).
     """
     scale = 255 / (_LN_RANGE * log_scale)
     offset = -float(np.log(8.0)) * log_scale * scale
