@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from ahf_ros.features import frame
-from ahf_ros.features.circle_fit import Fit, fit_circles
-from ahf_ros.features.circles import Circles, dot_circles
+from ahf_ros.features.circle_fit import Fit, fit_circles, fit_dots
+from ahf_ros.features.circles import Circles
 
 BLUR = 0.7
 DARK, BRIGHT = 40.0, 200.0
@@ -47,9 +47,8 @@ def dot_frame(x: float, y: float, radius: float = 12.0) -> np.ndarray:
 
 
 def fitted(image: np.ndarray, start: np.ndarray) -> Fit:
-    return fit_circles(
-        image.astype(np.float32), start, dot_circles([1], 48), reach=0.45, projective=False
-    )
+    dark = np.ones(len(start), int)
+    return fit_dots(image.astype(np.float32), start, dark, rays=48, reach=0.45)
 
 
 def centre(fit: Fit) -> np.ndarray:
@@ -136,13 +135,7 @@ def test_where_there_is_no_edge_nothing_is_in_place():
 def test_dots_do_not_depend_on_each_other():
     image = drawn(dot_frame(30.2, 40.1)) + drawn(dot_frame(70.4, 60.3)) - BRIGHT
     starts = [dot_frame(30.0, 40.0), dot_frame(70.0, 60.0)]
-    together = fit_circles(
-        image.astype(np.float32),
-        np.concatenate(starts),
-        dot_circles([1, 1], 48),
-        reach=0.45,
-        projective=False,
-    )
+    together = fitted(image, np.concatenate(starts))
     for index, start in enumerate(starts):
         alone = fitted(image, start)
         # BLAS may round batches of another size otherwise.
@@ -163,14 +156,7 @@ def test_the_covariance_is_that_of_the_errors(deviation, least):
     image = generator.normal(0, deviation, (400, 400))
     for (x, y), place in zip(corners, places, strict=True):
         image[y : y + 40, x : x + 40] += drawn(dot_frame(*place), side=40)
-    starts = frame.affine_frames(*(corners.T + 20), 12.0, 12.0, 0.0)
-    fit = fit_circles(
-        image.astype(np.float32),
-        starts,
-        dot_circles(np.ones(100, int), 48),
-        reach=0.45,
-        projective=False,
-    )
+    fit = fitted(image, frame.affine_frames(*(corners.T + 20), 12.0, 12.0, 0.0))
     errors = fit.frames[:, :2, 2] - corners - places
     squares = np.einsum('ki,kij,kj->k', errors, np.linalg.inv(fit.covariance), errors)
     assert least < np.mean(squares) < 2.6

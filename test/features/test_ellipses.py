@@ -11,22 +11,7 @@ from ahf_ros.features.candidates import Candidates
 from ahf_ros.features.dots import Dots
 from ahf_ros.features.ellipses import fit_ellipses, refine_ellipses
 from ahf_ros.features.pyramid import image_pyramid, log_image
-
-SHAPE = (200, 240)
-
-
-def drawn(
-    ellipses: list[tuple[float, float, float, float, float]], paper: int = 210, ink: int = 30
-) -> np.ndarray:
-    """Return ellipses (x, y, semi-axes, angle) on paper, blurred as by a lens."""
-    rows, columns = (np.mgrid[: 4 * SHAPE[0], : 4 * SHAPE[1]] + 0.5) / 4 - 0.5
-    image = np.full(rows.shape, paper, np.float32)
-    for x, y, major, minor, angle in ellipses:
-        along = (columns - x) * np.cos(angle) + (rows - y) * np.sin(angle)
-        across = (rows - y) * np.cos(angle) - (columns - x) * np.sin(angle)
-        image[(along / major) ** 2 + (across / minor) ** 2 < 1] = ink
-    small = cv2.resize(image, SHAPE[::-1], interpolation=cv2.INTER_AREA)
-    return np.rint(cv2.GaussianBlur(small, (0, 0), 0.7)).astype(np.uint8)
+from support.drawn_dots import drawn
 
 
 def half_in_shadow(gray: np.ndarray, x: float, y: float, angle: float) -> np.ndarray:
@@ -36,9 +21,7 @@ def half_in_shadow(gray: np.ndarray, x: float, y: float, angle: float) -> np.nda
     return np.rint(gray * np.clip(0.65 + side / 2, 0.3, 1)).astype(np.uint8)
 
 
-def refined(
-    log: np.ndarray, ellipses: list[tuple[float, float, float, float, float]], polarity: list[int]
-) -> Dots:
+def refined(log: np.ndarray, ellipses: list[tuple[float, ...]], polarity: list[int]) -> Dots:
     starts = frame.affine_frames(*np.array(ellipses).reshape(-1, 5).T)
     return refine_ellipses(log, Dots(starts, np.array(polarity, int), np.zeros(len(polarity))))
 
