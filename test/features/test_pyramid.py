@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from ahf_ros.features.log_edges import LOG_SCALE, find_edges, mask_of
+from ahf_ros.features.log_edges import LOG_SCALE, find_edges
 from ahf_ros.features.pyramid import halved, image_pyramid, log_image, octaves
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
@@ -86,13 +86,3 @@ def test_edges_lie_on_steps_and_point_to_the_bright_side():
     assert set(edges.x) <= {40, 41}
     assert edges.unit_x == pytest.approx(1, abs=1e-6)
     assert edges.unit_y == pytest.approx(0, abs=1e-6)
-
-
-def test_edges_within_polygons_are_left_out():
-    gray = np.full((60, 80), 40, np.uint8)
-    gray[:, 20:50] = 160
-    edges = find_edges(log_image(gray))
-    square = np.array([(10, -1), (30, -1), (30, 60), (10, 60)]) + 0.25
-    rest = edges.unmasked(mask_of([square], edges.marked.shape))
-    assert 0 < len(rest.x) < len(edges.x)
-    assert rest.x.min() > 30
