@@ -15,23 +15,17 @@ BLUR = 0.7
 DARK, BRIGHT = 40.0, 200.0
 
 
-def through(frames: np.ndarray, side: int) -> tuple[np.ndarray, ...]:
-    """Return where pixels are on the target: radii, and px a radius across a circle."""
-    rows, columns = np.mgrid[:side, :side]
-    pixels = np.stack([columns.ravel(), rows.ravel(), np.ones(rows.size)])
-    plane = np.linalg.inv(frames[0]) @ pixels
-    x, y = (plane[:2] / plane[2]).reshape(2, side, side)
-    radius = np.hypot(x, y)
-    return radius, 1 / np.maximum(np.hypot(*np.gradient(radius)), 1e-3)
-
-
 def drawn(frames: np.ndarray, side: int = 100, radii: Sequence[float] = (1.0,)) -> np.ndarray:
     """Return a target, dark inside, whose edges are blurred steps across circles.
 
     A blurred step across a circle differs from a blurred disc: its level halfway stays on the
     circle. `fit_circles` expects a disc, whose level halfway moves inwards by blur^2 / 2 radii.
     """
-    radius, scale = through(frames, side)
+    rows, columns = np.mgrid[:side, :side]
+    pixels = np.stack([columns.ravel(), rows.ravel(), np.ones(rows.size)])
+    plane = np.linalg.inv(frames[0]) @ pixels
+    radius = np.hypot(*(plane[:2] / plane[2])).reshape(side, side)
+    scale = 1 / np.maximum(np.hypot(*np.gradient(radius)), 1e-3)  # px a radius across a circle
 
     def rise(edge: float) -> np.ndarray:
         outwards = (radius - edge) * scale
@@ -53,6 +47,10 @@ def fitted(image: np.ndarray, start: np.ndarray) -> Fit:
 
 def centre(fit: Fit) -> np.ndarray:
     return fit.frames[0, :2, 2]
+
+
+PLACE, START = (50.2, 49.7), dot_frame(50.0, 50.0)
+DISC = drawn(dot_frame(*PLACE))
 
 
 @pytest.mark.parametrize('place', [(50.0, 50.0), (50.37, 49.81), (49.5, 50.5)])
@@ -94,40 +92,32 @@ def test_circles_of_several_groups_give_the_image_of_the_centre():
     assert joint.share[0] > 0.9
 
 
-def test_a_slope_of_the_light_does_not_move_the_centre():
-    place = (50.2, 49.7)
-    light = np.exp(0.015 * (np.arange(100.0) - 50))  # a fifth brighter from side to side
-    even, sloping = (
-        fitted(image, dot_frame(50.0, 50.0))
-        for image in (drawn(dot_frame(*place)), drawn(dot_frame(*place)) * light)
-    )
-    assert centre(even) == pytest.approx(place, abs=0.005)
-    assert centre(sloping) == pytest.approx(place, abs=0.025)
+@pytest.mark.parametrize(
+    ('light', 'error'),
+    [
+        (np.ones(100), 0.005),
+        (np.exp(0.015 * (np.arange(100.0) - 50)), 0.025),  # a fifth brighter from side to side
+        (0.3 + 0.7 / (1 + np.exp(-(np.arange(100.0) - 53.3) / 0.6)), 0.05),
+    ],
+    ids=['even', 'slope', 'edge'],
+)
+def test_light_hardly_moves_the_centre(light, error):
+    assert centre(fitted(DISC * light, START)) == pytest.approx(PLACE, abs=error)
 
 
 @pytest.mark.parametrize('colour', [DARK, 110.0, 255.0])
 def test_an_edge_that_is_hidden_is_left_out(colour):
     """A bar over a quarter of the dot, whatever its colour, has edges that are not the dot's."""
-    place = (50.2, 49.7)
-    image = drawn(dot_frame(*place))
+    image = DISC.copy()
     image[:, 57:] = colour
-    fit = fitted(image, dot_frame(50.0, 50.0))
-    assert centre(fit) == pytest.approx(place, abs=0.06)
+    fit = fitted(image, START)
+    assert centre(fit) == pytest.approx(PLACE, abs=0.06)
     assert 0.5 < fit.share[0] < 0.85
-    whole = fitted(drawn(dot_frame(*place)), dot_frame(50.0, 50.0))
-    assert fit.covariance[0, 0, 0] > 1.5 * whole.covariance[0, 0, 0]
-
-
-def test_an_edge_of_light_across_the_dot_hardly_moves_it():
-    place = (50.2, 49.7)
-    shadow = 0.3 + 0.7 / (1 + np.exp(-(np.arange(100.0) - 53.3) / 0.6))
-    fit = fitted(drawn(dot_frame(*place)) * shadow, dot_frame(50.0, 50.0))
-    assert centre(fit) == pytest.approx(place, abs=0.05)
+    assert fit.covariance[0, 0, 0] > 1.5 * fitted(DISC, START).covariance[0, 0, 0]
 
 
 def test_where_there_is_no_edge_nothing_is_in_place():
-    image = np.full((100, 100), 90.0)
-    fit = fitted(image, dot_frame(50.0, 50.0))
+    fit = fitted(np.full((100, 100), 90.0), START)
     assert fit.share[0] == 0
     assert np.isfinite(fit.frames).all()
 
