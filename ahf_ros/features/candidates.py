@@ -125,24 +125,25 @@ def _elected(
     polarities: Sequence[int],
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the points, shape (k, 2), that enough edges vote for, and polarities, shape (k,)."""
+    height, width = edges.marked.shape
     found = Peaks.joined([_peaks(edges, radii, of, polarities) for of in shapes])
-    points = np.stack([found.x, found.y], axis=-1)
-    inside = np.all((points > -1) & (points < edges.marked.shape[::-1]), axis=1)
-    found, points = found.select(inside), points[inside]
+    inside = (found.x > -1) & (found.x < width) & (found.y > -1) & (found.y < height)
+    found = found.select(inside)
     reach = max(1, round(_REACH * radii[0] / _CELL))
     margin = reach + 1
-    tall, wide = (side // _CELL + 1 + 2 * margin for side in edges.marked.shape)
-    columns, rows = np.rint((points.T + 0.5) / _CELL - 0.5).astype(int) + margin
+    tall, wide = (side // _CELL + 1 + 2 * margin for side in (height, width))
+    columns, rows = (
+        np.rint((np.stack([found.x, found.y]) + 0.5) / _CELL - 0.5).astype(int) + margin
+    )
     cells = (found.plane * tall + rows) * wide + columns
-    kept = highest(cells, found.votes, (len(polarities) * tall, wide), reach)
-    found, points = found.select(kept), points[kept]
+    found = found.select(highest(cells, found.votes, (len(polarities) * tall, wide), reach))
     # Spots of light may be many, of one polarity, and must not crowd out the other.
     chosen = [
         best(which, -found.votes[which], MAXIMUM_CANDIDATES, 'candidates of one size')
         for which in (np.flatnonzero(found.plane == number) for number in range(len(polarities)))
     ]
-    kept = np.concatenate([np.zeros(0, np.intp), *chosen])
-    return points[kept], np.asarray(polarities, int)[found.plane[kept]]
+    found = found.select(np.concatenate([np.zeros(0, np.intp), *chosen]))
+    return np.stack([found.x, found.y], axis=-1), np.asarray(polarities, int)[found.plane]
 
 
 def _peaks(

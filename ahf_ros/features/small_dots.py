@@ -58,8 +58,7 @@ def small_dots(
         operation = cv2.MORPH_CLOSE if polarity > 0 else cv2.MORPH_OPEN
         ground = cv2.morphologyEx(reduced, operation, kernel)
         ground = cv2.resize(ground, (width, height), interpolation=cv2.INTER_LINEAR)
-        pair = (ground, eight_bit) if polarity > 0 else (eight_bit, ground)
-        steps = cv2.subtract(*pair)
+        steps = cv2.subtract(*((ground, eight_bit) if polarity > 0 else (eight_bit, ground)))
         for outline in explained:
             cv2.fillConvexPoly(steps, np.rint(outline).astype(np.int32), 0)
         found.append(_blobs(steps, min_radius, max_radius, polarity))
@@ -92,7 +91,7 @@ def _blobs(height: np.ndarray, min_radius: float, max_radius: float, polarity: i
     minor = 2 * np.sqrt(np.maximum(middle - half - _BLUR, (_MINIMUM_MINOR / 2) ** 2))
     good = (longest >= 2 * min_radius - 2) & (peak >= least)
     good &= (major >= min_radius) & (major <= max_radius)
-    good &= (ellipse > 0) & (filled < _FILLED[1]) & (filled > _FILLED[0])
+    good &= (filled < _FILLED[1]) & (filled > _FILLED[0])
     which = best(np.flatnonzero(good), -peak[good].astype(float), MAXIMUM_BLOBS, 'small dots')
     frames = affine_frames(centre_x, centre_y, major, minor, np.arctan2(xy, (xx - yy) / 2) / 2)
     return Dots(frames[which], np.full(len(which), polarity), np.ones(len(which)))
