@@ -26,6 +26,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ahf_ros.features.robust import NORMAL
 from ahf_ros.interchange.point_clouds import AXES
 from ahf_ros.target import Target
 
@@ -43,7 +44,6 @@ _MAXIMUM_OFFSET = 2.0  # from the mean of these points to the centre, standard d
 _TRIALS, _JUDGES = 64, 200  # planes through three points, and points that judge them
 _MINIMUM_AREA = 0.1  # of the triangle of three points, squared reaches
 _SPREADS = np.array([0.8191725134, 0.6710436067, 0.5497004779])  # Roberts' sequence in 3-D
-_DEVIATION = 1.4826  # standard deviation of normal noise in units of its median magnitude
 _OUTLIER = 3.0  # standard deviations
 _PASSES = 3
 
@@ -53,14 +53,7 @@ class CloudGrid:
     """Which pixel of the image each point of a cloud belongs to.
 
     The point in row i and column j belongs to the pixel at x = `offset_x` + `step` j and
-    y = `offset_y` + `step` i.
-
-    Attributes
-    ----------
-    offset_x, offset_y : float
-        Pixel of the first point, px.
-    step : float
-        Distance in the image between neighbouring points, px.
+    y = `offset_y` + `step` i, px.
 
     Examples
     --------
@@ -75,24 +68,14 @@ class CloudGrid:
     step: float = 1.0
 
     def fits(self, cloud: tuple[int, int], image: tuple[int, int]) -> bool:
-        """Return whether a cloud lies within an image; by default only one of the same size does.
+        """Return whether a cloud lies within an image, by the numbers of their rows and columns.
 
-        Parameters
-        ----------
-        cloud, image : tuple of 2 int
-            Number of rows and columns of each.
+        By default only a cloud of the size of the image does.
         """
-        if self == CloudGrid():
+        if self == FULL:
             return cloud == image
-        last = [
-            first + self.step * (count - 1)
-            for first, count in zip((self.offset_y, self.offset_x), cloud, strict=True)
-        ]
-        return all(at <= size - 0.5 for at, size in zip(last, image, strict=True))
-
-    def of(self, x: float, y: float) -> tuple[float, float]:
-        """Return column and row of the cloud at a pixel of the image."""
-        return (x - self.offset_x) / self.step, (y - self.offset_y) / self.step
+        axes = zip((self.offset_y, self.offset_x), cloud, image, strict=True)
+        return all(first + self.step * (count - 1) <= size - 0.5 for first, count, size in axes)
 
 
 FULL = CloudGrid()
@@ -101,17 +84,12 @@ FULL = CloudGrid()
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Positions:
-    """Positions of targets in the frame and unit of a cloud, one row per target.
+    """Positions of n targets in the frame and unit of a cloud, NaN where unknown.
 
-    Attributes
-    ----------
-    points : ndarray of float64, shape (n, 3)
-        x, y, z of the centres; NaN where unknown.
-    deviations : ndarray of float64, shape (n,)
-        Root mean square of the residuals of the fit: the noise of the scanner, or more if a
-        target is not flat.
-    spacings : ndarray of float64, shape (n,)
-        Distance on the target of two adjacent pixels, along the axis where it is larger.
+    Points of shape (n, 3) are x, y, z of the centres. Deviations, shape (n,), are the root mean
+    square of the residuals of the fit: the noise of the scanner, or more if a target is not flat.
+    Spacings, shape (n,), are the distances on the target of two adjacent pixels, along the axis
+    where they are larger.
     """
 
     points: np.ndarray
@@ -130,32 +108,23 @@ def positions(
     neighbourhood: float = NEIGHBOURHOOD,
     grid: CloudGrid = FULL,
 ) -> Positions:
-    """Return the positions of targets.
+    """Return the positions of targets, `Target` or ahf_ros/CodedTarget, px of the image.
 
-    A target has no position if fewer than `MINIMUM_POINTS`, or less than a fifth, of the pixels
-    around it have points on its plane, or if all of these are on one side of its centre: nothing
-    is extrapolated.
-
-    Parameters
-    ----------
-    cloud : ndarray of shape (height, width), with the fields x, y and z
-        Result of `ahf_ros.interchange.point_clouds.organised_points`. Points that are not finite
-        in float32 or that are 0, 0, 0 are missing.
-    targets : sequence of Target, or of ahf_ros/CodedTarget
-        Targets in the pixels of the image that the cloud belongs to.
-    neighbourhood : float
-        Radius around a centre within which points count, in radii of its dot, an ellipse in the
-        image.
-    grid : CloudGrid
-        Pixels of the image that the points belong to.
+    The cloud, of shape (height, width) with the fields x, y and z, is one that
+    `ahf_ros.interchange.point_clouds.organised_points` returns. Points that are not finite in
+    float32 or that are 0, 0, 0 are missing. Those within `neighbourhood` radii of the dot, an
+    ellipse, from its centre count. A target has no position if fewer than `MINIMUM_POINTS`, or
+    less than a fifth, of the pixels around it have points on its plane, or if all of these are on
+    one side of its centre: nothing is extrapolated.
     """
     rows = np.full((len(targets), 5), np.nan)
     with np.errstate(all='ignore'):  # bad points end in values that are not finite
         for row, target in zip(rows, targets, strict=True):
             offsets, points, pixels = _neighbours(cloud, target, neighbourhood, grid)
-            if len(points) >= max(MINIMUM_POINTS, _MINIMUM_SHARE * pixels):
+            minimum = max(MINIMUM_POINTS, _MINIMUM_SHARE * pixels)
+            if len(points) >= minimum:
                 with suppress(np.linalg.LinAlgError):
-                    row[:] = _position(offsets, points, _MINIMUM_SHARE * pixels)
+                    row[:] = _position(offsets, points, minimum)
     rows[~np.isfinite(rows).all(axis=1)] = np.nan
     return Positions(rows[:, :3], rows[:, 3], rows[:, 4] / grid.step)
 
@@ -167,11 +136,11 @@ def _neighbours(
 
     Offsets are in steps of the grid.
     """
-    shape = (target.x, target.y, target.semi_major, target.semi_minor, target.angle)
-    if not all(map(math.isfinite, shape)):
+    axes = target.semi_major, target.semi_minor
+    if not all(map(math.isfinite, (target.x, target.y, *axes, target.angle))):
         return np.empty((0, 2)), np.empty((0, 3)), 0
-    reach = [max(_MINIMUM_REACH, neighbourhood * axis / grid.step) for axis in shape[2:4]]
-    x, y = grid.of(target.x, target.y)
+    reach = [max(_MINIMUM_REACH, neighbourhood * axis / grid.step) for axis in axes]
+    x, y = (target.x - grid.offset_x) / grid.step, (target.y - grid.offset_y) / grid.step
     places = []
     for centre, size in ((y, cloud.shape[0]), (x, cloud.shape[1])):
         first = math.ceil(min(size, max(0, centre - reach[0])))
@@ -182,12 +151,8 @@ def _neighbours(
     window = tuple(slice(first, end, step) for first, end in places)
     rows, columns = np.mgrid[window]
     offsets = np.stack((columns - x, rows - y), axis=-1)
-    turn = np.array(
-        [
-            [math.cos(target.angle), -math.sin(target.angle)],
-            [math.sin(target.angle), math.cos(target.angle)],
-        ]
-    )
+    cosine, sine = math.cos(target.angle), math.sin(target.angle)
+    turn = np.array([[cosine, -sine], [sine, cosine]])
     inside = (((offsets @ turn) / reach) ** 2).sum(axis=-1) <= 1
     near = cloud[window][inside]
     points = np.stack([near[name].astype(np.float64) for name in AXES], axis=-1)
@@ -196,20 +161,17 @@ def _neighbours(
 
 
 def _position(offsets: np.ndarray, points: np.ndarray, minimum: float) -> list[float]:
-    """Return position, deviation and spacing of a target; NaN if the points do not suffice."""
-    unknown = [math.nan] * 5
+    """Return position, deviation and spacing of a target; LinAlgError if its points are few."""
     reach = np.abs(offsets).max()
     unit = offsets / reach
     origin = np.median(points, axis=0)
     shifted = points - origin
     distances = _distances_from_median_plane(unit, shifted)
-    if distances is None:
-        return unknown
     floor = 1e-6 * np.abs(shifted).max()
     for _ in range(_PASSES):
-        near = distances <= max(_OUTLIER * _DEVIATION * np.median(distances), floor)
-        if near.sum() < max(MINIMUM_POINTS, minimum) or _outside(unit[near]):
-            return unknown
+        near = distances <= max(_OUTLIER * NORMAL * np.median(distances), floor)
+        if near.sum() < minimum or _outside(unit[near]):
+            raise np.linalg.LinAlgError('too few points are on the plane, or all on one side')
         plane, perspective = _homography(unit[near], shifted[near])
         seen = plane[0] + unit @ plane[1:]
         distances = np.linalg.norm(shifted - seen / (1 + unit @ perspective)[:, None], axis=1)
@@ -219,23 +181,18 @@ def _position(offsets: np.ndarray, points: np.ndarray, minimum: float) -> list[f
     return [*(origin + plane[0]), deviation, float(spacing)]
 
 
-def _distances_from_median_plane(unit: np.ndarray, shifted: np.ndarray) -> np.ndarray | None:
+def _distances_from_median_plane(unit: np.ndarray, shifted: np.ndarray) -> np.ndarray:
     """Return distances from the affine plane through three points with the least median error.
 
-    This is least median of squares [1]_ with triples spread evenly over the points [2]_. None if
-    all points are on a line.
-
-    References
-    ----------
-    .. [1] Rousseeuw, P. J. Least median of squares regression. JASA 1984, 79, 871.
-    .. [2] Roberts, M. The unreasonable effectiveness of quasirandom sequences, 2018.
+    This is least median of squares (Rousseeuw, JASA 1984, 79, 871) with triples that Roberts'
+    sequence (The unreasonable effectiveness of quasirandom sequences, 2018) spreads evenly over
+    the points.
     """
     design = np.column_stack((np.ones(len(unit)), unit))
     triples = (np.arange(1, _TRIALS + 1)[:, None] * _SPREADS % 1 * len(unit)).astype(int)
-    wide = np.abs(np.linalg.det(design[triples])) > 2 * _MINIMUM_AREA
-    triples = triples[wide]
+    triples = triples[np.abs(np.linalg.det(design[triples])) > 2 * _MINIMUM_AREA]
     if not len(triples):
-        return None
+        raise np.linalg.LinAlgError('all points are on a line')
     planes = np.linalg.solve(design[triples], shifted[triples])
     judges = slice(None, None, max(1, len(unit) // _JUDGES))
     errors = np.linalg.norm(design[judges] @ planes - shifted[judges], axis=-1)

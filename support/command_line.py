@@ -1,4 +1,4 @@
-"""The command `ahf` as a process."""
+"""The command `ahf`, in this process or in one of its own."""
 
 from __future__ import annotations
 
@@ -7,7 +7,17 @@ import subprocess
 import sys
 from pathlib import Path
 
+from ahf_ros.cli import main
+
 ROOT = Path(__file__).resolve().parent.parent
+
+
+def status(*arguments: object) -> int:
+    """Return the exit status of the command line in this process."""
+    try:
+        return main([str(argument) for argument in arguments])
+    except SystemExit as left:
+        return int(left.code or 0)
 
 
 def ahf(

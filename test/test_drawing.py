@@ -5,14 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ahf_ros.drawing.colours import (
+from ahf_ros.drawing.overlay import (
     DECODED_COLOUR,
     DOUBTFUL_COLOUR,
     MISSED_COLOUR,
     UNDECODED_COLOUR,
     WRONG_COLOUR,
+    Label,
+    draw,
+    overlay,
+    place_labels,
+    summary,
 )
-from ahf_ros.drawing.overlay import Label, draw, overlay, place_labels, summary
 from ahf_ros.drawing.tiles import Tile, side_by_side
 from ahf_ros.target import (
     UNDECODED,
@@ -61,16 +65,14 @@ def test_a_missed_target_is_crossed_out():
 
 
 def test_doubtful_targets_are_dashed_and_have_a_question_mark() -> None:
-    uncertain = UndecodedTarget(
-        UNDECODED, 0, 160.0, 140.0, 20.0, 12.0, 0.3, 0.4, reason='uncertain', likely_id=7
-    )
-    for target in (Target(7, 0, 160.0, 140.0, 20.0, 12.0, 0.3, 0.9), uncertain):
-        drawn = overlay(GRAY, [target])
+    place = (160.0, 140.0, 20.0, 12.0, 0.3)
+    uncertain = UndecodedTarget(UNDECODED, 0, *place, 0.4, reason='uncertain', likely_id=7)
+    whole = shown(overlay(GRAY, [target(7)]), DECODED_COLOUR)[126:155].sum()
+    for doubtful in (Target(7, 0, *place, 0.9), uncertain):
+        drawn = overlay(GRAY, [doubtful])
         assert not shown(drawn, DECODED_COLOUR).any()
         assert shown(drawn, DOUBTFUL_COLOUR)[100:125, 175:205].any()  # its label
-        ring = shown(drawn, DOUBTFUL_COLOUR)[126:155]
-        whole = shown(overlay(GRAY, [Target(7, 0, 160.0, 140.0, 20.0, 12.0, 0.3)]), DECODED_COLOUR)
-        assert 0.4 * whole[126:155].sum() < ring.sum() < 0.85 * whole[126:155].sum()
+        assert 0.4 * whole < shown(drawn, DOUBTFUL_COLOUR)[126:155].sum() < 0.85 * whole
 
 
 def test_labels_hide_no_target_and_no_other_label() -> None:
@@ -95,8 +97,7 @@ def test_squares_are_drawn_as_squares_with_their_number_beside_them() -> None:
     drawn = shown(overlay(GRAY, [marker]), DECODED_COLOUR)
     assert all(drawn[round(y), round(x)] for x, y in turned)
     assert not drawn[120 - 71, 160]  # the inscribed circle
-    sides = [(210.0, 70.0), (210.0, 170.0), (110.0, 70.0), (110.0, 170.0)]
-    outline = np.array([*turned, *sides])
+    outline = np.array([*turned, (210, 70), (210, 170), (110, 70), (110, 170)])
     label = Label('7', 160.0, 120.0, 100.0, DECODED_COLOUR, outline)
     ((left, bottom),) = place_labels([label], [(18.0, 11.0)], (240, 320), 2.0)
     assert np.hypot(left - 210.0, bottom - 70.0) < 8.0
@@ -146,18 +147,17 @@ def test_lines_grow_with_the_image():
 
 
 def test_the_summary_says_how_many_and_through_what():
-    assert summary(Identification((target(7), target(UNDECODED)))) == '1 identified, no filter'
+    def told(expected: int = 0, *more: FilterState, **values: object) -> str:
+        return summary(Identification((target(7), target(UNDECODED)), expected, *more, **values))
+
+    assert told() == '1 identified, no filter'
     through = FilterState(applied=True, gamma_high=1.2, gamma_low=0.25)
-    told = summary(Identification((target(7),), 54, through))
-    assert told == '1 identified of 54, gamma_high 1.2, gamma_low 0.25'
-    missed = Identification((target(7),), 3, expected_ids=(6, 7, 8))
-    assert summary(missed) == '1 identified of 3, missed 6 8, no filter'
-    many = summary(Identification((), 20, expected_ids=tuple(range(1, 21))))
-    assert many.endswith('missed 1 2 3 4 5 6 7 8 9 10 11 12 and 8 others, no filter')
-    mirrored = Identification((target(7),), 54, mirrored=True)
-    assert summary(mirrored) == '1 identified of 54, mirrored, no filter'
-    estimated = Identification((target(7),), 54, estimated=True)
-    assert summary(estimated) == '1 identified of an estimated 54, no filter'
+    assert told(54, through) == '1 identified of 54, gamma_high 1.2, gamma_low 0.25'
+    assert told(3, expected_ids=(6, 7, 8)) == '1 identified of 3, missed 6 8, no filter'
+    many = told(20, expected_ids=range(10, 30))
+    assert many.endswith('missed 10 11 12 13 14 15 16 17 18 19 20 21 and 8 others, no filter')
+    assert told(54, mirrored=True) == '1 identified of 54, mirrored, no filter'
+    assert told(54, estimated=True) == '1 identified of an estimated 54, no filter'
 
 
 def test_no_size_of_a_target_crashes() -> None:

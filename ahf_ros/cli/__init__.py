@@ -13,22 +13,9 @@ from collections.abc import Sequence
 
 from ahf_ros import ending
 
-INTERRUPTED, FAILED = 130, 1
-
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command.
-
-    Parameters
-    ----------
-    arguments : sequence of str, optional
-        Arguments after the name of the program; where None, `sys.argv` has them.
-
-    Returns
-    -------
-    int
-        The exit status.
-    """
+    """Run the command that arguments name, by default those of `sys.argv`; return its status."""
     # What OpenCV warns of, such as tags of TIFF files that it does not know, is not for users.
     os.environ.setdefault('OPENCV_LOG_LEVEL', 'ERROR')
     try:
@@ -41,15 +28,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
             sys.stdout.flush()
         return status
     except KeyboardInterrupt:
-        return INTERRUPTED
+        return 130
     except BrokenPipeError:
         # Without this, the interpreter reports an error when it flushes the closed pipe.
         _discard_output()
-        return FAILED
     except OSError as error:  # of standard output: a full disk
         _discard_output()
         print(f'ahf: error: {error.strerror or error}', file=sys.stderr)
-        return FAILED
+    return 1
+
+
+def tell(command: str, problem: object) -> None:
+    """Say on standard error what a command could not do."""
+    print(f'ahf {command}: {problem}', file=sys.stderr)
 
 
 def _replace_closed() -> None:

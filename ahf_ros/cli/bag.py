@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterator, Sequence
 from contextlib import closing, redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 
 from ahf_ros.batch.engine import EngineLost, TaskFailed, finished_tasks
 from ahf_ros.batch.processes import SHUTDOWN_TIMEOUT
-from ahf_ros.cli.engines import create_engine, shared_settings
+from ahf_ros.cli import tell
+from ahf_ros.cli.engines import create_engine, progress_bar, shared_settings
 from ahf_ros.cli.options import (
+    add_engine_options,
     add_option,
     add_options,
-    add_scheduler_argument,
     add_search_options,
     add_target_options,
     settings_from,
@@ -28,16 +27,6 @@ from ahf_ros.settings.parameter import Parameter
 
 if TYPE_CHECKING:
     from ahf_ros.bag.run import BagTask, Outcome
-
-JOBS = Parameter('jobs', 1, 'Number of bags processed at the same time.', minimum=1)
-OUTPUT_TOPIC = Parameter(
-    'output_topic',
-    'coded_targets',
-    'Topic of the answers, relative to the topic of the images unless it begins with a slash.',
-)
-STORAGE = Parameter(
-    'storage', 'mcap', 'Storage format of the output bag.', choices=('mcap', 'sqlite3')
-)
 
 # A process outlives its killed worker of a cluster by at most `SHUTDOWN_TIMEOUT`.
 _LOCK_TIMEOUT = 2 * SHUTDOWN_TIMEOUT  # s
@@ -66,47 +55,47 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='TOPIC',
         help='Topic of images; may be repeated. Default: all image topics.',
     )
-    add_option(parser, OUTPUT_TOPIC)
-    add_option(parser, STORAGE)
+    text = (
+        'Topic of the answers, relative to the topic of the images unless it begins with a slash.'
+    )
+    add_option(parser, Parameter('output_topic', 'coded_targets', text))
+    storages = 'mcap', 'sqlite3'
+    text = 'Storage format of the output bag.'
+    add_option(parser, Parameter('storage', 'mcap', text, choices=storages))
     parser.add_argument(
         '--debug-images', action='store_true', help='Also write annotated images, as JPEG.'
     )
-    add_option(parser, JOBS)
-    add_scheduler_argument(parser)
+    text = 'Number of bags processed at the same time.'
+    add_engine_options(parser, Parameter('jobs', 1, text, minimum=1))
     add_target_options(parser)
     add_options(parser.add_argument_group('stacks'), StackSettings)
     add_search_options(parser)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Process all bags.
-
-    Returns
-    -------
-    int
-        0, or 1 if a bag could not be read completely or written, or an image was refused.
-
-    Raises
-    ------
-    ValueError
-        If options contradict each other.
-    """
+    """Process all bags; the status is 1 as well if an image was refused or a bag is damaged."""
     tasks = _tasks(options)
+    jobs = min(options.jobs, len(tasks))
+    columns = TextColumn('{task.description}'), BarColumn(), MofNCompleteColumn()
     failed = False
-    with _progress() as progress:
+    with progress_bar(True, *columns, TimeRemainingColumn()) as progress:
         bars = [progress.add_task(task.source.name, total=None) for task in tasks]
 
         def report(number: int, done: int, total: int, remark: str) -> None:
             progress.update(bars[number], completed=done, total=max(total, done))
             if remark:
-                print(f'ahf bag: {tasks[number].source}: {remark}', file=sys.stderr)
+                tell('bag', f'{tasks[number].source}: {remark}')
 
+        engine = create_engine('bag', _attempt, jobs, options.scheduler, _with_machine, report)
         try:
-            for task, outcome in _outcomes(tasks, options.jobs, options.scheduler, report):
-                _report(task, outcome)
-                failed |= isinstance(outcome, ValueError) or bool(outcome.refused or outcome.lost)
+            with closing(engine):
+                for item in finished_tasks(engine, tasks):
+                    outcome = item.result
+                    if isinstance(outcome, TaskFailed):
+                        outcome = ValueError(f'{item.task.source}: {outcome.reason}')
+                    failed |= not _report(item.task, outcome)
         except EngineLost as error:
-            print(f'ahf bag: {error}', file=sys.stderr)
+            tell('bag', error)
             failed = True
     return int(failed)
 
@@ -145,21 +134,6 @@ def _tasks(options: argparse.Namespace) -> list[BagTask]:
     ]
 
 
-def _outcomes(
-    tasks: Sequence[BagTask], jobs: int, scheduler: str, report: Any
-) -> Iterator[tuple[BagTask, Outcome | ValueError]]:
-    """Yield the outcome of each bag, or the error that ended it, as soon as it is known."""
-    engine = create_engine(
-        'bag', _attempt, min(jobs, len(tasks)), scheduler, _with_machine, report
-    )
-    with closing(engine):
-        for item in finished_tasks(engine, tasks):
-            outcome = item.result
-            if isinstance(outcome, TaskFailed):
-                outcome = ValueError(f'{item.task.source}: {outcome.reason}')
-            yield item.task, outcome
-
-
 def _with_machine(outcome: Outcome | ValueError, machine: str) -> Outcome | ValueError:
     if isinstance(outcome, ValueError):
         return ValueError(f'{outcome} (on {machine})')
@@ -178,34 +152,22 @@ def _attempt(task: BagTask, report: Any) -> Outcome | ValueError:
         return ValueError(f'{task.output} cannot be written: {error}')
 
 
-def _progress() -> Progress:
-    shown = sys.stderr.isatty()
-    return Progress(
-        TextColumn('{task.description}'),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        console=Console(stderr=True, quiet=not shown),
-        transient=True,
-        redirect_stdout=False,
-        disable=not shown,
-    )
-
-
-def _report(task: BagTask, outcome: Outcome | ValueError) -> None:
-    """Report the outcome of a bag on standard error."""
+def _report(task: BagTask, outcome: Outcome | ValueError) -> bool:
+    """Report the outcome of a bag on standard error; return whether all of it was processed."""
     if isinstance(outcome, ValueError):
-        print(f'ahf bag: {outcome}', file=sys.stderr)
-        return
+        tell('bag', outcome)
+        return False
     refused = f', {outcome.refused} of them not accepted' if outcome.refused else ''
     print(f'{task.output}: {outcome.images} images answered{refused}', file=sys.stderr)
     for lost in outcome.lost:
-        print(f'ahf bag: {task.source}: missing: {lost}', file=sys.stderr)
+        tell('bag', f'{task.source}: missing: {lost}')
     for left_out in outcome.left_out:
-        print(f'ahf bag: {task.source}: left out: {left_out}', file=sys.stderr)
-    if outcome.refused or outcome.lost:
-        print(
-            f'ahf bag: {task.output}: what was not accepted or is missing is not tried again; '
-            'to do so, remove this bag or name another one',
-            file=sys.stderr,
-        )
+        tell('bag', f'{task.source}: left out: {left_out}')
+    if not outcome.refused and not outcome.lost:
+        return True
+    tell(
+        'bag',
+        f'{task.output}: what was not accepted or is missing is not tried again; to do so, '
+        'remove this bag or name another one',
+    )
+    return False

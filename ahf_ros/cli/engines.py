@@ -1,35 +1,27 @@
-"""The engines that commands process their tasks with."""
+"""The engines that commands process their tasks with, and the bar that shows how far they are."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ahf_ros.batch.engine import Engine, Job, Report, SerialEngine, available_cores, no_report
 from ahf_ros.batch.processes import ProcessEngine
+from ahf_ros.cli import tell
 from ahf_ros.session_settings import IdentificationSettings
 from ahf_ros.settings.nested import updated
 
-
-def threads_each(jobs: int) -> int:
-    """Return the number of threads of each of several processes on this machine."""
-    return max(available_cores() // max(jobs, 1), 1)
+if TYPE_CHECKING:
+    from rich.progress import Progress, ProgressColumn
 
 
 def shared_settings(
     settings: IdentificationSettings, jobs: int, scheduler: str
 ) -> IdentificationSettings:
     """Return settings for one of several processes: its share of the threads, on any machine.
-
-    Parameters
-    ----------
-    settings : IdentificationSettings
-    jobs : int
-        Number of processes on this machine.
-    scheduler : str
-        Address of a scheduler; empty for this machine.
 
     Examples
     --------
@@ -38,7 +30,7 @@ def shared_settings(
     """
     values: dict[str, Any] = {}
     if (jobs > 1 or scheduler) and not settings.adaptive.threads:
-        values['threads'] = 1 if scheduler else threads_each(jobs)
+        values['threads'] = 1 if scheduler else _threads_each(jobs)
     if scheduler and settings.detection.family_file:
         values['family_file'] = str(Path(settings.detection.family_file).absolute())
     return updated(settings, values)
@@ -53,36 +45,36 @@ def create_engine(
     report: Report = no_report,
     isolated: bool = False,
 ) -> Engine:
-    """Return the engine for a job: a cluster, processes, or this process.
+    """Return the engine for a job: the cluster of a scheduler, processes, or this process.
 
-    Parameters
-    ----------
-    command : str
-        Name of the command, for messages.
-    job : callable
-    jobs : int
-        Number of processes on this machine.
-    scheduler : str
-        Address of the scheduler of a cluster; empty for this machine.
-    located : callable
-        As for `ahf_ros.batch.cluster.DaskEngine`.
-    report : callable, optional
-        Called with the number of the task before what the job reports.
-    isolated : bool
-        Whether one process is started, too, where there is but one.
-
-    Raises
-    ------
-    ValueError
-        If the cluster cannot be used.
+    `located` is as for `ahf_ros.batch.cluster.DaskEngine`, and `report` is called with the number
+    of the task before what the job reports. `isolated` starts a process where there is but one,
+    too. A ValueError says so if the cluster cannot be used.
     """
     if scheduler:
         from ahf_ros.batch.cluster import DaskEngine
 
-        def say(text: str) -> None:
-            print(f'ahf {command}: {text}', file=sys.stderr)
-
-        return DaskEngine(job, scheduler, report, say, located)
+        return DaskEngine(job, scheduler, report, partial(tell, command), located)
     if jobs > 1 or isolated:
-        return ProcessEngine(job, jobs, report, threads_each(jobs))
+        return ProcessEngine(job, jobs, report, _threads_each(jobs))
     return SerialEngine(job, report)
+
+
+def _threads_each(jobs: int) -> int:
+    """Return the number of threads of each of several processes on this machine."""
+    return max(available_cores() // max(jobs, 1), 1)
+
+
+def progress_bar(shown: bool, *columns: ProgressColumn) -> Progress:
+    """Return a bar on standard error that is gone when all is done; it needs a terminal."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    # If standard output were redirected, JSON would go to the console of the progress bar.
+    return Progress(
+        *columns,
+        console=Console(stderr=True),
+        transient=True,
+        redirect_stdout=False,
+        disable=not (shown and sys.stderr.isatty()),
+    )

@@ -7,16 +7,13 @@ import json
 import sys
 from typing import Any
 
+from ahf_ros.cli import tell
 from ahf_ros.cli.options import add_option
 from ahf_ros.evaluation import TOLERANCE, Score, evaluate, table, total
 from ahf_ros.interchange.target_json import read_results
 from ahf_ros.interchange.truth_files import read_truth
 from ahf_ros.settings.parameter import Parameter
 from ahf_ros.text import printable
-
-TOLERANCE_PARAMETER = Parameter(
-    'tolerance', TOLERANCE, 'Maximum distance between a target and the truth, px.', minimum=1e-3
-)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,41 +27,33 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action='store_true',
         help='Print one JSON object per image on standard output, and a last one for all images.',
     )
-    add_option(parser, TOLERANCE_PARAMETER)
+    text = 'Maximum distance between a target and the truth, px.'
+    add_option(parser, Parameter('tolerance', TOLERANCE, text, minimum=1e-3))
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the figures of each image and of all images.
-
-    Returns
-    -------
-    int
-        0, or 1 if a file could not be read or compared.
-    """
+    """Print the figures of each image and of all images."""
     try:
         truth = read_truth(options.truth)
         results = read_results(options.results)
         scores = evaluate(truth, results, options.tolerance)
     except ValueError as error:
-        print(f'ahf evaluate: {error}', file=sys.stderr)
+        tell('evaluate', error)
         return 1
     for name in results:
         if name not in truth:
-            print(
-                f'ahf evaluate: {printable(name)} is not in {options.truth}; its targets count as '
-                'false',
-                file=sys.stderr,
-            )
+            text = f'{printable(name)} is not in {options.truth}; its targets count as false'
+            tell('evaluate', text)
     if options.json:
         for name, item in scores.items():
-            print(json.dumps(record(name, item)))
-        print(json.dumps(record(None, total(scores.values()))))
+            print(json.dumps(_record(name, item)))
+        print(json.dumps(_record(None, total(scores.values()))))
     else:
         print(table(scores), file=sys.stderr)
     return 0
 
 
-def record(image: str | None, item: Score) -> dict[str, Any]:
+def _record(image: str | None, item: Score) -> dict[str, Any]:
     """Return the figures of an image as a JSON object; `image` is None for all images."""
     x, y, both = item.rmse or (None, None, None)
     return {

@@ -1,27 +1,25 @@
-"""`ahf export`, and what `ahf identify` exports at once."""
+"""`ahf export`, and what `ahf identify` exports at once.
+
+What computes is imported where it is used, because `ahf identify --help` lists the formats.
+"""
 
 from __future__ import annotations
 
 import argparse
 import sys
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-from ahf_ros.cli.export_options import (
-    add_control_arguments,
-    check_control,
-    export_help,
-    parsed_export,
-)
+from ahf_ros.cli import tell
+from ahf_ros.cli.options import Group, add_option, parsed_by
 from ahf_ros.interchange.export.formats import FORMATS, Export
-from ahf_ros.interchange.export.survey import (
-    Control,
-    MeasuredImage,
-    make_survey,
-    notes_on,
-    read_measured_images,
-)
-from ahf_ros.interchange.point_lists import read_point_list
+from ahf_ros.settings.parameter import Parameter
 from ahf_ros.text import counted
+
+if TYPE_CHECKING:
+    from ahf_ros.interchange.export.survey import Control, MeasuredImage
+
+_FOLDER = f'to a folder as other software reads them: {", ".join(FORMATS)}.'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -32,46 +30,73 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         'export',
         nargs='+',
-        type=parsed_export,
+        type=parsed_by(Export.parsed),
         metavar='FORMAT=DIR',
-        help=export_help('Write the results'),
+        help=f'Write the results {_FOLDER}',
     )
-    add_control_arguments(parser)
+    _add_control_arguments(parser)
+
+
+def add_export_arguments(parser: Group) -> None:
+    """Give another command, or a group of it, the options that export what it identifies."""
+    parser.add_argument(
+        '--export',
+        action='append',
+        default=[],
+        type=parsed_by(Export.parsed),
+        metavar='FORMAT=DIR',
+        help=f'Also write the results, once all images are identified, {_FOLDER} Repeatable.',
+    )
+    _add_control_arguments(parser)
+
+
+def _add_control_arguments(parser: Group) -> None:
+    parser.add_argument(
+        '--control', metavar='POINTS.csv', help='Control points to export: ID, x, y, z.'
+    )
+    text = (
+        'Coordinate reference system of the control points, such as EPSG:25832; empty for local '
+        'coordinates.'
+    )
+    add_option(parser, Parameter('control_crs', '', text))
+    text = 'Standard deviation of the coordinates of control points, in their unit; 0: unknown.'
+    add_option(parser, Parameter('control_sigma', 0.0, text, minimum=0.0))
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write each export.
+    """Write each export."""
+    from ahf_ros.interchange.export.survey import read_measured_images
 
-    Returns
-    -------
-    int
-        0, or 1 if a file could not be read or written, or a format cannot hold the results.
-
-    Raises
-    ------
-    ValueError
-        If options are not accepted.
-    """
     check_control(options)
     try:
         control = control_from(options)
         images = read_measured_images(options.results)
     except ValueError as error:
-        print(f'ahf export: {error}', file=sys.stderr)
+        tell('export', error)
         return 1
-    return write_exports('export', options.export, images, control)
+    return int(not write_exports('export', options.export, images, control))
+
+
+def check_control(options: argparse.Namespace) -> None:
+    """Raise a ValueError if options describe control points that are not given or exported."""
+    if options.control and not options.export:
+        raise ValueError('control is given without export, accepted is both')
+    if not options.control and (options.control_crs or options.control_sigma):
+        raise ValueError('control_crs or control_sigma is given without control, accepted is both')
+    if not options.control_crs.isprintable():
+        raise ValueError(f'control_crs is {options.control_crs!r}, accepted is one line of text')
 
 
 def control_from(options: argparse.Namespace) -> Control | None:
     """Return the control points that the options name; None if they name none.
 
-    Raises
-    ------
-    ValueError
-        If the list of points cannot be read or is damaged.
+    A ValueError says so if the list of points cannot be read or is damaged.
     """
     if options.control is None:
         return None
+    from ahf_ros.interchange.export.survey import Control
+    from ahf_ros.interchange.point_lists import read_point_list
+
     points = read_point_list(options.control)
     return Control(points, options.control_crs.strip(), options.control_sigma)
 
@@ -82,23 +107,20 @@ def write_exports(
     images: Sequence[MeasuredImage],
     control: Control | None,
     quiet: bool = False,
-) -> int:
-    """Write exports, each independently of the others, and report them on standard error.
+) -> bool:
+    """Write exports, each independently of the others, and return whether all are written.
 
-    With `quiet`, only problems are reported.
-
-    Returns
-    -------
-    int
-        0, or 1 if one of them could not be written.
+    They are reported on standard error; with `quiet`, only problems are.
     """
-    failed = False
+    from ahf_ros.interchange.export.survey import make_survey, notes_on
+
+    written = True
     for export in exports:
         try:
             files = export.write(images, control)
         except ValueError as error:
-            print(f'ahf {command}: {export.format}: {error}', file=sys.stderr)
-            failed = True
+            tell(command, f'{export.format}: {error}')
+            written = False
             continue
         if quiet:
             continue
@@ -106,7 +128,7 @@ def write_exports(
         print(f'{export.folder}: {export.format}, {count}', file=sys.stderr)
         if control and not FORMATS[export.format].control:
             print(f'{export.folder}: {export.format} has no control points', file=sys.stderr)
-    if control and exports and not failed and not quiet:
+    if control and exports and written and not quiet:
         for note in notes_on(control, make_survey(images, control)):
             print(note, file=sys.stderr)
-    return int(failed)
+    return written

@@ -1,110 +1,162 @@
-"""`ahf identify`: the coded targets in image files: files, folders, patterns and lists."""
+"""`ahf identify`: the coded targets in image files: files, folders, patterns and lists.
+
+What computes is imported where it is used, so that `--help` and mistakes come at once.
+"""
 
 from __future__ import annotations
 
 import argparse
+import json
+import re
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing, redirect_stdout
 from glob import glob, has_magic
 from pathlib import Path
-from typing import Any, TextIO
-
-from rich.console import Console
-from rich.progress import Progress
+from typing import TYPE_CHECKING, Any, TextIO
 
 from ahf_ros.batch.engine import Engine, EngineLost, available_cores
-from ahf_ros.batch.identification import detector_of, identify_images
-from ahf_ros.batch.results import Results, Unwritable
-from ahf_ros.batch.run import kept_outcomes_in_order, outcomes_in_order
-from ahf_ros.batch.task import ImageOutcome, ImageTask, with_machine
-from ahf_ros.cli.engines import create_engine, shared_settings
-from ahf_ros.cli.export import control_from, write_exports
-from ahf_ros.cli.export_options import check_control
-from ahf_ros.cli.identify_options import stacked
-from ahf_ros.cli.options import settings_from
-from ahf_ros.cli.outcomes import overlay_path, print_outcome
+from ahf_ros.batch.task import ImageOutcome, ImageTask, Level, with_machine
+from ahf_ros.cli import tell
+from ahf_ros.cli.engines import create_engine, progress_bar, shared_settings
+from ahf_ros.cli.export import add_export_arguments, check_control, control_from, write_exports
+from ahf_ros.cli.options import (
+    add_image_options,
+    add_option,
+    add_output_options,
+    add_search_options,
+    add_target_options,
+    settings_from,
+)
 from ahf_ros.codes import VENDOR_NAMES
 from ahf_ros.codes.families import AUTO
-from ahf_ros.interchange.export.survey import MeasuredImage, measured_image
-from ahf_ros.interchange.files import is_url, read_text, urls_named
-from ahf_ros.interchange.image_files import SUFFIXES
-from ahf_ros.session import create_identifier
+from ahf_ros.interchange.files import RESULTS_FILE, is_url, read_text, urls_named
 from ahf_ros.session_settings import IdentificationSettings, StackSettings
+from ahf_ros.settings.parameter import parameters
 from ahf_ros.target import UNDECODED
 from ahf_ros.text import shown
 
+if TYPE_CHECKING:
+    from ahf_ros.interchange.export.survey import MeasuredImage
+
+_WORTH_PROCESSES = 4  # images; fewer are identified before processes have started
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Give a parser the arguments of the command."""
+    parser.add_argument(
+        'images',
+        nargs='+',
+        metavar='IMAGE',
+        help='Image files; folders, for their images; patterns in quotation marks, such as '
+        '"day*/*.jpg" or "**/*.tif"; URLs of storages that fsspec reads, such as s3:// and '
+        'https://; @FILE for a list of these, one a line.',
+    )
+    add_image_options(parser)
+    add_target_options(parser)
+    output = parser.add_argument_group('output')
+    output.add_argument(
+        '--output',
+        type=Path,
+        metavar='DIR',
+        help=f'Write results to {RESULTS_FILE} in this folder as they come. The same command '
+        'again goes on where it was interrupted; files that have changed, and all with other '
+        'settings, are identified again.',
+    )
+    add_output_options(output)
+    add_export_arguments(parser.add_argument_group('export'))
+    stacks = parser.add_argument_group('stacks')
+    for item in parameters(StackSettings):
+        if item.name in ('stack', 'stack_movement'):
+            add_option(stacks, item)
+    stacks.add_argument(
+        '--stack-by',
+        default='',
+        metavar='REGEX',
+        help='Identify images together that are in one folder (folder), or in whose names the '
+        "groups of a regular expression match the same text, such as '(.*)_\\d+'; with --stack N, "
+        'N of them at a time.',
+    )
+    add_search_options(parser)
+
 
 def run(options: argparse.Namespace) -> int:
-    """Identify, print and draw each image or stack, independently of those before it.
-
-    Returns
-    -------
-    int
-        0, or 1 if a file could not be read or written.
-
-    Raises
-    ------
-    ValueError
-        If options contradict each other.
-    """
-    output = sys.stdout
+    """Identify, print and draw each image or stack, independently of those before it."""
+    output = sys.stdout if options.json else None
     with redirect_stdout(sys.stderr):  # what other detectors print is not JSON
         return _run(options, output)
 
 
-def _run(options: argparse.Namespace, output: TextIO) -> int:
-    settings = settings_from(options, IdentificationSettings)
+def _run(options: argparse.Namespace, output: TextIO | None) -> int:
     check_control(options)
     if options.upright and options.export:
         raise ValueError(
             'upright is given with export, accepted is one of them: other software counts pixels '
             'as they are stored'
         )
+    settings = settings_from(options, IdentificationSettings)
     paths, problems = image_paths(options.images)
     for problem in problems:
-        print(f'ahf identify: {problem}', file=sys.stderr)
+        tell('identify', problem)
     jobs, tasks = _tasks(options, settings, paths)
     for export in options.export:
         export.check_names([task.paths[0] for task in tasks])
     try:
         control = control_from(options)
     except ValueError as error:
-        print(f'ahf identify: {error}', file=sys.stderr)
+        tell('identify', error)
         return 1
-    # Refuses what does not fit together.
-    create_identifier(detector=detector_of(settings), settings=settings)
-    quiet = options.quiet
+    check_settings(settings)
+
+    from ahf_ros.batch.identification import identify_images
+    from ahf_ros.batch.results import Unwritable
+    from ahf_ros.interchange.export.survey import measured_image
+
     failed = bool(problems)
     results = identified = 0
     measured: list[MeasuredImage] = []
     engine = create_engine('identify', identify_images, jobs, options.scheduler, with_machine)
-    with closing(engine):
+    with closing(engine), progress_bar(len(tasks) > 1 and not options.quiet) as progress:
+        outcomes = _outcomes(engine, tasks, options)
         try:
-            for outcome in _with_progress(_outcomes(engine, tasks, options), len(tasks), quiet):
-                print_outcome('identify', outcome, output if options.json else None, quiet)
+            for outcome in progress.track(outcomes, total=len(tasks), description='identify'):
+                print_outcome('identify', outcome, output, options.quiet)
                 failed |= outcome.failed
-                results += len(outcome.records)
-                identified += sum(_decoded(record) for record in outcome.records)
-                if options.export:
-                    measured += [measured_image(it, it['image']) for it in outcome.records]
+                for record in outcome.records:
+                    results += 1
+                    identified += sum(it['id'] != UNDECODED for it in record['targets'])
+                    if options.export:
+                        measured.append(measured_image(record, record['image']))
         except (EngineLost, Unwritable) as error:
-            print(f'ahf identify: {error}', file=sys.stderr)
+            tell('identify', error)
             return 1
-    if results and not quiet:
+    if results and not options.quiet:
         print(_hint(settings, identified), end='', file=sys.stderr)
-    failed |= bool(write_exports('identify', options.export, measured, control, quiet))
+    if not write_exports('identify', options.export, measured, control, options.quiet):
+        failed = True
     return int(failed)
 
 
-_WITHOUT_N = (
-    'N is not given, so that no filter was searched for: with --expected-targets N, AHF searches '
-    'for a filter wherever an image shows fewer than N targets\n'
-)
+def check_settings(settings: IdentificationSettings) -> None:
+    """Raise a ValueError if the settings do not fit together, before any image is read."""
+    from ahf_ros.batch.identification import detector_of
+    from ahf_ros.session import create_identifier
+
+    create_identifier(detector=detector_of(settings), settings=settings)
 
 
-def _decoded(record: Mapping[str, Any]) -> int:
-    return sum(target['id'] != UNDECODED for target in record['targets'])
+def print_outcome(command: str, outcome: ImageOutcome, output: TextIO | None, quiet: bool) -> None:
+    """Print messages of an outcome on standard error, and JSON where there is an output for it.
+
+    If `quiet`, only warnings and problems are printed on standard error.
+    """
+    minimum = Level.WARNING if quiet else Level.NOTE if output else Level.DETAIL
+    for record in outcome.records if output else ():
+        print(json.dumps(record), file=output, flush=True)
+    for message in outcome.messages:
+        if message.level >= minimum:
+            before = f'ahf {command}: ' if message.level == Level.PROBLEM else ''
+            print(f'{before}{message.text}', file=sys.stderr)
 
 
 def _hint(settings: IdentificationSettings, identified: int) -> str:
@@ -112,17 +164,17 @@ def _hint(settings: IdentificationSettings, identified: int) -> str:
     family = settings.detection.family
     if not identified and family == AUTO:
         return (
-            f'--family {AUTO} looks for rings only, {", ".join(VENDOR_NAMES)}; other families have to '
-            'be named\n'
+            f'--family {AUTO} looks for {", ".join(VENDOR_NAMES)} only; other families have to be '
+            'named\n'
         )
     if not identified:
         return f'targets of {family} were looked for; --family names others\n'
     if settings.expected_targets or settings.adaptive.listed or settings.estimate_expected:
         return ''
-    return _WITHOUT_N
-
-
-_WORTH_PROCESSES = 4  # images; fewer are identified before processes have started
+    return (
+        'N is not given, so that no filter was searched for: with --expected-targets N, AHF '
+        'searches for a filter wherever an image shows fewer than N targets\n'
+    )
 
 
 def _tasks(
@@ -134,26 +186,55 @@ def _tasks(
     jobs = min(jobs, len(groups))
     settings = shared_settings(settings, jobs, options.scheduler)
     stacking = StackSettings(stack=options.stack, stack_movement=options.stack_movement)
-    overlays = _overlay_paths(paths, options.overlay)
+    if options.overlay and len(set(_overlay_paths(options, set(paths)))) < len(set(paths)):
+        raise ValueError(
+            'overlay would hold several images of the same name, accepted are different names'
+        )
     return jobs, [
-        ImageTask(
-            tuple(group),
+        image_task(
+            options,
+            group,
             settings,
-            stacking,
-            upright=options.upright,
+            stacking=stacking,
             stacked=bool(options.stack_by) or options.stack > 1,
             minimum=0 if options.stack_by else options.stack,
-            overlays=tuple(overlays[path] for path in group) if overlays else (),
-            folder=str(Path.cwd()) if options.scheduler else '',
         )
         for group in groups
     ]
+
+
+def image_task(
+    options: argparse.Namespace,
+    paths: Iterable[str],
+    settings: IdentificationSettings,
+    **more: Any,
+) -> ImageTask:
+    """Return the task of images that are identified together, with more fields of it."""
+    paths = tuple(paths)
+    return ImageTask(
+        paths=paths,
+        settings=settings,
+        upright=options.upright,
+        overlays=_overlay_paths(options, paths),
+        folder=str(Path.cwd()) if options.scheduler else '',
+        **more,
+    )
+
+
+def _overlay_paths(options: argparse.Namespace, images: Iterable[str]) -> tuple[str, ...]:
+    """Return the files that images are drawn to; none if there is no folder for them."""
+    if options.overlay is None:
+        return ()
+    return tuple(str(options.overlay / f'{Path(it).stem}_overlay.png') for it in images)
 
 
 def _outcomes(
     engine: Engine, tasks: Sequence[ImageTask], options: argparse.Namespace
 ) -> Iterator[ImageOutcome]:
     """Yield the outcomes of tasks in their order, and keep the results if that is wanted."""
+    from ahf_ros.batch.results import Results
+    from ahf_ros.batch.run import kept_outcomes_in_order, outcomes_in_order
+
     if not options.output:
         yield from outcomes_in_order(engine, tasks)
         return
@@ -166,48 +247,11 @@ def _outcomes(
         yield from kept_outcomes_in_order(engine, tasks, results, say)
 
 
-def _overlay_paths(images: Sequence[str], folder: Path | None) -> dict[str, str]:
-    """Return the path of the overlay of each image; none if there is no folder for them."""
-    if folder is None:
-        return {}
-    paths = {path: overlay_path(folder, path) for path in images}
-    if len(set(paths.values())) < len(paths):
-        raise ValueError(
-            'overlay would hold several images of the same name, accepted are different names'
-        )
-    return paths
-
-
-def _with_progress(
-    outcomes: Iterator[ImageOutcome], count: int, quiet: bool
-) -> Iterator[ImageOutcome]:
-    """Yield outcomes, with a progress bar for several tasks on a terminal."""
-    shown = count > 1 and sys.stderr.isatty() and not quiet
-    # If standard output were redirected, JSON would go to the console of the progress bar.
-    with Progress(
-        console=Console(stderr=True, quiet=not shown),
-        transient=True,
-        redirect_stdout=False,
-        disable=not shown,
-    ) as progress:
-        yield from progress.track(outcomes, total=count, description='identify')
-
-
 def image_paths(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Return the image files that arguments name, and what is wrong with the others.
+    """Return the image files that arguments name, and what is wrong with other arguments.
 
-    Parameters
-    ----------
-    arguments : sequence of str
-        As `ahf_ros.cli.identify_options.IMAGES` says. A file of the name comes first, whatever
-        characters are in it.
-
-    Returns
-    -------
-    paths : list of str
-        In the order of the arguments, and sorted by name within a folder or a pattern.
-    problems : list of str
-        One for each argument that names no image.
+    A file of the name comes first, whatever characters are in it. Files are in the order of the
+    arguments, and sorted by name within a folder or a pattern.
 
     Examples
     --------
@@ -229,6 +273,8 @@ def image_paths(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
 
 
 def _named(argument: str) -> Iterator[str]:
+    from ahf_ros.interchange.image_files import SUFFIXES
+
     path = Path(argument)
     if is_url(argument):
         yield from urls_named(argument, SUFFIXES)
@@ -241,7 +287,53 @@ def _named(argument: str) -> Iterator[str]:
             if line.strip():
                 yield from _named(line.strip())
     elif has_magic(argument):
-        found = glob(argument, recursive=True)  # noqa: PTH207  Path has none for absolute patterns
-        yield from sorted(found)
+        yield from sorted(glob(argument, recursive=True))  # noqa: PTH207  no absolute ones in Path
     else:
         yield argument  # whoever reads it says what is wrong
+
+
+def stacked(images: Sequence[str], by: str, size: int) -> list[list[str]]:
+    r"""Return the images of each stack, in the order of their first images.
+
+    `by` is 'folder', or a regular expression with a group, which has to match whole names without
+    their endings, or empty. A stack has at most `size` images; 1 is no maximum where `by` groups
+    them. A ValueError says what is wrong with `by`.
+
+    Examples
+    --------
+    >>> stacked(['a_0.png', 'a_1.png', 'b_0.png'], r'(.*)_\d', 1)
+    [['a_0.png', 'a_1.png'], ['b_0.png']]
+    """
+    groups: dict[object, list[str]] = {}
+    for path in images:
+        groups.setdefault(_key(path, by), []).append(path)
+    stacks = []
+    for paths in groups.values():
+        step = len(paths) if by and size == 1 else size
+        stacks += [paths[first : first + step] for first in range(0, len(paths), step)]
+    return stacks
+
+
+def _key(path: str, by: str) -> object:
+    """Return what the images of one stack have in common."""
+    if not by:
+        return None
+    if by == 'folder':
+        return Path(path).parent
+    try:
+        pattern = re.compile(by)
+    except (re.error, RecursionError) as error:
+        raise ValueError(
+            f'stack_by is {shown(by)}, accepted is folder or a regular expression: {error}'
+        ) from error
+    if not pattern.groups:
+        raise ValueError(
+            f'stack_by is {shown(by)}, accepted is folder or a regular expression with a group'
+        )
+    match = pattern.fullmatch(Path(path).stem)
+    if match is None:
+        raise ValueError(
+            f'stack_by is {shown(by)}, which does not match {shown(Path(path).stem)}; accepted is '
+            'an expression that matches the names of all images, without their endings'
+        )
+    return (Path(path).parent, *match.groups())

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ahf_ros.cli import tell
 from ahf_ros.codes.gsi import PointFamily, point_family
 from ahf_ros.codes.gsi_learning import Learnt, learn_family, library_text, with_codes
 from ahf_ros.interchange.files import write_whole
@@ -41,18 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write the data file and say what was learnt.
-
-    Returns
-    -------
-    int
-        0, or 1 if a file could not be read or written, or has no target.
-
-    Raises
-    ------
-    ValueError
-        If options are not accepted.
-    """
+    """Write the data file and say what was learnt."""
     radius = options.dot_radius
     if radius is not None and not 0 < radius < np.inf:
         raise ValueError(f'dot_radius is {radius!r}, accepted is a length above 0')
@@ -62,9 +52,9 @@ def run(options: argparse.Namespace) -> int:
         learnt = learn_family(read_point_list(options.points), base, name)
         family = replace(learnt.family, unit=options.unit, source=Path(options.points).name)
         if radius is not None:
-            same = replace(family, dot_radius=radius)
             family = replace(
-                same,
+                family,
+                dot_radius=radius,
                 template_radii=family.template_radii * (radius / family.dot_radius),
                 position_radii=family.position_radii * (radius / family.dot_radius),
             )
@@ -72,7 +62,7 @@ def run(options: argparse.Namespace) -> int:
         write_whole(options.output, library_text(family).encode())
         point_family(options.output)
     except ValueError as error:
-        print(f'ahf learn-family: {error}', file=sys.stderr)
+        tell('learn-family', error)
         return 1
     _report(learnt, base, options)
     return 0
@@ -81,7 +71,7 @@ def run(options: argparse.Namespace) -> int:
 def _report(learnt: Learnt, base: PointFamily, options: argparse.Namespace) -> None:
     """Say on standard error what was learnt and what was not."""
     for number, reason in learnt.left_out.items():
-        print(f'ahf learn-family: target {number} is left out: it {reason}', file=sys.stderr)
+        tell('learn-family', f'target {number} is left out: it {reason}')
     sizes = [target.scale for target in learnt.targets]
     numbers = ', '.join(str(target.number) for target in learnt.targets)
     spread = max(np.hypot(*(target.template - base.template).T).max() for target in learnt.targets)

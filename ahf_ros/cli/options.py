@@ -1,10 +1,11 @@
-"""Command line options: from settings, and those that say where tasks are processed."""
+"""Command line options: from settings, and those that several commands have."""
 
 from __future__ import annotations
 
 import argparse
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar
 
 from ahf_ros.detectors.contract import DetectorSettings
@@ -14,6 +15,7 @@ from ahf_ros.settings.nested import assemble, flat_parameters
 from ahf_ros.settings.parameter import Parameter, parameters
 
 Settings = TypeVar('Settings')
+Value = TypeVar('Value')
 
 _METAVARS = {int: 'N', float: 'X', str: 'TEXT'}
 _FORMER = {'expected_targets': '--expected'}
@@ -21,16 +23,6 @@ _FORMER = {'expected_targets': '--expected'}
 
 Group = argparse._ArgumentGroup | argparse.ArgumentParser
 """What takes options: a parser, or a group of its options."""
-
-JOBS = Parameter(
-    'jobs',
-    0,
-    'Number of images or stacks that are identified at the same time, each in a process of its '
-    'own; 0: one per processor core, and none for fewer than 4 images, which are faster without. '
-    'The result is the same.',
-    minimum=0,
-    maximum=256,
-)
 
 
 def add_target_options(parser: argparse.ArgumentParser) -> None:
@@ -47,37 +39,73 @@ def add_search_options(parser: argparse.ArgumentParser) -> None:
     add_options(group, AdaptiveSettings)
 
 
-def add_options(parser: Group, settings: type) -> None:
-    """Give a parser one option for each parameter of a settings dataclass.
+def add_image_options(parser: Group) -> None:
+    """Give a parser the options that say how and where image files are read."""
+    parser.add_argument(
+        '--upright',
+        action='store_true',
+        help='Turn images as their orientation says. Coordinates then count in the upright '
+        'image, otherwise in the pixels as they are stored.',
+    )
+    text = (
+        'Number of images or stacks that are identified at the same time, each in a process of '
+        'its own; 0: one per processor core, and none for fewer than 4 images, which are faster '
+        'without. The result is the same.'
+    )
+    add_engine_options(parser, Parameter('jobs', 0, text, minimum=0, maximum=256))
 
-    Parameters
-    ----------
-    parser : argparse.ArgumentParser, or a group of it
-        Gets `--max-radius` for the parameter `max_radius`; `--ahf` and `--no-ahf` for one that is
-        true or false.
-    settings : type
-        Settings dataclass, as for `ahf_ros.settings.nested.flat_parameters`.
-    """
+
+def add_engine_options(parser: Group, jobs: Parameter) -> None:
+    """Give a parser the options that say how many processes there are, and on which machines."""
+    add_option(parser, jobs)
+    parser.add_argument(
+        '--scheduler',
+        default='',
+        metavar='ADDRESS',
+        help='Process on the workers of this scheduler of dask.distributed, such as '
+        'tcp://host:8786; files are read and written there.',
+    )
+
+
+def add_output_options(parser: Group) -> None:
+    """Give a parser the options that say what is printed and drawn."""
+    parser.add_argument(
+        '--json', action='store_true', help='Print one JSON object per image on standard output.'
+    )
+    parser.add_argument(
+        '--overlay',
+        type=Path,
+        metavar='DIR',
+        help='Write each image with its targets marked to this folder, as NAME_overlay.png.',
+    )
+    add_quiet(parser)
+
+
+def add_quiet(parser: Group) -> None:
+    """Give a parser the option that leaves problems only."""
+    parser.add_argument(
+        '--quiet', action='store_true', help='Print nothing on standard error but problems.'
+    )
+
+
+def add_options(parser: Group, settings: type) -> None:
+    """Give a parser one option for each parameter of settings and of those nested in them."""
     for item in flat_parameters(settings):
         add_option(parser, item)
 
 
 def add_option(parser: Group, item: Parameter, **changes: Any) -> None:
-    """Give a parser the option of one parameter.
+    """Give a parser the option of one parameter, with other arguments of `add_argument`.
 
-    Parameters
-    ----------
-    parser : argparse.ArgumentParser, or a group of it
-    item : Parameter
-    **changes
-        Arguments of `add_argument` to replace.
+    It is `--max-radius` for the parameter `max_radius`; `--ahf` and `--no-ahf` for one that is
+    true or false.
     """
     text = f'{item.description} Default: {item.default}; accepted: {item.accepted}.'
     arguments: dict[str, Any] = {'default': item.default, 'help': text.replace('%', '%%')}
     if isinstance(item.default, bool):
         arguments |= {'action': argparse.BooleanOptionalAction}
     else:
-        arguments |= {'type': _converter(item), 'metavar': _METAVARS[type(item.default)]}
+        arguments |= {'type': parsed_by(item.value_of), 'metavar': _METAVARS[type(item.default)]}
     name = f'--{item.name.replace("_", "-")}'
     parser.add_argument(name, dest=item.name, **(arguments | changes))
     if former := _FORMER.get(item.name):
@@ -105,36 +133,19 @@ class _Former(argparse.Action):
         setattr(namespace, self.dest, values)
 
 
-def settings_from(options: argparse.Namespace, settings: type[Settings]) -> Settings:
-    """Return the settings from the values of the options.
+def parsed_by(function: Callable[[str], Value]) -> Callable[[str], Value]:
+    """Return a function for the `type` of an argument; the user reads its ValueErrors."""
 
-    Raises
-    ------
-    ValueError
-        If values contradict each other.
-    """
-    names = [item.name for item in flat_parameters(settings)]
-    return assemble(settings, {name: getattr(options, name) for name in names})
-
-
-def _converter(item: Parameter) -> Callable[[str], Any]:
-    """Return the function from the text of an option to its value."""
-
-    def convert(text: str) -> Any:
+    def parse(text: str) -> Value:
         try:
-            return item.value_of(text)
+            return function(text)
         except ValueError as error:
             raise argparse.ArgumentTypeError(str(error)) from error
 
-    return convert
+    return parse
 
 
-def add_scheduler_argument(parser: Group) -> None:
-    """Give a parser the option that names a cluster."""
-    parser.add_argument(
-        '--scheduler',
-        default='',
-        metavar='ADDRESS',
-        help='Process on the workers of this scheduler of dask.distributed, such as '
-        'tcp://host:8786; files are read and written there.',
-    )
+def settings_from(options: argparse.Namespace, settings: type[Settings]) -> Settings:
+    """Return the settings from the values of the options, which must not contradict each other."""
+    names = [item.name for item in flat_parameters(settings)]
+    return assemble(settings, {name: getattr(options, name) for name in names})

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
+from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 from ahf_ros import ending
+from ahf_ros.cli import tell
 from ahf_ros.cli.options import add_option, settings_from
 from ahf_ros.interchange.image_files import write_image
 from ahf_ros.interchange.truth_files import read_truth, write_truth
@@ -17,12 +18,8 @@ from ahf_ros.settings.parameter import Parameter
 from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import TrueTarget
 
-COUNT = Parameter(
-    'count', 1, 'Number of images for each light, with consecutive seeds.', minimum=1
-)
 
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: ArgumentParser) -> None:
     """Give a parser the arguments of the command."""
     parser.add_argument(
         'folder',
@@ -31,7 +28,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='Folder for LIGHT_AMBIENT_SEED.png, or LIGHT_AMBIENT_SEED_PHASE.png with several '
         'phases, and truth.csv; created if it does not exist.',
     )
-    add_option(parser, COUNT)
+    text = 'Number of images for each light, with consecutive seeds.'
+    add_option(parser, Parameter('count', 1, text, minimum=1))
     for item in flat_parameters(SceneSettings):
         if item.name == 'light':
             add_option(parser, item, nargs='+', default=[item.default])
@@ -39,19 +37,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             add_option(parser, item)
 
 
-def run(options: argparse.Namespace) -> int:
-    """Render the images and add their truth to the truth of the folder.
-
-    Returns
-    -------
-    int
-        0, or 1 if a file could not be read or written, or a scene is impossible.
-
-    Raises
-    ------
-    ValueError
-        If options contradict each other.
-    """
+def run(options: Namespace) -> int:
+    """Render the images and add their truth to the truth of the folder."""
     scenes = _scenes(options)
     truth_path = options.folder / 'truth.csv'
     try:
@@ -64,24 +51,22 @@ def run(options: argparse.Namespace) -> int:
             write_image(options.folder / name, rendering.image)
             truth[name] = tuple(map(TrueTarget.of, rendering.targets))
             write_truth(truth_path, truth)
-            text = f'{options.folder / name}: {len(rendering.targets)} targets'
-            print(text, file=sys.stderr)
-    except ValueError as error:
-        print(f'ahf render: {error}', file=sys.stderr)
+            count = len(rendering.targets)
+            print(f'{options.folder / name}: {count} targets', file=sys.stderr)
+    except ValueError as error:  # of a file, or an impossible scene
+        tell('render', error)
         return 1
     return 0
 
 
-def _scenes(options: argparse.Namespace) -> Iterator[tuple[SceneSettings, int]]:
+def _scenes(options: Namespace) -> Iterator[tuple[SceneSettings, int]]:
     """Return scenes and phases one by one, having refused options that do not fit each other."""
-    lights = options.light
     first = [
-        settings_from(argparse.Namespace(**vars(options) | {'light': light}), SceneSettings)
-        for light in lights
+        settings_from(Namespace(**vars(options) | {'light': light}), SceneSettings)
+        for light in options.light
     ]
-    last = options.count - 1
     for scene in first:
-        replace(scene, seed=scene.seed + last)  # refuses a seed that is too large
+        replace(scene, seed=scene.seed + options.count - 1)  # refuses a seed that is too large
     return (
         (replace(scene, seed=scene.seed + number), phase)
         for scene in first

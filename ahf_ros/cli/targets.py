@@ -6,6 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from ahf_ros.cli import tell
 from ahf_ros.cli.options import add_options, settings_from
 from ahf_ros.interchange.files import write_whole
 from ahf_ros.printing.files import geometry_text, sheet_files
@@ -34,18 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write the sheets and their geometry.
-
-    Returns
-    -------
-    int
-        0, or 1 if a file could not be written; the others are written nevertheless.
-
-    Raises
-    ------
-    ValueError
-        If options are not accepted, or do not fit each other.
-    """
+    """Write the sheets and their geometry, each file independently of the others."""
     sheets = Sheets(settings_from(options, SheetSettings))
     failed = False
     files = list(sheet_files(options.output, sheets))
@@ -59,7 +49,7 @@ def run(options: argparse.Namespace) -> int:
         try:
             write_whole(path, content)
         except ValueError as error:
-            print(f'ahf targets: {error}', file=sys.stderr)
+            tell('targets', error)
             failed = True
     if failed:
         return 1

@@ -1,4 +1,8 @@
-"""Overlays: what was found, doubtful and missed, at one look, with labels that have room."""
+"""Overlays: what was found, doubtful and missed, at one look, with labels that have room.
+
+Everything has a dark outline, so that it is seen on any ground. The colours mean the same in
+reports and viewers.
+"""
 
 from __future__ import annotations
 
@@ -10,27 +14,6 @@ import cv2
 import numpy as np
 
 from ahf_ros.codes.designs import relative_reach
-from ahf_ros.drawing.colours import (
-    DECODED_COLOUR,
-    DECODING_DOT_COLOUR,
-    DOUBTFUL_BELOW,
-    DOUBTFUL_COLOUR,
-    MISSED_COLOUR,
-    TEXT_COLOUR,
-    UNDECODED_COLOUR,
-    WRONG_COLOUR,
-    Colour,
-)
-from ahf_ros.drawing.strokes import (
-    FONT_HEIGHT,
-    Ellipse,
-    cross_out,
-    draw_ellipse,
-    draw_plus,
-    draw_polygon,
-    text_size,
-    write,
-)
 from ahf_ros.imaging.image import stretched_to_8_bit
 from ahf_ros.target import (
     UNDECODED,
@@ -41,8 +24,28 @@ from ahf_ros.target import (
     UndecodedTarget,
 )
 
+Colour = tuple[int, int, int]
+"""Blue, green, red."""
+
 Box = tuple[float, float, float, float]
 """Left, upper, right and lower border, px."""
+
+DECODED_COLOUR: Colour = (60, 230, 60)
+DOUBTFUL_COLOUR: Colour = (0, 216, 255)  # confidence below `DOUBTFUL_BELOW`, or not for certain
+UNDECODED_COLOUR: Colour = (222, 212, 201)  # a dot without a likely code word
+WRONG_COLOUR: Colour = (60, 60, 255)
+MISSED_COLOUR: Colour = (0, 130, 255)
+DECODING_DOT_COLOUR: Colour = (255, 200, 0)  # the dots that are the code of a target of dots
+TEXT_COLOUR: Colour = (255, 255, 255)
+OUTLINE_COLOUR: Colour = (0, 0, 0)
+
+DOUBTFUL_BELOW = 0.95
+"""Confidence below which a decoded target counts as doubtful."""
+
+FONT = cv2.FONT_HERSHEY_SIMPLEX
+_FONT_HEIGHT = 22.0  # px, of a capital at scale 1
+_SHIFT = 4  # fractional bits of the coordinates that OpenCV draws
+_DASHES = 10  # of an ellipse
 
 _CORNERS = np.array([(1.0, -1.0), (1.0, 1.0), (-1.0, -1.0), (-1.0, 1.0)])  # where labels may be
 _CIRCLE = math.sqrt(0.5)  # of the radius, what a circle reaches in both directions of a corner
@@ -58,16 +61,8 @@ _MAXIMUM_NAMED = 12  # IDs that the summary names at most
 class Label:
     """A text that belongs to a target.
 
-    Attributes
-    ----------
-    text : str
-    x, y : float
-        Centre of the target, px.
-    radius : float
-        Of the circle that holds the target, px.
-    colour : tuple of 3 int
-    outline : ndarray of float64, shape (k, 2)
-        Points on the outline of the target, px; empty where it is round.
+    `x`, `y` is the centre of the target and `radius` that of a circle that holds it, px. `outline`
+    has points on its outline, px, shape (k, 2); none where it is round.
     """
 
     text: str
@@ -87,21 +82,10 @@ def place_labels(
 ) -> list[tuple[float, float]]:
     """Return the left and the lower border of each label, px.
 
-    A label is beside its target: where it is inside the image and hides the fewest targets and
-    earlier labels; if several places are as good, the first of upper right, lower right, upper
-    left and lower left.
-
-    Parameters
-    ----------
-    labels : sequence of Label
-    sizes : sequence of (float, float)
-        Width and height of each, px.
-    shape : tuple of int
-        Height and width of the image, px.
-    gap : float
-        Between a target and its label, px.
-    taken : sequence of Box, optional
-        What is written already.
+    A label is beside its target, `gap` px away: where it is inside the image of `shape` (height,
+    width) and hides the fewest targets and earlier labels or `taken` boxes; if several places are
+    as good, the first of upper right, lower right, upper left and lower left. `sizes` are width
+    and height of each label, px.
 
     Examples
     --------
@@ -117,7 +101,11 @@ def place_labels(
         places = _boxes(label, size, gap)
         outside = np.maximum(-places[:, :2], 0).sum(axis=1)
         outside += np.maximum(places[:, 2:] - (width, height), 0).sum(axis=1)
-        hidden = [_hidden(box, circles) + _crossed(box, boxes[:index]) for box in places]
+        upper, lower = places[:, None, :2], places[:, None, 2:]
+        nearest = np.clip(circles[:, :2], upper, lower) - circles[:, :2]
+        hides = np.hypot(nearest[..., 0], nearest[..., 1]) < 0.95 * circles[:, 2]
+        apart = (boxes[:index, :2] > lower) | (boxes[:index, 2:] < upper)
+        hidden = hides.sum(axis=1) + (~apart.any(axis=2)).sum(axis=1)
         left, _, _, bottom = places[np.argmin(_OUTSIDE * (outside > 0) + hidden)]
         left = max(min(left, width - size[0]), 0.0)
         bottom = min(max(bottom, size[1]), float(height))
@@ -135,18 +123,6 @@ def _boxes(label: Label, size: tuple[float, float], gap: float) -> np.ndarray:
     near = centre + _CORNERS * (reach + gap)[:, None]  # the corner of the box beside the target
     far = near + _CORNERS * size
     return np.hstack([np.minimum(near, far), np.maximum(near, far)])
-
-
-def _hidden(box: np.ndarray, circles: np.ndarray) -> int:
-    """Return the number of circles that a box touches."""
-    nearest = np.clip(circles[:, :2], box[:2], box[2:])
-    return int((np.hypot(*(nearest - circles[:, :2]).T) < 0.95 * circles[:, 2]).sum())
-
-
-def _crossed(box: np.ndarray, boxes: np.ndarray) -> int:
-    """Return the number of boxes that a box overlaps."""
-    apart = (boxes[:, :2] > box[2:]) | (boxes[:, 2:] < box[:2])
-    return int((~apart.any(axis=1)).sum())
 
 
 def draw(image: np.ndarray, identification: Identification) -> np.ndarray:
@@ -169,10 +145,7 @@ def draw(image: np.ndarray, identification: Identification) -> np.ndarray:
     >>> draw(np.full((60, 80), 128, np.uint8), Identification(())).shape
     (60, 80, 3)
     """
-    canvas, labels = _marked(image, identification.targets, (), (), _pen(image))
-    title = _draw_title(canvas, summary(identification), _pen(image))
-    _draw_labels(canvas, labels, _pen(image), [title])
-    return canvas
+    return overlay(image, identification.targets, title=summary(identification))
 
 
 def overlay(
@@ -181,68 +154,43 @@ def overlay(
     wrong: Collection[Target] = (),
     missed: Collection[Target] = (),
     unit: int | None = None,
+    title: str = '',
 ) -> np.ndarray:
-    """Return an image in colour with the dot, the centre and the ID of every target.
+    """Return an image in colour with the dot, the centre and the ID of every target, as `draw`.
 
     Decoded targets have a solid outline. Doubtful ones have a dashed one, and their ID has a
-    question mark. Missed ones are crossed out. The family is beside the ID if there are targets of
-    several families.
+    question mark. `wrong` are those of `targets` that are known to be wrong; `missed` ones are
+    crossed out. The family is beside the ID if there are targets of several families.
 
-    Parameters
-    ----------
-    image : ndarray, shape (height, width)
-        Gray values, as for `draw`.
-    targets : collection of Target
-        What was identified.
-    wrong : collection of Target
-        Those of `targets` that are known to be wrong.
-    missed : collection of Target
-        Targets that were not identified.
-    unit : int, optional
-        Width of a line, px. By default it grows with the image, so that lines and letters are
-        legible when all of the image is on a screen.
-
-    Returns
-    -------
-    ndarray of uint8, shape (height, width, 3)
-        Blue, green, red.
+    Lines are `unit` px wide. By default that grows with the image, so that lines and letters are
+    legible when all of the image is on a screen.
     """
-    unit = unit or _pen(image)
-    canvas, labels = _marked(image, targets, wrong, missed, unit)
-    _draw_labels(canvas, labels, unit)
-    return canvas
-
-
-def _marked(
-    image: np.ndarray,
-    targets: Collection[Target],
-    wrong: Collection[Target],
-    missed: Collection[Target],
-    unit: int,
-) -> tuple[np.ndarray, list[Label]]:
-    """Return an image with the outlines of its targets, and the labels that are to be written."""
+    unit = unit or max(1, round(math.hypot(*image.shape) / 2400))
     canvas = cv2.cvtColor(stretched_to_8_bit(image), cv2.COLOR_GRAY2BGR)
     several = len({target.family for target in targets if target.family}) > 1
-    labels = []
     for target in missed:
-        cross_out(canvas, target.x, target.y, 1.8 * target.semi_major, MISSED_COLOUR, unit)
+        arm = 1.8 * target.semi_major
+        _draw_lines(canvas, target, ((arm, arm), (arm, -arm)), MISSED_COLOUR, 3 * unit, unit)
+    labels = []
     for target in sorted(targets, key=lambda it: it.id != UNDECODED):
-        look = _look(target, target in wrong)
-        _draw_target(canvas, target, look, unit)
-        if look.text:
-            named = several and target.id != UNDECODED
-            text = f'{look.text} {target.family}' if named else look.text
+        colour, text = _look(target, target in wrong)
+        _draw_outline(canvas, target, colour, unit)
+        if text:
+            arm = max(3.0 * unit, 0.35 * target.semi_minor)
+            _draw_lines(canvas, target, ((arm, 0), (0, arm)), colour, unit, unit)
             labels.append(
                 Label(
-                    text=text,
+                    text=f'{text} {target.family}' if several and target.id != UNDECODED else text,
                     x=target.x,
                     y=target.y,
                     radius=_radius(target),
-                    colour=look.colour,
+                    colour=colour,
                     outline=_outline(target),
                 )
             )
-    return canvas, labels
+    taken = [_draw_title(canvas, title, unit)] if title else []
+    _draw_labels(canvas, labels, unit, taken)
+    return canvas
 
 
 def summary(identification: Identification) -> str:
@@ -266,30 +214,17 @@ def summary(identification: Identification) -> str:
     return f'{words}, gamma_high {used.gamma_high:g}, gamma_low {used.gamma_low:g}'
 
 
-@dataclass(frozen=True, slots=True)
-class _Look:
-    """How a target looks."""
-
-    colour: Colour
-    text: str
-    dashed: bool = False
-
-
-def _look(target: Target, wrong: bool) -> _Look:
+def _look(target: Target, wrong: bool) -> tuple[Colour, str]:
+    """Return the colour of a target and its ID in words; these are empty if it has none."""
     if isinstance(target, UndecodedTarget) and target.likely_id != UNDECODED:
-        return _Look(DOUBTFUL_COLOUR, f'{target.likely_id}?', dashed=True)
+        return DOUBTFUL_COLOUR, f'{target.likely_id}?'
     if target.id == UNDECODED:
-        return _Look(UNDECODED_COLOUR, '')
+        return UNDECODED_COLOUR, ''
     if wrong:
-        return _Look(WRONG_COLOUR, str(target.id))
+        return WRONG_COLOUR, str(target.id)
     if target.confidence < DOUBTFUL_BELOW:
-        return _Look(DOUBTFUL_COLOUR, f'{target.id}?', dashed=True)
-    return _Look(DECODED_COLOUR, str(target.id))
-
-
-def _pen(image: np.ndarray) -> int:
-    """Return the width of a line that is visible when all of the image is on a screen, px."""
-    return max(1, round(math.hypot(*image.shape) / 2400))
+        return DOUBTFUL_COLOUR, f'{target.id}?'
+    return DECODED_COLOUR, str(target.id)
 
 
 def _radius(target: Target) -> float:
@@ -308,45 +243,98 @@ def _outline(target: Target) -> np.ndarray:
     return np.empty((0, 2))
 
 
-def _ellipses(target: Target) -> tuple[Sequence[Ellipse], Sequence[Ellipse]]:
-    """Return the ellipses that all targets of the family have, and those that are the code."""
-    if isinstance(target, DottedTarget):
-        return target.dots[: target.template_dots], target.dots[target.template_dots :]
+def _draw_outline(canvas: np.ndarray, target: Target, colour: Colour, unit: int) -> None:
+    """Draw the sides of a square, the dots of a target of dots, or else its ellipse."""
+    dashed = colour == DOUBTFUL_COLOUR
     if isinstance(target, SquareMarker) and target.corners:
-        return (), ()
-    return ((target.x, target.y, target.semi_major, target.semi_minor, target.angle),), ()
+        corners = np.array([_fixed(*corner) for corner in target.corners], np.int32)
+        for shade, width in _strokes(colour, unit, unit):
+            cv2.polylines(canvas, [corners], True, shade, width, cv2.LINE_AA, _SHIFT)
+    elif isinstance(target, DottedTarget):
+        for dot in target.dots[: target.template_dots]:
+            _draw_ellipse(canvas, dot, colour, unit, dashed)
+        for dot in target.dots[target.template_dots :]:
+            _draw_ellipse(canvas, dot, DECODING_DOT_COLOUR, unit, False)
+    else:
+        ellipse = target.x, target.y, target.semi_major, target.semi_minor, target.angle
+        _draw_ellipse(canvas, ellipse, colour, unit, dashed)
 
 
-def _draw_target(canvas: np.ndarray, target: Target, look: _Look, unit: int) -> None:
-    if isinstance(target, SquareMarker) and target.corners:
-        draw_polygon(canvas, target.corners, look.colour, unit)
-    template, decoding = _ellipses(target)
-    for ellipse in template:
-        draw_ellipse(canvas, ellipse, look.colour, unit, look.dashed)
-    for ellipse in decoding:
-        draw_ellipse(canvas, ellipse, DECODING_DOT_COLOUR, unit)
-    if look.text:
-        arm = max(3.0 * unit, 0.35 * target.semi_minor)
-        draw_plus(canvas, target.x, target.y, arm, look.colour, unit)
+def _draw_ellipse(
+    canvas: np.ndarray,
+    ellipse: tuple[float, float, float, float, float],
+    colour: Colour,
+    unit: int,
+    dashed: bool,
+) -> None:
+    """Draw an ellipse: centre, semi-axes, px, and direction of the major one, rad."""
+    x, y, semi_major, semi_minor, direction = ellipse
+    centre, axes = _fixed(x, y), _fixed(semi_major, semi_minor)
+    angle, period = math.degrees(direction), 360 / _DASHES
+    arcs = [(i * period, (i + 0.6) * period) for i in range(_DASHES)] if dashed else [(0, 360)]
+    for shade, width in _strokes(colour, unit, unit):
+        for start, end in arcs:
+            cv2.ellipse(canvas, centre, axes, angle, start, end, shade, width, cv2.LINE_AA, _SHIFT)
+
+
+def _draw_lines(
+    canvas: np.ndarray,
+    target: Target,
+    arms: Sequence[tuple[float, float]],
+    colour: Colour,
+    width: int,
+    unit: int,
+) -> None:
+    """Draw lines through the centre of a target; an arm is half a line, px."""
+    x, y = target.x, target.y
+    for shade, thickness in _strokes(colour, width, unit):
+        for across, down in arms:
+            start, end = _fixed(x - across, y - down), _fixed(x + across, y + down)
+            cv2.line(canvas, start, end, shade, thickness, cv2.LINE_AA, _SHIFT)
+
+
+def _strokes(colour: Colour, width: int, unit: int) -> tuple[tuple[Colour, int], ...]:
+    """Return colours and widths of the two strokes of a line: its outline and itself."""
+    return (OUTLINE_COLOUR, width + 2 * unit), (colour, width)
+
+
+def _fixed(*coordinates: float) -> tuple[int, ...]:
+    return tuple(round(coordinate * 2**_SHIFT) for coordinate in coordinates)
 
 
 def _draw_labels(
-    canvas: np.ndarray, labels: Sequence[Label], unit: int, taken: Sequence[Box] = ()
+    canvas: np.ndarray, labels: Sequence[Label], unit: int, taken: Sequence[Box]
 ) -> None:
     """Write the labels, in letters of one height."""
     shape: tuple[int, int] = canvas.shape[:2]
     height = max(_MINIMUM_LETTERS * unit, _LETTERS * math.hypot(*shape))
-    scale = min(height, shape[0]) / FONT_HEIGHT
-    sizes = [text_size(label.text, scale, unit) for label in labels]
+    scale = min(height, shape[0]) / _FONT_HEIGHT
+    sizes = [_text_size(label.text, scale, unit) for label in labels]
     places = place_labels(labels, sizes, shape, 3.0 * unit, taken)
     for label, (left, bottom) in zip(labels, places, strict=True):
-        write(canvas, label.text, (round(left), round(bottom)), label.colour, scale, unit)
+        _write(canvas, label.text, (round(left), round(bottom)), label.colour, scale, unit)
 
 
 def _draw_title(canvas: np.ndarray, text: str, unit: int) -> Box:
     """Write a line at the top left, smaller where the image is narrow, and return its box."""
-    width, _ = text_size(text, 1.0, unit)
+    width, _ = _text_size(text, 1.0, unit)
     scale = min(float(unit), 0.95 * canvas.shape[1] / width)
     place = (round(8 * scale), round(30 * scale))
-    write(canvas, text, place, TEXT_COLOUR, scale, unit)
+    _write(canvas, text, place, TEXT_COLOUR, scale, unit)
     return 0.0, 0.0, place[0] + scale * width, 1.2 * place[1]
+
+
+def _text_size(text: str, scale: float, unit: int) -> tuple[int, int]:
+    (width, height), _ = cv2.getTextSize(text, FONT, scale, 2 * unit)
+    return width, height
+
+
+def _write(
+    canvas: np.ndarray, text: str, place: tuple[int, int], colour: Colour, scale: float, unit: int
+) -> None:
+    """Write a text with its lower left corner at a place."""
+    # The outline is the text, displaced: a wider stroke is not the same in all versions of OpenCV.
+    places = [(unit * i, unit * j, OUTLINE_COLOUR) for i in (-1, 0, 1) for j in (-1, 0, 1)]
+    for across, down, shade in (*places, (0, 0, colour)):
+        corner = (place[0] + across, place[1] + down)
+        cv2.putText(canvas, text, corner, FONT, scale, shade, 2 * unit, cv2.LINE_AA)

@@ -8,24 +8,16 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from ahf_ros.drawing.colours import TEXT_COLOUR, Colour
-from ahf_ros.drawing.strokes import FONT
+from ahf_ros.drawing.overlay import FONT, TEXT_COLOUR, Colour
 
 _GROUND_COLOUR = (45, 40, 35)
 
 
 @dataclass(frozen=True, slots=True)
 class Tile:
-    """One of several pictures side by side.
+    """One of several pictures side by side: uint8, gray or colour, with two lines above it.
 
-    Attributes
-    ----------
-    picture : ndarray of uint8, shape (height, width) or (height, width, 3)
-        Gray, or blue, green, red.
-    title : str
-        Line above it.
-    remarks : sequence of (str, tuple of 3 int)
-        Words of a second line, each with its colour.
+    The first one is the title, the second one has the remarks in their colours.
     """
 
     picture: np.ndarray
@@ -34,19 +26,9 @@ class Tile:
 
 
 def side_by_side(rows: Sequence[Sequence[Tile]], width: int) -> np.ndarray:
-    """Return pictures of one size in rows, each with its two lines of text above it.
+    """Return pictures of one size in rows of as many, each resized to a width in px.
 
-    Parameters
-    ----------
-    rows : sequence of sequence of Tile
-        As many in each row.
-    width : int
-        Width of each picture in the result, px.
-
-    Returns
-    -------
-    ndarray of uint8, shape (height, width, 3)
-        Blue, green, red.
+    The result is an ndarray of uint8, shape (height, width, 3): blue, green, red.
     """
     return np.vstack([np.hstack([_framed(tile, width) for tile in row]) for row in rows])
 

@@ -6,6 +6,9 @@ On an ellipse the centre does not lie along the gradient, but in a direction tha
 and from the shape; so oblique dots are voted for with ellipses in several directions. An edge that
 runs straight on for longer than a dot is wide belongs to no dot and does not vote, which silences
 projected stripes.
+
+Most votes are strays. So they are counted in blocks of cells first, and cell by cell only where
+blocks have enough. Votes for different things are counted in planes of their own.
 """
 
 from __future__ import annotations
@@ -19,37 +22,23 @@ import cv2
 import numpy as np
 
 from ahf_ros.features import frame
+from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.dots import best
 from ahf_ros.features.log_edges import LogEdges, mask_of
 from ahf_ros.features.pyramid import MAXIMUM_RADIUS
-from ahf_ros.features.votes import NO_PEAKS, Peaks, find_peaks, highest
 
 MAXIMUM_CANDIDATES = 6000
 """Candidates kept at the most for one range of radii and one polarity, those with most votes."""
 
 
 class _Shape(NamedTuple):
-    """Ellipses that are voted for.
+    """Ellipses that are voted for."""
 
-    Attributes
-    ----------
-    aspect : float
-        Ratio of their axes.
-    directions : int
-        Number of directions of the major axis.
-    cell : int
-        Side of the cells in which votes are counted, px.
-    votes : float
-        Needed, for a px of the circumference of the smallest dot, as if it were round.
-    every : int
-        One of so many edges votes.
-    """
-
-    aspect: float
-    directions: int
-    cell: int
-    votes: float
-    every: int
+    aspect: float  # ratio of their axes
+    directions: int  # number of directions of the major axis
+    cell: int  # side of the cells in which votes are counted, px
+    votes: float  # needed, for a px of the circumference of the smallest dot, as if it were round
+    every: int  # one of so many edges votes
 
 
 _TINY = _Shape(1.0, 1, 1, 0.6, 1)  # whose edges are the least exact
@@ -66,32 +55,27 @@ _FIRST_RANGES = {  # of the first level
     (5.8, MAXIMUM_RADIUS): (_LARGE, _OBLIQUE),
 }
 _STEP = 0.8  # of the radii voted for, in cells
-_FLAT = 0.75  # sine of the angle between an edge of an ellipse and its major axis, at the most
+_FLAT_PART = 0.75  # sine of the angle between an edge of an ellipse and its major axis, at most
 _REACH = 0.5  # within which no other centre has more votes, in radii of the smallest dot
 _CELL = 2  # in which the votes for different shapes are compared, px
 _LONG = 1.5  # length of an edge that is straight, in radii of the largest dot
+_SHIFT = 1
+_BLOCK = 1 << _SHIFT  # cells, side of a block
+_SPREAD = 1.4  # votes in a cell and beside it, in weighted votes, at the least
+_OWN = 1 / 8  # of the weighted votes of a peak, that its own cell has
+_WEIGHTS = (0.5, 1.0, 0.5)  # of votes for the cell before, for a cell itself, and the next one
+_OUTSIDE = cv2.BORDER_CONSTANT  # no votes are there
+_FLAT = 1e-6  # curvature of votes from which their top is computed
 
 
 @dataclass(frozen=True, slots=True)
 class Candidates:
-    """Points where a dot may be, in the pixels of one level of the pyramid.
+    """Points where a dot may be, in the pixels of one level of the pyramid."""
 
-    Attributes
-    ----------
-    level : int
-        The level; its pixels are 2^level wide.
-    points : ndarray of float64, shape (k, 2)
-        Centres, px of the level, to about a pixel.
-    radii : tuple of 2 float
-        Smallest and largest radius of the dots, px of the level.
-    polarity : ndarray of int, shape (k,)
-        1 for a dark dot on bright ground, -1 for a bright one on dark.
-    """
-
-    level: int
-    points: np.ndarray
-    radii: tuple[float, float]
-    polarity: np.ndarray
+    level: int  # pixels are 2^level wide
+    points: np.ndarray  # float64, (k, 2), centres, px of the level, to about a pixel
+    radii: tuple[float, float]  # smallest and largest radius of the dots, px of the level
+    polarity: np.ndarray  # int, (k,), 1 for a dark dot on bright ground, -1 for a bright one
 
 
 def find_candidates(
@@ -101,23 +85,11 @@ def find_candidates(
     polarities: Sequence[int],
     explained: Sequence[np.ndarray] | np.ndarray = (),
 ) -> list[Candidates]:
-    """Find the points where dots may be.
+    """Find the points where dots may be, for each range of radii.
 
-    Parameters
-    ----------
-    edges : sequence of LogEdges
-        Of the levels of the pyramid from the first half on.
-    min_radius, max_radius : float
-        Of the dots, px of the image.
-    polarities : sequence of int
-        1 to find dark dots, -1 to find bright ones.
-    explained : sequence of ndarray of float, each of shape (m, 2)
-        Outlines of objects that are known already, px of the image. Edges inside do not vote.
-
-    Returns
-    -------
-    list of Candidates
-        One for each range of radii.
+    The edges are those of the pyramid from the first half on. Bounds of the radius and the
+    outlines of objects that are explained already, each of shape (m, 2), are px of the image;
+    edges inside do not vote. The polarities are 1 to find dark dots, -1 to find bright ones.
     """
     candidates, mask = [], None
     for level, of_level in enumerate(edges, start=1):
@@ -153,24 +125,25 @@ def _elected(
     polarities: Sequence[int],
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the points, shape (k, 2), that enough edges vote for, and polarities, shape (k,)."""
+    height, width = edges.marked.shape
     found = Peaks.joined([_peaks(edges, radii, of, polarities) for of in shapes])
-    points = np.stack([found.x, found.y], axis=-1)
-    inside = np.all((points > -1) & (points < edges.marked.shape[::-1]), axis=1)
-    found, points = found.select(inside), points[inside]
+    inside = (found.x > -1) & (found.x < width) & (found.y > -1) & (found.y < height)
+    found = found.select(inside)
     reach = max(1, round(_REACH * radii[0] / _CELL))
     margin = reach + 1
-    tall, wide = (side // _CELL + 1 + 2 * margin for side in edges.marked.shape)
-    columns, rows = np.rint((points.T + 0.5) / _CELL - 0.5).astype(int) + margin
+    tall, wide = (side // _CELL + 1 + 2 * margin for side in (height, width))
+    columns, rows = (
+        np.rint((np.stack([found.x, found.y]) + 0.5) / _CELL - 0.5).astype(int) + margin
+    )
     cells = (found.plane * tall + rows) * wide + columns
-    kept = highest(cells, found.votes, (len(polarities) * tall, wide), reach)
-    found, points = found.select(kept), points[kept]
+    found = found.select(highest(cells, found.votes, (len(polarities) * tall, wide), reach))
     # Spots of light may be many, of one polarity, and must not crowd out the other.
     chosen = [
         best(which, -found.votes[which], MAXIMUM_CANDIDATES, 'candidates of one size')
         for which in (np.flatnonzero(found.plane == number) for number in range(len(polarities)))
     ]
-    kept = np.concatenate([np.zeros(0, np.intp), *chosen])
-    return points[kept], np.asarray(polarities, int)[found.plane[kept]]
+    found = found.select(np.concatenate([np.zeros(0, np.intp), *chosen]))
+    return np.stack([found.x, found.y], axis=-1), np.asarray(polarities, int)[found.plane]
 
 
 def _peaks(
@@ -182,7 +155,7 @@ def _peaks(
     steps = low + (np.arange(count) + 0.5) * (high - low) / count
     needed = of.votes * 2 * np.pi * low
     if not len(polarities) or count * len(edges.x) <= needed:
-        return NO_PEAKS
+        return _NO_PEAKS
     reach = max(1, round(_REACH * low / of.cell))
     margin = reach + ceil(high / of.cell) + 1  # votes may lie outside of the image
     tall, wide = (side // of.cell + 1 + 2 * margin for side in edges.marked.shape)
@@ -197,18 +170,10 @@ def _peaks(
 def _votes(
     edges: LogEdges, of: _Shape, radii: np.ndarray, margin: int, tall: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the columns and rows of the cells that edges vote for, int32, shape (n,).
+    """Return the columns and rows of the cells that edges vote for, int32, shape (n,) both.
 
-    Parameters
-    ----------
-    edges : LogEdges
-    of : _Shape
-    radii : ndarray of float, shape (k, n)
-        Signed, to vote for k polarities.
-    margin : int
-        Cells about the image.
-    tall : int
-        Rows of a plane.
+    Radii of shape (k, n) are signed, to vote for k polarities. A plane has `tall` rows, with a
+    margin of so many cells about the image.
     """
     columns, rows = [], []
     cell = np.float32(of.cell)
@@ -230,17 +195,13 @@ def _votes(
 def _towards_centres(
     edges: LogEdges, aspect: float, angle: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return edges that may be flat ones of an ellipse, and where they lie on it.
+    """Return the indices of edges that may be flat ones of an ellipse, and where they lie on it.
 
-    Returns
-    -------
-    which : ndarray of int, shape (k,)
-    x, y : ndarray of float32, shape (k,)
-        From the centre of the ellipse whose semi-major axis is 1.
+    The places are x and y, float32, from the centre of the ellipse whose semi-major axis is 1.
     """
     cosine, sine = np.float32(np.cos(angle)), np.float32(np.sin(angle))
     along = edges.unit_x * cosine + edges.unit_y * sine
-    which = np.flatnonzero(np.abs(along) < np.float32(_FLAT))
+    which = np.flatnonzero(np.abs(along) < np.float32(_FLAT_PART))
     along = along[which]
     across = edges.unit_y[which] * cosine - edges.unit_x[which] * sine
     # The point of the ellipse (u / 1)^2 + (v / aspect)^2 = 1 with this normal.
@@ -248,3 +209,104 @@ def _towards_centres(
     scale = 1 / np.sqrt(along * along + square * across * across)
     along, across = along * scale, across * (square * scale)
     return which, along * cosine - across * sine, along * sine + across * cosine
+
+
+@dataclass(frozen=True, slots=True)
+class Peaks(ArrayRecord):
+    """k places with more votes than their neighbourhood."""
+
+    x: np.ndarray  # (k,), in cells; the middle of the first one of a plane is at 0
+    y: np.ndarray
+    plane: np.ndarray  # int, (k,)
+    votes: np.ndarray  # (k,), in units of those needed
+
+
+_NONE = np.zeros(0)
+_NO_PEAKS = Peaks(_NONE, _NONE, _NONE.astype(int), _NONE)
+
+
+def find_peaks(
+    columns: np.ndarray,
+    rows: np.ndarray,
+    shape: tuple[int, int, int],
+    needed: float,
+    reach: int,
+) -> Peaks:
+    """Return the cells with enough votes in them and beside them, and none with more within reach.
+
+    The cells voted for, int32, have rows that count through all planes. The shape is the number
+    of planes, and of rows and columns of each; nobody votes for those within `reach` cells of its
+    border. Of the votes needed, one for a neighbouring cell counts half, and a quarter on the
+    diagonal.
+    """
+    planes, tall, wide = shape
+    which = _promising(columns, rows, (planes * tall, wide), needed)
+    if not len(which):
+        return _NO_PEAKS
+    cells, counts = np.unique(rows[which] * np.int32(wide) + columns[which], return_counts=True)
+    votes = np.zeros(planes * tall * wide, np.uint16)
+    votes[cells] = counts
+    cells = cells[counts > _OWN * needed]
+    sums = _weighted(votes, cells, wide)
+    enough = sums > needed
+    cells, sums = cells[enough], sums[enough]
+    kept = highest(cells, sums, (planes * tall, wide), reach)
+    cells, sums = cells[kept], sums[kept]
+    row, column = np.divmod(cells, wide)
+    plane, row = np.divmod(row, tall)
+    x, y = (
+        middle
+        + _top(_weighted(votes, cells - step, wide), sums, _weighted(votes, cells + step, wide))
+        for middle, step in ((column, 1), (row, wide))
+    )
+    return Peaks(x, y, plane.astype(int), sums / needed)
+
+
+def highest(
+    cells: np.ndarray, values: np.ndarray, shape: tuple[int, int], reach: int
+) -> np.ndarray:
+    """Return whether no value within `reach` cells is higher, for k values over 0, shape (k,).
+
+    The cells are indices into rows and columns of a shape, row by row.
+    """
+    field = np.zeros(shape[0] * shape[1], np.float32)
+    values = values.astype(np.float32)
+    np.maximum.at(field, cells, values)
+    free = np.ones(len(cells), bool)
+    for down in range(-reach, reach + 1):
+        for across in range(-reach, reach + 1):
+            free &= values >= field.take(cells + (down * shape[1] + across), mode='clip')
+    return free
+
+
+def _promising(
+    columns: np.ndarray, rows: np.ndarray, shape: tuple[int, int], needed: float
+) -> np.ndarray:
+    """Return the indices of the votes in blocks that, with some neighbours, have enough."""
+    tall, wide = (-(-side // _BLOCK) for side in shape)
+    block = (rows >> _SHIFT) * np.int32(wide) + (columns >> _SHIFT)
+    of_blocks = np.zeros((tall, wide), np.uint16)
+    np.add.at(of_blocks.ravel(), block, np.uint16(1))
+    # A cell and its neighbours lie in two by two blocks.
+    of_four = cv2.boxFilter(of_blocks, -1, (2, 2), normalize=False, borderType=_OUTSIDE)
+    enough = (of_four > _SPREAD * needed).astype(np.uint8)
+    if not enough.any():
+        return np.zeros(0, np.intp)
+    hot = cv2.dilate(enough, np.ones((2, 2), np.uint8), anchor=(0, 0))
+    return np.flatnonzero(hot.ravel().take(block))
+
+
+def _weighted(votes: np.ndarray, cells: np.ndarray, wide: int) -> np.ndarray:
+    """Return the votes in cells and, with less weight, beside them, float32, shape (k,)."""
+    sums = np.zeros(len(cells), np.float32)
+    for down, of_row in zip((-wide, 0, wide), _WEIGHTS, strict=True):
+        for across, of_column in zip((-1, 0, 1), _WEIGHTS, strict=True):
+            beside = votes.take(cells + (down + across), mode='clip')
+            sums += np.float32(of_row * of_column) * beside.astype(np.float32)
+    return sums
+
+
+def _top(before: np.ndarray, value: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Return where the parabola through values at -1, 0 and 1 is highest, at most half a cell."""
+    curvature = np.maximum(2 * value - before - after, _FLAT)
+    return np.clip((after - before) / (2 * curvature), -0.5, 0.5)

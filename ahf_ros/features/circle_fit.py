@@ -8,24 +8,35 @@ would move all edges to the same side, is taken from the profiles and corrected 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
-from ahf_ros.features.circles import Circles, dot_circles
-from ahf_ros.features.displacement_model import DisplacementModel
-from ahf_ros.features.edge_covariance import common_errors, edge_covariance
-from ahf_ros.features.edge_weights import EdgeWeights, weigh_edges
-from ahf_ros.features.light_slope import LightSlope, common_slope, smooth_slopes, unevenness
-from ahf_ros.features.profiles import BLURS, USUAL_BLUR, Edges, measure_edges
+from ahf_ros.features.circles import Circles, dot_circles, edge_points
+from ahf_ros.features.edge_errors import (
+    NO_WEIGHT,
+    EdgeWeights,
+    LightSlope,
+    common_errors,
+    common_slope,
+    edge_covariance,
+    smooth_slopes,
+    unevenness,
+    weigh_edges,
+)
+from ahf_ros.features.profiles import BLURS, USUAL_BLUR, Edges, measure_outlines
 from ahf_ros.features.robust import geman_mcclure, geman_mcclure_gain, median, reweight, spread
 
 ENOUGH = 0.5
 """Share of the expected edges from which a fit counts."""
 
+SOFT = 1.0
+"""Blur from which on an edge is soft, standard deviation in px."""
+
+_SOFT_ROUNDS = 4  # of measurements of soft edges
 _NOISE = 1.0  # of gray values, of 255; the fit scales it to what it finds
 _MINIMUM_STEP = 1.0  # gray values, that the error of an edge is computed from
 _OUTLIER = 3.0  # times the usual distance from the circle that quarters the weight
@@ -39,43 +50,25 @@ _LIGHT_PRIOR = 5.0  # px of whole edges that say as much of the slope as the pri
 _SHARPENED = 0.03  # slope of all edges that makes single slopes doubtful, 1/px
 _OF_COMMON, _OF_SIZE = 1.1, 4.5  # of the variance of whole targets, as rendered scenes have it
 _SYSTEMATIC = 0.001  # standard deviation of what pixels and interpolation do to a centre, px
-_NO_WEIGHT = 1e-9  # instead of a sum of no weights
+_PRIOR_SCALE = 0.003  # standard deviation of the printed proportions of circles and dot
+_PRIOR_PERSPECTIVE = 0.02  # of the projective part, in 1 a dot radius
+_PRIOR_SHIFT = 1.0  # of the shift of edges towards the dark side, px
+_WEAK_PRIOR = 1e-6  # of the other changes, so that they can always be solved for
 
 
 @dataclass(frozen=True, slots=True)
 class Fit(ArrayRecord):
-    """Frames of k targets fitted to edges.
+    """Frames of k targets fitted to edges."""
 
-    Attributes
-    ----------
-    frames : ndarray of float64, shape (k, 3, 3)
-    polarity : ndarray of int, shape (k,)
-        1 for a dark target on bright ground, -1 for a bright one on dark.
-    contrast : ndarray of float64, shape (k,)
-        Usual gray value of the dark side of an edge, divided by the bright side's.
-    bright : ndarray of float64, shape (k,)
-        Usual gray value of the bright side.
-    share : ndarray of float64, shape (k,)
-        Share of the expected edges that were measured where they are expected.
-    deviation : ndarray of float64, shape (k,)
-        Standard deviation of these edges, px.
-    covariance : ndarray of float64, shape (k, 2, 2)
-        Of the image of the centre, px^2; NaN where it was not asked for.
-    blur : ndarray of float64, shape (k,)
-        Of the edges, standard deviation in px.
-    edge_shift : ndarray of float64, shape (k,)
-        By how much what is dark has grown on all edges, px; 0 for a single circle.
-    """
-
-    frames: np.ndarray
-    polarity: np.ndarray
-    contrast: np.ndarray
-    bright: np.ndarray
-    share: np.ndarray
-    deviation: np.ndarray
-    covariance: np.ndarray
-    blur: np.ndarray
-    edge_shift: np.ndarray
+    frames: np.ndarray  # (k, 3, 3)
+    polarity: np.ndarray  # int, (k,), 1 for a dark target on bright ground, -1 for a bright one
+    contrast: np.ndarray  # (k,), usual gray value of the dark side of edges over the bright side's
+    bright: np.ndarray  # (k,), usual gray value of the bright side
+    share: np.ndarray  # (k,), of the expected edges that were measured where they are expected
+    deviation: np.ndarray  # (k,), standard deviation of these edges, px
+    covariance: np.ndarray  # (k, 2, 2), of the image of the centre, px^2; NaN if not asked for
+    blur: np.ndarray  # (k,), of the edges, standard deviation in px
+    edge_shift: np.ndarray  # (k,), by which what is dark has grown, px; 0 for a single circle
 
     @property
     def size(self) -> np.ndarray:
@@ -101,17 +94,7 @@ def fit_dots(
     blur: np.ndarray | None = None,
     covariances: bool = True,
 ) -> Fit:
-    """Fit the ellipses of dots.
-
-    Parameters
-    ----------
-    gray, frames, reach, rounds, blur, covariances
-        As for `fit_circles`.
-    polarity : ndarray of int, shape (k,)
-        1 for a dark dot, -1 for a bright one.
-    rays : int
-        Number of points about a dot.
-    """
+    """Fit the ellipses of dots at `rays` points, as `fit_circles` does for `dot_circles`."""
     return fit_circles(
         gray,
         frames,
@@ -122,6 +105,38 @@ def fit_dots(
         blur=blur,
         covariances=covariances,
     )
+
+
+def fit_circles_of_any_blur(
+    gray: np.ndarray,
+    frames: np.ndarray,
+    circles: Circles,
+    *,
+    reach: float | np.ndarray,
+    projective: bool,
+    rounds: int = 2,
+) -> Fit:
+    """Move frames onto the edges of circles as `fit_circles`, and those with soft edges once more.
+
+    How soft edges are is known only when they have been measured. A step that is sharper than an
+    edge is fitted to a part of it, at the wrong place.
+    """
+    fit = fit_circles(gray, frames, circles, reach=reach, projective=projective, rounds=rounds)
+    soft = np.flatnonzero((fit.blur > SOFT) & (fit.share >= ENOUGH))
+    if not soft.size:
+        return fit
+    first = fit.select(soft)
+    again = fit_circles(
+        gray,
+        first.frames,
+        replace(circles, polarity=circles.polarity[soft]),
+        reach=np.broadcast_to(reach, (len(frames), 1))[soft],
+        projective=projective,
+        rounds=_SOFT_ROUNDS,
+        blur=first.blur,
+    )
+    good = again.share >= ENOUGH
+    return fit.replaced(soft[good], again.select(good))
 
 
 def fit_circles(
@@ -135,48 +150,52 @@ def fit_circles(
     blur: np.ndarray | None = None,
     covariances: bool = True,
 ) -> Fit:
-    """Move frames onto the edges of circles.
+    """Move frames, shape (k, 3, 3) and right to about two pixels, onto the edges of circles.
 
-    Parameters
-    ----------
-    gray : ndarray of float32, shape (height, width)
-        Gray values from 0 to 255.
-    frames : ndarray of float64, shape (k, 3, 3)
-        To about two pixels.
-    circles : Circles
-    reach : float or ndarray of float, shape (k, 1)
-        Distance from an expected edge within which edges are measured, dot radii.
-    projective : bool
-        Whether the circles have different radii, so that they determine the common centre.
-        Otherwise it is the centre of the ellipse.
-    rounds : int
-        Number of measurements.
-    blur : ndarray of float64, shape (k,), optional
-        Of the edges, as far as it is known: standard deviation in px.
-    covariances : bool
-        Whether covariances are needed; they are NaN otherwise.
+    Edges within `reach` of a circle, dot radii, a number or of shape (k, 1), are measured `rounds`
+    times in `gray`, float32 from 0 to 255. In a projective fit the circles have different radii,
+    so that they determine the common centre; otherwise it is the centre of the ellipse. `blur`,
+    shape (k,), is the standard deviation of the edges, px, as far as it is known.
     """
     blur = np.full(len(frames), USUAL_BLUR) if blur is None else blur
-    window = _window(circles)
-    for remaining in reversed(range(rounds)):
-        edges = measure_edges(gray, frames, circles, blur, reach)
+    window = _window(circles.angles.tobytes(), circles.radii.tobytes())
+    moved = frames
+    for _ in range(rounds):
+        frames = moved
+        edges = measure_outlines(gray, edge_points(frames, circles), blur, reach)
         blur = np.clip(blur + median(edges.softness, edges.visible, 0.0), *BLURS)
         solution = _solve(edges, circles, window, projective)
         of_frame = solution.changes[:, :7]
         np.clip(of_frame, -_MAXIMUM_CHANGE, _MAXIMUM_CHANGE, out=of_frame)
-        if remaining:
-            frames = frame.moved(frames, solution.changes[:, : 7 if projective else 5])
-    return _fit(solution, frames, circles, blur, covariances)
+        moved = frame.moved(frames, of_frame)
+    seen, errors = solution.own.seen, solution.errors
+    placed = seen & (solution.relative < _PLACED) & (np.abs(errors) < _PLACED_RADII)
+    count = placed.sum(axis=1)
+    squares = np.where(placed, errors * edges.scale, 0) ** 2
+    covariance = np.full((len(frames), 2, 2), np.nan)
+    if covariances:
+        covariance = _covariance(solution, edges, frames, circles, projective)
+    affine = frame.local_affine(moved)
+    return Fit(
+        frames=moved,
+        polarity=circles.polarity[:, 0],
+        contrast=solution.own.contrast,
+        bright=median(np.maximum(edges.bright, 0), seen),
+        share=count / np.maximum(edges.visible.sum(axis=1), 1),
+        deviation=np.sqrt(squares.sum(axis=1) / np.maximum(count, 1)),
+        covariance=affine @ covariance @ affine.transpose(0, 2, 1) + _SYSTEMATIC**2 * np.eye(2),
+        blur=blur,
+        edge_shift=-solution.changes[:, -1] if projective else np.zeros(len(frames)),
+    )
 
 
 @dataclass(frozen=True, slots=True)
 class _Solution:
     """Changes of frames that bring circles onto edges, and what they were computed from."""
 
-    edges: Edges
     own: EdgeWeights
     light: LightSlope
-    model: DisplacementModel
+    model: _DisplacementModel
     changes: np.ndarray
     normal: np.ndarray
     weights: np.ndarray
@@ -188,15 +207,17 @@ class _Solution:
 def _solve(edges: Edges, circles: Circles, window: np.ndarray, projective: bool) -> _Solution:
     """Return the changes of the frames that bring the circles onto the edges."""
     own = weigh_edges(edges)
-    light = _light(edges, own.weights, circles, window)
+    common = common_slope(edges.slope, circles.polarity, own.weights)
+    prior = _LIGHT_PRIOR / edges.scale.mean(axis=1, keepdims=True)
+    # Where edges were sharpened, none of their slopes is the light's.
+    prior *= (1 + (common / _SHARPENED) ** 2) ** 2
+    light = smooth_slopes(edges.slope - circles.polarity * common, own.weights, window, prior)
     displacement = (edges.offset - edges.sensitivity * light.slope) / edges.scale
     noise = _NOISE * np.sqrt(2 * np.sqrt(np.pi) * USUAL_BLUR)
     deviation = noise / np.maximum(edges.bright - edges.dark, _MINIMUM_STEP) / edges.scale
-    model = DisplacementModel(circles, edges.scale, projective)
+    model = _DisplacementModel(circles, edges.scale, projective)
 
-    def solve(
-        weights: np.ndarray,
-    ) -> tuple[tuple[np.ndarray, np.ndarray, np.ndarray], np.ndarray]:
+    def solve(weights: np.ndarray) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
         changes, normal = model.solve(displacement, weights)
         errors = displacement - model.displacement(changes)
         return (changes, normal, errors), np.abs(errors) / deviation
@@ -205,79 +226,86 @@ def _solve(edges: Edges, circles: Circles, window: np.ndarray, projective: bool)
     (changes, normal, errors), relative, robust = reweight(
         solve, weights, lambda sizes: _OUTLIER * spread(sizes, own.seen, _MINIMUM_SPREAD), _ROUNDS
     )
-    return _Solution(edges, own, light, model, changes, normal, weights, errors, relative, robust)
+    return _Solution(own, light, model, changes, normal, weights, errors, relative, robust)
 
 
-def _fit(
-    of: _Solution, frames: np.ndarray, circles: Circles, blur: np.ndarray, covariances: bool
-) -> Fit:
-    """Return the fit of frames, which are those before the solution, with its quality."""
-    edges, own = of.edges, of.own
-    placed = own.seen & (of.relative < _PLACED) & (np.abs(of.errors) < _PLACED_RADII)
-    count = placed.sum(axis=1)
-    share = count / np.maximum(edges.visible.sum(axis=1), 1)
-    squares = np.where(placed, of.errors * edges.scale, 0) ** 2
-    scatter = np.sqrt(squares.sum(axis=1) / np.maximum(count, 1))
-    bright = median(np.maximum(edges.bright, 0), own.seen)
-    covariance = np.full((len(frames), 2, 2), np.nan)
-    if covariances:
-        covariance = _covariance(of, frames, circles)
-    polarity = circles.polarity[:, 0]
-    moved = frame.moved(frames, of.changes[:, : 7 if of.model.projective else 5])
-    affine = frame.local_affine(moved)
-    covariance = affine @ covariance @ affine.transpose(0, 2, 1) + _SYSTEMATIC**2 * np.eye(2)
-    shift = -of.changes[:, -1] if of.model.projective else np.zeros(len(frames))
-    return Fit(
-        frames=moved,
-        polarity=polarity,
-        contrast=own.contrast,
-        bright=bright,
-        share=share,
-        deviation=scatter,
-        covariance=covariance,
-        blur=blur,
-        edge_shift=shift,
-    )
-
-
-def _covariance(of: _Solution, frames: np.ndarray, circles: Circles) -> np.ndarray:
+def _covariance(
+    of: _Solution, edges: Edges, frames: np.ndarray, circles: Circles, projective: bool
+) -> np.ndarray:
     """Return the covariances of the centres, shape (k, 2, 2), squared dot radii."""
-    edges, errors = of.edges, of.errors
     # What an error changes is not its weight times the error, but the derivative of that.
     gain = geman_mcclure_gain(of.weights, of.relative).sum(axis=1)
-    gain = np.maximum(gain / np.maximum(of.robust.sum(axis=1), _NO_WEIGHT), _MINIMUM_GAIN)
+    gain = np.maximum(gain / np.maximum(of.robust.sum(axis=1), NO_WEIGHT), _MINIMUM_GAIN)
     influence = of.model.influence(of.normal) * (of.robust / gain[:, None])[:, None]
-    parts = influence * errors[:, None]
+    parts = influence * of.errors[:, None]
     parts -= of.light.influence(influence * (edges.sensitivity / edges.scale)[:, None])
     used = geman_mcclure(of.own.weights, of.relative)
-    common = common_errors(used * errors * edges.scale, circles.radii)
+    common = common_errors(used * of.errors * edges.scale, circles.radii)
     covariance = edge_covariance(parts, used, edges.spacing, of.normal.shape[1], common)
     variance = 1 + unevenness(of.light.errors, used)
-    if of.model.projective:
+    if projective:
         variance *= _OF_COMMON * common * np.exp(-_OF_SIZE / frame.mean_radii(frames))
     covariance *= variance[:, None, None]
     return covariance
 
 
-def _light(edges: Edges, weights: np.ndarray, circles: Circles, window: np.ndarray) -> LightSlope:
-    """Return the slope of the light along the circles."""
-    common = common_slope(edges.slope, circles.polarity, weights)
-    prior = _LIGHT_PRIOR / edges.scale.mean(axis=1, keepdims=True)
-    # Where edges were sharpened, none of their slopes is the light's.
-    prior *= (1 + (common / _SHARPENED) ** 2) ** 2
-    slopes = edges.slope - circles.polarity * common
-    return smooth_slopes(slopes, weights, window, prior)
+class _DisplacementModel:
+    """How changes of k frames, and of what else is unknown, move their edges outwards.
 
+    The unknowns are the changes in the order of `frame.displacement_basis`. In a projective model
+    the scale of each group of circles, and the shift of all edges towards the dark side which the
+    gamma of a camera causes, follow.
+    """
 
-def _window(circles: Circles) -> np.ndarray:
-    """Return the weights of the light at other points of the same circle, (m, m)."""
-    angles, radii = (np.asarray(of, float).tobytes() for of in (circles.angles, circles.radii))
-    return _window_of(angles, radii)
+    def __init__(self, circles: Circles, scale: np.ndarray, projective: bool) -> None:
+        shared = frame.displacement_basis(circles.angles, circles.radii)
+        own = np.zeros((len(scale), len(shared), 0))
+        prior: np.ndarray = np.full(5, _WEAK_PRIOR)
+        if projective:
+            groups = np.arange(1, circles.group.max(initial=0) + 1)
+            scales = np.where(circles.group[:, None] == groups, circles.radii[:, None], 0)
+            shared = np.concatenate([shared, scales], axis=1)
+            own = (-circles.polarity / scale)[..., None]
+            deviations = [_PRIOR_PERSPECTIVE] * 2 + [_PRIOR_SCALE] * len(groups) + [_PRIOR_SHIFT]
+            prior = np.concatenate([prior, np.array(deviations) ** -2])
+        else:
+            shared = shared[:, :5]
+        self._shared, self._own, self._prior = shared, own, np.diag(prior)
+        self._products = (shared[:, :, None] * shared[:, None]).reshape(len(shared), -1)
+
+    def solve(self, values: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the unknowns, shape (k, n), and the normal matrices of weighted least squares."""
+        count, known = len(values), self._shared.shape[1]
+        weighted = weights[..., None] * self._own
+        mixed = weighted.transpose(0, 2, 1) @ self._shared
+        normal = np.empty((count, *self._prior.shape))
+        normal[:, :known, :known] = (weights @ self._products).reshape(count, known, known)
+        normal[:, known:, :known] = mixed
+        normal[:, :known, known:] = mixed.transpose(0, 2, 1)
+        normal[:, known:, known:] = weighted.transpose(0, 2, 1) @ self._own
+        normal += self._prior
+        right = np.concatenate(
+            [(weights * values) @ self._shared, (weighted * values[..., None]).sum(axis=1)], axis=1
+        )
+        return np.linalg.solve(normal, right[..., None])[..., 0], normal
+
+    def displacement(self, unknowns: np.ndarray) -> np.ndarray:
+        """Return how far unknowns, shape (k, n), move the edges, dot radii, shape (k, m)."""
+        known = self._shared.shape[1]
+        own = (self._own @ unknowns[:, known:, None])[..., 0]
+        return unknowns[:, :known] @ self._shared.T + own
+
+    def influence(self, normal: np.ndarray) -> np.ndarray:
+        """Return what a weighted displacement does to the translation, shape (k, 2, m)."""
+        known = self._shared.shape[1]
+        inverse = np.linalg.inv(normal)[:, :2]
+        own = inverse[:, :, known:] @ self._own.transpose(0, 2, 1)
+        return inverse[:, :, :known] @ self._shared.T + own
 
 
 @lru_cache(maxsize=8)  # up to two megabytes each; the same circles are fitted again and again
-def _window_of(angles: bytes, radii: bytes) -> np.ndarray:
-    """Return the same for angles and radii of float64."""
+def _window(angles: bytes, radii: bytes) -> np.ndarray:
+    """Return the weights of the light at other points of the same circle, (m, m), from float64."""
     around, lengths = np.frombuffer(angles), np.frombuffer(radii)
     points = lengths[:, None] * np.stack([np.cos(around), np.sin(around)], axis=1)
     squares = 2 * (lengths**2 - points @ points.T)

@@ -1,15 +1,16 @@
-"""Dots in an image: what is known of each, and which of them are the same."""
+"""Dots in an image: what is known of each, which are near others, and which are the same."""
 
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
-from ahf_ros.features.neighbours import pairs_within
 
 _SAME = 0.3  # largest distance of the centres of the same dot in its radius; of radii in ln
 _PART = 100_000  # pairs looked at at a time, which bounds the memory
@@ -18,21 +19,11 @@ _LOG = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class Dots(ArrayRecord):
-    """k elliptic dots.
+    """k elliptic dots."""
 
-    Attributes
-    ----------
-    frames : ndarray of float64, shape (k, 3, 3)
-        Affine, from the unit circle onto the ellipse, px.
-    polarity : ndarray of int, shape (k,)
-        1 for a dark dot on bright ground, -1 for a bright one on dark.
-    share : ndarray of float64, shape (k,)
-        Share of the ellipse where the image shows an edge.
-    """
-
-    frames: np.ndarray
-    polarity: np.ndarray
-    share: np.ndarray
+    frames: np.ndarray  # (k, 3, 3), affine, from the unit circle onto the ellipse, px
+    polarity: np.ndarray  # int, (k,), 1 for a dark dot on bright ground, -1 for a bright one
+    share: np.ndarray  # (k,), of the ellipse where the image shows an edge
 
 
 NO_DOTS = Dots(np.zeros((0, 3, 3)), np.zeros(0, int), np.zeros(0))
@@ -62,17 +53,56 @@ def distinct(dots: Dots) -> Dots:
 
 
 def best(indices: np.ndarray, ranks: np.ndarray, limit: int, what: str) -> np.ndarray:
-    """Return the indices of the lowest ranks, in their order; log a warning if any is left out.
+    """Return at most `limit` of k indices, those of the lowest ranks, in their order.
 
-    Parameters
-    ----------
-    indices, ranks : ndarray, shape (k,)
-    limit : int
-        Maximum number of indices returned.
-    what : str
-        What the indices are of, for the warning.
+    If any is left out, a warning says of what.
     """
     if len(indices) <= limit:
         return indices
     _LOG.warning('%d %s; the %d best are looked at', len(indices), what, limit)
     return np.sort(indices[np.argsort(ranks, kind='stable')[:limit]])
+
+
+def pairs_within(
+    points: np.ndarray, reach: np.ndarray, part: int
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Yield the ordered pairs of points where the second is within reach of the first.
+
+    The reach, shape (n,), is half the side of the square about each of the points, shape (n, 2);
+    0 where no pairs are asked for. The indices of first and second points come in parts of about
+    `part` pairs that are looked at, which bounds the memory. All pairs with one first point come
+    together, and ascending.
+    """
+    asked = reach[reach > 0]
+    if not len(asked):
+        return
+    x, y = (points - points.min(axis=0)).T
+    # Strips as high as the usual reach, each sorted by x, have their neighbours in a few runs.
+    height = max(float(np.median(asked)), 1e-9)
+    width = float(x.max() + 2 * reach.max() + 1)
+    strip = np.floor(y / height)
+    key = strip * width + x
+    order = np.argsort(key, kind='stable')
+    key = key[order]
+    lowest, highest = np.floor((y - reach) / height), np.floor((y + reach) / height)
+    lowest, highest = np.maximum(lowest, 0), np.minimum(highest, strip.max())
+    strips = (highest - lowest + 1).astype(int)
+    owner = np.repeat(np.arange(len(points)), strips)
+    row = lowest[owner] + _counted(strips)
+    begin = np.searchsorted(key, row * width + np.maximum(x - reach, 0)[owner])
+    end = np.searchsorted(key, row * width + (x + reach)[owner], side='right')
+    count = end - begin
+    total = np.concatenate([[0], np.cumsum(np.bincount(owner, count, len(points)))])
+    marks = np.searchsorted(total, np.arange(0, total[-1] + part, part))
+    runs = np.concatenate([[0], np.cumsum(strips)])
+    for low, high in pairwise(np.unique(np.minimum(marks, len(points)))):
+        of_part = slice(runs[low], runs[high])
+        first = np.repeat(owner[of_part], count[of_part])
+        second = order[np.repeat(begin[of_part], count[of_part]) + _counted(count[of_part])]
+        near = (np.abs(y[second] - y[first]) < reach[first]) & (first != second)
+        yield first[near], second[near]
+
+
+def _counted(counts: np.ndarray) -> np.ndarray:
+    """Return 0, 1, 2 to n - 1 for each of the counts n, shape (sum of n,)."""
+    return np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)

@@ -14,12 +14,10 @@ from ahf_ros.target import UNDECODED, Target
 def ellipse_fields(
     frames: np.ndarray, covariance: np.ndarray, edge_shift: np.ndarray | None = None
 ) -> list[dict[str, Any]]:
-    """Return the fields of `Target` that say where and how large it is.
+    """Return the fields of `Target` that say where and how large it is, from k frames in px.
 
-    Parameters
-    ----------
-    frames, covariance, edge_shift : ndarray
-        As for `targets_from_frames`.
+    The covariance of the image of the centre is px^2, shape (k, 2, 2), the edge shift px, shape
+    (k,); NaN where it is unknown, as all are by default.
     """
     columns = (frames[:, 0, 2], frames[:, 1, 2], *ellipse_axes(frames))
     names = ('x', 'y', 'semi_major', 'semi_minor', 'angle')
@@ -45,23 +43,9 @@ def targets_from_frames(
     family: str | np.ndarray,
     edge_shift: np.ndarray | None = None,
 ) -> list[Target]:
-    """Return targets, in the order given.
+    """Return targets, in the order given, whose places are as for `ellipse_fields`.
 
-    Parameters
-    ----------
-    frames : ndarray of float64, shape (k, 3, 3)
-        In px of the image.
-    covariance : ndarray of float64, shape (k, 2, 2)
-        Of the image of the centre, px^2.
-    ids : ndarray of int, shape (k,)
-        `UNDECODED` where the code word is not certain.
-    codes : ndarray of int, shape (k,)
-        Code words; 0 is reported where the ID is `UNDECODED`.
-    confidence : ndarray of float64, shape (k,)
-    family : str, or ndarray of str, shape (k,)
-        Names of the families of the codes; none is reported where the ID is `UNDECODED`.
-    edge_shift : ndarray of float64, shape (k,), optional
-        As in `Target`, px; NaN where it is unknown, as all are by default.
+    Where an ID is `UNDECODED`, neither a code word nor the name of its family is reported.
     """
     undecoded = ids == UNDECODED
     columns = (ids, np.where(undecoded, 0, codes), confidence, np.where(undecoded, '', family))

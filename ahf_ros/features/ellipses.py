@@ -50,74 +50,40 @@ def fit_ellipses(logs: Sequence[np.ndarray], candidates: Sequence[Candidates]) -
 
     About each candidate the steps of ln I along rays are summed on circles and ellipses of all
     sizes; the best one is then refined, robustly, on the strongest step of each ray near to it.
-
-    Parameters
-    ----------
-    logs : sequence of ndarray of int16
-        The pyramid of logarithmic images.
-    candidates : sequence of Candidates
-
-    Returns
-    -------
-    Dots
-        In px of the first level; only candidates that the edges support.
+    The images are the logarithmic ones of the pyramid. Only candidates that the edges support are
+    returned, in px of the first level.
     """
     found = [NO_DOTS]
     for some in candidates:
         level = 0 if some.level == 1 and some.radii[1] < _SMALL else some.level
-        for start in range(0, len(some.points), _PART):
-            begun, largest = _best_ellipses(logs[level], some, level, slice(start, start + _PART))
-            dots, kept = refine_ellipses(logs[level], begun.frames, begun.polarity)
-            dots = dots.select(frame.ellipse_axes(dots.frames)[0] < largest[kept])
+        shrink = 2.0 ** (some.level - level)
+        points = (some.points + 0.5) * shrink - 0.5
+        low, high = (radius * shrink for radius in some.radii)
+        for start in range(0, len(points), _PART):
+            part = slice(start, start + _PART)
+            dots = _best_ellipses(logs[level], points[part], some.polarity[part], low, high)
+            dots = refine_ellipses(logs[level], dots)
+            dots = dots.select(frame.ellipse_axes(dots.frames)[0] < _OVERSIZE * high)
             found.append(replace(dots, frames=frame.enlarged(dots.frames, level)))
     return Dots.joined(found)
 
 
-def refine_ellipses(
-    log: np.ndarray, frames: np.ndarray, polarity: np.ndarray
-) -> tuple[Dots, np.ndarray]:
-    """Refine ellipses on a logarithmic image, and drop those that its edges do not support.
-
-    Parameters
-    ----------
-    log : ndarray of int16, shape (height, width)
-    frames : ndarray of float64, shape (k, 3, 3)
-        Affine, in px of `log`.
-    polarity : ndarray of int, shape (k,)
-
-    Returns
-    -------
-    dots : Dots
-        In px of `log`.
-    kept : ndarray of int
-        Indices of the ellipses that these were.
-    """
-    dots, kept = Dots(frames, polarity, np.zeros(len(frames))), np.arange(len(frames))
+def refine_ellipses(log: np.ndarray, dots: Dots) -> Dots:
+    """Refine dots in px of a logarithmic image, and drop those that its edges do not support."""
     for window, minimum_share, every in _WINDOWS:
         dots = _refined(log, dots, window, _ANGLES[::every])
         major, minor, _ = frame.ellipse_axes(dots.frames)
         good = (minor > _MINIMUM_ASPECT * major) & (minor > _MINIMUM_MINOR)
         good &= dots.share > minimum_share
-        dots, kept = dots.select(good), kept[good]
-    return resized(log, dots), kept
+        dots = dots.select(good)
+    return resized(log, dots)
 
 
 def _best_ellipses(
-    log: np.ndarray, candidates: Candidates, level: int, part: slice
-) -> tuple[Dots, np.ndarray]:
-    """Return the ellipses about some candidates with the highest mean steps.
-
-    Returns
-    -------
-    dots : Dots
-        Those that are clear, in px of the level of `log`.
-    largest : ndarray of float64, shape (k,)
-        Semi-major axis that they may have.
-    """
-    shrink = 2.0 ** (candidates.level - level)
-    x, y = ((candidates.points[part] + 0.5) * shrink - 0.5).T
-    polarity = candidates.polarity[part]
-    low, high = candidates.radii[0] * shrink, candidates.radii[1] * shrink
+    log: np.ndarray, points: np.ndarray, polarity: np.ndarray, low: float, high: float
+) -> Dots:
+    """Return the ellipses about points with the highest mean steps, if these are clear."""
+    x, y = points.T
     templates, radii, ellipses = _templates(low, high)
     one = np.ones(len(x))
     frames = frame.affine_frames(x, y, one, one, 0 * one)
@@ -126,22 +92,16 @@ def _best_ellipses(
     best, highest = scores.argmax(axis=1), scores.max(axis=1)
     move_x, move_y, *axes = ellipses[best].T
     fitted = frame.affine_frames(x + move_x, y + move_y, *axes)
-    dots = Dots(fitted, polarity, highest).select(highest > _MINIMUM_SCORE)
-    return dots, np.full(len(dots.frames), _OVERSIZE * high)
+    return Dots(fitted, polarity, highest).select(highest > _MINIMUM_SCORE)
 
 
 @lru_cache(maxsize=16)  # a megabyte each; radii may be set to any number while a node runs
 def _templates(low: float, high: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return templates of ellipses about a candidate, and of circles beside it.
 
-    Returns
-    -------
-    weights : ndarray of float32, shape (rays x bins, n)
-        That average steps along each of them.
-    radii : ndarray of float64, shape (bins + 2,)
-        That are sampled.
-    ellipses : ndarray of float64, shape (n, 5)
-        Centres, seen from the candidate, semi-axes and directions.
+    They are weights, float32 of shape (rays x bins, n), that average steps along each of n; the
+    radii that are sampled, shape (bins + 2,); and the centres of the ellipses, seen from the
+    candidate, with their semi-axes and directions, shape (n, 5).
     """
     radii = np.geomspace(_MINIMUM_RADIUS * low, _MAXIMUM_RADIUS * high, _BINS)
     ratio = np.log(radii[1] / radii[0])
@@ -200,16 +160,9 @@ def _refined(log: np.ndarray, dots: Dots, window: float, angles: np.ndarray) -> 
 
 
 def resized(log: np.ndarray, dots: Dots) -> Dots:
-    """Return dots with their sizes in gray values.
+    """Return dots, in px of an image LOG_SCALE ln(I + 8), with their sizes in gray values.
 
     In a logarithm a blurred edge lies on its dark side.
-
-    Parameters
-    ----------
-    log : ndarray of int16, shape (height, width)
-        LOG_SCALE ln(I + 8).
-    dots : Dots
-        In px of `log`.
     """
     if not len(dots.frames):
         return dots

@@ -25,18 +25,10 @@ def affine_frames(
     semi_minor: np.ndarray,
     angle: np.ndarray,
 ) -> np.ndarray:
-    """Return the frames that map the unit circle onto ellipses.
+    """Return the frames, shape (k, 3, 3), that map the unit circle onto ellipses.
 
-    Parameters
-    ----------
-    x, y, semi_major, semi_minor : array_like of float, shape (k,)
-        Centres and semi-axes, px.
-    angle : array_like of float, shape (k,)
-        Direction of the major axis from +x towards +y, rad.
-
-    Returns
-    -------
-    ndarray of float64, shape (k, 3, 3)
+    Centres and semi-axes, px, and directions of the major axis from +x towards +y, rad, are
+    numbers or of shape (k,).
     """
     x, y, major, minor, angle = np.broadcast_arrays(
         *(np.asarray(values, np.float64) for values in (x, y, semi_major, semi_minor, angle))
@@ -51,54 +43,25 @@ def affine_frames(
 
 
 def circle_points(angles: np.ndarray, radii: np.ndarray) -> np.ndarray:
-    """Return points on concentric circles.
+    """Return points on concentric circles, shape (..., m, n, 2).
 
-    Parameters
-    ----------
-    angles : ndarray of float, shape (m,)
-        From +x towards +y, rad.
-    radii : ndarray of float, shape (..., n)
-        In dot radii.
-
-    Returns
-    -------
-    ndarray of float64, shape (..., m, n, 2)
+    Angles, shape (m,), are from +x towards +y, rad; radii, shape (..., n), are dot radii.
     """
     directions = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     return radii[..., None, :, None] * directions[:, None, :]
 
 
 def circle_outlines(frames: np.ndarray, radii: np.ndarray) -> np.ndarray:
-    """Return polygons along the images of circles, one of each target.
-
-    Parameters
-    ----------
-    frames : ndarray of float64, shape (k, 3, 3)
-    radii : ndarray of float, shape (k,)
-        In dot radii.
-
-    Returns
-    -------
-    ndarray of float64, shape (k, 32, 2)
-        Pixels.
-    """
+    """Return polygons along the images of circles of radii (k,), px, shape (k, 32, 2)."""
     angles = 2 * np.pi * np.arange(_CORNERS) / _CORNERS
     return project(frames, circle_points(angles, radii[:, None]))[:, :, 0]
 
 
 def project(frames: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Return the images of points of the target's plane.
+    """Return the images of points of the target's plane, px, shape (k, ..., 2).
 
-    Parameters
-    ----------
-    frames : ndarray of float64, shape (k, 3, 3)
-    points : ndarray of float, shape (..., 2) of up to three axes, or (k, m, n, 2)
-        The same points for every frame, or others for each.
-
-    Returns
-    -------
-    ndarray of float64, shape (k, ..., 2)
-        Pixels.
+    Points of shape (..., 2), of up to three axes, are the same for every frame, those of shape
+    (k, m, n, 2) are others for each.
     """
     spread = (slice(None),) + (None,) * (points.ndim - 1 - (points.ndim > 3))
     x, y = points[..., 0], points[..., 1]
@@ -111,45 +74,20 @@ def project(frames: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def displacement_basis(angles: np.ndarray, radii: np.ndarray) -> np.ndarray:
-    """Return how far each frame change moves an edge outwards, in dot radii.
+    """Return how far each frame change moves edges at m angles and radii outwards, dot radii.
 
-    Parameters
-    ----------
-    angles, radii : ndarray of float, shape (m,)
-        Where on the target the edges are, rad and dot radii.
-
-    Returns
-    -------
-    ndarray of float64, shape (m, 7)
-        Columns: translation x, y; strain 1, cos 2a, sin 2a; projective x, y.
+    The columns, shape (m, 7), are translation x, y; strain 1, cos 2a, sin 2a; projective x, y.
     """
     cosine, sine = np.cos(angles), np.sin(angles)
-    return np.stack(
-        [
-            cosine,
-            sine,
-            radii,
-            radii * np.cos(2 * angles),
-            radii * np.sin(2 * angles),
-            -(radii**2) * cosine,
-            -(radii**2) * sine,
-        ],
-        axis=-1,
-    )
+    strain = [radii, radii * np.cos(2 * angles), radii * np.sin(2 * angles)]
+    projective = [-(radii**2) * cosine, -(radii**2) * sine]
+    return np.stack([cosine, sine, *strain, *projective], axis=-1)
 
 
 def moved(frames: np.ndarray, changes: np.ndarray) -> np.ndarray:
-    """Return frames after small changes, as `displacement_basis` orders them.
+    """Return frames after small changes, scaled so that their last element is one.
 
-    Parameters
-    ----------
-    frames : ndarray of float64, shape (k, 3, 3)
-    changes : ndarray of float64, shape (k, 5) or (k, 7)
-
-    Returns
-    -------
-    ndarray of float64, shape (k, 3, 3)
-        Scaled so that the last element is one.
+    Changes are those of `displacement_basis`, all seven or all but the projective ones.
     """
     change = np.zeros_like(frames)
     change[:, 0, 0] = 1 + changes[:, 2] + changes[:, 3]
@@ -188,18 +126,10 @@ def reduced(points: np.ndarray, level: int) -> np.ndarray:
 
 
 def ellipse_axes(frames: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the semi-axes of the dots and the direction of the major ones.
+    """Return the semi-axes of the dots, major and minor, and the direction of the major ones.
 
-    Parameters
-    ----------
-    frames : ndarray of float64, shape (k, 3, 3)
-
-    Returns
-    -------
-    semi_major, semi_minor : ndarray of float64, shape (k,)
-        px, of the affine part of the frame at its centre.
-    angle : ndarray of float64, shape (k,)
-        rad in (-pi/2, pi/2], from +x towards +y.
+    They belong to the affine part of the frame at its centre: px, and rad in (-pi/2, pi/2] from
+    +x towards +y.
     """
     affine = local_affine(frames)
     square = affine @ affine.transpose(0, 2, 1)

@@ -16,18 +16,10 @@ _MINIMUM_DEPTH = 0.2  # as a fraction of the centre's depth
 
 @dataclass(frozen=True, slots=True)
 class HomographyFit:
-    """Homographies of k objects.
+    """Homographies of k objects."""
 
-    Attributes
-    ----------
-    homographies : ndarray of float64, shape (k, 3, 3)
-        From the plane of the object to pixels, the last element being one.
-    covariance : ndarray of float64, shape (k, 2, 2)
-        Of the image of the centre of the object, px^2, where the weights are inverse variances.
-    """
-
-    homographies: np.ndarray
-    covariance: np.ndarray
+    homographies: np.ndarray  # (k, 3, 3), from the plane of the object to px, last element one
+    covariance: np.ndarray  # (k, 2, 2), of the image of the centre of the object, px^2
 
 
 def fit_homographies(
@@ -35,16 +27,9 @@ def fit_homographies(
 ) -> HomographyFit:
     """Fit homographies to the images of points, with little perspective where they do not show it.
 
-    Parameters
-    ----------
-    points : ndarray of float, shape (m, 2) or (k, m, 2)
-        In the plane of the object, about its centre.
-    images : ndarray of float, shape (k, m, 2)
-        px.
-    weights : ndarray of float, shape (k, m) or (k, m, 2, 2)
-        Inverse variances or inverse covariances of the images, 1/px^2; zero leaves a point out.
-    reach : float
-        Size of the object, from its centre, in units of `points`.
+    Points in the plane of the object, shape (m, 2) or (k, m, 2), are about its centre; `reach` is
+    its size from there, in their unit. Their images, shape (k, m, 2), are px. Weights are inverse
+    variances, shape (k, m), or covariances, (k, m, 2, 2), 1/px^2; zero leaves a point out.
     """
     count = len(images)
     scaled = np.broadcast_to(points / reach, images.shape)
@@ -83,19 +68,11 @@ def fit_homographies(
 
 
 def local_frames(homographies: np.ndarray, points: np.ndarray, radii: np.ndarray) -> np.ndarray:
-    """Return frames of circles in the plane of objects, see `ahf_ros.features.frame`.
+    """Return frames of circles in the plane of objects, shape (k, m, 3, 3).
 
-    Parameters
-    ----------
-    homographies : ndarray of float64, shape (k, 3, 3)
-    points : ndarray of float, shape (m, 2) or (k, m, 2)
-    radii : ndarray of float, shape (m,) or (k, m)
-
-    Returns
-    -------
-    ndarray of float64, shape (k, m, 3, 3)
-        Affine, with the image of the centre of the circle as their centre. Their second axis is
-        turned round where the homography is a mirror image, as from a design with y upwards.
+    Their centres, shape (m, 2) or (k, m, 2), and radii, (m,) or (k, m), are those in the plane.
+    Frames are affine, with the image of the centre of the circle as their centre. Their second
+    axis is turned round where the homography is a mirror image, as from a design with y upwards.
     """
     count = len(homographies)
     points = np.broadcast_to(points, (count, *points.shape[-2:]))
@@ -111,11 +88,5 @@ def local_frames(homographies: np.ndarray, points: np.ndarray, radii: np.ndarray
 
 
 def reference_frames(homographies: np.ndarray, radius: float) -> np.ndarray:
-    """Return the frames of circles about the origin of the plane of objects, shape (k, 3, 3).
-
-    Parameters
-    ----------
-    homographies : ndarray of float64, shape (k, 3, 3)
-    radius : float
-    """
+    """Return the frames of circles about the origin of the plane of objects, shape (k, 3, 3)."""
     return local_frames(homographies, np.zeros((1, 2)), np.array([radius]))[:, 0]

@@ -28,13 +28,7 @@ def targets_of_octaves(
 ) -> list[Target]:
     """Return the targets of all octaves, in px of the image; where octaves meet, some twice.
 
-    Parameters
-    ----------
-    pyramid : ImagePyramid
-    radii : tuple of 2 float
-        Bounds of the radius of a dot, px of the image.
-    identify : callable
-    refine : callable
+    `radii` are the bounds of the radius of a dot, px of the image.
     """
     found: list[Target] = []
     for octave in octaves(pyramid, *radii):

@@ -19,28 +19,16 @@ _CONTINUED = 0.5  # of the strength of an edge, that its continuation has at lea
 
 @dataclass(frozen=True, slots=True)
 class LogEdges:
-    """The edge pixels of a logarithmic image, and their gradients.
+    """The edge pixels of a logarithmic image, and their gradients."""
 
-    Attributes
-    ----------
-    dx, dy : ndarray of int16, shape (height, width)
-        Gradient of the image.
-    marked : ndarray of uint8, shape (height, width)
-        Not zero on edges.
-    x, y : ndarray of int32, shape (m,)
-        The edge pixels.
-    unit_x, unit_y, strength : ndarray of float32, shape (m,)
-        Direction and size of their gradients.
-    """
-
-    dx: np.ndarray
+    dx: np.ndarray  # int16, (height, width), gradient of the image, as the next
     dy: np.ndarray
-    marked: np.ndarray
-    x: np.ndarray
+    marked: np.ndarray  # uint8, (height, width), not zero on edges
+    x: np.ndarray  # int32, (m,), the edge pixels, as the next
     y: np.ndarray
-    unit_x: np.ndarray
+    unit_x: np.ndarray  # float32, (m,), direction of their gradients, as the next
     unit_y: np.ndarray
-    strength: np.ndarray
+    strength: np.ndarray  # float32, (m,), size of these gradients
 
     def select(self, which: np.ndarray | slice) -> LogEdges:
         """Return some of the edge pixels, by an index array, a mask of shape (m,) or a slice."""
@@ -82,16 +70,11 @@ def mask_of(polygons: Iterable[np.ndarray], shape: tuple[int, ...]) -> np.ndarra
     return mask
 
 
-def find_edges(
-    log: np.ndarray, weak_edge: float = _WEAK_EDGE, strong_edge: float = _STRONG_EDGE
-) -> LogEdges:
-    """Return the edges of a logarithmic image, ndarray of int16, shape (height, width).
-
-    Edges begin at strong steps of ln and go on along weak ones.
-    """
+def find_edges(log: np.ndarray) -> LogEdges:
+    """Return the edges of a logarithmic image, ndarray of int16, shape (height, width)."""
     dx = cv2.Scharr(log, cv2.CV_16S, 1, 0, scale=1 / 32)
     dy = cv2.Scharr(log, cv2.CV_16S, 0, 1, scale=1 / 32)
-    weak, strong = weak_edge * LOG_SCALE, strong_edge * LOG_SCALE
+    weak, strong = _WEAK_EDGE * LOG_SCALE, _STRONG_EDGE * LOG_SCALE
     marked = cv2.Canny(dx, dy, weak, strong, L2gradient=True)
     pixels = cv2.findNonZero(marked)
     pixels = np.zeros((0, 2), np.int32) if pixels is None else pixels.reshape(-1, 2)

@@ -14,13 +14,9 @@ _MAXIMUM_ODDS = 30.0  # log-odds, beyond which a probability changes no more
 
 
 def logistic(features: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Return the probabilities of a logistic regression, shape (k,).
+    """Return the probabilities of a logistic regression, shape (k,), from features (k, n).
 
-    Parameters
-    ----------
-    features : ndarray of float, shape (k, n)
-    weights : ndarray of float, shape (n + 1,)
-        The intercept, and the weights of the features.
+    The weights, shape (n + 1,), are the intercept and those of the features.
 
     Examples
     --------
@@ -33,16 +29,6 @@ def logistic(features: np.ndarray, weights: np.ndarray) -> np.ndarray:
 
 
 def read_weights(path: Path, purpose: str, *names: str) -> tuple[np.ndarray, ...]:
-    """Return arrays of one set of a data file, each ndarray of float64, shape (n,).
-
-    Parameters
-    ----------
-    path : Path
-        JSON.
-    purpose : str
-        Name of the set.
-    *names : str
-        Names of the arrays.
-    """
+    """Return named arrays, float64 of shape (n,), of the set for a purpose in a JSON file."""
     weights = json.loads(path.read_text(encoding='utf-8'))[purpose]
     return tuple(np.array(weights[name], np.float64) for name in names)

@@ -2,18 +2,21 @@
 
 Across each point of an outline a blurred step is fitted to the gray values. Besides the offset of
 the step, the fit gives its levels, the slope of the light beside it and what it leaves
-unexplained, which tell later how much weight the edge deserves.
+unexplained, which tell later how much weight the edge deserves. The fit is linear about each of a
+few offsets, so that it is done by filters that are made once for each blur and each width of
+profiles.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
+from math import erf, pi, sqrt
 
 import numpy as np
 
-from ahf_ros.features.circles import Circles
 from ahf_ros.features.sampling import sample_lines, within
-from ahf_ros.features.step_fit import ALONG, BLUR_STEP, HALF_WIDTHS, fit_steps
 
 USUAL_BLUR = 0.8
 """Standard deviation of a step, px: a sharp lens, the area of a pixel and the interpolation."""
@@ -24,149 +27,77 @@ BLURS = (0.5, 4.0)
 CORRELATION = 1.9
 """Distance along an edge from where on the errors of profiles are independent, px."""
 
+_SAMPLES = 13  # of a profile
+_ALONG = np.linspace(-1, 1, _SAMPLES)  # where they are, half widths
+# The first one stands for no profile.
+_HALF_WIDTHS = np.array([0.0, 1.0, 1.3, 1.6, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0])  # px
+_BLUR_STEP = 0.1  # distance of two blurs that filters are made for, standard deviations in px
 _ENOUGH, _ENOUGH_BLURS = 3.0, 2.5  # half width of a profile, px, or deviations of the step
 _MAXIMUM_ASIDE = 0.8  # of the two lines of a profile, from its middle, px
+_FARTHEST, _OFFSETS = 0.8, 17  # farthest offset that is tried, half widths, and number of them
+_CONTRAST = 0.25  # usual gray value of dark over bright
+_MINIMUM_STEP = 1.0  # gray values, that an offset is computed from
 
 
 @dataclass(frozen=True, slots=True)
 class OutlinePoints:
-    """Where the outlines of k targets have edges, at m points each.
+    """Where the outlines of k targets have edges, at m points each, px."""
 
-    Attributes
-    ----------
-    points, normals : ndarray of float64, shape (k, m, 2)
-        In px; normals point outwards and have the length 1.
-    polarity : ndarray of int, shape (k, m)
-        1 where the outside is brighter, -1 where it is darker, 0 where there is no edge.
-    scale : ndarray of float64, shape (k, m)
-        px a unit of the outline (the dot radius of a ring target), across the edge.
-    spacing : ndarray of float64, shape (k, m)
-        Distance from one point to the next along the edge, px.
-    curvature : ndarray of float64, shape (k, m)
-        Of the outline, 1/px, positive where its centre lies inside.
-    """
-
-    points: np.ndarray
-    normals: np.ndarray
-    polarity: np.ndarray
-    scale: np.ndarray
-    spacing: np.ndarray
-    curvature: np.ndarray
+    points: np.ndarray  # (k, m, 2)
+    normals: np.ndarray  # (k, m, 2), outwards, of length 1
+    polarity: np.ndarray  # (k, m), 1 where the outside is brighter, -1 darker, 0 for no edge
+    scale: np.ndarray  # (k, m), px a unit of the outline (a dot radius, say), across the edge
+    spacing: np.ndarray  # (k, m), distance from one point to the next along the edge
+    curvature: np.ndarray  # (k, m), of the outline, 1/px, positive where its centre lies inside
 
 
 @dataclass(frozen=True, slots=True)
 class Edges:
-    """The edges of k targets at m points each, shape (k, m) all.
+    """The edges of k targets at m points each, shape (k, m) all; 0 where none is visible."""
 
-    Attributes
-    ----------
-    offset : ndarray of float64
-        Distance of the edge from the outline, outwards, px.
-    dark, bright : ndarray of float64
-        Gray values beside it.
-    slope : ndarray of float64
-        Slope of the light outwards, as a share of it, 1/px.
-    sensitivity : ndarray of float64
-        How far a slope of the light moves the offset outwards, px^2.
-    softness : ndarray of float64
-        Blur of the edge minus the blur of the step, standard deviations in px.
-    residual : ndarray of float64
-        Root mean square of what step, slope and blur do not explain, gray values.
-    scale : ndarray of float64
-        As in `OutlinePoints`, as is the next.
-    spacing : ndarray of float64
-    visible : ndarray of bool
-        Whether an edge is expected and its profile lies in the image; what was measured is 0
-        elsewhere.
-    """
-
-    offset: np.ndarray
-    dark: np.ndarray
+    offset: np.ndarray  # distance from the outline, outwards, px
+    dark: np.ndarray  # gray values beside it
     bright: np.ndarray
-    slope: np.ndarray
-    sensitivity: np.ndarray
-    softness: np.ndarray
-    residual: np.ndarray
-    scale: np.ndarray
+    slope: np.ndarray  # of the light outwards, as a share of it, 1/px
+    sensitivity: np.ndarray  # how far a slope of the light moves the offset outwards, px^2
+    softness: np.ndarray  # blur of the edge minus that of the step, standard deviations in px
+    residual: np.ndarray  # root mean square of what step, slope and blur do not explain
+    scale: np.ndarray  # as in `OutlinePoints`, everywhere
     spacing: np.ndarray
-    visible: np.ndarray
-
-
-def edge_points(frames: np.ndarray, circles: Circles) -> OutlinePoints:
-    """Return where the circles of targets have edges, for frames (k, 3, 3)."""
-    radii = circles.radii
-    radial = np.stack([np.cos(circles.angles), np.sin(circles.angles)])
-    tangential = np.stack([-radial[1], radial[0]])
-    images = frames[:, :, :2] @ (radii * radial) + frames[:, :, 2:]
-    depth = images[:, 2:]
-    points = images[:, :2] / depth
-    outwards, along = (
-        (moved[:, :2] - points * moved[:, 2:]) / depth
-        for moved in (frames[:, :, :2] @ radial, frames[:, :, :2] @ tangential)
-    )
-    stretch = np.hypot(along[:, 0], along[:, 1])
-    area = outwards[:, 0] * along[:, 1] - outwards[:, 1] * along[:, 0]
-    return OutlinePoints(
-        points=points.transpose(0, 2, 1),
-        normals=np.stack([along[:, 1], -along[:, 0]], axis=2) / stretch[..., None],
-        polarity=circles.polarity,
-        scale=area / stretch,
-        spacing=circles.spacing * stretch,
-        curvature=area / (radii * stretch**3),
-    )
-
-
-def measure_edges(
-    gray: np.ndarray,
-    frames: np.ndarray,
-    circles: Circles,
-    blur: np.ndarray,
-    reach: float | np.ndarray,
-) -> Edges:
-    """Fit blurred steps to the gray values across circles.
-
-    Parameters
-    ----------
-    gray : ndarray of float32, shape (height, width)
-        Gray values from 0 to 255.
-    frames : ndarray of float64, shape (k, 3, 3)
-    circles : Circles
-    blur : ndarray of float64, shape (k,)
-        Standard deviation of the steps, px. A wrong one costs precision, and moves nothing.
-    reach : float or ndarray of float, shape (k, 1)
-        How far from a circle to look, dot radii.
-    """
-    return measure_outlines(gray, edge_points(frames, circles), blur, reach)
+    visible: np.ndarray  # whether an edge is expected and its profile lies in the image
 
 
 def measure_outlines(
     gray: np.ndarray, outlines: OutlinePoints, blur: np.ndarray, reach: float | np.ndarray
 ) -> Edges:
-    """Fit blurred steps to the gray values across the outlines of k targets.
+    """Fit blurred steps to gray values, float32 from 0 to 255, across the outlines of k targets.
 
-    Parameters
-    ----------
-    gray : ndarray of float32, shape (height, width)
-        Gray values from 0 to 255.
-    outlines : OutlinePoints
-    blur : ndarray of float64, shape (k,)
-        Standard deviation of the steps, px. A wrong one costs precision, and moves nothing.
-    reach : float or ndarray of float, shape (k, 1)
-        How far from an outline to look, in its units.
+    The standard deviations of the steps, `blur`, are px of shape (k,); a wrong one costs
+    precision, and moves nothing. Steps are looked for within `reach` of an outline, in its units,
+    a number or of shape (k, 1).
     """
     aside = np.minimum(outlines.spacing / 4, _MAXIMUM_ASIDE)
     enough = np.maximum(_ENOUGH, _ENOUGH_BLURS * blur)[:, None]
-    which = np.searchsorted(HALF_WIDTHS, np.minimum(reach * outlines.scale, enough), 'right') - 1
+    which = np.searchsorted(_HALF_WIDTHS, np.minimum(reach * outlines.scale, enough), 'right') - 1
     which[outlines.polarity == 0] = 0
-    ends = HALF_WIDTHS[which, None] * outlines.normals
+    ends = _HALF_WIDTHS[which, None] * outlines.normals
     for end in (outlines.points - ends, outlines.points + ends):
         which[~within(end, gray.shape)] = 0
-    blurs = np.rint(np.clip(blur, *BLURS) / BLUR_STEP).astype(int)
-    groups = (which + len(HALF_WIDTHS) * blurs[:, None]).ravel()
+    blurs = np.rint(np.clip(blur, *BLURS) / _BLUR_STEP).astype(int)
+    groups = (which + len(_HALF_WIDTHS) * blurs[:, None]).ravel()
     chosen = np.flatnonzero(which)
     chosen = chosen[np.argsort(groups[chosen], kind='stable')]
-    fitted = fit_steps(_profiles(gray, outlines, aside, which, chosen), groups[chosen])
-    fitted[[0, 3]] *= outlines.polarity.ravel()[chosen]
+    points, normals = (of.reshape(-1, 2)[chosen] for of in (outlines.points, outlines.normals))
+    outwards = outlines.polarity.ravel()[chosen]
+    across = outwards[:, None] * normals  # from dark to bright
+    beside = aside.ravel()[chosen, None] * across[:, ::-1] * [-1, 1]
+    middles = np.concatenate([points - beside, points + beside])
+    directions = _HALF_WIDTHS[which.ravel()[chosen], None] * across
+    lines = sample_lines(gray, middles, np.concatenate([directions] * 2), _ALONG)
+    profiles = lines[: len(points)] + lines[len(points) :]
+    profiles /= 2
+    fitted = _fit_steps(profiles, groups[chosen])
+    fitted[[0, 3]] *= outwards
     steps = np.zeros((len(fitted), which.size))
     steps[:, chosen] = fitted
     # On a curve, the blur and the chord between the two lines of a profile lie inside.
@@ -176,32 +107,91 @@ def measure_outlines(
     return Edges(*[*measured, outlines.scale, outlines.spacing, which > 0])
 
 
-def _profiles(
-    gray: np.ndarray,
-    outlines: OutlinePoints,
-    aside: np.ndarray,
-    which: np.ndarray,
-    chosen: np.ndarray,
-) -> np.ndarray:
-    """Return profiles through some points, each the mean of two lines, shape (n, samples).
+def _fit_steps(values: np.ndarray, groups: np.ndarray) -> np.ndarray:
+    """Fit blurred steps to n profiles, shape (n, samples), from dark to bright.
 
-    Parameters
-    ----------
-    gray, outlines
-        As for `measure_outlines`.
-    aside : ndarray of float64, shape (k, m)
-        Distance of the two lines from the points, px.
-    which : ndarray of int, shape (k, m)
-        Indices of the half widths.
-    chosen : ndarray of int, shape (n,)
-        Indices of the points, of k m.
+    The fit is linear about each of the offsets tried; the one with the smallest residual is taken.
+    `groups`, shape (n,), ascend, see `_step_filters`. The result, shape (7, n), has the fields of
+    `Edges` up to the residual.
     """
-    points, normals = (of.reshape(-1, 2)[chosen] for of in (outlines.points, outlines.normals))
-    across = outlines.polarity.ravel()[chosen, None] * normals  # from dark to bright
-    beside = aside.ravel()[chosen, None] * across[:, ::-1] * [-1, 1]
-    middles = np.concatenate([points - beside, points + beside])
-    directions = HALF_WIDTHS[which.ravel()[chosen], None] * across
-    lines = sample_lines(gray, middles, np.concatenate([directions] * 2), ALONG)
-    profiles: np.ndarray = lines[: len(points)] + lines[len(points) :]
-    profiles /= 2
-    return profiles
+    best = np.empty(len(values), np.intp)
+    bounds = np.flatnonzero(np.diff(groups, prepend=-1, append=-1))
+    for start, end in pairwise(bounds):
+        best[start:end] = _best_offsets(values[start:end], _step_filters(int(groups[start])))
+    kinds = groups * _OFFSETS + best
+    order = np.argsort(kinds, kind='stable')
+    ordered, kinds = values[order], kinds[order]
+    parameters = np.empty((len(values), _SAMPLES), np.float32)
+    known = np.empty((3, len(values)))
+    bounds = np.flatnonzero(np.diff(kinds, prepend=-1, append=-1))
+    for start, end in pairwise(bounds):
+        group, index = divmod(int(kinds[start]), _OFFSETS)
+        filters = _step_filters(group)
+        np.matmul(ordered[start:end], filters.parts[index], out=parameters[start:end])
+        known[:, start:end] = filters.known[:, index, None]
+    low, high, moved, light, blurred = parameters[:, :5].T.astype(np.float64)
+    rest = parameters[:, 5:]
+    residual = np.sqrt(np.einsum('ij,ij->i', rest, rest) / values.shape[1])
+    tried, spacing, sensitivity = known
+    contrast = np.maximum(high - low, _MINIMUM_STEP)
+    offset = tried + np.clip(-moved / contrast, -spacing, spacing)
+    slope, softness = light / np.maximum(high, _MINIMUM_STEP), -blurred / contrast
+    fitted = np.empty((7, len(values)))
+    fitted[:, order] = offset, low, high, slope, sensitivity, softness, residual
+    return fitted
+
+
+@dataclass(frozen=True, slots=True)
+class _StepFilters:
+    search: np.ndarray  # (samples, 3 p), two that explain a step at each offset, its contrast
+    parts: np.ndarray  # (p, samples, samples), low, high, moved, slope, blur, residuals
+    known: np.ndarray  # (3, p), offsets, their spacing, how a slope of the light moves steps, px^2
+
+
+def _best_offsets(values: np.ndarray, filters: _StepFilters) -> np.ndarray:
+    """Return the indices of the offsets at which steps explain profiles best."""
+    found = values @ filters.search
+    first, second, contrast = (
+        found[:, index * _OFFSETS : (index + 1) * _OFFSETS] for index in range(3)
+    )
+    first *= first
+    second *= second
+    first += second
+    np.copyto(first, -1.0, where=contrast <= 0)
+    best: np.ndarray = first.argmax(axis=1)
+    return best
+
+
+@cache
+def _step_filters(group: int) -> _StepFilters:
+    """Return the filters that fit steps of one blur to profiles of one half width.
+
+    A group is the index of the half width, plus the blur in steps times their number. A step has
+    the levels inside and outside, and minus its contrast times its distance from the
+    offset as unknowns; the slope of the light is one more, and minus its contrast times its change
+    of blur another. A single profile hardly determines these two: each is fitted with those
+    before it, and without those behind.
+    """
+    blur_steps, index = divmod(group, len(_HALF_WIDTHS))
+    half, blur = float(_HALF_WIDTHS[index]), blur_steps * _BLUR_STEP
+    along = half * _ALONG
+    offsets = half * np.linspace(-_FARTHEST, _FARTHEST, _OFFSETS)
+    search, parts, sensitivity = [], [], []
+    for offset in offsets:
+        scaled = (along - offset) / blur
+        rise = 0.5 * (1 + np.array([erf(value / sqrt(2)) for value in scaled]))
+        density = np.exp(-0.5 * scaled**2) / (blur * sqrt(2 * pi))
+        light = (along - offset) * (_CONTRAST + (1 - _CONTRAST) * rise)
+        design = np.stack([1 - rise, rise, density, light, scaled * density], axis=1)
+        step = np.linalg.pinv(design[:, :3])
+        slope = np.linalg.pinv(design[:, :4])[3]
+        softness = np.linalg.pinv(design)[4]
+        rest = np.linalg.qr(design, mode='complete')[0][:, design.shape[1] :]
+        search.append([*np.linalg.qr(design[:, :2])[0].T, step[1] - step[0]])
+        parts.append(np.column_stack([step.T, slope, softness, rest]))
+        sensitivity.append(-(light @ step[2]) / (1 - _CONTRAST))
+    return _StepFilters(
+        np.array(search).transpose(2, 1, 0).reshape(_SAMPLES, -1).astype(np.float32),
+        np.array(parts, np.float32),
+        np.stack([offsets, np.full(_OFFSETS, offsets[1] - offsets[0]), sensitivity]),
+    )

@@ -25,99 +25,54 @@ _ABOVE, _SLACK = 1.01, 1.03  # of the bounds of octaves, which overlap by less t
 
 @dataclass(frozen=True, slots=True)
 class ImagePyramid:
-    """An image and its halves; pixel (x, y) of a level covers four of the level below.
+    """An image and its halves; pixel (x, y) of a level covers four of the level below."""
 
-    Attributes
-    ----------
-    gray : ndarray of float32, shape (height, width)
-        The image, gray values from 0 to 255.
-    halves : tuple of ndarray of uint8 or float32
-        Its gray values on each level from the first half on.
-    logs : tuple of ndarray of int16
-        LOG_SCALE ln(I + LOG_OFFSET) of each level, the image as received first.
-    edges : tuple of LogEdges
-        Of each level from the first half on: `edges[i]` belongs to `logs[i + 1]`.
-    """
-
-    gray: np.ndarray
-    halves: tuple[np.ndarray, ...]
-    logs: tuple[np.ndarray, ...]
-    edges: tuple[LogEdges, ...]
+    gray: np.ndarray  # float32, (height, width), from 0 to 255
+    halves: tuple[np.ndarray, ...]  # gray values, uint8 or float32, from the first half on
+    logs: tuple[np.ndarray, ...]  # `log_image` of each level, the image as received first
+    edges: tuple[LogEdges, ...]  # from the first half on: `edges[i]` belongs to `logs[i + 1]`
 
 
 @dataclass(frozen=True, slots=True)
 class Octave:
-    """The radii of dots that are read in an image, or in a half of it.
+    """The radii of dots that are read in an image, or in a half of it."""
 
-    Attributes
-    ----------
-    level : int
-        How often the image is halved.
-    pyramid : ImagePyramid
-        Of that half.
-    radii : tuple of 2 float
-        Smallest and largest radius of the dots, px of that half.
-    """
-
-    level: int
-    pyramid: ImagePyramid
-    radii: tuple[float, float]
+    level: int  # how often the image is halved
+    pyramid: ImagePyramid  # of that half
+    radii: tuple[float, float]  # smallest and largest radius of the dots, px of that half
 
 
 def image_pyramid(gray: np.ndarray, max_radius: float) -> ImagePyramid:
-    """Return the pyramid of an image in which dots can be found.
+    """Return the pyramid of an image, uint8 or float32 from 0 to 255, to find dots in.
 
-    Parameters
-    ----------
-    gray : ndarray of uint8 or float32, shape (height, width)
-        Gray values from 0 to 255.
-    max_radius : float
-        Largest radius of a dot, px; it decides how often the image is halved. No dot is larger
-        than the image.
+    The largest radius of a dot, px, decides how often the image is halved. No dot is larger than
+    the image.
     """
     largest = min(max_radius, max(gray.shape) / 2)
     levels = max(1, ceil(log2(largest / MAXIMUM_RADIUS)))
     images = halved(gray, levels)
     logs = tuple(log_image(level) for level in images)
     edges = tuple(find_edges(log) for log in logs[1:])
-    return ImagePyramid(_as_float(gray), tuple(images[1:]), logs, edges)
+    return ImagePyramid(gray.astype(np.float32, copy=False), tuple(images[1:]), logs, edges)
 
 
 def octaves(pyramid: ImagePyramid, min_radius: float, max_radius: float) -> Iterator[Octave]:
     """Yield the octaves of the radii of dots, small dots first.
 
     Dots of up to 90 px are read in the image as it is. Each octave of larger ones is read in an
-    image half the size of the one before, so that a dot never has more pixels than it needs.
-
-    Parameters
-    ----------
-    pyramid : ImagePyramid
-    min_radius, max_radius : float
-        Bounds of the radius, px of the image.
+    image half the size of the one before, so that a dot never has more pixels than it needs. The
+    bounds of the radius are px of the image.
     """
     largest = MAXIMUM_RADIUS * 2**_OCTAVE_LEVELS
     for level in range(max(1, len(pyramid.edges) - _OCTAVE_LEVELS + 1)):
         smallest = largest / 2 * _ABOVE if level else 0.0
-        low, high = (
-            max(min_radius / 2**level, smallest),
-            min(max_radius / 2**level, largest * _SLACK),
-        )
+        low = max(min_radius / 2**level, smallest)
+        high = min(max_radius / 2**level, largest * _SLACK)
         if low <= high:
-            yield Octave(level, _half(pyramid, level), (low, high))
-
-
-def _half(pyramid: ImagePyramid, level: int) -> ImagePyramid:
-    """Return the pyramid of a level."""
-    if not level:
-        return pyramid
-    gray, *halves = pyramid.halves[level - 1 :]
-    return ImagePyramid(
-        _as_float(gray), tuple(halves), pyramid.logs[level:], pyramid.edges[level:]
-    )
-
-
-def _as_float(gray: np.ndarray) -> np.ndarray:
-    return gray.astype(np.float32, copy=False)
+            gray, *halves = (pyramid.gray, *pyramid.halves)[level:]
+            gray = gray.astype(np.float32, copy=False)
+            half = ImagePyramid(gray, tuple(halves), pyramid.logs[level:], pyramid.edges[level:])
+            yield Octave(level, half, (low, high))
 
 
 def halved(image: np.ndarray, levels: int) -> list[np.ndarray]:
@@ -131,18 +86,7 @@ def halved(image: np.ndarray, levels: int) -> list[np.ndarray]:
 
 
 def log_image(gray: np.ndarray) -> np.ndarray:
-    """Return the logarithm of an image.
-
-    Parameters
-    ----------
-    gray : ndarray of uint8 or float32, shape (height, width)
-        Gray values from 0 to 255.
-
-    Returns
-    -------
-    ndarray of int16, shape (height, width)
-        LOG_SCALE ln(I + LOG_OFFSET).
-    """
+    """Return LOG_SCALE ln(I + LOG_OFFSET), int16, of an image, uint8 or float32 from 0 to 255."""
     if gray.dtype == np.uint8:
         table = LOG_SCALE * np.log(np.arange(256) + LOG_OFFSET)
         return cv2.LUT(gray, table.astype(np.int16))

@@ -23,18 +23,9 @@ _RIDGE = 1e-3  # added to normal matrices, in weights, so that they can be inver
 
 
 def median(values: np.ndarray, selected: np.ndarray, empty: float = 1.0) -> np.ndarray:
-    """Return the lower medians of the selected values of each row.
+    """Return the lower medians, shape (k,), of the selected values of each row, shape (k, m).
 
-    Parameters
-    ----------
-    values : ndarray of float, shape (k, m)
-    selected : ndarray of bool, shape (k, m)
-    empty : float
-        The result where nothing is selected.
-
-    Returns
-    -------
-    ndarray of float64, shape (k,)
+    They are `empty` where nothing is selected.
     """
     count = selected.sum(axis=1)
     ordered = np.sort(np.where(selected, values, np.inf), axis=1)
@@ -43,19 +34,9 @@ def median(values: np.ndarray, selected: np.ndarray, empty: float = 1.0) -> np.n
 
 
 def spread(sizes: np.ndarray, selected: np.ndarray, minimum: float) -> np.ndarray:
-    """Return robust standard deviations from the median of the sizes of errors.
+    """Return robust standard deviations, shape (k, 1), from the medians of absolute errors (k, m).
 
-    Parameters
-    ----------
-    sizes : ndarray of float, shape (k, m)
-        Absolute errors.
-    selected : ndarray of bool, shape (k, m)
-    minimum : float
-        Returned where the errors spread less.
-
-    Returns
-    -------
-    ndarray of float64, shape (k, 1)
+    They are no less than the minimum.
     """
     return np.maximum(NORMAL * median(sizes, selected), minimum)[:, None]
 
@@ -84,23 +65,10 @@ def reweight(
 ) -> tuple[_Solution, np.ndarray, np.ndarray]:
     """Solve least-squares problems by iterated reweighting after Geman and McClure.
 
-    Parameters
-    ----------
-    solve : callable
-        Given weights, the solution and its residuals, of the shape of the weights.
-    weights : ndarray of float
-        Those without outliers.
-    scale : callable
-        Given the residuals, the residual at which a value keeps a quarter of its weight.
-    rounds : int
-        Number of solutions, at least 1.
-
-    Returns
-    -------
-    solution
-        The last one.
-    errors, weights : ndarray of float64
-        Its residuals over their scale, and the weights that they leave.
+    Given weights, `solve` returns a solution and its residuals, of the shape of the weights. Given
+    residuals, `scale` returns the one at which a value keeps a quarter of its weight. Of at least
+    one round, the last solution is returned, with its residuals over their scale, and the weights
+    that they leave of those without outliers.
     """
     robust = weights
     for _ in range(rounds):
@@ -113,21 +81,10 @@ def reweight(
 def fit_linear(
     values: np.ndarray, weights: np.ndarray, basis: np.ndarray, scale: float, rounds: int = 4
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Fit linear models to k sets of values by iterated reweighting.
+    """Fit linear models to k sets of values, shape (k, m), by iterated reweighting.
 
-    Parameters
-    ----------
-    values, weights : ndarray of float, shape (k, m)
-    basis : ndarray of float, shape (m, n)
-    scale : float
-        Residual at which a value keeps a quarter of its weight.
-    rounds : int
-        Number of solutions.
-
-    Returns
-    -------
-    parameters : ndarray of float64, shape (k, n)
-    residuals : ndarray of float64, shape (k, m)
+    With a basis of shape (m, n), the parameters have the shape (k, n), and their residuals (k, m).
+    A value with a residual of `scale` keeps a quarter of its weight.
     """
     products = (basis[:, :, None] * basis[:, None, :]).reshape(len(basis), -1)
     size = basis.shape[1]

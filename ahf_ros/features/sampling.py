@@ -12,17 +12,10 @@ _REMAP_ROWS = 16384  # cv2.remap takes maps of at most 32767 rows
 
 
 def sample(image: np.ndarray, pixels: np.ndarray) -> np.ndarray:
-    """Return the bilinearly interpolated values of an image.
+    """Return the bilinearly interpolated values of an image at pixels, shape (..., 2).
 
-    Parameters
-    ----------
-    image : ndarray of uint8, uint16, int16 or float32, shape (height, width)
-    pixels : ndarray of float, shape (..., 2)
-        Beyond the border the nearest pixel counts.
-
-    Returns
-    -------
-    ndarray of the image's dtype, shape (...)
+    The image is of uint8, uint16, int16 or float32, as are the values, shape (...). Beyond the
+    border the nearest pixel counts.
     """
     columns = pixels.shape[-2]
     maps = np.ascontiguousarray(pixels, np.float32).reshape(-1, columns, 2)
@@ -36,20 +29,10 @@ def sample(image: np.ndarray, pixels: np.ndarray) -> np.ndarray:
 def sample_lines(
     image: np.ndarray, middles: np.ndarray, directions: np.ndarray, along: np.ndarray
 ) -> np.ndarray:
-    """Return the values of an image on straight lines, as `sample` does.
+    """Return the values of an image on straight lines as `sample` does, shape (k, n).
 
-    Parameters
-    ----------
-    image : ndarray of uint8, uint16, int16 or float32, shape (height, width)
-    middles : ndarray of float, shape (k, 2)
-        px.
-    directions : ndarray of float, shape (k, 2)
-        From the middle to the point at 1 along the line, px.
-    along : ndarray of float, shape (n,)
-
-    Returns
-    -------
-    ndarray of the image's dtype, shape (k, n)
+    The directions, px, shape (k, 2) as the middles, lead from these to the point at 1 along the
+    line; values are taken at places `along` it, shape (n,).
     """
     x, y = middles.T.astype(np.float32)[..., None]
     across, down = directions.T.astype(np.float32)[..., None]
@@ -69,20 +52,8 @@ def sample_circles(
     """Return the values of an image on concentric circles of targets.
 
     It does what `sample` does for the projected `frame.circle_points`, in single precision and in
-    parts that stay in the cache.
-
-    Parameters
-    ----------
-    image : ndarray of uint8, uint16, int16 or float32, shape (height, width)
-    frames : ndarray of float64, shape (k, 3, 3)
-    angles : ndarray of float, shape (m,)
-        From +x towards +y, rad.
-    radii : ndarray of float, shape (n,) or (k, n)
-        The same for every frame, or others for each, dot radii.
-
-    Returns
-    -------
-    ndarray of the image's dtype, shape (k, m, n)
+    parts that stay in the cache. Radii of shape (n,) are the same for all k frames, those of shape
+    (k, n) are others for each; with m angles, the values have the shape (k, m, n).
     """
     directions = np.stack([np.cos(angles), np.sin(angles)])
     radii = np.broadcast_to(radii, (len(frames), np.shape(radii)[-1])).astype(np.float32)

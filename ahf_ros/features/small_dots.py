@@ -39,25 +39,11 @@ def small_dots(
     log_scale: float,
     explained: Sequence[np.ndarray] | np.ndarray = (),
 ) -> Dots:
-    """Return the dots that stand out of an even ground all the way round.
+    """Return the dots that stand out of an even ground all the way round, to a few tenths of a px.
 
-    Parameters
-    ----------
-    log : ndarray of int16, shape (height, width)
-        `log_scale` ln(I + 8).
-    min_radius, max_radius : float
-        Bounds of the semi-major axis, px.
-    polarities : sequence of int
-        1 to find dark dots, -1 to find bright ones.
-    log_scale : float
-        Units of `log` in one unit of ln.
-    explained : sequence of ndarray of float, each of shape (m, 2)
-        Outlines of objects that are known already, px. No dots are looked for inside.
-
-    Returns
-    -------
-    Dots
-        To a few tenths of a pixel.
+    The image is `log_scale` ln(I + 8), int16. The bounds are those of the semi-major axis, px. The
+    polarities are 1 to find dark dots, -1 to find bright ones. No dots are looked for inside the
+    outlines of objects that are explained already, px, each of shape (m, 2).
     """
     scale = 255 / (_LN_RANGE * log_scale)
     offset = -float(np.log(8.0)) * log_scale * scale
@@ -72,8 +58,7 @@ def small_dots(
         operation = cv2.MORPH_CLOSE if polarity > 0 else cv2.MORPH_OPEN
         ground = cv2.morphologyEx(reduced, operation, kernel)
         ground = cv2.resize(ground, (width, height), interpolation=cv2.INTER_LINEAR)
-        pair = (ground, eight_bit) if polarity > 0 else (eight_bit, ground)
-        steps = cv2.subtract(*pair)
+        steps = cv2.subtract(*((ground, eight_bit) if polarity > 0 else (eight_bit, ground)))
         for outline in explained:
             cv2.fillConvexPoly(steps, np.rint(outline).astype(np.int32), 0)
         found.append(_blobs(steps, min_radius, max_radius, polarity))
@@ -106,7 +91,7 @@ def _blobs(height: np.ndarray, min_radius: float, max_radius: float, polarity: i
     minor = 2 * np.sqrt(np.maximum(middle - half - _BLUR, (_MINIMUM_MINOR / 2) ** 2))
     good = (longest >= 2 * min_radius - 2) & (peak >= least)
     good &= (major >= min_radius) & (major <= max_radius)
-    good &= (ellipse > 0) & (filled < _FILLED[1]) & (filled > _FILLED[0])
+    good &= (filled < _FILLED[1]) & (filled > _FILLED[0])
     which = best(np.flatnonzero(good), -peak[good].astype(float), MAXIMUM_BLOBS, 'small dots')
     frames = affine_frames(centre_x, centre_y, major, minor, np.arctan2(xy, (xx - yy) / 2) / 2)
     return Dots(frames[which], np.full(len(which), polarity), np.ones(len(which)))

@@ -20,8 +20,13 @@ import numpy as np
 from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
 from sensor_msgs.msg import Image
 
-from ahf_ros.drawing.colours import DECODED_COLOUR, MISSED_COLOUR, TEXT_COLOUR, WRONG_COLOUR
-from ahf_ros.drawing.overlay import overlay
+from ahf_ros.drawing.overlay import (
+    DECODED_COLOUR,
+    MISSED_COLOUR,
+    TEXT_COLOUR,
+    WRONG_COLOUR,
+    overlay,
+)
 from ahf_ros.drawing.tiles import Tile, side_by_side
 from ahf_ros.evaluation import FALSE, RIGHT, WRONG, judge
 from ahf_ros.interchange.image_files import write_image

@@ -18,7 +18,7 @@ from sensor_msgs.msg import PointCloud2, PointField
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import ImageMarker, Marker, MarkerArray
 
-from ahf_ros.drawing.colours import DECODED_COLOUR, DOUBTFUL_COLOUR
+from ahf_ros.drawing.overlay import DECODED_COLOUR, DOUBTFUL_COLOUR
 from ahf_ros.localisation import Positions
 from ahf_ros.msg import CodedTarget, CodedTargetArray
 from ahf_ros.target import UNDECODED

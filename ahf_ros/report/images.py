@@ -20,14 +20,12 @@ from ahf_ros.imaging.stack import ImageStack, unlike
 from ahf_ros.interchange.image_files import read_image
 from ahf_ros.report.results import ImageResult
 
-THUMBNAIL_SIDES = 132, 88
-"""Maximum width and height of a thumbnail, px."""
-
+_THUMBNAIL_SIDES = 132, 88  # maximum width and height, px
 _THUMBNAIL_BYTES = 3000
 _SIZES = {88: 1.75, 80: 1.4, 70: 1.15, 58: 1.0, 46: 0.85, 34: 0.7, 24: 0.58}
 """About how many bytes a quality takes, as a fraction of the medium one."""
 
-_QUALITIES = tuple(_SIZES)
+_BEST, *_, _WORST = _SIZES
 _MIDDLE = 58
 _BITS = 1.1  # of a picture at first, per pixel; photographs of targets need 0.3 to 1.5
 _AIMED = 1.2  # times the bytes of the medium quality: the one above it
@@ -37,43 +35,12 @@ _MAXIMUM_WEBP = 2_000_000  # px; it takes 0.6 s per million
 _MINIMUM_SIDE = 16  # px, the longer side
 
 
-@dataclass(frozen=True, slots=True)
-class ShownImage:
-    """An image as people see it.
-
-    Attributes
-    ----------
-    original : ndarray of uint8, shape (height, width)
-        The image as received, or the combination of a stack.
-    filtered : ndarray of uint8, shape (height, width), or None
-        The image in which the targets were identified; None if it was not filtered.
-    """
-
-    original: np.ndarray
-    filtered: np.ndarray | None
-
-
 def find_image(image: str, source: Path, folders: Sequence[Path] = ()) -> Path:
     """Return the path of an image, which may have moved since it was identified.
 
-    Parameters
-    ----------
-    image : str
-        Its path at that time.
-    source : Path
-        The file with the result. A relative path may start at its folder, or at the one around it.
-    folders : sequence of Path
-        Where images may be now, directly or in the folders that `image` names.
-
-    Returns
-    -------
-    Path
-        The first one that exists.
-
-    Raises
-    ------
-    ValueError
-        If there is none.
+    It may now be in `folders`, directly or in the folders that `image` names. A relative path may
+    start at the folder of `source`, the file with the result, or at the one around it. A
+    ValueError says so if the image is nowhere.
 
     Examples
     --------
@@ -97,20 +64,13 @@ def find_image(image: str, source: Path, folders: Sequence[Path] = ()) -> Path:
     raise ValueError(f'{image} is not there{where}')
 
 
-def shown_image(result: ImageResult, folders: Sequence[Path] = ()) -> ShownImage:
-    """Return the image of a result, and the filtered one if a filter was applied.
+def shown_image(
+    result: ImageResult, folders: Sequence[Path] = ()
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """Return the image of a result, and the filtered one if a filter was applied, of uint8.
 
-    Parameters
-    ----------
-    result : ImageResult
-    folders : sequence of Path
-        As for `find_image`.
-
-    Raises
-    ------
-    ValueError
-        If an image is not there, cannot be read, or is not of the size of the result; the message
-        names it.
+    The image of a stack is its combination. `folders` are as for `find_image`. A ValueError names
+    an image that is not there, cannot be read, or is not of the size of the result.
     """
     names = result.images if result.combination else (result.image,)
     images = [_read(name, result, folders) for name in names]
@@ -123,7 +83,7 @@ def shown_image(result: ImageResult, folders: Sequence[Path] = ()) -> ShownImage
         filtered = _filtered(image, result) if result.filter.applied else None
     except ValueError as error:
         raise ValueError(f'{result.image}: {error}') from error
-    return ShownImage(stretched_to_8_bit(image), filtered)
+    return stretched_to_8_bit(image), filtered
 
 
 def _read(name: str, result: ImageResult, folders: Sequence[Path]) -> np.ndarray:
@@ -140,24 +100,14 @@ def _read(name: str, result: ImageResult, folders: Sequence[Path]) -> np.ndarray
 
 def _filtered(image: np.ndarray, result: ImageResult) -> np.ndarray:
     used = result.filter
-    mapping = FilterSettings(**result.mapping)
-    return HomomorphicFilter(image, mapping).filtered(
+    return HomomorphicFilter(image, FilterSettings(**result.mapping)).filtered(
         used.gamma_high, used.gamma_low, used.cutoff or None, used.attenuation
     )
 
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """An encoded picture.
-
-    Attributes
-    ----------
-    content : bytes
-    kind : str
-        Its media type.
-    width, height : int
-        Its size, px.
-    """
+    """An encoded picture; `kind` is its media type, and its size is in px."""
 
     content: bytes
     kind: str
@@ -172,21 +122,16 @@ class Picture:
 
 def thumbnail(image: np.ndarray) -> Picture:
     """Return a small picture of an image, ndarray of uint8, shape (height, width)."""
-    width, height = THUMBNAIL_SIDES
+    width, height = _THUMBNAIL_SIDES
     scale = min(width / image.shape[1], height / image.shape[0], 1.0)
     return fitted(_resized(image, scale), _THUMBNAIL_BYTES)
 
 
 def fitted(image: np.ndarray, limit: int) -> Picture:
-    """Return a picture of an image that takes no more than a number of bytes.
+    """Return a picture of an image, ndarray of uint8, that takes at most `limit` bytes.
 
-    It is WebP, or JPEG if it is large or OpenCV was built without WebP.
-
-    Parameters
-    ----------
-    image : ndarray of uint8, shape (height, width)
-    limit : int
-        Maximum number of bytes; pictures of a few pixels may need more.
+    Pictures of a few pixels may need more. It is WebP, or JPEG if it is large or OpenCV was built
+    without WebP.
 
     Examples
     --------
@@ -201,25 +146,21 @@ def fitted(image: np.ndarray, limit: int) -> Picture:
         reduced = _resized(image, scale)
         probe = _encoded(reduced, _MIDDLE)
         room = limit / len(probe.content)
-        if growing and scale < 1.0 and room > _SIZES[_QUALITIES[0]]:
+        if growing and scale < 1.0 and room > _SIZES[_BEST]:
             pixels *= min(room / _AIMED, _MAXIMUM_STEP)
             continue
         if picture := _best_of(reduced, probe, limit):
             return picture
         if max(reduced.shape) <= _MINIMUM_SIDE:
-            return _encoded(reduced, _QUALITIES[-1])
+            return _encoded(reduced, _WORST)
         growing = False
         pixels = min(pixels, image.size) * min(max(room / _REDUCED, 1 / _MAXIMUM_STEP), 0.8)
 
 
 def _best_of(image: np.ndarray, probe: Picture, limit: int) -> Picture | None:
-    """Return the picture of the best quality that fits; None if none does.
-
-    `probe` is the picture of medium quality, which shows what sizes may fit.
-    """
-    size = len(probe.content)
-    for quality in _QUALITIES:
-        if _SIZES[quality] * size > limit:
+    """Return the picture of the best quality that fits, by that of medium quality, or None."""
+    for quality, size in _SIZES.items():
+        if size * len(probe.content) > limit:
             continue
         picture = probe if quality == _MIDDLE else _encoded(image, quality)
         if len(picture.content) <= limit:

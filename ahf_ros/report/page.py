@@ -8,22 +8,23 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections import Counter, deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import cv2
 
 from ahf_ros.codes.designs import relative_reach
+from ahf_ros.drawing.overlay import DOUBTFUL_BELOW
 from ahf_ros.edge_shift import edge_shift_remark
 from ahf_ros.evaluation import FALSE, RIGHT, WRONG, judge
 from ahf_ros.interchange.files import whole_file
 from ahf_ros.report.images import Picture, fitted, shown_image, thumbnail
 from ahf_ros.report.results import ImageResult
-from ahf_ros.report.settings import ReportSettings
+from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.target import (
     UNDECODED,
     DottedTarget,
@@ -36,23 +37,41 @@ from ahf_ros.target import (
 )
 from ahf_ros.text import reason_of
 
-MAXIMUM_UNREAD = 300
-"""Number of dots of an image without any likely code word that are shown."""
-
-PAGE = Path(__file__).parent / 'page'
-"""Folder of the template, and of the styles and scripts that it holds."""
-
-SCRIPTS = ('data', 'table', 'viewer', 'plots', 'details', 'overview', 'main')
-"""Scripts of the page, in their order."""
-
+_PAGE = Path(__file__).parent / 'page'  # the template, and the styles and scripts that it holds
+_SCRIPTS = ('data', 'table', 'viewer', 'plots', 'details', 'overview', 'main')  # in their order
+_MAXIMUM_UNREAD = 300  # dots of an image without any likely code word that are shown
 _MAXIMUM_PICTURE = 4_000_000  # bytes
 _MINIMUM_PICTURE = 2_000
 _FILTERED_WEIGHT = 0.6  # of the bytes of an original
 _MARKUP = 600  # bytes around the pictures of an image
 _THUMBNAIL = 4_000  # bytes of its text
+_GAINS = 'gamma_high', 'gamma_low', 'cutoff', 'attenuation'
 
-Item = TypeVar('Item')
-Value = TypeVar('Value')
+
+@dataclass(frozen=True, slots=True)
+class ReportSettings:
+    """What a report shows, and how large it may be."""
+
+    title: str = parameter('', 'Title of the page; empty: the names of the results.')
+    max_size: float = parameter(
+        55.0,
+        'Maximum size of the page, MB. Pictures are reduced to fit; results alone may take more.',
+        minimum=0.1,
+        maximum=2000.0,
+    )
+    doubtful_below: float = parameter(
+        DOUBTFUL_BELOW,
+        'Confidence below which an identified target counts as doubtful.',
+        minimum=0.0,
+        maximum=1.0,
+    )
+    threads: int = parameter(
+        0, 'Number of images that are read at a time; 0: one per core.', minimum=0, maximum=1024
+    )
+
+    def __post_init__(self) -> None:
+        """Check every parameter."""
+        check_parameters(self)
 
 
 def row(
@@ -61,17 +80,9 @@ def row(
     doubtful_below: float,
     truth: Sequence[TrueTarget] | None = None,
 ) -> dict[str, Any]:
-    """Return what the page knows about an image.
+    """Return what the page knows about an image; `truth` is what it shows.
 
-    Parameters
-    ----------
-    result : ImageResult
-    families : sequence of str
-        Names of all families of the page; rows have their indices.
-    doubtful_below : float
-        Confidence below which an identified target counts as doubtful.
-    truth : sequence of TrueTarget, optional
-        What the image shows.
+    Targets have the indices of their families, and are doubtful below a confidence.
     """
     decoded = [target for target in result.targets if target.id != UNDECODED]
     undecoded = [target for target in result.targets if target.id == UNDECODED]
@@ -109,7 +120,7 @@ def row(
         'targets': [_target(target, families) for target in decoded],
         'dots': [_dots(target) for target in decoded if isinstance(target, DottedTarget)],
         'squares': [_square(target) for target in decoded if isinstance(target, SquareMarker)],
-        'undecoded': [_undecoded(target) for target in [*likely, *unread[:MAXIMUM_UNREAD]]],
+        'undecoded': [_undecoded(target) for target in [*likely, *unread[:_MAXIMUM_UNREAD]]],
         'truth': judged,
     }
 
@@ -165,10 +176,9 @@ def _square(target: SquareMarker) -> dict[str, Any]:
 
 def _filter(result: ImageResult) -> dict[str, Any] | None:
     used = result.filter
-    names = 'gamma_high', 'gamma_low', 'cutoff', 'attenuation'
     state: dict[str, Any] = {'applied': used.applied, 'evaluations': used.evaluations}
     if used.applied:
-        state |= {name: _significant(getattr(used, name)) for name in names}
+        state |= {name: _significant(getattr(used, name)) for name in _GAINS}
     return state
 
 
@@ -176,7 +186,7 @@ def _search(result: ImageResult) -> dict[str, Any] | None:
     if result.search is None:
         return None
     columns = asdict(result.search)
-    for name in ('gamma_high', 'gamma_low', 'cutoff', 'attenuation'):
+    for name in _GAINS:
         columns[name] = [_significant(value) for value in columns[name]]
     return columns
 
@@ -202,153 +212,65 @@ def _significant(value: float) -> float:
     return float(f'{value:.5g}')
 
 
-@dataclass(frozen=True, slots=True)
-class Pictures:
-    """The pictures of one image of the page.
-
-    Attributes
-    ----------
-    index : int
-        Row of the image.
-    pictures : dict of str to Picture
-        By what they are: 'thumbnail', 'original', 'filtered'.
-    problem : str
-        Why there are none; empty if there are.
-    """
-
-    index: int
-    pictures: dict[str, Picture]
-    problem: str = ''
-
-
-@dataclass(frozen=True, slots=True)
-class Page:
-    """Everything on a page but its pictures.
-
-    Attributes
-    ----------
-    title : str
-    rows : tuple of str
-        JSON of each image, see `ahf_ros.report.rows.row`.
-    about : str
-        JSON of what concerns all images.
-    limits : tuple of int
-        Bytes for the pictures of each image.
-    """
-
-    title: str
-    rows: tuple[str, ...]
-    about: str
-    limits: tuple[int, ...]
-
-
-def make_page(
+def write_page(
+    path: Path,
     results: Sequence[ImageResult],
     settings: ReportSettings,
     title: str,
     truth: Truth | None = None,
-) -> Page:
-    """Return the page of results, without its pictures.
+    folders: Sequence[Path] = (),
+    track: Callable[[Iterable[Any]], Iterable[Any]] = iter,
+) -> list[str]:
+    """Write the page of results to a file that is never there in part.
 
-    Parameters
-    ----------
-    results : sequence of ImageResult
-    settings : ReportSettings
-    title : str
-        Where the settings have none.
-    truth : mapping of str to sequence of TrueTarget, optional
-        What images show, by their names without folders.
+    The settings may have another title. The truth is by the names of images without folders, which
+    may be in other `folders` now, see `ahf_ros.report.images.find_image`. `track` follows the
+    images as they are done. The texts that are returned say what is wrong with images. A
+    ValueError says so if the file cannot be written, or jinja2 is not installed.
     """
+    template = _template()
     families = families_of(results)
-    rows = [
-        row(
-            result,
-            families,
-            settings.doubtful_below,
-            truth.get(Path(result.image).name) if truth is not None else None,
-        )
-        for result in results
-    ]
+    rows = []
+    for result in results:
+        shown = None if truth is None else truth.get(Path(result.image).name)
+        rows.append(_json(row(result, families, settings.doubtful_below, shown)))
     about = {
         'families': families,
         'reach': [round(relative_reach(name), 4) for name in families],
         'doubtfulBelow': settings.doubtful_below,
         'maxSize': settings.max_size,
     }
-    texts = tuple(_json(it) for it in rows)
-    taken = sum(map(len, texts)) + sum(len(text) for text in _parts().values())
-    weights = [1 + _FILTERED_WEIGHT * result.filter.applied for result in results]
-    limits = _limits(round(1e6 * settings.max_size) - taken, weights)
-    return Page(settings.title or title, texts, _json(about), limits)
-
-
-def page_pictures(
-    results: Sequence[ImageResult], page: Page, threads: int, folders: Sequence[Path] = ()
-) -> Iterator[Pictures]:
-    """Yield the pictures of each image in turn; a few are made at a time.
-
-    Parameters
-    ----------
-    results : sequence of ImageResult
-    page : Page
-        Of these results.
-    threads : int
-        0 for one per core.
-    folders : sequence of Path
-        Where images may be, see `ahf_ros.report.images.find_image`.
-    """
-
-    def make(index: int) -> Pictures:
-        return _pictures(index, results[index], page.limits[index], folders)
-
-    yield from _in_order(make, range(len(results)), threads or os.cpu_count() or 1)
-
-
-def write_page(path: Path, page: Page, pictures: Iterable[Pictures]) -> list[str]:
-    """Write a page to a file that is never there in part.
-
-    Parameters
-    ----------
-    path : Path
-    page : Page
-    pictures : iterable of Pictures
-        Of all its images, in their order.
-
-    Returns
-    -------
-    list of str
-        What is wrong with images.
-
-    Raises
-    ------
-    ValueError
-        If the file cannot be written, or jinja2 is not installed.
-    """
-    template = _template()
+    style = (_PAGE / 'style.css').read_text(encoding='utf-8')
+    script = '\n'.join((_PAGE / f'{it}.js').read_text(encoding='utf-8') for it in _SCRIPTS)
+    taken = sum(map(len, rows)) + len(style) + len(script)
+    limits = _limits(round(1e6 * settings.max_size) - taken, results)
     problems: dict[int, str] = {}
 
-    def passing() -> Iterator[Pictures]:
-        for item in pictures:
-            if item.problem:
-                problems[item.index] = item.problem
-            yield item
+    def pictures_of(index: int) -> dict[str, Picture]:
+        try:
+            return _pictures(results[index], limits[index], folders)
+        except ValueError as error:
+            problems[index] = str(error)
+        except (MemoryError, cv2.error) as error:  # the other images may be smaller
+            problems[index] = f'{results[index].image}: {reason_of(error)}'
+        return {}
 
-    with whole_file(path) as file:
-        for text in template.generate(
-            **_parts(), page=page, pictures=passing(), problems=_Late(problems)
-        ):
-            file.write(text.encode('utf-8', 'backslashreplace'))
+    executor = ThreadPoolExecutor(settings.threads or os.cpu_count())
+    try:
+        with whole_file(path) as file:
+            for text in template.generate(
+                title=settings.title or title,
+                style=style,
+                script=script,
+                rows=rows,
+                about=_json(about),
+                pictures=enumerate(track(executor.map(pictures_of, range(len(results))))),
+                problems=lambda: _json(dict(sorted(problems.items()))),  # known when all are done
+            ):
+                file.write(text.encode('utf-8', 'backslashreplace'))
+    finally:
+        executor.shutdown(cancel_futures=True)
     return [problems[index] for index in sorted(problems)]
-
-
-class _Late:
-    """What is known only when all pictures are written."""
-
-    def __init__(self, problems: Mapping[int, str]) -> None:
-        self._problems = problems
-
-    def __html__(self) -> str:
-        return _json(self._problems)
 
 
 def _template() -> Any:
@@ -359,7 +281,7 @@ def _template() -> Any:
             "the page needs jinja2, which is not installed: pip install 'ahf_ros[report]'"
         ) from error
     environment = Environment(
-        loader=FileSystemLoader(PAGE),
+        loader=FileSystemLoader(_PAGE),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -368,59 +290,26 @@ def _template() -> Any:
     return environment.get_template('page.html')
 
 
-def _parts() -> dict[str, str]:
-    """Return the styles and the scripts of the page."""
-    scripts = [(PAGE / f'{name}.js').read_text(encoding='utf-8') for name in SCRIPTS]
-    style = (PAGE / 'style.css').read_text(encoding='utf-8')
-    return {'style': style, 'script': '\n'.join(scripts)}
-
-
-def _limits(available: int, weights: Sequence[float]) -> tuple[int, ...]:
-    """Return the bytes for the pictures of each image, in proportion to the weights."""
-    if not weights:
-        return ()
+def _limits(available: int, results: Sequence[ImageResult]) -> list[int]:
+    """Return the bytes for the pictures of each image."""
+    weights = [1 + _FILTERED_WEIGHT * result.filter.applied for result in results]
     texts = available - len(weights) * (_MARKUP + _THUMBNAIL)
     share = texts * 3 / 4 / sum(weights)  # base64 makes four bytes of three
     share = min(max(share, _MINIMUM_PICTURE), _MAXIMUM_PICTURE)
-    return tuple(int(share * weight) for weight in weights)
+    return [int(share * weight) for weight in weights]
 
 
-def _pictures(index: int, result: ImageResult, limit: int, folders: Sequence[Path]) -> Pictures:
-    try:
-        shown = shown_image(result, folders)
-    except ValueError as error:
-        return Pictures(index, {}, str(error))
-    except (MemoryError, cv2.error) as error:  # the other images may be smaller
-        return Pictures(index, {}, f'{result.image}: {reason_of(error)}')
-    pictures = {'thumbnail': thumbnail(shown.original)}
-    if shown.filtered is None:
-        pictures['original'] = fitted(shown.original, limit)
+def _pictures(result: ImageResult, limit: int, folders: Sequence[Path]) -> dict[str, Picture]:
+    """Return the pictures of an image by what they are; the large ones fit into the limit."""
+    original, filtered = shown_image(result, folders)
+    pictures = {'thumbnail': thumbnail(original)}
+    if filtered is None:
+        pictures['original'] = fitted(original, limit)
     else:
         part = int(limit / (1 + _FILTERED_WEIGHT))
-        pictures['original'] = fitted(shown.original, part)
-        pictures['filtered'] = fitted(shown.filtered, limit - part)
-    return Pictures(index, pictures)
-
-
-def _in_order(
-    function: Callable[[Item], Value], items: Iterable[Item], threads: int
-) -> Iterator[Value]:
-    """Yield the values of a function in the order of the items, a few of them ahead."""
-    if threads == 1:
-        yield from map(function, items)
-        return
-    waiting: deque[Future[Value]] = deque()
-    with ThreadPoolExecutor(threads) as executor:
-        try:
-            for item in items:
-                waiting.append(executor.submit(function, item))
-                if len(waiting) > threads:
-                    yield waiting.popleft().result()
-            while waiting:
-                yield waiting.popleft().result()
-        finally:
-            for future in waiting:
-                future.cancel()
+        pictures['original'] = fitted(original, part)
+        pictures['filtered'] = fitted(filtered, limit - part)
+    return pictures
 
 
 def _json(value: Any) -> str:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ahf_ros.interchange.files import file_errors, read_text
+from ahf_ros.interchange.files import file_errors, read_bytes
 from ahf_ros.interchange.target_json import RESULTS_FILE, parsed_json, targets_from_json
 from ahf_ros.target import UNDECODED, FilterState, SearchTrace, Target
 from ahf_ros.target_check import MAXIMUM_ID, checked_integer, checked_number
@@ -26,33 +27,10 @@ ENDINGS = ('.json', '.jsonl')
 class ImageResult:
     """What was identified in one image, or in one stack of images.
 
-    Attributes
-    ----------
-    image : str
-        Path of the image as the record has it; the first one of a stack.
-    source : Path
-        File that the record is in.
-    width, height : int
-        Size of the image, px; 0 if the record does not say.
-    upright : bool
-        Whether the image was turned as its orientation says.
-    family, detector : str
-    expected : int
-        N; 0 if unknown.
-    expected_ids : tuple of int
-        Empty if unknown.
-    estimated, mirrored : bool
-    edge_shift : float, optional
-        Of the image, px; None if it is unknown.
-    targets : tuple of Target
-    filter : FilterState
-    mapping : dict of str to float
-        The settings of the filter that the record has beside its gains.
-    search : SearchTrace or None
-    images : tuple of str
-        Paths of all images of a stack; empty for one image.
-    combination : str
-        Combination of the stack; empty for one image.
+    Fields are those of the record, which is in the file `source`, and empty where it does not say;
+    `edge_shift` and `search` are then None. Lengths are in px. `image` is the path of the first
+    image of a stack; only stacks have `images`, the paths of all, and `combination`. `mapping` has
+    the settings of the filter that the record has beside its gains.
     """
 
     image: str
@@ -81,22 +59,10 @@ class ImageResult:
 
 
 def result_from_json(content: Any, source: Path, where: str) -> ImageResult:
-    """Return the result that a JSON object is.
+    """Return the result that a JSON object of a file is; errors call the object `where`.
 
-    Parameters
-    ----------
-    content : dict
-        As `ahf_ros.interchange.target_json.to_json` makes it; only 'image' and 'targets' are
-        required.
-    source : Path
-        The file that it is in.
-    where : str
-        What errors call the object.
-
-    Raises
-    ------
-    ValueError
-        If the object is not like that; the message names the field.
+    `ahf_ros.interchange.target_json.to_json` makes such objects; only 'image' and 'targets' are
+    required. A ValueError names a field that is not accepted.
 
     Examples
     --------
@@ -106,7 +72,6 @@ def result_from_json(content: Any, source: Path, where: str) -> ImageResult:
     targets = tuple(targets_from_json(content, where))
     record = _Record(content, where)
     used = record.object('filter')
-    extra = {key: used.number(key) for key in used.content if key in _MAPPING}
     search = record.object('search')
     return ImageResult(
         image=record.text('image', required=True),
@@ -132,7 +97,7 @@ def result_from_json(content: Any, source: Path, where: str) -> ImageResult:
             generations=used.integer('generations'),
             duration=record.number('elapsed_s'),
         ),
-        mapping=extra,
+        mapping={key: used.number(key) for key in used.content if key in _MAPPING},
         search=_search(search) if search.content else None,
         images=record.texts('images'),
         combination=record.text('combination'),
@@ -202,93 +167,73 @@ class _Record:
         return tuple(checked_number(it, called, -math.inf, math.inf) for it in values)
 
 
-def result_files(paths: Sequence[str | Path]) -> tuple[list[Path], list[str]]:
-    """Return the files with results, also in folders, and what is wrong with others.
-
-    Parameters
-    ----------
-    paths : sequence of str or Path
-        Files, and folders: for the results of a batch if they hold them, for their files with an
-        ending of `ENDINGS` if not.
-    """
-    files: list[Path] = []
-    problems: list[str] = []
-    for path in map(Path, paths):
-        if not path.is_dir():
-            files.append(path)
-            continue
-        try:
-            with file_errors(path, 'read'):
-                inside = sorted(it for it in path.iterdir() if it.suffix.lower() in ENDINGS)
-                if (path / RESULTS_FILE).is_file():
-                    inside = [path / RESULTS_FILE]
-        except ValueError as error:
-            problems.append(str(error))
-            continue
-        if not inside:
-            problems.append(f'{path} has no results, accepted are files {" and ".join(ENDINGS)}')
-        files += inside
-    return files, problems
-
-
 def read_results(paths: Sequence[str | Path]) -> tuple[list[ImageResult], list[str]]:
     """Return the results in files, and what is wrong with those that cannot be used.
 
-    Of several results for one image, the last one counts.
-
-    Parameters
-    ----------
-    paths : sequence of str or Path
-        As for `result_files`. A file holds one JSON object a line, or one object, or a list of
-        objects. Objects without 'image' are no results and are ignored.
-
-    Returns
-    -------
-    results : list of ImageResult
-        In the order of the files and of their lines.
-    problems : list of str
-        Each names the file and the line.
+    Results are in the order of the files and of their lines; of several for one image, the last
+    one counts. A folder stands for the results of a batch if it holds them, for its files with an
+    ending of `ENDINGS` if not. A file holds one JSON object a line, or one object, or a list of
+    objects. Objects without 'image' are no results and are ignored.
     """
-    files, problems = result_files(paths)
     results: dict[tuple[str, ...], ImageResult] = {}
+    files: list[Path] = []
+    problems: list[str] = []
+    for path in map(Path, paths):
+        with _noted(problems):
+            files += _files(path)
     for file in files:
         for where, content in _contents(file, problems):
             if isinstance(content, dict) and 'image' not in content:
                 continue
-            try:
+            with _noted(problems):
                 result = result_from_json(content, file, where)
-            except ValueError as error:
-                problems.append(str(error))
-                continue
-            key = (str(result.image), *result.images)
-            results.pop(key, None)
-            results[key] = result
+                key = result.image, *result.images
+                results.pop(key, None)
+                results[key] = result
     return list(results.values()), problems
+
+
+@contextmanager
+def _noted(problems: list[str]) -> Iterator[None]:
+    """Append what a ValueError says to the problems, and go on."""
+    try:
+        yield
+    except ValueError as error:
+        problems.append(str(error))
+
+
+def _files(path: Path) -> list[Path]:
+    """Return the files with results that a path stands for."""
+    if not path.is_dir():
+        return [path]
+    if (path / RESULTS_FILE).is_file():
+        return [path / RESULTS_FILE]
+    with file_errors(path, 'read'):
+        inside = sorted(it for it in path.iterdir() if it.suffix.lower() in ENDINGS)
+    if not inside:
+        raise ValueError(f'{path} has no results, accepted are files {" and ".join(ENDINGS)}')
+    return inside
 
 
 def _contents(file: Path, problems: list[str]) -> Iterator[tuple[str, Any]]:
     """Yield the values in a file and what errors call them; append what is wrong with others."""
+    content = b''
+    with _noted(problems):
+        content = read_bytes(file)
     if file.suffix.lower() == '.json':
-        try:
-            whole = parsed_json(read_text(file), str(file))
-        except ValueError:
-            whole = None  # perhaps one object a line
-        if isinstance(whole, list):
-            yield from ((f'{file}, item {number}', it) for number, it in enumerate(whole, start=1))
+        with suppress(ValueError):  # perhaps one object a line
+            whole = parsed_json(content.decode('utf-8-sig'), str(file))
+            if isinstance(whole, list):
+                yield from ((f'{file}, item {number}', it) for number, it in enumerate(whole, 1))
+            else:
+                yield str(file), whole
             return
-        if whole is not None:
-            yield str(file), whole
-            return
-    try:
-        with file_errors(file, 'read'), file.open('rb') as lines:
-            for number, line in enumerate(lines, start=1):
-                if line.strip():
-                    where = f'{file}, line {number}'
-                    try:
-                        yield where, parsed_json(line.decode('utf-8-sig'), where)
-                    except UnicodeDecodeError:
-                        problems.append(f'{where} is not in UTF-8, accepted is JSON')
-                    except ValueError as error:
-                        problems.append(str(error))
-    except ValueError as error:
-        problems.append(str(error))
+    for number, line in enumerate(content.splitlines(), start=1):
+        where = f'{file}, line {number}'
+        if line.strip():
+            try:
+                yield where, parsed_json(line.decode('utf-8-sig'), where)
+            except UnicodeDecodeError:
+                problems.append(f'{where} is not in UTF-8, accepted is JSON')
+            except ValueError as error:
+                problems.append(str(error))

@@ -14,15 +14,7 @@ Settings = TypeVar('Settings')
 def flat_parameters(settings: type) -> tuple[Parameter, ...]:
     """Return the parameters of a settings dataclass and of the settings nested in it.
 
-    Parameters
-    ----------
-    settings : type
-        Settings dataclass, whose fields are parameters or again settings dataclasses.
-
-    Raises
-    ------
-    ValueError
-        If one name stands for two different parameters.
+    A ValueError says so if one name stands for two different parameters.
     """
     found: dict[str, Parameter] = {}
     parts = (parameters(settings), *map(flat_parameters, _parts(settings).values()))
@@ -33,19 +25,10 @@ def flat_parameters(settings: type) -> tuple[Parameter, ...]:
 
 
 def assemble(settings: type[Settings], values: Mapping[str, Any]) -> Settings:
-    """Return settings with the given values and defaults for the others.
+    """Return settings with values by the name of their parameter, and defaults for the others.
 
-    Parameters
-    ----------
-    settings : type
-        Settings dataclass, as for `flat_parameters`.
-    values : mapping of str to value
-        Values by name of the parameter; an integer is accepted for a number.
-
-    Raises
-    ------
-    ValueError
-        If a name is unknown, or a value is not accepted or does not fit the others.
+    An integer is accepted for a number. A ValueError names an unknown name, and a value that is
+    not accepted or does not fit the others.
     """
     names = [item.name for item in flat_parameters(settings)]
     for name in values:
@@ -63,39 +46,20 @@ def flat_values(settings: Any) -> dict[str, Any]:
 
 
 def updated(settings: Settings, values: Mapping[str, Any]) -> Settings:
-    """Return settings with other values for some of their parameters.
-
-    Parameters
-    ----------
-    settings : instance of a settings dataclass
-    values : mapping of str to value
-        As for `assemble`.
-
-    Raises
-    ------
-    ValueError
-        As `assemble` does.
-    """
+    """Return settings with other values for some of their parameters, as `assemble` does."""
     return assemble(type(settings), {**flat_values(settings), **values}) if values else settings
 
 
 def _assembled(settings: type[Settings], values: Mapping[str, Any]) -> Settings:
-    own = {
-        item.name: _typed(item, values[item.name])
-        for item in parameters(settings)
-        if item.name in values
-    }
-    parts: dict[str, Any] = {
+    given: dict[str, Any] = {
         name: _assembled(part, values) for name, part in _parts(settings).items()
     }
-    return settings(**own, **parts)
-
-
-def _typed(item: Parameter, value: Any) -> Any:
-    """Return an integer that stands for a number as a number, anything else unchanged."""
-    if isinstance(item.default, float) and item.accepts(value):
-        return float(value)
-    return value
+    for item in parameters(settings):
+        if item.name in values:
+            value = values[item.name]
+            is_number = isinstance(item.default, float) and item.accepts(value)
+            given[item.name] = float(value) if is_number else value
+    return settings(**given)
 
 
 def _parts(settings: type) -> dict[str, type]:

@@ -23,25 +23,11 @@ _KEY = 'ahf_ros.settings.parameter'
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One parameter of a settings dataclass.
+    """One parameter of a settings dataclass; it has the type of its default.
 
-    Attributes
-    ----------
-    name : str
-        Name of the field and of the ROS parameter.
-    default : bool, int, float or str
-        Default; the parameter has its type.
-    description : str
-        One sentence, with the unit if there is one.
-    minimum, maximum : float or None
-        Closed bounds of a number.
-    choices : tuple of str
-        Accepted texts; empty if any is accepted.
-    read_only : bool
-        Whether a node takes it at its start only.
-    form : str
-        Description of the accepted texts where the settings check them; empty if `choices` or the
-        type say it.
+    The description is one sentence, with the unit if there is one. Bounds are closed. No `choices`
+    means that any text is accepted. A node takes a `read_only` one at its start only. `form`
+    describes accepted texts that the settings check, where `choices` and type do not say it.
     """
 
     name: str
@@ -61,15 +47,15 @@ class Parameter:
         if self.choices:
             return f'one of {", ".join(self.choices)}'
         kind = {bool: 'true or false', int: 'an integer', float: 'a number', str: 'a text'}
-        words = kind[type(self.default)]
         form = 'd' if isinstance(self.default, int) else 'g'
+        bounds = ''
         if self.minimum is not None and self.maximum is not None:
-            return f'{words} from {self.minimum:{form}} to {self.maximum:{form}}'
-        if self.minimum is not None:
-            return f'{words} of at least {self.minimum:{form}}'
-        if self.maximum is not None:
-            return f'{words} of at most {self.maximum:{form}}'
-        return words
+            bounds = f' from {self.minimum:{form}} to {self.maximum:{form}}'
+        elif self.minimum is not None:
+            bounds = f' of at least {self.minimum:{form}}'
+        elif self.maximum is not None:
+            bounds = f' of at most {self.maximum:{form}}'
+        return kind[type(self.default)] + bounds
 
     def accepts(self, value: object) -> bool:
         """Return whether `value` has the right type and lies in range."""
@@ -94,13 +80,7 @@ class Parameter:
             raise ValueError(f'{self.name} is {shown(value)}, accepted is {self.accepted}')
 
     def value_of(self, text: str) -> Any:
-        """Return the value that a text stands for.
-
-        Raises
-        ------
-        ValueError
-            If there is none that is accepted; the message names the parameter, the text and what
-            is accepted.
+        """Return the value that a text stands for; a ValueError as of `check` if there is none.
 
         Examples
         --------
@@ -153,14 +133,7 @@ def parameters(settings: Any) -> tuple[Parameter, ...]:
 
 
 def check_parameters(settings: Any) -> None:
-    """Check all parameters of a settings instance; call it in `__post_init__`.
-
-    Raises
-    ------
-    ValueError
-        If a value is not accepted; the message names the parameter, the value and what is
-        accepted.
-    """
+    """Check all parameters of a settings instance; call it in `__post_init__`."""
     for item in parameters(settings):
         item.check(getattr(settings, item.name))
 
@@ -168,10 +141,7 @@ def check_parameters(settings: Any) -> None:
 def numbers_in(name: str, text: str) -> frozenset[int]:
     """Return the numbers in a list of integers and ranges, such as '1-54, 60'.
 
-    Raises
-    ------
-    ValueError
-        If the text is not such a list, or has more than `MAXIMUM_NUMBERS` numbers.
+    A ValueError names a text that is no such list or has more than `MAXIMUM_NUMBERS` numbers.
     """
     numbers: set[int] = set()
     for part in filter(None, re.split(r'[,\s]+', text)):

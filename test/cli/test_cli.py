@@ -3,25 +3,23 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import struct
-import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from ahf_ros.cli import main
 from ahf_ros.interchange.image_files import read_image, write_image
 from ahf_ros.interchange.truth_files import read_truth
 from ahf_ros.session_settings import IdentificationSettings
 from ahf_ros.settings.nested import flat_parameters
 from ahf_ros.synthetic.scene import SceneSettings
-from support.command_line import ahf
+from support.command_line import ahf, status
 
-ROOT = Path(__file__).resolve().parents[2]
 SCENE = ['--width', '640', '--height', '480', '--targets', '6', '--dot-radius', '10']
 KEYS = (
     'image width height upright family detector expected estimated expected_ids mirrored '
@@ -30,14 +28,6 @@ KEYS = (
     'applied gamma_high gamma_low cutoff attenuation evaluations generations log_offset '
     'black_percentile white_percentile',
 )
-
-
-def status(*arguments: object) -> int:
-    """Return the exit status of the command line in this process."""
-    try:
-        return main([str(argument) for argument in arguments])
-    except SystemExit as left:
-        return int(left.code or 0)
 
 
 @pytest.fixture(scope='module')
@@ -58,12 +48,22 @@ def results(folder) -> str:
     return done.stdout
 
 
+@pytest.fixture
+def identify(folder, capsys) -> Callable[..., tuple[Any, str]]:
+    """Return a function from options to the result of the first image, and to what is said."""
+
+    def identified(*options: object) -> tuple[Any, str]:
+        assert status('identify', folder / 'normal_0.3_4.png', '--json', *options) == 0
+        output, errors = capsys.readouterr()
+        return json.loads(output), errors
+
+    return identified
+
+
 def test_rendered_images_have_their_truth(folder):
     truth = read_truth(folder / 'truth.csv')
-    assert {name: len(targets) for name, targets in truth.items()} == {
-        'normal_0.3_4.png': 6,
-        'shadow_0.3_4.png': 6,
-    }
+    numbers = {name: len(targets) for name, targets in truth.items()}
+    assert numbers == {'normal_0.3_4.png': 6, 'shadow_0.3_4.png': 6}
     assert read_image(folder / 'shadow_0.3_4.png').shape == (480, 640)
 
 
@@ -97,30 +97,25 @@ def test_json_tells_the_truth(folder, results):
         assert len(target['covariance']) == 4
 
 
-def test_an_unknown_number_is_estimated_where_that_is_asked_for(folder, capsys):
-    command = ('identify', folder / 'normal_0.3_4.png', '--detector', 'traditional', '--json')
-    found = []
-    for more in ((), ('--estimate-expected',), ('--estimate-expected', '--expected-targets', 6)):
-        assert status(*command, *more) == 0
-        found.append(json.loads(capsys.readouterr().out))
-    assert [(it['expected'], it['estimated']) for it in found] == [
-        (0, False),
-        (6, True),
-        (6, False),
-    ]
+def test_an_unknown_number_is_estimated_where_that_is_asked_for(identify):
+    options = ((), ('--estimate-expected',), ('--estimate-expected', '--expected-targets', 6))
+    found = [identify('--detector', 'traditional', *more)[0] for more in options]
+    of = [(it['expected'], it['estimated']) for it in found]
+    assert of == [(0, False), (6, True), (6, False)]
     assert found[0]['targets'] == found[1]['targets']
 
 
-def test_without_json_standard_output_stays_empty(folder):
-    done = ahf('identify', folder / 'normal_0.3_4.png', '--detector', 'traditional')
-    assert (done.returncode, done.stdout) == (0, '')
-    head, *lines, hint = done.stderr.splitlines()
+def test_without_json_standard_output_stays_empty(folder, capsys):
+    assert status('identify', folder / 'normal_0.3_4.png', '--detector', 'traditional') == 0
+    output, errors = capsys.readouterr()
+    assert output == ''
+    head, *lines, hint = errors.splitlines()
     assert '6 identified, no filter' in head
     assert len(lines) == 6
     assert 'with --expected-targets N, AHF searches' in hint
 
 
-def test_what_was_looked_for_is_said_where_nothing_is_found(folder, tmp_path):
+def test_what_was_looked_for_is_said_where_nothing_is_found(folder, tmp_path, capsys):
     image = tmp_path / 'empty.png'
     write_image(image, np.tile(np.arange(80, dtype=np.uint8), (60, 1)))
     for options, hint in (
@@ -128,32 +123,25 @@ def test_what_was_looked_for_is_said_where_nothing_is_found(folder, tmp_path):
         (('--expected-targets', 6, '--max-evaluations', 1), 'targets of metashape12 were looked'),
         (('--family', 'auto'), '--family auto looks for rings only, metashape12, .*; other famil'),
     ):
-        told = ahf('identify', image, *options).stderr.splitlines()
-        assert re.match(hint, told[-1])
-    found = ahf('identify', image, folder / 'normal_0.3_4.png', '--expected-ids', '1-600')
-    assert 'looked for' not in found.stderr
-    assert 'N is not given' not in found.stderr
-    assert ahf('identify', image, '--quiet').stderr == ''
+        assert status('identify', image, *options) == 0
+        assert re.match(hint, capsys.readouterr().err.splitlines()[-1])
+    status('identify', image, folder / 'normal_0.3_4.png', '--expected-ids', '1-600')
+    said = capsys.readouterr().err
+    assert 'looked for' not in said
+    assert 'N is not given' not in said
+    status('identify', image, '--quiet')
+    assert capsys.readouterr().err == ''
+    assert status('identify', tmp_path / 'missing.png') == 1
+    (said,) = capsys.readouterr().err.splitlines()
+    assert said.endswith('missing.png cannot be read: No such file or directory')
 
 
-def test_the_former_name_of_the_number_of_targets_works_and_says_so(folder, capsys):
-    command = ('identify', folder / 'normal_0.3_4.png', '--json')
-    results = []
+def test_the_former_name_of_the_number_of_targets_works_and_says_so(identify):
     for option in ('--expected-targets', '--expected'):
-        assert status(*command, option, 6) == 0
-        printed = capsys.readouterr()
-        results.append(json.loads(printed.out)['expected'])
-        said = 'identify: --expected is called --expected-targets now' in printed.err
+        found, errors = identify(option, 6)
+        assert found['expected'] == 6
+        said = 'identify: --expected is called --expected-targets now' in errors
         assert said == (option == '--expected')
-    assert results == [6, 6]
-
-
-def test_a_missing_file_is_no_stack(tmp_path):
-    done = ahf('identify', tmp_path / 'missing.png')
-    assert done.returncode == 1
-    assert 'missing.png cannot be read: No such file or directory' in done.stderr
-    assert 'stack' not in done.stderr
-    assert 'N is not given' not in done.stderr
 
 
 def tiff_with_unknown_tag(image: np.ndarray) -> bytes:
@@ -185,24 +173,25 @@ def test_evaluation_of_results_in_a_file_and_in_a_pipe(folder, results, tmp_path
     assert together['rmse_xy'] < 0.1
 
 
-def test_evaluation_names_images_without_truth(folder):
+def test_evaluation_names_images_without_truth(folder, tmp_path, capsys):
     line = json.dumps({'image': 'other.png', 'targets': [{'id': 1, 'x': 5, 'y': 5}]})
-    told = ahf('evaluate', folder / 'truth.csv', '-', '--json', stdin=line)
-    assert 'other.png is not in' in told.stderr
-    *_, other, together = map(json.loads, told.stdout.splitlines())
+    (tmp_path / 'results.jsonl').write_text(line)
+    assert status('evaluate', folder / 'truth.csv', tmp_path / 'results.jsonl', '--json') == 0
+    output, errors = capsys.readouterr()
+    assert 'other.png is not in' in errors
+    *_, other, together = map(json.loads, output.splitlines())
     assert (other['image'], other['false_positives'], other['recall']) == ('other.png', 1, None)
     assert (together['expected'], together['recall']) == (12, 0.0)
 
 
-def test_edges_that_are_not_where_they_should_be_are_reported(folder, tmp_path, capsys):
+def test_edges_that_are_not_where_they_should_be_are_reported(identify, tmp_path):
     found = {'targets': [{'id': 7, 'x': 1, 'y': 2, 'edge_shift': -0.75}]}
     (tmp_path / 'program.py').write_text(f'print({json.dumps(found)!r})')
-    program = ['--detector', 'command', '--command', f'{sys.executable} {tmp_path}/program.py']
-    assert status('identify', folder / 'normal_0.3_4.png', *program, '--json') == 0
-    printed = capsys.readouterr()
-    assert json.loads(printed.out)['edge_shift'] == -0.75
+    program = f'{sys.executable} {tmp_path}/program.py'
+    result, errors = identify('--detector', 'command', '--command', program)
+    assert result['edge_shift'] == -0.75
     said = 'normal_0.3_4.png: edges are 0.8 px too bright: the photograph is over-exposed'
-    assert said in printed.err
+    assert said in errors
 
 
 def test_an_image_that_is_white_is_named_where_nothing_is_identified(tmp_path, capsys):
@@ -247,16 +236,8 @@ def test_stripes_need_the_filter_and_a_search_repeats_itself(tmp_path, capsys):
     image = tmp_path / 'stripe_0.3_2.png'
     search = ('--seed', 3, '--population', 10)
     found = []
+    command = ('identify', image, '--detector', 'traditional', '--expected-targets', 6, '--json')
     for more in (('--no-ahf',), search, (*search, '--threads', 1)):
-        command = (
-            'identify',
-            image,
-            '--detector',
-            'traditional',
-            '--expected-targets',
-            6,
-            '--json',
-        )
         assert status(*command, *more) == 0
         found.append(json.loads(capsys.readouterr().out))
     plain, first, second = found
@@ -268,27 +249,25 @@ def test_stripes_need_the_filter_and_a_search_repeats_itself(tmp_path, capsys):
     assert {**first, 'elapsed_s': 0} == {**second, 'elapsed_s': 0}
 
 
-def test_a_search_that_ended_early_says_so(folder, capsys):
-    image = folder / 'normal_0.3_4.png'
-    command = ('identify', image, '--expected-targets', 7, '--max-radius', 40, '--json')
-    assert status(*command) == 0
-    found, said = capsys.readouterr()
-    assert json.loads(found)['filter']['evaluations'] == 3
-    assert f'{image}: the search ended early, 2 filters in a row show no more targets' in said
+def test_a_search_that_ended_early_says_so(identify):
+    found, said = identify('--expected-targets', 7, '--max-radius', 40)
+    assert found['filter']['evaluations'] == 3
+    text = f'{found["image"]}: the search ended early, 2 filters in a row show no more targets'
+    assert text in said
 
 
-def test_files_that_cannot_be_read_do_not_stop_the_others(folder, tmp_path):
+def test_files_that_cannot_be_read_do_not_stop_the_others(folder, tmp_path, capsys):
     (tmp_path / 'text.png').write_text('not an image')
     write_image(tmp_path / 'flat.png', np.full((50, 50), 9, np.uint8))
     empty = tmp_path / 'empty'
     empty.mkdir()
     images = (empty, 'missing.png', tmp_path / 'text.png', tmp_path / 'flat.png')
     good = folder / 'normal_0.3_4.png'
-    done = ahf('identify', *images, good, '--detector', 'traditional', '--json')
-    assert done.returncode == 1
-    assert len(done.stdout.splitlines()) == 1
-    told = [line for line in done.stderr.splitlines() if line.startswith('ahf identify: ')]
-    assert len(told) == 4
+    command = ('identify', *images, good, '--detector', 'traditional', '--json', '--jobs', 1)
+    assert status(*command) == 1
+    output, errors = capsys.readouterr()
+    assert len(output.splitlines()) == 1
+    told = [line for line in errors.splitlines() if line.startswith('ahf identify: ')]
     for line, name in zip(told, (str(empty), 'missing.png', 'text.png', 'flat.png'), strict=True):
         assert name in line
     assert 'constant' in told[3]
@@ -298,21 +277,22 @@ def test_files_that_cannot_be_read_do_not_stop_the_others(folder, tmp_path):
     ('arguments', 'message'),
     [
         (
-            ['--expected-targets', -1],
+            '--expected-targets=-1',
             "expected_targets is '-1', accepted is an integer from 0 to 100000",
         ),
-        (['--expected-targets', '9' * 400], "expected_targets is '999"),
-        (['--population', 1], "population is '1', accepted is an integer from 2 to"),
-        (['--family', 'ring'], "family is 'ring', accepted is one of metashape12, metashape14"),
-        (['--detector', 'magic'], "detector is 'magic', accepted is one of"),
-        (['--min-radius', 'nan'], "min_radius is 'nan', accepted is a number from 0"),
-        (['--min-radius', 70, '--max-radius', 60], 'min_radius is 70.0, accepted is a number of'),
-        (['--gamma-high-min', 5], 'gamma_high_min is 5.0, accepted is a number of at most'),
-        (['--magic'], 'unrecognized arguments: --magic'),
+        ('--expected-targets ' + '9' * 400, "expected_targets is '999"),
+        ('--population 1', "population is '1', accepted is an integer from 2 to"),
+        ('--family ring', "family is 'ring', accepted is one of metashape12, metashape14"),
+        ('--detector magic', "detector is 'magic', accepted is one of"),
+        ('--min-radius nan', "min_radius is 'nan', accepted is a number from 0"),
+        ('--min-radius 70 --max-radius 60', 'min_radius is 70.0, accepted is a number of'),
+        ('--gamma-high-min 5', 'gamma_high_min is 5.0, accepted is a number of at most'),
+        ('--magic', 'unrecognized arguments: --magic'),
     ],
 )
 def test_bad_options_are_named(capsys, arguments, message):
-    assert status('identify', 'image.png', '--detector', 'traditional', *arguments) == 2
+    given = ('--detector', 'traditional', *arguments.split())
+    assert status('identify', 'image.png', *given) == 2
     out, errors = capsys.readouterr()
     assert (out, message in errors) == ('', True), errors
 
@@ -320,13 +300,13 @@ def test_bad_options_are_named(capsys, arguments, message):
 @pytest.mark.parametrize(
     ('arguments', 'message'),
     [
-        (['--light', 'dark'], "light is 'dark', accepted is one of normal, "),
-        (['--count', 0], "count is '0', accepted is an integer of at least 1"),
-        (['--targets', 100000], 'targets is 100000, accepted is an integer from 0 to'),
+        ('--light dark', "light is 'dark', accepted is one of normal, "),
+        ('--count 0', "count is '0', accepted is an integer of at least 1"),
+        ('--targets 100000', 'targets is 100000, accepted is an integer from 0 to'),
     ],
 )
 def test_bad_scenes_are_named(tmp_path, capsys, arguments, message):
-    assert status('render', tmp_path / 'new', *arguments) == 2
+    assert status('render', tmp_path / 'new', *arguments.split()) == 2
     assert message in capsys.readouterr().err
     assert not (tmp_path / 'new').exists()
 
@@ -340,15 +320,9 @@ def test_files_that_cannot_be_compared_are_named(tmp_path, capsys, missing):
     assert f'{missing} cannot be read: No such file' in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    ('command', 'settings'),
-    [
-        ('identify', IdentificationSettings),
-        ('bag', IdentificationSettings),
-        ('render', SceneSettings),
-    ],
-)
-def test_help_describes_every_setting(monkeypatch, capsys, command, settings):
+@pytest.mark.parametrize('command', ['identify', 'bag', 'render'])
+def test_help_describes_every_setting(monkeypatch, capsys, command):
+    settings = SceneSettings if command == 'render' else IdentificationSettings
     monkeypatch.setenv('COLUMNS', '1000')
     assert status(command, '--help') == 0
     words = capsys.readouterr().out
@@ -360,19 +334,3 @@ def test_help_describes_every_setting(monkeypatch, capsys, command, settings):
 def test_no_command_and_the_version():
     assert status() == 2
     assert ahf('--version').returncode == 0
-
-
-def test_a_reader_that_stops_reading_is_no_error_to_see(folder):
-    command = [sys.executable, '-m', 'ahf_ros.cli', 'identify', '--json', '--detector']
-    process = subprocess.Popen(
-        [*command, 'traditional', *[str(folder / 'normal_0.3_4.png')] * 3],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env={**os.environ, 'PYTHONPATH': str(ROOT)},
-    )
-    process.stdout.close()
-    errors = process.stderr.read()
-    assert process.wait(timeout=100) == 1
-    assert 'Traceback' not in errors
-    assert 'Exception ignored' not in errors

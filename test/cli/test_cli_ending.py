@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from pathlib import Path
 
 import numpy as np
@@ -20,20 +20,40 @@ from ahf_ros.bag import run
 from ahf_ros.bag.definitions import typestore
 from ahf_ros.cli import main
 from ahf_ros.interchange.image_files import write_image
-from support import bags, packages
+from support import ROOT, bags, packages
+from support.command_line import status as status_of
 
-ROOT = Path(__file__).resolve().parents[2]
 LIMIT = 300.0
 SLOW = 'import pathlib, sys, time; pathlib.Path({mark!r}).touch(); time.sleep(600)'
+RAMP = np.tile(np.arange(40, dtype=np.uint8), (30, 1))
 
 
-def start(*arguments: object, **options: object) -> subprocess.Popen[bytes]:
+def start(
+    *arguments: object, path: Path = ROOT, stdout: object = subprocess.PIPE, **environment: str
+) -> subprocess.Popen[bytes]:
+    """Start the command line, which also imports from a path."""
     command = [sys.executable, '-m', 'ahf_ros.cli', *map(str, arguments)]
     before = signal.signal(signal.SIGHUP, signal.SIG_DFL)  # also where the tests run with nohup
+    environment = {**os.environ, 'PYTHONPATH': f'{ROOT}{os.pathsep}{path}', **environment}
     try:
-        return subprocess.Popen(command, cwd=ROOT, **options)  # type: ignore[call-overload,no-any-return]
+        return subprocess.Popen(
+            command, cwd=ROOT, stdout=stdout, stderr=subprocess.PIPE, env=environment
+        )
     finally:
         signal.signal(signal.SIGHUP, before)
+
+
+def end_of(process: subprocess.Popen[bytes]) -> tuple[int | None, bytes, bytes]:
+    """Return the exit status of a process and what it has written, which is no traceback."""
+    output, errors = process.communicate(timeout=LIMIT)
+    assert b'Traceback' not in (output or b'') + errors
+    return process.returncode, output, errors
+
+
+@pytest.fixture
+def image(tmp_path: Path) -> Path:
+    write_image(tmp_path / 'image.png', RAMP)
+    return tmp_path / 'image.png'
 
 
 def wait_for(condition: object) -> None:
@@ -43,18 +63,13 @@ def wait_for(condition: object) -> None:
         time.sleep(0.02)
 
 
-def running(mark: Path) -> list[int]:
-    """Return the processes on whose command line a path is."""
-    found = []
-    for folder in Path('/proc').iterdir():
-        try:
-            line = (folder / 'cmdline').read_bytes() if folder.name.isdigit() else b''
-            state = (folder / 'stat').read_text().rpartition(')')[2].split()[0] if line else 'Z'
-        except OSError:
-            continue
-        if str(mark).encode() in line and state != 'Z' and int(folder.name) != os.getpid():
-            found.append(int(folder.name))
-    return found
+def is_running(mark: Path) -> bool:
+    """Return whether a path is on the command line of another process."""
+    for line in Path('/proc').glob('[0-9]*/cmdline'):  # empty for a zombie
+        with suppress(OSError):
+            if line.parent.name != str(os.getpid()) and str(mark).encode() in line.read_bytes():
+                return True
+    return False
 
 
 KILLER = """
@@ -72,7 +87,7 @@ class MyDetector:
 """
 
 
-def test_an_image_that_kills_its_process_costs_only_itself(tmp_path: Path) -> None:
+def test_images_that_kill_and_detectors_that_print_do_no_harm(tmp_path: Path) -> None:
     packages.write_package(tmp_path, 'killing', KILLER)
     paths = [tmp_path / name for name in ('a.png', 'killer.png', 'b.png', 'missing.png', 'c.png')]
     for path, height in zip(paths, (30, 31, 33, 0, 35), strict=True):
@@ -83,12 +98,11 @@ def test_an_image_that_kills_its_process_costs_only_itself(tmp_path: Path) -> No
         process = start(
             'identify', '--json', *images, '--jobs', jobs, '--detector', 'mine',
             '--export', f'csv={tmp_path / str(jobs)}', '--overlay', tmp_path / f'seen{jobs}',
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-            env={**os.environ, 'PYTHONPATH': f'{ROOT}{os.pathsep}{tmp_path}'},
+            path=tmp_path,
         )  # fmt: skip
-        output, errors = process.communicate(timeout=LIMIT)
+        status, output, errors = end_of(process)
         lines = [{**json.loads(line), 'elapsed_s': 0} for line in output.splitlines()]
-        return process.returncode, lines, errors.decode()
+        return status, lines, errors.decode()
 
     status, lines, errors = result(2, *paths)
     assert status == 1
@@ -119,35 +133,25 @@ def slow_command(tmp_path: Path) -> tuple[str, Path]:
     return f'{sys.executable} {tmp_path / "slow.py"} {{image}}', mark
 
 
-@pytest.mark.parametrize(
-    ('number', 'status'),
-    [
-        (signal.SIGINT, 130),
-        (signal.SIGTERM, 128 + signal.SIGTERM),
-        (signal.SIGHUP, 128 + signal.SIGHUP),
-    ],
-)
-def test_a_signal_ends_the_command_and_its_files(
-    tmp_path: Path, number: signal.Signals, status: int
-) -> None:
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_ends_the_command_and_its_files(tmp_path: Path, number: signal.Signals) -> None:
     images = ['a.png', 'b.png'][: 2 if number == signal.SIGINT else 1]  # two workers, or none
     for name in images:
-        write_image(tmp_path / name, np.tile(np.arange(40, dtype=np.uint8), (30, 1)))
+        write_image(tmp_path / name, RAMP)
     command, mark = slow_command(tmp_path)
     (tmp_path / 'scratch').mkdir()
     process = start(
         'identify', *(tmp_path / name for name in images), '--jobs', 2, '--expected-targets', 3,
         '--detector', 'command', '--command', command, '--detector-timeout', 600,
-        stderr=subprocess.PIPE, env={**os.environ, 'TMPDIR': str(tmp_path / 'scratch')},
+        TMPDIR=str(tmp_path / 'scratch'),
     )  # fmt: skip
     wait_for(mark.exists)
     for _ in range(2):  # a terminal and a launcher both send one
         process.send_signal(number)
         time.sleep(0.005)
-    errors = process.communicate(timeout=LIMIT)[1]
-    assert process.returncode == status, errors
-    assert b'Traceback' not in errors
-    wait_for(lambda: not running(tmp_path / 'slow.py'))
+    status, _, errors = end_of(process)
+    assert status == 128 + number, errors
+    wait_for(lambda: not is_running(tmp_path / 'slow.py'))
     assert list((tmp_path / 'scratch').iterdir()) == []
 
 
@@ -156,21 +160,18 @@ def test_a_signal_ends_the_command_and_its_files(
     [(signal.SIGTERM, 0), (signal.SIGINT, 1)],  # a search calls it in other threads
 )
 def test_a_signal_does_not_wait_for_a_detector_of_another_package(
-    tmp_path: Path, number: signal.Signals, fast: int
+    tmp_path: Path, image: Path, number: signal.Signals, fast: int
 ) -> None:
     mark = tmp_path / 'mark'
     packages.write_package(tmp_path, 'hanging', packages.SLOW.format(fast=fast, mark=str(mark)))
-    write_image(tmp_path / 'image.png', np.tile(np.arange(40, dtype=np.uint8), (30, 1)))
     process = start(
-        'identify', tmp_path / 'image.png', '--detector', 'mine', '--expected-targets', 3,
-        '--detector-timeout', 600, stderr=subprocess.PIPE,
-        env={**os.environ, 'PYTHONPATH': f'{ROOT}{os.pathsep}{tmp_path}'},
+        'identify', image, '--detector', 'mine', '--expected-targets', 3,
+        '--detector-timeout', 600, path=tmp_path,
     )  # fmt: skip
     wait_for(mark.exists)
     process.send_signal(number)
-    errors = process.communicate(timeout=LIMIT)[1]
-    assert process.returncode == (130 if number == signal.SIGINT else 128 + number), errors
-    assert b'Traceback' not in errors
+    status, _, errors = end_of(process)
+    assert status == 128 + number, errors
 
 
 INTERRUPTING = """
@@ -190,54 +191,30 @@ class MyDetector:
 """
 
 
-def test_a_signal_that_an_import_would_lose_ends_the_command(tmp_path: Path) -> None:
+def test_a_signal_that_an_import_would_lose_ends_the_command(tmp_path: Path, image: Path) -> None:
     packages.write_package(tmp_path, 'interrupting', INTERRUPTING)
-    write_image(tmp_path / 'image.png', np.tile(np.arange(40, dtype=np.uint8), (30, 1)))
-    process = start(
-        'identify', '--json', tmp_path / 'image.png', '--detector', 'mine',
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-        env={**os.environ, 'PYTHONPATH': f'{ROOT}{os.pathsep}{tmp_path}'},
-    )  # fmt: skip
-    output, errors = process.communicate(timeout=LIMIT)
-    assert process.returncode == 130, errors
-    assert (output, errors) == (b'', b'')
-
-
-def test_what_a_detector_prints_is_not_in_the_json(tmp_path: Path) -> None:
-    body = packages.EXAMPLE.read_text().replace('radii = np', "print('noise')\n        radii = np")
-    packages.write_package(tmp_path, 'printing', body)
-    write_image(tmp_path / 'image.png', np.tile(np.arange(40, dtype=np.uint8), (30, 1)))
-    process = start(
-        'identify', '--json', tmp_path / 'image.png', '--detector', 'mine',
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-        env={**os.environ, 'PYTHONPATH': f'{ROOT}{os.pathsep}{tmp_path}'},
-    )  # fmt: skip
-    output, errors = process.communicate(timeout=LIMIT)
-    assert b'noise' in errors
-    assert json.loads(output)['detector'] == 'mine'
+    process = start('identify', '--json', image, '--detector', 'mine', path=tmp_path)
+    assert end_of(process) == (130, b'', b'')
 
 
 def test_workers_end_with_their_parent_and_a_rerun_is_accepted(tmp_path: Path) -> None:
-    images = [np.tile(np.arange(40, dtype=np.uint8) + it, (30, 1)) for it in range(2)]
+    images = [RAMP, RAMP + 1]
     sources = [
         bags.write_ros2(tmp_path / name, bags.recorded(typestore(), images)) for name in 'ab'
     ]
     command, mark = slow_command(tmp_path)
     target = tmp_path / 'made'
-    process = start(
+    arguments = (
         'bag', *sources, target, '--jobs', 2, '--detector', 'command', '--command', command,
         '--detector-timeout', 600,
     )  # fmt: skip
+    process = start(*arguments)
     wait_for(mark.exists)
     os.kill(process.pid, signal.SIGKILL)
     process.wait()
-    wait_for(lambda: not running(tmp_path) and all(is_free(target / name) for name in 'ab'))
+    wait_for(lambda: not is_running(tmp_path) and all(is_free(target / name) for name in 'ab'))
     (tmp_path / 'slow.py').write_text('print(\'{"targets": []}\')')
-    again = start(
-        'bag', *sources, target, '--jobs', 2, '--detector', 'command', '--command', command,
-        '--detector-timeout', 600,
-    )  # fmt: skip
-    assert again.wait(LIMIT) == 0
+    assert end_of(start(*arguments))[0] == 0
     for name in 'ab':
         assert len(bags.answers(target / name)) == 2
 
@@ -245,36 +222,39 @@ def test_workers_end_with_their_parent_and_a_rerun_is_accepted(tmp_path: Path) -
 def test_a_command_that_was_missing_is_tried_again(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    images = [np.tile(np.arange(40, dtype=np.uint8), (30, 1))]
-    source = bags.write_ros2(tmp_path / 'in', bags.recorded(typestore(), images))
+    source = bags.write_ros2(tmp_path / 'in', bags.recorded(typestore(), [RAMP]))
     program = tmp_path / 'program'
-    arguments = ['bag', source, tmp_path / 'out', '--detector', 'command', '--command', program]
-    assert main([*map(str, arguments)]) == 1
+    arguments = ('bag', source, tmp_path / 'out', '--detector', 'command', '--command', program)
+    assert status_of(*arguments) == 1
     assert 'cannot be started: No such file or directory' in capfd.readouterr().err
     program.write_text(f'#!{sys.executable}\nprint(\'{{"targets": []}}\')')
     program.chmod(0o755)
-    assert main([*map(str, arguments)]) == 0
+    assert status_of(*arguments) == 0
     assert len(bags.answers(tmp_path / 'out')) == 1
 
 
-def test_a_full_disk_behind_standard_output_is_named(tmp_path: Path) -> None:
-    write_image(tmp_path / 'image.png', np.tile(np.arange(40, dtype=np.uint8), (30, 1)))
+def test_a_full_disk_behind_standard_output_is_named(image: Path) -> None:
     with Path('/dev/full').open('w') as full:
-        process = start(
-            'identify', '--json', '--detector', 'traditional', tmp_path / 'image.png',
-            stdout=full, stderr=subprocess.PIPE,
-        )  # fmt: skip
-        errors = process.communicate(timeout=LIMIT)[1]
-    assert process.returncode == 1
-    assert b'No space left on device' in errors and b'Traceback' not in errors
+        process = start('identify', '--json', '--detector', 'traditional', image, stdout=full)
+        status, _, errors = end_of(process)
+    assert status == 1
+    assert b'No space left on device' in errors
+
+
+def test_a_reader_that_stops_reading_is_no_error_to_see(image: Path) -> None:
+    process = start('identify', '--json', '--detector', 'traditional', *[image] * 3)
+    assert process.stdout and process.stderr
+    process.stdout.close()
+    errors = process.stderr.read()
+    assert process.wait(LIMIT) == 1
+    assert b'Traceback' not in errors and b'Exception ignored' not in errors
 
 
 @pytest.mark.parametrize('closed', ['2>&-', '>&-', '2>/dev/full'])
-def test_closed_outputs_do_no_harm(tmp_path: Path, closed: str) -> None:
-    write_image(tmp_path / 'image.png', np.tile(np.arange(40, dtype=np.uint8), (30, 1)))
+def test_closed_outputs_do_no_harm(image: Path, closed: str) -> None:
     words = f'{sys.executable} -m ahf_ros.cli identify --detector traditional'
     done = subprocess.run(
-        ['sh', '-c', f'{words} {tmp_path / "image.png"} {closed}'],
+        ['sh', '-c', f'{words} {image} {closed}'],
         cwd=ROOT, capture_output=True, timeout=LIMIT,
     )  # fmt: skip
     assert done.returncode in (0, 1)
@@ -282,13 +262,11 @@ def test_closed_outputs_do_no_harm(tmp_path: Path, closed: str) -> None:
 
 
 def test_many_images_are_rendered_one_by_one(tmp_path: Path) -> None:
-    process = start(
-        'render', tmp_path / 'made', '--count', 10**9, '--width', 64, '--height', 64,
-        '--targets', 1, '--dot-radius', 5, stderr=subprocess.DEVNULL,
-    )  # fmt: skip
+    scene = ('--width', 64, '--height', 64, '--targets', 1, '--dot-radius', 5)
+    process = start('render', tmp_path / 'made', '--count', 10**9, *scene)
     wait_for(lambda: (tmp_path / 'made' / 'truth.csv').exists())
     process.send_signal(signal.SIGINT)
-    assert process.wait(LIMIT) == 130
+    assert end_of(process)[0] == 130
 
 
 def test_an_interrupt_during_the_imports_ends_in_order(monkeypatch: pytest.MonkeyPatch) -> None:

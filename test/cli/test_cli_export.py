@@ -7,9 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from ahf_ros.cli import main
 from ahf_ros.interchange.export.formats import FORMATS
-from support.command_line import ahf
+from support.command_line import ahf, status
 from support.exported import READERS
 
 SCENE = ('--width', 320, '--height', 240, '--targets', 3, '--dot-radius', 10, '--seed', 4)
@@ -19,7 +18,7 @@ SCENE = ('--width', 320, '--height', 240, '--targets', 3, '--dot-radius', 10, '-
 def identified(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str, str]:
     """Return a folder with exports, and what `ahf identify` printed."""
     folder = tmp_path_factory.mktemp('exports')
-    assert main(['render', str(folder), *map(str, SCENE)]) == 0
+    assert status('render', folder, *SCENE) == 0
     (image,) = folder.glob('*.png')
     exports = [option for name in FORMATS for option in ('--export', f'{name}={folder / name}')]
     points = [f'{number},{number}.5,0,-1\n' for number in range(1000)]
@@ -53,9 +52,9 @@ def test_what_was_exported_is_said(identified):
 def test_export_of_results_gives_the_same_files(identified, tmp_path: Path):
     folder = identified[0]
     exports = [f'{name}={tmp_path / name}' for name in FORMATS]
-    control = ['--control', str(folder / 'points.csv'), '--control-crs', 'EPSG:25832']
-    given = [str(folder / 'results.jsonl'), *exports, *control, '--control-sigma', '0.01']
-    assert main(['export', *given]) == 0
+    control = ('--control', folder / 'points.csv', '--control-crs', 'EPSG:25832')
+    given = (folder / 'results.jsonl', *exports, *control, '--control-sigma', 0.01)
+    assert status('export', *given) == 0
     files = [it.relative_to(tmp_path) for it in tmp_path.rglob('*') if it.is_file()]
     assert len(files) >= 12
     for file in files:
@@ -73,8 +72,8 @@ def test_export_of_results_gives_the_same_files(identified, tmp_path: Path):
 )
 def test_damaged_control_points_are_named(identified, rows, message, tmp_path, capsys):
     (tmp_path / 'points.csv').write_text(rows)
-    given = [str(identified[0] / 'results.jsonl'), f'csv={tmp_path / "out"}']
-    assert main(['export', *given, '--control', str(tmp_path / 'points.csv')]) == 1
+    given = (identified[0] / 'results.jsonl', f'csv={tmp_path / "out"}')
+    assert status('export', *given, '--control', tmp_path / 'points.csv') == 1
     assert message in capsys.readouterr().err
     assert not (tmp_path / 'out').exists()
 
@@ -83,7 +82,7 @@ def test_an_export_that_fails_leaves_the_others(identified, tmp_path, capsys):
     (tmp_path / 'file').write_text('')
     results = identified[0] / 'results.jsonl'
     exports = [f'odm={tmp_path}', f'csv={tmp_path / "file"}', f'mmvii={tmp_path / "out"}']
-    assert main(['export', str(results), *exports]) == 1
+    assert status('export', results, *exports) == 1
     messages = capsys.readouterr().err
     assert 'ahf export: odm: odm has only control points, accepted are results with' in messages
     assert f'ahf export: csv: {tmp_path}/file/targets.csv cannot be written: ' in messages
@@ -91,24 +90,17 @@ def test_an_export_that_fails_leaves_the_others(identified, tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
-    ('options', 'status', 'message'),
+    ('options', 'expected', 'message'),
     [
-        (
-            ('--export', 'photomodeler=out'),
-            2,
-            "export is 'photomodeler=out', accepted is FORMAT=D",
-        ),
-        (('--export', 'odm=out'), 2, "odm knows images by their names, 'other/a.png' and 'a.png'"),
-        (('--control', 'points.csv'), 2, 'control is given without export, accepted is both'),
-        (('--export', 'csv=out', '--control-crs', 'EPSG:4326'), 2, 'given without control, accep'),
-        (('--export', 'csv=out', '--upright'), 2, 'upright is given with export, accepted is one'),
-        (('--export', 'csv=out', '--control', 'missing'), 1, 'missing cannot be read: No such'),
-        (('--export', 'csv=out', '--control-sigma', '-1'), 2, 'control_sigma is '),
+        ('--export photomodeler=out', 2, "export is 'photomodeler=out', accepted is FORMAT=D"),
+        ('--export odm=out', 2, "odm knows images by their names, 'other/a.png' and 'a.png'"),
+        ('--control points.csv', 2, 'control is given without export, accepted is both'),
+        ('--export csv=out --control-crs EPSG:4326', 2, 'given without control, accep'),
+        ('--export csv=out --upright', 2, 'upright is given with export, accepted is one'),
+        ('--export csv=out --control missing', 1, 'missing cannot be read: No such'),
+        ('--export csv=out --control-sigma -1', 2, 'control_sigma is '),
     ],
 )
-def test_what_does_not_fit_is_refused_before_any_image(options, status, message, capsys):
-    try:
-        found = main(['identify', 'a.png', 'other/a.png', *options])
-    except SystemExit as left:
-        found = int(left.code or 0)
-    assert (found, message in capsys.readouterr().err) == (status, True)
+def test_what_does_not_fit_is_refused_before_any_image(options, expected, message, capsys):
+    assert status('identify', 'a.png', 'other/a.png', *options.split()) == expected
+    assert message in capsys.readouterr().err

@@ -9,11 +9,11 @@ import cv2
 import numpy as np
 import pytest
 
-from ahf_ros.cli import main
 from ahf_ros.cli.identify import image_paths
 from ahf_ros.interchange.image_files import as_oriented, read_image
 from ahf_ros.interchange.target_json import read_results
 from ahf_ros.synthetic.scene import SceneSettings, render
+from support.command_line import status
 
 ROTATED = 6
 """Orientation in Exif of an image whose camera was turned by 90 degrees."""
@@ -51,7 +51,7 @@ def test_what_names_no_image_is_told_and_the_rest_goes_on(folder: Path) -> None:
     assert found == ['b.png']
     for problem, named in zip(problems, ('empty', '*.bmp', 'none'), strict=True):
         assert named in problem
-    assert main(['identify', str(empty)]) == 1
+    assert status('identify', empty) == 1
 
 
 def oriented_jpeg(image: np.ndarray, orientation: int) -> bytes:
@@ -81,7 +81,7 @@ def test_coordinates_are_those_of_stored_pixels_unless_upright_is_said(
     path.write_bytes(oriented_jpeg(scene.image, ROTATED))
 
     def result(*options: str) -> tuple[dict[int, tuple[float, float]], str]:
-        assert main(['identify', '--json', *options, str(path)]) == 0
+        assert status('identify', '--json', *options, path) == 0
         output = capsys.readouterr()
         (tmp_path / 'results.jsonl').write_text(output.out)
         (found,) = read_results(tmp_path / 'results.jsonl').values()

@@ -8,13 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ahf_ros.cli import main
-from ahf_ros.cli.identify_options import stacked
+from ahf_ros.cli.identify import stacked
 from ahf_ros.interchange.image_files import read_image, write_image
-from support.command_line import ahf
+from support.command_line import status
 
-PHASES = 4
-NAMES = [f'stripe_0.02_{seed}_{phase}.png' for seed in (1, 2) for phase in range(PHASES)]
+NAMES = [f'stripe_0.02_{seed}_{phase}.png' for seed in (1, 2) for phase in range(4)]
 
 
 @pytest.fixture(scope='module')
@@ -22,8 +20,7 @@ def folder(tmp_path_factory) -> Path:
     """Return a folder with four phases of two scenes, and their truth."""
     folder = tmp_path_factory.mktemp('phases')
     scene = '--width 480 --height 360 --targets 4 --dot-radius 12 --light stripe --ambient 0.02'
-    done = ahf('render', folder, *scene.split(), '--seed', 1, '--count', 2, '--phases', PHASES)
-    assert (done.returncode, done.stdout) == (0, '')
+    assert status('render', folder, *scene.split(), '--seed=1', '--count=2', '--phases=4') == 0
     return folder
 
 
@@ -38,50 +35,46 @@ def test_phases_are_one_scene_in_light_that_moves(folder):
     assert values[0] == values[1]
 
 
-def test_every_stack_is_one_result_that_names_its_images(folder):
+def test_every_stack_is_one_result_that_names_its_images(folder, tmp_path, capsys):
     paths = [str(folder / name) for name in NAMES]
-    done = ahf('identify', *paths, '--stack', 4, '--expected-targets', 4, '--json')
-    assert done.returncode == 0, done.stderr
-    results = [json.loads(line) for line in done.stdout.splitlines()]
+    assert status('identify', *paths, '--stack', 4, '--expected-targets', 4, '--json') == 0
+    (tmp_path / 'results.jsonl').write_text(capsys.readouterr().out)
+    results = [json.loads(line) for line in (tmp_path / 'results.jsonl').open()]
     assert [result['images'] for result in results] == [paths[:4], paths[4:]]
     assert [result['image'] for result in results] == [paths[0], paths[4]]
     assert [len(result['targets']) for result in results] == [4, 4]
     assert {result['combination'] for result in results} == {'even_light'}
     assert [result['split'] for result in results] == ['', '']
-    judged = ahf('evaluate', folder / 'truth.csv', '-', '--json', stdin=done.stdout)
-    total = json.loads(judged.stdout.splitlines()[-1])
+    status('evaluate', folder / 'truth.csv', tmp_path / 'results.jsonl', '--json')
+    total = json.loads(capsys.readouterr().out.splitlines()[-1])
     assert (total['right'], total['wrong'], total['expected']) == (32, 0, 32)
 
 
-def test_names_and_folders_say_what_belongs_together(folder):
+def test_names_and_folders_say_what_belongs_together(folder, capsys):
     paths = [str(folder / name) for name in reversed(NAMES)]
-    done = ahf('identify', *paths, '--stack-by', r'(.*)_\d', '--expected-targets', 4, '--json')
-    results = [json.loads(line) for line in done.stdout.splitlines()]
+    status('identify', *paths, '--stack-by', r'(.*)_\d', '--expected-targets', 4, '--json')
+    results = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert [result['images'] for result in results] == [paths[:4], paths[4:]]
     assert [len(result['targets']) for result in results] == [4, 4]
 
 
-def test_a_stack_of_several_sizes_is_split_and_what_is_unreadable_is_left_out(folder, tmp_path):
+def test_a_stack_of_several_sizes_is_split_and_what_is_unreadable_is_left_out(
+    folder, tmp_path, capsys
+):
     paths = [str(folder / name) for name in NAMES[:3]]
     write_image(tmp_path / 'other.png', read_image(paths[0])[:-8])
     (tmp_path / 'broken.png').write_bytes(b'nothing')
     paths += [str(tmp_path / 'other.png'), str(tmp_path / 'broken.png')]
-    done = ahf('identify', *paths, '--stack', 5, '--json', '--overlay', tmp_path / 'seen')
-    assert done.returncode == 1
-    first, second = (json.loads(line) for line in done.stdout.splitlines())
+    assert status('identify', *paths, '--stack=5', '--json', '--overlay', tmp_path / 'seen') == 1
+    output, errors = capsys.readouterr()
+    first, second = (json.loads(line) for line in output.splitlines())
     assert (first['images'], second['images']) == (paths[:3], paths[3:4])
     reason = 'image 4 of the stack is 480 x 352 px, accepted is the size of the first'
     assert second['split'].startswith(reason)
-    assert reason in done.stderr
-    assert 'broken.png' in done.stderr
-    assert '4 of 5 images of a stack' in done.stderr
+    for said in (reason, 'broken.png', '4 of 5 images of a stack'):
+        assert said in errors
     seen = sorted(path.name for path in (tmp_path / 'seen').iterdir())
     assert seen == ['other_overlay.png', 'stripe_0.02_1_0_overlay.png']
-
-
-def test_single_images_are_what_they_were(folder):
-    done = ahf('identify', folder / NAMES[0], '--json')
-    assert not {'images', 'combination', 'split'} & set(json.loads(done.stdout))
 
 
 def test_groups_are_in_the_order_of_their_first_images():
@@ -102,5 +95,5 @@ def test_groups_are_in_the_order_of_their_first_images():
     ],
 )
 def test_bad_groups_are_named(folder, capsys, by, message):
-    assert main(['identify', str(folder / NAMES[0]), '--stack-by', by]) == 2
+    assert status('identify', folder / NAMES[0], '--stack-by', by) == 2
     assert message in capsys.readouterr().err

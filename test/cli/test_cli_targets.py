@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import json
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from ahf_ros.cli import main
 from ahf_ros.codes.families import FAMILY_NAMES, KINDS
 from benchmarks.printed import identified, largest_error, sample, settings_of
-from support.command_line import ahf
+from support.command_line import ahf, status
 from support.disk import room_for
 
 pytest.importorskip('reportlab', reason='PDF files are written by reportlab')
@@ -22,8 +22,7 @@ ROUND = (*KINDS['ring'], 'gsi', 'dots')
 PER_FAMILY = 12
 
 
-def status(*arguments: object) -> int:
-    return main(['targets', *(str(argument) for argument in arguments)])
+targets = partial(status, 'targets')
 
 
 def rendered(file: Path, scale: float) -> list[np.ndarray]:
@@ -82,20 +81,19 @@ def test_the_bars_are_100_mm_long(folder: Path) -> None:
     assert width > 4000
 
 
-def test_the_geometry_has_every_target(folder: Path) -> None:
+def test_the_geometry_has_every_target_and_sheets_repeat_themselves(
+    folder: Path, tmp_path: Path
+) -> None:
     geometry = json.loads((folder / 'sheet.json').read_text())
     assert (geometry['pages'], geometry['radii']['band_outer']) == (2, 14.0)
     assert [target['id'] for target in geometry['targets']] == list(range(1, 55))
-
-
-def test_the_same_sheet_is_the_same_file(folder: Path, tmp_path: Path) -> None:
-    assert status('--ids', '1-54', '-o', tmp_path / 'again.pdf') == 0
+    assert targets('--ids', '1-54', '-o', tmp_path / 'again.pdf') == 0
     assert (tmp_path / 'again.pdf').read_bytes() == (folder / 'sheet.pdf').read_bytes()
 
 
 def test_the_best_ids_are_printed_and_told(tmp_path: Path, capsys) -> None:
     file = tmp_path / 'best.json'
-    assert status('--best', 20, '-o', tmp_path / 'best.svg', '--geometry', file) == 0
+    assert targets('--best', 20, '-o', tmp_path / 'best.svg', '--geometry', file) == 0
     ids = [target['id'] for target in json.loads(file.read_text())['targets']]
     assert len(ids) == 20
     assert f'IDs: {", ".join(map(str, ids))}\n' in capsys.readouterr().err
@@ -116,7 +114,7 @@ def test_what_is_not_accepted_leaves_the_old_file(
     monkeypatch.chdir(tmp_path)
     file = Path('sheet.pdf')
     file.write_text('old')
-    assert status(*options, '-o', file) == 2
+    assert targets(*options, '-o', file) == 2
     assert f'ahf targets: error: {message}' in capsys.readouterr().err
     assert file.read_text() == 'old'
 
@@ -125,7 +123,7 @@ def test_a_full_disk_leaves_the_old_file_and_the_rest_is_written(tmp_path: Path,
     file, geometry = tmp_path / 'sheet.pdf', tmp_path / 'sheet.json'
     file.write_text('old')
     with room_for(5000):
-        assert status('--ids', '1-54', '-o', file, '--geometry', geometry) == 1
+        assert targets('--ids', '1-54', '-o', file, '--geometry', geometry) == 1
     assert f'ahf targets: {file} cannot be written: File too large' in capsys.readouterr().err
     assert file.read_text() == 'old'
     assert len(json.loads(geometry.read_text())['targets']) == 54
@@ -136,9 +134,9 @@ def test_without_its_library_a_pdf_is_refused_and_svg_is_not(
     tmp_path: Path, capsys, monkeypatch
 ) -> None:
     monkeypatch.setitem(sys.modules, 'reportlab.pdfgen.canvas', None)
-    assert status('--ids', '1', '-o', tmp_path / 'sheet.pdf') == 2
+    assert targets('--ids', '1', '-o', tmp_path / 'sheet.pdf') == 2
     assert "install ahf_ros with 'ahf_ros[print]'" in capsys.readouterr().err
-    assert status('--ids', '1', '-o', tmp_path / 'sheet.svg') == 0
+    assert targets('--ids', '1', '-o', tmp_path / 'sheet.svg') == 0
     assert [it.name for it in tmp_path.iterdir()] == ['sheet.svg']
-    assert status('--ids', '1', '-o', tmp_path / 'sheet.png') == 2
+    assert targets('--ids', '1', '-o', tmp_path / 'sheet.png') == 2
     assert 'sheet.png has an unknown format, accepted is one of .pdf' in capsys.readouterr().err

@@ -12,8 +12,7 @@ from ahf_ros.codes.gsi import GSI_LIBRARY, point_family, positions_of, value_of
 from ahf_ros.detectors import create_detector
 from ahf_ros.detectors.gsi.evidence import Evidence, read_codes, seen_templates
 from ahf_ros.detectors.gsi.grouping import Templates
-from ahf_ros.drawing.colours import DECODED_COLOUR, DECODING_DOT_COLOUR
-from ahf_ros.drawing.overlay import draw
+from ahf_ros.drawing.overlay import DECODED_COLOUR, DECODING_DOT_COLOUR, draw
 from ahf_ros.features.homography import fit_homographies
 from ahf_ros.features.pyramid import image_pyramid
 from ahf_ros.synthetic.scene import Rendering

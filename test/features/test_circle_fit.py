@@ -8,21 +8,11 @@ import numpy as np
 import pytest
 
 from ahf_ros.features import frame
-from ahf_ros.features.circle_fit import Fit, fit_circles
-from ahf_ros.features.circles import Circles, dot_circles
+from ahf_ros.features.circle_fit import Fit, fit_circles, fit_dots
+from ahf_ros.features.circles import Circles
 
 BLUR = 0.7
 DARK, BRIGHT = 40.0, 200.0
-
-
-def through(frames: np.ndarray, side: int) -> tuple[np.ndarray, ...]:
-    """Return where pixels are on the target: radii, and px a radius across a circle."""
-    rows, columns = np.mgrid[:side, :side]
-    pixels = np.stack([columns.ravel(), rows.ravel(), np.ones(rows.size)])
-    plane = np.linalg.inv(frames[0]) @ pixels
-    x, y = (plane[:2] / plane[2]).reshape(2, side, side)
-    radius = np.hypot(x, y)
-    return radius, 1 / np.maximum(np.hypot(*np.gradient(radius)), 1e-3)
 
 
 def drawn(frames: np.ndarray, side: int = 100, radii: Sequence[float] = (1.0,)) -> np.ndarray:
@@ -31,7 +21,11 @@ def drawn(frames: np.ndarray, side: int = 100, radii: Sequence[float] = (1.0,)) 
     A blurred step across a circle differs from a blurred disc: its level halfway stays on the
     circle. `fit_circles` expects a disc, whose level halfway moves inwards by blur^2 / 2 radii.
     """
-    radius, scale = through(frames, side)
+    rows, columns = np.mgrid[:side, :side]
+    pixels = np.stack([columns.ravel(), rows.ravel(), np.ones(rows.size)])
+    plane = np.linalg.inv(frames[0]) @ pixels
+    radius = np.hypot(*(plane[:2] / plane[2])).reshape(side, side)
+    scale = 1 / np.maximum(np.hypot(*np.gradient(radius)), 1e-3)  # px a radius across a circle
 
     def rise(edge: float) -> np.ndarray:
         outwards = (radius - edge) * scale
@@ -47,13 +41,16 @@ def dot_frame(x: float, y: float, radius: float = 12.0) -> np.ndarray:
 
 
 def fitted(image: np.ndarray, start: np.ndarray) -> Fit:
-    return fit_circles(
-        image.astype(np.float32), start, dot_circles([1], 48), reach=0.45, projective=False
-    )
+    dark = np.ones(len(start), int)
+    return fit_dots(image.astype(np.float32), start, dark, rays=48, reach=0.45)
 
 
 def centre(fit: Fit) -> np.ndarray:
     return fit.frames[0, :2, 2]
+
+
+PLACE, START = (50.2, 49.7), dot_frame(50.0, 50.0)
+DISC = drawn(dot_frame(*PLACE))
 
 
 @pytest.mark.parametrize('place', [(50.0, 50.0), (50.37, 49.81), (49.5, 50.5)])
@@ -95,40 +92,32 @@ def test_circles_of_several_groups_give_the_image_of_the_centre():
     assert joint.share[0] > 0.9
 
 
-def test_a_slope_of_the_light_does_not_move_the_centre():
-    place = (50.2, 49.7)
-    light = np.exp(0.015 * (np.arange(100.0) - 50))  # a fifth brighter from side to side
-    even, sloping = (
-        fitted(image, dot_frame(50.0, 50.0))
-        for image in (drawn(dot_frame(*place)), drawn(dot_frame(*place)) * light)
-    )
-    assert centre(even) == pytest.approx(place, abs=0.005)
-    assert centre(sloping) == pytest.approx(place, abs=0.025)
+@pytest.mark.parametrize(
+    ('light', 'error'),
+    [
+        (np.ones(100), 0.005),
+        (np.exp(0.015 * (np.arange(100.0) - 50)), 0.025),  # a fifth brighter from side to side
+        (0.3 + 0.7 / (1 + np.exp(-(np.arange(100.0) - 53.3) / 0.6)), 0.05),
+    ],
+    ids=['even', 'slope', 'edge'],
+)
+def test_light_hardly_moves_the_centre(light, error):
+    assert centre(fitted(DISC * light, START)) == pytest.approx(PLACE, abs=error)
 
 
 @pytest.mark.parametrize('colour', [DARK, 110.0, 255.0])
 def test_an_edge_that_is_hidden_is_left_out(colour):
     """A bar over a quarter of the dot, whatever its colour, has edges that are not the dot's."""
-    place = (50.2, 49.7)
-    image = drawn(dot_frame(*place))
+    image = DISC.copy()
     image[:, 57:] = colour
-    fit = fitted(image, dot_frame(50.0, 50.0))
-    assert centre(fit) == pytest.approx(place, abs=0.06)
+    fit = fitted(image, START)
+    assert centre(fit) == pytest.approx(PLACE, abs=0.06)
     assert 0.5 < fit.share[0] < 0.85
-    whole = fitted(drawn(dot_frame(*place)), dot_frame(50.0, 50.0))
-    assert fit.covariance[0, 0, 0] > 1.5 * whole.covariance[0, 0, 0]
-
-
-def test_an_edge_of_light_across_the_dot_hardly_moves_it():
-    place = (50.2, 49.7)
-    shadow = 0.3 + 0.7 / (1 + np.exp(-(np.arange(100.0) - 53.3) / 0.6))
-    fit = fitted(drawn(dot_frame(*place)) * shadow, dot_frame(50.0, 50.0))
-    assert centre(fit) == pytest.approx(place, abs=0.05)
+    assert fit.covariance[0, 0, 0] > 1.5 * fitted(DISC, START).covariance[0, 0, 0]
 
 
 def test_where_there_is_no_edge_nothing_is_in_place():
-    image = np.full((100, 100), 90.0)
-    fit = fitted(image, dot_frame(50.0, 50.0))
+    fit = fitted(np.full((100, 100), 90.0), START)
     assert fit.share[0] == 0
     assert np.isfinite(fit.frames).all()
 
@@ -136,13 +125,7 @@ def test_where_there_is_no_edge_nothing_is_in_place():
 def test_dots_do_not_depend_on_each_other():
     image = drawn(dot_frame(30.2, 40.1)) + drawn(dot_frame(70.4, 60.3)) - BRIGHT
     starts = [dot_frame(30.0, 40.0), dot_frame(70.0, 60.0)]
-    together = fit_circles(
-        image.astype(np.float32),
-        np.concatenate(starts),
-        dot_circles([1, 1], 48),
-        reach=0.45,
-        projective=False,
-    )
+    together = fitted(image, np.concatenate(starts))
     for index, start in enumerate(starts):
         alone = fitted(image, start)
         # BLAS may round batches of another size otherwise.
@@ -163,14 +146,7 @@ def test_the_covariance_is_that_of_the_errors(deviation, least):
     image = generator.normal(0, deviation, (400, 400))
     for (x, y), place in zip(corners, places, strict=True):
         image[y : y + 40, x : x + 40] += drawn(dot_frame(*place), side=40)
-    starts = frame.affine_frames(*(corners.T + 20), 12.0, 12.0, 0.0)
-    fit = fit_circles(
-        image.astype(np.float32),
-        starts,
-        dot_circles(np.ones(100, int), 48),
-        reach=0.45,
-        projective=False,
-    )
+    fit = fitted(image, frame.affine_frames(*(corners.T + 20), 12.0, 12.0, 0.0))
     errors = fit.frames[:, :2, 2] - corners - places
     squares = np.einsum('ki,kij,kj->k', errors, np.linalg.inv(fit.covariance), errors)
     assert least < np.mean(squares) < 2.6

@@ -8,24 +8,10 @@ import pytest
 
 from ahf_ros.features import ellipses, frame
 from ahf_ros.features.candidates import Candidates
+from ahf_ros.features.dots import Dots
 from ahf_ros.features.ellipses import fit_ellipses, refine_ellipses
 from ahf_ros.features.pyramid import image_pyramid, log_image
-
-SHAPE = (200, 240)
-
-
-def drawn(
-    ellipses: list[tuple[float, float, float, float, float]], paper: int = 210, ink: int = 30
-) -> np.ndarray:
-    """Return ellipses (x, y, semi-axes, angle) on paper, blurred as by a lens."""
-    rows, columns = (np.mgrid[: 4 * SHAPE[0], : 4 * SHAPE[1]] + 0.5) / 4 - 0.5
-    image = np.full(rows.shape, paper, np.float32)
-    for x, y, major, minor, angle in ellipses:
-        along = (columns - x) * np.cos(angle) + (rows - y) * np.sin(angle)
-        across = (rows - y) * np.cos(angle) - (columns - x) * np.sin(angle)
-        image[(along / major) ** 2 + (across / minor) ** 2 < 1] = ink
-    small = cv2.resize(image, SHAPE[::-1], interpolation=cv2.INTER_AREA)
-    return np.rint(cv2.GaussianBlur(small, (0, 0), 0.7)).astype(np.uint8)
+from support.drawn_dots import drawn
 
 
 def half_in_shadow(gray: np.ndarray, x: float, y: float, angle: float) -> np.ndarray:
@@ -35,8 +21,9 @@ def half_in_shadow(gray: np.ndarray, x: float, y: float, angle: float) -> np.nda
     return np.rint(gray * np.clip(0.65 + side / 2, 0.3, 1)).astype(np.uint8)
 
 
-def frames_of(*ellipses: tuple[float, float, float, float, float]) -> np.ndarray:
-    return frame.affine_frames(*np.array(ellipses).T)
+def refined(log: np.ndarray, ellipses: list[tuple[float, ...]], polarity: list[int]) -> Dots:
+    starts = frame.affine_frames(*np.array(ellipses).reshape(-1, 5).T)
+    return refine_ellipses(log, Dots(starts, np.array(polarity, int), np.zeros(len(polarity))))
 
 
 ELLIPSES = [
@@ -52,8 +39,8 @@ def test_a_start_that_is_near_comes_onto_the_edge(ellipse, polarity):
     colours = (210, 30) if polarity == 1 else (30, 210)
     log = log_image(drawn([ellipse], *colours))
     x, y, major, minor, angle = ellipse
-    start = frames_of((x + 0.1 * minor, y - 0.1 * minor, 1.1 * major, 1.08 * minor, angle))
-    dots, _ = refine_ellipses(log, start, np.array([polarity]))
+    start = (x + 0.1 * minor, y - 0.1 * minor, 1.1 * major, 1.08 * minor, angle)
+    dots = refined(log, [start], [polarity])
     assert dots.polarity.tolist() == [polarity]
     assert dots.share[0] > 0.9
     assert dots.frames[0, :2, 2] == pytest.approx((x, y), abs=0.2)
@@ -70,30 +57,29 @@ def test_the_size_of_a_dot_does_not_depend_on_its_blur(blur, polarity):
     ellipse = (100.3, 90.6, 18.0, 15.0, 0.7)
     gray = drawn([ellipse], *((210, 30) if polarity == 1 else (30, 210)))
     log = log_image(cv2.GaussianBlur(gray, (0, 0), blur))
-    dots, _ = refine_ellipses(log, frames_of(ellipse), np.array([polarity]))
+    dots = refined(log, [ellipse], [polarity])
     assert frame.mean_radii(dots.frames)[0] == pytest.approx((18 * 15) ** 0.5, abs=0.25)
 
 
 @pytest.mark.parametrize('angle', [0.0, 0.8, 2.0])
 def test_an_edge_of_light_across_the_dot_moves_it_little(angle):
     gray = half_in_shadow(drawn([(100.3, 90.6, 16.0, 14.0, 0.3)]), 104, 92, angle)
-    start = frames_of((101.0, 90.0, 15.0, 15.0, 0.0))
-    dots, _ = refine_ellipses(log_image(gray), start, np.array([1]))
+    dots = refined(log_image(gray), [(101.0, 90.0, 15.0, 15.0, 0.0)], [1])
     assert dots.share[0] > 0.7
     assert dots.frames[0, :2, 2] == pytest.approx((100.3, 90.6), abs=0.4)
 
 
 def test_what_the_edges_do_not_bear_out_is_left_out():
     log = log_image(drawn([(60, 60, 12, 12, 0)]))
-    start = frames_of((60, 60, 12, 12, 0), (160, 120, 12, 12, 0), (60, 60, 12, 12, 0))
-    dots, _ = refine_ellipses(log, start, np.array([1, 1, -1]))
+    start = [(60, 60, 12, 12, 0), (160, 120, 12, 12, 0), (60, 60, 12, 12, 0)]
+    dots = refined(log, start, [1, 1, -1])
     assert len(dots.frames) == len(dots.polarity) == len(dots.share) == 1
     assert dots.frames[0, :2, 2] == pytest.approx((60, 60), abs=0.1)
 
 
 def test_nothing_in_nothing_out():
     log = log_image(drawn([(60, 60, 12, 12, 0)]))
-    dots, _ = refine_ellipses(log, np.zeros((0, 3, 3)), np.zeros(0, int))
+    dots = refined(log, [], [])
     assert (dots.frames.shape, dots.polarity.shape, dots.share.shape) == ((0, 3, 3), (0,), (0,))
 
 

@@ -37,9 +37,8 @@ def test_points_without_weight_do_not_count() -> None:
     weights = np.full((5, 6), 1e6)
     weights[:, 3] = 0.0
     fit = fit_homographies(POINTS, images, weights, 20.0)
-    assert (
-        np.abs(project(fit.homographies, POINTS)[:, 3] - project(true, POINTS)[:, 3]).max() < 0.1
-    )
+    away = project(fit.homographies, POINTS) - project(true, POINTS)
+    assert np.abs(away[:, 3]).max() < 0.1
 
 
 def test_three_points_give_a_map_without_perspective() -> None:
@@ -49,9 +48,8 @@ def test_three_points_give_a_map_without_perspective() -> None:
     weights[:, [0, 1, 3]] = 1.0
     fit = fit_homographies(POINTS, images, weights, 20.0)
     assert np.abs(fit.homographies[:, 2, :2]).max() < 1e-4
-    assert (
-        np.abs(project(fit.homographies, POINTS)[:, [0, 1, 3]] - images[:, [0, 1, 3]]).max() < 1e-3
-    )
+    away = project(fit.homographies, POINTS) - images
+    assert np.abs(away[:, [0, 1, 3]]).max() < 1e-3
 
 
 def test_covariances_are_those_of_the_errors() -> None:

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import erf
 
 import numpy as np
 import pytest
 
 from ahf_ros.features import frame
-from ahf_ros.features.circles import Circles, dot_circles
-from ahf_ros.features.profiles import Edges, edge_points, measure_edges
+from ahf_ros.features.circles import Circles, dot_circles, edge_points
+from ahf_ros.features.profiles import Edges, measure_outlines
 
 WIDE = 1000.0
 """Radius of a circle that is straight as far as a profile sees, px."""
 
 MIDDLE = (30.0, 20.0)
-OBLIQUE = np.array([[[20.0, 3.0, 100.5], [-2.0, 12.0, 80.25], [0.02, -0.01, 1.0]]])
-ANGLES = np.linspace(0, 2 * np.pi, 24, endpoint=False)
 DARK, BRIGHT = 40.0, 160.0  # as dark and bright as profiles take for usual
 
 
@@ -33,7 +30,8 @@ def measured(image: np.ndarray, blur: float, polarity: int = 1) -> Edges:
     """Measure the one point of a wide circle that is vertical at MIDDLE."""
     frames = frame.affine_frames([MIDDLE[0] - WIDE], [MIDDLE[1]], [WIDE], [WIDE], [0.0])
     point = Circles(np.zeros(1), np.ones(1), np.zeros(1, int), np.full((1, 1), polarity))
-    return measure_edges(image, frames, point, np.array([blur]), reach=2.5 / WIDE)
+    outline = edge_points(frames, point)
+    return measure_outlines(image, outline, np.array([blur]), reach=2.5 / WIDE)
 
 
 @pytest.mark.parametrize('blur', [0.6, 0.8, 1.2])
@@ -94,49 +92,16 @@ def test_the_curve_of_a_small_circle_is_taken_into_account():
     # Samples at the centres of pixels, between the two finer ones beside them.
     image = sum(image[i::scale, j::scale] for i in (3, 4) for j in (3, 4)) / 4
     frames = frame.affine_frames([30.3], [20.4], [radius], [radius], [0.0])
-    edges = measure_edges(
-        image.astype(np.float32), frames, dot_circles([1], 48), np.array([0.9]), reach=0.45
-    )
+    outline = edge_points(frames, dot_circles([1], 48))
+    edges = measure_outlines(image.astype(np.float32), outline, np.array([0.9]), reach=0.45)
     assert edges.offset.mean() == pytest.approx(0, abs=0.01)
     assert np.abs(edges.offset).max() < 0.05
 
 
 def test_profiles_beyond_the_image_are_not_visible():
     frames = frame.affine_frames([2.0], [20.0], [8.0], [8.0], [0.0])
-    edges = measure_edges(
-        step_image(0, 0.8), frames, dot_circles([1], 16), np.array([0.8]), reach=0.45
-    )
     geometry = edge_points(frames, dot_circles([1], 16))
+    edges = measure_outlines(step_image(0, 0.8), geometry, np.array([0.8]), reach=0.45)
     assert not edges.visible[geometry.points[..., 0] < 0].any()
     assert edges.visible[geometry.points[..., 0] > 4].all()
     assert not edges.offset[~edges.visible].any()
-
-
-def test_geometry_of_a_circle():
-    frames = frame.affine_frames([50], [40], [8], [8], [0])
-    circles = replace(dot_circles([1], 24), radii=np.full(24, 2.5))
-    geometry = edge_points(frames, circles)
-    normals = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
-    assert geometry.normals[0] == pytest.approx(normals)
-    assert geometry.points[0] == pytest.approx(np.array([50, 40]) + 20 * normals)
-    assert geometry.scale[0] == pytest.approx(np.full(24, 8.0))
-    assert geometry.spacing[0] == pytest.approx(np.full(24, 2 * np.pi / 24 * 20))
-    assert geometry.curvature[0] == pytest.approx(np.full(24, 1 / 20))
-
-
-def test_geometry_of_an_oblique_circle_is_that_of_its_points():
-    step = 1e-4
-    before, at, after = (
-        frame.project(OBLIQUE, frame.circle_points(ANGLES + shift, np.ones(1)))[0, :, 0]
-        for shift in (-step, 0, step)
-    )
-    along, bend = (after - before) / (2 * step), (after - 2 * at + before) / step**2
-    speed = np.hypot(*along.T)
-    geometry = edge_points(OBLIQUE, dot_circles([1], 24))
-    assert geometry.points[0] == pytest.approx(at)
-    assert geometry.spacing[0] == pytest.approx(2 * np.pi / 24 * speed, rel=1e-5)
-    curvature = (along[:, 0] * bend[:, 1] - along[:, 1] * bend[:, 0]) / speed**3
-    assert geometry.curvature[0] == pytest.approx(curvature, rel=1e-3)
-    wider = frame.project(OBLIQUE, frame.circle_points(ANGLES, np.array([1 + step])))[0, :, 0]
-    outwards = ((wider - at) * geometry.normals[0]).sum(axis=1) / step
-    assert geometry.scale[0] == pytest.approx(outwards, rel=1e-2)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 import pytest
 
@@ -10,29 +9,14 @@ from ahf_ros.features.frame import ellipse_axes
 from ahf_ros.features.log_edges import LOG_SCALE
 from ahf_ros.features.pyramid import log_image
 from ahf_ros.features.small_dots import small_dots
-
-
-def drawn(dots: list[tuple[float, float, float, float, float]], polarity: int) -> np.ndarray:
-    """Return an image of ellipses, drawn eight times as large."""
-    ink = np.zeros((960, 1280), np.float32)
-    for x, y, major, minor, angle in dots:
-        centre = (round((x + 0.5) * 8 - 0.5), round((y + 0.5) * 8 - 0.5))
-        axes = (round(8 * major), round(8 * minor))
-        cv2.ellipse(ink, centre, axes, angle, 0, 360, 1.0, -1)
-    ink = cv2.resize(ink, (160, 120), interpolation=cv2.INTER_AREA)
-    ink = cv2.GaussianBlur(ink, (0, 0), 0.7)
-    ground, dot = (200.0, 50.0) if polarity > 0 else (40.0, 200.0)
-    return (ground + (dot - ground) * ink).astype(np.uint8)
+from support.drawn_dots import drawn
 
 
 @pytest.mark.parametrize('polarity', [1, -1])
 def test_round_and_flat_dots_are_found_with_their_ellipses(polarity: int) -> None:
-    dots = [
-        (30.0, 30.0, 2.5, 2.5, 0.0),
-        (80.3, 40.6, 5.0, 1.2, 30.0),
-        (120.0, 90.0, 6.0, 3.0, 90.0),
-    ]
-    log = log_image(drawn(dots, polarity))
+    dots = [(30, 30, 2.5, 2.5, 0.0), (80.3, 40.6, 5.0, 1.2, 0.5), (120, 90, 6.0, 3.0, 1.6)]
+    colours = (200, 50) if polarity == 1 else (40, 200)
+    log = log_image(drawn(dots, *colours, shape=(120, 160)))
     found = small_dots(log, 1.5, 8.0, (polarity,), LOG_SCALE)
     assert found.polarity.tolist() == [polarity] * 3
     order = np.argsort(found.frames[:, 0, 2])

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ahf_ros.drawing.colours import DECODED_COLOUR, MISSED_COLOUR, WRONG_COLOUR
+from ahf_ros.drawing.overlay import DECODED_COLOUR, MISSED_COLOUR, WRONG_COLOUR
 from ahf_ros.interchange.image_files import read_image
 from ahf_ros.target import FilterState, Identification, Target
 from support.live import PATIENCE, errors_of, ros_environment

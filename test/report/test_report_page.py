@@ -7,14 +7,15 @@ import os
 import re
 import sys
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from ahf_ros.cli import main
 from ahf_ros.target import SquareMarker
 from support.browser import opened
+from support.command_line import status
 from support.results import record, save_image, save_lines, searched, target, undecoded
 
 pytest.importorskip('jinja2', reason='pages are written with jinja2')
@@ -23,8 +24,7 @@ HOSTILE = '</script><script>document.title="taken"<!--.png'
 MANY = 40
 
 
-def report(*arguments: object) -> int:
-    return main(['report', *map(str, arguments)])
+report = partial(status, 'report')
 
 
 @pytest.fixture(scope='module')
@@ -59,9 +59,8 @@ def page(folder: Path) -> Path:
 
 
 @pytest.fixture(scope='module')
-def browser(page: Path) -> Iterator[Any]:
+def browser() -> Iterator[Any]:
     with opened() as browser:
-        browser.get(page.as_uri())
         yield browser
 
 
@@ -97,7 +96,8 @@ class Reader:
         return [float(it) for it in self.one('#viewer svg').get_dom_attribute('viewBox').split()]
 
 
-def test_people_find_and_look_at_images(browser: Any, folder: Path) -> None:
+def test_people_find_and_look_at_images(browser: Any, page: Path, folder: Path) -> None:
+    browser.get(page.as_uri())
     use = Reader(browser)
     assert browser.title == use.text('h1') == folder.name
     assert use.text('#count') == '44 of 44 images'
@@ -182,17 +182,16 @@ def test_people_find_and_look_at_images(browser: Any, folder: Path) -> None:
     assert [it for it in browser.get_log('browser') if it['level'] in ('SEVERE', 'WARNING')] == []
 
 
-def test_squares_are_drawn_as_squares(tmp_path: Path) -> None:
+def test_squares_are_drawn_as_squares(browser: Any, tmp_path: Path) -> None:
     corners = ((10.0, 10.0), (30.0, 10.0), (30.0, 30.0), (10.0, 30.0))
     square = SquareMarker(5, 5, 20.0, 20.0, 10.0, 10.0, family='aruco_4x4_50', corners=corners)
     image = save_image(tmp_path / 'a.png')
     save_lines(tmp_path / 'results.jsonl', record(image, square))
     assert report(tmp_path / 'results.jsonl', '-o', tmp_path / 'a.html') == 0
-    with opened() as browser:
-        browser.get((tmp_path / 'a.html').as_uri())
-        drawn = browser.find_elements('css selector', '.mark polygon.line')
-        assert [it.get_attribute('points') for it in drawn] == ['10,10 30,10 30,30 10,30']
-        assert browser.find_elements('css selector', '.mark ellipse') == []
+    browser.get((tmp_path / 'a.html').as_uri())
+    drawn = browser.find_elements('css selector', '.mark polygon.line')
+    assert [it.get_attribute('points') for it in drawn] == ['10,10 30,10 30,30 10,30']
+    assert browser.find_elements('css selector', '.mark ellipse') == []
 
 
 def test_every_control_has_a_name(page: Path) -> None:

@@ -73,19 +73,19 @@ def test_images_are_found_where_they_are_now(tmp_path: Path) -> None:
 def test_what_is_shown_is_what_was_identified(tmp_path: Path) -> None:
     path = save_image(tmp_path / 'a.png')
     image = read_image(path)
-    found = shown_image(result(record(path, target(1))))
-    assert found.filtered is None
-    assert (found.original == image).all()
-    found = shown_image(result(record(path, target(1), **searched())))
-    assert found.filtered is not None
-    assert (found.original == image).all()
-    assert not (found.filtered == image).all()
+    original, filtered = shown_image(result(record(path, target(1))))
+    assert filtered is None
+    assert (original == image).all()
+    original, filtered = shown_image(result(record(path, target(1), **searched())))
+    assert filtered is not None
+    assert (original == image).all()
+    assert not (filtered == image).all()
     other = tmp_path / 'b.png'
     write_image(other, image[::-1])
     stack = {'images': [str(path), str(other)], 'combination': 'mean_gray'}
     content = record(path, target(1)) | stack
     combined = ImageStack((image, image[::-1])).combined('mean_gray')
-    assert (shown_image(result(content)).original == stretched_to_8_bit(combined)).all()
+    assert (shown_image(result(content))[0] == stretched_to_8_bit(combined)).all()
 
 
 def test_pictures_take_no_more_bytes_than_they_may(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -20,7 +20,7 @@ from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.dots.reading import Readings, dot_points, read_rings
 from ahf_ros.features.array_record import ArrayRecord
-from ahf_ros.features.circle_fit import Fit
+from ahf_ros.features.circle_fit import Fit, fit_circles_of_any_blur
 from ahf_ros.features.circles import Circles
 from ahf_ros.features.dots import Dots
 from ahf_ros.features.ellipse_targets import ellipse_fields
@@ -28,7 +28,6 @@ from ahf_ros.features.frame import ellipse_axes, mean_radii
 from ahf_ros.features.homography import local_frames
 from ahf_ros.features.logistic import logistic, read_weights
 from ahf_ros.features.pyramid import ImagePyramid
-from ahf_ros.features.soft_edges import fit_circles_of_any_blur
 from ahf_ros.target import UNDECODED, DottedTarget
 
 _RAYS = 40  # round each circle

@@ -10,14 +10,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ahf_ros.features.circle_fit import ENOUGH
+from ahf_ros.features.circle_fit import ENOUGH, fit_circles_of_any_blur
 from ahf_ros.features.circles import dot_circles
 from ahf_ros.features.dots import Dots
 from ahf_ros.features.frame import ellipse_axes, mean_radii, project
 from ahf_ros.features.homography import fit_homographies, local_frames
 from ahf_ros.features.robust import median
 from ahf_ros.features.sampling import sample_circles
-from ahf_ros.features.soft_edges import fit_circles_of_any_blur
 from ahf_ros.imaging.black import black_lift
 
 _RAYS = 32  # about a dot

@@ -19,7 +19,7 @@ import numpy as np
 
 from ahf_ros.detectors.ring.polar import CORRELATION, LIGHT_EDGE, PolarImages
 from ahf_ros.features.array_record import ArrayRecord
-from ahf_ros.features.soft_edges import SOFT
+from ahf_ros.features.circle_fit import SOFT
 from ahf_ros.imaging.image import SATURATED
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 

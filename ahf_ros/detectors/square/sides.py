@@ -16,10 +16,14 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from ahf_ros.features.edge_covariance import common_errors
-from ahf_ros.features.edge_weights import weigh_edges
+from ahf_ros.features.edge_errors import (
+    common_errors,
+    common_slope,
+    smooth_slopes,
+    unevenness,
+    weigh_edges,
+)
 from ahf_ros.features.frame import project
-from ahf_ros.features.light_slope import common_slope, smooth_slopes, unevenness
 from ahf_ros.features.profiles import (
     BLURS,
     CORRELATION,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ahf_ros.features.edge_covariance import common_errors, edge_covariance
+from ahf_ros.features.edge_errors import common_errors, edge_covariance
 
 EDGES = 200
 

@@ -1,11 +1,12 @@
-"""Pairs of points that are near to each other."""
+"""Dots: pairs that are near to each other, and those that are the same."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from ahf_ros.features.neighbours import pairs_within
+from ahf_ros.features import frame
+from ahf_ros.features.dots import Dots, distinct, pairs_within
 
 
 @pytest.mark.parametrize('part', [7, 100_000])
@@ -36,3 +37,11 @@ def test_points_that_ask_for_none_are_neighbours_of_others() -> None:
     first, second = (np.concatenate(column) for column in zip(*parts, strict=True))
     assert first.tolist() == [1, 1]
     assert sorted(second.tolist()) == [0, 2]
+
+
+def test_of_the_same_dot_found_twice_the_one_with_more_of_its_edge_is_kept():
+    frames = frame.affine_frames([50.0, 51.0, 50.0, 80.0], [50.0] * 4, [10, 10, 20, 10], 10.0, 0.0)
+    dots = distinct(Dots(frames, np.array([1, 1, 1, 1]), np.array([0.6, 0.9, 0.5, 0.7])))
+    assert dots.share.tolist() == [0.9, 0.7, 0.5]  # another size is another dot
+    either = distinct(Dots(frames[:2], np.array([1, -1]), np.array([0.6, 0.9])))
+    assert either.polarity.tolist() == [-1, 1]

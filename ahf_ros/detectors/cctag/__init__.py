@@ -1,1 +1,0 @@
-"""Concentric circles (CCTag)."""

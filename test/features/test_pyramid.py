@@ -1,0 +1,88 @@
+"""Pyramids: their halves, logarithms and edges, and the octaves of radii in them."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from ahf_ros.features.log_edges import LOG_SCALE, find_edges
+from ahf_ros.features.pyramid import halved, image_pyramid, log_image, octaves
+from ahf_ros.imaging.logarithm import LOG_OFFSET
+
+IMAGE = np.random.default_rng(0).integers(0, 256, (300, 1700)).astype(np.uint8)
+
+
+def bounds(low: float, high: float) -> list[tuple[float, float]]:
+    """Return the radii of the octaves, px of the image."""
+    pyramid = image_pyramid(IMAGE, high)
+    return [
+        (it.radii[0] * 2**it.level, it.radii[1] * 2**it.level)
+        for it in octaves(pyramid, low, high)
+    ]
+
+
+def test_every_radius_up_to_half_of_the_image_is_in_an_octave():
+    every = bounds(4.0, 1e4)
+    assert every[0][0] == 4
+    assert every[-1][1] >= IMAGE.shape[1] / 2
+    for (_, end), (start, _) in pairwise(every):
+        assert 0.9 * end < start < end
+
+
+def test_no_dot_of_an_octave_is_larger_than_those_of_the_first():
+    for octave in octaves(image_pyramid(IMAGE, 1e4), 4.0, 1e4):
+        height, width = (side // 2**octave.level for side in IMAGE.shape)
+        assert octave.pyramid.gray.shape == octave.pyramid.logs[0].shape == (height, width)
+        assert octave.radii[1] < 93
+        mean = octave.pyramid.gray.mean()
+        assert mean == pytest.approx(IMAGE.mean(), abs=1.0)
+
+
+@pytest.mark.parametrize(
+    ('low', 'high', 'count'), [(4.0, 60.0, 1), (4.0, 100.0, 2), (150.0, 160.0, 1), (9.0, 8.0, 0)]
+)
+def test_bounds_are_obeyed(low, high, count):
+    every = bounds(low, high)
+    assert len(every) == count
+    assert all(low <= start <= end <= high for start, end in every)
+
+
+def test_the_logarithm_of_bytes_and_of_numbers_is_the_same():
+    gray = np.arange(256, dtype=np.uint8).reshape(16, 16)
+    log = log_image(gray)
+    assert log.dtype == np.int16
+    assert log[0, 0] == int(LOG_SCALE * np.log(LOG_OFFSET))
+    assert np.abs(log_image(gray.astype(np.float32)) - log).max() <= 1
+
+
+def test_a_step_is_as_high_in_the_shadow_as_in_the_light():
+    dark, bright = np.float32([[20, 60]]), np.float32([[100, 220]])
+    offset = np.float32(LOG_OFFSET)
+    shadow = (np.concatenate([dark, bright]) + offset) * np.float32(0.4) - offset
+    light = log_image(np.concatenate([dark, bright]))
+    assert np.abs(np.diff(light, axis=0) - np.diff(log_image(shadow), axis=0)).max() < 3
+
+
+@pytest.mark.parametrize('shape', [(64, 48), (65, 49), (16, 17)])
+def test_a_pixel_of_the_pyramid_is_the_mean_of_four(shape):
+    image = np.random.default_rng(0).integers(0, 256, shape).astype(np.uint8)
+    first, second, third, _ = halved(image, 3)
+    height, width = shape[0] // 2, shape[1] // 2
+    assert first is image
+    assert second.shape == (height, width)
+    assert third.shape == (height // 2, width // 2)
+    even = image[: 2 * height, : 2 * width].astype(float)
+    means = even.reshape(height, 2, width, 2).mean(axis=(1, 3))
+    assert np.abs(second - means).max() <= 0.5
+
+
+def test_edges_lie_on_steps_and_point_to_the_bright_side():
+    gray = np.full((60, 80), 40, np.uint8)
+    gray[:, 41:] = 160
+    edges = find_edges(log_image(gray))
+    assert len(edges.x) >= 50
+    assert set(edges.x) <= {40, 41}
+    assert edges.unit_x == pytest.approx(1, abs=1e-6)
+    assert edges.unit_y == pytest.approx(0, abs=1e-6)
