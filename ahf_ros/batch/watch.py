@@ -10,9 +10,8 @@ from pathlib import Path
 
 from ahf_ros import ending
 from ahf_ros.batch.engine import Engine
-from ahf_ros.batch.results import Results, file_fingerprint
-from ahf_ros.batch.run import outcome_of
-from ahf_ros.batch.task import ImageOutcome, ImageTask, Message
+from ahf_ros.batch.identification import ImageOutcome, ImageTask, Message, file_fingerprint
+from ahf_ros.batch.results import Results, outcome_of
 
 _BUSY = 0.2  # s after which waiting is interrupted
 _EMPTY = '0 '  # how the fingerprint of an empty file begins
@@ -30,22 +29,10 @@ class _Seen:
 class Arrivals:
     """The files of a folder, as they arrive: each is taken once it has stopped changing.
 
-    Parameters
-    ----------
-    folder : Path
-    suffixes : collection of str
-        Endings of the files, in small letters. Files whose name begins with a dot are left out.
-    recursive : bool
-        Whether files of folders in the folder are looked at, too.
-    settling : float
-        Time for which a file has to be unchanged, s.
-    clock : callable, optional
-        Time in s.
-
-    Attributes
-    ----------
-    away : str
-        Why the folder cannot be read; empty if it can.
+    Files count that end in one of `suffixes`, in small or capital letters, and do not begin with a
+    dot; those of folders in the folder only if `recursive`. They have to be unchanged for
+    `settling` seconds of `clock`. `away` says why the folder cannot be read; it is empty if it
+    can.
 
     Examples
     --------
@@ -127,24 +114,9 @@ def watch(
 ) -> Iterator[ImageOutcome]:
     """Yield the outcome of each image that arrives, once its result is written, without an end.
 
-    Parameters
-    ----------
-    engine : Engine
-        Its job is `ahf_ros.batch.identification.identify_images`.
-    arrivals : Arrivals
-    results : Results
-        What it has already is not done again.
-    task_of : callable
-        From the path of an image to its task.
-    interval : float
-        Time between two looks at the folder, s.
-    say : callable
-        Called with what there is to say about the folder.
-
-    Raises
-    ------
-    Unwritable
-        If the results cannot be written.
+    The job of the engine is `ahf_ros.batch.identification.identify_images`. What `results` have
+    already is not done again. `task_of` is called with the path of an image, `say` with what there
+    is to say about the folder, which is looked at every `interval` seconds.
     """
     running: dict[int, ImageTask] = {}
     waiting: list[ImageTask] = []

@@ -14,10 +14,19 @@ from rich.console import Console
 from rich.progress import Progress
 
 from ahf_ros.batch.engine import Engine, EngineLost, available_cores
-from ahf_ros.batch.identification import detector_of, identify_images
-from ahf_ros.batch.results import Results, Unwritable
-from ahf_ros.batch.run import kept_outcomes_in_order, outcomes_in_order
-from ahf_ros.batch.task import ImageOutcome, ImageTask, with_machine
+from ahf_ros.batch.identification import (
+    ImageOutcome,
+    ImageTask,
+    detector_of,
+    identify_images,
+    with_machine,
+)
+from ahf_ros.batch.results import (
+    Results,
+    Unwritable,
+    kept_outcomes_in_order,
+    outcomes_in_order,
+)
 from ahf_ros.cli.engines import create_engine, shared_settings
 from ahf_ros.cli.export import control_from, write_exports
 from ahf_ros.cli.export_options import check_control

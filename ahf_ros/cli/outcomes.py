@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TextIO
 
-from ahf_ros.batch.task import ImageOutcome, Level
+from ahf_ros.batch.identification import ImageOutcome, Level
 
 
 def print_outcome(command: str, outcome: ImageOutcome, output: TextIO | None, quiet: bool) -> None:

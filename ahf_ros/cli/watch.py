@@ -9,9 +9,13 @@ from pathlib import Path
 from typing import TextIO
 
 from ahf_ros.batch.engine import EngineLost, available_cores
-from ahf_ros.batch.identification import detector_of, identify_images
+from ahf_ros.batch.identification import (
+    ImageTask,
+    detector_of,
+    identify_images,
+    with_machine,
+)
 from ahf_ros.batch.results import Results, Unwritable
-from ahf_ros.batch.task import ImageTask, with_machine
 from ahf_ros.batch.watch import Arrivals, watch
 from ahf_ros.cli.engines import create_engine, shared_settings
 from ahf_ros.cli.identify_options import add_output_options, add_processing_options

@@ -12,9 +12,14 @@ import numpy as np
 import pytest
 
 from ahf_ros.batch.engine import Report, SerialEngine
-from ahf_ros.batch.results import PREVIOUS, Results, Unwritable, file_fingerprint
-from ahf_ros.batch.run import kept_outcomes_in_order
-from ahf_ros.batch.task import ImageOutcome, ImageTask, Level, Message
+from ahf_ros.batch.identification import (
+    ImageOutcome,
+    ImageTask,
+    Level,
+    Message,
+    file_fingerprint,
+)
+from ahf_ros.batch.results import PREVIOUS, Results, Unwritable, kept_outcomes_in_order
 from ahf_ros.cli import main
 from ahf_ros.interchange.files import RESULTS_FILE
 from ahf_ros.interchange.image_files import write_image
