@@ -169,12 +169,12 @@ class Stream(Generic[Item]):
         timed: bool = True,
         interrupt: Callable[[], None] | None = None,
     ) -> None:
-        self._identifier = create_identifier(
-            detector=detector, settings=settings, interrupt=interrupt
-        )
         self._stacking = stacking
         self._timed = timed
         self._window: Window[Frame[Item]] = Window(stacking)
+        self._identifier = create_identifier(
+            detector=detector, settings=settings, interrupt=interrupt
+        )
 
     @property
     def memory(self) -> Memory:

@@ -53,31 +53,15 @@ _MAXIMUM_LINES = 100  # about what is missing; more are only counted
 
 @dataclass(frozen=True, slots=True)
 class Metadata:
-    """What metadata.yaml says.
+    """What metadata.yaml says."""
 
-    Attributes
-    ----------
-    files : tuple of str
-        Names of the files in their order.
-    counts : Counter
-        Number of messages by topic.
-    custom : dict of str to str
-        What somebody has added.
-    """
-
-    files: tuple[str, ...] = ()
-    counts: Counter[str] = field(default_factory=Counter)
-    custom: dict[str, str] = field(default_factory=dict)
+    files: tuple[str, ...] = ()  # their names in their order
+    counts: Counter[str] = field(default_factory=Counter)  # of the messages, by topic
+    custom: dict[str, str] = field(default_factory=dict)  # what somebody has added
 
 
 def read_metadata(folder: Path) -> Metadata:
-    """Return what the metadata of a bag say.
-
-    Raises
-    ------
-    ValueError
-        If there are none, or they are not as ROS 2 writes them.
-    """
+    """Return what the metadata of a bag say; a ValueError unless they are as ROS 2 writes them."""
     try:
         text = (folder / METADATA).read_text(encoding='utf-8')
         about = YAML(typ='safe').load(text)['rosbag2_bagfile_information']
@@ -105,35 +89,20 @@ class _Topic:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _File:
-    """A file of a bag.
-
-    Attributes
-    ----------
-    name : str
-    start : int
-        Time of the first message, ns.
-    count : int
-        Number of messages that it should have.
-    topics : dict of int to _Topic
-        By the number of the connection.
-    messages : callable
-        Yields all messages in their order.
-    """
+    """A file of a bag."""
 
     name: str
-    start: int
-    count: int
-    topics: dict[int, _Topic]
-    messages: Callable[[], Iterator[Message]]
+    start: int  # time of the first message, ns
+    count: int  # of the messages that it should have
+    topics: dict[int, _Topic]  # by the number of the connection
+    messages: Callable[[], Iterator[Message]]  # yields all in their order
 
 
-class Source:
+class Source(ExitStack):
     """A bag of ROS 1 or ROS 2, open for reading.
 
-    Parameters
-    ----------
-    path : Path
-        Folder of a ROS 2 bag, one of its files (.db3, .mcap), or a ROS 1 bag (.bag).
+    It is the folder of a ROS 2 bag, one of its files (.db3, .mcap), or a ROS 1 bag (.bag). If
+    nothing can be read, that raises a ValueError that names the bag.
 
     Attributes
     ----------
@@ -145,14 +114,10 @@ class Source:
         Contents of metadata.yaml.
     stores : TypeStores
         Types of the messages.
-
-    Raises
-    ------
-    ValueError
-        If nothing can be read; the message names the bag.
     """
 
     def __init__(self, path: Path) -> None:
+        super().__init__()
         self.path = path
         self.metadata = Metadata()
         self.connections: list[Connection] = []
@@ -164,22 +129,13 @@ class Source:
         self._damages: dict[str, str] = {}  # by file, as of the last reading
         self._refused: Counter[tuple[str, str]] = Counter()  # by topic and reason
         self._uncounted: list[str] = []
-        self._stack = ExitStack()
         if not path.exists():
             raise ValueError(f'{path} does not exist, accepted is a bag')
         try:
             self._open()
         except BaseException:
-            self._stack.close()
+            self.close()
             raise
-
-    def __enter__(self) -> Source:
-        """Return itself."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Close the bag."""
-        self._stack.close()
 
     @property
     def lost(self) -> list[str]:
@@ -204,10 +160,7 @@ class Source:
     def image_topics(self, names: Collection[str]) -> list[str]:
         """Return the given image topics, or all image topics if none are given.
 
-        Raises
-        ------
-        ValueError
-            If a topic is not in the bag or has no images; the message names both.
+        A topic that is not in the bag or has no images is named by a ValueError.
         """
         kinds = {item.topic: item.msgtype for item in self.connections}
         accepted = [topic for topic, kind in kinds.items() if kind in (IMAGE, COMPRESSED_IMAGE)]
@@ -267,7 +220,7 @@ class Source:
                 }
             except ValueError as error:
                 self._unopened.append(str(error))
-        scratch = Path(self._stack.enter_context(TemporaryDirectory(prefix='ahf_')))
+        scratch = Path(self.enter_context(TemporaryDirectory(prefix='ahf_')))
         for path in paths:
             try:
                 self._files.append(self._opened(path, scratch))
@@ -304,14 +257,14 @@ class Source:
             self._unopened.append(f'{wal.name} was not merged into {path.name}')
         reader: Any = (rosbag1 if path.suffix == '.bag' else rosbag2).Reader(path)
         try:
-            self._stack.enter_context(reader)
+            self.enter_context(reader)
         except Exception:
             # Such as damages, and channels that are not of ROS.
             if path.suffix == '.mcap':
                 return self._unindexed(path, scratch)
             if path.suffix != '.db3':
                 raise
-            reader = self._stack.enter_context(rosbag2.Reader(self._recovered(path, scratch)))
+            reader = self.enter_context(rosbag2.Reader(self._recovered(path, scratch)))
         return _File(
             name=path.name,
             start=reader.start_time,

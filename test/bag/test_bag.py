@@ -17,7 +17,7 @@ pytest.importorskip('rosbags', reason='rosbags is not installed')
 
 from rosbags import rosbag2
 
-from ahf_ros.bag import assembly, journal, run
+from ahf_ros.bag import output, run
 from ahf_ros.bag.definitions import COMPRESSED_IMAGE, IMAGE, typestore
 from ahf_ros.cli import main
 from support import bags
@@ -31,7 +31,7 @@ UNFINISHED = """
 import sys, time
 from ahf_ros.bag import run
 from ahf_ros.cli import main
-run.assemble = lambda *_: time.sleep(600)
+run.write_bag = lambda *_: time.sleep(600)
 sys.exit(main())
 """
 """The command `ahf`, which answers all images of a bag and then waits to be killed."""
@@ -175,10 +175,10 @@ def test_several_bags_at_once(recording: Path, answered: Path, tmp_path: Path) -
 
 def unfinished(target: Path) -> list[tuple[str, bytes]]:
     """Return what an unfinished run has answered so far."""
-    if not journal.begun_with(target):
+    if not output.begun_with(target):
         return []
-    with closing(journal.Journal(target)) as answered:
-        return [output for _, outputs in answered.outputs() for output in outputs]
+    with closing(output.Journal(target)) as answered:
+        return [it for _, outputs in answered.outputs() for it in outputs]
 
 
 def test_killed_and_finished_the_same(recording: Path, answered: Path, tmp_path: Path) -> None:
@@ -201,7 +201,7 @@ def test_killed_and_finished_the_same(recording: Path, answered: Path, tmp_path:
 
 @pytest.mark.parametrize(
     ('module', 'name'),
-    [(journal, 'begin'), (assembly, '_write'), (Path, 'replace'), (journal, 'remove')],
+    [(run, 'begin'), (output, '_write'), (Path, 'replace'), (run, 'remove_unfinished')],
     ids=['at the beginning', 'copying', 'moving', 'at the end'],
 )
 def test_a_kill_besides_the_answers(

@@ -21,9 +21,8 @@ from rosbags import rosbag1, rosbag2
 from rosbags.interfaces import QosDurability
 from ruamel.yaml import YAML
 
-from ahf_ros.bag.assembly import finished
 from ahf_ros.bag.definitions import IMAGE, LONGEST_DEFINITION, typestore
-from ahf_ros.bag.journal import Journal
+from ahf_ros.bag.output import Journal, finished
 from ahf_ros.bag.source import Source
 from ahf_ros.cli import main
 from support import bags, mcap
