@@ -32,11 +32,10 @@ from ahf_ros.batch.engine import TRIES, EngineLost, Job, Report, TaskFailed, no_
 from ahf_ros.batch.processes import ProcessEngine
 from ahf_ros.text import reason_of
 
-CONNECTION_ERRORS = (OSError, asyncio.TimeoutError, asyncio.CancelledError, RuntimeError)
-"""What calls of a client raise whose scheduler is away."""
+# What calls of a client raise whose scheduler is away.
+_CONNECTION_ERRORS = (OSError, asyncio.TimeoutError, asyncio.CancelledError, RuntimeError)
 
 _CONNECT = 10.0  # s in which a scheduler has to answer
-
 _LOOK = 2.0  # s between two looks at the workers
 _WAIT = 0.1  # s after which waiting is interrupted
 _AT_A_TIME = 2  # tasks for each thread of a worker: one that it works on and one that waits
@@ -47,10 +46,8 @@ _thread = threading.local()  # of a worker
 def connect(address: str) -> Any:
     """Return a client of a scheduler, whose address is such as tcp://host:8786.
 
-    Raises
-    ------
-    ValueError
-        If distributed is not installed, no scheduler answers, or it has another version.
+    It raises a ValueError if distributed is not installed, no scheduler answers, or it has another
+    version.
     """
     try:
         import distributed
@@ -113,7 +110,7 @@ def _installed(versions: dict[str, Any]) -> dict[str, str]:
 
 def _is_news(record: logging.LogRecord) -> bool:
     """Return whether a record is about anything but a connection that is lost or closed."""
-    return not (record.exc_info and isinstance(record.exc_info[1], CONNECTION_ERRORS))
+    return not (record.exc_info and isinstance(record.exc_info[1], _CONNECTION_ERRORS))
 
 
 def perform(content: bytes, topic: str) -> tuple[str, Any]:
@@ -165,23 +162,9 @@ class _Begun:
 class DaskEngine:
     """The engine that processes tasks on the workers of a scheduler.
 
-    Parameters
-    ----------
-    job : callable
-        A function of a module.
-    address : str
-        Of the scheduler, such as tcp://host:8786.
-    report : callable, optional
-        Called with the number of the task before what the job reports.
-    say : callable, optional
-        Called with lines for people: workers that are refused or missing.
-    located : callable, optional
-        From a result and the name of the machine that it comes from to a result that names it.
-
-    Raises
-    ------
-    ValueError
-        If distributed is not installed, or there is no scheduler or one of another version.
+    `report` is called with the number of the task before what the job reports, `say` with lines
+    for people: workers that are refused or missing. `located` makes of a result and the name of
+    the machine that it comes from a result that names it. It raises what `connect` does.
     """
 
     def __init__(
@@ -252,7 +235,7 @@ class DaskEngine:
 
     def close(self) -> None:
         """Let go of what still runs."""
-        with suppress(*CONNECTION_ERRORS):
+        with suppress(*_CONNECTION_ERRORS):
             self._client.close(timeout=_LOOK)
 
     def _check_connected(self) -> None:
@@ -271,7 +254,7 @@ class DaskEngine:
     def _look(self) -> None:
         """Look at the workers, say if there are none, and keep the tasks of those that left."""
         self._looked = time.monotonic()
-        with suppress(*CONNECTION_ERRORS):
+        with suppress(*_CONNECTION_ERRORS):
             threads = self._client.nthreads()
             if not threads.keys() <= self._refused.keys():
                 for worker, reason in refused_workers(self._client).items():
@@ -303,7 +286,7 @@ class DaskEngine:
         else:
             try:
                 machine, outcome = future.result(timeout=_CONNECT)
-            except (*CONNECTION_ERRORS, CancelledError):  # it got lost on its way
+            except (*_CONNECTION_ERRORS, CancelledError):  # it got lost on its way
                 future.add_done_callback(self._events.put)
                 return None
             if isinstance(outcome, Exception):

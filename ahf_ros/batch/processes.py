@@ -33,9 +33,7 @@ from ahf_ros.text import reason_of
 SHUTDOWN_TIMEOUT = 10 * ending.GRACE
 """Time after which a worker is taken to be stuck at its end, s."""
 
-PIPE_CLOSED = (EOFError, OSError)
-"""What the pipe of a process that has ended raises."""
-
+_PIPE_CLOSED = (EOFError, OSError)  # what the pipe of a process that has ended raises
 _PACKAGE = str(Path(__file__).parents[2])
 _BEGIN = (
     'import sys; sys.path.insert(0, sys.argv[1]); '
@@ -62,13 +60,18 @@ def work(descriptor: int) -> None:
     pipe = Connection(descriptor)
 
     def report(*values: Any) -> None:
-        with suppress(*PIPE_CLOSED):  # this process is about to end
+        with suppress(*_PIPE_CLOSED):  # this process is about to end
             pipe.send((Kind.REPORT, values))
 
-    with suppress(*PIPE_CLOSED):
+    with suppress(*_PIPE_CLOSED):
         sys.path[:] = pipe.recv()
         job, threads = pipe.recv()
-        _prepare(threads)
+        if sys.stdout and sys.stderr:  # otherwise other files may have their numbers
+            os.dup2(2, 1)
+        sys.stdout = sys.stderr  # also of what other detectors print
+        import cv2
+
+        cv2.setNumThreads(threads)
         while True:
             task = pipe.recv()
             result: tuple[Kind, Any]
@@ -107,16 +110,6 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
     ending.interrupt(frame)
 
 
-def _prepare(threads: int) -> None:
-    """Send what other detectors print to standard error, and limit threads."""
-    if sys.stdout and sys.stderr:  # otherwise other files may have their numbers
-        os.dup2(2, 1)
-    sys.stdout = sys.stderr
-    import cv2
-
-    cv2.setNumThreads(threads)
-
-
 @dataclass(slots=True, eq=False)
 class _Worker:
     """A process, the pipe to it, and the task that it has; it is idle before the first try."""
@@ -131,20 +124,10 @@ class _Worker:
 class ProcessEngine:
     """The engine that processes tasks in worker processes.
 
-    Workers are started as they are needed. They end with this process, however it ends. What they
-    print goes to standard error.
-
-    Parameters
-    ----------
-    job : callable
-        A function of a module.
-    count : int
-        Maximum number of workers.
-    report : callable, optional
-        Called in this process with the number of the task before what the job reports; it may be
-        replaced between two tasks.
-    threads : int
-        Number of threads that OpenCV uses in each worker.
+    At most `count` workers are started, as they are needed, in each of which OpenCV uses `threads`
+    threads. They end with this process, however it ends. What they print goes to standard error.
+    `report` is called in this process with the number of the task before what the job reports; it
+    may be replaced between two tasks.
     """
 
     def __init__(self, job: Job, count: int, report: Report = no_report, threads: int = 1) -> None:
@@ -170,7 +153,7 @@ class ProcessEngine:
                 number = worker.number
                 try:
                     kind, content = worker.pipe.recv()
-                except PIPE_CLOSED:
+                except _PIPE_CLOSED:
                     self._remove(worker)
                     if worker.tries == TRIES:
                         how = _how_ended(worker.process.returncode)
@@ -201,14 +184,14 @@ class ProcessEngine:
 
     def _hand_over(self, number: int, task: Any, tries: int) -> None:
         for worker in [it for it in self._workers if not it.tries]:
-            with suppress(*PIPE_CLOSED):  # killed while it had nothing to do
+            with suppress(*_PIPE_CLOSED):  # killed while it had nothing to do
                 worker.pipe.send(task)
                 break
             self._remove(worker)
         else:
             worker = _start()
             self._workers.append(worker)
-            with suppress(*PIPE_CLOSED):  # `wait` finds that it has died
+            with suppress(*_PIPE_CLOSED):  # `wait` finds that it has died
                 worker.pipe.send(sys.path)
                 worker.pipe.send((self._job, self._threads))
                 worker.pipe.send(task)

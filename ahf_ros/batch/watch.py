@@ -125,7 +125,13 @@ def watch(
     while True:
         if not running or time.monotonic() - looked >= interval:
             looked = time.monotonic()
-            pending, notes = results.pending(list(map(task_of, _taken(arrivals, say))))
+            before = arrivals.away
+            paths = arrivals.take()
+            if arrivals.away and not before:
+                say(f'the folder cannot be read, waiting for it: {arrivals.away}')
+            if before and not arrivals.away:
+                say('the folder is back')
+            pending, notes = results.pending(list(map(task_of, paths)))
             if notes:
                 texts = (f'{results.path}: {note}' for note in notes)
                 yield ImageOutcome(messages=tuple(map(Message, texts)))
@@ -147,14 +153,3 @@ def watch(
             outcome = outcome_of(task, found[1])
             results.append(task, outcome)
             yield outcome
-
-
-def _taken(arrivals: Arrivals, say: Callable[[str], None]) -> list[str]:
-    """Return what has arrived, and tell of a folder that goes away and comes back."""
-    before = arrivals.away
-    paths = arrivals.take()
-    if arrivals.away and not before:
-        say(f'the folder cannot be read, waiting for it: {arrivals.away}')
-    if before and not arrivals.away:
-        say('the folder is back')
-    return paths
