@@ -25,7 +25,6 @@ import uuid
 from collections.abc import Callable
 from concurrent.futures import CancelledError
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import Any
 
 from ahf_ros.batch.engine import TRIES, EngineLost, Job, Report, TaskFailed, no_report
@@ -150,15 +149,6 @@ def _performer() -> Callable[[bytes, str], Any]:
     return identify
 
 
-@dataclass(frozen=True, slots=True)
-class _Begun:
-    """A task that the scheduler has, for these workers."""
-
-    number: int
-    task: Any
-    workers: frozenset[str]
-
-
 class DaskEngine:
     """The engine that processes tasks on the workers of a scheduler.
 
@@ -182,7 +172,8 @@ class DaskEngine:
         self._located = located
         self._topic = uuid.uuid4().hex
         self._events: queue.SimpleQueue[Any] = queue.SimpleQueue()  # reports and ended futures
-        self._begun: dict[str, _Begun] = {}
+        # Number, task and the workers that may process it, by key.
+        self._begun: dict[str, tuple[int, Any, set[str]]] = {}
         self._waiting: list[tuple[int, Any]] = []
         self._threads: dict[str, int] = {}  # of each worker that may process tasks
         self._refused: dict[str, str] = {}  # why, by worker; empty for those above
@@ -212,7 +203,7 @@ class DaskEngine:
             retries=TRIES - 1,
             workers=list(self._threads),
         )
-        self._begun[future.key] = _Begun(number, task, frozenset(self._threads))
+        self._begun[future.key] = number, task, set(self._threads)
         future.add_done_callback(self._events.put)
 
     def wait(self, timeout: float | None = None) -> tuple[int, Any] | None:
@@ -269,15 +260,14 @@ class DaskEngine:
         if not self._threads and not self._deserted:
             self._say(f'{self._address} has no workers, waiting for them')
         self._deserted = not self._threads
-        for key, begun in list(self._begun.items()):
-            if not begun.workers & self._threads.keys():
+        for key, (number, task, workers) in list(self._begun.items()):
+            if not workers & self._threads.keys():
                 del self._begun[key]
-                self._waiting.append((begun.number, begun.task))
+                self._waiting.append((number, task))
 
     def _result_of(self, future: Any) -> tuple[int, Any] | None:
         """Return what became of a task, None if its workers have left or it is asked for again."""
-        begun = self._begun.get(future.key)
-        if begun is None:
+        if future.key not in self._begun:
             return None
         if future.status == 'cancelled':
             raise self._lost()
@@ -292,5 +282,5 @@ class DaskEngine:
             if isinstance(outcome, Exception):
                 raise outcome
             result = self._located(pickle.loads(outcome), machine)
-        del self._begun[future.key]
-        return begun.number, result
+        number, _, _ = self._begun.pop(future.key)
+        return number, result

@@ -20,6 +20,7 @@ from rosbags import rosbag2
 from ahf_ros.bag import output, run
 from ahf_ros.bag.definitions import COMPRESSED_IMAGE, IMAGE, typestore
 from ahf_ros.cli import main
+from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 from support import bags
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -46,8 +47,13 @@ def status(*arguments: object) -> int:
 
 
 @pytest.fixture(scope='module')
-def images() -> list[np.ndarray]:
-    return bags.scenes(6)
+def scenes() -> list[Rendering]:
+    return [render(SceneSettings(**bags.SCENE, seed=seed)) for seed in range(6)]
+
+
+@pytest.fixture(scope='module')
+def images(scenes: list[Rendering]) -> list[np.ndarray]:
+    return [scene.image for scene in scenes]
 
 
 @pytest.fixture(scope='module')
@@ -94,14 +100,11 @@ def test_answers_are_beside_everything_else(recording: Path, answered: Path) -> 
     assert {message.filter.duration for _, message in found} == {0.0}
 
 
-def test_answers_are_true(images: list[np.ndarray], recording: Path, tmp_path: Path) -> None:
-    from ahf_ros.synthetic.scene import SceneSettings, render
-
+def test_answers_are_true(scenes: list[Rendering], recording: Path, tmp_path: Path) -> None:
     assert status(recording, tmp_path / 'out') == 0
-    for seed, (_, message) in enumerate(bags.answers(tmp_path / 'out')):
-        truth = render(SceneSettings(**bags.SCENE, seed=seed)).targets
-        assert [it.id for it in message.targets] == [it.id for it in truth]
-        for one, true in zip(message.targets, truth, strict=True):
+    for scene, (_, message) in zip(scenes, bags.answers(tmp_path / 'out'), strict=True):
+        assert [it.id for it in message.targets] == [it.id for it in scene.targets]
+        for one, true in zip(message.targets, scene.targets, strict=True):
             assert (one.x, one.y) == pytest.approx((true.x, true.y), abs=0.2)
 
 

@@ -21,6 +21,7 @@ from rosbags import rosbag1, rosbag2
 from rosbags.interfaces import QosDurability
 from ruamel.yaml import YAML
 
+from ahf_ros.bag import source as sources
 from ahf_ros.bag.definitions import IMAGE, LONGEST_DEFINITION, typestore
 from ahf_ros.bag.output import Journal, finished
 from ahf_ros.bag.source import Source
@@ -38,6 +39,20 @@ def status(*arguments: object) -> int:
         return main(['bag', *map(str, arguments), '--detector', 'traditional'])
     except SystemExit as left:
         return int(left.code or 0)
+
+
+Run = Callable[[Path, int], str]
+
+
+@pytest.fixture
+def run(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> Run:
+    """Return a function that answers a bag, checks the status and returns what is said."""
+
+    def answered(source: Path, expected: int) -> str:
+        assert status(source, tmp_path / 'out') == expected
+        return capfd.readouterr().err
+
+    return answered
 
 
 def serialized() -> list[bytes]:
@@ -113,9 +128,7 @@ def test_no_page_that_is_zeroed_loses_anything_in_silence(
     assert ends[1] > 0
 
 
-def test_a_damage_ends_the_bag_there_and_is_named(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_damage_ends_the_bag_there_and_is_named(tmp_path: Path, run: Run) -> None:
     one, two, three = serialized()
     bad = bytearray(mcap.chunk(mcap.message(2, 3, text('bad')), 3, 3))
     bad[-1] ^= 1
@@ -123,24 +136,20 @@ def test_a_damage_ends_the_bag_there_and_is_named(
     file.records += [mcap.chunk(mcap.message(1, 1, one), 1, 1), bytes(bad)]
     file.records += [mcap.chunk(mcap.message(1, 5, two) + mcap.message(1, 7, three), 5, 7)]
     source = file.write(tmp_path / 'in.mcap')
-    assert status(source, tmp_path / 'out') == 1
-    errors = capfd.readouterr().err
+    errors = run(source, 1)
     assert '1 images answered' in errors
     assert 'missing: in.mcap: nothing after 0.000000001 s can be read: CRCValid' in errors
     assert counts(tmp_path / 'out') == {'/image': 1, '/image/coded_targets': 1}
 
 
-def test_a_damaged_file_does_not_end_the_next_one(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_damaged_file_does_not_end_the_next_one(tmp_path: Path, run: Run) -> None:
     one, two, _ = serialized()
     source = tmp_path / 'in'
     source.mkdir()
     cut = mcap.McapFile([*IMAGES, mcap.message(1, 1, one)]).write(source / 'in_0.mcap')
     cut.write_bytes(cut.read_bytes()[:-50])
     mcap.McapFile([*IMAGES, mcap.message(1, 5, two)]).write(source / 'in_1.mcap')
-    assert status(source, tmp_path / 'out') == 1
-    assert 'missing: in_0.mcap: nothing after 0.000000001 s' in capfd.readouterr().err
+    assert 'missing: in_0.mcap: nothing after 0.000000001 s' in run(source, 1)
     assert counts(tmp_path / 'out') == {'/image': 2, '/image/coded_targets': 2}
 
 
@@ -178,14 +187,11 @@ def test_what_nobody_asked_about_is_copied_as_bytes(tmp_path: Path) -> None:
     ]
 
 
-def test_what_a_copy_does_not_have_is_named(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_what_a_copy_does_not_have_is_named(tmp_path: Path, run: Run) -> None:
     one, *_ = serialized()
     file = mcap.McapFile([*IMAGES, mcap.message(1, 10, one)])
     file.records += [mcap.attachment('calibration.txt', b'f = 35'), mcap.metadata('rig')]
-    assert status(file.write(tmp_path / 'in.mcap'), tmp_path / 'out') == 0
-    errors = capfd.readouterr().err
+    errors = run(file.write(tmp_path / 'in.mcap'), 0)
     for name in ("attachment 'calibration.txt'", "metadata 'rig'"):
         assert f'left out: {name}' in errors
 
@@ -223,17 +229,16 @@ def test_messages_of_a_cut_bag_are_decompressed(tmp_path: Path, storage: str) ->
 
 
 def test_bombs_are_named_before_they_are_allocated(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, run: Run
 ) -> None:
+    monkeypatch.setattr(sources, 'MAXIMUM_SIZE', 2**20)
     compressor = zstandard.ZstdCompressor().compressobj()
-    part = bytes(2**20)
-    bomb = b''.join([*(compressor.compress(part) for _ in range(600)), compressor.flush()])
+    bomb = compressor.compress(bytes(2**20 + 1)) + compressor.flush()
     one, *_ = serialized()
     huge = bytearray(mcap.chunk(bytes(10), 7, 7, compressed=True))
     huge[9 + 16 : 9 + 24] = (2**40).to_bytes(8, 'little')
     file = mcap.McapFile([*IMAGES, mcap.message(1, 4, bomb), mcap.message(1, 5, one), bytes(huge)])
-    assert status(file.write(tmp_path / 'in.mcap'), tmp_path / 'out') == 1
-    errors = capfd.readouterr().err
+    errors = run(file.write(tmp_path / 'in.mcap'), 1)
     assert 'missing: /image: 1 message cannot be converted: ZstdError: ' in errors
     assert 'missing: in.mcap: nothing after 0.000000005 s can be read: ' in errors
     assert counts(tmp_path / 'out') == {'/image': 1, '/image/coded_targets': 1}
@@ -270,7 +275,7 @@ def test_a_finished_bag_without_its_data_is_not_done(
 def test_a_bag_that_shrinks_while_it_is_answered_keeps_its_answers(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
-    capfd: pytest.CaptureFixture[str],
+    run: Run,
 ) -> None:
     source = recorded(tmp_path)
     read = Source.messages
@@ -281,17 +286,14 @@ def test_a_bag_that_shrinks_while_it_is_answered_keeps_its_answers(
 
     with monkeypatch.context() as patch:
         patch.setattr(Source, 'messages', short)
-        assert status(source, tmp_path / 'out') == 1
-    assert f'{COUNT} images were answered, {COUNT - 1} can be read now' in capfd.readouterr().err
+        assert f'{COUNT} images were answered, {COUNT - 1} can be read now' in run(source, 1)
     with closing(Journal(tmp_path / 'out')) as journal:
         assert sum(len(outputs) for _, outputs in journal.outputs()) == COUNT
     assert status(source, tmp_path / 'out') == 0
     assert counts(tmp_path / 'out')['/image/coded_targets'] == COUNT
 
 
-def test_messages_of_ros1_that_ros2_cannot_hold_are_named(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_messages_of_ros1_that_ros2_cannot_hold_are_named(tmp_path: Path, run: Run) -> None:
     store = bags.ros1()
     with rosbag1.Writer(tmp_path / 'in.bag') as writer:
         item = writer.add_connection('/image', IMAGE, typestore=store, latching=1)
@@ -303,8 +305,7 @@ def test_messages_of_ros1_that_ros2_cannot_hold_are_named(
             '/held', 'strange/msg/Held', msgdef='strange/Held it', md5sum='0' * 32
         )
         writer.write(held, 10**9 + 2, b'1234')
-    assert status(tmp_path / 'in.bag', tmp_path / 'out') == 1
-    errors = capfd.readouterr().err
+    errors = run(tmp_path / 'in.bag', 1)
     assert 'missing: /notes: 1 message cannot be converted: ' in errors
     assert 'missing: /held: 1 message cannot be converted: ' in errors
     assert counts(tmp_path / 'out') == {'/image': 1, '/image/coded_targets': 1}
@@ -345,31 +346,26 @@ def test_rows_of_any_content_are_read_or_named(
     statement: str,
     reason: str,
     copied: int,
-    capfd: pytest.CaptureFixture[str],
+    run: Run,
 ) -> None:
     source = recorded(tmp_path, 'sqlite3')
     with closing(sqlite3.connect(source / 'in.db3')) as database, database:
         database.execute(statement)
-    assert status(source, tmp_path / 'out') == bool(reason)
-    assert reason in capfd.readouterr().err
+    assert reason in run(source, bool(reason))
     topics = [topic for topic, _, _ in bags.read(tmp_path / 'out')]
     assert sum(topic in ('/image', '/notes') for topic in topics) == copied
 
 
-def test_a_journal_of_sqlite_that_was_not_merged_is_named(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_journal_of_sqlite_that_was_not_merged_is_named(tmp_path: Path, run: Run) -> None:
     source = recorded(tmp_path, 'sqlite3')
     (source / 'in.db3-wal').write_bytes(b'more')
-    assert status(source, tmp_path / 'out') == 1
-    assert 'missing: in.db3-wal was not merged into in.db3' in capfd.readouterr().err
+    assert 'missing: in.db3-wal was not merged into in.db3' in run(source, 1)
 
 
-def test_a_file_that_is_none_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_file_that_is_none_is_refused(tmp_path: Path, run: Run) -> None:
     (tmp_path / 'in').mkdir()
     os.mkfifo(tmp_path / 'in' / 'a.mcap')
-    assert status(tmp_path / 'in', tmp_path / 'out') == 1
-    assert 'a.mcap cannot be read: it is not a regular file' in capfd.readouterr().err
+    assert 'a.mcap cannot be read: it is not a regular file' in run(tmp_path / 'in', 1)
 
 
 @pytest.mark.parametrize(
@@ -384,18 +380,15 @@ def test_metadata_of_any_content_are_named(
     tmp_path: Path,
     metadata: str,
     reason: str,
-    capfd: pytest.CaptureFixture[str],
+    run: Run,
 ) -> None:
     source = recorded(tmp_path)
     (source / 'metadata.yaml').write_text(metadata)
-    assert status(source, tmp_path / 'out') == 1
-    assert f'metadata.yaml: {reason}' in capfd.readouterr().err
+    assert f'metadata.yaml: {reason}' in run(source, 1)
     assert len(bags.answers(tmp_path / 'out')) == COUNT
 
 
-def test_channels_of_other_kinds_are_named_as_left_out(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_channels_of_other_kinds_are_named_as_left_out(tmp_path: Path, run: Run) -> None:
     source = tmp_path / 'in.mcap'
     with source.open('wb') as file:
         writer = Writer(file)
@@ -410,8 +403,7 @@ def test_channels_of_other_kinds_are_named_as_left_out(
             writer.add_message(log, log_time=time, data=b'x', publish_time=time)
         writer.add_message(plain, log_time=9, data=b'{}', publish_time=9)
         writer.finish()
-    assert status(source, tmp_path / 'out') == 0
-    errors = capfd.readouterr().err
+    errors = run(source, 0)
     assert 'left out: /log: 3 messages serialized as protobuf' in errors
     assert 'left out: /image: 1 message serialized as json' in errors
     assert counts(tmp_path / 'out') == {'/image': 3, '/image/coded_targets': 3}
@@ -450,10 +442,7 @@ def test_what_takes_long_to_parse_is_copied_unparsed(tmp_path: Path) -> None:
     assert ('/long', 5, b'12') in bags.read(tmp_path / 'out')
 
 
-def test_more_topics_than_can_be_written_in_time_are_refused(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_more_topics_than_can_be_written_in_time_are_refused(tmp_path: Path, run: Run) -> None:
     channels = [mcap.channel(number, 0, f'/t{number}') for number in range(2, 2002)]
     source = mcap.McapFile([*image_records(), *channels]).write(tmp_path / 'in.mcap')
-    assert status(source, tmp_path / 'out') == 1
-    assert 'has 2001 topics, accepted are at most 2000' in capfd.readouterr().err
+    assert 'has 2001 topics, accepted are at most 2000' in run(source, 1)
