@@ -79,12 +79,8 @@ def read_metadata(folder: Path) -> Metadata:
         raise ValueError(f'{METADATA}: {reason_of(error)}') from error
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Topic:
-    """A topic as one of ROS 2, and what turns a message as recorded into one of ROS 2."""
-
-    connection: Connection
-    convert: Callable[[bytes], bytes]
+_Topic = tuple[Connection, Callable[[bytes], bytes]]
+"""A topic as one of ROS 2, and what turns a message as recorded into one of ROS 2."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -114,6 +110,8 @@ class Source(ExitStack):
         Contents of metadata.yaml.
     stores : TypeStores
         Types of the messages.
+    left_out : dict of str to None
+        What a copy does not have besides messages that are missing, as an ordered set.
     """
 
     def __init__(self, path: Path) -> None:
@@ -122,7 +120,7 @@ class Source(ExitStack):
         self.metadata = Metadata()
         self.connections: list[Connection] = []
         self.foreign: list[Connection] = []
-        self._left_out: dict[str, None] = {}  # an ordered set
+        self.left_out: dict[str, None] = {}
         self.stores = TypeStores()
         self._files: list[_File] = []
         self._unopened: list[str] = []
@@ -146,11 +144,6 @@ class Source(ExitStack):
         lines = [*self._unopened, *self._damages.values(), *refused, *self._uncounted]
         more = len(lines) - _MAXIMUM_LINES
         return [*lines[:_MAXIMUM_LINES], f'{more} more'] if more > 0 else lines
-
-    @property
-    def left_out(self) -> list[str]:
-        """What a copy does not have besides messages that are missing."""
-        return list(self._left_out)
 
     def size(self) -> int:
         """Return the total size of the files of the bag, bytes."""
@@ -215,9 +208,7 @@ class Source(ExitStack):
                 self.metadata = read_metadata(self.path)
                 paths = [self.path / name for name in self.metadata.files]
                 unlisted = (it.name for it in found if it not in paths)
-                self._left_out |= {
-                    f'{it}, which {METADATA} does not list': None for it in unlisted
-                }
+                self.left_out |= {f'{it}, which {METADATA} does not list': None for it in unlisted}
             except ValueError as error:
                 self._unopened.append(str(error))
         scratch = Path(self.enter_context(TemporaryDirectory(prefix='ahf_')))
@@ -233,7 +224,7 @@ class Source(ExitStack):
             raise ValueError(f'{self.path} is not a bag that can be read: {why}')
         if not self.metadata.files:
             self._files.sort(key=lambda file: file.start)
-        topics = [topic.connection for file in self._files for topic in file.topics.values()]
+        topics = [topic for file in self._files for topic, _ in file.topics.values()]
         if len(topics) > _MAXIMUM_TOPICS:
             raise ValueError(
                 f'{self.path} has {len(topics)} topics, accepted are at most {_MAXIMUM_TOPICS}'
@@ -242,7 +233,7 @@ class Source(ExitStack):
         self.connections = [item for item in topics if _encoding(item) == _SERIALIZATION]
         for item in self.foreign:
             messages = counted(item.msgcount, 'message')
-            self._left_out[f'{item.topic}: {messages} serialized as {_encoding(item)}'] = None
+            self.left_out[f'{item.topic}: {messages} serialized as {_encoding(item)}'] = None
 
     def _opened(self, path: Path, scratch: Path) -> _File:
         """Open a file, decompressed where it is compressed."""
@@ -323,7 +314,7 @@ class Source(ExitStack):
 
     def _leave_out(self, items: Iterable[Any], what: str) -> None:
         names = (item.name for item in items if item.name != _OWN_METADATA)
-        self._left_out |= {f'{what} {name!r}': None for name in names}
+        self.left_out |= {f'{what} {name!r}': None for name in names}
 
     def _unindexed(self, path: Path, scratch: Path) -> _File:
         """Open an MCAP file that is read from its beginning.
@@ -367,7 +358,7 @@ class Source(ExitStack):
         def messages() -> Iterator[Message]:
             for record in self._records(path):
                 if isinstance(record, McapMessage) and record.channel_id in topics:
-                    connection = topics[record.channel_id].connection
+                    connection, _ = topics[record.channel_id]
                     yield connection, record.log_time, record.data
 
         return _File(
@@ -413,11 +404,11 @@ class Source(ExitStack):
                 topic = file.topics.get(recorded.id)
                 if topic is None or (topics is not None and recorded.topic not in topics):
                     continue
-                connection = topic.connection
+                connection, convert = topic
                 try:
                     if not (isinstance(time, int) and 0 <= time < 2**63):
                         raise ValueError(f'{time} ns is not a time')
-                    converted = topic.convert(data)
+                    converted = convert(data)
                 except Exception as error:
                     # With damaged messages, the generated code may raise anything.
                     self._refused[connection.topic, reason_of(error)] += 1
@@ -459,11 +450,11 @@ def _ending(path: Path) -> str:
 def _topic(item: Connection) -> _Topic:
     """Return a topic as one of ROS 2."""
     if isinstance(item.ext, ConnectionExtRosbag1):
-        return _Topic(*as_ros2(item))
+        return as_ros2(item)
     texts = (item.topic, item.msgtype, item.msgdef.data, item.digest, _encoding(item))
     if not all(isinstance(it, str) for it in texts):
         raise ValueError(f'it is of type {item.msgtype!r}, serialized as {_encoding(item)!r}')
-    return _Topic(item, _plain)
+    return item, _plain
 
 
 def _plain(data: object) -> bytes:
