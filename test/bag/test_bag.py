@@ -285,15 +285,6 @@ def test_a_bag_of_ros1_that_is_cut_is_refused(
     assert not (tmp_path / 'out').exists()
 
 
-def test_a_bag_without_metadata_is_read(
-    messages: list[bags.Recorded], answered: Path, tmp_path: Path
-) -> None:
-    source = bags.write_ros2(tmp_path / 'in', messages)
-    (source / 'metadata.yaml').unlink()
-    assert status(source, tmp_path / 'out', *SEARCH, '--debug-images') == 1
-    assert bags.read(tmp_path / 'out') == bags.read(answered)
-
-
 @pytest.mark.parametrize(
     ('arguments', 'message'),
     [

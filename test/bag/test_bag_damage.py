@@ -23,14 +23,13 @@ from ruamel.yaml import YAML
 
 from ahf_ros.bag import source as sources
 from ahf_ros.bag.definitions import IMAGE, LONGEST_DEFINITION, typestore
-from ahf_ros.bag.output import Journal, finished
+from ahf_ros.bag.output import Journal
 from ahf_ros.bag.source import Source
 from ahf_ros.cli import main
 from support import bags, mcap
 
 COUNT = 3
 PIXELS = [np.tile(np.arange(50, dtype=np.uint8) + number, (40, 1)) for number in range(COUNT)]
-PAGE = 4096
 
 
 def status(*arguments: object) -> int:
@@ -89,43 +88,6 @@ def image_records() -> list[bytes]:
 
 def counts(path: Path) -> Counter[str]:
     return Counter(topic for topic, _, _ in bags.read(path))
-
-
-def check(target: Path, ended: int, recorded: Counter[str]) -> None:
-    """Fail if an answer is missing, or messages are and the status says that none is."""
-    made = counts(target)
-    outcome = finished(target)
-    assert outcome and outcome.images == made['/image']
-    assert made['/image'] == made['/image/coded_targets'] + outcome.refused
-    if ended == 0:
-        assert {topic: made[topic] for topic in recorded} == dict(recorded)
-
-
-@pytest.mark.parametrize('storage', ['mcap', 'sqlite3', 'ros1'])
-def test_no_page_that_is_zeroed_loses_anything_in_silence(
-    tmp_path: Path, storage: str, capfd: pytest.CaptureFixture[str]
-) -> None:
-    if storage == 'ros1':
-        file = bags.write_ros1(tmp_path / 'in.bag', bags.recorded(bags.ros1(), PIXELS))
-        source = file
-    else:
-        source = recorded(tmp_path, storage)
-        file = next(it for it in source.iterdir() if it.suffix != '.yaml')
-    whole = file.read_bytes()
-    everything = Counter({'/image': COUNT, '/notes': COUNT})
-    ends = Counter()
-    for place in range(0, len(whole), PAGE if storage == 'sqlite3' else 512):
-        size = PAGE if storage == 'sqlite3' else 512
-        file.write_bytes(whole[:place] + bytes(size) + whole[place + size :])
-        target = tmp_path / f'out{place}'
-        ended = status(source, target)
-        ends[ended] += 1
-        errors = capfd.readouterr().err
-        if not (target / 'metadata.yaml').exists():
-            assert 'ahf bag: ' in errors and ended == 1
-        else:
-            check(target, ended, everything)
-    assert ends[1] > 0
 
 
 def test_a_damage_ends_the_bag_there_and_is_named(tmp_path: Path, run: Run) -> None:
