@@ -143,6 +143,9 @@ def identify_images(task: ImageTask, report: Report = no_report) -> ImageOutcome
         )
         for part, stack, found in identify_parts(identifier, list(images.values()), task.stacking):
             paths = tuple(images)[part.images.start : part.images.stop]
+            search = identifier.last_search
+            in_vain = search.in_vain if search and search.reason == 'patience' else 0
+            messages += _messages(paths, part.split, stack.images[0], found, in_vain)
             record = to_json(
                 found,
                 paths[0],
@@ -155,9 +158,6 @@ def identify_images(task: ImageTask, report: Report = no_report) -> ImageOutcome
                 mapping=asdict(task.settings.adaptive.filter),
             )
             records.append(record)
-            search = identifier.last_search
-            in_vain = search.in_vain if search and search.reason == 'patience' else 0
-            messages += _messages(paths, part.split, stack.images[0], found, in_vain)
             if overlays:
                 drawn = draw(stack.combined(found.combination), found)
                 write_image(Path(task.folder, overlays[paths[0]]), drawn)
