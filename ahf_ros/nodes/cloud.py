@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from operator import attrgetter
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from sensor_msgs.msg import PointCloud2
@@ -27,6 +28,8 @@ ANSWERS = 100
 CLOUD, ANSWER = 0, 1
 """Sides of the matcher."""
 
+_relevant = attrgetter('cloud', 'queue', 'queue_memory')
+
 
 class TargetPoints:
     """Publishes the positions of targets as soon as an answer and its cloud are both there.
@@ -34,27 +37,13 @@ class TargetPoints:
     Drivers of scanners give the image and the cloud of a shot the same stamp, and either may
     arrive first. A match discards everything that arrived before it; if too much waits, the oldest
     is discarded.
-
-    Parameters
-    ----------
-    node : ProcessNode
-        Subscribes to `points`, and publishes `~/target_points` and `~/target_labels`.
-    settings : DetectorNodeSettings
-        Settings of the node.
-    tally : CloudTally
-        Counts to continue.
     """
 
     def __init__(
-        self,
-        node: ProcessNode,
-        settings: DetectorNodeSettings,
-        tally: CloudTally,
+        self, node: ProcessNode, settings: DetectorNodeSettings, tally: CloudTally
     ) -> None:
         self._node = node
-        self._settings = _relevant(settings)
-        self._radius = settings.cloud.cloud_radius
-        self._grid = settings.cloud.grid
+        self._settings = settings
         self._tally = tally
         tolerance = round(settings.cloud.cloud_tolerance * 1e9)
         limits = (settings.queue_memory * 2**20, ANSWERS)
@@ -69,7 +58,7 @@ class TargetPoints:
 
     def suits(self, settings: DetectorNodeSettings) -> bool:
         """Return whether other settings of the node would make no difference."""
-        return _relevant(settings) == self._settings
+        return _relevant(settings) == _relevant(self._settings)
 
     def close(self) -> None:
         """End the subscription and the publishers."""
@@ -101,11 +90,11 @@ class TargetPoints:
             self._publish(answer, cloud)
 
     def _publish(self, answer: CodedTargetArray, cloud: PointCloud2) -> None:
-        image = answer.height, answer.width
-        if not self._grid.fits((cloud.height, cloud.width), image):
-            self._refuse(unfit(cloud, answer, self._grid))
+        grid, radius = self._settings.cloud.grid, self._settings.cloud.cloud_radius
+        if not grid.fits((cloud.height, cloud.width), (answer.height, answer.width)):
+            self._refuse(unfit(cloud, answer, grid))
             return
-        found = positions(organised_points(cloud), answer.targets, self._radius, self._grid)
+        found = positions(organised_points(cloud), answer.targets, radius, grid)
         header = Header(stamp=answer.header.stamp, frame_id=cloud.header.frame_id)
         with self._publishing:
             if self._closed:
@@ -135,7 +124,3 @@ def unfit(cloud: PointCloud2, answer: CodedTargetArray, grid: CloudGrid) -> str:
         f'cloud has {size} points, accepted are those that an image of {image} has room for from '
         f'x = {grid.offset_x:g}, y = {grid.offset_y:g} in steps of {grid.step:g} px'
     )
-
-
-def _relevant(settings: DetectorNodeSettings) -> tuple[object, ...]:
-    return settings.cloud, settings.queue, settings.queue_memory

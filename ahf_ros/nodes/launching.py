@@ -12,8 +12,8 @@ from launch_ros.actions import Node
 
 from ahf_ros.nodes.drivers import Driver
 from ahf_ros.nodes.interfaces import NODES
-from ahf_ros.nodes.qos import LOSSLESS_SUBSCRIPTION, SUBSCRIPTION
 from ahf_ros.nodes.settings import DetectorNodeSettings
+from ahf_ros.nodes.topics import LOSSLESS_SUBSCRIPTION, SUBSCRIPTION
 from ahf_ros.settings.nested import flat_parameters
 from ahf_ros.settings.parameter import Parameter
 

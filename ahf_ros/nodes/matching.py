@@ -16,37 +16,20 @@ class _Message(NamedTuple):
 
 
 class Waiting(NamedTuple):
-    """What waits for its match.
+    """What waits for its match, of each of two topics."""
 
-    Attributes
-    ----------
-    counts : tuple of 2 int
-        Messages of each topic.
-    seconds : tuple of 2 float
-        How long the oldest message of each topic has waited, s; 0 where there is none.
-    nearest : int
-        Smallest difference of two stamps since the last match, ns; 0 if none were compared.
-    """
-
-    counts: tuple[int, int]
-    seconds: tuple[float, float]
-    nearest: int
+    counts: list[int]
+    seconds: list[float]  # for how long the oldest has waited, s; 0 where there is none
+    nearest: int  # smallest difference of two stamps since the last match, ns; 0 without any
 
 
 class Matcher:
     """Pairs messages of two topics, whichever of them arrives first.
 
-    Each topic keeps its order, so a match discards all messages that arrived before it on either
-    topic.
-
-    Parameters
-    ----------
-    tolerance : int
-        Maximum difference of the stamps of a match, ns; the nearest message matches.
-    limits : tuple of 2 int
-        Maximum size of all waiting messages of each topic together; a single one may always wait.
-    unmatched : list of 2 int
-        Counts of discarded messages of each topic, to continue.
+    The stamps of a match differ by at most `tolerance`, ns; the nearest message matches. Each
+    topic keeps its order, so a match discards all messages that arrived before it on either topic.
+    The messages of a topic that wait have together at most the size in `limits`; a single one may
+    always wait. `unmatched` has counts of discarded messages of each topic, to continue.
     """
 
     def __init__(self, tolerance: int, limits: tuple[int, int], unmatched: list[int]) -> None:
@@ -58,33 +41,26 @@ class Matcher:
         self._lock = threading.Lock()
 
     def put(self, side: int, stamp: int, item: Any, size: int = 1) -> Any:
-        """Return the match of a message, or None and let the message wait.
+        """Return the match of a message of topic 0 or 1, or None and let the message wait.
 
-        Parameters
-        ----------
-        side : int
-            Topic, 0 or 1.
-        stamp : int
-            Stamp of the message, ns.
-        item : object
-            The message.
-        size : int
-            Its size, in the unit of `limits`.
+        The stamp is in ns, the size in the unit of `limits`.
         """
         other = 1 - side
+        own, others = self._waiting[side], self._waiting[other]
         with self._lock:
-            stamps = [abs(waiting.stamp - stamp) for waiting in self._waiting[other]]
-            if stamps and min(stamps) <= self._tolerance:
-                for _ in range(stamps.index(min(stamps))):
+            apart = [abs(it.stamp - stamp) for it in others]
+            nearest = min(apart, default=0)
+            if apart and nearest <= self._tolerance:
+                for _ in range(apart.index(nearest)):
                     self._discard(other)
-                while self._waiting[side]:
+                while own:
                     self._discard(side)
                 self._nearest = 0
-                return self._waiting[other].popleft().item
-            if stamps:
-                self._nearest = min(self._nearest or min(stamps), min(stamps))
-            self._waiting[side].append(_Message(stamp, item, size, time.monotonic()))
-            while len(self._waiting[side]) > 1 and self._taken(side) > self._limits[side]:
+                return others.popleft().item
+            if apart:
+                self._nearest = min(self._nearest or nearest, nearest)
+            own.append(_Message(stamp, item, size, time.monotonic()))
+            while len(own) > 1 and sum(it.size for it in own) > self._limits[side]:
                 self._discard(side)
         return None
 
@@ -92,12 +68,8 @@ class Matcher:
         """Return what waits, and for how long."""
         now = time.monotonic()
         with self._lock:
-            first, second = self._waiting
             seconds = [now - it[0].arrived if it else 0.0 for it in self._waiting]
-            return Waiting((len(first), len(second)), (seconds[0], seconds[1]), self._nearest)
-
-    def _taken(self, side: int) -> int:
-        return sum(waiting.size for waiting in self._waiting[side])
+            return Waiting([len(it) for it in self._waiting], seconds, self._nearest)
 
     def _discard(self, side: int) -> None:
         self._waiting[side].popleft()
