@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from sensor_msgs.msg import CameraInfo, Image
@@ -21,13 +21,12 @@ from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 from ahf_ros.target import Identification
 
 
-@dataclass(frozen=True, slots=True)
-class SceneMessages:
-    """The messages of one rendered image, which share a header."""
+class SceneMessages(NamedTuple):
+    """The messages of one rendered image, which share a header, in the order of publication."""
 
-    image: Image
-    camera_info: CameraInfo
     ground_truth: CodedTargetArray
+    camera_info: CameraInfo
+    image: Image
 
 
 class IlluminationNode(ProcessNode):
@@ -39,9 +38,11 @@ class IlluminationNode(ProcessNode):
         self._scenes: list[tuple[SceneSettings, int]] = []
         self._rendered: list[SceneMessages] = []
         self._published = 0
-        self._image = self.publisher(Image, 'image')
-        self._camera_info = self.publisher(CameraInfo, 'camera_info')
-        self._ground_truth = self.publisher(CodedTargetArray, 'ground_truth')
+        self._outputs = (
+            self.publisher(CodedTargetArray, 'ground_truth'),
+            self.publisher(CameraInfo, 'camera_info'),
+            self.publisher(Image, 'image'),
+        )
         self._timer = self.create_timer(1 / self._settings.current.rate, self._publish)
         self._worker = Worker()
         self._restart()
@@ -90,27 +91,22 @@ class IlluminationNode(ProcessNode):
         turn = self._published % len(self._scenes)
         if turn >= len(self._rendered):
             return
-        messages = self._rendered[turn]
         frame_id = self._settings.current.frame_id
         header = Header(stamp=self.get_clock().now().to_msg(), frame_id=frame_id)
-        for message in (messages.ground_truth, messages.camera_info, messages.image):
+        for publisher, message in zip(self._outputs, self._rendered[turn], strict=True):
             message.header = header
-        self._ground_truth.publish(messages.ground_truth)
-        self._camera_info.publish(messages.camera_info)
-        self._image.publish(messages.image)
+            publisher.publish(message)
         self._published += 1
 
 
 def scene_messages(rendering: Rendering) -> SceneMessages:
     """Return the messages of a rendered image."""
-    settings = rendering.settings
+    family, shape = rendering.settings.family, rendering.image.shape
     truth = Identification(rendering.targets, expected=len(rendering.targets))
     return SceneMessages(
-        image=image_message(rendering.image, Header()),
+        ground_truth=coded_target_array(truth, family, shape, Header(), msg),
         camera_info=camera_info(rendering),
-        ground_truth=coded_target_array(
-            truth, settings.family, rendering.image.shape, Header(), msg
-        ),
+        image=image_message(rendering.image, Header()),
     )
 
 

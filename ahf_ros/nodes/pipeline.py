@@ -31,19 +31,8 @@ class Stopping(Unavailable):
 class Pipeline:
     """A stream of images, and its answers as messages; new settings need a new pipeline.
 
-    Parameters
-    ----------
-    settings : DetectorNodeSettings
-        Settings of the node.
-    stopping : threading.Event
-        Interrupts an identification, also a search, at its next step: it raises `Stopping`.
-    detector : Detector, optional
-        Replaces the detector that the settings name.
-
-    Attributes
-    ----------
-    stream : Stream of Header
-        Identifies the images.
+    The event `stopping` interrupts an identification, also a search, at its next step: it raises
+    `Stopping`. A `detector` replaces the one that the settings name.
     """
 
     def __init__(

@@ -81,8 +81,7 @@ class ProcessNode(Node):
         self.ended = Ending()  # an exit status ends the node, as a signal does
         self._inputs: list[Input] = []
         self._listening = True
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(1.0, self._follow, clock=steady)
+        self.every(1.0, self._follow)
 
     def introduction(self) -> str:
         """Return what the node will do, for the log at its start; empty if that is not needed."""
@@ -99,6 +98,13 @@ class ProcessNode(Node):
 
     def close(self) -> None:
         """End the threads of the node, while topics and the log still work."""
+
+    def every(self, period: float, callback: Callable[[], None]) -> None:
+        """Call a function every `period` seconds, also where the node's clock stops.
+
+        With `use_sim_time`, it does when a replay stops.
+        """
+        self.create_timer(period, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def publisher(self, kind: type, topic: str, depth: int = 1) -> Publisher:
         """Return a publisher, reliable and of this depth unless `qos_overrides` differ."""
