@@ -20,7 +20,7 @@ from std_srvs.srv import Trigger
 from ahf_ros import ending
 from ahf_ros.nodes.answers import Answers
 from ahf_ros.nodes.diagnostics import Diagnostics, Tally
-from ahf_ros.nodes.image_queue import ImageQueue
+from ahf_ros.nodes.image_queue import ImageQueue, Worker
 from ahf_ros.nodes.inputs import Input
 from ahf_ros.nodes.parameters import ParameterSettings
 from ahf_ros.nodes.pipeline import STOPPING, Pipeline
@@ -35,7 +35,6 @@ from ahf_ros.nodes.topics import (
     image_topic,
 )
 from ahf_ros.nodes.watch import Watch
-from ahf_ros.nodes.worker import Worker
 from ahf_ros.srv import Identify
 from ahf_ros.text import printable
 

@@ -14,10 +14,11 @@ import time
 import traceback
 from collections import deque
 from collections.abc import Callable, Iterable
+from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from itertools import count
-from typing import Any, BinaryIO, TypeAlias
+from typing import Any, BinaryIO, TypeAlias, TypeVar
 
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import CompressedImage, Image
@@ -30,7 +31,6 @@ from ahf_ros.nodes.diagnostics import Tally
 from ahf_ros.nodes.pipeline import Pipeline, Stopping
 from ahf_ros.nodes.process import LOG_PERIOD, ProcessNode
 from ahf_ros.nodes.settings import LOSSLESS
-from ahf_ros.nodes.worker import Worker
 from ahf_ros.stream import Answer, Kind, Remark, message_frame, why_refused
 from ahf_ros.text import printable
 
@@ -39,6 +39,8 @@ SEGMENT = 64 * 2**20
 
 RESERVE = 256 * 2**20
 """Space of the disk that is left to others, bytes."""
+
+Result = TypeVar('Result')
 
 ImageMessage: TypeAlias = Image | CompressedImage
 """The messages that images arrive in."""
@@ -216,6 +218,63 @@ class ImageQueue:
                 self._logger.error('\n'.join(map(printable, lines)))
             text = f'image refused: {remark.text}'
             self._logger.warning(text, throttle_duration_sec=LOG_PERIOD)
+
+
+class Worker:
+    """Runs jobs in order, one at a time, in a thread of its own; while it is paused, they wait."""
+
+    def __init__(self) -> None:
+        self._thread = ThreadPoolExecutor(max_workers=1)
+        self._turn = threading.Condition()  # held while a job runs
+        self._paused = self._stopped = False
+
+    def append(self, job: Callable[[], Result]) -> Future[Result]:
+        """Run `job`, unless the worker is stopped first, which cancels it."""
+        try:
+            return self._thread.submit(self._in_turn, job)
+        except RuntimeError:  # stopped
+            future: Future[Result] = Future()
+            future.cancel()
+            return future
+
+    def call(self, job: Callable[[], Result]) -> Result:
+        """Run `job` and return its result, or raise its error.
+
+        Raises a `concurrent.futures.CancelledError` if the worker is stopped before its turn.
+        """
+        return self.append(job).result()
+
+    def pause(self) -> None:
+        """Let jobs wait, and return when the running one has ended."""
+        self._paused = True
+        with self._turn:
+            pass
+
+    def resume(self) -> None:
+        """Run the jobs that wait."""
+        with self._turn:
+            self._paused = False
+            self._turn.notify()
+
+    def discard(self) -> None:
+        """Drop the waiting jobs and return when the running one has ended; the worker goes on."""
+        self.stop()
+        self._paused = self._stopped = False
+        self._thread = ThreadPoolExecutor(max_workers=1)
+
+    def stop(self) -> None:
+        """Drop the waiting jobs and return when the running one has ended."""
+        self._stopped = True
+        with self._turn:
+            self._turn.notify()
+        self._thread.shutdown(cancel_futures=True)
+
+    def _in_turn(self, job: Callable[[], Result]) -> Result:
+        with self._turn:
+            self._turn.wait_for(lambda: self._stopped or not self._paused)
+            if self._stopped:
+                raise CancelledError
+            return job()
 
 
 class _Segment:

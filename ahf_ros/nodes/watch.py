@@ -10,10 +10,9 @@ from difflib import get_close_matches
 from rclpy.qos import QoSCompatibility, ReliabilityPolicy, qos_check_compatible
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from ahf_ros.nodes.cloud import ANSWER, CLOUD
+from ahf_ros.nodes.cloud import ANSWER, CLOUD, Waiting
 from ahf_ros.nodes.diagnostics import Tally
 from ahf_ros.nodes.inputs import Input
-from ahf_ros.nodes.matching import Waiting
 from ahf_ros.nodes.process import ProcessNode
 from ahf_ros.nodes.settings import MAXIMUM_TOLERANCE
 from ahf_ros.nodes.topics import qos_words

@@ -1,6 +1,10 @@
 from __future__ import annotations
 
-from ahf_ros.nodes.matching import Matcher
+import pytest
+
+pytest.importorskip('rclpy', reason='ROS 2 is not installed')
+
+from ahf_ros.nodes.cloud import Matcher
 from ahf_ros.nodes.settings import CloudSettings
 
 CLOUD, ANSWER = 0, 1

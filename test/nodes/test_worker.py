@@ -6,7 +6,9 @@ from concurrent.futures import CancelledError
 
 import pytest
 
-from ahf_ros.nodes.worker import Worker
+pytest.importorskip('rclpy', reason='ROS 2 is not installed')
+
+from ahf_ros.nodes.image_queue import Worker
 from support.live import PATIENCE
 
 
