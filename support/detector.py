@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from pathlib import PurePosixPath
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.srv import GetParameters, SetParametersAtomically
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import Image
@@ -15,6 +16,21 @@ from std_srvs.srv import Trigger
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.srv import Identify
 from support.live import Graph
+
+
+def overrides(**given: Any) -> list[str]:
+    """Return command line arguments that set parameters."""
+    return [word for name, value in given.items() for word in ('-p', f'{name}:={value}')]
+
+
+def own(namespace: str) -> tuple[str, ...]:
+    """Return the arguments that put a node and its diagnostics into a namespace."""
+    return '-r', f'__ns:={namespace}', '-r', f'/diagnostics:={namespace}/diagnostics'
+
+
+def values(message: DiagnosticArray) -> dict[str, str]:
+    """Return what a node says about itself."""
+    return {item.key: item.value for item in message.status[0].values}
 
 
 class DetectorProcess:
@@ -30,8 +46,7 @@ class DetectorProcess:
     ) -> None:
         self.graph = graph
         self.namespace = namespace
-        places = '-r', f'__ns:={namespace}', '-r', f'/diagnostics:={namespace}/diagnostics'
-        self.process = graph.start('detector', *places, *arguments)
+        self.process = graph.start('detector', *own(namespace), *arguments)
         self.targets = graph.listen(CodedTargetArray, f'{self.namespace}/coded_targets')
         if subscribed:
             self.image = graph.publisher(Image, str(PurePosixPath(namespace, images)))

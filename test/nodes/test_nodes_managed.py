@@ -17,15 +17,11 @@ from std_msgs.msg import Header
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.synthetic.scene import SceneSettings, render
-from support.detector import DetectorProcess
+from support.detector import DetectorProcess, overrides, values
 
 TARGETS = 2
 WAITING = 3
 SEARCH = ('expected_targets', 50), ('max_evaluations', 5)
-
-
-def overrides(**given: Any) -> list[str]:
-    return [word for name, value in given.items() for word in ('-p', f'{name}:={value}')]
 
 
 def state(graph: Any, node: str) -> int:
@@ -83,8 +79,7 @@ def test_a_managed_node_goes_through_its_states(graph: Any) -> None:
     for _ in range(WAITING):
         send()
     received = str(len(sent))
-    graph.until(lambda: {it.key: it.value for it in diagnostics[-1].status[0].values}['received']
-                == received)  # fmt: skip
+    graph.until(lambda: values(diagnostics[-1])['received'] == received)
     assert change(graph, node, Transition.TRANSITION_DEACTIVATE)
     assert state(graph, node) == State.PRIMARY_STATE_INACTIVE
     graph.until(lambda: not images.get_subscription_count())

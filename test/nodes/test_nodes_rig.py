@@ -15,14 +15,14 @@ pytest.importorskip('rclpy', reason='ROS 2 is not installed')
 from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import Image, PointCloud2, PointField
 from std_msgs.msg import Header
-from test_nodes import header, overrides, values
+from test_nodes import header
 from visualization_msgs.msg import ImageMarker, Marker, MarkerArray
 
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.synthetic.camera import Camera, tilted_camera
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
-from support.detector import DetectorProcess
+from support.detector import DetectorProcess, overrides, values
 
 SCENE = SceneSettings(width=640, height=480, targets=6, dot_radius=10.0, tilt=30.0, seed=3)
 DISTANCE = 800.0  # mm, of the middle of the wall
@@ -95,8 +95,7 @@ class Rig:
 
     def __init__(self, graph: Any) -> None:
         self.graph = graph
-        own = ('-r', '/diagnostics:=/own/diagnostics')
-        self.detector = DetectorProcess(graph, '/own', *own, *overrides(cloud='true'))
+        self.detector = DetectorProcess(graph, '/own', *overrides(cloud='true'))
         self.points = graph.listen(PointCloud2, '/own/detector/target_points')
         self.diagnostics = graph.listen(DiagnosticArray, '/own/diagnostics')
         self.cloud = graph.publisher(PointCloud2, '/own/points')

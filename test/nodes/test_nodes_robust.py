@@ -28,6 +28,7 @@ from ahf_ros.nodes.settings import DetectorNodeSettings
 from ahf_ros.settings.nested import flat_parameters
 from ahf_ros.synthetic.scene import SceneSettings, render
 from support import live
+from support.detector import overrides, own, values
 from support.hostile import IMAGES, Fields
 
 SCENE = {'width': 320, 'height': 240, 'targets': 3, 'dot_radius': 9.0}
@@ -38,11 +39,6 @@ ENDLESS = {
     'generations': 100000,
     'patience': 1000000,
 }
-
-
-def overrides(**given: Any) -> list[str]:
-    """Return command line arguments that set parameters."""
-    return [word for name, value in given.items() for word in ('-p', f'{name}:={value}')]
 
 
 @pytest.fixture(scope='module')
@@ -73,11 +69,10 @@ class Bench:
         graph.until(lambda: self.diagnostics)
 
     def start(self, *places: str, **given: Any) -> None:
-        own = f'__ns:=/{self.name}', f'/diagnostics:=/{self.name}/diagnostics'
-        remapped = [word for place in (*own, *places) for word in ('-r', place)]
+        remapped = [word for place in places for word in ('-r', place)]
         # Nothing is said of images that a busy machine has not sent yet.
         chosen = overrides(**{'image_timeout': 0, **given})
-        self.process = self.graph.start('detector', *remapped, *chosen)
+        self.process = self.graph.start('detector', *own(f'/{self.name}'), *remapped, *chosen)
 
     def kill(self) -> None:
         """End the detector without notice, and forget what it said."""
@@ -87,8 +82,7 @@ class Bench:
 
     def told(self, key: str) -> str:
         """Return what the detector said last about something, nothing before it said anything."""
-        said = self.diagnostics[-1].status[0].values if self.diagnostics else []
-        return next((item.value for item in said if item.key == key), '')
+        return values(self.diagnostics[-1])[key] if self.diagnostics else ''
 
 
 def test_the_end_of_a_node_does_not_gather_callbacks() -> None:
@@ -232,8 +226,8 @@ def test_parameters_are_those_described_and_take_integers_for_numbers(graph: Any
     names = graph.call(
         ListParameters, '/whole/detector/list_parameters', ListParameters.Request()
     ).result.names
-    own = {name for name in names if not name.startswith('qos_overrides.')}
-    assert set(items) <= own
-    assert own - set(items) <= {'use_sim_time', 'start_type_description_service'}
+    declared = {name for name in names if not name.startswith('qos_overrides.')}
+    assert set(items) <= declared
+    assert declared - set(items) <= {'use_sim_time', 'start_type_description_service'}
     assert all(len(item.description) > 10 for item in items.values())
     assert bench.process.end() == (0, '')

@@ -17,21 +17,17 @@ from rcl_interfaces.srv import ListParameters, SetParameters
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Image, PointCloud2
-from test_nodes import header, values
+from test_nodes import header
 from test_nodes_rig import cloud_message
 
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.image_msg import image_message
+from support.detector import own, values
 
 LATCHED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 WEAK = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 PIXELS = np.tile(np.arange(60, dtype=np.uint8), (40, 1))
 CONFIG = Path(__file__).parents[2] / 'config'
-
-
-def own(namespace: str) -> tuple[str, ...]:
-    """Return the arguments that put a node and its diagnostics into a namespace."""
-    return '-r', f'__ns:={namespace}', '-r', f'/diagnostics:={namespace}/diagnostics'
 
 
 def assert_every_topic_has_overrides(graph: Any, *node: str) -> None:
@@ -126,10 +122,6 @@ class Quiet:
     def said(self) -> list[DiagnosticStatus]:
         return [message.status[0] for message in self.diagnostics]
 
-    def values(self) -> dict[str, str]:
-        """Return the entries of the diagnostics that come next."""
-        return values(self.graph.newer(self.diagnostics))
-
     def set(self, *given: tuple[str, Any]) -> None:
         parameters = [Parameter(name, value=value).to_parameter_msg() for name, value in given]
         request = SetParameters.Request(parameters=parameters)
@@ -160,7 +152,7 @@ def test_what_does_not_arrive_is_named_with_the_reason_and_the_remedy(graph: Any
         camera.publish(image_message(image, header()))
         graph.until(lambda count=count: len(answers) == count)
     assert [(it.width, it.height) for it in answers] == [(60, 40), (60, 30)]
-    told = quiet.values()
+    told = values(graph.newer(quiet.diagnostics))
     assert told['changes of size or encoding'] == '1'
     # From Kilted on, rclpy tells publishers apart.
     uncounted = '0, not counted: messages come from 2 publishers'

@@ -16,7 +16,7 @@ from std_msgs.msg import Header
 from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.nodes.settings import IlluminationNodeSettings
 from ahf_ros.synthetic.scene import SceneSettings, render
-from support.detector import DetectorProcess
+from support.detector import DetectorProcess, overrides, values
 
 SCENE = SceneSettings(
     width=400, height=300, targets=4, dot_radius=10, light='stripe', ambient=0.02, phases=4
@@ -33,8 +33,7 @@ OPTIONS = {
 
 @pytest.fixture(scope='module')
 def detector(graph: Any) -> DetectorProcess:
-    given = [word for name, it in OPTIONS.items() for word in ('-p', f'{name}:={it}')]
-    return DetectorProcess(graph, '/stacks', *given)
+    return DetectorProcess(graph, '/stacks', *overrides(**OPTIONS))
 
 
 @pytest.fixture(scope='module')
@@ -71,8 +70,7 @@ def test_what_does_not_belong_together_is_answered_and_said(
     diagnostics = detector.graph.listen(DiagnosticArray, '/stacks/diagnostics')
 
     def said(name: str) -> int:
-        values = diagnostics[-1].status[0].values
-        return int({it.key: it.value for it in values}[name])
+        return int(values(diagnostics[-1])[name])
 
     detector.graph.newer(diagnostics)
     before = said('stacks that were not full')
