@@ -306,7 +306,7 @@ def test_parameters_are_answered_and_the_latest_image_waits_during_a_search(
         return answers if in_time and searched == answers[:1] else []
 
     # A machine may be so busy that a short search has ended before the parameters are set.
-    first, *between, last = next(filter(None, map(answers_in_time, (5.0, 20.0, 60.0))), [None] * 4)
+    first, *between, last = next(filter(None, map(answers_in_time, (2.0, 10.0, 60.0))), [None] * 4)
     assert first is not None
     assert last is not None
     assert (first.expected, last.expected) == (50, 6)

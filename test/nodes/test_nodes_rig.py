@@ -31,17 +31,6 @@ DOT_WITHOUT_POINTS, WITHOUT_POINTS = 0, 5  # places of targets in the truth
 CLOUD_FRAME = 'scanner_optical_frame'
 
 
-@pytest.fixture(scope='module')
-def rendering() -> Rendering:
-    return render(SCENE)
-
-
-@pytest.fixture(scope='module')
-def camera() -> Camera:
-    """Return the camera of the rendering."""
-    return synthetic_camera(SCENE)
-
-
 def synthetic_camera(scene: SceneSettings) -> Camera:
     """Return the camera that a scene is rendered with."""
     setup = np.random.default_rng(np.random.SeedSequence(scene.seed).spawn(5)[0])
@@ -56,8 +45,7 @@ def in_space(camera: Camera, pixels: np.ndarray) -> np.ndarray:
     return wall @ camera.pose.T * DISTANCE / camera.intrinsics[0, 0]
 
 
-@pytest.fixture(scope='module')
-def scanned(rendering: Rendering, camera: Camera) -> np.ndarray:
+def scan(rendering: Rendering, camera: Camera) -> np.ndarray:
     """Return what a scanner measures, shape (height, width, 3)."""
     height, width = rendering.image.shape
     rows, columns = np.mgrid[:height, :width]
@@ -69,6 +57,10 @@ def scanned(rendering: Rendering, camera: Camera) -> np.ndarray:
         away = np.hypot(columns - target.x, rows - target.y)
         points[away < dots * target.semi_major] = np.nan
     return points
+
+
+RENDERING, CAMERA = render(SCENE), synthetic_camera(SCENE)
+SCANNED = scan(RENDERING, CAMERA)
 
 
 def cloud_message(points: np.ndarray, of: Header) -> PointCloud2:
@@ -132,13 +124,13 @@ def read(message: PointCloud2) -> np.ndarray:
     )
 
 
-def assert_true(message: PointCloud2, rendering: Rendering, camera: Camera) -> None:
+def assert_true(message: PointCloud2) -> None:
     """Assert that a labelled cloud says where the targets of the rendering are."""
     points = read(message)
     assert points.dtype.names == ('x', 'y', 'z', 'id', 'confidence', 'deviation')
-    assert points['id'].tolist() == [target.id for target in rendering.targets]
-    pixels = np.array([(target.x, target.y) for target in rendering.targets])
-    true = in_space(camera, pixels)
+    assert points['id'].tolist() == [target.id for target in RENDERING.targets]
+    pixels = np.array([(target.x, target.y) for target in RENDERING.targets])
+    true = in_space(CAMERA, pixels)
     errors = np.linalg.norm(np.stack([points[name] for name in 'xyz'], axis=1) - true, axis=1)
     known = np.arange(len(pixels)) != WITHOUT_POINTS
     assert errors[known].max() < MAXIMUM_ERROR
@@ -148,11 +140,9 @@ def assert_true(message: PointCloud2, rendering: Rendering, camera: Camera) -> N
 
 
 @pytest.mark.parametrize('cloud_first', [True, False])
-def test_every_target_has_its_position_whatever_comes_first(
-    rig: Rig, rendering: Rendering, camera: Camera, scanned: np.ndarray, cloud_first: bool
-) -> None:
-    image = image_message(rendering.image, header())
-    cloud = cloud_message(scanned, image.header)
+def test_every_target_has_its_position_whatever_comes_first(rig: Rig, cloud_first: bool) -> None:
+    image = image_message(RENDERING.image, header())
+    cloud = cloud_message(SCANNED, image.header)
     if cloud_first:
         rig.send_cloud(cloud)
     answer = rig.detector.answer(image)
@@ -161,33 +151,29 @@ def test_every_target_has_its_position_whatever_comes_first(
     message = rig.found(image.header)
     assert message.header == Header(stamp=image.header.stamp, frame_id=CLOUD_FRAME)
     assert (message.height, message.width, message.is_dense) == (1, len(answer.targets), False)
-    assert_true(message, rendering, camera)
+    assert_true(message)
     rig.graph.until(lambda: values(rig.diagnostics[-1])['targets with a position'] == '5 of 6')
 
 
-def test_what_has_no_partner_is_counted(
-    rig: Rig, rendering: Rendering, scanned: np.ndarray
-) -> None:
+def test_what_has_no_partner_is_counted(rig: Rig) -> None:
     names = ('clouds without an image', 'images without a cloud')
     rig.graph.newer(rig.diagnostics)
     before = [rig.told(name) for name in names]
     lonely, of = header(), header()
-    rig.send_cloud(cloud_message(scanned, lonely))
-    rig.detector.answer(image_message(rendering.image, header()))
-    rig.send_cloud(cloud_message(scanned, of))
-    rig.detector.answer(image_message(rendering.image, of))
+    rig.send_cloud(cloud_message(SCANNED, lonely))
+    rig.detector.answer(image_message(RENDERING.image, header()))
+    rig.send_cloud(cloud_message(SCANNED, of))
+    rig.detector.answer(image_message(RENDERING.image, of))
     rig.found(of)
     rig.graph.until(lambda: [rig.told(name) for name in names] == [count + 1 for count in before])
     assert not [it for it in rig.points if it.header.stamp == lonely.stamp]
 
 
-def test_stamps_may_differ_by_the_tolerance(
-    rig: Rig, rendering: Rendering, scanned: np.ndarray
-) -> None:
+def test_stamps_may_differ_by_the_tolerance(rig: Rig) -> None:
     with rig.detector.resubscription('points'):
         assert rig.detector.set(('cloud_tolerance', 0.01)) == (True, '')
-    image = image_message(rendering.image, header())
-    cloud = cloud_message(scanned, image.header)
+    image = image_message(RENDERING.image, header())
+    cloud = cloud_message(SCANNED, image.header)
     cloud.header.stamp.nanosec += 9_000_000
     rig.detector.answer(image)
     rig.cloud.publish(cloud)
@@ -196,18 +182,16 @@ def test_stamps_may_differ_by_the_tolerance(
         assert rig.detector.set(('cloud_tolerance', 0)) == (True, '')
 
 
-def test_bad_clouds_are_named_and_the_node_goes_on(
-    rig: Rig, rendering: Rendering, camera: Camera, scanned: np.ndarray
-) -> None:
+def test_bad_clouds_are_named_and_the_node_goes_on(rig: Rig) -> None:
     rig.graph.newer(rig.diagnostics)
     before = rig.told('clouds rejected')
-    flat = cloud_message(scanned, header())
+    flat = cloud_message(SCANNED, header())
     flat.height, flat.width = 1, flat.height * flat.width
-    short = cloud_message(scanned[:9], header())
+    short = cloud_message(SCANNED[:9], header())
     short.height = 10
-    huge = cloud_message(scanned[:9], header())
+    huge = cloud_message(SCANNED[:9], header())
     huge.height = huge.width = huge.row_step = 2**32 - 1
-    nameless = cloud_message(scanned[:9], header())
+    nameless = cloud_message(SCANNED[:9], header())
     nameless.fields = nameless.fields[:2]
     bad = [
         (flat, 'height is 1, accepted is an integer of at least 2'),
@@ -221,23 +205,21 @@ def test_bad_clouds_are_named_and_the_node_goes_on(
         rig.graph.until(lambda count=count: rig.told('clouds rejected') == before + count)
         reason = values(rig.diagnostics[-1])['last reason for rejection of a cloud']
         assert reason.startswith(words)
-    image = image_message(rendering.image, header())
+    image = image_message(RENDERING.image, header())
     rig.detector.answer(image)
-    rig.cloud.publish(cloud_message(scanned[:, :-1], image.header))
+    rig.cloud.publish(cloud_message(SCANNED[:, :-1], image.header))
     rig.graph.until(lambda: rig.told('clouds rejected') == before + len(bad) + 1)
     assert values(rig.diagnostics[-1])['last reason for rejection of a cloud'] == (
         'cloud has 639 x 480 points, accepted is 640 x 480, the size of the image; for another '
         'one, set cloud_offset_x, cloud_offset_y and cloud_step'
     )
-    image = image_message(rendering.image, header())
+    image = image_message(RENDERING.image, header())
     rig.detector.answer(image)
-    rig.cloud.publish(cloud_message(scanned, image.header))
-    assert_true(rig.found(image.header), rendering, camera)
+    rig.cloud.publish(cloud_message(SCANNED, image.header))
+    assert_true(rig.found(image.header))
 
 
-def test_no_cloud_is_lost_in_a_lossless_queue(
-    rig: Rig, rendering: Rendering, scanned: np.ndarray
-) -> None:
+def test_no_cloud_is_lost_in_a_lossless_queue(rig: Rig) -> None:
     with rig.detector.resubscription('image', 'points'):
         assert rig.detector.set(('queue', 'lossless')) == (True, '')
     clouds = rig.graph.publisher(PointCloud2, '/own/points')
@@ -245,26 +227,24 @@ def test_no_cloud_is_lost_in_a_lossless_queue(
     before = len(rig.points)
     headers = [header() for _ in range(8)]
     for of in headers:
-        clouds.publish(cloud_message(scanned, of))
-        images.publish(image_message(rendering.image, of))
+        clouds.publish(cloud_message(SCANNED, of))
+        images.publish(image_message(RENDERING.image, of))
     rig.graph.until(lambda: len(rig.points) == before + len(headers))
     assert [it.header.stamp for it in rig.points[before:]] == [of.stamp for of in headers]
     with rig.detector.resubscription('image', 'points'):
         assert rig.detector.set(('queue', 'latest')) == (True, '')
 
 
-def test_labels_in_space_for_those_who_look(
-    rig: Rig, rendering: Rendering, scanned: np.ndarray
-) -> None:
+def test_labels_in_space_for_those_who_look(rig: Rig) -> None:
     labels = rig.graph.listen(MarkerArray, '/own/detector/target_labels')
-    image = image_message(rendering.image, header())
-    rig.cloud.publish(cloud_message(scanned, image.header))
+    image = image_message(RENDERING.image, header())
+    rig.cloud.publish(cloud_message(SCANNED, image.header))
     rig.detector.answer(image)
     found = read(rig.found(image.header))
     rig.graph.until(lambda: labels)
     first, *texts = labels[-1].markers
     assert first.action == Marker.DELETEALL
-    assert [it.text for it in texts] == [str(it.id) for it in rendering.targets[:WITHOUT_POINTS]]
+    assert [it.text for it in texts] == [str(it.id) for it in RENDERING.targets[:WITHOUT_POINTS]]
     assert {it.header.frame_id for it in texts} == {CLOUD_FRAME}
     for marker, point in zip(texts, found, strict=False):
         place = marker.pose.position
@@ -272,9 +252,9 @@ def test_labels_in_space_for_those_who_look(
         assert 10 < marker.scale.z < 40  # mm; a dot is about 14 mm wide
 
 
-def test_annotations_of_the_image_for_those_who_look(rig: Rig, rendering: Rendering) -> None:
+def test_annotations_of_the_image_for_those_who_look(rig: Rig) -> None:
     annotations = rig.graph.listen(ImageMarker, '/own/detector/annotations')
-    image = image_message(rendering.image, header())
+    image = image_message(RENDERING.image, header())
     rig.detector.image.publish(image)
     rig.graph.until(lambda: annotations)
     marker = annotations[-1]
@@ -282,23 +262,21 @@ def test_annotations_of_the_image_for_those_who_look(rig: Rig, rendering: Render
     assert marker.type == ImageMarker.LINE_LIST
     assert len(marker.points) == 2 * len(marker.outline_colors)
     places = np.array([(point.x, point.y) for point in marker.points]) - 0.5
-    for target in rendering.targets:
+    for target in RENDERING.targets:
         away = np.hypot(*(places - (target.x, target.y)).T)
         assert away.min() == pytest.approx(target.semi_minor, abs=0.3)
 
 
-def test_without_the_parameter_there_are_no_clouds(
-    rig: Rig, rendering: Rendering, scanned: np.ndarray
-) -> None:
+def test_without_the_parameter_there_are_no_clouds(rig: Rig) -> None:
     assert rig.detector.set(('cloud', False)) == (True, '')
     rig.graph.until(lambda: not rig.cloud.get_subscription_count())
     count = len(rig.points)
-    rig.detector.answer(image_message(rendering.image, header()))
+    rig.detector.answer(image_message(RENDERING.image, header()))
     assert len(rig.points) == count
     assert rig.detector.set(('cloud', True)) == (True, '')
     rig.graph.until(rig.cloud.get_subscription_count)
-    image = image_message(rendering.image, header())
-    rig.send_cloud(cloud_message(scanned, image.header))
+    image = image_message(RENDERING.image, header())
+    rig.send_cloud(cloud_message(SCANNED, image.header))
     rig.detector.answer(image)
     assert rig.found(image.header).width == SCENE.targets
 
