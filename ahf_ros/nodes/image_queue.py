@@ -166,7 +166,8 @@ class ImageQueue:
             self._end(self._last, 'parameters changed')
 
     def _look(self) -> None:
-        if not self._looking:
+        last = self._last
+        if last and last.pipeline.stream.waiting and not self._looking:
             self._looking = True
             self._worker.append(self._end_overdue)
 

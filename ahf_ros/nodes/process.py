@@ -100,10 +100,7 @@ class ProcessNode(Node):
         """End the threads of the node, while topics and the log still work."""
 
     def every(self, period: float, callback: Callable[[], None]) -> None:
-        """Call a function every `period` seconds, also where the node's clock stops.
-
-        With `use_sim_time`, it does when a replay stops.
-        """
+        """Call a function every `period` seconds, also where a simulated clock stands still."""
         self.create_timer(period, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def publisher(self, kind: type, topic: str, depth: int = 1) -> Publisher:
@@ -175,8 +172,8 @@ def run(make_node: Callable[[], ProcessNode], arguments: list[str] | None = None
     if text := node.introduction():
         node.get_logger().info(text)
     threading.Thread(target=_end_at_signal, args=(node.ended, arrived), daemon=True).start()
-    # One thread for a service that takes as long as an identification, one for an image that waits
-    # for room in the queue, one for everything short.
+    # One thread for a service that takes as long as an identification, one for an image that is
+    # written to disk, one for everything short.
     executor = JoiningExecutor(num_threads=3)
     executor.add_node(node)
     try:

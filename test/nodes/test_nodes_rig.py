@@ -27,7 +27,7 @@ from support.detector import DetectorProcess, overrides, values
 SCENE = SceneSettings(width=640, height=480, targets=6, dot_radius=10.0, tilt=30.0, seed=3)
 DISTANCE = 800.0  # mm, of the middle of the wall
 MAXIMUM_ERROR = 0.2  # mm, of which a tenth of a pixel is most
-DOT_WITHOUT_POINTS, WITHOUT_POINTS = 0, 5  # places of targets in the truth
+WITHOUT_POINTS = 5  # place of a target in the truth
 CLOUD_FRAME = 'scanner_optical_frame'
 
 
@@ -45,22 +45,27 @@ def in_space(camera: Camera, pixels: np.ndarray) -> np.ndarray:
     return wall @ camera.pose.T * DISTANCE / camera.intrinsics[0, 0]
 
 
-def scan(rendering: Rendering, camera: Camera) -> np.ndarray:
-    """Return what a scanner measures, shape (height, width, 3)."""
+def scan(
+    rendering: Rendering, camera: Camera, noise: float, without: dict[int, float]
+) -> np.ndarray:
+    """Return what a scanner measures, mm, shape (height, width, 3).
+
+    There are no points around some targets, by their places in the truth, within so many radii.
+    """
     height, width = rendering.image.shape
     rows, columns = np.mgrid[:height, :width]
     pixels = np.column_stack((columns.ravel(), rows.ravel())).astype(float)
     points = in_space(camera, pixels).reshape(height, width, 3)
-    points *= 1 + 0.05 / DISTANCE * np.random.default_rng(0).standard_normal((height, width, 1))
-    for number, dots in ((DOT_WITHOUT_POINTS, 1.2), (WITHOUT_POINTS, 5.0)):
+    points *= 1 + noise / DISTANCE * np.random.default_rng(0).standard_normal((height, width, 1))
+    for number, radii in without.items():
         target = rendering.targets[number]
         away = np.hypot(columns - target.x, rows - target.y)
-        points[away < dots * target.semi_major] = np.nan
+        points[away < radii * target.semi_major] = np.nan
     return points
 
 
 RENDERING, CAMERA = render(SCENE), synthetic_camera(SCENE)
-SCANNED = scan(RENDERING, CAMERA)
+SCANNED = scan(RENDERING, CAMERA, 0.05, {0: 1.2, WITHOUT_POINTS: 5.0})
 
 
 def cloud_message(points: np.ndarray, of: Header) -> PointCloud2:
