@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cached_property
 from pathlib import PurePosixPath
 from typing import Any
 
@@ -46,10 +47,25 @@ class DetectorProcess:
     ) -> None:
         self.graph = graph
         self.namespace = namespace
-        self.process = graph.start('detector', *own(namespace), *arguments)
+        self.start(*arguments)
         self.targets = graph.listen(CodedTargetArray, f'{self.namespace}/coded_targets')
         if subscribed:
             self.image = graph.publisher(Image, str(PurePosixPath(namespace, images)))
+
+    def start(self, *arguments: str) -> None:
+        """Start the process, as after the end of another one."""
+        self.process = self.graph.start('detector', *own(self.namespace), *arguments)
+
+    @cached_property
+    def diagnostics(self) -> list[DiagnosticArray]:
+        """What the node says about itself from now on, at least once."""
+        said = self.graph.listen(DiagnosticArray, f'{self.namespace}/diagnostics')
+        self.graph.until(lambda: said)
+        return said
+
+    def told(self, name: str) -> str:
+        """Return what the node said last about something, nothing before it said anything."""
+        return values(self.diagnostics[-1])[name] if self.diagnostics else ''
 
     def answer(self, message: Image) -> CodedTargetArray:
         """Return the answer to an image."""

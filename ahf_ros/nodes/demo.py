@@ -14,8 +14,8 @@ from ahf_ros.drawing.colours import DECODED_COLOUR, MISSED_COLOUR, TEXT_COLOUR, 
 from ahf_ros.drawing.overlay import overlay
 from ahf_ros.drawing.tiles import Tile, side_by_side
 from ahf_ros.evaluation import FALSE, RIGHT, WRONG, judge
-from ahf_ros.filtering.homomorphic import HomomorphicFilter
 from ahf_ros.interchange.image_files import write_image
+from ahf_ros.nodes.pipeline import filtered
 from ahf_ros.nodes.scoreboard import line, method
 from ahf_ros.session import create_identifier
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
@@ -71,11 +71,7 @@ def show(scene: SceneSettings, picture: Path) -> None:
     for way, options in WAYS.items():
         found = create_identifier(expected_targets=len(truth), **options).identify(image)
         print(f'  {way:{max(map(len, WAYS))}}  {line(found, truth)}', flush=True)
-        used, seen = found.filter, image
-        if used.applied:
-            seen = HomomorphicFilter(image).filtered(
-                used.gamma_high, used.gamma_low, used.cutoff, used.attenuation
-            )
+        seen = filtered(image, found.filter)
         tiles.append(tile(f'{way}: {method(found)}', seen, found, truth))
     write_image(picture, side_by_side([tiles[:2], tiles[2:]], WIDTH))
     print(f'  {picture}', flush=True)

@@ -16,7 +16,6 @@ import pytest
 
 pytest.importorskip('rclpy', reason='ROS 2 is not installed')
 
-from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.srv import DescribeParameters, SetParameters
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
@@ -151,13 +150,8 @@ def test_colour_and_padding_make_no_difference(
 def test_what_is_refused_is_counted_and_the_node_goes_on(
     graph: Any, detector: DetectorProcess, message: Image
 ) -> None:
-    diagnostics = graph.listen(DiagnosticArray, '/own/diagnostics')
-
-    def rejected() -> tuple[int, str]:
-        told = values(diagnostics[-1])
-        return int(told['rejected']), told['last reason for rejection']
-
-    before = int(values(graph.newer(diagnostics))['rejected'])
+    graph.newer(detector.diagnostics)
+    before = int(detector.told('rejected'))
     flat = image_message(np.zeros((100, 100), np.uint8), header())
     short = image_message(np.zeros((100, 100), np.uint8), header())
     short.height = 200
@@ -168,9 +162,9 @@ def test_what_is_refused_is_counted_and_the_node_goes_on(
         (3, flat, 'image is constant, 0 everywhere'),
     ):
         detector.image.publish(bad)
-        graph.until(lambda count=count: rejected()[0] == before + count)
-        assert rejected()[1].startswith(error)
-        assert diagnostics[-1].status[0].name == 'own/detector: identification'
+        graph.until(lambda count=count: detector.told('rejected') == str(before + count))
+        assert detector.told('last reason for rejection').startswith(error)
+        assert detector.diagnostics[-1].status[0].name == 'own/detector: identification'
         refused.append(bad.header)
     assert len(detector.answer(message).targets) == SCENE['targets']
     assert not [it for it in detector.targets if it.header in refused]
@@ -278,10 +272,9 @@ def test_images_for_those_who_look(
 def test_parameters_are_answered_and_the_latest_image_waits_during_a_search(
     graph: Any, detector: DetectorProcess, rendering: Rendering
 ) -> None:
-    diagnostics = graph.listen(DiagnosticArray, '/own/diagnostics')
 
     def received() -> int:
-        return int(values(graph.newer(diagnostics))['received'])
+        return int(values(graph.newer(detector.diagnostics))['received'])
 
     def answers_in_time(duration: float) -> list[CodedTargetArray | None]:
         """Return the answers to four images, none if the search ended before the last one came."""
@@ -361,9 +354,8 @@ def test_a_signal_ends_the_node_in_the_middle_of_a_search(
     space = f'/ending{number}'
     given = overrides(expected_targets=50, **PATIENT, **dict(ENDLESS))
     detector = DetectorProcess(graph, space, *given)
-    diagnostics = graph.listen(DiagnosticArray, f'{space}/diagnostics')
     detector.image.publish(message)
-    graph.until(lambda: diagnostics and values(diagnostics[-1])['received'] == '1')
+    graph.until(lambda: detector.told('received') == '1')
     assert detector.process.end(number) == (0, '')
     assert detector.targets == []
 

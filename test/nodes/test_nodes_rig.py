@@ -12,7 +12,6 @@ import pytest
 
 pytest.importorskip('rclpy', reason='ROS 2 is not installed')
 
-from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import Image, PointCloud2, PointField
 from std_msgs.msg import Header
 from test_nodes import header
@@ -22,7 +21,7 @@ from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.synthetic.camera import Camera, tilted_camera
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
-from support.detector import DetectorProcess, overrides, values
+from support.detector import DetectorProcess, overrides
 
 SCENE = SceneSettings(width=640, height=480, targets=6, dot_radius=10.0, tilt=30.0, seed=3)
 DISTANCE = 800.0  # mm, of the middle of the wall
@@ -87,20 +86,17 @@ def cloud_message(points: np.ndarray, of: Header) -> PointCloud2:
     )
 
 
-class Rig:
+class Rig(DetectorProcess):
     """A detector that is given clouds, and what it says."""
 
     def __init__(self, graph: Any) -> None:
-        self.graph = graph
-        self.detector = DetectorProcess(graph, '/own', *overrides(cloud='true'))
+        super().__init__(graph, '/own', *overrides(cloud='true'))
         self.points = graph.listen(PointCloud2, '/own/detector/target_points')
-        self.diagnostics = graph.listen(DiagnosticArray, '/own/diagnostics')
         self.cloud = graph.publisher(PointCloud2, '/own/points')
-        graph.until(lambda: self.diagnostics)
 
-    def told(self, name: str) -> int:
+    def count(self, name: str) -> int:
         """Return a number of the diagnostics."""
-        return int(values(self.diagnostics[-1])[name])
+        return int(self.told(name))
 
     def found(self, of: Header) -> PointCloud2:
         """Return the positions of an image, once they are there."""
@@ -111,9 +107,9 @@ class Rig:
     def send_cloud(self, message: PointCloud2) -> None:
         """Publish a cloud, and return when the node has got it."""
         self.graph.newer(self.diagnostics)
-        before = self.told('clouds received')
+        before = self.count('clouds received')
         self.cloud.publish(message)
-        self.graph.until(lambda: self.told('clouds received') > before)
+        self.graph.until(lambda: self.count('clouds received') > before)
 
 
 @pytest.fixture(scope='module')
@@ -150,46 +146,46 @@ def test_every_target_has_its_position_whatever_comes_first(rig: Rig, cloud_firs
     cloud = cloud_message(SCANNED, image.header)
     if cloud_first:
         rig.send_cloud(cloud)
-    answer = rig.detector.answer(image)
+    answer = rig.answer(image)
     if not cloud_first:
         rig.cloud.publish(cloud)
     message = rig.found(image.header)
     assert message.header == Header(stamp=image.header.stamp, frame_id=CLOUD_FRAME)
     assert (message.height, message.width, message.is_dense) == (1, len(answer.targets), False)
     assert_true(message)
-    rig.graph.until(lambda: values(rig.diagnostics[-1])['targets with a position'] == '5 of 6')
+    rig.graph.until(lambda: rig.told('targets with a position') == '5 of 6')
 
 
 def test_what_has_no_partner_is_counted(rig: Rig) -> None:
     names = ('clouds without an image', 'images without a cloud')
     rig.graph.newer(rig.diagnostics)
-    before = [rig.told(name) for name in names]
+    before = [rig.count(name) for name in names]
     lonely, of = header(), header()
     rig.send_cloud(cloud_message(SCANNED, lonely))
-    rig.detector.answer(image_message(RENDERING.image, header()))
+    rig.answer(image_message(RENDERING.image, header()))
     rig.send_cloud(cloud_message(SCANNED, of))
-    rig.detector.answer(image_message(RENDERING.image, of))
+    rig.answer(image_message(RENDERING.image, of))
     rig.found(of)
-    rig.graph.until(lambda: [rig.told(name) for name in names] == [count + 1 for count in before])
+    rig.graph.until(lambda: [rig.count(name) for name in names] == [count + 1 for count in before])
     assert not [it for it in rig.points if it.header.stamp == lonely.stamp]
 
 
 def test_stamps_may_differ_by_the_tolerance(rig: Rig) -> None:
-    with rig.detector.resubscription('points'):
-        assert rig.detector.set(('cloud_tolerance', 0.01)) == (True, '')
+    with rig.resubscription('points'):
+        assert rig.set(('cloud_tolerance', 0.01)) == (True, '')
     image = image_message(RENDERING.image, header())
     cloud = cloud_message(SCANNED, image.header)
     cloud.header.stamp.nanosec += 9_000_000
-    rig.detector.answer(image)
+    rig.answer(image)
     rig.cloud.publish(cloud)
     assert rig.found(image.header).width == SCENE.targets
-    with rig.detector.resubscription('points'):
-        assert rig.detector.set(('cloud_tolerance', 0)) == (True, '')
+    with rig.resubscription('points'):
+        assert rig.set(('cloud_tolerance', 0)) == (True, '')
 
 
 def test_bad_clouds_are_named_and_the_node_goes_on(rig: Rig) -> None:
     rig.graph.newer(rig.diagnostics)
-    before = rig.told('clouds rejected')
+    before = rig.count('clouds rejected')
     flat = cloud_message(SCANNED, header())
     flat.height, flat.width = 1, flat.height * flat.width
     short = cloud_message(SCANNED[:9], header())
@@ -207,26 +203,26 @@ def test_bad_clouds_are_named_and_the_node_goes_on(rig: Rig) -> None:
     ]
     for count, (message, words) in enumerate(bad, start=1):
         rig.cloud.publish(message)
-        rig.graph.until(lambda count=count: rig.told('clouds rejected') == before + count)
-        reason = values(rig.diagnostics[-1])['last reason for rejection of a cloud']
+        rig.graph.until(lambda count=count: rig.count('clouds rejected') == before + count)
+        reason = rig.told('last reason for rejection of a cloud')
         assert reason.startswith(words)
     image = image_message(RENDERING.image, header())
-    rig.detector.answer(image)
+    rig.answer(image)
     rig.cloud.publish(cloud_message(SCANNED[:, :-1], image.header))
-    rig.graph.until(lambda: rig.told('clouds rejected') == before + len(bad) + 1)
-    assert values(rig.diagnostics[-1])['last reason for rejection of a cloud'] == (
+    rig.graph.until(lambda: rig.count('clouds rejected') == before + len(bad) + 1)
+    assert rig.told('last reason for rejection of a cloud') == (
         'cloud has 639 x 480 points, accepted is 640 x 480, the size of the image; for another '
         'one, set cloud_offset_x, cloud_offset_y and cloud_step'
     )
     image = image_message(RENDERING.image, header())
-    rig.detector.answer(image)
+    rig.answer(image)
     rig.cloud.publish(cloud_message(SCANNED, image.header))
     assert_true(rig.found(image.header))
 
 
 def test_no_cloud_is_lost_in_a_lossless_queue(rig: Rig) -> None:
-    with rig.detector.resubscription('image', 'points'):
-        assert rig.detector.set(('queue', 'lossless')) == (True, '')
+    with rig.resubscription('image', 'points'):
+        assert rig.set(('queue', 'lossless')) == (True, '')
     clouds = rig.graph.publisher(PointCloud2, '/own/points')
     images = rig.graph.publisher(Image, '/own/image')
     before = len(rig.points)
@@ -236,15 +232,15 @@ def test_no_cloud_is_lost_in_a_lossless_queue(rig: Rig) -> None:
         images.publish(image_message(RENDERING.image, of))
     rig.graph.until(lambda: len(rig.points) == before + len(headers))
     assert [it.header.stamp for it in rig.points[before:]] == [of.stamp for of in headers]
-    with rig.detector.resubscription('image', 'points'):
-        assert rig.detector.set(('queue', 'latest')) == (True, '')
+    with rig.resubscription('image', 'points'):
+        assert rig.set(('queue', 'latest')) == (True, '')
 
 
 def test_labels_in_space_for_those_who_look(rig: Rig) -> None:
     labels = rig.graph.listen(MarkerArray, '/own/detector/target_labels')
     image = image_message(RENDERING.image, header())
     rig.cloud.publish(cloud_message(SCANNED, image.header))
-    rig.detector.answer(image)
+    rig.answer(image)
     found = read(rig.found(image.header))
     rig.graph.until(lambda: labels)
     first, *texts = labels[-1].markers
@@ -260,7 +256,7 @@ def test_labels_in_space_for_those_who_look(rig: Rig) -> None:
 def test_annotations_of_the_image_for_those_who_look(rig: Rig) -> None:
     annotations = rig.graph.listen(ImageMarker, '/own/detector/annotations')
     image = image_message(RENDERING.image, header())
-    rig.detector.image.publish(image)
+    rig.image.publish(image)
     rig.graph.until(lambda: annotations)
     marker = annotations[-1]
     assert marker.header == image.header
@@ -273,16 +269,16 @@ def test_annotations_of_the_image_for_those_who_look(rig: Rig) -> None:
 
 
 def test_without_the_parameter_there_are_no_clouds(rig: Rig) -> None:
-    assert rig.detector.set(('cloud', False)) == (True, '')
+    assert rig.set(('cloud', False)) == (True, '')
     rig.graph.until(lambda: not rig.cloud.get_subscription_count())
     count = len(rig.points)
-    rig.detector.answer(image_message(RENDERING.image, header()))
+    rig.answer(image_message(RENDERING.image, header()))
     assert len(rig.points) == count
-    assert rig.detector.set(('cloud', True)) == (True, '')
+    assert rig.set(('cloud', True)) == (True, '')
     rig.graph.until(rig.cloud.get_subscription_count)
     image = image_message(RENDERING.image, header())
     rig.send_cloud(cloud_message(SCANNED, image.header))
-    rig.detector.answer(image)
+    rig.answer(image)
     assert rig.found(image.header).width == SCENE.targets
 
 

@@ -9,14 +9,13 @@ import pytest
 
 pytest.importorskip('rclpy', reason='ROS 2 is not installed')
 
-from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
 from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.nodes.settings import IlluminationNodeSettings
 from ahf_ros.synthetic.scene import SceneSettings, render
-from support.detector import DetectorProcess, overrides, values
+from support.detector import DetectorProcess, overrides
 
 SCENE = SceneSettings(
     width=400, height=300, targets=4, dot_radius=10, light='stripe', ambient=0.02, phases=4
@@ -63,21 +62,17 @@ def test_a_stack_is_answered_once_with_the_stamp_of_its_last_image(
 def test_what_does_not_belong_together_is_answered_and_said(
     detector: DetectorProcess,
 ) -> None:
-    diagnostics = detector.graph.listen(DiagnosticArray, '/stacks/diagnostics')
-
-    def said(name: str) -> int:
-        return int(values(diagnostics[-1])[name])
-
-    detector.graph.newer(diagnostics)
-    before = said('stacks that were not full')
+    detector.graph.newer(detector.diagnostics)
+    before = int(detector.told('stacks that were not full'))
     small = [pixels[:-20] for pixels in PHASES]
     stream = [message(pixels, 30 + number) for number, pixels in enumerate(PHASES[:2])]
     stream += [message(pixels, 32 + number) for number, pixels in enumerate(small[:2])]
     stream += [message(pixels, 20 + number) for number, pixels in enumerate(small)]
     stamps = [stamp for stamp, _ in sent(detector, stream, 3)]
     assert stamps == [31, 33, 23]
-    detector.graph.until(lambda: said('stacks that were not full') == before + 2)
-    assert said('rejected') == 0
+    after = str(before + 2)
+    detector.graph.until(lambda: detector.told('stacks that were not full') == after)
+    assert detector.told('rejected') == '0'
 
 
 def test_a_stack_that_does_not_fill_is_answered_when_its_time_is_up(
