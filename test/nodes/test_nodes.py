@@ -34,12 +34,13 @@ SCENE = {'width': 1000, 'height': 700, 'targets': 6}
 MAXIMUM_ERROR = 0.1  # px
 PATIENT = {'image_timeout': 0}
 """Nothing is said of images that a busy machine has not sent yet."""
-ENDLESS = (
-    ('max_evaluations', 0),
-    ('population', 10000),
-    ('generations', 100000),
-    ('patience', 1000000),
-)
+ENDLESS = {
+    'expected_targets': 50,
+    'max_evaluations': 0,
+    'population': 10000,
+    'generations': 100000,
+    'patience': 1000000,
+}
 
 
 def stamp(header: Header) -> tuple[int, int]:
@@ -283,7 +284,7 @@ def test_parameters_are_answered_and_the_latest_image_waits_during_a_search(
         def answer(image: Image) -> CodedTargetArray | None:
             return next((it for it in detector.targets if it.header == image.header), None)
 
-        search = *ENDLESS, ('max_duration', duration), ('expected_targets', 50)
+        search = *ENDLESS.items(), ('max_duration', duration)
         assert detector.set(*search) == (True, '')
         before = received()
         detector.image.publish(images[0])
@@ -352,7 +353,7 @@ def test_a_signal_ends_the_node_in_the_middle_of_a_search(
     graph: Any, message: Image, number: signal.Signals
 ) -> None:
     space = f'/ending{number}'
-    given = overrides(expected_targets=50, **PATIENT, **dict(ENDLESS))
+    given = overrides(**PATIENT, **ENDLESS)
     detector = DetectorProcess(graph, space, *given)
     detector.image.publish(message)
     graph.until(lambda: detector.told('received') == '1')

@@ -20,6 +20,7 @@ from rcl_interfaces.srv import ListParameters
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header, String
+from test_nodes import ENDLESS
 
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.image_msg import image_message
@@ -32,13 +33,6 @@ from support.detector import DetectorProcess, overrides
 from support.hostile import IMAGES, Fields
 
 SCENE = {'width': 320, 'height': 240, 'targets': 3, 'dot_radius': 9.0}
-ENDLESS = {
-    'expected_targets': 50,
-    'max_evaluations': 0,
-    'population': 10000,
-    'generations': 100000,
-    'patience': 1000000,
-}
 
 
 @pytest.fixture(scope='module')
