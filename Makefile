@@ -1,4 +1,4 @@
-# make demo    ROS 2 nodes identify one striped image in three ways: a line each, a picture in demo/
+# make demo    one striped image is identified in three ways: a line each, a picture in demo/
 #              DEMO='--light lattice --ambient 0.12' and so on; ahf_demo --help lists all options
 # make test    every check: ruff, mypy, the import rules, the site, the tests; then the tests that
 #              need no ROS with the oldest versions and without the processor's vector units

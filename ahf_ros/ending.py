@@ -82,10 +82,7 @@ def _pass(_: int, __: FrameType | None) -> None:
 def interrupt(frame: FrameType | None) -> None:
     """Raise what `check` does in the main thread, after an import if that is not too long.
 
-    Parameters
-    ----------
-    frame : frame, optional
-        Where a signal interrupts the main thread; the handler of the signal calls this.
+    The handler of a signal calls this with the frame where the signal interrupts that thread.
     """
     global _limit
     _limit = time.monotonic() + GRACE
@@ -109,13 +106,7 @@ def at_begin(action: Callable[[], None]) -> None:
 
 
 def begin(number: int = signal.SIGTERM) -> None:
-    """Say that this process ends, and why: nobody waits for programs and detectors any more.
-
-    Parameters
-    ----------
-    number : int
-        The signal, or the one that stands for the reason.
-    """
+    """Say that this process ends, and by which signal: nobody waits for programs any more."""
     global _number
     _number = number
     for action in _actions:
@@ -130,12 +121,8 @@ def has_begun() -> bool:
 def check() -> None:
     """Go on, unless this process ends.
 
-    Raises
-    ------
-    KeyboardInterrupt
-        If it ends by SIGINT.
-    SystemExit
-        If it ends by another signal; its code is 128 and the number of the signal.
+    It raises a KeyboardInterrupt if that is by SIGINT, otherwise a SystemExit whose code is 128
+    and the number of the signal.
     """
     global _raised
     if _number is None:

@@ -11,7 +11,6 @@ from ahf_ros.codes.families import mirrored_number
 from ahf_ros.deprecation import deprecated_arguments
 from ahf_ros.detectors import (
     Detector,
-    DetectorSettings,
     Drafter,
     EarlyStopping,
     Expecting,
@@ -25,7 +24,7 @@ from ahf_ros.filtering.trials import DetectorFunction
 from ahf_ros.imaging.stack import ImageStack
 from ahf_ros.session_settings import IdentificationSettings
 from ahf_ros.settings.nested import updated
-from ahf_ros.target import Identification, Target
+from ahf_ros.target import Identification
 from ahf_ros.text import shown
 
 if TYPE_CHECKING:
@@ -83,7 +82,11 @@ def create_identifier(
         used = used.expecting(listed) if isinstance(used, Expecting) else used
     estimate = None
     if settings.estimate_expected:
-        _check_family(used, settings.detection)
+        if isinstance(used, Detector) and used.family != settings.detection.family:
+            raise ValueError(
+                f'family is {settings.detection.family!r}, accepted with estimate_expected is '
+                f'that of the detector, {used.family!r}'
+            )
         estimate = estimator(settings.detection)
     return Identifier(
         used,
@@ -94,7 +97,7 @@ def create_identifier(
         estimate=estimate,
         interrupt=interrupt,
         patience=used.patience if isinstance(used, EarlyStopping) else 0,
-        mirrored=_mirrored_id,
+        mirrored=lambda target: mirrored_number(target.family, target.code),
         name=f'detector {used.name!r}' if isinstance(used, Detector) else 'detector',
     )
 
@@ -149,18 +152,4 @@ def _check_kinds(detector: object, settings: object) -> None:
             f'settings is {shown(settings)}, accepted is an IdentificationSettings; a detector is '
             'given as detector=..., and DetectorSettings as '
             'settings=IdentificationSettings(detection=...)'
-        )
-
-
-def _mirrored_id(target: Target) -> int | None:
-    """Return the ID that a target has in a mirror, None if that is unknown."""
-    return mirrored_number(target.family, target.code)
-
-
-def _check_family(detector: DetectorFunction, settings: DetectorSettings) -> None:
-    """Refuse to count targets of another family than the detector's."""
-    if isinstance(detector, Detector) and detector.family != settings.family:
-        raise ValueError(
-            f'family is {settings.family!r}, accepted with estimate_expected is that of the '
-            f'detector, {detector.family!r}'
         )

@@ -32,37 +32,18 @@ _LONGEST_REASON = 2000  # characters
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame(Generic[Item]):
-    """A decoded image of a stream.
+    """A decoded image of a stream."""
 
-    Attributes
-    ----------
-    item
-        What stands for the image in its answer, such as its header or its path.
-    image : ndarray of uint8, uint16, float32 or float64, shape (height, width)
-    kind : hashable
-        Its size and encoding; another one begins a new stack.
-    stamp : int
-        Its time, ns; an earlier one than before begins a new stack.
-    """
-
-    item: Item
-    image: np.ndarray
-    kind: Hashable
-    stamp: int
+    item: Item  # what stands for the image in its answer, such as its header or its path
+    image: np.ndarray  # of uint8, uint16, float32 or float64, shape (height, width)
+    kind: Hashable  # its size and encoding; another one begins a new stack
+    stamp: int  # its time, ns; an earlier one than before begins a new stack
 
 
 def message_frame(message: Any) -> Frame[Any]:
-    """Return the image of a message with its header.
+    """Return the image of a message of ROS or rosbags, Image or CompressedImage, with its header.
 
-    Parameters
-    ----------
-    message : sensor_msgs.msg.Image or sensor_msgs.msg.CompressedImage
-        Of ROS or rosbags.
-
-    Raises
-    ------
-    ValueError
-        If the image is not accepted.
+    An image that is not accepted raises a ValueError.
     """
     compressed = hasattr(message, 'format')
     image = decode_compressed(message) if compressed else decode_image(message)
@@ -115,19 +96,10 @@ class Kind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Remark:
-    """What there is to say about an image or a stack.
-
-    Attributes
-    ----------
-    kind : Kind
-    text : str
-        Printable.
-    error : Exception, optional
-        What an image or a stack is refused for.
-    """
+    """What there is to say about an image or a stack; the error is what it is refused for."""
 
     kind: Kind
-    text: str
+    text: str  # printable
     error: Exception | None = field(default=None, compare=False)
 
 
@@ -169,12 +141,12 @@ class Stream(Generic[Item]):
         timed: bool = True,
         interrupt: Callable[[], None] | None = None,
     ) -> None:
-        self._identifier = create_identifier(
-            detector=detector, settings=settings, interrupt=interrupt
-        )
         self._stacking = stacking
         self._timed = timed
         self._window: Window[Frame[Item]] = Window(stacking)
+        self._identifier = create_identifier(
+            detector=detector, settings=settings, interrupt=interrupt
+        )
 
     @property
     def memory(self) -> Memory:
@@ -197,32 +169,15 @@ class Stream(Generic[Item]):
         self._identifier.reset()
 
     def identify(self, frame: Frame[Item], expected_targets: int | None = None) -> Answer[Item]:
-        """Identify the targets of an image that is in no stack.
-
-        Parameters
-        ----------
-        frame : Frame
-        expected_targets : int, optional
-            N, as for `Identifier.identify`.
-
-        Raises
-        ------
-        Exception
-            Whatever `Identifier.identify` raises.
-        """
+        """Identify the targets of an image that is in no stack, as `Identifier.identify` does."""
         stack = ImageStack((frame.image,))
         found = self._identifier.identify(stack, expected_targets=expected_targets)
         return self._answer((frame.item,), 1, stack, found)
 
     def resume(self, memory: Memory, read: Callable[[], Frame[Item]]) -> None:
-        """Go on as if an image had just been answered.
+        """Go on as if an image had just been answered and had left this memory.
 
-        Parameters
-        ----------
-        memory : Memory
-            What the image left.
-        read : callable
-            As for `add`; called if the image may belong to an unfinished stack.
+        `read` is as for `add`; it is called if the image may belong to an unfinished stack.
         """
         self._identifier.memory = memory
         if self._stacking.stack > 1:
@@ -231,15 +186,8 @@ class Stream(Generic[Item]):
     def add(self, read: Callable[[], Frame[Item]]) -> Iterator[Answer[Item] | Remark]:
         """Add an image, and yield what there is to say and the answers to what is complete.
 
-        Parameters
-        ----------
-        read : callable
-            Returns the image; what it raises is why the image is refused.
-
-        Raises
-        ------
-        Unavailable
-            If the detector cannot be used: that is not the fault of the image.
+        `read` returns the image; what it raises is why the image is refused. Only `Unavailable` is
+        raised again: that a detector cannot be used is not the fault of the image.
         """
         for gathered in self._gathered(read):
             if isinstance(gathered, Remark):
@@ -292,13 +240,7 @@ class Stream(Generic[Item]):
 
 
 def refusal(error: Exception) -> Remark:
-    """Return why an image is refused.
-
-    Raises
-    ------
-    Unavailable
-        If the error is one: that is not the fault of the image, another run may find the detector.
-    """
+    """Return why an image is refused; raise `Unavailable`: another run may find the detector."""
     if isinstance(error, Unavailable):
         raise error
     return why_refused(error)
@@ -313,29 +255,15 @@ def why_refused(error: Exception) -> Remark:
 
 @dataclass(frozen=True, slots=True)
 class Gathered(Generic[Item]):
-    """Images that are identified together.
-
-    Attributes
-    ----------
-    items : tuple
-        In the order in which they came.
-    fresh : int
-        How many of the last ones have not been answered before.
-    reason : str
-        Why there are fewer than a stack has; empty if there are not.
-    """
+    """Images that are identified together, in the order in which they came."""
 
     items: tuple[Item, ...]
-    fresh: int
-    reason: str = ''
+    fresh: int  # how many of the last ones have not been answered before
+    reason: str = ''  # why there are fewer than a stack has; empty if there are not
 
 
 class Window(Generic[Item]):
     """Gathers the images of a stream to stacks.
-
-    Parameters
-    ----------
-    settings : StackSettings
 
     Examples
     --------
@@ -357,16 +285,9 @@ class Window(Generic[Item]):
         return self._fresh
 
     def add(self, item: Item, kind: Hashable, stamp: int) -> list[Gathered[Item]]:
-        """Add an image and return the stacks that this completes or ends.
+        """Add an image, or what stands for it, and return the stacks that this completes or ends.
 
-        Parameters
-        ----------
-        item
-            The image, or what stands for it.
-        kind : hashable
-            Its size and encoding; another one begins a new stack.
-        stamp : int
-            Its time, ns; an earlier one than before begins a new stack.
+        Another kind (size and encoding) or an earlier stamp (ns) than before begins a new stack.
         """
         ended: list[Gathered[Item]] = []
         before, time = self._last
@@ -382,7 +303,7 @@ class Window(Generic[Item]):
         self._fresh += 1
         if len(self._items) < self._size:
             return ended
-        full = Gathered(tuple(self._items), self._fresh)
+        full = Gathered(items=tuple(self._items), fresh=self._fresh)
         self._fresh = 0
         if not self._sliding:
             self._items = []
@@ -394,34 +315,23 @@ class Window(Generic[Item]):
         self._items, self._fresh = [], 0
         if not fresh:
             return []
-        return [Gathered(items, fresh, f'{len(items)} of {self._size} images: {why}')]
+        reason = f'{len(items)} of {self._size} images: {why}'
+        return [Gathered(items=items, fresh=fresh, reason=reason)]
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """Consecutive images of a stack that are identified together.
+    """Consecutive images of a stack that are identified together."""
 
-    Attributes
-    ----------
-    images : range
-        Their indices in the stack.
-    split : str
-        Why the stack was split before the first of them; empty at its beginning.
-    """
-
-    images: range
-    split: str = ''
+    images: range  # their indices in the stack
+    split: str = ''  # why the stack was split before the first of them; empty at its beginning
 
 
 def unmoved_parts(images: Sequence[np.ndarray], look_for_movement: bool = True) -> list[Part]:
     """Return the parts of a stack that can be combined and in which nothing moved.
 
-    Parameters
-    ----------
-    images : sequence of ndarray of uint8, uint16, float32 or float64, shape (height, width)
-        In the order in which they were taken.
-    look_for_movement : bool
-        False if only size and pixel type count.
+    `images` are of shape (height, width) and of type uint8, uint16, float32 or float64, in the
+    order in which they were taken. Without `look_for_movement` only size and type count.
 
     Examples
     --------
@@ -450,7 +360,6 @@ def identify_parts(
     identifier: Identifier,
     images: Sequence[np.ndarray],
     settings: StackSettings,
-    expected_targets: int | None = None,
     fresh: int | None = None,
 ) -> Iterator[tuple[Part, ImageStack, Identification]]:
     """Yield the parts of a stack with their images and identifications.
@@ -461,8 +370,6 @@ def identify_parts(
     images : sequence of ndarray of uint8, uint16, float32 or float64, shape (height, width)
         In the order in which they were taken; one image is identified as it is.
     settings : StackSettings
-    expected_targets : int, optional
-        N, as for `Identifier.identify`.
     fresh : int, optional
         How many of the last images were not identified before; parts without them are left out.
         All where None.
@@ -485,4 +392,4 @@ def identify_parts(
     for part in unmoved_parts(images, settings.stack_movement):
         if part.images.stop > first_fresh:
             stack = ImageStack(tuple(images[index] for index in part.images))
-            yield part, stack, identifier.identify(stack, expected_targets=expected_targets)
+            yield part, stack, identifier.identify(stack)

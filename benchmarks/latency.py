@@ -32,7 +32,6 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
 from ahf_ros.msg import CodedTargetArray
-from ahf_ros.nodes.demo import profile_variable
 from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.nodes.settings import LATEST, LOSSLESS
 from ahf_ros.synthetic.scene import SceneSettings, render
@@ -40,7 +39,8 @@ from benchmarks import report
 from support import live
 
 PROFILE = Path(__file__).resolve().parents[1] / 'config' / 'fastdds_shm.xml'
-TRANSPORTS = {'defaults': {}, PROFILE.name: {profile_variable(): str(PROFILE)}}
+VARIABLES = ('FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE')
+TRANSPORTS = {'defaults': {}, PROFILE.name: dict.fromkeys(VARIABLES, str(PROFILE))}
 """Environments by the names of what they set up."""
 
 SIZES = {'2.5 MP': (1936, 1296, 10.0), '10.6 MP': (3984, 2656, 20.0)}

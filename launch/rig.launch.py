@@ -7,9 +7,9 @@ from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
 
 from ahf_ros.nodes.drivers import DRIVERS
-from ahf_ros.nodes.launching import CLOUD, USUAL, arguments, detector
+from ahf_ros.nodes.launching import USUAL, arguments, detector
 
-PARAMETERS = (*USUAL, *CLOUD)
+PARAMETERS = (*USUAL, 'cloud_tolerance', 'cloud_offset_x', 'cloud_offset_y', 'cloud_step')
 
 
 def generate_launch_description():

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cached_property
 from pathlib import PurePosixPath
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.srv import GetParameters, SetParametersAtomically
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import Image
@@ -15,6 +17,21 @@ from std_srvs.srv import Trigger
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.srv import Identify
 from support.live import Graph
+
+
+def overrides(**given: Any) -> list[str]:
+    """Return command line arguments that set parameters."""
+    return [word for name, value in given.items() for word in ('-p', f'{name}:={value}')]
+
+
+def own(namespace: str) -> tuple[str, ...]:
+    """Return the arguments that put a node and its diagnostics into a namespace."""
+    return '-r', f'__ns:={namespace}', '-r', f'/diagnostics:={namespace}/diagnostics'
+
+
+def values(message: DiagnosticArray) -> dict[str, str]:
+    """Return what a node says about itself."""
+    return {item.key: item.value for item in message.status[0].values}
 
 
 class DetectorProcess:
@@ -30,11 +47,25 @@ class DetectorProcess:
     ) -> None:
         self.graph = graph
         self.namespace = namespace
-        places = '-r', f'__ns:={namespace}', '-r', f'/diagnostics:={namespace}/diagnostics'
-        self.process = graph.start('detector', *places, *arguments)
+        self.start(*arguments)
         self.targets = graph.listen(CodedTargetArray, f'{self.namespace}/coded_targets')
         if subscribed:
             self.image = graph.publisher(Image, str(PurePosixPath(namespace, images)))
+
+    def start(self, *arguments: str) -> None:
+        """Start the process, as after the end of another one."""
+        self.process = self.graph.start('detector', *own(self.namespace), *arguments)
+
+    @cached_property
+    def diagnostics(self) -> list[DiagnosticArray]:
+        """What the node says about itself from now on, at least once."""
+        said = self.graph.listen(DiagnosticArray, f'{self.namespace}/diagnostics')
+        self.graph.until(lambda: said)
+        return said
+
+    def told(self, name: str) -> str:
+        """Return what the node said last about something, nothing before it said anything."""
+        return values(self.diagnostics[-1])[name] if self.diagnostics else ''
 
     def answer(self, message: Image) -> CodedTargetArray:
         """Return the answer to an image."""

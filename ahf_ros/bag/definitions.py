@@ -56,14 +56,9 @@ _LATCHED = Qos(
 
 
 def definition_folder() -> Path:
-    """Return the folder of the .msg files of this package.
+    """Return the folder of the .msg files of this package, which has to have them.
 
     In the sources it is beside the package; in an installation it is below `share`.
-
-    Raises
-    ------
-    FileNotFoundError
-        If the files are missing.
     """
     package = Path(ahf_ros.__file__).resolve().parent
     # The second is for a package in PREFIX/lib/python3.12/site-packages/ahf_ros.
@@ -78,11 +73,9 @@ def definition_folder() -> Path:
 def typestore() -> Typestore:
     """Return the message types of ROS 2 Jazzy and of this package; nobody adds any."""
     store = get_typestore(Stores.ROS2_JAZZY)
-    types = {}
     for name in _NAMES:
         text = (definition_folder() / f'{name}.msg').read_text(encoding='utf-8')
-        types.update(get_types_from_msg(text, f'ahf_ros/msg/{name}'))
-    store.register(types)
+        store.register(get_types_from_msg(text, f'ahf_ros/msg/{name}'))
     return store
 
 
@@ -102,13 +95,7 @@ class TypeStores:
         self._stores: dict[tuple[str, MessageDefinition], Typestore] = {}
 
     def of(self, item: Connection) -> Typestore:
-        """Return the types of a topic.
-
-        Raises
-        ------
-        ValueError
-            If the definition in the bag is invalid or the type is unknown.
-        """
+        """Return the types of a topic; an unknown one that is not well defined is a ValueError."""
         key = (item.msgtype, item.msgdef)
         if key not in self._stores:
             try:
@@ -124,13 +111,7 @@ class TypeStores:
         return self._stores[key]
 
     def deserialize(self, item: Connection, data: bytes) -> Any:
-        """Return a message of a topic.
-
-        Raises
-        ------
-        ValueError
-            If the data do not match their type, or the type is unknown.
-        """
+        """Return a message of a topic; data that do not match their type are a ValueError."""
         store = self.of(item)
         try:
             return store.deserialize_cdr(data, item.msgtype)

@@ -1,7 +1,7 @@
 """Identification of all images of a bag, into a copy of the bag with the results.
 
 First, the results of all images are written to a journal in the folder of the new bag
-(`ahf_ros.bag.journal`). Then the bag is written in one pass, at the speed of the disk, and
+(`ahf_ros.bag.output`). Then the bag is written in one pass, at the speed of the disk, and
 replaces the journal. A run that was killed continues where it stopped.
 """
 
@@ -10,31 +10,39 @@ from __future__ import annotations
 import json
 import re
 import sqlite3
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import closing
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import cv2
 from rosbags.rosbag2 import WriterError
 
 from ahf_ros import ending
-from ahf_ros.bag import journal as journals
-from ahf_ros.bag.answering import Answering, AnswerTopics
-from ahf_ros.bag.assembly import (
-    TASK_KEY,
+from ahf_ros.bag.definitions import CODED_TARGETS, COMPRESSED_IMAGE, message_types, typestore
+from ahf_ros.bag.output import (
+    JOURNAL,
+    AnswerTopics,
+    Entry,
+    Journal,
     Outcome,
-    assemble,
+    Output,
+    begin,
+    begun_with,
     check_entry,
-    custom_data,
     finished,
-    remove_assembled,
+    remove_unfinished,
+    write_bag,
 )
-from ahf_ros.bag.journal import Entry, Journal
 from ahf_ros.bag.source import Message, Source, seconds
+from ahf_ros.detectors import create_detector
+from ahf_ros.drawing.overlay import draw
 from ahf_ros.interchange.files import locked
+from ahf_ros.interchange.target_messages import coded_target_array
 from ahf_ros.session_settings import IdentificationSettings, StackSettings
-from ahf_ros.settings.parameter import parameters
+from ahf_ros.settings.nested import flat_values
+from ahf_ros.stream import Answer, Frame, Kind, Remark, Stream, message_frame, refusal
 
 WRITING_ERRORS = (OSError, sqlite3.Error, WriterError)
 """Errors of writing a bag, such as a full disk or a folder without permission."""
@@ -46,66 +54,30 @@ unknown, and what there is to say about this image or its stack, empty if there 
 _FORMAT = 3  # version of the journal and of the data stored in a bag
 _TOPIC_NAME = re.compile(r'/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*', re.ASCII)
 _ADDRESS = re.compile('[?#%]')  # rosbags opens SQLite files by an address
-_OF_STACKS = tuple(item.name for item in parameters(StackSettings))
-_IRRELEVANT = (
-    'source',
-    'output',
-    'threads',
-    'lock_timeout',
-)  # settings that do not change the bag
 
 
 @dataclass(frozen=True, slots=True)
 class BagTask:
-    """Task of `answer_bag`.
+    """Task of `answer_bag`."""
 
-    Attributes
-    ----------
-    source : Path
-        The bag with the images.
-    output : Path
-        The bag to write.
-    topics : tuple of str
-        Topics of the images; all if empty.
-    output_topic : str
-        Topic of the results; without a leading slash, relative to the topic of the images.
-    storage : str
-        One of `ahf_ros.bag.assembly.STORAGES`.
-    debug_images : bool
-        Whether to write annotated images, as JPEG.
-    identification : IdentificationSettings
-        Settings of the identification.
-    stacking : StackSettings
-        Which images are identified together.
-    lock_timeout : float
-        Time to wait for another process that writes the bag, s.
-    """
-
-    source: Path
-    output: Path
-    topics: tuple[str, ...] = ()
-    output_topic: str = 'coded_targets'
-    storage: str = 'mcap'
-    debug_images: bool = False
+    source: Path  # the bag with the images
+    output: Path  # the bag to write
+    topics: tuple[str, ...] = ()  # of the images; all if empty
+    output_topic: str = (
+        'coded_targets'  # relative to the topic of the images unless it begins with /
+    )
+    storage: str = 'mcap'  # or 'sqlite3'
+    debug_images: bool = False  # whether to write annotated images, as JPEG
     identification: IdentificationSettings = field(default_factory=IdentificationSettings)
     stacking: StackSettings = field(default_factory=StackSettings)
-    lock_timeout: float = 0.0
+    lock_timeout: float = 0.0  # time to wait for another process that writes the bag, s
 
 
 def answer_bag(task: BagTask, report: Report) -> Outcome:
     """Identify the targets of all images in a bag, or continue an interrupted run.
 
-    Parameters
-    ----------
-    task : BagTask
-    report : callable
-        Called after each image, also for images of an earlier run.
-
-    Returns
-    -------
-    Outcome
-        Equal for equal tasks, as is the bag, byte for byte, however often the run was
-        interrupted.
+    The outcome is equal for equal tasks, as is the bag, byte for byte, however often the run was
+    interrupted. `report` is called after each image, also for images of an earlier run.
 
     Raises
     ------
@@ -123,23 +95,15 @@ def answer_bag(task: BagTask, report: Report) -> Outcome:
         task.output.mkdir(parents=True, exist_ok=True)
         with locked(task.output, task.lock_timeout):
             _begin(task.output, origin)
-            outcome = finished(task.output) or _made(task, source, topics, origin, report)
-            remove_assembled(task.output)
-            journals.remove(task.output)
+            outcome = finished(task.output)
+            if outcome is None:
+                with closing(Journal(task.output)) as journal:
+                    _answer_images(task, source, topics, journal, report)
+                    outcome = write_bag(
+                        source, task.output, topics, journal, task.storage, json.dumps(origin)
+                    )
+            remove_unfinished(task.output)
     return outcome
-
-
-def _made(
-    task: BagTask,
-    source: Source,
-    topics: dict[str, AnswerTopics],
-    origin: dict[str, Any],
-    report: Report,
-) -> Outcome:
-    """Complete the journal, then write the bag."""
-    with closing(Journal(task.output)) as journal:
-        _answer_images(task, source, topics, journal, report)
-        return assemble(source, task.output, topics, journal, task.storage, json.dumps(origin))
 
 
 def _answer_topics(task: BagTask, source: Source) -> dict[str, AnswerTopics]:
@@ -170,29 +134,29 @@ def _answer_topics(task: BagTask, source: Source) -> dict[str, AnswerTopics]:
 
 def _origin(task: BagTask, source: Source, topics: dict[str, AnswerTopics]) -> dict[str, Any]:
     """Return everything that the results depend on."""
-    origin = _flat(asdict(task))
-    irrelevant = _IRRELEVANT if task.stacking.stack > 1 else (*_IRRELEVANT, *_OF_STACKS)
-    origin = {name: value for name, value in origin.items() if name not in irrelevant}
-    origin |= {'topics': list(topics), 'size of the bag': source.size(), 'format': _FORMAT}
+    origin = {
+        'topics': list(topics),
+        'output_topic': task.output_topic,
+        'storage': task.storage,
+        'debug_images': task.debug_images,
+        **flat_values(task.identification),
+        **(flat_values(task.stacking) if task.stacking.stack > 1 else {}),
+        'size of the bag': source.size(),
+        'format': _FORMAT,
+    }
+    del origin['threads']  # which does not change the bag
     return origin
-
-
-def _flat(values: dict[str, Any]) -> dict[str, Any]:
-    flat: dict[str, Any] = {}
-    for name, value in values.items():
-        flat |= _flat(value) if isinstance(value, dict) else {name: value}
-    return flat
 
 
 def _begin(output: Path, origin: dict[str, Any]) -> None:
     """Begin a bag, or raise a ValueError unless it was begun with the same task."""
-    begun = journals.begun_with(output) or custom_data(output).get(TASK_KEY)
-    if begun is None:
-        if any(not it.name.startswith(journals.NAME) for it in output.iterdir()):
+    begun = begun_with(output)
+    if not begun:
+        if any(not it.name.startswith(JOURNAL) for it in output.iterdir()):
             raise ValueError(
                 f'{output} exists, accepted is a new name or a bag that was begun here'
             )
-        journals.begin(output, json.dumps(origin))
+        begin(output, json.dumps(origin))
         return
     before = json.loads(begun)
     for name in before | origin:
@@ -206,12 +170,12 @@ def _begin(output: Path, origin: dict[str, Any]) -> None:
 def _answer_images(
     task: BagTask,
     source: Source,
-    topics: dict[str, AnswerTopics],
+    topics: Mapping[str, AnswerTopics],
     journal: Journal,
     report: Report,
 ) -> None:
     """Identify the images that are not in the journal yet."""
-    answering = Answering(source, topics, task.identification, task.stacking)
+    answering = _Answering(task, source, topics)
     total = sum(item.msgcount for item in source.connections if item.topic in topics)
     earlier = list(journal.entries)
     for number, (message, last) in enumerate(_with_last(source.messages(topics))):
@@ -224,7 +188,9 @@ def _answer_images(
             entry, outputs = answering.answer(message, last)
             ending.check()  # the answer may be that of a program that was ended
             journal.append(entry, outputs)
-        report(number + 1, total, _remark(entry))
+        said = '; '.join(filter(None, (entry.reason, entry.note)))
+        about = f'{entry.topic} at {seconds(entry.timestamp)} s: {said}' if said else ''
+        report(number + 1, total, about)
 
 
 def _with_last(messages: Iterable[Message]) -> Iterator[tuple[Message, bool]]:
@@ -238,7 +204,69 @@ def _with_last(messages: Iterable[Message]) -> Iterator[tuple[Message, bool]]:
         yield before, True
 
 
-def _remark(entry: Entry) -> str:
-    """Return what there is to say about an image; empty if there is nothing."""
-    said = '; '.join(filter(None, (entry.reason, entry.note)))
-    return f'{entry.topic} at {seconds(entry.timestamp)} s: {said}' if said else ''
+class _Answering:
+    """Identifies the images of each topic as a node of its own would.
+
+    A stack is answered with the header of its last image.
+    """
+
+    def __init__(self, task: BagTask, source: Source, topics: Mapping[str, AnswerTopics]) -> None:
+        settings = task.identification
+        detector = create_detector(settings.detector, settings=settings.detection)
+        self._source = source
+        self._topics = topics
+        self._family = detector.family
+        # Without durations, runs are byte-identical.
+        self._streams: dict[str, Stream[Any]] = {
+            topic: Stream(settings, task.stacking, detector, timed=False, interrupt=ending.check)
+            for topic in topics
+        }
+        self._store = typestore()
+        self._types = message_types(self._store)
+
+    def answer(self, message: Message, last: bool) -> tuple[Entry, list[Output]]:
+        """Return what becomes of an image, and the messages about it; the last ends all stacks."""
+        connection, timestamp, _ = message
+        topic = connection.topic
+        said = [(topic, it) for it in self._streams[topic].add(lambda: self._frame(message))]
+        if last:
+            for name, stream in self._streams.items():
+                said += [(name, it) for it in stream.end('no image follows')]
+        outputs: list[Output] = []
+        remarks: list[Remark] = []
+        for name, it in said:
+            try:
+                if isinstance(it, Remark):
+                    remarks.append(it)
+                else:
+                    outputs += list(self._messages(self._topics[name], it))
+            except Exception as error:
+                remarks.append(refusal(error))
+        entry = Entry(
+            topic=topic,
+            timestamp=timestamp,
+            memory=self._streams[topic].memory,
+            reason='; '.join(it.text for it in remarks if it.kind == Kind.REFUSED),
+            note='; '.join(it.text for it in remarks if it.kind != Kind.REFUSED),
+        )
+        return entry, outputs
+
+    def resume(self, entry: Entry, message: Message) -> None:
+        """Go on as if an image had just been answered."""
+        self._streams[entry.topic].resume(entry.memory, lambda: self._frame(message))
+
+    def _frame(self, message: Message) -> Frame[Any]:
+        connection, _, data = message
+        return message_frame(self._source.stores.deserialize(connection, data))
+
+    def _messages(self, topics: AnswerTopics, answer: Answer[Any]) -> Iterator[Output]:
+        """Yield the messages about an image or a stack."""
+        header, found = answer.items[-1], answer.identification
+        message = coded_target_array(found, self._family, answer.stack.shape, header, self._types)
+        yield topics.targets, bytes(self._store.serialize_cdr(message, CODED_TARGETS))
+        if topics.debug_image:
+            _, encoded = cv2.imencode('.jpg', draw(answer.image, found))
+            drawn = self._store.types[COMPRESSED_IMAGE](
+                header=header, format='bgr8; jpeg compressed bgr8', data=encoded.ravel()
+            )
+            yield topics.debug_image, bytes(self._store.serialize_cdr(drawn, COMPRESSED_IMAGE))

@@ -53,31 +53,15 @@ _MAXIMUM_LINES = 100  # about what is missing; more are only counted
 
 @dataclass(frozen=True, slots=True)
 class Metadata:
-    """What metadata.yaml says.
+    """What metadata.yaml says."""
 
-    Attributes
-    ----------
-    files : tuple of str
-        Names of the files in their order.
-    counts : Counter
-        Number of messages by topic.
-    custom : dict of str to str
-        What somebody has added.
-    """
-
-    files: tuple[str, ...] = ()
-    counts: Counter[str] = field(default_factory=Counter)
-    custom: dict[str, str] = field(default_factory=dict)
+    files: tuple[str, ...] = ()  # their names in their order
+    counts: Counter[str] = field(default_factory=Counter)  # of the messages, by topic
+    custom: dict[str, str] = field(default_factory=dict)  # what somebody has added
 
 
 def read_metadata(folder: Path) -> Metadata:
-    """Return what the metadata of a bag say.
-
-    Raises
-    ------
-    ValueError
-        If there are none, or they are not as ROS 2 writes them.
-    """
+    """Return what the metadata of a bag say; a ValueError unless they are as ROS 2 writes them."""
     try:
         text = (folder / METADATA).read_text(encoding='utf-8')
         about = YAML(typ='safe').load(text)['rosbag2_bagfile_information']
@@ -95,45 +79,26 @@ def read_metadata(folder: Path) -> Metadata:
         raise ValueError(f'{METADATA}: {reason_of(error)}') from error
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Topic:
-    """A topic as one of ROS 2, and what turns a message as recorded into one of ROS 2."""
-
-    connection: Connection
-    convert: Callable[[bytes], bytes]
+_Topic = tuple[Connection, Callable[[bytes], bytes]]
+"""A topic as one of ROS 2, and what turns a message as recorded into one of ROS 2."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _File:
-    """A file of a bag.
-
-    Attributes
-    ----------
-    name : str
-    start : int
-        Time of the first message, ns.
-    count : int
-        Number of messages that it should have.
-    topics : dict of int to _Topic
-        By the number of the connection.
-    messages : callable
-        Yields all messages in their order.
-    """
+    """A file of a bag."""
 
     name: str
-    start: int
-    count: int
-    topics: dict[int, _Topic]
-    messages: Callable[[], Iterator[Message]]
+    start: int  # time of the first message, ns
+    count: int  # of the messages that it should have
+    topics: dict[int, _Topic]  # by the number of the connection
+    messages: Callable[[], Iterator[Message]]  # yields all in their order
 
 
-class Source:
+class Source(ExitStack):
     """A bag of ROS 1 or ROS 2, open for reading.
 
-    Parameters
-    ----------
-    path : Path
-        Folder of a ROS 2 bag, one of its files (.db3, .mcap), or a ROS 1 bag (.bag).
+    It is the folder of a ROS 2 bag, one of its files (.db3, .mcap), or a ROS 1 bag (.bag). If
+    nothing can be read, that raises a ValueError that names the bag.
 
     Attributes
     ----------
@@ -145,41 +110,30 @@ class Source:
         Contents of metadata.yaml.
     stores : TypeStores
         Types of the messages.
-
-    Raises
-    ------
-    ValueError
-        If nothing can be read; the message names the bag.
+    left_out : dict of str to None
+        What a copy does not have besides messages that are missing, as an ordered set.
     """
 
     def __init__(self, path: Path) -> None:
+        super().__init__()
         self.path = path
         self.metadata = Metadata()
         self.connections: list[Connection] = []
         self.foreign: list[Connection] = []
-        self._left_out: dict[str, None] = {}  # an ordered set
+        self.left_out: dict[str, None] = {}
         self.stores = TypeStores()
         self._files: list[_File] = []
         self._unopened: list[str] = []
         self._damages: dict[str, str] = {}  # by file, as of the last reading
         self._refused: Counter[tuple[str, str]] = Counter()  # by topic and reason
         self._uncounted: list[str] = []
-        self._stack = ExitStack()
         if not path.exists():
             raise ValueError(f'{path} does not exist, accepted is a bag')
         try:
             self._open()
         except BaseException:
-            self._stack.close()
+            self.close()
             raise
-
-    def __enter__(self) -> Source:
-        """Return itself."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Close the bag."""
-        self._stack.close()
 
     @property
     def lost(self) -> list[str]:
@@ -191,11 +145,6 @@ class Source:
         more = len(lines) - _MAXIMUM_LINES
         return [*lines[:_MAXIMUM_LINES], f'{more} more'] if more > 0 else lines
 
-    @property
-    def left_out(self) -> list[str]:
-        """What a copy does not have besides messages that are missing."""
-        return list(self._left_out)
-
     def size(self) -> int:
         """Return the total size of the files of the bag, bytes."""
         files = self.path.rglob('*') if self.path.is_dir() else [self.path]
@@ -204,10 +153,7 @@ class Source:
     def image_topics(self, names: Collection[str]) -> list[str]:
         """Return the given image topics, or all image topics if none are given.
 
-        Raises
-        ------
-        ValueError
-            If a topic is not in the bag or has no images; the message names both.
+        A topic that is not in the bag or has no images is named by a ValueError.
         """
         kinds = {item.topic: item.msgtype for item in self.connections}
         accepted = [topic for topic, kind in kinds.items() if kind in (IMAGE, COMPRESSED_IMAGE)]
@@ -262,12 +208,10 @@ class Source:
                 self.metadata = read_metadata(self.path)
                 paths = [self.path / name for name in self.metadata.files]
                 unlisted = (it.name for it in found if it not in paths)
-                self._left_out |= {
-                    f'{it}, which {METADATA} does not list': None for it in unlisted
-                }
+                self.left_out |= {f'{it}, which {METADATA} does not list': None for it in unlisted}
             except ValueError as error:
                 self._unopened.append(str(error))
-        scratch = Path(self._stack.enter_context(TemporaryDirectory(prefix='ahf_')))
+        scratch = Path(self.enter_context(TemporaryDirectory(prefix='ahf_')))
         for path in paths:
             try:
                 self._files.append(self._opened(path, scratch))
@@ -280,7 +224,7 @@ class Source:
             raise ValueError(f'{self.path} is not a bag that can be read: {why}')
         if not self.metadata.files:
             self._files.sort(key=lambda file: file.start)
-        topics = [topic.connection for file in self._files for topic in file.topics.values()]
+        topics = [topic for file in self._files for topic, _ in file.topics.values()]
         if len(topics) > _MAXIMUM_TOPICS:
             raise ValueError(
                 f'{self.path} has {len(topics)} topics, accepted are at most {_MAXIMUM_TOPICS}'
@@ -289,7 +233,7 @@ class Source:
         self.connections = [item for item in topics if _encoding(item) == _SERIALIZATION]
         for item in self.foreign:
             messages = counted(item.msgcount, 'message')
-            self._left_out[f'{item.topic}: {messages} serialized as {_encoding(item)}'] = None
+            self.left_out[f'{item.topic}: {messages} serialized as {_encoding(item)}'] = None
 
     def _opened(self, path: Path, scratch: Path) -> _File:
         """Open a file, decompressed where it is compressed."""
@@ -304,14 +248,14 @@ class Source:
             self._unopened.append(f'{wal.name} was not merged into {path.name}')
         reader: Any = (rosbag1 if path.suffix == '.bag' else rosbag2).Reader(path)
         try:
-            self._stack.enter_context(reader)
+            self.enter_context(reader)
         except Exception:
             # Such as damages, and channels that are not of ROS.
             if path.suffix == '.mcap':
                 return self._unindexed(path, scratch)
             if path.suffix != '.db3':
                 raise
-            reader = self._stack.enter_context(rosbag2.Reader(self._recovered(path, scratch)))
+            reader = self.enter_context(rosbag2.Reader(self._recovered(path, scratch)))
         return _File(
             name=path.name,
             start=reader.start_time,
@@ -370,7 +314,7 @@ class Source:
 
     def _leave_out(self, items: Iterable[Any], what: str) -> None:
         names = (item.name for item in items if item.name != _OWN_METADATA)
-        self._left_out |= {f'{what} {name!r}': None for name in names}
+        self.left_out |= {f'{what} {name!r}': None for name in names}
 
     def _unindexed(self, path: Path, scratch: Path) -> _File:
         """Open an MCAP file that is read from its beginning.
@@ -414,7 +358,7 @@ class Source:
         def messages() -> Iterator[Message]:
             for record in self._records(path):
                 if isinstance(record, McapMessage) and record.channel_id in topics:
-                    connection = topics[record.channel_id].connection
+                    connection, _ = topics[record.channel_id]
                     yield connection, record.log_time, record.data
 
         return _File(
@@ -460,11 +404,11 @@ class Source:
                 topic = file.topics.get(recorded.id)
                 if topic is None or (topics is not None and recorded.topic not in topics):
                     continue
-                connection = topic.connection
+                connection, convert = topic
                 try:
                     if not (isinstance(time, int) and 0 <= time < 2**63):
                         raise ValueError(f'{time} ns is not a time')
-                    converted = topic.convert(data)
+                    converted = convert(data)
                 except Exception as error:
                     # With damaged messages, the generated code may raise anything.
                     self._refused[connection.topic, reason_of(error)] += 1
@@ -506,11 +450,11 @@ def _ending(path: Path) -> str:
 def _topic(item: Connection) -> _Topic:
     """Return a topic as one of ROS 2."""
     if isinstance(item.ext, ConnectionExtRosbag1):
-        return _Topic(*as_ros2(item))
+        return as_ros2(item)
     texts = (item.topic, item.msgtype, item.msgdef.data, item.digest, _encoding(item))
     if not all(isinstance(it, str) for it in texts):
         raise ValueError(f'it is of type {item.msgtype!r}, serialized as {_encoding(item)!r}')
-    return _Topic(item, _plain)
+    return item, _plain
 
 
 def _plain(data: object) -> bytes:

@@ -15,9 +15,6 @@ from ahf_ros import ending
 TRIES = 2
 """How often a task is tried whose process dies."""
 
-AHEAD = 1000
-"""Number of tasks that may be finished before the first that is not."""
-
 _LIMIT = Path('/sys/fs/cgroup/cpu.max')  # of a container: time of processors, and in which time
 
 Task = TypeVar('Task')
@@ -32,13 +29,7 @@ Job = Callable[[Any, Report], Any]
 
 @dataclass(frozen=True, slots=True)
 class TaskFailed:
-    """Result of a task whose process died each time.
-
-    Attributes
-    ----------
-    reason : str
-        What became of it.
-    """
+    """Result of a task whose process died each time, and what became of it."""
 
     reason: str
 
@@ -62,15 +53,7 @@ class Engine(Protocol):
     def wait(self, timeout: float | None = None) -> tuple[int, Any] | None:
         """Return the number of a task that is finished, and its result or `TaskFailed`.
 
-        Parameters
-        ----------
-        timeout : float, optional
-            Time after which it may return None, s.
-
-        Raises
-        ------
-        Exception
-            What the job has raised.
+        After `timeout` seconds it may return None. It raises what the job has raised.
         """
         ...
 
@@ -89,17 +72,12 @@ class Finished(Generic[Task, Result]):
 
 
 def finished_tasks(
-    engine: Engine, tasks: Iterable[Task], ahead: int = AHEAD
+    engine: Engine, tasks: Iterable[Task], ahead: int = 1000
 ) -> Iterator[Finished[Task, Any]]:
     """Yield tasks with their results or `TaskFailed`, each as soon as it is finished.
 
-    Parameters
-    ----------
-    engine : Engine
-    tasks : iterable
-        Drawn as the engine can take them.
-    ahead : int
-        Number of tasks that may be begun from the first one on that is not finished.
+    Tasks are drawn as the engine can take them, and at most `ahead` are begun from the first one
+    on that is not finished.
 
     Examples
     --------
@@ -123,7 +101,8 @@ def finished_tasks(
         found = engine.wait()
         ending.check()  # the result may come from a program that was ended
         if found is not None:
-            yield Finished(found[0], running.pop(found[0]), found[1])
+            number, result = found
+            yield Finished(number=number, task=running.pop(number), result=result)
 
 
 def in_order(finished: Iterable[Finished[Task, Result]]) -> Iterator[Finished[Task, Result]]:
@@ -161,11 +140,7 @@ def no_report(*_: Any) -> None:
 class SerialEngine:
     """The engine that processes tasks in this process, one after the other.
 
-    Parameters
-    ----------
-    job : callable
-    report : callable, optional
-        Called with the number of the task before what the job reports.
+    `report` is called with the number of the task before what the job reports.
     """
 
     capacity = 1

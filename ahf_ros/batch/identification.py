@@ -1,11 +1,11 @@
-"""From the images of a task to its outcome."""
+"""The job of a batch: identification of the images of a task, and messages about it."""
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -14,14 +14,12 @@ import numpy as np
 
 from ahf_ros import ending
 from ahf_ros.batch.engine import Report, no_report
-from ahf_ros.batch.results import file_fingerprint
 from ahf_ros.batch.task import ImageOutcome, ImageTask, Level, Message
 from ahf_ros.detectors import Detector, DetectorSettings, create_detector
 from ahf_ros.drawing.overlay import draw, summary
 from ahf_ros.edge_shift import edge_shift_remark
 from ahf_ros.imaging.image import check_image, white_remark
-from ahf_ros.imaging.stack import ImageStack
-from ahf_ros.interchange.files import is_url, read_bytes
+from ahf_ros.interchange.files import is_url, read_bytes, url_fingerprint
 from ahf_ros.interchange.image_files import read_noted_image, write_image
 from ahf_ros.interchange.target_json import to_json
 from ahf_ros.session import create_identifier
@@ -33,18 +31,8 @@ from ahf_ros.target import Identification
 def identify_images(task: ImageTask, report: Report = no_report) -> ImageOutcome:
     """Identify the targets in the images of a task, and draw its overlays.
 
-    What is wrong with an image or a file is a message of the outcome.
-
-    Parameters
-    ----------
-    task : ImageTask
-    report : callable, optional
-        Not called; a job of an engine has it.
-
-    Raises
-    ------
-    ValueError
-        If the detector cannot be created or does not fit the other settings.
+    What is wrong with an image or a file is a message of the outcome. A detector that cannot be
+    created raises a ValueError. `report` is not called; a job of an engine has it.
 
     Examples
     --------
@@ -53,22 +41,55 @@ def identify_images(task: ImageTask, report: Report = no_report) -> ImageOutcome
     """
     messages: list[Message] = []
     records: list[dict[str, Any]] = []
+    files: list[str] = []
+    images: dict[str, np.ndarray] = {}
     detector = detector_of(task.settings)
-    files = tuple(file_fingerprint(_located(path, task)) for path in task.paths)
-    images = _read(task, messages)
+    for path in task.paths:
+        with _reported(path, messages):
+            file = path
+            if task.folder and not is_url(path):
+                file = str(Path(task.folder, path))
+            files.append(file_fingerprint(file))
+            try:
+                image, note = read_noted_image(file, upright=task.upright)
+            except ValueError as error:  # which names the file
+                messages.append(Message(refusal(error).text, Level.PROBLEM))
+                continue
+            check_image(image)
+            images[path] = image
+            if note:
+                messages.append(Message(note))
     if task.minimum > 1 and len(images) < task.minimum:
         text = f'{task.paths[0]}: {len(images)} of {task.minimum} images of a stack'
         messages.append(Message(text, Level.WARNING))
+    if not images:
+        return ImageOutcome(messages=tuple(messages), files=tuple(files))
     overlays = dict(zip(task.paths, task.overlays, strict=False))
     with _reported(', '.join(images), messages):
-        for found in _identified(images, detector, task):
-            records.append(_record(found, detector, task))
-            messages += _messages(found)
+        identifier = create_identifier(
+            detector=detector, settings=task.settings, interrupt=ending.check
+        )
+        for part, stack, found in identify_parts(identifier, list(images.values()), task.stacking):
+            paths = tuple(images)[part.images.start : part.images.stop]
+            search = identifier.last_search
+            in_vain = search.in_vain if search and search.reason == 'patience' else 0
+            messages += _messages(paths, part.split, stack.images[0], found, in_vain)
+            record = to_json(
+                found,
+                paths[0],
+                stack.shape,
+                detector.family,
+                detector.name,
+                stack=paths if task.stacked else (),
+                split=part.split,
+                upright=task.upright,
+                mapping=asdict(task.settings.adaptive.filter),
+            )
+            records.append(record)
             if overlays:
-                shown = found.stack.combined(found.identification.combination)
-                drawn = draw(shown, found.identification)
-                write_image(_located(overlays[found.paths[0]], task), drawn)
-    return ImageOutcome(tuple(records), tuple(messages), files)
+                drawn = draw(stack.combined(found.combination), found)
+                write_image(Path(task.folder, overlays[paths[0]]), drawn)
+    return ImageOutcome(tuple(records), tuple(messages), tuple(files))
 
 
 def detector_of(settings: IdentificationSettings) -> Detector:
@@ -83,20 +104,21 @@ def _detector(name: str, settings: DetectorSettings, digest: bytes) -> Detector:
     return create_detector(name, settings=settings)
 
 
-@dataclass(frozen=True, slots=True)
-class _Found:
-    """What was identified in images of an unmoved scene, or in one."""
+def file_fingerprint(path: str) -> str:
+    """Return size and time of change of a file; empty where it cannot be looked at.
 
-    paths: tuple[str, ...]
-    stack: ImageStack
-    identification: Identification
-    split: str  # why there was a stack before
-    in_vain: int  # filters in a row that showed no more, after which a search ended early
-
-
-def _located(path: str, task: ImageTask) -> str:
-    """Return a path from the folder of the task."""
-    return str(Path(task.folder, path)) if task.folder and not is_url(path) else path
+    Examples
+    --------
+    >>> file_fingerprint('missing.png')
+    ''
+    """
+    try:
+        if is_url(path):
+            return url_fingerprint(path)
+        status = Path(path).stat()
+    except (OSError, ValueError):  # ValueError: of a URL, or a zero byte in the name
+        return ''
+    return f'{status.st_size} {status.st_mtime_ns}'
 
 
 @contextmanager
@@ -105,94 +127,33 @@ def _reported(name: str, messages: list[Message]) -> Iterator[None]:
     try:
         yield
     except Exception as error:
-        reason = refusal(error).text
-        text = reason if isinstance(error, ValueError) else f'{name}: {reason}'
-        messages.append(Message(text, Level.PROBLEM))
+        messages.append(Message(f'{name}: {refusal(error).text}', Level.PROBLEM))
 
 
-def _read(task: ImageTask, messages: list[Message]) -> dict[str, np.ndarray]:
-    """Return the images that can be read."""
-    images: dict[str, np.ndarray] = {}
-    for path in task.paths:
-        with _reported(path, messages):
-            images[path], note = _read_checked(path, task)
-            if note:
-                messages.append(Message(note))
-    return images
+def _messages(
+    paths: tuple[str, ...], split: str, image: np.ndarray, found: Identification, in_vain: int
+) -> Iterator[Message]:
+    """Yield what there is to say about the result of a part of a stack, and about each target.
 
-
-def _read_checked(path: str, task: ImageTask) -> tuple[np.ndarray, str]:
-    """Return an image of a task and what there is to say about it.
-
-    Raises
-    ------
-    ValueError
-        If it cannot be read or is not accepted.
+    `split` says why there was a stack before it, and `in_vain` is the number of filters in a row
+    that showed no more targets, after which a search ended early.
     """
-    image, note = read_noted_image(_located(path, task), upright=task.upright)
-    try:
-        check_image(image)
-    except ValueError as error:
-        raise ValueError(f'{path}: {error}') from error
-    return image, note
-
-
-def _identified(
-    images: dict[str, np.ndarray], detector: Detector, task: ImageTask
-) -> Iterator[_Found]:
-    """Yield what was identified in each part of a stack."""
-    paths = tuple(images)
-    if not paths:
-        return
-    try:
-        identifier = create_identifier(
-            detector=detector, settings=task.settings, interrupt=ending.check
-        )
-        for part, stack, found in identify_parts(identifier, list(images.values()), task.stacking):
-            of = paths[part.images.start : part.images.stop]
-            search = identifier.last_search
-            in_vain = search.in_vain if search and search.reason == 'patience' else 0
-            yield _Found(
-                paths=of, stack=stack, identification=found, split=part.split, in_vain=in_vain
-            )
-    except ValueError as error:
-        raise ValueError(f'{", ".join(paths)}: {error}') from error
-
-
-def _record(found: _Found, detector: Detector, task: ImageTask) -> dict[str, Any]:
-    return to_json(
-        found.identification,
-        found.paths[0],
-        found.stack.shape,
-        detector.family,
-        detector.name,
-        found.paths if task.stacked else (),
-        found.split,
-        task.upright,
-        asdict(task.settings.adaptive.filter),
-    )
-
-
-def _messages(of: _Found) -> Iterator[Message]:
-    """Yield what there is to say about a result, and a detail for each target."""
-    path, found = ', '.join(of.paths), of.identification
-    if of.split:
-        yield Message(f'{of.paths[0]}: the stack is split here: {of.split}')
-    yield Message(f'{path}: {summary(found)}, {found.filter.duration:.2f} s')
-    if of.in_vain:
-        yield Message(
-            f'{path}: the search ended early, {of.in_vain} filters in a row show no more targets'
-        )
+    name = ', '.join(paths)
+    if split:
+        yield Message(f'{paths[0]}: the stack is split here: {split}')
+    remarks = [f'{summary(found)}, {found.filter.duration:.2f} s']
+    if in_vain:
+        remarks.append(f'the search ended early, {in_vain} filters in a row show no more targets')
     if found.mirrored:
-        yield Message(
-            f'{path}: the image seems to be mirrored: most IDs are not among the expected ones, '
-            'and most would be in a mirror'
+        remarks.append(
+            'the image seems to be mirrored: most IDs are not among the expected ones, and most '
+            'would be in a mirror'
         )
-    remarks = [edge_shift_remark(found.edge_shift)]
+    remarks.append(edge_shift_remark(found.edge_shift))
     if found.count == 0:
-        remarks.append(white_remark(of.stack.images[0]))
+        remarks.append(white_remark(image))
     for remark in filter(None, remarks):
-        yield Message(f'{path}: {remark}')
+        yield Message(f'{name}: {remark}')
     for target in found.targets:
         yield Message(
             f'{target.id:>8} {target.family:<11} {target.x:10.3f} {target.y:10.3f} px'

@@ -1,26 +1,26 @@
 """The engine of one machine: worker processes, each with one task at a time.
 
-A worker that dies takes nothing along but its task, which another one tries once more. Each has
-pipes of its own to the process that started it, so no lock outlives a worker that is killed. It
-reads tasks from one and writes what becomes of them to another, and it ends when they are closed,
-at the latest when the process that started it is gone. With pebble 5.2, a worker whose parent was
-killed worked on, and a task whose worker had died was not tried again.
+A worker that dies takes nothing along but its task, which another one tries once more. Each has a
+pipe of its own to the process that started it, so no lock outlives a worker that is killed, and it
+ends when that pipe is closed, at the latest when the process that started it is gone. With pebble
+5.2, a worker whose parent was killed worked on, and a task whose worker had died was not tried
+again.
 """
 
 from __future__ import annotations
 
 import os
+import select
 import signal
 import subprocess
 import sys
 import threading
 import time
 import traceback
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import IntEnum
-from functools import partial
+from multiprocessing import Pipe
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from types import FrameType
@@ -33,13 +33,11 @@ from ahf_ros.text import reason_of
 SHUTDOWN_TIMEOUT = 10 * ending.GRACE
 """Time after which a worker is taken to be stuck at its end, s."""
 
-PIPE_CLOSED = (EOFError, OSError)
-"""What the pipe of a process that has ended raises."""
-
+_PIPE_CLOSED = (EOFError, OSError)  # what the pipe of a process that has ended raises
 _PACKAGE = str(Path(__file__).parents[2])
 _BEGIN = (
     'import sys; sys.path.insert(0, sys.argv[1]); '
-    'from ahf_ros.batch.processes import work; work(*map(int, sys.argv[2:]))'
+    'from ahf_ros.batch.processes import work; work(int(sys.argv[2]))'
 )
 
 
@@ -51,55 +49,48 @@ class Kind(IntEnum):
     RAISED = 2
 
 
-def work(tasks: int, answers: int, alive: int) -> None:
-    """Process tasks until there are no more.
-
-    Parameters
-    ----------
-    tasks, answers : int
-        File descriptors of the pipes.
-    alive : int
-        File descriptor of a pipe that is closed when the parent ends.
-    """
-    _heed_signals(alive)
-    received, sent = Connection(tasks, writable=False), Connection(answers, readable=False)
-    with suppress(*PIPE_CLOSED):
-        sys.path[:] = received.recv()
-        job, threads = received.recv()
-        _prepare(threads)
-        while True:
-            result = _result_of(job, received.recv(), sent)
-            ending.check()  # the result may come from a program that was ended
-            sent.send(result)
-
-
-def _result_of(job: Job, task: Any, sent: Connection) -> tuple[Kind, Any]:
-    try:
-        return Kind.DONE, job(task, partial(_report, sent))
-    except ValueError as error:
-        return Kind.RAISED, ValueError(str(error))
-    except Exception as error:
-        traceback.print_exc()  # which the exception of another process does not have
-        return Kind.RAISED, RuntimeError(reason_of(error))
-
-
-def _report(sent: Connection, *report: Any) -> None:
-    with suppress(*PIPE_CLOSED):  # this process is about to end
-        sent.send((Kind.REPORT, report))
-
-
-def _heed_signals(alive: int) -> None:
+def work(descriptor: int) -> None:
+    """Process tasks that come through a pipe until it is closed."""
     for number in (signal.SIGINT, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)  # the parent gets it, too, and ends
     signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
     signal.signal(signal.SIGTERM, _end)
     signal.signal(signal.SIGPROF, _interrupt)
-    threading.Thread(target=_watch, args=(alive,), daemon=True).start()
+    threading.Thread(target=_watch, args=(descriptor,), daemon=True).start()
+    pipe = Connection(descriptor)
+
+    def report(*values: Any) -> None:
+        with suppress(*_PIPE_CLOSED):  # this process is about to end
+            pipe.send((Kind.REPORT, values))
+
+    with suppress(*_PIPE_CLOSED):
+        sys.path[:] = pipe.recv()
+        job, threads = pipe.recv()
+        if sys.stdout and sys.stderr:  # otherwise other files may have their numbers
+            os.dup2(2, 1)
+        sys.stdout = sys.stderr  # also of what other detectors print
+        import cv2
+
+        cv2.setNumThreads(threads)
+        while True:
+            task = pipe.recv()
+            result: tuple[Kind, Any]
+            try:
+                result = Kind.DONE, job(task, report)
+            except ValueError as error:
+                result = Kind.RAISED, ValueError(str(error))
+            except Exception as error:
+                traceback.print_exc()  # which the exception of another process does not have
+                result = Kind.RAISED, RuntimeError(reason_of(error))
+            ending.check()  # the result may come from a program that was ended
+            pipe.send(result)
 
 
-def _watch(alive: int) -> None:
-    """End this process once nobody holds the other end of a pipe."""
-    os.read(alive, 1)
+def _watch(descriptor: int) -> None:
+    """End this process once nobody holds the other end of the pipe."""
+    closed = select.poll()
+    closed.register(descriptor, 0)  # only that is told without being asked for
+    closed.poll()
     _end()
     time.sleep(SHUTDOWN_TIMEOUT)
     os._exit(1)
@@ -119,58 +110,24 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
     ending.interrupt(frame)
 
 
-def _prepare(threads: int) -> None:
-    """Send what other detectors print to standard error, and limit threads."""
-    if sys.stdout and sys.stderr:  # otherwise other files may have their numbers
-        os.dup2(2, 1)
-    sys.stdout = sys.stderr
-    import cv2
-
-    cv2.setNumThreads(threads)
-
-
 @dataclass(slots=True, eq=False)
 class _Worker:
-    """A process, the pipes to it, and the task that it has."""
+    """A process, the pipe to it, and the task that it has; it is idle before the first try."""
 
     process: subprocess.Popen[bytes]
-    tasks: Connection
-    answers: Connection
-    alive: Connection
+    pipe: Connection
     number: int = -1
     task: Any = None
     tries: int = 0
-
-    @property
-    def busy(self) -> bool:
-        return self.tries > 0
-
-    def close(self) -> None:
-        for pipe in (self.tasks, self.answers, self.alive):
-            pipe.close()
 
 
 class ProcessEngine:
     """The engine that processes tasks in worker processes.
 
-    Workers are started as they are needed. They end with this process, however it ends. What they
-    print goes to standard error.
-
-    Parameters
-    ----------
-    job : callable
-        A function of a module.
-    count : int
-        Maximum number of workers.
-    report : callable, optional
-        Called in this process with the number of the task before what the job reports.
-    threads : int
-        Number of threads that OpenCV uses in each worker.
-
-    Attributes
-    ----------
-    report : callable
-        As above; it may be replaced between two tasks.
+    At most `count` workers are started, as they are needed, in each of which OpenCV uses `threads`
+    threads. They end with this process, however it ends. What they print goes to standard error.
+    `report` is called in this process with the number of the task before what the job reports; it
+    may be replaced between two tasks.
     """
 
     def __init__(self, job: Job, count: int, report: Report = no_report, threads: int = 1) -> None:
@@ -187,7 +144,7 @@ class ProcessEngine:
     def wait(self, timeout: float | None = None) -> tuple[int, Any] | None:
         """Return the next result, see `ahf_ros.batch.engine.Engine`."""
         while True:
-            busy = {worker.answers: worker for worker in self._workers if worker.busy}
+            busy = {worker.pipe: worker for worker in self._workers if worker.tries}
             ready = wait(list(busy), timeout)
             if not ready:
                 return None
@@ -195,10 +152,15 @@ class ProcessEngine:
                 worker = busy[pipe]  # type: ignore[index]
                 number = worker.number
                 try:
-                    kind, content = worker.answers.recv()
-                except PIPE_CLOSED:
-                    if given_up := self._replaced(worker):
-                        return number, given_up
+                    kind, content = worker.pipe.recv()
+                except _PIPE_CLOSED:
+                    self._remove(worker)
+                    if worker.tries == TRIES:
+                        how = _how_ended(worker.process.returncode)
+                        return number, TaskFailed(
+                            f'given up, {TRIES} processes that worked on it died, the last {how}'
+                        )
+                    self._hand_over(number, worker.task, worker.tries + 1)
                     continue
                 if kind == Kind.REPORT:
                     self.report(number, *content)
@@ -211,7 +173,7 @@ class ProcessEngine:
     def close(self) -> None:
         """End all workers."""
         for worker in self._workers:
-            worker.close()  # so it ends
+            worker.pipe.close()  # so it ends
         limit = time.monotonic() + SHUTDOWN_TIMEOUT
         for worker in self._workers:
             with suppress(subprocess.TimeoutExpired):
@@ -221,65 +183,39 @@ class ProcessEngine:
         self._workers.clear()
 
     def _hand_over(self, number: int, task: Any, tries: int) -> None:
-        idle = [worker for worker in self._workers if not worker.busy]
-        while idle:
-            worker = idle.pop()
-            with suppress(*PIPE_CLOSED):  # killed while it had nothing to do
-                worker.tasks.send(task)
+        for worker in [it for it in self._workers if not it.tries]:
+            with suppress(*_PIPE_CLOSED):  # killed while it had nothing to do
+                worker.pipe.send(task)
                 break
             self._remove(worker)
         else:
             worker = _start()
             self._workers.append(worker)
-            with suppress(*PIPE_CLOSED):  # `wait` finds that it has died
-                worker.tasks.send(sys.path)
-                worker.tasks.send((self._job, self._threads))
-                worker.tasks.send(task)
+            with suppress(*_PIPE_CLOSED):  # `wait` finds that it has died
+                worker.pipe.send(sys.path)
+                worker.pipe.send((self._job, self._threads))
+                worker.pipe.send(task)
         worker.number, worker.task, worker.tries = number, task, tries
-
-    def _replaced(self, worker: _Worker) -> TaskFailed | None:
-        """Hand the task of a worker that died to another one, or give it up."""
-        self._remove(worker)
-        if worker.tries < TRIES:
-            self._hand_over(worker.number, worker.task, worker.tries + 1)
-            return None
-        how = _how_ended(worker.process.returncode)
-        return TaskFailed(f'given up, {TRIES} processes that worked on it died, the last {how}')
 
     def _remove(self, worker: _Worker) -> None:
         self._workers.remove(worker)
-        worker.close()
+        worker.pipe.close()
         worker.process.wait()
 
 
 def _start() -> _Worker:
-    (tasks, to_worker), (from_worker, answers), (alive, held) = (os.pipe() for _ in range(3))
-    inherited = (tasks, answers, alive)
-    try:
-        with _unheard_interrupts():
-            process = subprocess.Popen(
-                [sys.executable, '-c', _BEGIN, _PACKAGE, *map(str, inherited)],
-                pass_fds=inherited,
-            )
-    finally:
-        for descriptor in inherited:
-            os.close(descriptor)
-    return _Worker(
-        process,
-        Connection(to_worker, readable=False),
-        Connection(from_worker, writable=False),
-        Connection(held, readable=False),
-    )
-
-
-@contextmanager
-def _unheard_interrupts() -> Iterator[None]:
-    """Start processes that do not heed Ctrl-C before they can ignore it."""
+    pipe, other = Pipe()
+    # It does not heed Ctrl-C before it can ignore it.
     before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
     try:
-        yield
+        process = subprocess.Popen(
+            [sys.executable, '-c', _BEGIN, _PACKAGE, str(other.fileno())],
+            pass_fds=[other.fileno()],
+        )
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        other.close()
+    return _Worker(process, pipe)
 
 
 def _how_ended(status: int) -> str:

@@ -1,8 +1,8 @@
-"""The results of a batch in a folder: written as they come, and continued by a later run.
+"""The results of a batch: in the order of its tasks, and in a folder where a later run goes on.
 
-Each line is a record of `ahf identify --json` with one more field, `provenance`: what the result
-depends on. A result counts as long as that is what it would depend on today. A line that a killed
-process left unfinished does not count.
+Each line of the file is a record of `ahf identify --json` with one more field, `provenance`: what
+the result depends on. A result counts as long as that is what it would depend on today. A line
+that a killed process left unfinished does not count.
 """
 
 from __future__ import annotations
@@ -11,32 +11,24 @@ import hashlib
 import json
 import os
 import time
-from collections.abc import Hashable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from shutil import copyfile
 from typing import Any
 
-from ahf_ros.batch.task import ImageOutcome, ImageTask
-from ahf_ros.interchange.files import (
-    RESULTS_FILE,
-    file_errors,
-    is_url,
-    locked,
-    read_bytes,
-    url_fingerprint,
-)
+from ahf_ros.batch.engine import Engine, Finished, TaskFailed, finished_tasks, in_order
+from ahf_ros.batch.identification import file_fingerprint
+from ahf_ros.batch.task import ImageOutcome, ImageTask, Level, Message
+from ahf_ros.interchange.files import RESULTS_FILE, file_errors, locked, read_bytes
 from ahf_ros.release import release
 from ahf_ros.settings.nested import flat_values
 
 PREVIOUS = 'previous.jsonl'
 """Name of the file with the results that a run with other settings replaces."""
 
-PROVENANCE = 'provenance'
-"""Field of a record with what its result depends on."""
-
-_IRRELEVANT = ('threads',)  # settings that do not change results
+_PROVENANCE = 'provenance'  # field of a record with what its result depends on
 _NAMED = 10  # tasks that a note names at most
 _SYNCHRONISED = 1.0  # s after which results are safe even if the machine loses its power
 
@@ -56,17 +48,10 @@ class _Entry:
 
 
 class Results:
-    """The results in a folder, one task a time; one process may have it open.
+    """The results in a folder, which is created if it is missing; one process may have it open.
 
-    Parameters
-    ----------
-    folder : Path
-        Is created if it is missing.
-
-    Raises
-    ------
-    Unwritable
-        If the folder cannot be written to, or another process does.
+    Whatever cannot be written raises `Unwritable`, also because another process has the folder
+    open. `path` is the file.
 
     Examples
     --------
@@ -78,11 +63,6 @@ class Results:
     ...     results.records(task), results.pending([task])
     ...     results.close()
     (({'image': 'a.jpg'},), ([], ['1 of 1 results are there already']))
-
-    Attributes
-    ----------
-    path : Path
-        The file.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -120,11 +100,6 @@ class Results:
 
         Their earlier results are removed. If settings or version were others, all earlier results
         are kept in `PREVIOUS`.
-
-        Raises
-        ------
-        Unwritable
-            If the results cannot be written.
         """
         pending = {task.paths: task for task in tasks if not self.has(task)}
         kept = sum(task.paths not in pending for task in tasks)
@@ -148,13 +123,7 @@ class Results:
         return list(pending.values()), notes
 
     def append(self, task: ImageTask, outcome: ImageOutcome) -> None:
-        """Write the result of a task, if it has one, in the place of an earlier one.
-
-        Raises
-        ------
-        Unwritable
-            If it cannot be written, for instance because the disk is full.
-        """
+        """Write the result of a task, if it has one, in the place of an earlier one."""
         if not outcome.records:
             return
         if task.paths in self._entries:
@@ -166,7 +135,7 @@ class Results:
             'parts': len(outcome.records),
         }
         content = b''.join(
-            json.dumps({**record, PROVENANCE: {**provenance, 'part': number}}).encode() + b'\n'
+            json.dumps({**record, _PROVENANCE: {**provenance, 'part': number}}).encode() + b'\n'
             for number, record in enumerate(outcome.records)
         )
         with _writing(self.path):
@@ -190,7 +159,7 @@ class Results:
         entry = self._entries.get(task.paths)
         records = map(json.loads, self._content(entry).splitlines() if entry else ())
         return tuple(
-            {name: value for name, value in record.items() if name != PROVENANCE}
+            {name: value for name, value in record.items() if name != _PROVENANCE}
             for record in records
         )
 
@@ -237,7 +206,7 @@ class Results:
             self._damaged += 1
             return
         try:
-            provenance = record[PROVENANCE]
+            provenance = record[_PROVENANCE]
             paths, part = tuple(provenance['files']), provenance['part']
         except (LookupError, TypeError) as error:
             raise Unwritable(
@@ -246,13 +215,10 @@ class Results:
             ) from error
         before = self._entries.pop(paths, None)
         if part == 0:
-            before = _Entry(provenance, place, 0, 0)
+            before = _Entry(provenance=provenance, place=place, length=0, lines=0)
         if before and line.endswith(b'\n') and place == before.place + before.length:
-            self._entries[paths] = _Entry(
-                provenance=before.provenance,
-                place=before.place,
-                length=before.length + len(line),
-                lines=before.lines + 1,
+            self._entries[paths] = replace(
+                before, length=before.length + len(line), lines=before.lines + 1
             )
         else:
             self._damaged += 1 + (before.lines if before else 0)
@@ -264,12 +230,7 @@ class Results:
         with _writing(self.path), part.open('wb') as file:
             for paths in order:
                 entry = self._entries[paths]
-                entries[paths] = _Entry(
-                    provenance=entry.provenance,
-                    place=file.tell(),
-                    length=entry.length,
-                    lines=entry.lines,
-                )
+                entries[paths] = replace(entry, place=file.tell())
                 file.write(self._content(entry))
             file.flush()
             os.fsync(file.fileno())
@@ -283,31 +244,17 @@ class Results:
             return os.pread(self._file.fileno(), entry.length, entry.place)
 
 
-def file_fingerprint(path: str) -> str:
-    """Return size and time of change of a file; empty where it cannot be looked at.
-
-    Examples
-    --------
-    >>> file_fingerprint('missing.png')
-    ''
-    """
-    try:
-        if is_url(path):
-            return url_fingerprint(path)
-        status = Path(path).stat()
-    except (OSError, ValueError):  # ValueError: of a URL, or a zero byte in the name
-        return ''
-    return f'{status.st_size} {status.st_mtime_ns}'
-
-
 def _fingerprint(task: ImageTask) -> str:
     """Return a text that differs where settings of a task lead to other results."""
     values = flat_values(task.settings)
     if file := task.settings.detection.family_file:
         values['family_file'] = hashlib.sha256(read_bytes(file)).hexdigest()
-    values = {name: value for name, value in values.items() if name not in _IRRELEVANT}
-    values |= {'stack_movement': task.stacking.stack_movement, 'stacked': task.stacked}
-    values |= {'upright': task.upright}
+    del values['threads']  # which does not change results
+    values |= {
+        'stack_movement': task.stacking.stack_movement,
+        'stacked': task.stacked,
+        'upright': task.upright,
+    }
     text = json.dumps(values, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
@@ -319,3 +266,56 @@ def _writing(path: Path) -> Iterator[None]:
             yield
     except ValueError as error:
         raise Unwritable(str(error)) from error
+
+
+def outcomes_in_order(engine: Engine, tasks: Iterable[ImageTask]) -> Iterator[ImageOutcome]:
+    """Yield the outcomes of tasks in their order, each as soon as those before it are known.
+
+    Examples
+    --------
+    >>> from ahf_ros.batch.engine import SerialEngine
+    >>> from ahf_ros.batch.identification import identify_images
+    >>> tasks = [ImageTask((name,)) for name in ('a.png', 'b.png')]
+    >>> outcomes = outcomes_in_order(SerialEngine(identify_images), tasks)
+    >>> [it.messages[0].text[:20] for it in outcomes]
+    ['a.png cannot be read', 'b.png cannot be read']
+    """
+    for item in in_order(finished_tasks(engine, tasks)):
+        yield outcome_of(item.task, item.result)
+
+
+def kept_outcomes_in_order(
+    engine: Engine, tasks: Sequence[ImageTask], results: Results, say: Callable[[str], None]
+) -> Iterator[ImageOutcome]:
+    """Yield the outcomes of tasks in their order; those with a result are not done again.
+
+    `results` get each result as soon as it is known, and the order of the tasks at the end. What
+    they have already has no messages. `say` is called with lines for people: what is done, and
+    what is done again.
+    """
+
+    def recorded() -> Iterator[Finished[ImageTask, ImageOutcome]]:
+        for item in finished_tasks(engine, pending):
+            outcome = outcome_of(item.task, item.result)
+            results.append(item.task, outcome)
+            yield replace(item, result=outcome)
+
+    pending, notes = results.pending(tasks)
+    for note in notes:
+        say(f'{results.path}: {note}')
+    following = in_order(recorded())
+    undone = {task.paths for task in pending}
+    for task in tasks:
+        if task.paths in undone:
+            undone.remove(task.paths)
+            yield next(following).result
+        else:
+            yield ImageOutcome(results.records(task))
+    results.put_in_order(tasks)
+
+
+def outcome_of(task: ImageTask, result: ImageOutcome | TaskFailed) -> ImageOutcome:
+    """Return the outcome of a task; it is a problem if the task was given up."""
+    if isinstance(result, TaskFailed):
+        return ImageOutcome(messages=(Message(f'{task.name}: {result.reason}', Level.PROBLEM),))
+    return result

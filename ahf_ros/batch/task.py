@@ -1,4 +1,4 @@
-"""One task of a batch, and its outcome: records that processes and machines exchange."""
+"""The images of a task and what becomes of them: records that processes and machines exchange."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ahf_ros.session_settings import IdentificationSettings, StackSettings
 
 
 class Level(IntEnum):
-    """How important a message is."""
+    """How important a message is; `PROBLEM` if something could not be read or written."""
 
     DETAIL = 0
     NOTE = 1
@@ -20,14 +20,7 @@ class Level(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """A line for people.
-
-    Attributes
-    ----------
-    text : str
-    level : Level
-        `PROBLEM` if something could not be read, identified or written.
-    """
+    """A line for people."""
 
     text: str
     level: Level = Level.NOTE
@@ -35,41 +28,18 @@ class Message:
 
 @dataclass(frozen=True, slots=True)
 class ImageTask:
-    """Image files that are identified together, independently of all others.
+    """Image files that are identified together, independently of all others."""
 
-    Attributes
-    ----------
-    paths : tuple of str
-        The files, as the user named them.
-    settings : IdentificationSettings
-    stacking : StackSettings
-        Whether movement within the stack is looked for.
-    upright : bool
-        Whether images are turned as their orientation says.
-    stacked : bool
-        Whether results name all images of their stack.
-    minimum : int
-        Number of images below which a message says that some are missing; 0 for none.
-    overlays : tuple of str
-        For each image, the file to draw it to if it is the first of its result; empty if none
-        are drawn.
-    folder : str
-        Where paths start that are not absolute; the working folder where empty.
-
-    Examples
-    --------
-    >>> ImageTask(('photos/a.jpg',)).name
-    'photos/a.jpg'
-    """
-
-    paths: tuple[str, ...]
+    paths: tuple[str, ...]  # as the user named them
     settings: IdentificationSettings = field(default_factory=IdentificationSettings)
-    stacking: StackSettings = field(default_factory=StackSettings)
-    upright: bool = False
-    stacked: bool = False
-    minimum: int = 0
-    overlays: tuple[str, ...] = ()
-    folder: str = ''
+    stacking: StackSettings = field(
+        default_factory=StackSettings
+    )  # whether movement is looked for
+    upright: bool = False  # whether images are turned as their orientation says
+    stacked: bool = False  # whether results name all images of their stack
+    minimum: int = 0  # images below which a message says that some are missing
+    overlays: tuple[str, ...] = ()  # files to draw the first image of each result to
+    folder: str = ''  # where paths start that are not absolute; the working folder where empty
 
     @property
     def name(self) -> str:
@@ -79,22 +49,11 @@ class ImageTask:
 
 @dataclass(frozen=True, slots=True)
 class ImageOutcome:
-    """What became of an `ImageTask`.
+    """What became of an `ImageTask`."""
 
-    Attributes
-    ----------
-    records : tuple of dict
-        What `ahf identify --json` prints, one for each part of the stack.
-    messages : tuple of Message
-        In the order in which they came up.
-    files : tuple of str
-        Fingerprint of each file of the task before it was read, see
-        `ahf_ros.batch.results.file_fingerprint`.
-    """
-
-    records: tuple[dict[str, Any], ...] = ()
-    messages: tuple[Message, ...] = ()
-    files: tuple[str, ...] = ()
+    records: tuple[dict[str, Any], ...] = ()  # as JSON, one for each part of the stack
+    messages: tuple[Message, ...] = ()  # in the order in which they came up
+    files: tuple[str, ...] = ()  # `file_fingerprint` of each before it was read
 
     @property
     def failed(self) -> bool:

@@ -10,8 +10,8 @@ from pathlib import Path
 
 from ahf_ros import ending
 from ahf_ros.batch.engine import Engine
-from ahf_ros.batch.results import Results, file_fingerprint
-from ahf_ros.batch.run import outcome_of
+from ahf_ros.batch.identification import file_fingerprint
+from ahf_ros.batch.results import Results, outcome_of
 from ahf_ros.batch.task import ImageOutcome, ImageTask, Message
 
 _BUSY = 0.2  # s after which waiting is interrupted
@@ -30,22 +30,10 @@ class _Seen:
 class Arrivals:
     """The files of a folder, as they arrive: each is taken once it has stopped changing.
 
-    Parameters
-    ----------
-    folder : Path
-    suffixes : collection of str
-        Endings of the files, in small letters. Files whose name begins with a dot are left out.
-    recursive : bool
-        Whether files of folders in the folder are looked at, too.
-    settling : float
-        Time for which a file has to be unchanged, s.
-    clock : callable, optional
-        Time in s.
-
-    Attributes
-    ----------
-    away : str
-        Why the folder cannot be read; empty if it can.
+    Files count that end in one of `suffixes`, in small or capital letters, and do not begin with a
+    dot; those of folders in the folder only if `recursive`. They have to be unchanged for
+    `settling` seconds of `clock`. `away` says why the folder cannot be read; it is empty if it
+    can.
 
     Examples
     --------
@@ -127,24 +115,9 @@ def watch(
 ) -> Iterator[ImageOutcome]:
     """Yield the outcome of each image that arrives, once its result is written, without an end.
 
-    Parameters
-    ----------
-    engine : Engine
-        Its job is `ahf_ros.batch.identification.identify_images`.
-    arrivals : Arrivals
-    results : Results
-        What it has already is not done again.
-    task_of : callable
-        From the path of an image to its task.
-    interval : float
-        Time between two looks at the folder, s.
-    say : callable
-        Called with what there is to say about the folder.
-
-    Raises
-    ------
-    Unwritable
-        If the results cannot be written.
+    The job of the engine is `ahf_ros.batch.identification.identify_images`. What `results` have
+    already is not done again. `task_of` is called with the path of an image, `say` with what there
+    is to say about the folder, which is looked at every `interval` seconds.
     """
     running: dict[int, ImageTask] = {}
     waiting: list[ImageTask] = []
@@ -153,7 +126,13 @@ def watch(
     while True:
         if not running or time.monotonic() - looked >= interval:
             looked = time.monotonic()
-            pending, notes = results.pending(list(map(task_of, _taken(arrivals, say))))
+            before = arrivals.away
+            paths = arrivals.take()
+            if arrivals.away and not before:
+                say(f'the folder cannot be read, waiting for it: {arrivals.away}')
+            if before and not arrivals.away:
+                say('the folder is back')
+            pending, notes = results.pending(list(map(task_of, paths)))
             if notes:
                 texts = (f'{results.path}: {note}' for note in notes)
                 yield ImageOutcome(messages=tuple(map(Message, texts)))
@@ -175,14 +154,3 @@ def watch(
             outcome = outcome_of(task, found[1])
             results.append(task, outcome)
             yield outcome
-
-
-def _taken(arrivals: Arrivals, say: Callable[[str], None]) -> list[str]:
-    """Return what has arrived, and tell of a folder that goes away and comes back."""
-    before = arrivals.away
-    paths = arrivals.take()
-    if arrivals.away and not before:
-        say(f'the folder cannot be read, waiting for it: {arrivals.away}')
-    if before and not arrivals.away:
-        say('the folder is back')
-    return paths

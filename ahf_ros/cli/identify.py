@@ -232,8 +232,7 @@ def _outcomes(
     engine: Engine, tasks: Sequence[ImageTask], options: argparse.Namespace
 ) -> Iterator[ImageOutcome]:
     """Yield the outcomes of tasks in their order, and keep the results if that is wanted."""
-    from ahf_ros.batch.results import Results
-    from ahf_ros.batch.run import kept_outcomes_in_order, outcomes_in_order
+    from ahf_ros.batch.results import Results, kept_outcomes_in_order, outcomes_in_order
 
     if not options.output:
         yield from outcomes_in_order(engine, tasks)

@@ -13,11 +13,10 @@ from visualization_msgs.msg import ImageMarker
 
 from ahf_ros.drawing.overlay import draw
 from ahf_ros.msg import CodedTargetArray
-from ahf_ros.nodes.cloud import TargetPoints
+from ahf_ros.nodes.cloud import TargetPoints, Waiting
 from ahf_ros.nodes.diagnostics import CloudTally, Tally
 from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.nodes.inputs import Input
-from ahf_ros.nodes.matching import Waiting
 from ahf_ros.nodes.pipeline import Pipeline
 from ahf_ros.nodes.process import ProcessNode
 from ahf_ros.nodes.settings import DetectorNodeSettings
@@ -28,15 +27,7 @@ from ahf_ros.stream import Answer
 
 
 class Answers:
-    """Publishes an identification in every form that is asked for.
-
-    Parameters
-    ----------
-    node : ProcessNode
-        Has the publishers.
-    tally : Tally
-        Counts to continue.
-    """
+    """Publishes an identification in every form that is asked for."""
 
     def __init__(self, node: ProcessNode, tally: Tally) -> None:
         self._node = node
@@ -52,9 +43,21 @@ class Answers:
 
     def renew(self, settings: DetectorNodeSettings) -> None:
         """Put settings into force: start or stop what they ask for."""
-        self._renew_clouds(settings)
-        self._renew_detections(settings.answers.detections)
-        self._renew_undistorted(settings.answers.undistort)
+        if not (self._clouds and self._clouds.suits(settings)):
+            self._close_clouds()
+            if settings.cloud.cloud:
+                self._tally.clouds = self._tally.clouds or CloudTally()
+                self._clouds = TargetPoints(self._node, settings, self._tally.clouds)
+        # A publisher stays once it is there: the answer that is being published may need it.
+        self._detecting = settings.answers.detections
+        if self._detecting and not self._detections:
+            kinds = import_module('vision_msgs.msg')
+            publisher = self._node.publisher(kinds.Detection2DArray, DETECTIONS, ANSWERS_KEPT)
+            self._detections = kinds, publisher
+        if settings.answers.undistort and not self._undistorted:
+            self._undistorted = UndistortedTargets(self._node, self._tally)
+        if self._undistorted:
+            self._undistorted.listen(settings.answers.undistort)
 
     def waiting(self) -> tuple[Input, Waiting] | None:
         """Return where clouds come from and what waits for its match, None without clouds."""
@@ -63,45 +66,19 @@ class Answers:
 
     def close(self) -> None:
         """Stop everything that settings ask for, and forget what waits for its cloud."""
-        clouds, self._clouds = self._clouds, None
-        if clouds:
-            clouds.close()
-        self._renew_undistorted(False)
-
-    def _renew_clouds(self, settings: DetectorNodeSettings) -> None:
-        if self._clouds and self._clouds.suits(settings):
-            return
-        clouds, self._clouds = self._clouds, None
-        if clouds:
-            clouds.close()
-        if settings.cloud.cloud:
-            self._tally.clouds = self._tally.clouds or CloudTally()
-            self._clouds = TargetPoints(self._node, settings, self._tally.clouds)
-
-    def _renew_detections(self, wanted: bool) -> None:
-        # A publisher stays once it is there: the answer that is being published may need it.
-        if wanted and not self._detections:
-            kinds = import_module('vision_msgs.msg')
-            publisher = self._node.publisher(kinds.Detection2DArray, DETECTIONS, ANSWERS_KEPT)
-            self._detections = kinds, publisher
-        self._detecting = wanted
-
-    def _renew_undistorted(self, wanted: bool) -> None:
-        if wanted and not self._undistorted:
-            self._undistorted = UndistortedTargets(self._node, self._tally)
+        self._close_clouds()
         if self._undistorted:
-            self._undistorted.listen(wanted)
+            self._undistorted.listen(False)
+
+    def _close_clouds(self) -> None:
+        clouds, self._clouds = self._clouds, None
+        if clouds:
+            clouds.close()
 
     def publish(self, answer: Answer[Header], pipeline: Pipeline, received: float) -> None:
-        """Publish an answer.
+        """Publish an answer of a pipeline, and count how long it took.
 
-        Parameters
-        ----------
-        answer : Answer of Header
-        pipeline : Pipeline
-            Made the answer.
-        received : float
-            When its last image arrived, s of the monotonic clock.
+        Its last image was `received` at that time, s of the monotonic clock.
         """
         message, found = pipeline.message(answer), answer.identification
         self._targets.publish(message)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import traceback
 from collections.abc import Callable
 from concurrent.futures import CancelledError
 from functools import partial
@@ -10,7 +11,8 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
-from rclpy.clock import Clock, ClockType
+from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
+from rclpy.lifecycle.node import LifecycleNodeMixin
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
@@ -18,12 +20,11 @@ from std_srvs.srv import Trigger
 from ahf_ros import ending
 from ahf_ros.nodes.answers import Answers
 from ahf_ros.nodes.diagnostics import Diagnostics, Tally
-from ahf_ros.nodes.image_queue import ImageQueue
+from ahf_ros.nodes.image_queue import ImageQueue, Worker
 from ahf_ros.nodes.inputs import Input
-from ahf_ros.nodes.managed import ACTIVE, ManagedNode
 from ahf_ros.nodes.parameters import ParameterSettings
 from ahf_ros.nodes.pipeline import STOPPING, Pipeline
-from ahf_ros.nodes.process import run
+from ahf_ros.nodes.process import ProcessNode, run
 from ahf_ros.nodes.service_detector import ServiceDetector
 from ahf_ros.nodes.settings import LOSSLESS, SERVICE, DetectorNodeSettings
 from ahf_ros.nodes.topics import (
@@ -34,8 +35,11 @@ from ahf_ros.nodes.topics import (
     image_topic,
 )
 from ahf_ros.nodes.watch import Watch
-from ahf_ros.nodes.worker import Worker
 from ahf_ros.srv import Identify
+from ahf_ros.text import printable
+
+ACTIVE = 'active'
+"""State of a node that works."""
 
 DIAGNOSTICS_PERIOD = 1.0
 """Period of /diagnostics, s."""
@@ -44,11 +48,14 @@ REQUESTS_KEPT = 1000
 """Requests to a service that may wait. The middleware drops more without an answer."""
 
 
-class DetectorNode(ManagedNode):
+class DetectorNode(ProcessNode, LifecycleNodeMixin):
     """Identifies the targets of images, and answers parameters and services meanwhile.
 
     Every valid image gets an answer, unless a newer one arrives before its turn. Invalid images
     are counted and logged. Requests are answered one at a time, while the node is active.
+
+    Where it is managed, others configure, activate, deactivate and clean it up, by the states and
+    services of ROS 2 (design.ros2.org/articles/node_lifecycle.html).
     """
 
     def __init__(self) -> None:
@@ -65,9 +72,7 @@ class DetectorNode(ManagedNode):
         self._answers = Answers(self, self._tally)
         self._queue = ImageQueue(self, self._worker, self._answers, self._tally)
         self._diagnostic_array = self.publisher(DiagnosticArray, '/diagnostics', 10)
-        # With use_sim_time, the node's clock stops when a replay stops.
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(DIAGNOSTICS_PERIOD, self._publish_diagnostics, clock=steady)
+        self.every(DIAGNOSTICS_PERIOD, self._publish_diagnostics)
         self._images: Input | None = None
         self._subscribed = ('', '')
         self._service: ServiceDetector | None = None
@@ -80,12 +85,72 @@ class DetectorNode(ManagedNode):
         ):
             respond = partial(self._respond, answer)
             self.create_service(kind, service, respond, qos_profile=kept, callback_group=group)
-        self.begin(self._settings.on('managed'), self._settings.on('autostart'))
+        self._managed = False
+        self._begin()
+
+    def _begin(self) -> None:
+        """Configure and activate, or let others do it. Raises a ValueError if it cannot."""
+        if not self._settings.on('managed'):
+            self.configure()
+            self.activate()
+            return
+        steps = {
+            'configure': self.configure,
+            'activate': self.activate,
+            'deactivate': self.deactivate,
+            'cleanup': self.cleanup,
+            'shutdown': self.cleanup,
+            'error': self.cleanup,  # after a step that failed unexpectedly
+        }
+        for name, work in steps.items():
+            setattr(self, f'on_{name}', partial(self._step, name, work))
+        LifecycleNodeMixin.__init__(self, callback_group=MutuallyExclusiveCallbackGroup())
+        self._managed = True
+        service = self._service_change_state
+        service.callback = partial(self._change_state, service.callback)
+        succeeded = TransitionCallbackReturn.SUCCESS
+        if self._settings.on('autostart') and self.trigger_configure() == succeeded:
+            self.trigger_activate()
+
+    @property
+    def state(self) -> str:
+        """State of a managed node; one that is not managed is always active."""
+        return self._state_machine.current_state[1] if self._managed else ACTIVE
+
+    def _step(
+        self, name: str, work: Callable[[], None], _: LifecycleState
+    ) -> TransitionCallbackReturn:
+        """Take a step of the lifecycle, and log why it fails, of which rclpy says nothing."""
+        try:
+            work()
+        except ValueError as error:
+            self.get_logger().error(f'{name} fails: {printable(str(error))}')
+            return TransitionCallbackReturn.FAILURE
+        except Exception:
+            lines = traceback.format_exc().splitlines()
+            self.get_logger().error('\n'.join(map(printable, lines)))
+            return TransitionCallbackReturn.ERROR
+        return TransitionCallbackReturn.SUCCESS
+
+    def _change_state(self, change: Callable[[Any, Any], Any], request: Any, response: Any) -> Any:
+        """Refuse an impossible transition, where an error of rcl would end the node."""
+        before = self.state
+        try:
+            return change(request, response)
+        except RuntimeError:
+            what = printable(request.transition.label or str(request.transition.id))
+            self.get_logger().error(f'transition {what} is not possible: state is {before}')
+            response.success = False
+            return response
 
     def configure(self) -> None:
         """Check the settings and make the detector."""
         self._configured = True
-        self._renew()
+        try:
+            self._renew()
+        except ValueError:
+            self.cleanup()
+            raise
 
     def activate(self) -> None:
         """Subscribe to images, and answer those that wait."""
@@ -99,6 +164,7 @@ class DetectorNode(ManagedNode):
 
     def cleanup(self) -> None:
         """Give up detector, subscriptions and the images that wait."""
+        self.deactivate()
         self._configured = False
         self._queue.discard()
         if self._images:
@@ -136,11 +202,11 @@ class DetectorNode(ManagedNode):
         self._answers.renew(settings)
         detector = self._service_detector(settings)
         self._queue.renew(Pipeline(settings, self._stopping, detector))
-        if self._subscribed != (settings.image_transport, settings.queue):
-            self._subscribed = (settings.image_transport, settings.queue)
+        transport = settings.image_transport
+        if self._subscribed != (transport, settings.queue):
+            self._subscribed = (transport, settings.queue)
             if self._images:
                 self.unsubscribe(self._images)
-            transport = settings.image_transport
             kind, topic = IMAGE_TYPES[transport], image_topic(self, transport)
             lossless = self._tally.lossless = settings.queue == LOSSLESS
             # The callback may write to the disk and must not block the others.

@@ -9,6 +9,7 @@ from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from std_msgs.msg import Header
 
 from ahf_ros.edge_shift import edge_shift_remark
+from ahf_ros.interchange.image_messages import nanoseconds
 from ahf_ros.target import Identification
 from ahf_ros.text import printable
 
@@ -18,33 +19,16 @@ LOSS_REMEDY = 'more depth of the publisher, or config/fastdds_shm.xml on both si
 
 @dataclass(slots=True)
 class CloudTally:
-    """Counts of point clouds since the start.
-
-    Attributes
-    ----------
-    received, used, rejected : int
-        Clouds that arrived; that matched an image, so that positions were published; that were
-        not accepted.
-    reason : str
-        Why the last rejected cloud was rejected.
-    unmatched : list of int
-        Number of clouds without an image, and of images without a cloud.
-    positions : str
-        How many targets of the last image have a position.
-    lost : int
-        Clouds lost in transport.
-    waiting : str
-        Message about images that wait for their cloud for long; empty if none do.
-    """
+    """Counts of point clouds since the start."""
 
     received: int = 0
-    used: int = 0
+    used: int = 0  # matched an image, so that positions were published
+    lost: int = 0  # in transport
     rejected: int = 0
-    reason: str = ''
-    unmatched: list[int] = field(default_factory=lambda: [0, 0])
-    positions: str = ''
-    lost: int = 0
-    waiting: str = ''
+    reason: str = ''  # why the last rejected cloud was rejected
+    unmatched: list[int] = field(default_factory=lambda: [0, 0])  # clouds, and images
+    positions: str = ''  # how many targets of the last image have one
+    waiting: str = ''  # message about images that wait for their cloud for long
 
     def values(self) -> dict[str, object]:
         """Return the entries of the diagnostics."""
@@ -62,81 +46,31 @@ class CloudTally:
 
 @dataclass(slots=True)
 class Tally:
-    """Counts of images since the start.
-
-    Attributes
-    ----------
-    received, answered, dropped, rejected, backwards : int
-        Images that arrived; that were answered; that were replaced by a newer one before their
-        turn; that were not accepted; whose stamp is earlier than the stamp before.
-    reason : str
-        Why the last rejected image was rejected.
-    mistaken : str
-        Message about other types on the topic of the images; empty if there are none.
-    several : str
-        Message about several publishers of images; empty if there are none.
-    silent : str
-        Message about images that do not arrive; empty if they do.
-    kind : str
-        Size and encoding of the last image.
-    changes : int
-        Images of another size or encoding than the one before.
-    change : str
-        The last of these changes.
-    lost : int
-        Images lost in transport.
-    lossless : bool
-        Whether every image counts.
-    lost_unknown : str
-        Why images lost in transport are not counted; empty if they are.
-    uncalibrated : str
-        Why the last answer has no undistorted targets; empty if it has, or if none are asked for.
-    inactive : str
-        State of a managed node that is not active; empty while it is.
-    incomplete, split : int
-        Stacks that were answered with fewer images; that were split.
-    latency : float
-        Time from the arrival of the last image to its answer, s.
-    last : Identification
-        The last identification.
-    clouds : CloudTally or None
-        Counts of clouds; None while they are not subscribed to.
-    stamp : tuple of 2 int
-        Stamp of the last image, s and ns.
-    """
+    """Counts of images since the start, and what is to be said about them; empty if nothing is."""
 
     received: int = 0
     answered: int = 0
-    dropped: int = 0
+    dropped: int = 0  # replaced by a newer one before their turn, or given up
     rejected: int = 0
-    backwards: int = 0
-    incomplete: int = 0
-    split: int = 0
-    reason: str = ''
-    mistaken: str = ''
-    several: str = ''
-    silent: str = ''
-    kind: str = ''
-    changes: int = 0
-    change: str = ''
-    lost: int = 0
-    lossless: bool = False
-    lost_unknown: str = ''
-    uncalibrated: str = ''
-    inactive: str = ''
-    latency: float = 0.0
+    reason: str = ''  # why the last rejected image was rejected
+    backwards: int = 0  # whose stamp is earlier than the stamp before
+    stamp: int = 0  # of the last image, ns
+    kind: str = ''  # size and encoding of the last image
+    changes: int = 0  # of size or encoding
+    change: str = ''  # the last of them
+    incomplete: int = 0  # stacks that were answered with fewer images
+    split: int = 0  # stacks that were split
+    lost: int = 0  # in transport
+    lost_unknown: str = ''  # why images lost in transport are not counted
+    lossless: bool = False  # whether every image counts
+    mistaken: str = ''  # message about other types on the topic of the images
+    several: str = ''  # message about several publishers of images
+    silent: str = ''  # message about images that do not arrive
+    uncalibrated: str = ''  # why the last answer has no undistorted targets, if they are asked for
+    inactive: str = ''  # state of a managed node that is not active
+    latency: float = 0.0  # from the arrival of the last image to its answer, s
     last: Identification = field(default_factory=lambda: Identification(()))
-    clouds: CloudTally | None = None
-    stamp: tuple[int, int] = (0, 0)
-
-    @property
-    def lost_in_transport(self) -> str:
-        """Images lost in transport, and whether they are counted."""
-        return (
-            f'{self.lost}, not counted: {self.lost_unknown}'
-            if self.lost_unknown
-            else str(self.lost)
-        )
+    clouds: CloudTally | None = None  # None while they are not subscribed to
 
     def give_up(self) -> int:
         """Count the images that wait as dropped, and return their number."""
@@ -146,15 +80,11 @@ class Tally:
 
     def compare_stamps(self, header: Header) -> str:
         """Count stamps that go backwards, as when a replay starts over; return what to report."""
-        (sec, nanosec), before = (header.stamp.sec, header.stamp.nanosec), self.stamp
-        self.stamp = sec, nanosec
+        before, self.stamp = self.stamp, nanoseconds(header)
         if self.stamp >= before:
             return ''
         self.backwards += 1
-        return (
-            f'stamp is {sec}.{nanosec:09} s, that of the image before is '
-            f'{before[0]}.{before[1]:09} s'
-        )
+        return f'stamp is {_seconds(self.stamp)}, that of the image before is {_seconds(before)}'
 
     def compare_kinds(self, kind: str) -> str:
         """Count changes of size or encoding; return what to report."""
@@ -180,8 +110,8 @@ class Diagnostics:
         before, self._before = self._before, replace(tally, clouds=copy(tally.clouds))
         answered = tally.answered - before.answered
         warning = '' if tally.inactive else _warning(tally, before)
-        message = f'the node is {tally.inactive}' if tally.inactive else ''
-        level = DiagnosticStatus.WARN if warning else DiagnosticStatus.OK
+        inactive = f'the node is {tally.inactive}' if tally.inactive else ''
+        unknown = f', not counted: {tally.lost_unknown}' if tally.lost_unknown else ''
         used, shift = tally.last.filter, tally.last.edge_shift
         values = {
             'rate (Hz)': f'{answered / period:.2f}',
@@ -189,7 +119,7 @@ class Diagnostics:
             'received': tally.received,
             'answered': tally.answered,
             'dropped': tally.dropped,
-            'lost in transport': tally.lost_in_transport,
+            'lost in transport': f'{tally.lost}{unknown}',
             'rejected': tally.rejected,
             'last reason for rejection': tally.reason,
             'stamps that went backwards': tally.backwards,
@@ -209,9 +139,9 @@ class Diagnostics:
         if tally.clouds:
             values |= tally.clouds.values()
         return DiagnosticStatus(
-            level=level,
+            level=DiagnosticStatus.WARN if warning else DiagnosticStatus.OK,
             name=self._name,
-            message=message or warning or f'{answered} images identified',
+            message=inactive or warning or f'{answered} images identified',
             values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
         )
 
@@ -240,3 +170,7 @@ def _warning(tally: Tally, before: Tally) -> str:
         tally.uncalibrated,
     )
     return '; '.join(text for text in reports if text)
+
+
+def _seconds(stamp: int) -> str:
+    return f'{stamp // 10**9}.{stamp % 10**9:09} s'

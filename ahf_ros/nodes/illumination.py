@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Iterator
+from itertools import cycle
+from typing import NamedTuple
 
 import numpy as np
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 
@@ -16,18 +18,16 @@ from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.nodes.parameters import ParameterSettings
 from ahf_ros.nodes.process import ProcessNode, run
 from ahf_ros.nodes.settings import IlluminationNodeSettings
-from ahf_ros.nodes.worker import Worker
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 from ahf_ros.target import Identification
 
 
-@dataclass(frozen=True, slots=True)
-class SceneMessages:
-    """The messages of one rendered image, which share a header."""
+class SceneMessages(NamedTuple):
+    """The messages of one rendered image, which share a header, in the order of publication."""
 
-    image: Image
-    camera_info: CameraInfo
     ground_truth: CodedTargetArray
+    camera_info: CameraInfo
+    image: Image
 
 
 class IlluminationNode(ProcessNode):
@@ -37,13 +37,18 @@ class IlluminationNode(ProcessNode):
         super().__init__('illumination')
         self._settings = ParameterSettings(self, IlluminationNodeSettings, self._restart)
         self._scenes: list[tuple[SceneSettings, int]] = []
-        self._rendered: list[SceneMessages] = []
-        self._published = 0
-        self._image = self.publisher(Image, 'image')
-        self._camera_info = self.publisher(CameraInfo, 'camera_info')
-        self._ground_truth = self.publisher(CodedTargetArray, 'ground_truth')
-        self._timer = self.create_timer(1 / self._settings.current.rate, self._publish)
-        self._worker = Worker()
+        self._messages: Iterator[SceneMessages] = iter(())
+        self._outputs = (
+            self.publisher(CodedTargetArray, 'ground_truth'),
+            self.publisher(CameraInfo, 'camera_info'),
+            self.publisher(Image, 'image'),
+        )
+        # Rendering takes its time and must not block the parameters.
+        self._timer = self.create_timer(
+            1 / self._settings.current.rate,
+            self._publish,
+            callback_group=MutuallyExclusiveCallbackGroup(),
+        )
         self._restart()
 
     def introduction(self) -> str:
@@ -55,62 +60,41 @@ class IlluminationNode(ProcessNode):
             f'images on {self.resolve_topic_name("image")}'
         )
 
-    def close(self) -> None:
-        """Stop rendering after the current image."""
-        self._rendered = []
-        self._worker.stop()
-
     def _restart(self) -> None:
         """Render and publish as the parameters now say."""
         settings = self._settings.current
         self._timer.timer_period_ns = round(1e9 / settings.rate)
         self._timer.reset()
-        if settings.scenes() == self._scenes:
-            return
-        self._scenes = settings.scenes()
-        self._rendered = []
-        self._published = 0
-        self._worker.append(partial(self._render, self._scenes, self._rendered))
-
-    def _render(
-        self, scenes: list[tuple[SceneSettings, int]], rendered: list[SceneMessages]
-    ) -> None:
-        """Render the scenes of the cycle, until other scenes or none are wanted."""
-        for scene, phase in scenes:
-            if self._rendered is not rendered:
-                return
-            try:
-                rendered.append(scene_messages(render(scene, phase)))
-            except ValueError as error:
-                self.get_logger().error(f'nothing to publish: {error}')
-                return
+        if settings.scenes() != self._scenes:
+            self._scenes = settings.scenes()
+            # Each is rendered once, when it is its turn.
+            self._messages = cycle(scene_messages(render(*scene)) for scene in self._scenes)
 
     def _publish(self) -> None:
-        """Publish the image whose turn it is, if it is already rendered."""
-        turn = self._published % len(self._scenes)
-        if turn >= len(self._rendered):
+        """Publish the image whose turn it is."""
+        turns = self._messages
+        try:
+            messages = next(turns, None)
+        except ValueError as error:
+            self.get_logger().error(f'nothing to publish: {error}')
             return
-        messages = self._rendered[turn]
+        if messages is None or turns is not self._messages:
+            return  # the parameters have changed meanwhile
         frame_id = self._settings.current.frame_id
         header = Header(stamp=self.get_clock().now().to_msg(), frame_id=frame_id)
-        for message in (messages.ground_truth, messages.camera_info, messages.image):
+        for publisher, message in zip(self._outputs, messages, strict=True):
             message.header = header
-        self._ground_truth.publish(messages.ground_truth)
-        self._camera_info.publish(messages.camera_info)
-        self._image.publish(messages.image)
-        self._published += 1
+            publisher.publish(message)
 
 
 def scene_messages(rendering: Rendering) -> SceneMessages:
     """Return the messages of a rendered image."""
-    settings = rendering.settings
+    family, shape = rendering.settings.family, rendering.image.shape
     truth = Identification(rendering.targets, expected=len(rendering.targets))
     return SceneMessages(
-        image=image_message(rendering.image, Header()),
+        ground_truth=coded_target_array(truth, family, shape, Header(), msg),
         camera_info=camera_info(rendering),
-        ground_truth=coded_target_array(
-            truth, settings.family, rendering.image.shape, Header(), msg
-        ),
+        image=image_message(rendering.image, Header()),
     )
 
 

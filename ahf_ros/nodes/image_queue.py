@@ -14,12 +14,12 @@ import time
 import traceback
 from collections import deque
 from collections.abc import Callable, Iterable
+from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from itertools import count
-from typing import Any, BinaryIO, TypeAlias
+from typing import Any, BinaryIO, TypeAlias, TypeVar
 
-from rclpy.clock import Clock, ClockType
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
@@ -31,7 +31,6 @@ from ahf_ros.nodes.diagnostics import Tally
 from ahf_ros.nodes.pipeline import Pipeline, Stopping
 from ahf_ros.nodes.process import LOG_PERIOD, ProcessNode
 from ahf_ros.nodes.settings import LOSSLESS
-from ahf_ros.nodes.worker import Worker
 from ahf_ros.stream import Answer, Kind, Remark, message_frame, why_refused
 from ahf_ros.text import printable
 
@@ -41,8 +40,7 @@ SEGMENT = 64 * 2**20
 RESERVE = 256 * 2**20
 """Space of the disk that is left to others, bytes."""
 
-PERIOD = 0.05
-"""Time between two looks at whether a stack is overdue, s."""
+Result = TypeVar('Result')
 
 ImageMessage: TypeAlias = Image | CompressedImage
 """The messages that images arrive in."""
@@ -71,17 +69,6 @@ class ImageQueue:
     Every image of a lossless queue waits. Of other images, as many wait as a stack has: a newer
     one takes the place of the oldest, and a stack has no images on both sides of such a gap.
     An image is identified as the parameters are when it arrives.
-
-    Parameters
-    ----------
-    node : ProcessNode
-        Has the timer and the log.
-    worker : Worker
-        Identifies the images.
-    answers : Answers
-        Publishes what is identified.
-    tally : Tally
-        Counts to continue.
     """
 
     def __init__(self, node: ProcessNode, worker: Worker, answers: Answers, tally: Tally) -> None:
@@ -91,28 +78,21 @@ class ImageQueue:
         self._tally = tally
         self._lock = threading.Lock()
         self._numbers = count(1)
-        self._in_force: Pipeline | None = None
+        self.pipeline: Pipeline  # in force
         self._begin()
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
         # It is never cancelled: rclpy ends the node where one thread cancels a timer that is due
         # while another is about to call it.
-        node.create_timer(PERIOD, self._look, clock=steady)
+        node.every(0.05, self._look)
 
     def _begin(self) -> None:
         self._waiting: deque[_Waiting] = deque()
         self._messages = WaitingMessages()
         self._last: _Waiting | None = None
-        self._ending = False
-
-    @property
-    def pipeline(self) -> Pipeline:
-        """The pipeline in force."""
-        assert self._in_force is not None
-        return self._in_force
+        self._looking = False
 
     def renew(self, pipeline: Pipeline) -> None:
         """Identify the images that arrive from now on by a pipeline; it begins a new stack."""
-        self._in_force = pipeline
+        self.pipeline = pipeline
         self._worker.append(self._settle)
 
     def discard(self) -> None:
@@ -145,16 +125,8 @@ class ImageQueue:
     def identify(self, message: ImageMessage, expected: int | None = None) -> CodedTargetArray:
         """Identify an image out of turn; called in the thread of the worker.
 
-        Parameters
-        ----------
-        message : Image or CompressedImage
-        expected : int, optional
-            N; where None, the N of the parameters.
-
-        Raises
-        ------
-        ValueError
-            If the image is refused, which is counted and logged, or the node stops.
+        Without `expected`, N is that of the parameters. Raises a ValueError if the image is
+        refused, which is counted and logged, or if the node stops.
         """
         pipeline = self.pipeline
         try:
@@ -190,27 +162,23 @@ class ImageQueue:
 
     def _settle(self) -> None:
         """End a stack that was begun with other parameters."""
-        if self._last and self._last.pipeline is not self._in_force:
+        if self._last and self._last.pipeline is not self.pipeline:
             self._end(self._last, 'parameters changed')
 
     def _look(self) -> None:
-        if self._overdue() and not self._ending:
-            self._ending = True
+        last = self._last
+        if last and last.pipeline.stream.waiting and not self._looking:
+            self._looking = True
             self._worker.append(self._end_overdue)
 
-    def _overdue(self) -> _Waiting | None:
-        """Return the last image if the next one of its stack has not come in time."""
-        last = self._last
-        if not last or not last.pipeline.stream.waiting:
-            return None
-        limit = last.pipeline.settings.stack_timeout
-        return last if time.monotonic() - last.arrived > limit else None
-
     def _end_overdue(self) -> None:
-        self._ending = False
-        if last := self._overdue():
+        """End a stack if its next image has not come in time."""
+        self._looking = False
+        last = self._last
+        if last and last.pipeline.stream.waiting:
             limit = last.pipeline.settings.stack_timeout
-            self._end(last, f'no image followed for {limit:g} s')
+            if time.monotonic() - last.arrived > limit:
+                self._end(last, f'no image followed for {limit:g} s')
 
     def _end(self, last: _Waiting, why: str) -> None:
         self._handle(last, last.pipeline.stream.end(why))
@@ -253,6 +221,63 @@ class ImageQueue:
             self._logger.warning(text, throttle_duration_sec=LOG_PERIOD)
 
 
+class Worker:
+    """Runs jobs in order, one at a time, in a thread of its own; while it is paused, they wait."""
+
+    def __init__(self) -> None:
+        self._thread = ThreadPoolExecutor(max_workers=1)
+        self._turn = threading.Condition()  # held while a job runs
+        self._paused = self._stopped = False
+
+    def append(self, job: Callable[[], Result]) -> Future[Result]:
+        """Run `job`, unless the worker is stopped first, which cancels it."""
+        try:
+            return self._thread.submit(self._in_turn, job)
+        except RuntimeError:  # stopped
+            future: Future[Result] = Future()
+            future.cancel()
+            return future
+
+    def call(self, job: Callable[[], Result]) -> Result:
+        """Run `job` and return its result, or raise its error.
+
+        Raises a `concurrent.futures.CancelledError` if the worker is stopped before its turn.
+        """
+        return self.append(job).result()
+
+    def pause(self) -> None:
+        """Let jobs wait, and return when the running one has ended."""
+        self._paused = True
+        with self._turn:
+            pass
+
+    def resume(self) -> None:
+        """Run the jobs that wait."""
+        with self._turn:
+            self._paused = False
+            self._turn.notify()
+
+    def discard(self) -> None:
+        """Drop the waiting jobs and return when the running one has ended; the worker goes on."""
+        self.stop()
+        self._paused = self._stopped = False
+        self._thread = ThreadPoolExecutor(max_workers=1)
+
+    def stop(self) -> None:
+        """Drop the waiting jobs and return when the running one has ended."""
+        self._stopped = True
+        with self._turn:
+            self._turn.notify()
+        self._thread.shutdown(cancel_futures=True)
+
+    def _in_turn(self, job: Callable[[], Result]) -> Result:
+        with self._turn:
+            self._turn.wait_for(lambda: self._stopped or not self._paused)
+            if self._stopped:
+                raise CancelledError
+            return job()
+
+
 class _Segment:
     """A file without a name that holds messages one after the other."""
 
@@ -273,16 +298,8 @@ class WaitingMessages:
     def put(self, message: Any, limit: int) -> Take:
         """Keep a message until it is taken.
 
-        Parameters
-        ----------
-        message : sensor_msgs.msg.Image or sensor_msgs.msg.CompressedImage
-        limit : int
-            Memory that waiting messages may take together, bytes; one may always wait.
-
-        Raises
-        ------
-        ValueError
-            If it would have to wait on disk and there is no space.
+        Waiting messages may take `limit` bytes of memory together; one may always wait. Raises a
+        ValueError if it would have to wait on disk and there is no space.
         """
         size = len(message.data)
         with self._lock:

@@ -19,16 +19,13 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from ahf_ros.nodes.qos import (
+from ahf_ros.nodes.topics import (
     LOSSLESS_SUBSCRIPTION,
     SUBSCRIPTION,
     declare_qos,
     qos_profile,
     qos_words,
 )
-
-NUMBER, SENDER, SENT = 'publication_sequence_number', 'publisher_gid', 'source_timestamp'
-"""Entries of the information that rclpy gives with a message."""
 
 SENDERS = 100
 """Maximum number of publishers that are remembered, the latest ones."""
@@ -38,20 +35,7 @@ class Losses:
     """Counts gaps in the numbers of the messages of each publisher.
 
     Up to Jazzy, rclpy does not say which publisher a message is from. The gaps are then counted
-    while there is one publisher, and the same one before and after the gap.
-
-    Parameters
-    ----------
-    publishers : callable
-        Returns the identifiers of the publishers on the topic.
-
-    Attributes
-    ----------
-    lost : int
-        Messages lost so far, including those that a newer one replaced in a full queue of the
-        middleware.
-    unknown : str
-        Why losses cannot be counted at present; empty if they can.
+    while there is one publisher on the topic, and the same one before and after the gap.
     """
 
     def __init__(self, publishers: Callable[[], frozenset[Hashable]]) -> None:
@@ -60,8 +44,8 @@ class Losses:
         self._before_pause: set[str] = set()
         self._known: frozenset[Hashable] = frozenset()
         self._told = 0
-        self.lost = 0
-        self.unknown = ''
+        self.lost = 0  # also those that a newer one replaced in a full queue of the middleware
+        self.unknown = ''  # why losses cannot be counted at present; empty if they can
 
     def pause(self) -> None:
         """Do not count what is missed from now on until the next message of each publisher."""
@@ -71,32 +55,29 @@ class Losses:
     def add(self, information: Mapping[str, Any]) -> bool:
         """Count what was lost before a message; return whether the message is a new one.
 
-        A subscription that takes the place of another one may get the last message again.
-
-        Parameters
-        ----------
-        information : mapping of str to value
-            What rclpy knows about the message.
+        A subscription that takes the place of another one may get the last message again. What
+        rclpy knows about the message is the `information`.
         """
-        number, sent = information.get(NUMBER) or 0, information.get(SENT) or 0
+        number = information.get('publication_sequence_number') or 0
+        sent = information.get('source_timestamp') or 0
         if not number:
             self.unknown = 'the middleware does not number messages'
             return True
-        sender = information.get(SENDER)
-        before = self._last.pop(str(sender), None)
-        self._last[str(sender)] = number, sent
+        told = information.get('publisher_gid')
+        sender = str(told)
+        before = self._last.pop(sender, None)
+        self._last[sender] = number, sent
         if sent and before == (number, sent):
             return False
         if len(self._last) > SENDERS:
             del self._last[next(iter(self._last))]
-        paused = str(sender) in self._before_pause
-        self._before_pause.discard(str(sender))
-        gap = number - before[0] - 1 if before and not paused else -1
-        if sender is not None:
+        gap = number - before[0] - 1 if before and sender not in self._before_pause else -1
+        self._before_pause.discard(sender)
+        if told is not None:
             self.unknown = ''
             self.lost += max(gap, 0)
-        elif gap or self.unknown:
-            self.lost += max(gap, 0) if self._from_one() else 0
+        elif (gap or self.unknown) and self._from_one():
+            self.lost += max(gap, 0)
         return True
 
     def newly_lost(self) -> int:
@@ -116,35 +97,7 @@ class Losses:
 class Input:
     """A subscription whose quality of service follows the publishers.
 
-    Parameters
-    ----------
-    node : rclpy.node.Node
-        Subscribes.
-    kind : type
-        Type of the messages.
-    topic : str
-        Name of the topic, before remapping.
-    callback : callable
-        Called with every message.
-    group : CallbackGroup, optional
-        Group of the callback.
-    lossless : bool
-        Whether every message is kept until it is taken. The callback must take each at once.
-    opened : bool
-        Whether to subscribe now.
-
-    Attributes
-    ----------
-    topic, name : str
-        Name of the topic, before and after remapping.
-    overrides : str
-        Where the names of its overrides begin.
-    profile : QoSProfile
-        Quality of service of the subscription.
-    losses : Losses
-        Messages lost in transport.
-    arrived : float
-        When the last message arrived, or the subscription began, s of the monotonic clock.
+    Where it is lossless, every message is kept until the callback takes it, which must be at once.
     """
 
     def __init__(
@@ -153,32 +106,24 @@ class Input:
         kind: type,
         topic: str,
         callback: Callable[[Any], None],
-        group: CallbackGroup | None = None,
-        lossless: bool = False,
-        opened: bool = True,
+        group: CallbackGroup | None,
+        lossless: bool,
     ) -> None:
         self._node = node
-        self.kind = kind
+        self._kind = kind
+        self.type_name = f'{kind.__module__.split(".")[0]}/msg/{kind.__name__}'
+        self.topic = topic  # before remapping
         self.name: str = node.resolve_topic_name(topic)
-        self.topic = topic
         self._callback = callback
         self._group = group
-        self._lossless = lossless
         end = LOSSLESS_SUBSCRIPTION if lossless else SUBSCRIPTION
-        self.overrides = f'qos_overrides.{self.name}.{end}'
+        self.overrides = f'qos_overrides.{self.name}.{end}'  # how the names of all begin
         self._values = declare_qos(node, end, topic)
         self._lock = threading.Lock()
         self.losses = Losses(self._identifiers)
-        self.arrived = time.monotonic()
+        self.arrived = time.monotonic()  # the last message, or the beginning
         self.profile = qos_profile(self._values)
         self._subscription: Subscription | None = None
-        if opened:
-            self.open()
-
-    @property
-    def type_name(self) -> str:
-        """Name of the type of the messages."""
-        return f'{self.kind.__module__.split(".")[0]}/msg/{self.kind.__name__}'
 
     def open(self) -> None:
         """Subscribe."""
@@ -186,8 +131,7 @@ class Input:
             if self._subscription:
                 return
             self.arrived = time.monotonic()
-            self.profile = qos_profile(self._values, self._offered())
-            self._subscription = self._subscribe()
+            self._subscribe(qos_profile(self._values, self._offered()))
         if self.profile != qos_profile(self._values):
             self._report()
 
@@ -212,8 +156,7 @@ class Input:
             if not offered or not self._subscription or profile == self.profile:
                 return
             self._node.destroy_subscription(self._subscription)
-            self.profile = profile
-            self._subscription = self._subscribe()
+            self._subscribe(profile)
         self._report()
 
     def _offered(self) -> list[QoSProfile]:
@@ -222,17 +165,17 @@ class Input:
     def _identifiers(self) -> frozenset[Hashable]:
         return frozenset(tuple(it.endpoint_gid) for it in self.publishers())
 
-    def _subscribe(self) -> Subscription:
-        # Without a callback of its own, rclpy warns that nothing will be received.
-        events = SubscriptionEventCallbacks(incompatible_qos=lambda _: self.follow())
+    def _subscribe(self, profile: QoSProfile) -> None:
+        self.profile = profile
         take: Any = self._take
-        return self._node.create_subscription(
-            self.kind,
+        self._subscription = self._node.create_subscription(
+            self._kind,
             self.topic,
             take,
-            self.profile,
+            profile,
             callback_group=self._group,
-            event_callbacks=events,
+            # Without a callback of its own, rclpy warns that nothing will be received.
+            event_callbacks=SubscriptionEventCallbacks(incompatible_qos=lambda _: self.follow()),
         )
 
     def _take(self, message: Any, information: Mapping[str, Any]) -> None:

@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import json
 import textwrap
-from collections.abc import Iterable, Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 
 from ahf_ros.nodes.settings import (
     DetectorNodeSettings,
@@ -18,11 +17,17 @@ from ahf_ros.nodes.settings import (
 )
 from ahf_ros.settings.nested import flat_parameters
 
-SUBSCRIBED, PUBLISHED, SERVED = 'in', 'out', 'service'
-"""What a node does with a topic or service."""
+_HELP = """\
+usage: ros2 run ahf_ros {node} --ros-args -p PARAMETER:=VALUE -r TOPIC:=OTHER ...
 
-_WIDTH = 99
-_REST = """\
+{purpose}
+
+topics and services:
+{interfaces}
+
+parameters that are changed most:
+{parameters}
+
 all parameters, while the node runs:
   ros2 param list /{node}
   ros2 param describe /{node} NAME
@@ -32,196 +37,96 @@ or docs/parameters.md, and the files in config/.
 
 @dataclass(frozen=True, slots=True)
 class Interface:
-    """One topic or service of a node.
+    """One topic or service of a node, by its name before remapping."""
 
-    Attributes
-    ----------
-    use : str
-        `SUBSCRIBED`, `PUBLISHED` or `SERVED`.
-    name : str
-        Name before remapping.
-    kind : str
-        Type of the messages.
-    text : str
-        What it is for, to follow the type.
-    """
-
-    use: str
+    use: str  # in, out or service
     name: str
-    kind: str
-    text: str
+    kind: str  # of the messages
+    text: str  # what it is for, to follow the type
 
 
 @dataclass(frozen=True, slots=True)
 class NodeInterface:
-    """What a user of a node needs to know before starting it.
+    """What a user of a node needs to know before starting it."""
 
-    Attributes
-    ----------
-    purpose : str
-        What the node does, one sentence.
-    interfaces : tuple of Interface
-        Its topics and services.
-    settings : type
-        Settings dataclass with its parameters.
-    usual : tuple of str
-        Names of the parameters that are changed most.
-    """
-
-    purpose: str
+    purpose: str  # one sentence
     interfaces: tuple[Interface, ...]
     settings: type
-    usual: tuple[str, ...]
+    usual: tuple[str, ...]  # names of the parameters that are changed most
 
 
-NODES: Mapping[str, NodeInterface] = MappingProxyType(
-    {
-        'detector': NodeInterface(
-            'Identifies the coded targets in images, also under difficult light.',
-            (
-                Interface(
-                    SUBSCRIBED,
-                    'image',
-                    'sensor_msgs/Image',
-                    'mono, colour, Bayer, YUV422; 8 and 16 bits and floats; any step and byte '
-                    'order',
-                ),
-                Interface(
-                    SUBSCRIBED,
-                    'image/compressed',
-                    'sensor_msgs/CompressedImage',
-                    'with `image_transport` compressed: JPEG, PNG of 8 and 16 bits',
-                ),
-                Interface(SUBSCRIBED, 'camera_info', 'sensor_msgs/CameraInfo', 'with `undistort`'),
-                Interface(
-                    SUBSCRIBED,
-                    'points',
-                    'sensor_msgs/PointCloud2',
-                    'with `cloud`: organised, one point per pixel',
-                ),
-                Interface(
-                    PUBLISHED,
-                    'coded_targets',
-                    'ahf_ros/CodedTargetArray',
-                    'one for every image, even if it is empty',
-                ),
-                Interface(
-                    PUBLISHED,
-                    '~/detections',
-                    'vision_msgs/Detection2DArray',
-                    'with `detections`',
-                ),
-                Interface(
-                    PUBLISHED,
-                    '~/undistorted_targets',
-                    'ahf_ros/CodedTargetArray',
-                    'with `undistort`: in the rectified image',
-                ),
-                Interface(
-                    PUBLISHED,
-                    '~/target_points',
-                    'sensor_msgs/PointCloud2',
-                    'with `cloud`: position and ID of every target',
-                ),
-                Interface(
-                    PUBLISHED,
-                    '~/target_labels',
-                    'visualization_msgs/MarkerArray',
-                    'with `cloud`: IDs at the target points; only while somebody subscribes',
-                ),
-                Interface(
-                    PUBLISHED,
-                    '~/debug_image',
-                    'sensor_msgs/Image',
-                    'outlines and IDs drawn into the image; only while somebody subscribes',
-                ),
-                Interface(
-                    PUBLISHED,
-                    '~/filtered_image',
-                    'sensor_msgs/Image',
-                    'the image as the filter leaves it; only while somebody subscribes',
-                ),
-                Interface(
-                    PUBLISHED,
-                    '~/annotations',
-                    'visualization_msgs/ImageMarker',
-                    'outlines to lay over the image; only while somebody subscribes',
-                ),
-                Interface(
-                    PUBLISHED,
-                    '/diagnostics',
-                    'diagnostic_msgs/DiagnosticArray',
-                    'once per second',
-                ),
-                Interface(
-                    SERVED,
-                    '~/identify',
-                    'ahf_ros/srv/Identify',
-                    'one image, one answer, never dropped',
-                ),
-                Interface(
-                    SERVED, '~/reset', 'std_srvs/Trigger', 'forget the filter of earlier images'
-                ),
-                Interface(
-                    SERVED,
-                    '~/change_state',
-                    'lifecycle_msgs/ChangeState',
-                    'with `managed`, as the other services of the lifecycle',
-                ),
-            ),
-            DetectorNodeSettings,
-            (
-                'expected_targets',
-                'expected_ids',
-                'detector',
-                'family',
-                'polarity',
-                'ahf',
-                'max_duration',
-                'stack',
-                'queue',
-                'image_transport',
-            ),
+def _interfaces(table: str) -> tuple[Interface, ...]:
+    """Return the interfaces in a table with a line for each."""
+    rows = (line.split(maxsplit=3) for line in table.strip().splitlines())
+    return tuple(Interface(use, name, kind, text) for use, name, kind, text in rows)
+
+
+_DETECTOR = _interfaces("""
+in image sensor_msgs/Image \
+    mono, colour, Bayer, YUV422; 8 and 16 bits and floats; any step and byte order
+in image/compressed sensor_msgs/CompressedImage \
+    with `image_transport` compressed: JPEG, PNG of 8 and 16 bits
+in camera_info sensor_msgs/CameraInfo with `undistort`
+in points sensor_msgs/PointCloud2 with `cloud`: organised, one point per pixel
+out coded_targets ahf_ros/CodedTargetArray one for every image, even if it is empty
+out ~/detections vision_msgs/Detection2DArray with `detections`
+out ~/undistorted_targets ahf_ros/CodedTargetArray with `undistort`: in the rectified image
+out ~/target_points sensor_msgs/PointCloud2 with `cloud`: position and ID of every target
+out ~/target_labels visualization_msgs/MarkerArray \
+    with `cloud`: IDs at the target points; only while somebody subscribes
+out ~/debug_image sensor_msgs/Image \
+    outlines and IDs drawn into the image; only while somebody subscribes
+out ~/filtered_image sensor_msgs/Image \
+    the image as the filter leaves it; only while somebody subscribes
+out ~/annotations visualization_msgs/ImageMarker \
+    outlines to lay over the image; only while somebody subscribes
+out /diagnostics diagnostic_msgs/DiagnosticArray once per second
+service ~/identify ahf_ros/srv/Identify one image, one answer, never dropped
+service ~/reset std_srvs/Trigger forget the filter of earlier images
+service ~/change_state lifecycle_msgs/ChangeState \
+    with `managed`, as the other services of the lifecycle
+""")
+
+_ILLUMINATION = _interfaces("""
+out image sensor_msgs/Image rendered, mono8
+out camera_info sensor_msgs/CameraInfo the calibration of the camera that is rendered
+out ground_truth ahf_ros/CodedTargetArray the exact truth
+""")
+
+_SCOREBOARD = _interfaces("""
+in coded_targets ahf_ros/CodedTargetArray answers
+in ground_truth ahf_ros/CodedTargetArray the truth
+""")
+
+NODES = {
+    'detector': NodeInterface(
+        purpose='Identifies the coded targets in images, also under difficult light.',
+        interfaces=_DETECTOR,
+        settings=DetectorNodeSettings,
+        usual=(
+            *('expected_targets', 'expected_ids', 'detector', 'family', 'polarity', 'ahf'),
+            *('max_duration', 'stack', 'queue', 'image_transport'),
         ),
-        'illumination': NodeInterface(
-            'Publishes synthetic images of coded targets under projected light, with their truth.',
-            (
-                Interface(PUBLISHED, 'image', 'sensor_msgs/Image', 'rendered, mono8'),
-                Interface(
-                    PUBLISHED,
-                    'camera_info',
-                    'sensor_msgs/CameraInfo',
-                    'the calibration of the camera that is rendered',
-                ),
-                Interface(
-                    PUBLISHED, 'ground_truth', 'ahf_ros/CodedTargetArray', 'the exact truth'
-                ),
-            ),
-            IlluminationNodeSettings,
-            ('light', 'ambient', 'targets', 'width', 'height', 'dot_radius', 'rate', 'seed'),
+    ),
+    'illumination': NodeInterface(
+        purpose=(
+            'Publishes synthetic images of coded targets under projected light, with their truth.'
         ),
-        'scoreboard': NodeInterface(
-            'Compares answers with the truth and prints one line per image.',
-            (
-                Interface(SUBSCRIBED, 'coded_targets', 'ahf_ros/CodedTargetArray', 'answers'),
-                Interface(SUBSCRIBED, 'ground_truth', 'ahf_ros/CodedTargetArray', 'the truth'),
-            ),
-            ScoreboardSettings,
-            ('images',),
-        ),
-    }
-)
-"""Nodes by name."""
+        interfaces=_ILLUMINATION,
+        settings=IlluminationNodeSettings,
+        usual=('light', 'ambient', 'targets', 'width', 'height', 'dot_radius', 'rate', 'seed'),
+    ),
+    'scoreboard': NodeInterface(
+        purpose='Compares answers with the truth and prints one line per image.',
+        interfaces=_SCOREBOARD,
+        settings=ScoreboardSettings,
+        usual=('images',),
+    ),
+}
 
 
 def help_text(node: str) -> str:
-    """Return what a node does, its topics, services and most used parameters.
-
-    Parameters
-    ----------
-    node : str
-        One of `NODES`.
-    """
+    """Return what one of `NODES` does, its topics, services and most used parameters."""
     about = NODES[node]
     rows = [
         (f'{it.use:7} {it.name}', f'{it.kind}, {it.text.replace("`", "")}')
@@ -232,32 +137,20 @@ def help_text(node: str) -> str:
         (item.name, f'{item.description} Default: {json.dumps(item.default)}.')
         for item in map(parameters.__getitem__, about.usual)
     ]
-    return '\n'.join(
-        [
-            f'usage: ros2 run ahf_ros {node} --ros-args -p PARAMETER:=VALUE -r TOPIC:=OTHER ...',
-            '',
-            about.purpose,
-            '',
-            'topics and services:',
-            *_columns(rows),
-            '',
-            'parameters that are changed most:',
-            *_columns(settings),
-            '',
-            _REST.format(node=node),
-        ]
+    return _HELP.format(
+        node=node,
+        purpose=about.purpose,
+        interfaces=_columns(rows),
+        parameters=_columns(settings),
     )
 
 
-def _columns(rows: Iterable[tuple[str, str]]) -> list[str]:
-    """Return the lines of a table of two columns; the second one is wrapped."""
-    rows = list(rows)
+def _columns(rows: Sequence[tuple[str, str]]) -> str:
+    """Return a table of two columns; the second one is wrapped."""
     width = max(len(first) for first, _ in rows) + 4
-    lines = []
-    for first, second in rows:
-        indent = ' ' * width
-        wrapped = textwrap.wrap(
-            second, _WIDTH, initial_indent=f'  {first}'.ljust(width), subsequent_indent=indent
+    return '\n'.join(
+        textwrap.fill(
+            second, 99, initial_indent=f'  {first}'.ljust(width), subsequent_indent=' ' * width
         )
-        lines.extend(wrapped)
-    return lines
+        for first, second in rows
+    )

@@ -12,20 +12,18 @@ from launch_ros.actions import Node
 
 from ahf_ros.nodes.drivers import Driver
 from ahf_ros.nodes.interfaces import NODES
-from ahf_ros.nodes.qos import LOSSLESS_SUBSCRIPTION, SUBSCRIPTION
 from ahf_ros.nodes.settings import DetectorNodeSettings
+from ahf_ros.nodes.topics import LOSSLESS_SUBSCRIPTION, SUBSCRIPTION
 from ahf_ros.settings.nested import flat_parameters
 from ahf_ros.settings.parameter import Parameter
 
 USUAL = NODES['detector'].usual
 """Parameters that are arguments of every launch file with a detector of the user's."""
 
-CLOUD = ('cloud_tolerance', 'cloud_offset_x', 'cloud_offset_y', 'cloud_step')
-"""Parameters of clouds that are arguments of `rig.launch.py`."""
-
-_PARAMETERS = {item.name: item for item in flat_parameters(DetectorNodeSettings)}
-_SIMULATED = Parameter('use_sim_time', False, 'Whether to take the time from /clock.')
-_UNLESS_GIVEN = 'Default: the value in the parameter file.'
+_PARAMETERS = {
+    **{item.name: item for item in flat_parameters(DetectorNodeSettings)},
+    'use_sim_time': Parameter('use_sim_time', False, 'Whether to take the time from /clock.'),
+}
 
 
 def config(name: str) -> str:
@@ -37,11 +35,6 @@ def arguments(names: Iterable[str]) -> list[DeclareLaunchArgument]:
     """Return launch arguments for parameters of the detector, for its namespace and its file.
 
     An argument that is not given is empty, and the parameter file decides.
-
-    Parameters
-    ----------
-    names : iterable of str
-        Names of parameters of the node `detector`.
     """
     declared = [
         DeclareLaunchArgument(
@@ -53,49 +46,47 @@ def arguments(names: Iterable[str]) -> list[DeclareLaunchArgument]:
             description='Parameter file of the node; arguments take precedence over it.',
         ),
     ]
-    return declared + [
-        _argument(item) for item in (*(_PARAMETERS[name] for name in names), _SIMULATED)
-    ]
+    for item in _items(names):
+        accepted = '' if item.choices else f' Accepted is {item.accepted}.'
+        argument = DeclareLaunchArgument(
+            item.name,
+            default_value='',
+            choices=['', *item.choices] if item.choices else None,
+            description=(
+                f'{item.description}{accepted} Default: the value in the parameter file.'
+            ),
+        )
+        declared.append(argument)
+    return declared
 
 
-def _argument(item: Parameter) -> DeclareLaunchArgument:
-    accepted = '' if item.choices else f' Accepted is {item.accepted}.'
-    return DeclareLaunchArgument(
-        item.name,
-        default_value='',
-        choices=['', *item.choices] if item.choices else None,
-        description=f'{item.description}{accepted} {_UNLESS_GIVEN}',
-    )
+def _items(names: Iterable[str]) -> list[Parameter]:
+    return [_PARAMETERS[name] for name in (*names, 'use_sim_time')]
 
 
 def detector(given: Mapping[str, str], names: Iterable[str], driver: Driver | None = None) -> Node:
     """Return the detector, whose end ends the launch.
 
-    Parameters
-    ----------
-    given : mapping of str to str
-        Values of the launch arguments by their names, also of launch files that include
-        this one.
-    names : iterable of str
-        Parameters that are arguments, as for `arguments`; others are left alone.
-    driver : Driver, optional
-        The driver whose topics the detector reads where no argument names another.
-
-    Raises
-    ------
-    ValueError
-        If a value is not accepted; the message names the argument, the value and what is accepted.
+    Of the values `given` to launch arguments, which may be those of a launch file that includes
+    this one, those of the parameters in `names` are taken. The detector reads the topics of the
+    driver where no argument names another. Raises a ValueError that names the argument, the value
+    and what is accepted, if a value is not.
     """
     image, points = given.get('image', ''), given.get('points', '')
     values: dict[str, Any] = {}
     if driver:
         image, points = image or driver.image, points or driver.points
         values = {'cloud': True, **driver.settings}
-    for item in (*(_PARAMETERS[name] for name in names), _SIMULATED):
+    for item in _items(names):
         if text := given.get(item.name):
             values[item.name] = item.value_of(text)
     if driver and not driver.reliable:
-        values |= _best_effort(given, image, points)
+        # Best effort, whatever the queue.
+        space = given['namespace'].strip('/')
+        for topic in (image, points):
+            name = topic if topic.startswith('/') else f'/{space}/{topic}'.replace('//', '/')
+            for end in (SUBSCRIPTION, LOSSLESS_SUBSCRIPTION):
+                values[f'qos_overrides.{name}.{end}.reliability'] = 'best_effort'
     return Node(
         package='ahf_ros',
         executable='detector',
@@ -105,14 +96,3 @@ def detector(given: Mapping[str, str], names: Iterable[str], driver: Driver | No
         output='screen',
         on_exit=Shutdown(reason='the detector has ended'),
     )
-
-
-def _best_effort(given: Mapping[str, str], *topics: str) -> dict[str, str]:
-    """Return the parameters that subscribe to topics as best effort, whatever the queue."""
-    space = given['namespace'].strip('/')
-    absolute = [it if it.startswith('/') else f'/{space}/{it}' for it in topics]
-    return {
-        f'qos_overrides.{topic.replace("//", "/")}.{end}.reliability': 'best_effort'
-        for topic in absolute
-        for end in (SUBSCRIPTION, LOSSLESS_SUBSCRIPTION)
-    }

@@ -21,26 +21,12 @@ from ahf_ros.text import printable
 
 Settings = TypeVar('Settings')
 
-MAXIMUM_LENGTH = 2000
-"""Maximum length of a list of unknown parameters."""
-
 
 class ParameterSettings(Generic[Settings]):
     """The settings of a node, declared as its parameters and always consistent.
 
-    Parameters
-    ----------
-    node : rclpy.node.Node
-        Node that gets one parameter for each field of the settings.
-    settings : type
-        Settings dataclass; nested settings are flattened.
-    changed : callable, optional
-        Called when new settings are in force.
-
-    Raises
-    ------
-    ParameterException
-        If an initial value is of a type or in a form that ROS does not accept.
+    Each field of the settings dataclass and of those nested in it is a parameter. `changed` is
+    called when new settings are in force.
     """
 
     def __init__(
@@ -52,7 +38,11 @@ class ParameterSettings(Generic[Settings]):
             item.name: node.declare_parameter(item.name, item.default, descriptor(item)).value
             for item in flat_parameters(settings)
         }
-        self._current: Settings | ValueError = self._initial()
+        self._current: Settings | ValueError
+        try:
+            self._current = self._assembled({})
+        except ValueError as error:
+            self._current = error
         node.add_on_set_parameters_callback(self._check)
         node.add_post_set_parameters_callback(self._apply)
 
@@ -67,49 +57,43 @@ class ParameterSettings(Generic[Settings]):
         """Return whether a parameter is true, also while others are not accepted."""
         return self._values[name] is True
 
-    def _initial(self) -> Settings | ValueError:
-        try:
-            for item in flat_parameters(self._type):
-                _check_quotes(item, self._values[item.name])
-            return assemble(self._type, self._values)
-        except ValueError as error:
-            return error
+    def _assembled(self, changes: dict[str, object]) -> Settings:
+        """Return the settings with changes; raises a ValueError if they are not accepted."""
+        values = self._values | changes
+        for item in flat_parameters(self._type):
+            value = values[item.name]
+            if isinstance(item.default, str) and not isinstance(value, str):
+                # A number or a list: say how YAML and the shell take it for a text.
+                text = printable(str(value))
+                quoted = f"""; as a text it is {item.name}:="'{text}'" on the command line"""
+                raise ValueError(
+                    f'{item.name} is {text}, accepted is {item.accepted}'
+                    f'{"" if item.choices else quoted}'
+                )
+        return assemble(self._type, values)
 
     def _changes(self, parameters: Iterable[RosParameter]) -> dict[str, object]:
         """Return the new values of our parameters, without those that rclpy declares."""
         return {item.name: item.value for item in parameters if item.name in self._values}
 
     def _check(self, parameters: Iterable[RosParameter]) -> SetParametersResult:
-        changes = self._changes(parameters)
-        if not changes:
-            return SetParametersResult(successful=True)
         try:
-            for item in flat_parameters(self._type):
-                _check_quotes(item, changes.get(item.name, item.default))
-            assemble(self._type, self._values | changes)
+            if changes := self._changes(parameters):
+                self._assembled(changes)
         except ValueError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 
     def _apply(self, parameters: Iterable[RosParameter]) -> None:
-        changes = self._changes(parameters)
-        if not changes:
-            return
-        self._values |= changes
-        self._current = assemble(self._type, self._values)
-        if self._changed is not None:
-            self._changed()
+        if changes := self._changes(parameters):
+            self._current = self._assembled(changes)
+            self._values |= changes
+            if self._changed is not None:
+                self._changed()
 
 
 def unknown_parameters(given: Iterable[str], known: Collection[str]) -> Iterator[str]:
     """Yield a message for each given parameter that the node does not have.
-
-    Parameters
-    ----------
-    given : iterable of str
-        Names from the command line and from parameter files.
-    known : collection of str
-        Parameters of the node.
 
     Examples
     --------
@@ -123,18 +107,8 @@ def unknown_parameters(given: Iterable[str], known: Collection[str]) -> Iterator
         else:
             unlike.append(name)
     if unlike:
-        names = printable(', '.join(unlike), MAXIMUM_LENGTH)
+        names = printable(', '.join(unlike), 2000)
         yield f'no parameter is named {names}; is that a parameter of another node?'
-
-
-def _check_quotes(item: Parameter, value: object) -> None:
-    """Refuse a number or a list for a text, and say how YAML and the shell take it for a text."""
-    if isinstance(item.default, str) and not isinstance(value, str):
-        text = printable(str(value))
-        quoted = f"""; as a text it is {item.name}:="'{text}'" on the command line"""
-        raise ValueError(
-            f'{item.name} is {text}, accepted is {item.accepted}{"" if item.choices else quoted}'
-        )
 
 
 def descriptor(item: Parameter) -> ParameterDescriptor:
@@ -152,12 +126,10 @@ def descriptor(item: Parameter) -> ParameterDescriptor:
     )
     if item.minimum is not None and item.maximum is not None:
         # Tools draw sliders from a range, which needs both ends.
+        low, high = item.minimum, item.maximum
         if isinstance(item.default, int):
-            bounds = IntegerRange(from_value=int(item.minimum), to_value=int(item.maximum))
-            described.integer_range = [bounds]
+            described.integer_range = [IntegerRange(from_value=int(low), to_value=int(high))]
         else:
-            bounds = FloatingPointRange(
-                from_value=float(item.minimum), to_value=float(item.maximum)
-            )
+            bounds = FloatingPointRange(from_value=float(low), to_value=float(high))
             described.floating_point_range = [bounds]
     return described

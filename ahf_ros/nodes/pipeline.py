@@ -12,10 +12,12 @@ from ahf_ros import msg
 from ahf_ros.detectors import Detector, create_detector
 from ahf_ros.detectors.contract import Unavailable
 from ahf_ros.filtering.homomorphic import HomomorphicFilter
+from ahf_ros.filtering.settings import FilterSettings
 from ahf_ros.interchange.target_messages import coded_target_array
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.settings import LOSSLESS, DetectorNodeSettings
 from ahf_ros.stream import Answer, Stream
+from ahf_ros.target import FilterState
 
 STOPPING = 'the node stops'
 """Why an image that waits is not answered."""
@@ -31,19 +33,8 @@ class Stopping(Unavailable):
 class Pipeline:
     """A stream of images, and its answers as messages; new settings need a new pipeline.
 
-    Parameters
-    ----------
-    settings : DetectorNodeSettings
-        Settings of the node.
-    stopping : threading.Event
-        Interrupts an identification, also a search, at its next step: it raises `Stopping`.
-    detector : Detector, optional
-        Replaces the detector that the settings name.
-
-    Attributes
-    ----------
-    stream : Stream of Header
-        Identifies the images.
+    The event `stopping` interrupts an identification, also a search, at its next step: it raises
+    `Stopping`. A `detector` replaces the one that the settings name.
     """
 
     def __init__(
@@ -74,13 +65,19 @@ class Pipeline:
 
     def filtered(self, answer: Answer[Header]) -> np.ndarray:
         """Return the filtered image in which the targets of an answer were identified."""
-        used = answer.identification.filter
-        if not used.applied:
-            return answer.image
         settings = self.settings.identification.adaptive.filter
-        return HomomorphicFilter(answer.image, settings).filtered(
-            used.gamma_high, used.gamma_low, used.cutoff, used.attenuation
-        )
+        return filtered(answer.image, answer.identification.filter, settings)
+
+
+def filtered(
+    image: np.ndarray, used: FilterState, settings: FilterSettings | None = None
+) -> np.ndarray:
+    """Return the image as the filter of an identification leaves it."""
+    if not used.applied:
+        return image
+    return HomomorphicFilter(image, settings).filtered(
+        used.gamma_high, used.gamma_low, used.cutoff, used.attenuation
+    )
 
 
 def _check_running(stopping: threading.Event) -> None:

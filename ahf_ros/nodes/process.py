@@ -26,23 +26,11 @@ from rclpy.utilities import remove_ros_args
 from ahf_ros.ending import ignore_ending, signalled
 from ahf_ros.nodes.inputs import Input
 from ahf_ros.nodes.parameters import unknown_parameters
-from ahf_ros.nodes.qos import PUBLISHER, declare_qos, qos_profile
+from ahf_ros.nodes.topics import PUBLISHER, declare_qos, qos_profile
 from ahf_ros.text import reason_of, shown
 
 LOG_PERIOD = 5.0
 """Minimum time between two log lines of the same kind about messages, s."""
-
-FOLLOW_PERIOD = 1.0
-"""Time between two looks at what publishers offer, s."""
-
-ARENAS = 2
-"""Number of memory arenas that the threads of a node share; glibc would give each its own."""
-
-MAXIMUM_KEPT = 32 * 2**20
-"""Size from which on memory is taken from the system each time, bytes; the maximum of glibc."""
-
-KEPT = 256 * 2**20
-"""Free memory at the end of an arena that a node keeps, bytes: buffers of an image of 10 MP."""
 
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD, _M_ARENA_MAX = -1, -3, -8  # of glibc's malloc.h
 
@@ -86,34 +74,21 @@ class JoiningExecutor(MultiThreadedExecutor):
 
 
 class ProcessNode(Node):
-    """A node with a process of its own.
-
-    Attributes
-    ----------
-    ended : Ending of int
-        Exit status; set it to end the node. A signal sets it, too.
-    """
+    """A node with a process of its own."""
 
     def __init__(self, name: str) -> None:
         super().__init__(name)
-        self.ended = Ending()
+        self.ended = Ending()  # an exit status ends the node, as a signal does
         self._inputs: list[Input] = []
         self._listening = True
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(FOLLOW_PERIOD, self._follow, clock=steady)
+        self.every(1.0, self._follow)
 
     def introduction(self) -> str:
         """Return what the node will do, for the log at its start; empty if that is not needed."""
         return ''
 
     def ineffective(self, arguments: Sequence[str]) -> Iterator[str]:
-        """Yield a message for each argument and parameter that has no effect on the node.
-
-        Parameters
-        ----------
-        arguments : sequence of str
-            Command line arguments, without the name of the program.
-        """
+        """Yield a message for each argument and parameter that has no effect on the node."""
         yield from unknown_parameters(self._parameter_overrides, self.get_parameters_by_prefix(''))
         if '--params-file' in arguments and not self._parameter_overrides:
             yield f'the parameter file is for other nodes than {self.get_fully_qualified_name()}'
@@ -123,6 +98,10 @@ class ProcessNode(Node):
 
     def close(self) -> None:
         """End the threads of the node, while topics and the log still work."""
+
+    def every(self, period: float, callback: Callable[[], None]) -> None:
+        """Call a function every `period` seconds, also where a simulated clock stands still."""
+        self.create_timer(period, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def publisher(self, kind: type, topic: str, depth: int = 1) -> Publisher:
         """Return a publisher, reliable and of this depth unless `qos_overrides` differ."""
@@ -142,8 +121,10 @@ class ProcessNode(Node):
         Only the latest message is kept; where lossless, every one, and the callback must take each
         at once. In `qos_overrides`, that is called `subscription_lossless`.
         """
-        made = Input(self, kind, topic, callback, group, lossless, self._listening)
+        made = Input(self, kind, topic, callback, group, lossless)
         self._inputs.append(made)
+        if self._listening:
+            made.open()
         return made
 
     def listen(self, wanted: bool) -> None:
@@ -166,20 +147,10 @@ class ProcessNode(Node):
 
 
 def run(make_node: Callable[[], ProcessNode], arguments: list[str] | None = None) -> int:
-    """Run a node until it ends itself or receives one of `ending_signals`.
+    """Run a node until it ends itself or receives one of `ending_signals`, and return its status.
 
-    Parameters
-    ----------
-    make_node : callable
-        Returns the node; called when rclpy is initialised.
-    arguments : list of str, optional
-        Command line arguments; where None, `sys.argv` has them.
-
-    Returns
-    -------
-    int
-        Exit status of the node: 0 after a signal, 1 if it cannot start with these arguments,
-        with the reason on stderr.
+    That is 0 after a signal, and 1 if the node cannot start with these arguments, with the reason
+    on stderr. Where there are no arguments, `sys.argv` has them.
     """
     reuse_memory()
     arrived = signalled()
@@ -191,7 +162,9 @@ def run(make_node: Callable[[], ProcessNode], arguments: list[str] | None = None
             set_logger_level('rcl', LoggingSeverity.UNSET)
         node = make_node()
     except (ValueError, ParameterException, RuntimeError) as error:
-        print(_reason(error), file=sys.stderr)
+        # In one line, without the places in the sources of rcl.
+        own = isinstance(error, ValueError)
+        print(str(error) if own else _PLACE.sub('', reason_of(error)), file=sys.stderr)
         rclpy.try_shutdown()
         return 1
     for text in node.ineffective(given):
@@ -199,8 +172,8 @@ def run(make_node: Callable[[], ProcessNode], arguments: list[str] | None = None
     if text := node.introduction():
         node.get_logger().info(text)
     threading.Thread(target=_end_at_signal, args=(node.ended, arrived), daemon=True).start()
-    # One thread for a service that takes as long as an identification, one for an image that waits
-    # for room in the queue, one for everything short.
+    # One thread for a service that takes as long as an identification, one for an image that is
+    # written to disk, one for everything short.
     executor = JoiningExecutor(num_threads=3)
     executor.add_node(node)
     try:
@@ -224,16 +197,9 @@ def reuse_memory() -> None:
     """
     with suppress(AttributeError):  # where malloc is not glibc's
         mallopt = ctypes.CDLL(None).mallopt
-        mallopt(_M_ARENA_MAX, ARENAS)
-        mallopt(_M_MMAP_THRESHOLD, MAXIMUM_KEPT)
-        mallopt(_M_TRIM_THRESHOLD, KEPT)
-
-
-def _reason(error: Exception) -> str:
-    """Return why a node does not start, in one line without the places in the sources of ROS."""
-    if isinstance(error, ValueError):
-        return str(error)
-    return _PLACE.sub('', reason_of(error))
+        mallopt(_M_ARENA_MAX, 2)
+        mallopt(_M_MMAP_THRESHOLD, 32 * 2**20)  # the maximum of glibc
+        mallopt(_M_TRIM_THRESHOLD, 256 * 2**20)  # buffers of an image of 10 MP
 
 
 def _end_at_signal(ended: Future, arrived: int) -> None:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from std_msgs.msg import Header
-
 from ahf_ros.evaluation import score
+from ahf_ros.interchange.image_messages import nanoseconds
 from ahf_ros.interchange.target_messages import identification_from
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.parameters import ParameterSettings
@@ -18,33 +17,15 @@ KEPT = 1000
 """Number of truths that wait for the answer to their image."""
 
 
-class Truths:
-    """The latest truths, by the stamp of their image."""
-
-    def __init__(self) -> None:
-        self._messages: dict[tuple[int, int], CodedTargetArray] = {}
-
-    def put(self, message: CodedTargetArray) -> None:
-        """Keep a truth, and forget the oldest of too many."""
-        self._messages[_stamp(message.header)] = message
-        while len(self._messages) > KEPT:
-            del self._messages[next(iter(self._messages))]
-
-    def get(self, header: Header) -> tuple[Target, ...] | None:
-        """Return the targets of the image with the stamp of a header, if they are known."""
-        message = self._messages.get(_stamp(header))
-        return identification_from(message).targets if message else None
-
-
 class Scoreboard(ProcessNode):
     """Compares what was identified with the truth and prints one line per image."""
 
     def __init__(self) -> None:
         super().__init__('scoreboard')
         self._settings = ParameterSettings(self, ScoreboardSettings)
-        self._truths = Truths()
+        self._truths: dict[int, CodedTargetArray] = {}  # by the stamp of their image, ns
         self._count = 0
-        self.subscribe(CodedTargetArray, 'ground_truth', self._truths.put)
+        self.subscribe(CodedTargetArray, 'ground_truth', self._on_truth)
         self.subscribe(CodedTargetArray, 'coded_targets', self._on_targets)
 
     def introduction(self) -> str:
@@ -52,13 +33,19 @@ class Scoreboard(ProcessNode):
         topics = [self.resolve_topic_name(it) for it in ('coded_targets', 'ground_truth')]
         return f'compares {topics[0]} with {topics[1]}'
 
+    def _on_truth(self, message: CodedTargetArray) -> None:
+        self._truths[nanoseconds(message.header)] = message
+        if len(self._truths) > KEPT:
+            del self._truths[next(iter(self._truths))]
+
     def _on_targets(self, message: CodedTargetArray) -> None:
         images = self._settings.current.images
-        truth = self._truths.get(message.header)
+        truth = self._truths.get(nanoseconds(message.header))
         if truth is None or (images and self._count >= images):
             return
         self._count += 1
-        print(f'image {self._count}: {line(identification_from(message), truth)}', flush=True)
+        words = line(identification_from(message), identification_from(truth).targets)
+        print(f'image {self._count}: {words}', flush=True)
         if self._count == images:
             self.ended.set_result(0)
 
@@ -84,10 +71,6 @@ def method(found: Identification) -> str:
     if used.applied:
         words = f'gamma_high {used.gamma_high:.2f}, gamma_low {used.gamma_low:.2f}'
     return f'{words}, {used.evaluations} trial{"" if used.evaluations == 1 else "s"}'
-
-
-def _stamp(header: Header) -> tuple[int, int]:
-    return header.stamp.sec, header.stamp.nanosec
 
 
 def main(arguments: list[str] | None = None) -> int:

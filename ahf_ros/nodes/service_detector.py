@@ -5,7 +5,6 @@ from __future__ import annotations
 import queue
 import threading
 import time
-from collections.abc import Callable
 from contextlib import suppress
 
 import numpy as np
@@ -25,60 +24,35 @@ from ahf_ros.text import printable
 
 _POLL = 0.2  # interval between checks that the service still exists, s
 _DISCOVERY = 3.0  # time that discovery may take, s
-_REPEATED = 1 / 3  # of the time limit, after which a service that is new is asked again
 
 
 class ServiceDetector:
-    """Identify targets by a service of type `ahf_ros/srv/Identify`.
+    """Identify targets by a service of type `ahf_ros/srv/Identify`, each within `timeout`, s.
 
-    Do not call it from threads of the node's executor, which deliver the responses.
-
-    Parameters
-    ----------
-    node : rclpy.node.Node
-        Node that has the client.
-    service : str
-        Name of the service.
-    family : str
-        Family of the targets.
-    timeout : float
-        Time limit for one image, s.
-    stopping : threading.Event
-        Interrupts waiting for a response.
+    Do not call it from threads of the node's executor, which deliver the responses. The event
+    `stopping` interrupts waiting for a response.
     """
+
+    name = 'service'
 
     def __init__(
         self, node: Node, service: str, family: str, timeout: float, stopping: threading.Event
     ) -> None:
         self.service = service
+        self.family = family
         self.timeout = timeout
-        self._family = family
         self._stopping = stopping
         self._client: Client = node.create_client(
             Identify, service, callback_group=ReentrantCallbackGroup()
         )
+        self._named = f'service {service!r}'
         self._known = False  # whether the service has answered since it was there
-
-    @property
-    def name(self) -> str:
-        """Name among the detectors of the node."""
-        return 'service'
-
-    @property
-    def family(self) -> str:
-        """Family of the targets, by which the results are named."""
-        return self._family
 
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of an 8-bit gray image; see `ahf_ros.detectors.Detector`.
 
-        Raises
-        ------
-        ValueError
-            If the service does not exist, disappears, exceeds its time limit or refuses the image;
-            the message names the service.
-        Stopping
-            If the node stops first.
+        Raises a ValueError that names the service if it does not exist, disappears, exceeds its
+        time limit or refuses the image, and `Stopping` if the node stops first.
         """
         # A request that is sent before the service is discovered gets lost.
         if not self._client.wait_for_service(min(_DISCOVERY, self.timeout)):
@@ -87,10 +61,6 @@ class ServiceDetector:
         if not response.success:
             raise ValueError(f'{self._named} refuses the image: {printable(response.message)}')
         return checked_targets(identification_from(response.coded_targets).targets, self._named)
-
-    @property
-    def _named(self) -> str:
-        return f'service {self.service!r}'
 
     def _absent(self) -> ValueError:
         self._known = False
@@ -109,33 +79,28 @@ class ServiceDetector:
             asked.append(self._client.call_async(request))
             asked[-1].add_done_callback(answers.put)
 
+        start = seen = time.monotonic()
+        repeats = not self._known
         try:
             ask()
-            return self._awaited(answers, ask)
+            while True:
+                with suppress(queue.Empty):
+                    response: Identify.Response = answers.get(timeout=_POLL).result()
+                    self._known = True
+                    return response
+                if self._stopping.is_set():
+                    raise Stopping
+                now = time.monotonic()
+                if self._client.service_is_ready():
+                    seen = now
+                elif now - seen > min(_DISCOVERY, self.timeout):
+                    raise self._absent()
+                if now - start > self.timeout:
+                    limit = f'{self.timeout:g} s'
+                    raise ValueError(f'{self._named} took longer than detector_timeout, {limit}')
+                if repeats and now - start > self.timeout / 3:
+                    repeats = False
+                    ask()
         finally:
             for future in asked:
                 self._client.remove_pending_request(future)
-
-    def _awaited(
-        self, answers: queue.SimpleQueue[Future], ask: Callable[[], None]
-    ) -> Identify.Response:
-        start = seen = time.monotonic()
-        limit = self.timeout
-        repeated = self._known
-        while True:
-            with suppress(queue.Empty):
-                response: Identify.Response = answers.get(timeout=_POLL).result()
-                self._known = True
-                return response
-            if self._stopping.is_set():
-                raise Stopping
-            now = time.monotonic()
-            if self._client.service_is_ready():
-                seen = now
-            elif now - seen > min(_DISCOVERY, limit):
-                raise self._absent()
-            if now - start > limit:
-                raise ValueError(f'{self._named} took longer than detector_timeout, {limit:g} s')
-            if not repeated and now - start > _REPEATED * limit:
-                repeated = True
-                ask()

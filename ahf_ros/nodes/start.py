@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from functools import partial
 from importlib import import_module
 
 from ahf_ros.ending import has_arrived, ignore_ending, signalled
@@ -20,14 +20,14 @@ NODES = {
 def start(node: str, arguments: list[str] | None = None) -> int:
     """Run one of `NODES` and return its exit status.
 
-    Parameters
-    ----------
-    node : str
-    arguments : list of str, optional
-        Command line arguments; where None, `sys.argv` has them.
+    Where there are no arguments, `sys.argv` has them. `--help` before those that ROS reads prints
+    what the node does; the demo has options of its own.
     """
     signalled()
-    if node != 'demo' and _help_wanted(sys.argv[1:] if arguments is None else arguments):
+    own = sys.argv[1:] if arguments is None else arguments
+    if '--ros-args' in own:
+        own = own[: own.index('--ros-args')]
+    if node != 'demo' and not {'-h', '--help'}.isdisjoint(own):
         from ahf_ros.nodes.interfaces import help_text
 
         print(help_text(node), end='')
@@ -40,27 +40,4 @@ def start(node: str, arguments: list[str] | None = None) -> int:
     return status
 
 
-def _help_wanted(arguments: Sequence[str]) -> bool:
-    """Return whether `--help` is among the arguments, before those that ROS reads."""
-    end = arguments.index('--ros-args') if '--ros-args' in arguments else len(arguments)
-    return not {'-h', '--help'}.isdisjoint(arguments[:end])
-
-
-def demo() -> int:
-    """Run the demonstration."""
-    return start('demo')
-
-
-def detector() -> int:
-    """Run the node `detector`."""
-    return start('detector')
-
-
-def illumination() -> int:
-    """Run the node `illumination`."""
-    return start('illumination')
-
-
-def scoreboard() -> int:
-    """Run the node `scoreboard`."""
-    return start('scoreboard')
+demo, detector, illumination, scoreboard = (partial(start, node) for node in NODES)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import array
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 from types import ModuleType
 
 import numpy as np
@@ -18,137 +19,89 @@ from sensor_msgs.msg import PointCloud2, PointField
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import ImageMarker, Marker, MarkerArray
 
-from ahf_ros.drawing.overlay import DECODED_COLOUR, DOUBTFUL_COLOUR
+from ahf_ros.drawing.overlay import DECODED_COLOUR, DOUBTFUL_COLOUR, Colour
 from ahf_ros.localisation import Positions
 from ahf_ros.msg import CodedTarget, CodedTargetArray
 from ahf_ros.target import UNDECODED
 
-CORNER = 0.5
-"""Offset of coordinates, px: in viewers, (0, 0) is the corner of the first pixel."""
-
-_SIDES = 24  # of the outline of a dot
-
-POINT_FIELDS = {
+_POINT = {
     'x': PointField.FLOAT32,
     'y': PointField.FLOAT32,
     'z': PointField.FLOAT32,
     'id': PointField.INT32,
     'confidence': PointField.FLOAT32,
-    'deviation': PointField.FLOAT32,
+    'deviation': PointField.FLOAT32,  # of `Positions`
 }
-"""Fields of a point of the cloud; the last one is the deviation of `Positions`."""
-
 _KINDS = {PointField.FLOAT32: '<f4', PointField.INT32: '<i4'}
-_POINT_TYPE = np.dtype([(name, _KINDS[datatype]) for name, datatype in POINT_FIELDS.items()])
-_LABEL_HEIGHT = 3.0  # of the letters, in radii of the dot
+_POINT_TYPE = np.dtype([(name, _KINDS[kind]) for name, kind in _POINT.items()])
 
 
 def target_detections(answer: CodedTargetArray, types: ModuleType) -> object:
     """Return the targets of an answer as detections, in their order.
 
-    The box of a detection is that around the ellipse of the central dot, turned with it. The
-    class of an object is the family of its code, and its ID is the ID of the target. A target that
-    was not decoded has no hypothesis and an empty ID.
-
-    Parameters
-    ----------
-    answer : CodedTargetArray
-        Targets of one image.
-    types : module
-        The module `vision_msgs.msg`, version 4 or newer.
-
-    Returns
-    -------
-    vision_msgs.msg.Detection2DArray
-        With the header of the answer.
+    They are a `vision_msgs.msg.Detection2DArray` with the header of the answer; `types` is the
+    module `vision_msgs.msg`, version 4 or newer. The box of a detection is that around the ellipse
+    of the central dot, turned with it. The class of an object is the family of its code, and its
+    ID is the ID of the target. A target that was not decoded has no hypothesis and an empty ID.
     """
-    return types.Detection2DArray(
-        header=answer.header,
-        detections=[_detection(target, answer, types) for target in answer.targets],
-    )
-
-
-def _detection(target: CodedTarget, answer: CodedTargetArray, types: ModuleType) -> object:
-    position = types.Point2D(x=target.x, y=target.y)
-    detection = types.Detection2D(
-        header=answer.header,
-        bbox=types.BoundingBox2D(
+    detections = []
+    for target in answer.targets:
+        position = types.Point2D(x=target.x, y=target.y)
+        box = types.BoundingBox2D(
             center=types.Pose2D(position=position, theta=target.angle),
             size_x=2 * target.semi_major,
             size_y=2 * target.semi_minor,
-        ),
-    )
-    if target.id != UNDECODED:
-        detection.id = str(target.id)
-        hypothesis = types.ObjectHypothesis(class_id=target.family, score=target.confidence)
-        detection.results = [types.ObjectHypothesisWithPose(hypothesis=hypothesis)]
-    return detection
+        )
+        detection = types.Detection2D(header=answer.header, bbox=box)
+        if target.id != UNDECODED:
+            detection.id = str(target.id)
+            hypothesis = types.ObjectHypothesis(class_id=target.family, score=target.confidence)
+            detection.results = [types.ObjectHypothesisWithPose(hypothesis=hypothesis)]
+        detections.append(detection)
+    return types.Detection2DArray(header=answer.header, detections=detections)
 
 
 def target_annotations(answer: CodedTargetArray) -> ImageMarker:
-    """Return the outlines of dots as lines of one marker.
+    """Return the outlines of dots as lines of one marker, whose width is by the size of the image.
 
-    Parameters
-    ----------
-    answer : CodedTargetArray
-        Targets of an image, whose size sets the width of the lines.
+    In viewers, (0, 0) is the corner of the first pixel, half a pixel from its centre.
     """
-    width = max(1.0, math.hypot(answer.height, answer.width) / 2400)
+    turn = np.linspace(0, 2 * math.pi, 25)
     marker = ImageMarker(
         header=answer.header,
         ns='targets',
         type=ImageMarker.LINE_LIST,
         action=ImageMarker.ADD,
-        scale=width,
-        outline_color=ColorRGBA(**_rgba(DECODED_COLOUR)),
+        scale=max(1.0, math.hypot(answer.height, answer.width) / 2400),
+        outline_color=_rgba(DECODED_COLOUR),
     )
     points, colours = [], []
     for target in answer.targets:
-        lines = _outline(target) + CORNER
-        points += [Point(x=x, y=y) for x, y in lines.reshape(-1, 2).tolist()]
-        colours += [ColorRGBA(**target_colour(target))] * len(lines)
+        along, across = target.semi_major * np.cos(turn), target.semi_minor * np.sin(turn)
+        cosine, sine = math.cos(target.angle), math.sin(target.angle)
+        x = target.x + along * cosine - across * sine + 0.5
+        y = target.y + along * sine + across * cosine + 0.5
+        corners = [Point(x=x, y=y) for x, y in zip(x.tolist(), y.tolist(), strict=True)]
+        points += [end for side in pairwise(corners) for end in side]
+        colours += [_colour(target)] * (len(corners) - 1)
     marker.points = points
     marker.outline_colors = colours
     return marker
 
 
-def target_colour(target: CodedTarget) -> dict[str, float]:
-    """Return the red, green, blue and opacity of a target, 0 to 1."""
+def _colour(target: CodedTarget) -> ColorRGBA:
     return _rgba(DOUBTFUL_COLOUR if target.id == UNDECODED else DECODED_COLOUR)
 
 
-def _rgba(colour: tuple[int, int, int]) -> dict[str, float]:
+def _rgba(colour: Colour) -> ColorRGBA:
     blue, green, red = colour
-    return {'r': red / 255, 'g': green / 255, 'b': blue / 255, 'a': 1.0}
-
-
-def _outline(target: CodedTarget) -> np.ndarray:
-    """Return the sides of the ellipse of a dot, shape (n, 2, 2): x, y of both ends."""
-    turn = np.linspace(0, 2 * math.pi, _SIDES + 1)
-    along = target.semi_major * np.cos(turn)
-    across = target.semi_minor * np.sin(turn)
-    cosine, sine = math.cos(target.angle), math.sin(target.angle)
-    corners = np.stack(
-        (
-            target.x + along * cosine - across * sine,
-            target.y + along * sine + across * cosine,
-        ),
-        axis=1,
-    )
-    return np.stack((corners[:-1], corners[1:]), axis=1)
+    return ColorRGBA(r=red / 255, g=green / 255, b=blue / 255, a=1.0)
 
 
 def target_points(targets: Sequence[CodedTarget], found: Positions, header: Header) -> PointCloud2:
     """Return a cloud with one point per target, in their order; NaN if it has no position.
 
-    Parameters
-    ----------
-    targets : sequence of CodedTarget
-        Targets of one image.
-    found : Positions
-        Their positions.
-    header : std_msgs.msg.Header
-        Header with the coordinate frame of the positions.
+    The header names the coordinate frame of the positions.
     """
     points = np.empty(len(targets), _POINT_TYPE)
     for axis, name in enumerate('xyz'):
@@ -158,7 +111,7 @@ def target_points(targets: Sequence[CodedTarget], found: Positions, header: Head
     points['deviation'] = found.deviations
     fields = [
         PointField(name=name, offset=4 * number, datatype=datatype, count=1)
-        for number, (name, datatype) in enumerate(POINT_FIELDS.items())
+        for number, (name, datatype) in enumerate(_POINT.items())
     ]
     return PointCloud2(
         header=header,
@@ -173,18 +126,12 @@ def target_points(targets: Sequence[CodedTarget], found: Positions, header: Head
 
 
 def target_labels(targets: Sequence[CodedTarget], found: Positions, header: Header) -> MarkerArray:
-    """Return the IDs of targets as text at their positions, which replaces all earlier text.
-
-    Parameters
-    ----------
-    targets, found, header
-        As for `target_points`.
-    """
+    """Return the IDs of targets as text at their positions, which replaces all earlier text."""
     markers = [Marker(header=header, action=Marker.DELETEALL)]
     for number in np.flatnonzero(found.known).tolist():
         target = targets[number]
         x, y, z = found.points[number].tolist()
-        height = _LABEL_HEIGHT * target.semi_major * float(found.spacings[number])
+        height = 3 * target.semi_major * float(found.spacings[number])  # three radii of the dot
         markers.append(
             Marker(
                 header=header,
@@ -194,7 +141,7 @@ def target_labels(targets: Sequence[CodedTarget], found: Positions, header: Head
                 action=Marker.ADD,
                 pose=Pose(position=Point(x=x, y=y, z=z)),
                 scale=Vector3(z=height),
-                color=ColorRGBA(**target_colour(target)),
+                color=_colour(target),
                 text='?' if target.id == UNDECODED else str(target.id),
             )
         )

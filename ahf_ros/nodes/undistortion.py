@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import bisect
 import threading
+from copy import copy
 from dataclasses import replace
 from typing import NamedTuple
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from sensor_msgs.msg import CameraInfo
+from std_msgs.msg import Header
 
 from ahf_ros import msg
 from ahf_ros.interchange.camera_info import Calibration, calibration, undistorted_targets
@@ -27,8 +29,8 @@ CHANGES = 1000
 
 class _Change(NamedTuple):
     stamp: int
-    content: tuple[object, ...]
-    calibration: Calibration | str
+    message: CameraInfo  # without its stamp
+    calibration: Calibration | str  # or why it is not accepted
 
 
 class Calibrations:
@@ -44,40 +46,29 @@ class Calibrations:
 
     def put(self, message: CameraInfo) -> None:
         """Remember the calibration of a message, or why it is not accepted."""
-        stamp, content = nanoseconds(message.header), _content(message)
+        stamp = nanoseconds(message.header)
+        unstamped = copy(message)
+        unstamped.header = Header(frame_id=message.header.frame_id)
         with self._lock:
-            place = bisect.bisect([change.stamp for change in self._changes], stamp)
-            if place and self._changes[place - 1].content == content:
+            place = bisect.bisect(self._changes, stamp, key=lambda change: change.stamp)
+            if place and self._changes[place - 1].message == unstamped:
                 return
             try:
                 found: Calibration | str = calibration(message)
             except ValueError as error:
                 found = str(error)
-            self._changes.insert(place, _Change(stamp, content, found))
+            self._changes.insert(place, _Change(stamp, unstamped, found))
             del self._changes[:-CHANGES]
 
     def at(self, stamp: int) -> Calibration | None:
-        """Return the calibration at a time: the last one before, or else the first one after.
+        """Return the calibration at a time, ns: the last one before, or else the first one after.
 
-        Parameters
-        ----------
-        stamp : int
-            Stamp of an image, ns.
-
-        Returns
-        -------
-        Calibration or None
-            None if there is none.
-
-        Raises
-        ------
-        ValueError
-            If it was not accepted.
+        Raises a ValueError if it was not accepted.
         """
         with self._lock:
             if not self._changes:
                 return None
-            place = bisect.bisect([change.stamp for change in self._changes], stamp)
+            place = bisect.bisect(self._changes, stamp, key=lambda change: change.stamp)
             found = self._changes[max(0, place - 1)].calibration
         if isinstance(found, str):
             raise ValueError(found)
@@ -85,15 +76,7 @@ class Calibrations:
 
 
 class UndistortedTargets:
-    """Publishes answers once more, with centres as a camera without distortion would see them.
-
-    Parameters
-    ----------
-    node : ProcessNode
-        Subscribes to camera_info.
-    tally : Tally
-        Gets the reason why an answer has no undistorted centres.
-    """
+    """Publishes answers once more, with centres as a camera without distortion would see them."""
 
     def __init__(self, node: ProcessNode, tally: Tally) -> None:
         self._node = node
@@ -107,8 +90,9 @@ class UndistortedTargets:
         """Subscribe to calibrations, or end the subscription."""
         if wanted and not self._subscription:
             group = MutuallyExclusiveCallbackGroup()
-            put = self._calibrations.put
-            self._subscription = self._node.subscribe(CameraInfo, self._topic, put, group)
+            self._subscription = self._node.subscribe(
+                CameraInfo, self._topic, self._calibrations.put, group
+            )
         elif self._subscription and not wanted:
             self._node.unsubscribe(self._subscription)
             self._subscription = None
@@ -134,15 +118,3 @@ class UndistortedTargets:
         targets = undistorted_targets(camera, identification.targets)
         moved = replace(identification, targets=targets)
         self._publisher.publish(coded_target_array(moved, answer.family, size, header, msg))
-
-
-def _content(message: CameraInfo) -> tuple[object, ...]:
-    """Return everything in a message but its stamp."""
-    roi = message.roi
-    return (
-        message.header.frame_id,
-        *(message.width, message.height, message.binning_x, message.binning_y),
-        *(roi.x_offset, roi.y_offset, roi.width, roi.height),
-        message.distortion_model,
-        *(it.tobytes() for it in (message.d, message.k, message.r, message.p)),
-    )

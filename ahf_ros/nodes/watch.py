@@ -5,21 +5,17 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from difflib import SequenceMatcher
+from difflib import get_close_matches
 
 from rclpy.qos import QoSCompatibility, ReliabilityPolicy, qos_check_compatible
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from ahf_ros.nodes.cloud import ANSWER, CLOUD
+from ahf_ros.nodes.cloud import ANSWER, CLOUD, Waiting
 from ahf_ros.nodes.diagnostics import Tally
 from ahf_ros.nodes.inputs import Input
-from ahf_ros.nodes.matching import Waiting
 from ahf_ros.nodes.process import ProcessNode
-from ahf_ros.nodes.qos import qos_words
 from ahf_ros.nodes.settings import MAXIMUM_TOLERANCE
-
-NEARBY = 3
-"""Maximum number of other topics that are named."""
+from ahf_ros.nodes.topics import qos_words
 
 _DIGITS = re.compile(r'\d+')  # a report whose numbers alone have changed is not logged again
 
@@ -28,13 +24,6 @@ class Watch:
     """Keeps the part of a tally that depends on publishers and on time.
 
     What it reports is logged when it begins, and is in the diagnostics as long as it lasts.
-
-    Parameters
-    ----------
-    node : ProcessNode
-        Subscribes, and logs.
-    tally : Tally
-        Gets the reports.
     """
 
     def __init__(self, node: ProcessNode, tally: Tally) -> None:
@@ -45,54 +34,40 @@ class Watch:
     def look(self, images: Input, timeout: float, clouds: tuple[Input, Waiting] | None) -> None:
         """Bring the tally up to date.
 
-        Parameters
-        ----------
-        images : Input
-            Where images come from.
-        timeout : float
-            Time of waiting after which that is reported, s; 0: never.
-        clouds : tuple of Input and Waiting, optional
-            Where clouds come from, and what waits for its match.
+        What has been waited for longer than `timeout`, s, is reported; 0: never. `clouds` are
+        where clouds come from, and what waits for its match.
         """
         tally, publishers = self._tally, images.publishers()
-        reports = {
-            'mistaken': other_types(images, publishers),
-            'several': several(images, publishers),
-            'silent': '',
-            'unmatched': '',
-        }
-        silent = time.monotonic() - images.arrived
-        if timeout and silent > timeout:
-            reports['silent'] = silence(images, publishers, self._topics)
-            tally.silent = f'no image for {silent:.0f} s: {reports["silent"]}'
-        else:
-            tally.silent = ''
-        if clouds and timeout:
-            reports['unmatched'] = self._unmatched(*clouds, timeout)
-        tally.mistaken, tally.several = reports['mistaken'], reports['several']
+        tally.mistaken = other_types(images, publishers)
+        tally.several = several(images, publishers)
         tally.lost += images.losses.newly_lost()
         tally.lost_unknown = images.losses.unknown
+        tally.silent = why = waiting = ''
+        silent = time.monotonic() - images.arrived
+        if timeout and silent > timeout:
+            why = silence(images, publishers, self._topics)
+            tally.silent = f'no image for {silent:.0f} s: {why}'
+        if clouds and timeout and clouds[1].seconds[ANSWER] > timeout:
+            waiting = self._unmatched(*clouds)
         if tally.clouds:
-            tally.clouds.waiting = reports['unmatched']
-            if clouds:
-                tally.clouds.lost += clouds[0].losses.newly_lost()
-        self._log(reports)
+            tally.clouds.waiting = waiting
+            tally.clouds.lost += clouds[0].losses.newly_lost() if clouds else 0
+        self._log(tally.mistaken, tally.several, why, waiting)
 
-    def _unmatched(self, source: Input, waiting: Waiting, timeout: float) -> str:
-        if waiting.seconds[ANSWER] <= timeout:
-            return ''
+    def _unmatched(self, source: Input, waiting: Waiting) -> str:
+        """Return why images wait for their clouds."""
         images, clouds = waiting.counts[ANSWER], waiting.counts[CLOUD]
         if not clouds:
             reason = silence(source, source.publishers(), self._topics)
             return f'{images} images wait for a cloud: {reason}'
-        text = f'{images} images and {clouds} clouds wait for each other'
-        if waiting.nearest > MAXIMUM_TOLERANCE * 1e9:
-            return (
-                f'{text}: their stamps are of different clocks, {waiting.nearest / 1e9:g} s apart'
-            )
+        text, apart = f'{images} images and {clouds} clouds wait for each other', waiting.nearest
+        if apart > MAXIMUM_TOLERANCE * 1e9:
+            return f'{text}: their stamps are of different clocks, {apart / 1e9:g} s apart'
+        step = 10 ** max(0, len(str(apart)) - 2)  # of the last of two significant digits
+        enough = -(-apart // step) * step
         return (
-            f'{text}: the nearest stamps differ by {waiting.nearest / 1e9:g} s, '
-            f'set cloud_tolerance to at least {_rounded_up(waiting.nearest) / 1e9:g}'
+            f'{text}: the nearest stamps differ by {apart / 1e9:g} s, '
+            f'set cloud_tolerance to at least {enough / 1e9:g}'
         )
 
     def _topics(self) -> Mapping[str, Sequence[str]]:
@@ -104,17 +79,11 @@ class Watch:
             if not name.startswith(f'{own}/') and self._node.count_publishers(name)
         }
 
-    def _log(self, reports: Mapping[str, str]) -> None:
-        now = {_DIGITS.sub('', text): text for text in reports.values() if text}
+    def _log(self, *reports: str) -> None:
+        now = {_DIGITS.sub('', text): text for text in reports if text}
         for form in sorted(now.keys() - self._reported):
             self._node.get_logger().warning(now[form])
         self._reported = frozenset(now)
-
-
-def _rounded_up(nanoseconds: int) -> int:
-    """Return a number of two significant digits that is not less."""
-    step = 10 ** max(0, len(str(nanoseconds)) - 2)
-    return -(-nanoseconds // step) * step
 
 
 def other_types(source: Input, publishers: Iterable[TopicEndpointInfo]) -> str:
@@ -141,31 +110,30 @@ def silence(
     publishers: Sequence[TopicEndpointInfo],
     topics: Callable[[], Mapping[str, Sequence[str]]],
 ) -> str:
-    """Return why nothing arrives, and a remedy if there is one.
+    """Return why nothing arrives from the publishers of a topic, and a remedy if there is one.
 
-    Parameters
-    ----------
-    source : Input
-        What nothing arrives on.
-    publishers : sequence of TopicEndpointInfo
-        Its publishers.
-    topics : callable
-        Returns the types of all topics that others publish.
+    `topics` returns the types of all topics that others publish.
     """
     ours = [it for it in publishers if it.topic_type == source.type_name]
     if not ours:
         return f'nobody publishes {source.type_name} on {source.name}{_nearby(source, topics())}'
-    unfit = [it for it in ours if _incompatible(it, source)]
+    unfit = [
+        it.qos_profile
+        for it in ours
+        if qos_check_compatible(it.qos_profile, source.profile)[0] == QoSCompatibility.ERROR
+    ]
     if unfit:
-        offered = ' and '.join(sorted({qos_words(it.qos_profile) for it in unfit}))
         return (
             f'{len(unfit)} of {len(ours)} publishers on {source.name} '
-            f'{_have("offer", len(unfit))} {offered}, which a subscription that is '
+            f'offer{"s" if len(unfit) == 1 else ""} '
+            f'{" and ".join(sorted(set(map(qos_words, unfit))))}, which a subscription that is '
             f'{qos_words(source.profile)} does not receive: '
             f'set {source.overrides} to what all of them offer'
         )
-    names = ', '.join(sorted(map(_node, ours)))
-    text = f'{names} {_have("publish", len(ours))} on {source.name}, but nothing arrives'
+    text = (
+        f'{", ".join(sorted(map(_node, ours)))} publish{"es" if len(ours) == 1 else ""} '
+        f'on {source.name}, but nothing arrives'
+    )
     if source.profile.reliability == ReliabilityPolicy.BEST_EFFORT:
         text += (
             ': large messages that are best effort need config/fastdds_shm.xml on both sides or '
@@ -174,40 +142,25 @@ def silence(
     return text
 
 
-def nearest(name: str, others: Iterable[str]) -> list[str]:
-    """Return the names of topics that are most like a name, the nearest first."""
-
-    def likeness(other: str) -> tuple[float, str]:
-        return -SequenceMatcher(None, name, other).ratio(), other
-
-    return sorted(others, key=likeness)[:NEARBY]
-
-
 def _nearby(source: Input, topics: Mapping[str, Sequence[str]]) -> str:
     """Return where the type, or the images in another form, are published instead."""
-    found = nearest(source.name, (it for it, kinds in topics.items() if source.type_name in kinds))
-    if found:
+
+    def nearest(wanted: str) -> list[str]:
+        names = [name for name, kinds in topics.items() if wanted in kinds]
+        return get_close_matches(source.name, names, n=3, cutoff=0.0)
+
+    if found := nearest(source.type_name):
         return f'; it is published on {", ".join(found)}: remap with -r {source.topic}:={found[0]}'
-    for transport, kind in (('raw', 'Image'), ('compressed', 'CompressedImage')):
-        name = f'sensor_msgs/msg/{kind}'
-        found = nearest(source.name, (it for it, kinds in topics.items() if name in kinds))
-        if found and 'Image' in source.type_name:
-            return (
-                f'; {name} is published on {", ".join(found)}: set image_transport to {transport}'
-            )
+    if 'Image' in source.type_name:
+        for transport, kind in (('raw', 'Image'), ('compressed', 'CompressedImage')):
+            name = f'sensor_msgs/msg/{kind}'
+            if found := nearest(name):
+                return (
+                    f'; {name} is published on {", ".join(found)}: '
+                    f'set image_transport to {transport}'
+                )
     return ''
-
-
-def _incompatible(publisher: TopicEndpointInfo, source: Input) -> bool:
-    fit, _ = qos_check_compatible(publisher.qos_profile, source.profile)
-    return bool(fit == QoSCompatibility.ERROR)
 
 
 def _node(of: TopicEndpointInfo) -> str:
     return f'{of.node_namespace.rstrip("/")}/{of.node_name}'
-
-
-def _have(verb: str, count: int) -> str:
-    if count > 1:
-        return verb
-    return f'{verb}es' if verb.endswith('sh') else f'{verb}s'

@@ -17,8 +17,8 @@ from hypothesis import strategies as st
 
 pytest.importorskip('rosbags', reason='rosbags is not installed')
 
-from ahf_ros.bag.assembly import finished
 from ahf_ros.bag.definitions import IMAGE, typestore
+from ahf_ros.bag.output import finished
 from ahf_ros.bag.run import BagTask, answer_bag
 from ahf_ros.bag.source import Source
 from ahf_ros.detectors import DetectorSettings

@@ -23,15 +23,21 @@ from support import bags
 SEARCH = {'detector': 'traditional', 'population': 6, 'seed': 3}
 
 
+@pytest.fixture(scope='module')
+def recording(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[bytes]]:
+    """Return a bag, and the answers to its images."""
+    folder = tmp_path_factory.mktemp('recording')
+    source = bags.write_ros2(folder / 'in', bags.recorded(typestore(), bags.scenes(4)))
+    options = [text for name, value in SEARCH.items() for text in (f'--{name}', str(value))]
+    assert main(['bag', str(source), str(folder / 'out'), '--expected', '4', *options]) == 0
+    return source, [data for topic, _, data in bags.read(folder / 'out') if 'coded' in topic]
+
+
 @pytest.mark.parametrize('simulated', [False, True], ids=['real time', 'simulated time'])
 def test_answers_of_the_node_are_those_of_the_bag(
-    graph: Any, tmp_path: Path, simulated: bool
+    graph: Any, recording: tuple[Path, list[bytes]], simulated: bool
 ) -> None:
-    source = bags.write_ros2(tmp_path / 'in', bags.recorded(typestore(), bags.scenes(4)))
-    options = [text for name, value in SEARCH.items() for text in (f'--{name}', str(value))]
-    assert main(['bag', str(source), str(tmp_path / 'out'), '--expected', '4', *options]) == 0
-    recorded = [data for topic, _, data in bags.read(tmp_path / 'out') if 'coded' in topic]
-
+    source, recorded = recording
     parameters = {
         **SEARCH,
         'expected_targets': 4,

@@ -5,8 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import os
-import shutil
-import sys
+from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -22,15 +21,11 @@ from ahf_ros.bag.definitions import typestore
 from ahf_ros.batch import cluster
 from ahf_ros.batch.cluster import DaskEngine
 from ahf_ros.batch.engine import EngineLost, TaskFailed, finished_tasks
-from ahf_ros.batch.remote import guarded_perform
 from ahf_ros.cli import main
 from ahf_ros.interchange.image_files import write_image
 from support import bags
 from support.cluster import LIMIT, LocalCluster, free_port
 from support.jobs import do_as_told
-
-FOREIGN = {'batch/remote.py': 'perform = None', 'release.py': 'def release():\n    return "0.1"'}
-"""A package of another release."""
 
 
 def lose_one(client: Any) -> None:
@@ -47,11 +42,9 @@ def lose_one(client: Any) -> None:
 def test_nothing_is_lost_and_nothing_twice(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for name, text in FOREIGN.items():
-        path = tmp_path / 'foreign' / 'ahf_ros' / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text)
-        (path.parent / '__init__.py').touch()
+    foreign = tmp_path / 'foreign' / 'ahf_ros-0.1.dist-info' / 'METADATA'
+    foreign.parent.mkdir(parents=True)
+    foreign.write_text('Metadata-Version: 2.1\nName: ahf_ros\nVersion: 0.1\n')
     monkeypatch.setattr(cluster, '_CONNECT', LIMIT)
     said: list[str] = []
     reports: list[tuple[int, str]] = []
@@ -123,42 +116,39 @@ def test_nothing_is_lost_and_nothing_twice(
     address = f'tcp://127.0.0.1:{free_port()}'
     assert main([*command, '--scheduler', address]) == 2
     assert f"scheduler is '{address}', accepted is the address" in capsys.readouterr().err
-    shutil.rmtree(tmp_path / 'foreign')
 
 
 class OtherVersions:
     """A client of a cluster of other versions."""
 
-    def __init__(self, scheduler: str, python: str) -> None:
-        self.found = {
-            'client': {'packages': {'distributed': '2026.1'}},
-            'scheduler': {'packages': {'distributed': scheduler}},
-            'workers': {'tcp://a': {'host': {'python': python}}},
+    def get_versions(self, packages: Sequence[str] = ()) -> dict[str, Any]:
+        def version(python: str, distributed: str, release: str | None) -> dict[str, Any]:
+            known = {'distributed': distributed, 'ahf_ros': release}
+            return {'host': {'python': python}, 'packages': known}
+
+        return {
+            'client': version('3.12.3.final.0', '2026.1', '1.0'),
+            'scheduler': version('3.12.3.final.0', '2023.4', None),
+            'workers': {
+                'tcp://a': version('3.1.4.final.0', '2026.1', '1.0'),
+                'tcp://b': version('3.12.9.final.0', '2026.1', None),
+                'tcp://c': version('3.12.9.final.0', '2026.1', '1.0'),
+            },
         }
-
-    def get_versions(self) -> dict[str, object]:
-        return self.found
-
-    def nthreads(self) -> dict[str, int]:
-        return {'tcp://a': 1}
 
 
 def test_other_versions_are_named() -> None:
-    client = OtherVersions('2023.4', '3.1.4.final.0')
+    client = OtherVersions()
     with pytest.raises(ValueError, match=r'has dask\.distributed 2023\.4, accepted is 2026\.1'):
         cluster.check_version(client, 'tcp://b')
-    refused = cluster.refused_workers(client)
-    assert refused['tcp://a'].startswith('has Python 3.1, accepted is 3.')
+    assert cluster.refused_workers(client) == {
+        'tcp://a': 'has Python 3.1, accepted is 3.12',
+        'tcp://b': 'has ahf_ros not installed, accepted is 1.0',
+        'tcp://c': '',
+    }
 
 
 def test_a_lost_connection_is_no_news_to_log() -> None:
     for error, news in ((ConnectionResetError('gone'), False), (ValueError('wrong'), True)):
         record = logging.makeLogRecord({'exc_info': (type(error), error, None)})
         assert cluster._is_news(record) == news
-
-
-def test_a_worker_without_the_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, 'ahf_ros.batch.remote', None)
-    machine, (address, reason) = guarded_perform()(b'', '', '0.1')
-    assert (machine, address) == (None, '')
-    assert reason.startswith('has no ahf_ros: ')

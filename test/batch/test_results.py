@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from ahf_ros.batch.engine import Report, SerialEngine
-from ahf_ros.batch.results import PREVIOUS, Results, Unwritable, file_fingerprint
-from ahf_ros.batch.run import kept_outcomes_in_order
+from ahf_ros.batch.identification import file_fingerprint
+from ahf_ros.batch.results import PREVIOUS, Results, Unwritable, kept_outcomes_in_order
 from ahf_ros.batch.task import ImageOutcome, ImageTask, Level, Message
 from ahf_ros.cli import main
 from ahf_ros.interchange.files import RESULTS_FILE

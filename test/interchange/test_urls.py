@@ -14,7 +14,7 @@ pytest.importorskip('fsspec', reason='fsspec is not installed')
 
 import fsspec
 
-from ahf_ros.batch.results import file_fingerprint
+from ahf_ros.batch.identification import file_fingerprint
 from ahf_ros.cli.identify import image_paths
 from ahf_ros.interchange.image_files import read_image, write_image
 

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import importlib.util
 import math
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -33,11 +34,6 @@ FIELDS = {
 }
 
 
-def defaults(make: Any, values: dict[str, Any]) -> Any:
-    """Return a class whose arguments are optional, as those of ROS are."""
-    return lambda **given: make(**{name: value() for name, value in values.items()} | given)
-
-
 @pytest.fixture(scope='module')
 def store() -> Any:
     store = get_typestore(Stores.ROS2_JAZZY)
@@ -48,16 +44,17 @@ def store() -> Any:
 
 @pytest.fixture(scope='module')
 def types(store: Any) -> SimpleNamespace:
+    """Return the classes of messages, which have defaults as those of ROS have."""
     kinds = {name: store.types[f'vision_msgs/msg/{name}'] for name in FIELDS}
     geometry = {name: store.types[f'geometry_msgs/msg/{name}'] for name in (
         'Point', 'Pose', 'PoseWithCovariance', 'Quaternion')}  # fmt: skip
-
-    def pose() -> Any:
-        at = geometry['Pose'](geometry['Point'](0, 0, 0), geometry['Quaternion'](0, 0, 0, 1))
-        return geometry['PoseWithCovariance'](at, np.zeros(36))
-
-    kinds['Detection2D'] = defaults(kinds['Detection2D'], {'results': list, 'id': str})
-    kinds['ObjectHypothesisWithPose'] = defaults(kinds['ObjectHypothesisWithPose'], {'pose': pose})
+    at = geometry['Pose'](geometry['Point'](0, 0, 0), geometry['Quaternion'](0, 0, 0, 1))
+    pose = geometry['PoseWithCovariance'](at, np.zeros(36))
+    for name, given in (
+        ('Detection2D', {'results': [], 'id': ''}),
+        ('ObjectHypothesisWithPose', {'pose': pose}),
+    ):
+        kinds[name] = partial(kinds[name], **given)
     return SimpleNamespace(**kinds)
 
 

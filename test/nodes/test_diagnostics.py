@@ -2,39 +2,43 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 pytest.importorskip('rclpy', reason='ROS 2 is not installed')
 
-from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
 from ahf_ros.nodes.diagnostics import Diagnostics, Tally
 from ahf_ros.target import Identification
+from support.detector import values
 
 
-def test_a_mirrored_image_is_a_warning() -> None:
-    tally = Tally(received=1, answered=1)
+@pytest.mark.parametrize(
+    ('last', 'message', 'key', 'value'),
+    [
+        ({'mirrored': True}, 'the last image seems to be mirrored', 'mirrored', 'True'),
+        (
+            {'edge_shift': -0.62},
+            'edges are 0.6 px too bright: the photograph is over-exposed or blurred',
+            'edge shift (px)',
+            '-0.62',
+        ),
+    ],
+)
+def test_what_is_wrong_with_the_last_image_is_a_warning(
+    last: dict[str, Any], message: str, key: str, value: str
+) -> None:
+    tally = Tally(received=1, answered=1, last=Identification((), edge_shift=0.2))
     diagnostics = Diagnostics('detector', tally)
     assert diagnostics.status(1.0).level == DiagnosticStatus.OK
-    tally.last = Identification((), mirrored=True)
+    tally.last = Identification((), **last)
     status = diagnostics.status(1.0)
-    assert (status.level, status.message) == (
-        DiagnosticStatus.WARN,
-        'the last image seems to be mirrored',
-    )
-    assert {it.key: it.value for it in status.values}['mirrored'] == 'True'
+    assert (status.level, status.message) == (DiagnosticStatus.WARN, message)
+    assert values(DiagnosticArray(status=[status]))[key] == value
 
 
-def test_edges_that_are_far_from_where_they_should_be_are_a_warning() -> None:
-    tally = Tally(received=1, answered=1, last=Identification((), edge_shift=-0.62))
-    status = Diagnostics('detector', tally).status(1.0)
-    assert (status.level, status.message) == (
-        DiagnosticStatus.WARN,
-        'edges are 0.6 px too bright: the photograph is over-exposed or blurred',
-    )
-    assert {it.key: it.value for it in status.values}['edge shift (px)'] == '-0.62'
-    tally.last = Identification((), edge_shift=0.2)
-    assert Diagnostics('detector', tally).status(1.0).level == DiagnosticStatus.OK
-    assert {it.key: it.value for it in Diagnostics('detector', Tally()).status(1.0).values}[
-        'edge shift (px)'
-    ] == ''
+def test_an_edge_shift_that_is_not_known_is_empty() -> None:
+    status = Diagnostics('detector', Tally()).status(1.0)
+    assert values(DiagnosticArray(status=[status]))['edge shift (px)'] == ''

@@ -21,10 +21,9 @@ pytest.importorskip('rclpy', reason='ROS 2 is not installed')
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Image, PointCloud2, PointField
 from std_msgs.msg import Header
-from test_nodes_rig import in_space, read, synthetic_camera
+from test_nodes_rig import in_space, read, scan, synthetic_camera
 
 from ahf_ros.nodes.drivers import DRIVERS, Driver
-from ahf_ros.synthetic.camera import Camera
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 from support.launch_files import launched
 from support.live import PATIENCE, ros_environment
@@ -131,17 +130,6 @@ def cloud_of(name: str, points: np.ndarray, stamp: int) -> PointCloud2:
     )
 
 
-def scanned(rendering: Rendering, camera: Camera) -> np.ndarray:
-    """Return what a scanner measures, m; nothing on the dot of a target."""
-    height, width = rendering.image.shape
-    rows, columns = np.mgrid[:height, :width]
-    every = np.column_stack((columns.ravel(), rows.ravel())).astype(float)
-    points = in_space(camera, every).reshape(height, width, 3) / 1000
-    target = rendering.targets[0]
-    points[np.hypot(columns - target.x, rows - target.y) < 1.2 * target.semi_major] = np.nan
-    return points
-
-
 @pytest.fixture
 def detectors() -> Iterator[subprocess.Popen]:
     """Start the detectors that the launch file describes for the drivers."""
@@ -160,7 +148,7 @@ def detectors() -> Iterator[subprocess.Popen]:
 
 def test_every_driver_has_positions_with_the_rig(graph: Any, detectors: subprocess.Popen) -> None:
     rendering, camera = render(SCENE), synthetic_camera(SCENE)
-    cloud = scanned(rendering, camera)
+    cloud = scan(rendering, camera, 0.0, {0: 1.2}) / 1000
     scanners = []
     for name, driver in DRIVERS.items():
         kinds = ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT

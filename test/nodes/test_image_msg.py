@@ -20,21 +20,6 @@ def message(encoding: str = 'mono8', step: int = 4, data: bytes | None = None, *
     return Image(data=GRAY.tobytes() if data is None else data, **values)
 
 
-def test_gray_is_a_view_of_the_data() -> None:
-    sent = message()
-    image = decode_image(sent)
-    assert np.array_equal(image, GRAY)
-    sent.data[0] = 200
-    assert image[0, 0] == 200
-
-
-@pytest.mark.parametrize('step', [5, 7, 64])
-def test_padding_of_rows_is_left_out(step: int) -> None:
-    padded = np.full((3, step), 255, np.uint8)
-    padded[:, :4] = GRAY
-    assert np.array_equal(decode_image(message(step=step, data=padded.tobytes())), GRAY)
-
-
 @pytest.mark.parametrize(
     ('encoding', 'gray'), [('rgb8', (RED, GREEN, BLUE)), ('bgr8', (BLUE, GREEN, RED))]
 )

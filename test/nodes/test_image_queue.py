@@ -16,10 +16,9 @@ from std_msgs.msg import Header
 
 from ahf_ros.nodes.diagnostics import Tally
 from ahf_ros.nodes.image_msg import image_message
-from ahf_ros.nodes.image_queue import ImageQueue
+from ahf_ros.nodes.image_queue import ImageQueue, Worker
 from ahf_ros.nodes.pipeline import Pipeline
 from ahf_ros.nodes.settings import DetectorNodeSettings
-from ahf_ros.nodes.worker import Worker
 from ahf_ros.settings.nested import assemble
 
 PIXELS = np.tile(np.arange(40, dtype=np.uint8), (30, 1))

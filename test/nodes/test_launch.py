@@ -74,15 +74,14 @@ def test_usual_parameters_are_arguments(name: str) -> None:
         assert tuple(named['choices'] or ('',)) == ('', *item.choices)
 
 
-def test_what_is_not_given_is_left_to_the_file_of_parameters() -> None:
-    (detector,) = launched('detector').nodes
+@pytest.mark.parametrize('of_another_file', [{}, {'threads': '4', 'seed': '7'}])
+def test_what_is_no_argument_is_left_to_the_file_of_parameters(
+    of_another_file: dict[str, str],
+) -> None:
+    """Also where another file includes this one."""
+    (detector,) = launched('detector', **of_another_file).nodes
     assert '-p' not in detector.arguments
     assert detector.arguments[:2] == ['--params-file', DETECTOR_FILE]
-
-
-def test_arguments_of_a_file_that_includes_this_one_are_left_alone() -> None:
-    (detector,) = launched('detector', threads='4', seed='7').nodes
-    assert '-p' not in detector.arguments
 
 
 def test_what_is_given_has_the_type_of_the_parameter() -> None:

@@ -16,11 +16,7 @@ import pytest
 
 pytest.importorskip('rclpy', reason='ROS 2 is not installed')
 
-from diagnostic_msgs.msg import DiagnosticArray
-from rcl_interfaces.srv import (
-    DescribeParameters,
-    SetParameters,
-)
+from rcl_interfaces.srv import DescribeParameters, SetParameters
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
@@ -31,24 +27,20 @@ from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.nodes.settings import DetectorNodeSettings
 from ahf_ros.settings.nested import flat_parameters
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
-from support.detector import DetectorProcess
+from support.detector import DetectorProcess, overrides, values
 
 CONFIG = Path(__file__).parents[2] / 'config' / 'detector.yaml'
 SCENE = {'width': 1000, 'height': 700, 'targets': 6}
 MAXIMUM_ERROR = 0.1  # px
 PATIENT = {'image_timeout': 0}
 """Nothing is said of images that a busy machine has not sent yet."""
-ENDLESS = (
-    ('max_evaluations', 0),
-    ('population', 10000),
-    ('generations', 100000),
-    ('patience', 1000000),
-)
-
-
-def overrides(**given: Any) -> list[str]:
-    """Return command line arguments that set parameters."""
-    return [word for name, value in given.items() for word in ('-p', f'{name}:={value}')]
+ENDLESS = {
+    'expected_targets': 50,
+    'max_evaluations': 0,
+    'population': 10000,
+    'generations': 100000,
+    'patience': 1000000,
+}
 
 
 def stamp(header: Header) -> tuple[int, int]:
@@ -63,11 +55,6 @@ def header() -> Header:
     made = Header(frame_id='bench')
     made.stamp.sec = next(_numbers)
     return made
-
-
-def values(message: DiagnosticArray) -> dict[str, str]:
-    """Return what a node says about itself."""
-    return {item.key: item.value for item in message.status[0].values}
 
 
 @pytest.fixture(scope='module')
@@ -94,7 +81,7 @@ def assert_true(answer: CodedTargetArray, truth: CodedTargetArray) -> None:
         assert found.semi_major == pytest.approx(true.semi_major, abs=0.5)
 
 
-def test_two_processes_identify_what_is_there(graph: Any) -> None:
+def test_processes_identify_what_is_there_and_compare_it(graph: Any) -> None:
     illumination = graph.start('illumination', *overrides(**SCENE, rate=4, frames=2, tilt=10))
     detector = graph.start('detector', *overrides(expected_targets=6, **PATIENT))
     truths = graph.listen(CodedTargetArray, '/ground_truth')
@@ -109,8 +96,7 @@ def test_two_processes_identify_what_is_there(graph: Any) -> None:
         return len({truth.targets[0].id for _, truth in known()}) == 2  # two different images
 
     graph.until(lambda: len(known()) >= 4 and both() and cameras)
-    pairs = known()
-    for answer, truth in pairs:
+    for answer, truth in known():
         assert_true(answer, truth)
         assert answer.header == truth.header
         assert answer.header.frame_id == 'camera'
@@ -120,15 +106,7 @@ def test_two_processes_identify_what_is_there(graph: Any) -> None:
         assert answer.filter.evaluations == 1
     assert (cameras[0].width, cameras[0].height) == (1000, 700)
     assert cameras[0].k[0] == cameras[0].k[4] == pytest.approx(1800)
-    for process in (detector, illumination):
-        assert process.end() == (0, '')
-
-
-def test_the_scoreboard_compares_with_the_truth(graph: Any) -> None:
-    others = ('-r', '__ns:=/match')
-    camera = graph.start('illumination', *others, *overrides(**SCENE, rate=4))
-    detector = graph.start('detector', *others, *overrides(expected_targets=6, **PATIENT))
-    board = graph.start('scoreboard', *others, *overrides(images=2))
+    board = graph.start('scoreboard', *overrides(images=2))
     assert board.wait() == (0, '')
     lines = board.output.splitlines()
     assert len(lines) == 2
@@ -136,7 +114,7 @@ def test_the_scoreboard_compares_with_the_truth(graph: Any) -> None:
         assert line.startswith(f'image {number}: 6 of 6 right, 0 wrong, 0 false, 0 missed, ')
         assert '; no filter, 1 trial, ' in line
         assert 0 < float(re.search(r'RMSE (.*) px', line).group(1)) < MAXIMUM_ERROR
-    for process in (detector, camera):
+    for process in (detector, illumination):
         assert process.end() == (0, '')
 
 
@@ -173,13 +151,8 @@ def test_colour_and_padding_make_no_difference(
 def test_what_is_refused_is_counted_and_the_node_goes_on(
     graph: Any, detector: DetectorProcess, message: Image
 ) -> None:
-    diagnostics = graph.listen(DiagnosticArray, '/own/diagnostics')
-
-    def rejected() -> tuple[int, str]:
-        told = values(diagnostics[-1])
-        return int(told['rejected']), told['last reason for rejection']
-
-    before = int(values(graph.newer(diagnostics))['rejected'])
+    graph.newer(detector.diagnostics)
+    before = int(detector.told('rejected'))
     flat = image_message(np.zeros((100, 100), np.uint8), header())
     short = image_message(np.zeros((100, 100), np.uint8), header())
     short.height = 200
@@ -190,9 +163,9 @@ def test_what_is_refused_is_counted_and_the_node_goes_on(
         (3, flat, 'image is constant, 0 everywhere'),
     ):
         detector.image.publish(bad)
-        graph.until(lambda count=count: rejected()[0] == before + count)
-        assert rejected()[1].startswith(error)
-        assert diagnostics[-1].status[0].name == 'own/detector: identification'
+        graph.until(lambda count=count: detector.told('rejected') == str(before + count))
+        assert detector.told('last reason for rejection').startswith(error)
+        assert detector.diagnostics[-1].status[0].name == 'own/detector: identification'
         refused.append(bad.header)
     assert len(detector.answer(message).targets) == SCENE['targets']
     assert not [it for it in detector.targets if it.header in refused]
@@ -300,10 +273,9 @@ def test_images_for_those_who_look(
 def test_parameters_are_answered_and_the_latest_image_waits_during_a_search(
     graph: Any, detector: DetectorProcess, rendering: Rendering
 ) -> None:
-    diagnostics = graph.listen(DiagnosticArray, '/own/diagnostics')
 
     def received() -> int:
-        return int(values(graph.newer(diagnostics))['received'])
+        return int(values(graph.newer(detector.diagnostics))['received'])
 
     def answers_in_time(duration: float) -> list[CodedTargetArray | None]:
         """Return the answers to four images, none if the search ended before the last one came."""
@@ -312,7 +284,7 @@ def test_parameters_are_answered_and_the_latest_image_waits_during_a_search(
         def answer(image: Image) -> CodedTargetArray | None:
             return next((it for it in detector.targets if it.header == image.header), None)
 
-        search = *ENDLESS, ('max_duration', duration), ('expected_targets', 50)
+        search = *ENDLESS.items(), ('max_duration', duration)
         assert detector.set(*search) == (True, '')
         before = received()
         detector.image.publish(images[0])
@@ -328,7 +300,7 @@ def test_parameters_are_answered_and_the_latest_image_waits_during_a_search(
         return answers if in_time and searched == answers[:1] else []
 
     # A machine may be so busy that a short search has ended before the parameters are set.
-    first, *between, last = next(filter(None, map(answers_in_time, (5.0, 20.0, 60.0))), [None] * 4)
+    first, *between, last = next(filter(None, map(answers_in_time, (2.0, 10.0, 60.0))), [None] * 4)
     assert first is not None
     assert last is not None
     assert (first.expected, last.expected) == (50, 6)
@@ -381,23 +353,17 @@ def test_a_signal_ends_the_node_in_the_middle_of_a_search(
     graph: Any, message: Image, number: signal.Signals
 ) -> None:
     space = f'/ending{number}'
-    process = graph.start(
-        'detector',
-        *('-r', f'__ns:={space}', '-r', f'/diagnostics:={space}/diagnostics'),
-        *overrides(expected_targets=50, **PATIENT, **dict(ENDLESS)),
-    )
-    diagnostics = graph.listen(DiagnosticArray, f'{space}/diagnostics')
-    answers = graph.listen(CodedTargetArray, f'{space}/coded_targets')
-    graph.publisher(Image, f'{space}/image').publish(message)
-    graph.until(lambda: diagnostics and values(diagnostics[-1])['received'] == '1')
-    assert process.end(number) == (0, '')
-    assert answers == []
+    given = overrides(**PATIENT, **ENDLESS)
+    detector = DetectorProcess(graph, space, *given)
+    detector.image.publish(message)
+    graph.until(lambda: detector.told('received') == '1')
+    assert detector.process.end(number) == (0, '')
+    assert detector.targets == []
 
 
 @pytest.mark.parametrize(
     ('node', 'given', 'words'),
     [
-        ('detector', {'population': 1}, ('population', '1', '2')),
         ('detector', {'family': 'qr'}, ("family is 'qr', accepted is one of metashape12",)),
         (
             'detector',

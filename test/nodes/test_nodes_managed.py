@@ -8,7 +8,6 @@ import pytest
 
 pytest.importorskip('rclpy', reason='ROS 2 is not installed')
 
-from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from sensor_msgs.msg import Image
@@ -17,15 +16,11 @@ from std_msgs.msg import Header
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.synthetic.scene import SceneSettings, render
-from support.detector import DetectorProcess
+from support.detector import DetectorProcess, overrides
 
 TARGETS = 2
 WAITING = 3
 SEARCH = ('expected_targets', 50), ('max_evaluations', 5)
-
-
-def overrides(**given: Any) -> list[str]:
-    return [word for name, value in given.items() for word in ('-p', f'{name}:={value}')]
 
 
 def state(graph: Any, node: str) -> int:
@@ -43,7 +38,7 @@ def test_a_managed_node_goes_through_its_states(graph: Any) -> None:
     wrong = {'min_radius': 70, 'max_radius': 60}
     given = overrides(managed='true', queue='lossless', **wrong)
     detector = DetectorProcess(graph, '/managed', *given, subscribed=False)
-    diagnostics = graph.listen(DiagnosticArray, '/managed/diagnostics')
+    diagnostics = detector.diagnostics
     images = graph.node.create_publisher(Image, topic, 2 * WAITING)
     image = render(SceneSettings(width=600, height=400, targets=TARGETS)).image
     sent: list[Header] = []
@@ -83,8 +78,7 @@ def test_a_managed_node_goes_through_its_states(graph: Any) -> None:
     for _ in range(WAITING):
         send()
     received = str(len(sent))
-    graph.until(lambda: {it.key: it.value for it in diagnostics[-1].status[0].values}['received']
-                == received)  # fmt: skip
+    graph.until(lambda: detector.told('received') == received)
     assert change(graph, node, Transition.TRANSITION_DEACTIVATE)
     assert state(graph, node) == State.PRIMARY_STATE_INACTIVE
     graph.until(lambda: not images.get_subscription_count())

@@ -12,34 +12,22 @@ import pytest
 
 pytest.importorskip('rclpy', reason='ROS 2 is not installed')
 
-from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import Image, PointCloud2, PointField
 from std_msgs.msg import Header
-from test_nodes import header, overrides, values
+from test_nodes import header
 from visualization_msgs.msg import ImageMarker, Marker, MarkerArray
 
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.synthetic.camera import Camera, tilted_camera
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
-from support.detector import DetectorProcess
+from support.detector import DetectorProcess, overrides
 
 SCENE = SceneSettings(width=640, height=480, targets=6, dot_radius=10.0, tilt=30.0, seed=3)
 DISTANCE = 800.0  # mm, of the middle of the wall
 MAXIMUM_ERROR = 0.2  # mm, of which a tenth of a pixel is most
-DOT_WITHOUT_POINTS, WITHOUT_POINTS = 0, 5  # places of targets in the truth
+WITHOUT_POINTS = 5  # place of a target in the truth
 CLOUD_FRAME = 'scanner_optical_frame'
-
-
-@pytest.fixture(scope='module')
-def rendering() -> Rendering:
-    return render(SCENE)
-
-
-@pytest.fixture(scope='module')
-def camera() -> Camera:
-    """Return the camera of the rendering."""
-    return synthetic_camera(SCENE)
 
 
 def synthetic_camera(scene: SceneSettings) -> Camera:
@@ -56,19 +44,27 @@ def in_space(camera: Camera, pixels: np.ndarray) -> np.ndarray:
     return wall @ camera.pose.T * DISTANCE / camera.intrinsics[0, 0]
 
 
-@pytest.fixture(scope='module')
-def scanned(rendering: Rendering, camera: Camera) -> np.ndarray:
-    """Return what a scanner measures, shape (height, width, 3)."""
+def scan(
+    rendering: Rendering, camera: Camera, noise: float, without: dict[int, float]
+) -> np.ndarray:
+    """Return what a scanner measures, mm, shape (height, width, 3).
+
+    There are no points around some targets, by their places in the truth, within so many radii.
+    """
     height, width = rendering.image.shape
     rows, columns = np.mgrid[:height, :width]
     pixels = np.column_stack((columns.ravel(), rows.ravel())).astype(float)
     points = in_space(camera, pixels).reshape(height, width, 3)
-    points *= 1 + 0.05 / DISTANCE * np.random.default_rng(0).standard_normal((height, width, 1))
-    for number, dots in ((DOT_WITHOUT_POINTS, 1.2), (WITHOUT_POINTS, 5.0)):
+    points *= 1 + noise / DISTANCE * np.random.default_rng(0).standard_normal((height, width, 1))
+    for number, radii in without.items():
         target = rendering.targets[number]
         away = np.hypot(columns - target.x, rows - target.y)
-        points[away < dots * target.semi_major] = np.nan
+        points[away < radii * target.semi_major] = np.nan
     return points
+
+
+RENDERING, CAMERA = render(SCENE), synthetic_camera(SCENE)
+SCANNED = scan(RENDERING, CAMERA, 0.05, {0: 1.2, WITHOUT_POINTS: 5.0})
 
 
 def cloud_message(points: np.ndarray, of: Header) -> PointCloud2:
@@ -90,21 +86,17 @@ def cloud_message(points: np.ndarray, of: Header) -> PointCloud2:
     )
 
 
-class Rig:
+class Rig(DetectorProcess):
     """A detector that is given clouds, and what it says."""
 
     def __init__(self, graph: Any) -> None:
-        self.graph = graph
-        own = ('-r', '/diagnostics:=/own/diagnostics')
-        self.detector = DetectorProcess(graph, '/own', *own, *overrides(cloud='true'))
+        super().__init__(graph, '/own', *overrides(cloud='true'))
         self.points = graph.listen(PointCloud2, '/own/detector/target_points')
-        self.diagnostics = graph.listen(DiagnosticArray, '/own/diagnostics')
         self.cloud = graph.publisher(PointCloud2, '/own/points')
-        graph.until(lambda: self.diagnostics)
 
-    def told(self, name: str) -> int:
+    def count(self, name: str) -> int:
         """Return a number of the diagnostics."""
-        return int(values(self.diagnostics[-1])[name])
+        return int(self.told(name))
 
     def found(self, of: Header) -> PointCloud2:
         """Return the positions of an image, once they are there."""
@@ -115,9 +107,9 @@ class Rig:
     def send_cloud(self, message: PointCloud2) -> None:
         """Publish a cloud, and return when the node has got it."""
         self.graph.newer(self.diagnostics)
-        before = self.told('clouds received')
+        before = self.count('clouds received')
         self.cloud.publish(message)
-        self.graph.until(lambda: self.told('clouds received') > before)
+        self.graph.until(lambda: self.count('clouds received') > before)
 
 
 @pytest.fixture(scope='module')
@@ -133,13 +125,13 @@ def read(message: PointCloud2) -> np.ndarray:
     )
 
 
-def assert_true(message: PointCloud2, rendering: Rendering, camera: Camera) -> None:
+def assert_true(message: PointCloud2) -> None:
     """Assert that a labelled cloud says where the targets of the rendering are."""
     points = read(message)
     assert points.dtype.names == ('x', 'y', 'z', 'id', 'confidence', 'deviation')
-    assert points['id'].tolist() == [target.id for target in rendering.targets]
-    pixels = np.array([(target.x, target.y) for target in rendering.targets])
-    true = in_space(camera, pixels)
+    assert points['id'].tolist() == [target.id for target in RENDERING.targets]
+    pixels = np.array([(target.x, target.y) for target in RENDERING.targets])
+    true = in_space(CAMERA, pixels)
     errors = np.linalg.norm(np.stack([points[name] for name in 'xyz'], axis=1) - true, axis=1)
     known = np.arange(len(pixels)) != WITHOUT_POINTS
     assert errors[known].max() < MAXIMUM_ERROR
@@ -149,66 +141,58 @@ def assert_true(message: PointCloud2, rendering: Rendering, camera: Camera) -> N
 
 
 @pytest.mark.parametrize('cloud_first', [True, False])
-def test_every_target_has_its_position_whatever_comes_first(
-    rig: Rig, rendering: Rendering, camera: Camera, scanned: np.ndarray, cloud_first: bool
-) -> None:
-    image = image_message(rendering.image, header())
-    cloud = cloud_message(scanned, image.header)
+def test_every_target_has_its_position_whatever_comes_first(rig: Rig, cloud_first: bool) -> None:
+    image = image_message(RENDERING.image, header())
+    cloud = cloud_message(SCANNED, image.header)
     if cloud_first:
         rig.send_cloud(cloud)
-    answer = rig.detector.answer(image)
+    answer = rig.answer(image)
     if not cloud_first:
         rig.cloud.publish(cloud)
     message = rig.found(image.header)
     assert message.header == Header(stamp=image.header.stamp, frame_id=CLOUD_FRAME)
     assert (message.height, message.width, message.is_dense) == (1, len(answer.targets), False)
-    assert_true(message, rendering, camera)
-    rig.graph.until(lambda: values(rig.diagnostics[-1])['targets with a position'] == '5 of 6')
+    assert_true(message)
+    rig.graph.until(lambda: rig.told('targets with a position') == '5 of 6')
 
 
-def test_what_has_no_partner_is_counted(
-    rig: Rig, rendering: Rendering, scanned: np.ndarray
-) -> None:
+def test_what_has_no_partner_is_counted(rig: Rig) -> None:
     names = ('clouds without an image', 'images without a cloud')
     rig.graph.newer(rig.diagnostics)
-    before = [rig.told(name) for name in names]
+    before = [rig.count(name) for name in names]
     lonely, of = header(), header()
-    rig.send_cloud(cloud_message(scanned, lonely))
-    rig.detector.answer(image_message(rendering.image, header()))
-    rig.send_cloud(cloud_message(scanned, of))
-    rig.detector.answer(image_message(rendering.image, of))
+    rig.send_cloud(cloud_message(SCANNED, lonely))
+    rig.answer(image_message(RENDERING.image, header()))
+    rig.send_cloud(cloud_message(SCANNED, of))
+    rig.answer(image_message(RENDERING.image, of))
     rig.found(of)
-    rig.graph.until(lambda: [rig.told(name) for name in names] == [count + 1 for count in before])
+    rig.graph.until(lambda: [rig.count(name) for name in names] == [count + 1 for count in before])
     assert not [it for it in rig.points if it.header.stamp == lonely.stamp]
 
 
-def test_stamps_may_differ_by_the_tolerance(
-    rig: Rig, rendering: Rendering, scanned: np.ndarray
-) -> None:
-    with rig.detector.resubscription('points'):
-        assert rig.detector.set(('cloud_tolerance', 0.01)) == (True, '')
-    image = image_message(rendering.image, header())
-    cloud = cloud_message(scanned, image.header)
+def test_stamps_may_differ_by_the_tolerance(rig: Rig) -> None:
+    with rig.resubscription('points'):
+        assert rig.set(('cloud_tolerance', 0.01)) == (True, '')
+    image = image_message(RENDERING.image, header())
+    cloud = cloud_message(SCANNED, image.header)
     cloud.header.stamp.nanosec += 9_000_000
-    rig.detector.answer(image)
+    rig.answer(image)
     rig.cloud.publish(cloud)
     assert rig.found(image.header).width == SCENE.targets
-    with rig.detector.resubscription('points'):
-        assert rig.detector.set(('cloud_tolerance', 0)) == (True, '')
+    with rig.resubscription('points'):
+        assert rig.set(('cloud_tolerance', 0)) == (True, '')
 
 
-def test_bad_clouds_are_named_and_the_node_goes_on(
-    rig: Rig, rendering: Rendering, camera: Camera, scanned: np.ndarray
-) -> None:
+def test_bad_clouds_are_named_and_the_node_goes_on(rig: Rig) -> None:
     rig.graph.newer(rig.diagnostics)
-    before = rig.told('clouds rejected')
-    flat = cloud_message(scanned, header())
+    before = rig.count('clouds rejected')
+    flat = cloud_message(SCANNED, header())
     flat.height, flat.width = 1, flat.height * flat.width
-    short = cloud_message(scanned[:9], header())
+    short = cloud_message(SCANNED[:9], header())
     short.height = 10
-    huge = cloud_message(scanned[:9], header())
+    huge = cloud_message(SCANNED[:9], header())
     huge.height = huge.width = huge.row_step = 2**32 - 1
-    nameless = cloud_message(scanned[:9], header())
+    nameless = cloud_message(SCANNED[:9], header())
     nameless.fields = nameless.fields[:2]
     bad = [
         (flat, 'height is 1, accepted is an integer of at least 2'),
@@ -219,53 +203,49 @@ def test_bad_clouds_are_named_and_the_node_goes_on(
     ]
     for count, (message, words) in enumerate(bad, start=1):
         rig.cloud.publish(message)
-        rig.graph.until(lambda count=count: rig.told('clouds rejected') == before + count)
-        reason = values(rig.diagnostics[-1])['last reason for rejection of a cloud']
+        rig.graph.until(lambda count=count: rig.count('clouds rejected') == before + count)
+        reason = rig.told('last reason for rejection of a cloud')
         assert reason.startswith(words)
-    image = image_message(rendering.image, header())
-    rig.detector.answer(image)
-    rig.cloud.publish(cloud_message(scanned[:, :-1], image.header))
-    rig.graph.until(lambda: rig.told('clouds rejected') == before + len(bad) + 1)
-    assert values(rig.diagnostics[-1])['last reason for rejection of a cloud'] == (
+    image = image_message(RENDERING.image, header())
+    rig.answer(image)
+    rig.cloud.publish(cloud_message(SCANNED[:, :-1], image.header))
+    rig.graph.until(lambda: rig.count('clouds rejected') == before + len(bad) + 1)
+    assert rig.told('last reason for rejection of a cloud') == (
         'cloud has 639 x 480 points, accepted is 640 x 480, the size of the image; for another '
         'one, set cloud_offset_x, cloud_offset_y and cloud_step'
     )
-    image = image_message(rendering.image, header())
-    rig.detector.answer(image)
-    rig.cloud.publish(cloud_message(scanned, image.header))
-    assert_true(rig.found(image.header), rendering, camera)
+    image = image_message(RENDERING.image, header())
+    rig.answer(image)
+    rig.cloud.publish(cloud_message(SCANNED, image.header))
+    assert_true(rig.found(image.header))
 
 
-def test_no_cloud_is_lost_in_a_lossless_queue(
-    rig: Rig, rendering: Rendering, scanned: np.ndarray
-) -> None:
-    with rig.detector.resubscription('image', 'points'):
-        assert rig.detector.set(('queue', 'lossless')) == (True, '')
+def test_no_cloud_is_lost_in_a_lossless_queue(rig: Rig) -> None:
+    with rig.resubscription('image', 'points'):
+        assert rig.set(('queue', 'lossless')) == (True, '')
     clouds = rig.graph.publisher(PointCloud2, '/own/points')
     images = rig.graph.publisher(Image, '/own/image')
     before = len(rig.points)
     headers = [header() for _ in range(8)]
     for of in headers:
-        clouds.publish(cloud_message(scanned, of))
-        images.publish(image_message(rendering.image, of))
+        clouds.publish(cloud_message(SCANNED, of))
+        images.publish(image_message(RENDERING.image, of))
     rig.graph.until(lambda: len(rig.points) == before + len(headers))
     assert [it.header.stamp for it in rig.points[before:]] == [of.stamp for of in headers]
-    with rig.detector.resubscription('image', 'points'):
-        assert rig.detector.set(('queue', 'latest')) == (True, '')
+    with rig.resubscription('image', 'points'):
+        assert rig.set(('queue', 'latest')) == (True, '')
 
 
-def test_labels_in_space_for_those_who_look(
-    rig: Rig, rendering: Rendering, scanned: np.ndarray
-) -> None:
+def test_labels_in_space_for_those_who_look(rig: Rig) -> None:
     labels = rig.graph.listen(MarkerArray, '/own/detector/target_labels')
-    image = image_message(rendering.image, header())
-    rig.cloud.publish(cloud_message(scanned, image.header))
-    rig.detector.answer(image)
+    image = image_message(RENDERING.image, header())
+    rig.cloud.publish(cloud_message(SCANNED, image.header))
+    rig.answer(image)
     found = read(rig.found(image.header))
     rig.graph.until(lambda: labels)
     first, *texts = labels[-1].markers
     assert first.action == Marker.DELETEALL
-    assert [it.text for it in texts] == [str(it.id) for it in rendering.targets[:WITHOUT_POINTS]]
+    assert [it.text for it in texts] == [str(it.id) for it in RENDERING.targets[:WITHOUT_POINTS]]
     assert {it.header.frame_id for it in texts} == {CLOUD_FRAME}
     for marker, point in zip(texts, found, strict=False):
         place = marker.pose.position
@@ -273,34 +253,32 @@ def test_labels_in_space_for_those_who_look(
         assert 10 < marker.scale.z < 40  # mm; a dot is about 14 mm wide
 
 
-def test_annotations_of_the_image_for_those_who_look(rig: Rig, rendering: Rendering) -> None:
+def test_annotations_of_the_image_for_those_who_look(rig: Rig) -> None:
     annotations = rig.graph.listen(ImageMarker, '/own/detector/annotations')
-    image = image_message(rendering.image, header())
-    rig.detector.image.publish(image)
+    image = image_message(RENDERING.image, header())
+    rig.image.publish(image)
     rig.graph.until(lambda: annotations)
     marker = annotations[-1]
     assert marker.header == image.header
     assert marker.type == ImageMarker.LINE_LIST
     assert len(marker.points) == 2 * len(marker.outline_colors)
     places = np.array([(point.x, point.y) for point in marker.points]) - 0.5
-    for target in rendering.targets:
+    for target in RENDERING.targets:
         away = np.hypot(*(places - (target.x, target.y)).T)
         assert away.min() == pytest.approx(target.semi_minor, abs=0.3)
 
 
-def test_without_the_parameter_there_are_no_clouds(
-    rig: Rig, rendering: Rendering, scanned: np.ndarray
-) -> None:
-    assert rig.detector.set(('cloud', False)) == (True, '')
+def test_without_the_parameter_there_are_no_clouds(rig: Rig) -> None:
+    assert rig.set(('cloud', False)) == (True, '')
     rig.graph.until(lambda: not rig.cloud.get_subscription_count())
     count = len(rig.points)
-    rig.detector.answer(image_message(rendering.image, header()))
+    rig.answer(image_message(RENDERING.image, header()))
     assert len(rig.points) == count
-    assert rig.detector.set(('cloud', True)) == (True, '')
+    assert rig.set(('cloud', True)) == (True, '')
     rig.graph.until(rig.cloud.get_subscription_count)
-    image = image_message(rendering.image, header())
-    rig.send_cloud(cloud_message(scanned, image.header))
-    rig.detector.answer(image)
+    image = image_message(RENDERING.image, header())
+    rig.send_cloud(cloud_message(SCANNED, image.header))
+    rig.answer(image)
     assert rig.found(image.header).width == SCENE.targets
 
 

@@ -15,11 +15,12 @@ from hypothesis import HealthCheck, given, settings
 pytest.importorskip('rclpy', reason='ROS 2 is not installed')
 
 from builtin_interfaces.msg import Time
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.srv import ListParameters
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header, String
+from test_nodes import ENDLESS
 
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.image_msg import image_message
@@ -28,21 +29,10 @@ from ahf_ros.nodes.settings import DetectorNodeSettings
 from ahf_ros.settings.nested import flat_parameters
 from ahf_ros.synthetic.scene import SceneSettings, render
 from support import live
+from support.detector import DetectorProcess, overrides
 from support.hostile import IMAGES, Fields
 
 SCENE = {'width': 320, 'height': 240, 'targets': 3, 'dot_radius': 9.0}
-ENDLESS = {
-    'expected_targets': 50,
-    'max_evaluations': 0,
-    'population': 10000,
-    'generations': 100000,
-    'patience': 1000000,
-}
-
-
-def overrides(**given: Any) -> list[str]:
-    """Return command line arguments that set parameters."""
-    return [word for name, value in given.items() for word in ('-p', f'{name}:={value}')]
 
 
 @pytest.fixture(scope='module')
@@ -60,35 +50,22 @@ def pixels() -> np.ndarray:
     return render(SceneSettings(**SCENE)).image
 
 
-class Bench:
+class Bench(DetectorProcess):
     """A detector in a namespace, and all that it says."""
 
     def __init__(self, graph: Any, name: str, *places: str, **given: Any) -> None:
-        self.graph = graph
-        self.name = name
-        self.start(*places, **given)
-        self.answers = graph.listen(CodedTargetArray, f'/{name}/coded_targets')
-        self.diagnostics = graph.listen(DiagnosticArray, f'/{name}/diagnostics')
-        # The node then knows who listens to its answers, too.
-        graph.until(lambda: self.diagnostics)
-
-    def start(self, *places: str, **given: Any) -> None:
-        own = f'__ns:=/{self.name}', f'/diagnostics:=/{self.name}/diagnostics'
-        remapped = [word for place in (*own, *places) for word in ('-r', place)]
+        remapped = [word for place in places for word in ('-r', place)]
         # Nothing is said of images that a busy machine has not sent yet.
         chosen = overrides(**{'image_timeout': 0, **given})
-        self.process = self.graph.start('detector', *remapped, *chosen)
+        super().__init__(graph, f'/{name}', *remapped, *chosen, subscribed=False)
+        # The node then knows who listens to its answers, too.
+        assert self.diagnostics
 
     def kill(self) -> None:
         """End the detector without notice, and forget what it said."""
         self.process.kill()
         self.diagnostics.clear()
-        self.answers.clear()
-
-    def told(self, key: str) -> str:
-        """Return what the detector said last about something, nothing before it said anything."""
-        said = self.diagnostics[-1].status[0].values if self.diagnostics else []
-        return next((item.value for item in said if item.key == key), '')
+        self.targets.clear()
 
 
 def test_the_end_of_a_node_does_not_gather_callbacks() -> None:
@@ -105,10 +82,10 @@ def test_a_camera_that_is_killed_and_comes_again(graph: Any, queue: str) -> None
     # An image takes many packets, so that one or another is on its way at any moment.
     scene = {**SCENE, 'width': 1200, 'height': 900, 'rate': 50, 'frames': 1}
     for _ in range(2):
-        camera = graph.start('illumination', '-r', f'__ns:=/{bench.name}', *overrides(**scene))
-        graph.until(lambda: len(bench.answers) >= 3)
+        camera = graph.start('illumination', '-r', f'__ns:={bench.namespace}', *overrides(**scene))
+        graph.until(lambda: len(bench.targets) >= 3)
         camera.kill()
-        bench.answers.clear()
+        bench.targets.clear()
     assert bench.told('rejected') == '0'
     status, errors = bench.process.end()
     assert status == 0
@@ -124,9 +101,9 @@ def test_a_detector_that_is_killed_in_the_middle_of_a_search_and_comes_again(gra
     graph.until(lambda: int(bench.told('received') or 0) >= 3)
     assert bench.told('answered') == '0'
     bench.kill()
-    bench.start()
-    graph.until(lambda: len(bench.answers) >= 3)
-    assert all(len(answer.targets) == SCENE['targets'] for answer in bench.answers)
+    bench.start(*overrides(image_timeout=0))
+    graph.until(lambda: len(bench.targets) >= 3)
+    assert all(len(answer.targets) == SCENE['targets'] for answer in bench.targets)
     assert camera.end() == (0, '')
 
 
@@ -136,8 +113,8 @@ def test_stamps_that_go_backwards_are_told_and_answered(graph: Any, pixels: np.n
     stamps = [Time(sec=5), Time(sec=7, nanosec=1), Time(sec=7), Time(sec=7), Time(sec=8)]
     for stamp in stamps:
         image.publish(image_message(pixels, Header(stamp=stamp)))
-    graph.until(lambda: len(bench.answers) == len(stamps))
-    assert [answer.header.stamp for answer in bench.answers] == stamps
+    graph.until(lambda: len(bench.targets) == len(stamps))
+    assert [answer.header.stamp for answer in bench.targets] == stamps
     graph.until(lambda: bench.told('answered') == str(len(stamps)))
     assert bench.told('stamps that went backwards') == '1'
     assert bench.told('rejected') == '0'
@@ -166,7 +143,7 @@ def test_a_topic_of_another_type_is_named_and_images_are_answered(graph: Any) ->
     camera = graph.start(
         'illumination', '-r', '__ns:=/mistaken/camera', *overrides(**SCENE, rate=20, frames=1)
     )
-    graph.until(lambda: bench.answers)
+    graph.until(lambda: bench.targets)
     graph.node.destroy_publisher(other)
     graph.until(lambda: status()[0] == DiagnosticStatus.OK)
     assert camera.end() == (0, '')
@@ -182,7 +159,7 @@ def test_simulated_time_that_has_not_begun_stands_still_or_jumps(
 
     def answered(count: int) -> None:
         image.publish(image_message(pixels, Header()))
-        graph.until(lambda: len(bench.answers) == count)
+        graph.until(lambda: len(bench.targets) == count)
         told = len(bench.diagnostics)
         graph.until(lambda: len(bench.diagnostics) >= told + 1)  # goes on, whatever the time
 
@@ -232,8 +209,8 @@ def test_parameters_are_those_described_and_take_integers_for_numbers(graph: Any
     names = graph.call(
         ListParameters, '/whole/detector/list_parameters', ListParameters.Request()
     ).result.names
-    own = {name for name in names if not name.startswith('qos_overrides.')}
-    assert set(items) <= own
-    assert own - set(items) <= {'use_sim_time', 'start_type_description_service'}
+    declared = {name for name in names if not name.startswith('qos_overrides.')}
+    assert set(items) <= declared
+    assert declared - set(items) <= {'use_sim_time', 'start_type_description_service'}
     assert all(len(item.description) > 10 for item in items.values())
     assert bench.process.end() == (0, '')

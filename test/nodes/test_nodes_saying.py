@@ -12,26 +12,21 @@ import pytest
 
 pytest.importorskip('rclpy', reason='ROS 2 is not installed')
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from rcl_interfaces.srv import ListParameters, SetParameters
-from rclpy.parameter import Parameter
+from diagnostic_msgs.msg import DiagnosticStatus
+from rcl_interfaces.srv import ListParameters
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Image, PointCloud2
-from test_nodes import header, values
+from test_nodes import header
 from test_nodes_rig import cloud_message
 
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.image_msg import image_message
+from support.detector import DetectorProcess, overrides, own, values
 
 LATCHED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 WEAK = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 PIXELS = np.tile(np.arange(60, dtype=np.uint8), (40, 1))
 CONFIG = Path(__file__).parents[2] / 'config'
-
-
-def own(namespace: str) -> tuple[str, ...]:
-    """Return the arguments that put a node and its diagnostics into a namespace."""
-    return '-r', f'__ns:={namespace}', '-r', f'/diagnostics:={namespace}/diagnostics'
 
 
 def assert_every_topic_has_overrides(graph: Any, *node: str) -> None:
@@ -104,37 +99,25 @@ def test_the_start_what_has_no_effect_and_the_quality_of_service(graph: Any) -> 
         graph.node.destroy_publisher(publisher)
 
 
-class Quiet:
+class Quiet(DetectorProcess):
     """A detector that soon says what it misses, and what it says."""
 
     def __init__(self, graph: Any) -> None:
-        self.graph = graph
-        given = ('-p', 'image_timeout:=0.1', '-p', 'cloud:=true', '-p', 'cloud_tolerance:=0.001')
-        self.detector = graph.start('detector', *own('/quiet'), *given)
-        self.diagnostics = graph.listen(DiagnosticArray, '/quiet/diagnostics')
+        given = overrides(image_timeout=0.1, cloud='true', cloud_tolerance=0.001)
+        super().__init__(graph, '/quiet', *given, subscribed=False)
 
     def says(self, *words: str) -> dict[str, str]:
         """Wait until the diagnostics warn in these words; return their entries."""
-        status = self.graph.until(
-            lambda: next((it for it in self.said() if words[0] in it.message), None)
-        )
+
+        def said() -> DiagnosticStatus | None:
+            every = (message.status[0] for message in self.diagnostics)
+            return next((it for it in every if words[0] in it.message), None)
+
+        status = self.graph.until(said)
         assert status.level == DiagnosticStatus.WARN
         assert all(it in status.message for it in words), status.message
         self.diagnostics.clear()
         return {item.key: item.value for item in status.values}
-
-    def said(self) -> list[DiagnosticStatus]:
-        return [message.status[0] for message in self.diagnostics]
-
-    def values(self) -> dict[str, str]:
-        """Return the entries of the diagnostics that come next."""
-        return values(self.graph.newer(self.diagnostics))
-
-    def set(self, *given: tuple[str, Any]) -> None:
-        parameters = [Parameter(name, value=value).to_parameter_msg() for name, value in given]
-        request = SetParameters.Request(parameters=parameters)
-        results = self.graph.call(SetParameters, '/quiet/detector/set_parameters', request).results
-        assert all(it.successful for it in results), results
 
 
 def test_what_does_not_arrive_is_named_with_the_reason_and_the_remedy(graph: Any) -> None:
@@ -151,22 +134,22 @@ def test_what_does_not_arrive_is_named_with_the_reason_and_the_remedy(graph: Any
     )
     node.destroy_publisher(cameras.pop())
     quiet.says('s: /test publishes on /quiet/image, but nothing arrives')
-    quiet.set(('image_timeout', 1000.0))
+    assert quiet.set(('image_timeout', 1000.0)) == (True, '')
     cameras.append(node.create_publisher(Image, '/quiet/image', 10))
     quiet.says('2 publishers on /quiet/image, /test, /test: what they send is taken in the order')
     graph.until(lambda: all(it.get_subscription_count() for it in cameras))
-    answers = graph.listen(CodedTargetArray, '/quiet/coded_targets')
+    answers = quiet.targets
     for count, (camera, image) in enumerate(zip(cameras, (PIXELS, PIXELS[:30]), strict=True), 1):
         camera.publish(image_message(image, header()))
         graph.until(lambda count=count: len(answers) == count)
     assert [(it.width, it.height) for it in answers] == [(60, 40), (60, 30)]
-    told = quiet.values()
+    told = values(graph.newer(quiet.diagnostics))
     assert told['changes of size or encoding'] == '1'
     # From Kilted on, rclpy tells publishers apart.
     uncounted = '0, not counted: messages come from 2 publishers'
     assert told['lost in transport'] in ('0', uncounted)
     node.destroy_publisher(cameras.pop())
-    quiet.set(('image_timeout', 0.1))
+    assert quiet.set(('image_timeout', 0.1)) == (True, '')
     image = image_message(PIXELS, header())
     cameras[0].publish(image)
     quiet.says(
@@ -179,14 +162,14 @@ def test_what_does_not_arrive_is_named_with_the_reason_and_the_remedy(graph: Any
         'clouds wait for each other: the nearest stamps differ by 0.03 s, '
         'set cloud_tolerance to at least 0.03'
     )
-    quiet.set(('cloud_tolerance', 0.03))
+    assert quiet.set(('cloud_tolerance', 0.03)) == (True, '')
     for camera in cameras:
         node.destroy_publisher(camera)
     assert_losses_are_counted(quiet, answers)
 
 
 def assert_losses_are_counted(quiet: Quiet, answers: list[CodedTargetArray]) -> None:
-    quiet.set(('queue', 'lossless'), ('image_timeout', 0.0))
+    assert quiet.set(('queue', 'lossless'), ('image_timeout', 0.0)) == (True, '')
     camera = quiet.graph.node.create_publisher(Image, '/quiet/image', 1)
     before = len(answers)
 
@@ -197,12 +180,12 @@ def assert_losses_are_counted(quiet: Quiet, answers: list[CodedTargetArray]) -> 
     quiet.graph.until(arrived)
     # More than any buffer on the way holds while the process stands still.
     large = np.tile(PIXELS[:1], (1000, 30))
-    os.kill(quiet.detector.process.pid, signal.SIGSTOP)
+    os.kill(quiet.process.process.pid, signal.SIGSTOP)
     try:
         for _ in range(20):
             camera.publish(image_message(large, header()))
     finally:
-        os.kill(quiet.detector.process.pid, signal.SIGCONT)
+        os.kill(quiet.process.process.pid, signal.SIGCONT)
     before = len(answers)
     quiet.graph.until(arrived)
     told = quiet.says('images were lost in transport; more depth of the publisher')

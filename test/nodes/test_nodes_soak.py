@@ -43,6 +43,7 @@ from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.srv import Identify
 from ahf_ros.synthetic.scene import SceneSettings, render
 from support import live
+from support.detector import overrides, own, values
 
 COUNT = int(os.environ.get('AHF_SOAK', '130'))
 LONG = 5000
@@ -54,17 +55,8 @@ NAME = '/soak/detector'
 WAITING = 20
 """Most images that are sent and not yet answered."""
 
-LOOKS = 400
-"""How often memory, threads and files are looked at."""
-
 WARM = 0.2
 """Share of the images after which memory has to keep its size."""
-
-GROWTH = 0.05
-"""Share by which it may grow from the first quarter of these to the last one, by medians."""
-
-LIMIT = 200.0
-"""Maximum memory of the node, MB."""
 
 Frame = tuple[Image, tuple[int, ...]]
 """An image and the IDs of the targets that it shows."""
@@ -72,25 +64,13 @@ Frame = tuple[Image, tuple[int, ...]]
 
 @dataclass(frozen=True)
 class Look:
-    """The size of the process after some images.
+    """The size of the process after some images."""
 
-    Attributes
-    ----------
-    images : int
-        Answered so far.
-    memory : float
-        Resident, MB.
-    peak : float
-        Maximum of that up to now, as the kernel knows it, MB.
-    threads, files : int
-        At that time; files are all open descriptors.
-    """
-
-    images: int
-    memory: float
-    peak: float
+    images: int  # answered so far
+    memory: float  # resident, MB
+    peak: float  # maximum of that up to now, as the kernel knows it, MB
     threads: int
-    files: int
+    files: int  # all open descriptors
 
 
 def look(process: int, images: int) -> Look:
@@ -152,10 +132,8 @@ class Visitor:
             (Image, f'{NAME}/filtered_image'),
             (CodedTargetArray, '/soak/coded_targets'),
         ):
-            self._node.create_subscription(kind, topic, self._counter(topic), 10)
-
-    def _counter(self, topic: str) -> Callable[[Any], None]:
-        return lambda _: self.seen.update([topic])
+            callback = lambda _, topic=topic: self.seen.update([topic])  # noqa: E731
+            self._node.create_subscription(kind, topic, callback, 10)
 
     def spin(self) -> None:
         """Take what has come in."""
@@ -171,13 +149,8 @@ class Visitor:
 class Soak:
     """One run: the node, what it is sent, and what becomes of it.
 
-    Parameters
-    ----------
-    graph : live.Graph
-    count : int
-        Images that are sent; one message in ten that is none comes in addition.
-    interval : int
-        Images from one thing that happens beside them to the next.
+    One message in ten that is no image comes in addition to the images; `interval` images lie
+    between one thing that happens beside them and the next.
     """
 
     def __init__(self, graph: live.Graph, count: int, interval: int) -> None:
@@ -187,12 +160,12 @@ class Soak:
         self.counts: Counter[str] = Counter()
         self.looks: list[Look] = []
         self._due: dict[int, tuple[int, ...]] = {}
-        self._diagnostics: dict[str, str] = {}
+        self.diagnostics: dict[str, str] = {}
         self._visitor: Visitor | None = None
         self.node = graph.start(
             'detector',
-            *('-r', '__ns:=/soak', '-r', '/diagnostics:=/soak/diagnostics'),
-            *('-p', 'queue:=lossless', '-p', 'queue_memory:=1', '-p', 'detector:=traditional'),
+            *own('/soak'),
+            *overrides(queue='lossless', queue_memory=1, detector='traditional'),
         )
         for kind, topic, callback in (
             (CodedTargetArray, '/soak/coded_targets', self._on_answer),
@@ -204,28 +177,25 @@ class Soak:
             lambda: (
                 self._image.get_subscription_count()
                 and graph.node.count_publishers('/soak/coded_targets')
-                and self._diagnostics
+                and self.diagnostics
             )
         )
 
     def _on_answer(self, message: CodedTargetArray) -> None:
         turn, ids = next(iter(self._due.items()), (0, ()))
-        if message.header.stamp.sec != turn:
-            raise AssertionError(
-                f'the answer is to image {message.header.stamp.sec}, it is the turn of {turn}'
-            )
+        assert message.header.stamp.sec == turn
         del self._due[turn]
         self.counts['answered'] += 1
         self.counts['unexpected IDs'] += ids != tuple(target.id for target in message.targets)
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
-        self._diagnostics = {item.key: item.value for item in message.status[0].values}
+        self.diagnostics = values(message)
 
     def run(self) -> None:
         """Send everything, and wait until all of it is answered or rejected."""
         happenings = self._happenings()
         bad, valid = cycle(garbage()), cycle(self._valid)
-        period = max(1, self._count // LOOKS)
+        period = max(1, self._count // 400)
         for place in range(1, self._count + 1):
             self._send(next(valid))
             if place % 10 == 0:
@@ -240,11 +210,6 @@ class Soak:
         self._leave()
         self._settle()
         self._look()
-
-    @property
-    def rejected(self) -> int:
-        """Messages that the node says it has rejected."""
-        return int(self._diagnostics['rejected'])
 
     def _send(self, frame: Frame) -> None:
         message, ids = frame
@@ -264,7 +229,8 @@ class Soak:
     def _settle(self) -> None:
         """Wait until everything is answered or rejected."""
         self._graph.until(lambda: not self._due)
-        self._graph.until(lambda: self.rejected == self.counts['messages that are not images'])
+        bad = self.counts['messages that are not images']
+        self._graph.until(lambda: int(self.diagnostics['rejected']) == bad)
 
     def _happenings(self) -> Iterator[Callable[[], None]]:
         """Yield what happens beside the images, in turn and over again."""
@@ -294,8 +260,7 @@ class Soak:
             f'{NAME}/set_parameters_atomically',
             SetParametersAtomically.Request(parameters=parameters),
         )
-        if response.result.successful != accepted:
-            raise AssertionError(f'{given} is accepted: {response.result.successful}')
+        assert response.result.successful == accepted, given
         self.counts['parameters set'] += 1
 
     def _subscribe_anew(self) -> None:
@@ -319,8 +284,7 @@ class Soak:
             return
         limit = time.monotonic() + live.PATIENCE
         while len(visitor.seen) != 3:  # the node may not know of it yet
-            if time.monotonic() > limit:
-                raise AssertionError(f'a visitor saw only {dict(visitor.seen)}')
+            assert time.monotonic() < limit, f'a visitor saw only {dict(visitor.seen)}'
             self._send(self._valid[0])
             self._graph.until(lambda: not self._due)
             visitor.spin()
@@ -330,8 +294,7 @@ class Soak:
     def _identify(self) -> None:
         request = Identify.Request(image=self._valid[0][0])
         response = self._graph.call(Identify, f'{NAME}/identify', request)
-        if not response.success:
-            raise AssertionError(response.message)
+        assert response.success, response.message
         self.counts['services called'] += 1
 
     def _reset(self) -> None:
@@ -348,7 +311,9 @@ def test_every_image_is_answered_and_nothing_is_left_behind(graph: live.Graph) -
     warm = [it for it in soak.looks if it.images >= WARM * counts['images']]
     assert counts['answered'] == counts['images'] >= COUNT
     assert counts['unexpected IDs'] == 0
-    assert soak.rejected == counts['messages that are not images'] > COUNT // 10
+    assert (
+        int(soak.diagnostics['rejected']) == counts['messages that are not images'] > COUNT // 10
+    )
     assert counts['parameters set'] >= 10
     assert counts['participants that joined and left'] >= 1
     # Threads of pools start when they are first needed: 3 of the executor, 3 of the worker.
@@ -357,6 +322,6 @@ def test_every_image_is_answered_and_nothing_is_left_behind(graph: live.Graph) -
     print(*soak.looks[:: max(1, len(soak.looks) // 10)], last, sep='\n')
     if COUNT >= LONG:
         memory, quarter = [it.memory for it in warm], len(warm) // 4
-        assert median(memory[-quarter:]) <= (1 + GROWTH) * median(memory[:quarter])
-        assert last.peak <= LIMIT
+        assert median(memory[-quarter:]) <= 1.05 * median(memory[:quarter])
+        assert last.peak <= 200  # MB
     assert soak.node.end()[0] == 0

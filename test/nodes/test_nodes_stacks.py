@@ -9,18 +9,18 @@ import pytest
 
 pytest.importorskip('rclpy', reason='ROS 2 is not installed')
 
-from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
 from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.nodes.settings import IlluminationNodeSettings
 from ahf_ros.synthetic.scene import SceneSettings, render
-from support.detector import DetectorProcess
+from support.detector import DetectorProcess, overrides
 
 SCENE = SceneSettings(
     width=400, height=300, targets=4, dot_radius=10, light='stripe', ambient=0.02, phases=4
 )
+PHASES = [render(SCENE, phase).image for phase in range(4)]
 TRUTH = [target.id for target in render(SCENE).targets]
 OPTIONS = {
     'queue': 'lossless',
@@ -33,13 +33,7 @@ OPTIONS = {
 
 @pytest.fixture(scope='module')
 def detector(graph: Any) -> DetectorProcess:
-    given = [word for name, it in OPTIONS.items() for word in ('-p', f'{name}:={it}')]
-    return DetectorProcess(graph, '/stacks', *given)
-
-
-@pytest.fixture(scope='module')
-def phases() -> list[np.ndarray]:
-    return [render(SCENE, phase).image for phase in range(4)]
+    return DetectorProcess(graph, '/stacks', *overrides(**OPTIONS))
 
 
 def message(pixels: np.ndarray, seconds: int) -> Image:
@@ -59,49 +53,44 @@ def sent(detector: DetectorProcess, images: list[Image], answers: int) -> list[t
 
 
 def test_a_stack_is_answered_once_with_the_stamp_of_its_last_image(
-    detector: DetectorProcess, phases: list[np.ndarray]
+    detector: DetectorProcess,
 ) -> None:
-    stream = [message(pixels, 10 + number) for number, pixels in enumerate(phases * 2)]
+    stream = [message(pixels, 10 + number) for number, pixels in enumerate(PHASES * 2)]
     assert sent(detector, stream, 2) == [(13, TRUTH), (17, TRUTH)]
 
 
 def test_what_does_not_belong_together_is_answered_and_said(
-    detector: DetectorProcess, phases: list[np.ndarray]
+    detector: DetectorProcess,
 ) -> None:
-    diagnostics = detector.graph.listen(DiagnosticArray, '/stacks/diagnostics')
-
-    def said(name: str) -> int:
-        values = diagnostics[-1].status[0].values
-        return int({it.key: it.value for it in values}[name])
-
-    detector.graph.newer(diagnostics)
-    before = said('stacks that were not full')
-    small = [pixels[:-20] for pixels in phases]
-    stream = [message(pixels, 30 + number) for number, pixels in enumerate(phases[:2])]
+    detector.graph.newer(detector.diagnostics)
+    before = int(detector.told('stacks that were not full'))
+    small = [pixels[:-20] for pixels in PHASES]
+    stream = [message(pixels, 30 + number) for number, pixels in enumerate(PHASES[:2])]
     stream += [message(pixels, 32 + number) for number, pixels in enumerate(small[:2])]
     stream += [message(pixels, 20 + number) for number, pixels in enumerate(small)]
     stamps = [stamp for stamp, _ in sent(detector, stream, 3)]
     assert stamps == [31, 33, 23]
-    detector.graph.until(lambda: said('stacks that were not full') == before + 2)
-    assert said('rejected') == 0
+    after = str(before + 2)
+    detector.graph.until(lambda: detector.told('stacks that were not full') == after)
+    assert detector.told('rejected') == '0'
 
 
 def test_a_stack_that_does_not_fill_is_answered_when_its_time_is_up(
-    detector: DetectorProcess, phases: list[np.ndarray]
+    detector: DetectorProcess,
 ) -> None:
     assert detector.set(('stack_timeout', 0.2)) == (True, '')
     try:
-        assert sent(detector, [message(phases[0], 50)], 1)[0][0] == 50
+        assert sent(detector, [message(PHASES[0], 50)], 1)[0][0] == 50
     finally:
         assert detector.set(('stack_timeout', 1e4)) == (True, '')
 
 
 def test_a_sliding_window_answers_every_image_and_bad_ones_do_not_end_the_node(
-    detector: DetectorProcess, phases: list[np.ndarray]
+    detector: DetectorProcess,
 ) -> None:
     assert detector.set(('stack_window', 'sliding')) == (True, '')
     try:
-        stream = [message(pixels, 60 + number) for number, pixels in enumerate(phases * 2)]
+        stream = [message(pixels, 60 + number) for number, pixels in enumerate(PHASES * 2)]
         stream[5].data = stream[5].data[:-1]
         stamps = [stamp for stamp, _ in sent(detector, stream, 4)]
         assert stamps == [63, 64, 66, 67]
@@ -110,9 +99,9 @@ def test_a_sliding_window_answers_every_image_and_bad_ones_do_not_end_the_node(
 
 
 def test_parameters_end_a_stack_and_single_images_are_answered_again(
-    detector: DetectorProcess, phases: list[np.ndarray]
+    detector: DetectorProcess,
 ) -> None:
-    detector.image.publish(message(phases[0], 80))
+    detector.image.publish(message(PHASES[0], 80))
     # The service is answered after what was sent before only if the image was taken: so wait.
     received = len(detector.targets)
     assert detector.set(('stack_timeout', 0.2)) == (True, '')
@@ -120,7 +109,7 @@ def test_parameters_end_a_stack_and_single_images_are_answered_again(
     assert detector.targets[-1].header.stamp.sec == 80
     assert detector.set(('stack', 1)) == (True, '')
     try:
-        assert sent(detector, [message(phases[1], 81)], 1)[0][0] == 81
+        assert sent(detector, [message(PHASES[1], 81)], 1)[0][0] == 81
     finally:
         assert detector.set(('stack', 4), ('stack_timeout', 1e4)) == (True, '')
 

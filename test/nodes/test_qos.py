@@ -12,7 +12,7 @@ import rclpy
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-from ahf_ros.nodes.qos import (
+from ahf_ros.nodes.topics import (
     LOSSLESS_SUBSCRIPTION,
     PUBLISHER,
     SUBSCRIPTION,

@@ -26,7 +26,7 @@ def test_a_lost_response_is_asked_for_again_by_who_had_none_before(graph: Any) -
     service = graph.node.create_service(Identify, '/lossy', answer)
     send = service.send_response
     service.send_response = lambda *response: send(*response) if len(asked) > 1 else None
-    detector = ServiceDetector(graph.node, '/lossy', 'metashape12', 30.0, threading.Event())
+    detector = ServiceDetector(graph.node, '/lossy', 'metashape12', 9.0, threading.Event())
     with ThreadPoolExecutor(1) as pool:
         for width in (3, 4):
             found = pool.submit(detector, np.zeros((2, width), np.uint8))

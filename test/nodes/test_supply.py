@@ -11,7 +11,7 @@ pytest.importorskip('rclpy', reason='ROS 2 is not installed')
 
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
-from ahf_ros.nodes.watch import nearest, other_types, silence
+from ahf_ros.nodes.watch import other_types, silence
 
 IMAGE, COMPRESSED = 'sensor_msgs/msg/Image', 'sensor_msgs/msg/CompressedImage'
 WEAK = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -53,4 +53,5 @@ def test_other_types_are_named() -> None:
 
 def test_the_nearest_names_come_first() -> None:
     others = ['/zivid/color', '/rig/image_raw', '/other/image', '/rig/image_rect', '/points']
-    assert nearest('/rig/image', others) == ['/rig/image_raw', '/rig/image_rect', '/other/image']
+    text = silence(source(WEAK), [], lambda: {it: [IMAGE] for it in others})
+    assert 'published on /rig/image_raw, /rig/image_rect, /other/image: remap' in text

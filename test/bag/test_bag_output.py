@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip('rosbags', reason='rosbags is not installed')
 
-from ahf_ros.bag.journal import NAME, Entry, Journal, begin, begun_with, remove
+from ahf_ros.bag.output import JOURNAL, Entry, Journal, begin, begun_with, remove_unfinished
 from ahf_ros.filtering.identifier import Memory
 
 ENTRIES = [
@@ -29,7 +29,7 @@ def test_everything_is_there_after_every_image_in_the_order_of_the_answers(tmp_p
             answered.append((entry, outputs))
             assert journal.entries == [entry for entry, _ in answered]
     assert begun_with(tmp_path) == 'told'
-    remove(tmp_path)
+    remove_unfinished(tmp_path)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -45,7 +45,7 @@ def test_an_image_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
 
 
 def test_a_journal_that_was_not_begun_is_none(tmp_path: Path) -> None:
-    (tmp_path / NAME).touch()
+    (tmp_path / JOURNAL).touch()
     assert begun_with(tmp_path) == ''
     begin(tmp_path, 'told')
     assert begun_with(tmp_path) == 'told'
