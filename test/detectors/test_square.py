@@ -16,7 +16,10 @@ from support.square_markers import needs_square_markers
 pytestmark = needs_square_markers
 FAMILY = 'aruco_4x4_50'
 SIZE = {'width': 1000, 'height': 750, 'targets': 6, 'dot_radius': 16.0, 'seed': 3}
-detect = create_detector(family=FAMILY)
+
+
+def detect(image: np.ndarray) -> list[Target]:
+    return create_detector(family=FAMILY)(image)
 
 
 def scene(family: str = FAMILY, **changes: object) -> Rendering:
