@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ahf_ros.codes.gsi_library import point_family
+from ahf_ros.codes.gsi import point_family
 from ahf_ros.detectors.gsi.grouping import find_templates, nearest_dots
 from ahf_ros.features.dots import Dots
 from ahf_ros.features.frame import affine_frames

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ahf_ros.detectors import create_detector
+from ahf_ros.detectors import Detector, create_detector
 from ahf_ros.evaluation import score
 from ahf_ros.session import identify
 from ahf_ros.synthetic.scene import Rendering
@@ -16,7 +16,11 @@ from support.square_markers import needs_square_markers
 pytestmark = needs_square_markers
 FAMILY = 'aruco_4x4_50'
 SIZE = {'width': 1000, 'height': 750, 'targets': 6, 'dot_radius': 16.0, 'seed': 3}
-detect = create_detector(family=FAMILY)
+
+
+@pytest.fixture
+def detect() -> Detector:
+    return create_detector(family=FAMILY)
 
 
 def scene(family: str = FAMILY, **changes: object) -> Rendering:
@@ -43,7 +47,9 @@ def test_markers_and_their_physical_centres(detector, family, tilt):
 
 
 @pytest.mark.parametrize(('gamma', 'low', 'high'), [(1.0, -0.03, 0.03), (2.2, -0.42, -0.28)])
-def test_the_shift_that_gamma_causes_is_reported_and_does_not_change_the_size(gamma, low, high):
+def test_the_shift_that_gamma_causes_is_reported_and_does_not_change_the_size(
+    gamma, low, high, detect
+):
     shown = scene(gamma=gamma, dot_radius=30.0, targets=2)
     true = {target.id: target for target in shown.targets}
     found = detect(shown.image)
@@ -58,7 +64,7 @@ def test_markers_of_another_dictionary_are_not_seen():
     assert create_detector(family='aruco_7x7_50')(shown.image) == []
 
 
-def test_the_filter_finds_markers_that_stripes_hide():
+def test_the_filter_finds_markers_that_stripes_hide(detect):
     shown = scene(light='stripe', ambient=0.12)
     without = score(shown, detect(shown.image))
     found = identify(shown.image, detector=detect, expected_targets=6, max_evaluations=40)
@@ -68,7 +74,7 @@ def test_the_filter_finds_markers_that_stripes_hide():
 
 
 @pytest.mark.parametrize('light', ['stripe', 'lattice', 'fringe'])
-def test_places_are_those_of_the_image_as_received(light):
+def test_places_are_those_of_the_image_as_received(light, detect):
     shown = scene(light=light, ambient=0.3)
     found = identify(shown.image, detector=detect, expected_targets=6)
     assert counted(shown, found) == (6, 0, 0)
@@ -78,7 +84,7 @@ def test_places_are_those_of_the_image_as_received(light):
         assert (other.x, other.y) == pytest.approx((one.x, one.y), abs=0.02)
 
 
-def test_corners_and_ellipse_are_those_of_the_marker():
+def test_corners_and_ellipse_are_those_of_the_marker(detect):
     shown = scene()
     true = {target.id: target for target in shown.targets}
     for target in detect(shown.image):
@@ -91,7 +97,7 @@ def test_corners_and_ellipse_are_those_of_the_marker():
         assert across[0] * down[1] > across[1] * down[0]  # clockwise as seen, y pointing down
 
 
-def test_what_has_no_corners_or_no_sides_stays_where_it_is():
+def test_what_has_no_corners_or_no_sides_stays_where_it_is(detect):
     shown = scene()
     markers = detect(shown.image)
     others = [Target(1, 1, 50.0, 60.0, 5.0, 5.0), Target(2, 2, -900.0, 60.0, 5.0, 5.0)]
@@ -101,7 +107,7 @@ def test_what_has_no_corners_or_no_sides_stays_where_it_is():
     assert detect.refine(shown.image, []) == []
 
 
-def test_any_kind_of_image():
+def test_any_kind_of_image(detect):
     shown = scene()
     same = detect(shown.image)
     for image in (shown.image.astype(np.uint16) * 16, shown.image[:, ::-1][:, ::-1]):
