@@ -74,7 +74,7 @@ class IdentificationSettings:
 
     def check_detector(self) -> None:
         """Refuse a detector that does not identify the family."""
-        detector_name(self.detector, self.detection.family)
+        detector_name(self.detector, self.detection.family, self.detection.family_file)
 
 
 @dataclass(frozen=True, slots=True)

@@ -94,13 +94,20 @@ def identify_images(task: ImageTask, report: Report = no_report) -> ImageOutcome
 
 def detector_of(settings: IdentificationSettings) -> Detector:
     """Return the detector of settings, the same one as long as its data file does not change."""
-    file = settings.detection.family_file
-    digest = hashlib.sha256(read_bytes(file)).digest() if file else b''
+    digest = files_digest(settings.detection.family_file)
     return _detector(settings.detector, settings.detection, digest)
 
 
+def files_digest(files: str) -> str:
+    """Return a text that differs where the content of files, separated by commas, does."""
+    digest = hashlib.sha256()
+    for path in files.split(',') if files else ():
+        digest.update(hashlib.sha256(read_bytes(path.strip())).digest())
+    return digest.hexdigest()
+
+
 @lru_cache(maxsize=4)
-def _detector(name: str, settings: DetectorSettings, digest: bytes) -> Detector:
+def _detector(name: str, settings: DetectorSettings, digest: str) -> Detector:
     return create_detector(name, settings=settings)
 
 

@@ -19,9 +19,9 @@ from shutil import copyfile
 from typing import Any
 
 from ahf_ros.batch.engine import Engine, Finished, TaskFailed, finished_tasks, in_order
-from ahf_ros.batch.identification import file_fingerprint
+from ahf_ros.batch.identification import file_fingerprint, files_digest
 from ahf_ros.batch.task import ImageOutcome, ImageTask, Level, Message
-from ahf_ros.interchange.files import RESULTS_FILE, file_errors, locked, read_bytes
+from ahf_ros.interchange.files import RESULTS_FILE, file_errors, locked
 from ahf_ros.release import release
 from ahf_ros.settings.nested import flat_values
 
@@ -247,8 +247,8 @@ class Results:
 def _fingerprint(task: ImageTask) -> str:
     """Return a text that differs where settings of a task lead to other results."""
     values = flat_values(task.settings)
-    if file := task.settings.detection.family_file:
-        values['family_file'] = hashlib.sha256(read_bytes(file)).hexdigest()
+    if files := task.settings.detection.family_file:
+        values['family_file'] = files_digest(files)
     del values['threads']  # which does not change results
     values |= {
         'stack_movement': task.stacking.stack_movement,

@@ -32,7 +32,8 @@ def shared_settings(
     if (jobs > 1 or scheduler) and not settings.adaptive.threads:
         values['threads'] = 1 if scheduler else _threads_each(jobs)
     if scheduler and settings.detection.family_file:
-        values['family_file'] = str(Path(settings.detection.family_file).absolute())
+        files = settings.detection.family_file.split(',')
+        values['family_file'] = ','.join(str(Path(of.strip()).absolute()) for of in files)
     return updated(settings, values)
 
 

@@ -6,10 +6,10 @@ anything. Therefore the codes, which take numpy and OpenCV, are imported where t
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from itertools import combinations
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from ahf_ros.codes import APRILTAG_NAMES, ARUCO_NAMES, RING_NAMES, SQUARE_NAMES, VENDOR_NAMES
 
@@ -33,25 +33,30 @@ FAMILY_NAMES = tuple(name for names in KINDS.values() for name in names)
 AUTO = 'auto'
 """Stands for all families of `VENDOR_NAMES`."""
 
-LISTED = KINDS['ring']
-"""Families that may be given together, separated by commas: they are read together."""
-
 ACCEPTED = (
-    f'one of {", ".join(FAMILY_NAMES)}; several of {", ".join(LISTED)}, separated by commas; or '
-    f'{AUTO} for {", ".join(VENDOR_NAMES)}, which are rings, and no others'
+    f'one of {", ".join(FAMILY_NAMES)}, or of a family_file; several of {", ".join(RING_NAMES)} '
+    f'and of rings of a family_file, separated by commas; or {AUTO} for {", ".join(VENDOR_NAMES)} '
+    'and rings of a family_file, and no others'
 )
 """Description of what `family` accepts."""
+
+ONE = f'one of {", ".join(FAMILY_NAMES)}, or the family of a family_file'
+"""The same where it is a single family."""
+
+Code = TypeVar('Code', 'Family', 'DotFamily', 'PointFamily')
+"""The codes of families of one kind."""
 
 _SHOWN = 10  # IDs in an error
 _ALIKE = 0.65  # share of letters of a name that is suggested; tag36h11 and apriltag_36h11: 0.73
 
 
-def families_in(text: str) -> tuple[str, ...]:
+def families_in(text: str, files: str = '') -> tuple[str, ...]:
     """Return the different families that a text names, in its order.
 
-    It names a family, several ring families separated by commas, or 'auto' for those of vendors. Raise
-    a ValueError if there is no family; if one is unknown or named twice; if two are of different
-    kinds or have the same print; or if families of their kind are not read together.
+    It names a family, several ring families separated by commas, or 'auto' for those of vendors.
+    `files` are data files, separated by commas, that describe more families. Raise a ValueError
+    if there is no family; if one is unknown or named twice; if two are of different kinds or have
+    the same print; if families of their kind are not read together; or if a file is not accepted.
 
     Examples
     --------
@@ -60,32 +65,102 @@ def families_in(text: str) -> tuple[str, ...]:
     >>> families_in('auto') == VENDOR_NAMES
     True
     """
-    if text == AUTO:
-        return VENDOR_NAMES
-    names = tuple(part.strip() for part in text.split(','))
+    names = VENDOR_NAMES if text == AUTO else tuple(part.strip() for part in text.split(','))
+    kinds = {name: kind for kind, of_kind in KINDS.items() for name in of_kind}
+    if files and (text == AUTO or not set(names) <= set(kinds)):
+        own = {name: _kind(code) for name, code in families_of(files).items()}
+        kinds |= own
+        if text == AUTO:
+            names += tuple(name for name, kind in own.items() if kind == 'ring')
     shown = f'family is {text!r}'
     for name in names:
-        if name not in FAMILY_NAMES:
+        if name not in kinds:
             where = f'{shown}, which names {name!r}' if len(names) > 1 else shown
-            alike = get_close_matches(name.lower(), FAMILY_NAMES, 1, _ALIKE)
+            alike = get_close_matches(name.lower(), list(kinds), 1, _ALIKE)
             accepted = f'{alike[0]}, which is most like it, or another family' if alike else ''
             raise ValueError(f'{where}, accepted is {accepted or ACCEPTED}')
     if len(names) > 1:
-        _check_list(names, shown)
+        _check_list(names, kinds, shown)
     return names
 
 
-def code_family(name: str, file: str = '') -> Family | DotFamily | PointFamily:
+def check_family(text: str, files: str = '') -> None:
+    """Refuse a text that does not name one family; `files` are as for `families_in`."""
+    if len(families_in(text, files)) > 1 or text == AUTO:
+        raise ValueError(f'family is {text!r}, accepted is one family')
+
+
+def kind_of(name: str, files: str = '') -> str:
+    """Return the kind of a family, see `KINDS`; `files` are as for `families_in`."""
+    for kind, names in KINDS.items():
+        if name in names:
+            return kind
+    return _kind(families_of(files)[name])
+
+
+def code_family(name: str, files: str = '') -> Family | DotFamily | PointFamily:
     """Return the codes and the proportions of a family that is not of square markers.
 
-    `file` is the data file that describes the family, of `gsi` and `dots`; the usual one where
-    empty. Raise a ValueError if there is no such family, or the data file is not accepted.
+    `files` are data files, separated by commas: of families of their own names, or of `gsi` and
+    `dots` in the place of the usual design. Raise a ValueError if there is no such family, or a
+    data file is not accepted.
     """
     from ahf_ros.codes import dots, gsi, ring
 
+    if files and name not in RING_NAMES:
+        own = families_of(files)
+        for code in own.values():
+            if name in (code.name, _kind(code)):
+                return code
+        raise ValueError(
+            f'family is {name!r}, and family_file is {files!r}, which describes {", ".join(own)}; '
+            'accepted is one of these'
+        )
     if name == 'gsi':
-        return gsi.point_family(file)
-    return dots.dot_family(file) if name == 'dots' else ring.family(name)
+        return gsi.point_family()
+    return dots.dot_family() if name == 'dots' else ring.family(name)
+
+
+def family_of(of_kind: type[Code], families: Sequence[str], files: str = '') -> tuple[Code, ...]:
+    """Return the codes of families of one kind, each as for `code_family`.
+
+    Raise a ValueError if one of them is of another kind.
+    """
+    codes = [code_family(name, files) for name in families]
+    found = tuple(code for code in codes if isinstance(code, of_kind))
+    if len(found) < len(codes):
+        raise ValueError(f'family is {", ".join(families)!r}, accepted are other families')
+    return found
+
+
+def families_of(files: str) -> dict[str, Family | DotFamily | PointFamily]:
+    """Return the families that data files describe, by their names.
+
+    The names of the files are separated by commas. Each is of point-distributed targets, rings of
+    dots, or rings, as its fields tell. Raise a ValueError, which names file, line and field, if
+    one is not accepted.
+    """
+    from ahf_ros.codes import dots, gsi, ring
+    from ahf_ros.codes.data_file import read_data_file
+
+    found: dict[str, Family | DotFamily | PointFamily] = {}
+    for path in (part.strip() for part in files.split(',')):
+        fields = dict(read_data_file(path).items())
+        code: Family | DotFamily | PointFamily
+        if 'template' in fields:
+            code = gsi.point_family(path)
+        elif 'dot_circle' in fields:
+            code = dots.dot_family(path)
+        else:
+            code = ring.ring_family(path)
+        if code.name in (*RING_NAMES, *SQUARE_NAMES, *found):
+            fields['family'].refuse('a name that no other family has')
+        found[code.name] = code
+    return found
+
+
+def _kind(code: Family | DotFamily | PointFamily) -> str:
+    return {'PointFamily': 'gsi', 'DotFamily': 'dots'}.get(type(code).__name__, 'ring')
 
 
 def numbers_of(name: str, file: str = '') -> Sequence[int]:
@@ -132,9 +207,8 @@ def mirrored_number(name: str, code: int) -> int | None:
     return family.number(cyclic.mirrored_words(code, family.bits))
 
 
-def _check_list(names: Sequence[str], shown: str) -> None:
+def _check_list(names: Sequence[str], kinds: Mapping[str, str], shown: str) -> None:
     """Refuse families that cannot be read together."""
-    kinds = {name: kind for kind, of_kind in KINDS.items() for name in of_kind}
     for first, second in combinations(names, 2):
         if first == second:
             raise ValueError(f'{shown}, which names {first} twice, accepted is each family once')
@@ -150,8 +224,8 @@ def _check_list(names: Sequence[str], shown: str) -> None:
                 f'{shown}, but targets of {first} and {second} have the same print; accepted is '
                 'one of them'
             )
-    if names[0] not in LISTED:
+    if kinds[names[0]] != 'ring':
         raise ValueError(
             f'{shown}, but the detector {kinds[names[0]]} reads one family; accepted are several '
-            f'of {", ".join(LISTED)}'
+            f'of {", ".join(RING_NAMES)}'
         )

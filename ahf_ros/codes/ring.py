@@ -14,7 +14,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from math import gcd
-from pathlib import Path
 
 import numpy as np
 
@@ -31,7 +30,7 @@ _MAXIMUM_RADIUS = 12.0  # of a band, dot radii
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Family(CyclicFamily):
-    """The code words of one kind of ring target, and the radii of its band, in radii of the dot."""
+    """The words of one kind of ring target, and the radii of its band, in radii of the dot."""
 
     band_inner: float
     band_outer: float
@@ -58,11 +57,11 @@ def family(name: str) -> Family:
     """
     if name not in RING_NAMES:
         raise ValueError(f'family is {name!r}, accepted is one of {", ".join(RING_NAMES)}')
-    return ring_family(RING_FOLDER / f'{name}.json')
+    return ring_family(str(RING_FOLDER / f'{name}.json'))
 
 
 @lru_cache(maxsize=64)
-def ring_family(path: Path) -> Family:
+def ring_family(path: str) -> Family:
     """Return the family of ring codes that a data file describes.
 
     A ValueError names the line and the field of what is not accepted in it.
@@ -202,32 +201,30 @@ def sectors(word: int, bits: int) -> np.ndarray:
 
 
 @lru_cache(maxsize=100_000)
-def words_of_print(
-    name: str, word: int, families: tuple[str, ...] = FAMILY_NAMES
-) -> dict[str, int]:
+def words_of_print(code: Family, word: int, families: tuple[Family, ...]) -> dict[Family, int]:
     """Return the canonical words of those of some families whose targets have the print of a word.
 
     A word all of whose runs are a multiple of some angle may be a word of other numbers of
     sectors, too: 000111000111 of 12 bit is 0000111100001111 of 16. Nothing in an image of the
-    target shows which one is meant. `word` is a word of the family `name`, which is included if it
-    is one of these.
+    target shows which one is meant. `word` is one of `code`, which is included if it is one of
+    these.
 
     Examples
     --------
-    >>> words_of_print('metashape12', 455, ('metashape12', 'metashape16', 'aicon12'))
-    {'metashape12': 455, 'metashape16': 3855}
+    >>> one, other = family('metashape12'), family('metashape16')
+    >>> list(words_of_print(one, 455, (one, other)).values())
+    [455, 3855]
     """
-    code = family(name)
     inked = sectors(word, code.bits)
     edges = np.flatnonzero(inked != np.roll(inked, 1))
     widest = gcd(code.bits, *np.diff(edges).tolist())
     blocks = np.roll(inked, -edges[0])[::widest]  # the print in as few sectors as show it
     words = {}
-    for other in map(family, families):
+    for other in families:
         times, rest = divmod(other.bits, len(blocks))
         if rest or other.band != code.band:
             continue
         spread = int(np.repeat(blocks, times) @ (1 << np.arange(other.bits)))
         if other.number(spread):
-            words[other.name] = int(other.canonical(spread))
+            words[other] = int(other.canonical(spread))
     return words

@@ -13,7 +13,7 @@ from importlib.metadata import EntryPoint, entry_points
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, NamedTuple
 
-from ahf_ros.codes.families import FAMILY_NAMES, KINDS, check_numbers, families_in
+from ahf_ros.codes.families import FAMILY_NAMES, KINDS, check_numbers, families_in, kind_of
 from ahf_ros.deprecation import deprecated_arguments
 from ahf_ros.detectors.contract import (
     Detector,
@@ -58,21 +58,21 @@ _AUTO = 'auto'  # stands for the detector of the family
 
 class _Entry(NamedTuple):
     detector: str  # its module and name, below `ahf_ros`
-    families: tuple[str, ...]
+    kinds: tuple[str, ...]  # of families
     several: bool = False  # families at a time
 
 
 # The detector of a family is the first one that lists it.
 _ENTRIES = {
-    'ring': _Entry('detectors.ring.detector:RingDetector', KINDS['ring'], several=True),
-    'traditional': _Entry('detectors.traditional:TraditionalDetector', KINDS['ring']),
-    'aruco': _Entry('detectors.square.detector:SquareDetector', KINDS['aruco']),
-    'apriltag': _Entry('detectors.square.detector:SquareDetector', KINDS['apriltag']),
-    'gsi': _Entry('detectors.gsi.detector:GsiDetector', KINDS['gsi']),
-    'gsi_published': _Entry('detectors.gsi.published:PublishedGsiDetector', KINDS['gsi']),
-    'dots': _Entry('detectors.dots.detector:DotsDetector', KINDS['dots']),
-    'dots_published': _Entry('detectors.dots.published:PublishedDotsDetector', KINDS['dots']),
-    'command': _Entry('detectors.external.command:CommandDetector', FAMILY_NAMES, several=True),
+    'ring': _Entry('detectors.ring.detector:RingDetector', ('ring',), several=True),
+    'traditional': _Entry('detectors.traditional:TraditionalDetector', ('ring',)),
+    'aruco': _Entry('detectors.square.detector:SquareDetector', ('aruco',)),
+    'apriltag': _Entry('detectors.square.detector:SquareDetector', ('apriltag',)),
+    'gsi': _Entry('detectors.gsi.detector:GsiDetector', ('gsi',)),
+    'gsi_published': _Entry('detectors.gsi.published:PublishedGsiDetector', ('gsi',)),
+    'dots': _Entry('detectors.dots.detector:DotsDetector', ('dots',)),
+    'dots_published': _Entry('detectors.dots.published:PublishedDotsDetector', ('dots',)),
+    'command': _Entry('detectors.external.command:CommandDetector', tuple(KINDS), several=True),
 }
 
 _ADDED: dict[str, EntryPoint] = {
@@ -127,24 +127,25 @@ def create_detector(
     if not (settings is None or isinstance(settings, DetectorSettings)):
         raise ValueError(f'settings is {shown(settings)}, accepted is a DetectorSettings')
     settings = updated(settings or DetectorSettings(), options)
-    name = detector_name(name, settings.family)
+    name = detector_name(name, settings.family, settings.family_file)
     if name in _ADDED:
         return _added(_ADDED[name], settings)
     made: Detector = resolve_name(f'ahf_ros.{_ENTRIES[name].detector}')(settings)
     return made
 
 
-def detector_name(name: str, family: str) -> str:
+def detector_name(name: str, family: str, files: str = '') -> str:
     """Return the name of a detector that identifies a family or several, see `families_in`.
 
     It raises a ValueError if there is no such detector, or it does not identify these families.
     """
     DETECTOR.check(name)
-    families = families_in(family)
+    families = families_in(family, files)
+    kinds = {kind_of(of, files) for of in families}
     fitting = [
         fit
         for fit, entry in _ENTRIES.items()
-        if set(families) <= set(entry.families) and (entry.several or len(families) == 1)
+        if kinds <= set(entry.kinds) and (entry.several or len(families) == 1)
     ]
     if name == _AUTO:
         return fitting[0]
@@ -153,7 +154,7 @@ def detector_name(name: str, family: str) -> str:
         raise ValueError(
             f'detector is {name!r} and family is {family!r}; accepted with this family is one of '
             f'{", ".join((_AUTO, *fitting, *_ADDED))}, and with this detector one of '
-            f'{", ".join(_ENTRIES[name].families)}{several}'
+            f'{", ".join(of for kind in _ENTRIES[name].kinds for of in KINDS[kind])}{several}'
         )
     return name
 
@@ -172,7 +173,7 @@ def estimator(settings: DetectorSettings) -> Callable[[np.ndarray], int]:
 
     It raises a ValueError if targets of the family cannot be counted.
     """
-    if detector_name(_AUTO, settings.family) != 'ring':
+    if detector_name(_AUTO, settings.family, settings.family_file) != 'ring':
         raise ValueError(
             f'estimate_expected is True and family is {settings.family!r}; accepted with this '
             f'family is False, and True with one of {", ".join(KINDS["ring"])}'

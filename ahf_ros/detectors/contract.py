@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
-from ahf_ros.codes.families import ACCEPTED, families_in
+from ahf_ros.codes.families import ACCEPTED, Code, families_in, family_of
 from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.target import Target
 
@@ -143,7 +143,8 @@ class DetectorSettings:
         One of `ahf_ros.codes.families.FAMILY_NAMES`, several ring families separated by commas, or
         'auto' for all of these; `families` has them one by one.
     family_file : str
-        Path of a data file that describes the family `gsi` or `dots`; empty for the usual design.
+        Paths of data files, separated by commas, that describe more families, or `gsi` or `dots`
+        in the place of the usual design.
     polarity : str
         Colour of the dot against its surroundings, 'dark', 'bright', or 'auto' for both.
     min_radius, max_radius : float
@@ -170,7 +171,8 @@ class DetectorSettings:
     )
     family_file: str = parameter(
         '',
-        'Data file that describes the family gsi or dots; empty: the usual design.',
+        'Data files that describe families, separated by commas: more rings, or gsi or dots in '
+        'the place of the usual design.',
         read_only=True,
     )
     polarity: str = parameter(
@@ -207,7 +209,7 @@ class DetectorSettings:
     def __post_init__(self) -> None:
         """Refuse values that are not accepted."""
         check_parameters(self)
-        families_in(self.family)
+        families_in(self.family, self.family_file)
         minimum, maximum = self.radii
         if minimum > maximum:
             raise ValueError(
@@ -218,7 +220,11 @@ class DetectorSettings:
     @property
     def families(self) -> tuple[str, ...]:
         """The families that `family` names."""
-        return families_in(self.family)
+        return families_in(self.family, self.family_file)
+
+    def codes(self, kind: type[Code]) -> tuple[Code, ...]:
+        """Return the codes of the families, all of one kind; raise a ValueError otherwise."""
+        return family_of(kind, self.families, self.family_file)
 
     @property
     def radii(self) -> tuple[float, float]:

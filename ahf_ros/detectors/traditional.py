@@ -24,7 +24,7 @@ import cv2
 import numpy as np
 
 from ahf_ros.blas import one_blas_thread
-from ahf_ros.codes.ring import Family, family
+from ahf_ros.codes.ring import Family
 from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import DetectorSettings, FamilyDetector
 from ahf_ros.detectors.ring.circles import REACH, target_circles
@@ -126,7 +126,7 @@ class TraditionalDetector(FamilyDetector):
     @property
     def design(self) -> Family:
         """Words and radii of the family."""
-        return family(self.family)
+        return self.settings.codes(Family)[0]
 
     @one_blas_thread()
     def __call__(self, image: np.ndarray) -> list[Target]:
@@ -146,7 +146,7 @@ class TraditionalDetector(FamilyDetector):
     @one_blas_thread()
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
         """Return targets with their centres in an image; see `refine_centres`."""
-        return refine_centres(image, targets, self.design, self.settings.polarities)
+        return refine_centres(image, targets, (self.design,), self.settings.polarities)
 
     def _identify(self, image: np.ndarray, fine: bool) -> list[Target]:
         check_image(image)
@@ -168,7 +168,7 @@ def _identify_dots(
 ) -> list[Target]:
     """Return the targets among dots, undecoded where they have no code word."""
     covariance = np.broadcast_to(_CONTOUR_ERROR**2 * np.eye(2), (len(frames), 2, 2))
-    code = family(settings.family)
+    code = settings.codes(Family)[0]
     if fine:
         fit = fit_dots(gray, frames, np.full(len(frames), polarity), rays=_RAYS, reach=REACH)
         fit = fit.select(fit.share >= _MINIMUM_SHARE)

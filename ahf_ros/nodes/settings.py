@@ -183,7 +183,7 @@ class DetectorNodeSettings:
         of = self.identification
         detector = self.service
         if of.detector != SERVICE:
-            detector = detector_name(of.detector, of.detection.family)
+            detector = detector_name(of.detector, of.detection.family, of.detection.family_file)
         number = str(of.expected_targets)
         if not of.expected_targets:
             number = 'estimated' if of.estimate_expected else NUMBER_UNKNOWN

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ahf_ros.codes.designs import HALF_SIDE, Proportions, proportions
-from ahf_ros.codes.families import FAMILY_NAMES, check_numbers, numbers_of
+from ahf_ros.codes.families import ONE, check_family, check_numbers, numbers_of
 from ahf_ros.codes.selection import select_ids
 from ahf_ros.codes.square import SQUARE_NAMES
 from ahf_ros.printing.paper import LABEL_SHEETS, Page, length_in, page_in
@@ -18,10 +18,8 @@ _NO_LABELS = 'none'
 class SheetSettings:
     """Targets to print, and the pages that they are printed on."""
 
-    family: str = parameter('metashape12', 'Family of the targets.', choices=FAMILY_NAMES)
-    family_file: str = parameter(
-        '', 'Data file that describes the family gsi or dots; empty: the usual design.'
-    )
+    family: str = parameter('metashape12', 'Family of the targets.', form=ONE)
+    family_file: str = parameter('', 'Data files that describe families, as for the detector.')
     ids: str = parameter('', 'IDs and ranges of IDs, such as 1-54, 60; empty: all of the family.')
     best: int = parameter(
         0,
@@ -64,6 +62,7 @@ class SheetSettings:
     def __post_init__(self) -> None:
         """Check each parameter, and that they fit each other."""
         check_parameters(self)
+        check_family(self.family, self.family_file)
         check_numbers('ids', numbers_in('ids', self.ids), (self.family,), self.family_file)
         square = self.family in SQUARE_NAMES
         if square and self.polarity != 'dark':

@@ -11,8 +11,7 @@ import numpy as np
 
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes.designs import proportions
-from ahf_ros.codes.families import FAMILY_NAMES, numbers_of
-from ahf_ros.codes.gsi import point_family
+from ahf_ros.codes.families import ONE, check_family, code_family, kind_of, numbers_of
 from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.synthetic.camera import Camera, Sensor, tilted_camera
 from ahf_ros.synthetic.covers import card_cover, design, distractor_cover
@@ -50,10 +49,8 @@ class SceneSettings:
     width: int = parameter(3984, 'Width of the image, px.', minimum=16, maximum=20000)
     height: int = parameter(2656, 'Height of the image, px.', minimum=16, maximum=20000)
     targets: int = parameter(54, 'Number of coded targets in the image.', minimum=0)
-    family: str = parameter('metashape12', 'Family of the codes.', choices=FAMILY_NAMES)
-    family_file: str = parameter(
-        '', 'Data file that describes the family gsi or dots; empty: the usual design.'
-    )
+    family: str = parameter('metashape12', 'Family of the codes.', form=ONE)
+    family_file: str = parameter('', 'Data files that describe families, as for the detector.')
     polarity: str = parameter(
         'dark',
         'Dark targets on white, or bright ones on black.',
@@ -158,6 +155,7 @@ class SceneSettings:
             If not; the message names the field, its value and what is accepted.
         """
         check_parameters(self)
+        check_family(self.family, self.family_file)
         half_view = math.hypot(self.width, self.height) / 2 / (self.width * self.focal_length)
         half_view += 0.02 / self.focal_length  # the principal point is off the middle
         steepest = math.degrees(math.atan(0.95 / half_view))
@@ -309,7 +307,8 @@ def _coded_targets(
     """
     name, file = settings.family, settings.family_file
     # IDs are drawn from those of gsi in the order of its data file
-    every = point_family(file).numbers if name == 'gsi' else numbers_of(name, file)
+    in_file = kind_of(name, file) == 'gsi'
+    every = code_family(name, file).numbers if in_file else numbers_of(name, file)
     count = settings.targets
     semi_major = settings.dot_radius * (
         1 + settings.radius_spread * generator.uniform(-1, 1, count)

@@ -13,7 +13,7 @@ from typing import ClassVar
 import numpy as np
 
 from ahf_ros.blas import one_blas_thread
-from ahf_ros.codes.dots import DotFamily, dot_family
+from ahf_ros.codes.dots import DotFamily
 from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import DetectorSettings, FamilyDetector, moved_targets
 from ahf_ros.detectors.dots.discs import judged, small_discs, voted_discs, whole_discs
@@ -39,7 +39,7 @@ class DotsDetector(FamilyDetector):
     @property
     def design(self) -> DotFamily:
         """Printed design of the family."""
-        return dot_family(self.settings.family_file)
+        return self.settings.codes(DotFamily)[0]
 
     @one_blas_thread()
     def __call__(self, image: np.ndarray) -> list[Target]:

@@ -20,7 +20,7 @@ from typing import ClassVar
 import cv2
 import numpy as np
 
-from ahf_ros.codes.dots import DotFamily, dot_family
+from ahf_ros.codes.dots import DotFamily
 from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import DetectorSettings, FamilyDetector
 from ahf_ros.detectors.dots.rings import FAMILY
@@ -119,7 +119,7 @@ class PublishedDotsDetector(FamilyDetector):
     @property
     def design(self) -> DotFamily:
         """Printed design of the family."""
-        return dot_family(self.settings.family_file)
+        return self.settings.codes(DotFamily)[0]
 
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image; see `Detector`.

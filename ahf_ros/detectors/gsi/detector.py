@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 
 from ahf_ros.blas import one_blas_thread
-from ahf_ros.codes.gsi import PointFamily, point_family
+from ahf_ros.codes.gsi import PointFamily
 from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import DetectorSettings, FamilyDetector, moved_targets
 from ahf_ros.detectors.gsi.evidence import find_evidence, read_codes, seen_templates
@@ -68,7 +68,7 @@ class GsiDetector(FamilyDetector):
     @property
     def design(self) -> PointFamily:
         """Printed design of the family."""
-        return point_family(self.settings.family_file)
+        return self.settings.codes(PointFamily)[0]
 
     @one_blas_thread()
     def __call__(self, image: np.ndarray) -> list[Target]:

@@ -31,7 +31,7 @@ from typing import Any, ClassVar
 import cv2
 import numpy as np
 
-from ahf_ros.codes.gsi import PointFamily, point_family
+from ahf_ros.codes.gsi import PointFamily
 from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import FamilyDetector
 from ahf_ros.features.array_record import ArrayRecord
@@ -212,7 +212,7 @@ class PublishedGsiDetector(FamilyDetector):
     @property
     def design(self) -> PointFamily:
         """Printed design of the family, which has to have what the method rests on."""
-        code = point_family(self.settings.family_file)
+        code = self.settings.codes(PointFamily)[0]
         good = sorted(code.template_names) == list('ABCDE') and code.rule.dots == _DOTS - 5
         if good:
             c, e, a = (code.template[code.template_names.index(name)] for name in 'CEA')

@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass, field, replace
 import numpy as np
 
 from ahf_ros.blas import one_blas_thread
-from ahf_ros.codes.ring import family
+from ahf_ros.codes.ring import Family
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.ring.families import (
     by_clear_dots,
@@ -75,8 +75,8 @@ class RingDetector:
     @one_blas_thread()
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
         """Return targets with their centres in an image; see `refine_centres`."""
-        code = family(self.settings.families[0])
-        return refine_centres(image, targets, code, self.settings.polarities, self.expected)
+        families = self.settings.codes(Family)
+        return refine_centres(image, targets, families, self.settings.polarities, self.expected)
 
     def expecting(self, ids: frozenset[int]) -> RingDetector:
         """Return a detector that knows which IDs are likely; see `Expecting`."""
@@ -112,7 +112,7 @@ def read_image(
     Dots are proposed in several ways, one after the other. What is read of the dots of one
     explains edges, which the next ones need not look at.
     """
-    families = [family(name) for name in settings.families]
+    families: Sequence[Family] = settings.codes(Family)
     pyramid = image_pyramid(gray, settings.max_radius)
     images = (pyramid.gray, *pyramid.halves)
     found = [Hypotheses.unread(NO_FITS, families[0])]
@@ -143,7 +143,7 @@ def report(hypotheses: Hypotheses, settings: DetectorSettings) -> list[Target]:
     whole = settings.report_undecoded & (hypotheses.share >= WHOLE)
     minimum, maximum = settings.radii
     of_size = (major >= minimum) & (major <= maximum)
-    hypotheses = settle_same_prints(hypotheses.select(of_size), settings.families)
+    hypotheses = settle_same_prints(hypotheses.select(of_size), settings.codes(Family))
     whole = whole[of_size]
     hypotheses = hypotheses.select(hypotheses.certain | whole)
     hypotheses = hypotheses.select(np.lexsort((-hypotheses.seen, ~hypotheses.certain)))

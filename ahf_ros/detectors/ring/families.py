@@ -110,62 +110,61 @@ def decoded(hypotheses: Hypotheses) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     """Return the names of families, the canonical code words and the IDs of k hypotheses."""
     names = np.array([code.name for code in hypotheses.families], str)
     codes, ids = np.zeros((2, len(names)), np.int64)
-    for name in np.unique(names):
-        which = names == name
-        codes[which], ids[which] = canonical(hypotheses.words[which], family(str(name)))
+    for code in dict.fromkeys(hypotheses.families):
+        which = hypotheses.families == code
+        codes[which], ids[which] = canonical(hypotheses.words[which], code)
     return names, codes, ids
 
 
-def settle_same_prints(hypotheses: Hypotheses, families: Sequence[str]) -> Hypotheses:
-    """Assign prints shared by several of the named families to one, or mark them uncertain.
+def settle_same_prints(hypotheses: Hypotheses, families: Sequence[Family]) -> Hypotheses:
+    """Assign prints shared by several families to one of them, or mark them uncertain.
 
     The families of an image are as few as explain all of its targets, and of those that explain
     the same ones that with the fewest words. Where two of these have a print, the nearest target
     that only one of them has tells which it is.
     """
-    names, codes, _ = decoded(hypotheses)
-    certain = np.flatnonzero(hypotheses.certain)
+    codes = decoded(hypotheses)[1]
+    certain = np.flatnonzero(hypotheses.certain).tolist()
     prints = {
-        int(index): words_of_print(str(names[index]), int(codes[index]), tuple(families))
+        index: words_of_print(hypotheses.families[index], int(codes[index]), tuple(families))
         for index in certain
     }
     present, sure = _present(list(prints.values()))
     options = {
-        index: {name: word for name, word in words.items() if name in present}
+        index: {code: word for code, word in words.items() if code in present}
         for index, words in prints.items()
     }
     clear = np.array([index for index, words in options.items() if len(words) == 1], int)
-    own = np.array([next(iter(options[index])) for index in clear.tolist()], str)
+    own = [next(iter(options[index])) for index in clear.tolist()]
     words, confidence = hypotheses.words.copy(), hypotheses.confidence.copy()
     of_families = hypotheses.families.copy()
     centres = hypotheses.frames[:, :2, 2]
     for index, of_print in options.items():
-        near = np.isin(own, list(of_print))
-        if not near.any():
+        near = np.flatnonzero([code in of_print for code in own])
+        if not near.size:
             confidence[index] = 0.0
             continue
-        others = clear[near]
-        nearest = np.hypot(*(centres[others] - centres[index]).T).argmin()
-        name = str(own[near][nearest])
-        if name not in sure:
+        away = np.hypot(*(centres[clear[near]] - centres[index]).T)
+        code = own[near[away.argmin()]]
+        if code not in sure:
             confidence[index] = 0.0
-        if name != names[index]:
-            words[index] = of_print[name]
-            of_families[index] = family(name)
+        if code is not of_families[index]:
+            words[index] = of_print[code]
+            of_families[index] = code
     return replace(hypotheses, words=words, confidence=confidence, families=of_families)
 
 
-def _present(prints: Sequence[dict[str, int]]) -> tuple[list[str], set[str]]:
+def _present(prints: Sequence[dict[Family, int]]) -> tuple[list[Family], set[Family]]:
     """Return the fewest families that have all prints, and those that no other may stand for."""
     left, present, sure = list(prints), [], set()
     while left:
-        count = {name: sum(name in of for of in left) for of in left for name in of}
-        size = {name: len(family(name).words) for name in count}
-        best = min(count, key=lambda name: (-count[name], size[name]))
+        count = {code: sum(code in of for of in left) for of in left for code in of}
+        best = min(count, key=lambda code: (-count[code], len(code.words)))
         covered = [of for of in left if best in of]
+        different = len({of[best] for of in covered})
         rivals = set.intersection(*(set(of) for of in covered)) - {best}
         # A larger family would hardly show only words of a smaller one.
-        doubt = sum((size[best] / size[name]) ** len(covered) for name in rivals)
+        doubt = sum((len(best.words) / len(code.words)) ** different for code in rivals)
         present.append(best)
         if doubt < _DOUBT:
             sure.add(best)

@@ -11,7 +11,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from ahf_ros.codes import ring
 from ahf_ros.codes.ring import Family, canonical
 from ahf_ros.detectors.ring.circles import RAYS, REACH
 from ahf_ros.detectors.ring.full_size import with_soft_edges
@@ -30,7 +29,7 @@ _MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE = 1.0, 0.2  # that a centre is moved: px, or 
 def refine_centres(
     image: np.ndarray,
     targets: Sequence[Target],
-    family: Family,
+    families: Sequence[Family],
     polarities: Sequence[int] = (1, -1),
     expected: frozenset[int] = frozenset(),
 ) -> list[Target]:
@@ -47,8 +46,8 @@ def refine_centres(
         The image as received; `ValueError` if it is none, see `check_image`.
     targets : sequence of Target
         To about a pixel.
-    family : Family
-        Of the targets that do not say theirs.
+    families : sequence of Family
+        Those of the targets; the first one of the targets that do not say theirs.
     polarities : sequence of int
         Those to be expected: 1 for a dark dot on bright ground, -1 for a bright one on dark.
     expected : frozenset of int
@@ -60,7 +59,7 @@ def refine_centres(
     gray = as_gray(image).astype(np.float32, copy=False)
     columns = [(it.x, it.y, it.semi_major, it.semi_minor, it.angle) for it in targets]
     start = frame.affine_frames(*np.array(columns).T)
-    located = _locate(gray, start, targets, family, polarities, expected)
+    located = _locate(gray, start, targets, families, polarities, expected)
     moved = np.hypot(*(located.frames[:, :2, 2] - start[:, :2, 2]).T)
     reach = np.maximum(_MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE * frame.ellipse_axes(start)[1])
     good = (located.share >= ENOUGH) & (moved <= reach)
@@ -75,7 +74,7 @@ def _locate(
     gray: np.ndarray,
     start: np.ndarray,
     targets: Sequence[Target],
-    family: Family,
+    families: Sequence[Family],
     polarities: Sequence[int],
     expected: frozenset[int],
 ) -> Hypotheses:
@@ -84,14 +83,14 @@ def _locate(
     decoded = np.flatnonzero(
         [target.id != UNDECODED for target in targets] & (dots.share >= ENOUGH)
     )
-    hypotheses, which = _agreeing(gray, dots, decoded, targets, family, expected)
+    hypotheses, which = _agreeing(gray, dots, decoded, targets, families, expected)
     # Of two hypotheses on one target, the one with the larger margin comes first.
     order = np.argsort(-hypotheses.seen, kind='stable')
     by_band, best = np.unique(which[order], return_index=True)
     rest = np.setdiff1d(np.arange(len(targets)), by_band)
     alone = fit_dots(gray, start[rest], dots.polarity[rest], rays=RAYS, reach=REACH)
-    located = Hypotheses.unread(dots, family)
-    located = located.replaced(rest, Hypotheses.unread(alone, family))
+    located = Hypotheses.unread(dots, families[0])
+    located = located.replaced(rest, Hypotheses.unread(alone, families[0]))
     return located.replaced(by_band, hypotheses.select(order[best]))
 
 
@@ -100,18 +99,17 @@ def _agreeing(
     dots: Fit,
     decoded: np.ndarray,
     targets: Sequence[Target],
-    family: Family,
+    families: Sequence[Family],
     expected: frozenset[int],
 ) -> tuple[Hypotheses, np.ndarray]:
     """Return readings that agree with the codes of targets, and the target that each is of."""
     codes = np.array([target.code for target in targets])
-    names = np.array(
-        [it.family if it.family in ring.FAMILY_NAMES else family.name for it in targets]
-    )
+    known = {code.name: code for code in families}
+    names = np.array([it.family if it.family in known else families[0].name for it in targets])
     parts, of_parts = [], []
-    for name in dict.fromkeys(names[decoded].tolist() or [family.name]):
+    for name in dict.fromkeys(names[decoded].tolist() or [families[0].name]):
         of_family = decoded[names[decoded] == name]
-        code = family if name == family.name else ring.family(name)
+        code = known[name]
         some = dots.select(of_family)
         read = read_bands(gray, some, code, Prior(expected))
         which = of_family
