@@ -19,9 +19,10 @@ import pytest
 
 pytest.importorskip('rosbags', reason='rosbags is not installed')
 
-from ahf_ros import FAMILY_NAMES, SceneSettings, create_detector, identify, render
+from ahf_ros import SceneSettings, create_detector, identify, render
 from ahf_ros.bag.definitions import typestore
 from ahf_ros.cli import main
+from ahf_ros.codes import VENDOR_NAMES
 from ahf_ros.interchange.image_files import write_image
 from ahf_ros.interchange.target_json import targets_from_json
 from support import bags
@@ -56,7 +57,7 @@ class Case:
 
 
 CASES = (
-    *(Case(family) for family in FAMILY_NAMES if not family.startswith(('aruco', 'apriltag'))),
+    *(Case(family) for family in (*VENDOR_NAMES, 'cct12', 'gsi', 'dots')),
     *(Case(family) for family in SQUARES),
     *(Case(families) for families in (BOTH, 'auto')),
     Case(detector='traditional', light='stripe', expected_targets=4),

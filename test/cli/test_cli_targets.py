@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ahf_ros.codes.families import FAMILY_NAMES, KINDS
+from ahf_ros.codes import SQUARE_NAMES, VENDOR_NAMES
 from benchmarks.printed import identified, largest_error, sample, settings_of
 from support.command_line import ahf, status
 from support.disk import room_for
@@ -18,7 +18,7 @@ from support.disk import room_for
 pytest.importorskip('reportlab', reason='PDF files are written by reportlab')
 pypdfium2 = pytest.importorskip('pypdfium2', reason='PDF files are rendered by pypdfium2')
 
-ROUND = (*KINDS['ring'], 'gsi', 'dots')
+ROUND = (*VENDOR_NAMES, 'cct12', 'gsi', 'dots')
 PER_FAMILY = 12
 
 
@@ -34,7 +34,7 @@ def rendered(file: Path, scale: float) -> list[np.ndarray]:
 
 @pytest.mark.parametrize(
     ('name', 'polarity'),
-    [*((name, 'dark') for name in FAMILY_NAMES), *((name, 'bright') for name in ROUND)],
+    [*((name, 'dark') for name in (*ROUND, *SQUARE_NAMES)), *((name, 'bright') for name in ROUND)],
 )
 def test_what_is_printed_is_identified_where_it_is(name: str, polarity: str) -> None:
     figures = identified(settings_of(name, polarity, sample(name, PER_FAMILY), page='A6'))

@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from ahf_ros.codes import RING_NAMES
 from ahf_ros.codes.cyclic import smallest_rotation
-from ahf_ros.codes.ring import FAMILY_NAMES, family, sectors, words_of_print
+from ahf_ros.codes.ring import (
+    FAMILY_NAMES,
+    Family,
+    family,
+    ring_family,
+    sectors,
+    words_of_print,
+)
 
 
 @pytest.mark.parametrize(
@@ -107,15 +118,100 @@ def outline(name: str, word: int) -> list[bool]:
     return min(samples[i:] + samples[:i] for i in starts)
 
 
+def words_by_name(name: str, word: int) -> dict[str, int]:
+    words = words_of_print(family(name), word, tuple(map(family, FAMILY_NAMES)))
+    return {code.name: of_code for code, of_code in words.items()}
+
+
 def test_opposite_quarters_are_a_word_of_three_families() -> None:
     words = {'metashape12': 455, 'metashape16': 3855, 'metashape20': 31775}
     for name, word in words.items():
-        assert words_of_print(name, word) == words
+        assert words_by_name(name, word) == words
         assert outline(name, word) == outline('metashape12', 455)
 
 
 @pytest.mark.parametrize('name', [name for name in FAMILY_NAMES if name != 'metashape20'])
 def test_all_other_words_are_prints_of_their_own(name: str) -> None:
     words = family(name).words.tolist()
-    shared = [word for word in words if words_of_print(name, word) != {name: word}]
+    shared = [word for word in words if words_by_name(name, word) != {name: word}]
     assert shared == {'metashape12': [455], 'metashape16': [3855]}.get(name, [])
+
+
+def test_cct_numbers_are_the_words_that_its_programs_print() -> None:
+    sizes = [family(f'cct{bits}').words.size for bits in range(8, 17)]
+    assert sizes == [34, 58, 106, 186, 350, 630, 1180, 2190, 4114]  # necklaces, less two
+    table = family('cct12')
+    assert table.number(0b000001110001) == 71
+    assert table.word(71) == 0b000001110001
+    assert sorted(table.numbers) == sorted(table.words)
+    assert words_of_print(family('aicon12'), 65, (table,)) == {table: 65}
+
+
+FAMILY = {'family': 'mine', 'bits': 12, 'band': [2, 3], 'words': 'all'}
+
+
+def described(folder: Path, **fields: object) -> Family:
+    """Return a family of a data file, whose fields are None where they are missing."""
+    content = {name: value for name, value in (FAMILY | fields).items() if value is not None}
+    path = folder / 'family.yaml'
+    path.write_text('\n'.join(f'{name}: {json.dumps(it)}' for name, it in content.items()))
+    ring_family.cache_clear()
+    return ring_family(str(path))
+
+
+def test_a_data_file_gives_rules_tables_and_numbers(tmp_path: Path) -> None:
+    vendor = described(tmp_path, words={'parity': 'even', 'above': 65}, band=[2.25, 3.5])
+    assert vendor.words.tolist() == family('metashape12').words.tolist()
+    assert vendor.band == (2.25, 3.5)
+    assert described(tmp_path, words={'parity': 'odd'}).words.tolist()[:3] == [1, 7, 11]
+    few = described(tmp_path, words={'changes': 2})
+    assert few.words.tolist() == [(1 << marks) - 1 for marks in range(1, 12)]
+    assert described(tmp_path, words={'opposite_pairs': 5}).words.tolist() == [2015, 2047]
+    table = described(tmp_path, words=None, codes={'101': 71, '7': 3})
+    assert (table.words.tolist(), table.numbers.tolist()) == ([3, 71], [7, 101])
+    assert [table.word(number) for number in (7, 101)] == [3, 71]
+    assert table.ids(np.array([6, 71 << 1, 5])).tolist() == [7, 101, 0]
+    with pytest.raises(ValueError, match='number is 8, accepted is an ID of mine from 7 to 101'):
+        table.word(8)
+    listed = described(tmp_path, words=[0b1000, 71], numbers={'direction': 'clockwise'})
+    assert (listed.words.tolist(), listed.numbers.tolist()) == ([1, 71], [1, 113])
+    both = {'direction': 'clockwise', 'first_bit': 'highest'}
+    assert described(tmp_path, words=[71], numbers=both).numbers.tolist() == [71]
+
+
+@pytest.mark.parametrize(
+    ('fields', 'message'),
+    [
+        ({'bits': 40}, 'line 2: bits is 40, accepted is an integer from 6 to 24'),
+        ({'band': [3, 2]}, r'line 3: band is \[3, 2\], accepted is two radii that grow'),
+        ({'band': [2]}, r'line 3: band is \[2\], accepted is its inner and outer radius'),
+        ({'words': []}, r'line 4: words is \[\], accepted is a rule that some word follows'),
+        ({'words': {'above': 4000}}, 'accepted is a rule that some word follows'),
+        ({'words': {'parity': 'none'}}, "line 4: words.parity is 'none', accepted is even or odd"),
+        ({'words': {'same': 1}}, r'line 4: words.same is 1, accepted is one of the fields parity'),
+        ({'words': [71, 3, 142]}, r'words\[2\] is 142, accepted is a word that is no rotation'),
+        ({'words': [4096]}, r'words\[0\] is 4096, accepted is an integer from 1 to 4095'),
+        ({'bits': 9, 'words': {'opposite_pairs': 1}}, 'where the number of bits is odd'),
+        ({'words': None}, "family is 'mine', accepted is a family with either the field words or"),
+        ({'codes': {'1': 71}}, 'accepted is a family with either the field words or the field'),
+        ({'words': None, 'codes': {'x': 71}}, 'codes.x is 71, accepted is a word whose name is'),
+        ({'words': None, 'codes': {}}, 'accepted is a mapping of one ID at least to its word'),
+        (
+            {'words': None, 'codes': {'1': 3, '2': 6}},
+            'codes.2 is 6, accepted is a word that is',
+        ),
+        ({'numbers': 'mine'}, "line 5: numbers is 'mine', accepted is rank, or a mapping with"),
+        ({'numbers': {'first_bit': 'x'}}, "first_bit is 'x', accepted is lowest or highest"),
+        ({'family': ''}, "line 1: family is '', accepted is a text"),
+    ],
+)
+def test_data_files_that_describe_no_family_are_refused(
+    tmp_path: Path, fields: dict, message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        described(tmp_path, **fields)
+
+
+@pytest.mark.parametrize('name', RING_NAMES)
+def test_data_files_are_named_as_their_families(name: str) -> None:
+    assert family(name).name == name

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from ahf_ros.codes import ring
+from ahf_ros.codes.dots import DOTS_DESIGN
 from ahf_ros.codes.families import (
-    LISTED,
+    check_family,
     check_numbers,
+    code_family,
     families_in,
+    families_of,
+    kind_of,
     mirrored_number,
     numbers_of,
 )
@@ -25,7 +32,10 @@ def test_families_keep_their_order():
 @pytest.mark.parametrize(
     ('text', 'message'),
     [
-        ('', r"family is '', accepted is one of metashape12, .*; several of .*; or auto for all"),
+        (
+            '',
+            r"family is '', accepted is one of metashape12, .*; several of .*; or auto for meta",
+        ),
         (
             'tag36h11',
             r"family is 'tag36h11', accepted is apriltag_36h11, which is most like",
@@ -58,17 +68,6 @@ def test_lists_that_make_no_sense_are_refused(text, message):
         families_in(text)
 
 
-def test_ring_families_with_the_same_print_are_refused(monkeypatch):
-    usual = ring.family
-
-    def same(name: str) -> ring.Family:
-        return usual('metashape14' if name == 'metashape12' else name)
-
-    monkeypatch.setattr(ring, 'family', same)
-    with pytest.raises(ValueError, match='metashape14 and metashape12 have the same print'):
-        families_in('metashape14,metashape12')
-
-
 def test_ids_that_no_family_has_are_named():
     check_numbers('expected_ids', [1, 161, 500], ('metashape12', 'aicon14'), '')
     with pytest.raises(ValueError) as caught:
@@ -83,7 +82,7 @@ def test_ids_that_no_family_has_are_named():
 
 def test_every_number_is_that_of_a_word():
     assert 505 in numbers_of('gsi')
-    for name in LISTED:
+    for name in ring.FAMILY_NAMES:
         family = ring.family(name)
         assert [family.number(int(word)) for word in family.words[:9]] == list(range(1, 10))
         assert len(numbers_of(name)) == family.words.size
@@ -100,3 +99,57 @@ def test_every_ring_code_is_another_one_in_a_mirror():
         assert 0.15 < symmetric < 0.4
     assert mirrored_number('gsi', 1) is None
     assert mirrored_number('', 71) is None
+
+
+RINGS = 'family: mine\nbits: 10\nband: [1.42, 1.87]\nwords: {changes: 6}\n'
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> str:
+    """Return a list of two files, of rings and of rings of dots."""
+    rings, dots = tmp_path / 'rings.yaml', tmp_path / 'dots.json'
+    rings.write_text(RINGS)
+    design = json.loads(DOTS_DESIGN.read_text())
+    dots.write_text(json.dumps(design | {'family': 'wide', 'border_radius': 3.5}))
+    return f'{rings}, {dots}'
+
+
+def test_files_describe_more_families(files: str) -> None:
+    assert families_in('mine, metashape12', files) == ('mine', 'metashape12')
+    assert families_in('auto', files) == (*families_in('auto'), 'mine')
+    assert [kind_of(name, files) for name in ('mine', 'wide', 'gsi')] == ['ring', 'dots', 'gsi']
+    assert code_family('mine', files).band == (1.42, 1.87)
+    assert code_family('wide', files) is code_family('dots', files)
+    assert code_family('metashape12', files) is ring.family('metashape12')
+    check_family('mine', files)
+    check_numbers('ids', [1, 2], ('mine',), files)
+
+
+@pytest.mark.parametrize(
+    ('text', 'message'),
+    [
+        ('min', "family is 'min', accepted is mine, which is most like it"),
+        ('mine,wide', 'mine is read by the detector ring and wide by the detector dots'),
+        ('wide,dots', 'the detector dots reads one family'),
+        ('mine,mine', 'names mine twice'),
+    ],
+)
+def test_names_that_no_file_describes_are_refused(files: str, text: str, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        families_in(text, files)
+
+
+def test_files_that_do_not_fit_are_refused(files: str, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"rings\.yaml, line 1: family is 'mine', accepted is a na"):
+        families_of(f'{files}, {tmp_path / "rings.yaml"}')
+    with pytest.raises(ValueError, match=r"family is 'gsi', .* describes mine, wide; accepted is"):
+        code_family('gsi', files)
+    with pytest.raises(ValueError, match=r'missing\.yaml cannot be read'):
+        families_in('mine', 'missing.yaml')
+    named = tmp_path / 'named.yaml'
+    named.write_text(RINGS.replace('mine', 'cct12'))
+    with pytest.raises(ValueError, match="family is 'cct12', accepted is a name that no other"):
+        families_of(str(named))
+    for text in ('auto', 'mine,metashape12'):
+        with pytest.raises(ValueError, match=f"family is '{text}', accepted is one family"):
+            check_family(text, files)

@@ -43,7 +43,7 @@ def distances(targets: list[Target], scene: SceneSettings) -> np.ndarray:
 def test_places_become_those_of_the_image(polarity):
     scene = replace(SCENE, polarity=polarity)
     targets = found(scene)
-    refined = refine_centres(rendered(scene).image, targets, CODE)
+    refined = refine_centres(rendered(scene).image, targets, [CODE])
     assert distances(targets, scene).max() > 0.4
     assert distances(refined, scene).max() < 0.05
     for before, after in zip(targets, refined, strict=True):
@@ -55,7 +55,7 @@ def test_places_become_those_of_the_image(polarity):
 def test_small_dots_are_not_taken_for_their_own_inside(polarity):
     scene = replace(SCENE, targets=24, polarity=polarity, dot_radius=7.0, light='normal')
     targets = rendered(scene).targets
-    refined = refine_centres(rendered(scene).image, targets, CODE)
+    refined = refine_centres(rendered(scene).image, targets, [CODE])
     for before, after in zip(targets, refined, strict=True):
         assert after.semi_major == pytest.approx(before.semi_major, abs=0.7)
     assert distances(refined, scene).max() < 0.04
@@ -63,8 +63,8 @@ def test_small_dots_are_not_taken_for_their_own_inside(polarity):
 
 def test_images_of_16_bit_give_the_same():
     image, targets = rendered(SCENE).image, found(SCENE)
-    expected = refine_centres(image, targets, CODE)
-    refined = refine_centres(image.astype(np.uint16) * 16, targets, CODE)
+    expected = refine_centres(image, targets, [CODE])
+    refined = refine_centres(image.astype(np.uint16) * 16, targets, [CODE])
     scale = 255 / image.max()  # images of more bits are scaled to their largest value
     assert scale < 1.5
     places = [[(it.x, it.y) for it in of] for of in (refined, expected)]
@@ -73,7 +73,7 @@ def test_images_of_16_bit_give_the_same():
 
 def test_undecoded_targets_get_the_centre_of_their_dot():
     targets = [replace(it, id=UNDECODED, code=0) for it in found(SCENE)]
-    refined = refine_centres(rendered(SCENE).image, targets, CODE)
+    refined = refine_centres(rendered(SCENE).image, targets, [CODE])
     truth = np.array([(it.x, it.y) for it in rendered(SCENE).targets])
     places = np.array([(it.x, it.y) for it in refined])
     assert np.linalg.norm(places - truth, axis=1).max() < 0.12
@@ -85,13 +85,13 @@ def test_a_band_that_says_something_else_is_not_used():
     scene = replace(SCENE, light='normal', tilt=50.0, focal_length=2.0)
     own, targets = rendered(scene), found(scene)
     other = [replace(it, code=CODE.word(it.id % len(CODE.words) + 1)) for it in targets]
-    by_dot = refine_centres(own.image, other, CODE)
+    by_dot = refine_centres(own.image, other, [CODE])
     undecoded = refine_centres(
-        own.image, [replace(it, id=UNDECODED, code=0) for it in targets], CODE
+        own.image, [replace(it, id=UNDECODED, code=0) for it in targets], [CODE]
     )
     assert [(it.x, it.y) for it in by_dot] == [(it.x, it.y) for it in undecoded]
     assert [it.id for it in by_dot] == [it.id for it in targets]
-    by_band = refine_centres(own.image, targets, CODE)
+    by_band = refine_centres(own.image, targets, [CODE])
     assert distances(by_band, scene).max() < distances(by_dot, scene).max() / 2
 
 
@@ -99,7 +99,7 @@ def test_targets_without_an_edge_stay_as_they_are():
     image = rendered(SCENE).image.copy()
     lost, *others = found(SCENE)
     cv2.circle(image, (round(lost.x), round(lost.y)), 70, 90, cv2.FILLED)
-    refined = refine_centres(image, [lost, *others], CODE)
+    refined = refine_centres(image, [lost, *others], [CODE])
     assert refined[0] is lost
     assert all(after != before for after, before in zip(refined[1:], others, strict=True))
 
@@ -108,11 +108,11 @@ def test_targets_do_not_move_far():
     """An error of a quarter of the radius is another dot, or none."""
     target, *_ = rendered(SCENE).targets
     far = replace(target, x=target.x + 0.25 * target.semi_minor)
-    assert refine_centres(rendered(SCENE).image, [far], CODE) == [far]
+    assert refine_centres(rendered(SCENE).image, [far], [CODE]) == [far]
 
 
 def test_nothing_is_refined_to_nothing():
-    assert refine_centres(rendered(SCENE).image, [], CODE) == []
+    assert refine_centres(rendered(SCENE).image, [], [CODE]) == []
 
 
 def test_images_that_are_none_are_refused():

@@ -108,7 +108,13 @@ def test_a_print_of_three_families_is_of_the_family_beside_it(name, families):
     assert {it.family for it in targets} == {name}
 
 
-@pytest.mark.parametrize('families', ['auto', *SHARED, 'metashape16,metashape12'])
+@pytest.mark.parametrize('name', SHARED)
+def test_a_print_of_three_families_alone_is_of_the_one_that_is_named(name):
+    image = sheet(('metashape12', SHARED['metashape12']))
+    assert [(it.family, it.code) for it in found(image, name)] == [(name, SHARED[name])]
+
+
+@pytest.mark.parametrize('families', ['auto', 'metashape16,metashape12'])
 def test_a_print_of_three_families_alone_is_of_none(families):
     image = sheet(('metashape12', SHARED['metashape12']))
     assert found(image, families) == []
@@ -144,3 +150,34 @@ def test_both_prints_are_found_among_the_many_dots_of_a_lattice():
     names = [target.family for target in found(image, 'metashape12,aicon14')]
     assert names.count('metashape12') >= 7
     assert names.count('aicon14') >= 7
+
+
+@pytest.mark.parametrize('families', ['cct10', 'cct12'])
+@pytest.mark.parametrize('light', ['normal', 'stripe'])
+def test_rings_of_all_words_have_the_numbers_of_their_programs(families, light):
+    shown = rendering(families, light)
+    truth = [(it.family, it.id, it.x, it.y) for it in shown.targets]
+    assert matches(found(shown.image, families), truth)
+
+
+def test_targets_of_a_small_family_are_not_those_of_a_larger_one_with_the_same_prints():
+    targets = found(rendering('aicon12').image, 'aicon12,cct12')
+    assert [it.family for it in targets] == ['aicon12'] * 4
+    shown = rendering('cct12')
+    truth = [(it.family, it.id, it.x, it.y) for it in shown.targets]
+    assert matches(found(shown.image, 'cct12,aicon12'), truth)
+
+
+def test_rings_of_a_data_file_are_rendered_and_identified(tmp_path):
+    file = tmp_path / 'mine.yaml'
+    file.write_text('family: mine\nbits: 10\nband: [1.42, 1.87]\nwords: {changes: 6}\n')
+    scene = SceneSettings(
+        width=640, height=480, targets=5, dot_radius=14, family='mine', family_file=str(file)
+    )
+    shown = render(scene)
+    truth = [(it.family, it.id, it.x, it.y) for it in shown.targets]
+    for families in ('mine', 'auto', 'metashape12,mine'):
+        detector = create_detector('ring', family=families, family_file=str(file))
+        targets = detector(shown.image)
+        assert matches(targets, truth)
+        assert matches(list(detector.refine(shown.image, targets)), truth)
