@@ -150,7 +150,11 @@ setup(
     setup_requires=wheels('build'),
     install_requires=REQUIREMENTS + wheels('run'),
     packages=find_packages(include=[NAME, f'{NAME}.*']),
-    package_data={'': ['*.json', 'py.typed'], 'ahf_ros.report': ['page/*']},
+    package_data={
+        '': ['*.json', 'py.typed'],
+        'ahf_ros.codes': ['ring_families/*'],
+        'ahf_ros.report': ['page/*'],
+    },
     # With this an editable installation is one path to the sources, new modules included.
     package_dir={'': '.'},
     distclass=BinaryDistribution,

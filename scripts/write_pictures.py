@@ -64,6 +64,7 @@ SCENE = SceneSettings(
 FAMILIES = {
     'metashape12': 17,
     'aicon14': 7,
+    'cct12': 71,
     'gsi': 18,
     'dots': 23,
     'aruco_4x4_50': 7,
