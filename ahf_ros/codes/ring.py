@@ -14,6 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from math import gcd
+from typing import Any
 
 import numpy as np
 
@@ -126,42 +127,62 @@ def _words(rule: Entry, bits: int) -> np.ndarray:
         # A word that is even or has its highest bit has a smaller rotation, or is 0 or all ones.
         words = np.arange(1, 1 << (bits - 1), 2, dtype=np.int64)
         if rule.value != 'all':
-            words = _conforming(rule, words, bits)
+            words = words[conforming(words, bits, **_rules(rule, bits))]
         words = words[words == smallest_rotation(words, bits)]
     if not words.size:
         rule.refuse('a rule that some word follows')
     return words
 
 
-def _conforming(rule: Entry, words: np.ndarray, bits: int) -> np.ndarray:
-    """Return the words that follow all of some rules."""
-    known = ('parity', 'opposite_pairs', 'changes', 'above')
-    for name, entry in rule.keys((), known).items():
+def _rules(rule: Entry, bits: int) -> dict[str, Any]:
+    """Return the arguments of `conforming` that a mapping gives."""
+    accepted: dict[str, Any] = {}
+    for name, entry in rule.keys((), ('parity', 'opposite_pairs', 'changes', 'above')).items():
         if name == 'parity':
             if entry.value not in ('even', 'odd'):
                 entry.refuse('even or odd')
-            good = _marks(words, bits) % 2 == (entry.value == 'odd')
+            accepted[name] = entry.value
         elif name == 'opposite_pairs':
-            least = entry.integer(1, bits // 2)
+            accepted[name] = entry.integer(1, bits // 2)
             if bits % 2:
                 entry.refuse('nothing where the number of bits is odd')
-            half = bits // 2
-            good = _marks(words & (words >> half) & ((1 << half) - 1), half) >= least
-        elif name == 'changes':
-            following = words >> 1 | (words & 1) << (bits - 1)
-            good = _marks(words ^ following, bits) <= entry.integer(2, bits)
         else:
-            good = words > entry.integer(0, 1 << bits)
-        words = words[good]
-    return words
+            least, most = (2, bits) if name == 'changes' else (0, 1 << bits)
+            accepted[name] = entry.integer(least, most)
+    return accepted
 
 
-def _marks(words: np.ndarray, bits: int) -> np.ndarray:
-    """Return the number of ones of words."""
-    marks = np.zeros_like(words)
+def conforming(
+    words: np.ndarray,
+    bits: int,
+    parity: str = '',
+    opposite_pairs: int = 0,
+    changes: int | None = None,
+    above: int = 0,
+) -> np.ndarray:
+    """Return whether words follow rules of a family, see docs/ring_targets.md, bool, shape (k,)."""
+    good = words > above
+    if parity:
+        good &= marks(words, bits) % 2 == (parity == 'odd')
+    if opposite_pairs:
+        half = bits // 2
+        good &= marks(words & (words >> half) & ((1 << half) - 1), half) >= opposite_pairs
+    if changes is not None:
+        good &= borders(words, bits) <= changes
+    return good
+
+
+def marks(words: np.ndarray, bits: int) -> np.ndarray:
+    """Return the numbers of ones of words."""
+    count = np.zeros_like(words)
     for bit in range(bits):
-        marks += words >> bit & 1
-    return marks
+        count += words >> bit & 1
+    return count
+
+
+def borders(words: np.ndarray, bits: int) -> np.ndarray:
+    """Return the numbers of borders between ones and zeros of words, read in a circle."""
+    return marks(words ^ (words >> 1 | (words & 1) << (bits - 1)), bits)
 
 
 def _numbers(rule: Entry | None, words: np.ndarray, bits: int) -> np.ndarray:

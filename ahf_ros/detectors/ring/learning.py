@@ -1,0 +1,299 @@
+"""Families of ring targets, learnt from photographs of targets that nobody described.
+
+A dot with a concentric band of sectors is a ring target of some family. The borders of its arcs lie
+on a grid of as many places as the family has bits, but for the growth of ink, which makes all arcs
+longer by as much at either end; the same growth is in the radii of the band and of the dot. All
+targets of a family share bits, radii and rules, so that a few borders of each are enough.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ahf_ros.blas import one_blas_thread
+from ahf_ros.codes.cyclic import smallest_rotation
+from ahf_ros.codes.ring import borders, conforming, marks
+from ahf_ros.detectors.contract import DetectorSettings
+from ahf_ros.detectors.ring.polar import angles_of
+from ahf_ros.features import frame
+from ahf_ros.features.array_record import ArrayRecord
+from ahf_ros.features.circle_fit import ENOUGH, NO_FITS, Fit, fit_dots
+from ahf_ros.features.dot_search import voted_dots, whole_dots
+from ahf_ros.features.pyramid import image_pyramid, octaves
+from ahf_ros.features.robust import NORMAL
+from ahf_ros.features.sampling import sample_circles
+from ahf_ros.imaging.image import as_gray, check_image
+
+MINIMUM_TARGETS = 5
+"""Targets of a family from which it is learnt; twenty tell it well."""
+
+_BITS = range(6, 25)  # of a family
+_ANGLES = 480
+_RADII = np.arange(1.05, 5.5, 0.05)  # of circles that are read, dot radii
+_REACH, _RAYS = 0.25, 48  # of the edge of a dot: dot radii, and their number
+_DEPTH = 0.25  # share of the band at either edge that says nothing of its sectors
+_EXACT = 0.12  # deviation of the edges of a band from circles, dot radii
+_AGREEING = 0.6  # share of the marks of a band that begin and end there
+_MARKED = 0.03, 0.97  # share of a band that is marked
+_ALIKE = 0.15  # difference of the radii of bands of one family, dot radii
+_GROWTH = np.arange(-2.0, 2.01, 0.1)  # of ink, that is tried, px
+_USUAL_GROWTH = 0.8  # its standard deviation, px; an arc that is longer by a sector reads as well
+_ERROR, _MINIMUM_ERROR = 0.3, 0.008  # of the place of a border: px, and rad at least
+_STRAY = 0.05  # share of borders that light makes
+_OTHER = 6.0  # log odds of another number of bits, from which a target is of another family
+_UNCLEAR = 0.25  # mean difference of sectors from paper and ink
+_SAMPLED = 200_000  # words that tell how common a rule is
+_SURE = {'parity': 5.0, 'opposite_pairs': 3.0, 'changes': 7.0}  # log odds, to take a rule
+
+
+@dataclass(frozen=True, slots=True)
+class Bands(ArrayRecord):
+    """k dots with a concentric band."""
+
+    frames: np.ndarray  # (k, 3, 3)
+    size: np.ndarray  # (k,), radius of the dot, px
+    polarity: np.ndarray  # (k,), 1 for a dark target on bright ground, -1 for a bright one
+    inner: np.ndarray  # (k,), radius of the band as it is seen, dot radii
+    outer: np.ndarray  # (k,)
+    ink: np.ndarray  # (k, m), share of ink of the band at each angle, see `angles_of`
+    spread: np.ndarray  # (k,), of the edges of the band about circles, dot radii
+    image: np.ndarray  # int, (k,), index of the image
+
+
+@dataclass(frozen=True, slots=True)
+class LearntFamily:
+    """A family of ring targets as photographs show it."""
+
+    bits: int
+    band: tuple[float, float]  # as printed, dot radii
+    growth: float  # of ink, on all edges, px
+    words: np.ndarray  # (k,), canonical words of the targets
+    bands: Bands  # the targets
+    lead: float  # log odds of the number of bits against the next one
+    rules: dict[str, Any]  # arguments of `conforming` that all words follow
+    odds: dict[str, float]  # log odds of these, of chance
+
+
+@one_blas_thread()
+def find_bands(images: Iterable[np.ndarray], settings: DetectorSettings) -> Bands:
+    """Return the dots of images that have a concentric band, of whatever family.
+
+    Of `settings`, the radii of dots and their polarity count.
+    """
+    found = []
+    for index, image in enumerate(images):
+        check_image(image)
+        pyramid = image_pyramid(as_gray(image), settings.max_radius)
+        for octave in octaves(pyramid, *settings.radii):
+            gray = octave.pyramid.gray
+            fits = [NO_FITS]
+            for search in (whole_dots, voted_dots):
+                dots = search(octave.pyramid, *octave.radii, settings.polarities)
+                fits.append(fit_dots(gray, dots.frames, dots.polarity, rays=_RAYS, reach=_REACH))
+            fit = Fit.joined(fits)
+            bands = _bands(gray, fit.select(fit.share >= ENOUGH), index)
+            frames = frame.enlarged(bands.frames, octave.level)
+            found.append(replace(bands, frames=frames, size=bands.size * 2**octave.level))
+    return _distinct(Bands.joined(found))
+
+
+def _bands(gray: np.ndarray, fit: Fit, index: int) -> Bands:
+    """Return the dots of an image that have a band."""
+    values = sample_circles(gray, fit.frames, angles_of(_ANGLES), _RADII)
+    bright, dark = fit.bright[:, None, None], (fit.contrast * fit.bright)[:, None, None]
+    ink = (bright - values) / np.maximum(bright - dark, 1)
+    ink = np.where(fit.polarity[:, None, None] > 0, ink, 1 - ink)
+    inked = ink >= 0.5
+    begins = ~inked[..., :-1] & inked[..., 1:]
+    first = begins.argmax(axis=2)
+    ends = inked[..., :-1] & ~inked[..., 1:] & (np.arange(len(_RADII) - 1) > first[..., None])
+    last = ends.argmax(axis=2)
+    marked = begins.any(axis=2) & ends.any(axis=2)
+    edges = [_crossing(ink, at) for at in (first, last)]
+    usual = [_median(of, marked) for of in edges]
+    away = [np.abs(of - middle[:, None]) for of, middle in zip(edges, usual, strict=True)]
+    spread = NORMAL * np.maximum(*(_median(of, marked) for of in away))
+    exact = marked & (np.maximum(*away) < 2 * _EXACT)
+    inner, outer = (_mean(of, exact) for of in edges)
+    depth = (_RADII - inner[:, None]) / np.maximum(outer - inner, 0.1)[:, None]
+    inside = (depth > _DEPTH) & (depth < 1 - _DEPTH)
+    pattern = _mean(np.clip(ink, -0.5, 1.5), np.broadcast_to(inside[:, None], ink.shape))
+    dark_part = pattern > 0.5
+    # Blur leaves narrow bands less dark than the dot.
+    low, high = _mean(pattern, ~dark_part), _mean(pattern, dark_part)
+    pattern = (pattern - low[:, None]) / np.maximum(high - low, 0.2)[:, None]
+    share = dark_part.mean(axis=1)
+    good = (share > _MARKED[0]) & (share < _MARKED[1]) & (spread < _EXACT) & inside.any(axis=1)
+    good &= exact.sum(axis=1) > _AGREEING * dark_part.sum(axis=1)
+    return Bands(
+        frames=fit.frames,
+        size=fit.size,
+        polarity=fit.polarity,
+        inner=inner,
+        outer=outer,
+        ink=pattern,
+        spread=spread,
+        image=np.full(len(fit.size), index),
+    ).select(good)
+
+
+def _crossing(ink: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Return the radii at which rays turn to ink or from it, after some circles."""
+    before, after = (np.take_along_axis(ink, (at + of)[..., None], 2)[..., 0] for of in (0, 1))
+    step = np.where(np.abs(after - before) > 1e-6, after - before, 1)
+    share = np.clip((0.5 - before) / step, 0, 1)
+    crossing: np.ndarray = _RADII[at] + share * (_RADII[1] - _RADII[0])
+    return crossing
+
+
+def _median(values: np.ndarray, which: np.ndarray) -> np.ndarray:
+    """Return the medians of some values of each row, large where there are none."""
+    some = np.where(which | ~which.any(axis=1, keepdims=True), values, np.nan)
+    some[~which.any(axis=1)] = 1 / np.finfo(np.float32).eps
+    return np.asarray(np.nanmedian(some, axis=1))
+
+
+def _mean(values: np.ndarray, which: np.ndarray) -> np.ndarray:
+    """Return the means of some values along the last axis, 0 where there are none."""
+    return np.asarray((values * which).sum(axis=-1) / np.maximum(which.sum(axis=-1), 1))
+
+
+def _distinct(bands: Bands) -> Bands:
+    """Return one band of each place, the one whose edges are most exactly circles."""
+    kept: list[int] = []
+    centres, reach = bands.frames[:, :2, 2], bands.size * bands.outer
+    for index in np.argsort(bands.spread, kind='stable').tolist():
+        near = np.hypot(*(centres[kept] - centres[index]).T) < reach[kept]
+        if not (near & (bands.image[kept] == bands.image[index])).any():
+            kept.append(index)
+    return bands.select(np.sort(np.array(kept, int)))
+
+
+def learn_families(bands: Bands) -> list[LearntFamily]:
+    """Return the families of bands, those with the most targets first."""
+    left, learnt = np.arange(len(bands.size)), []
+    while left.size >= MINIMUM_TARGETS:
+        some = bands.select(left)
+        apart = [np.abs(of[:, None] - of) for of in (some.inner, some.outer)]
+        near = (np.maximum(*apart) < _ALIKE) & (some.polarity[:, None] == some.polarity)
+        group = np.flatnonzero(near[near.sum(axis=1).argmax()])
+        if group.size < MINIMUM_TARGETS:
+            break
+        members, family = _learn(some.select(group))
+        if len(family.words) >= MINIMUM_TARGETS:
+            learnt.append(family)
+        left = np.delete(left, group[members])
+    return sorted(learnt, key=lambda it: -len(it.words))
+
+
+def _learn(bands: Bands) -> tuple[np.ndarray, LearntFamily]:
+    """Return the indices of bands of one family, and this."""
+    scores = np.stack([_grid_odds(bands, bits) for bits in _BITS])  # of bits, growth, target
+    unusual = 0.5 * (_GROWTH / _USUAL_GROWTH) ** 2 * MINIMUM_TARGETS
+    own = np.ones(len(bands.size), bool)
+    for _ in range(3):
+        total = scores[:, :, own].sum(axis=2) - unusual
+        best, at = np.unravel_index(total.argmax(), total.shape)
+        # Targets that another number of bits explains far better are of another family.
+        own = scores[best, at] > scores[:, at].max(axis=0) - _OTHER
+    bits, growth = _BITS[int(best)], float(_GROWTH[at])
+    some = bands.select(own)
+    printed = some.size - growth
+    inner = np.median((some.inner * some.size + growth) / printed)
+    outer = np.median((some.outer * some.size - growth) / printed)
+    words, clear = _words(some, bits, growth)
+    words = words[clear]
+    rules, odds = _rules(np.unique(words), bits)
+    family = LearntFamily(
+        bits=bits,
+        band=(float(inner), float(outer)),
+        growth=growth,
+        words=words,
+        bands=some.select(clear),
+        lead=float(total.max() - np.delete(total.max(axis=1), best).max()),
+        rules=rules,
+        odds=odds,
+    )
+    return np.flatnonzero(own), family
+
+
+def _borders(bands: Bands) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return target, angle and direction of the borders of arcs, 1 where ink begins."""
+    following = np.roll(bands.ink, -1, axis=1)
+    row, at = np.nonzero((bands.ink < 0.5) != (following < 0.5))
+    here, there = bands.ink[row, at], following[row, at]
+    angle = (at + 0.5 + (0.5 - here) / (there - here)) * (2 * np.pi / bands.ink.shape[1])
+    return row, angle, np.where(there > here, 1, -1)
+
+
+def _along(bands: Bands) -> np.ndarray:
+    """Return the lengths of a rad in the middle of bands, px."""
+    return bands.size * (bands.inner + bands.outer) / 2
+
+
+def _grid_odds(bands: Bands, bits: int) -> np.ndarray:
+    """Return the log odds of borders on a grid against any places, by growth and target."""
+    row, angle, begins = _borders(bands)
+    along, count = _along(bands), len(bands.size)
+    error = np.maximum(_ERROR / along, _MINIMUM_ERROR)
+    number = np.maximum(np.bincount(row, minlength=count), 1)
+    # What the phase, which is fitted to the borders, could have been.
+    free = np.log(np.minimum(error * bits / np.sqrt(2 * np.pi * number), 1))
+    scores = np.empty((len(_GROWTH), count))
+    for index, growth in enumerate(_GROWTH):
+        place = angle + begins * growth / along[row]
+        phase = _phase(place, row, count, bits)
+        off = np.angle(np.exp(1j * bits * (place - phase[row]))) / bits
+        density = np.exp(-0.5 * (off / error[row]) ** 2) / (np.sqrt(2 * np.pi) * error[row])
+        odds = np.log((1 - _STRAY) * density * (2 * np.pi / bits) + _STRAY)
+        scores[index] = np.bincount(row, odds, count) + free
+    return scores
+
+
+def _phase(place: np.ndarray, row: np.ndarray, count: int, bits: int) -> np.ndarray:
+    """Return where the grids of targets begin, rad."""
+    turns = np.exp(1j * bits * place)
+    sums = (np.bincount(row, of, count) for of in (turns.real, turns.imag))
+    return (
+        np.asarray(np.angle(sum(of * unit for of, unit in zip(sums, (1, 1j), strict=True)))) / bits
+    )
+
+
+def _words(bands: Bands, bits: int, growth: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the canonical words of bands, and whether these are clear."""
+    row, angle, begins = _borders(bands)
+    count, angles = bands.ink.shape
+    phase = _phase(angle + begins * growth / _along(bands)[row], row, count, bits)
+    inside = np.arange(bits)[:, None] + np.linspace(0.25, 0.75, 9)
+    places = inside * (2 * np.pi / bits) + phase[:, None, None]
+    at = np.rint(places * (angles / (2 * np.pi)) - 0.5).astype(int) % angles
+    levels = np.clip(bands.ink[np.arange(count)[:, None, None], at], 0, 1).mean(axis=2)
+    marked = levels > 0.5
+    words = (marked << np.arange(bits)).sum(axis=1)
+    return smallest_rotation(words, bits), np.abs(levels - marked).mean(axis=1) < _UNCLEAR
+
+
+def _rules(words: np.ndarray, bits: int) -> tuple[dict[str, Any], dict[str, float]]:
+    """Return the rules that different words follow and hardly would by chance, and their odds."""
+    rules: dict[str, Any] = {}
+    odds: dict[str, float] = {}
+    if not words.size:
+        return rules, odds
+    sampled = np.random.default_rng(0).integers(1, (1 << bits) - 1, _SAMPLED)
+    odd = marks(words, bits) % 2
+    tried: dict[str, Any] = {'parity': 'odd' if odd.all() else 'even', 'opposite_pairs': 1}
+    tried['changes'] = int(borders(words, bits).max())
+    for name, value in tried.items():
+        rule = {name: value}
+        if (name == 'opposite_pairs' and bits % 2) or not conforming(words, bits, **rule).all():
+            continue
+        follow = conforming(sampled, bits, **rule)
+        likely = -len(words) * np.log(max(follow.mean(), 1 / _SAMPLED))
+        if likely > _SURE[name]:
+            rules, odds = rules | rule, odds | {name: float(likely)}
+            sampled = sampled[follow]
+    return rules, odds
