@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -115,8 +117,7 @@ def test_pictures_side_by_side_have_their_text_above_them():
 
 
 def test_an_undecoded_target_has_no_label():
-    drawn = draw(GRAY, Identification((target(UNDECODED),)))
-    other = draw(GRAY, Identification((target(5),)))
+    drawn, other = (draw(GRAY, Identification((target(it),))) for it in (UNDECODED, 5))
     assert (other[100:125, 175:200] != drawn[100:125, 175:200]).any()
     assert (drawn[100:125, 178:200] == 120).all()
 
@@ -141,23 +142,23 @@ def test_images_of_more_bits_are_scaled(image):
 
 def test_lines_grow_with_the_image():
     large = np.full((2656, 3984), 120, np.uint8)
-    small = shown(draw(GRAY, Identification((target(7),))), DECODED_COLOUR).sum()
-    assert shown(draw(large, Identification((target(7),))), DECODED_COLOUR).sum() > 1.5 * small
+    small, wide = (draw(image, Identification((target(7),))) for image in (GRAY, large))
+    assert shown(wide[:240, :320], DECODED_COLOUR).sum() > 1.5 * shown(small, DECODED_COLOUR).sum()
 
 
 def test_the_summary_says_how_many_and_through_what():
-    assert summary(Identification((target(7), target(UNDECODED)))) == '1 identified, no filter'
+    def told(*given: Any, **named: Any) -> str:
+        return summary(Identification((target(7), target(UNDECODED)), *given, **named))
+
+    assert told() == '1 identified, no filter'
     through = FilterState(applied=True, gamma_high=1.2, gamma_low=0.25)
-    told = summary(Identification((target(7),), 54, through))
-    assert told == '1 identified of 54, gamma_high 1.2, gamma_low 0.25'
-    missed = Identification((target(7),), 3, expected_ids=(6, 7, 8))
-    assert summary(missed) == '1 identified of 3, missed 6 8, no filter'
-    many = summary(Identification((), 20, expected_ids=tuple(range(1, 21))))
-    assert many.endswith('missed 1 2 3 4 5 6 7 8 9 10 11 12 and 8 others, no filter')
-    mirrored = Identification((target(7),), 54, mirrored=True)
-    assert summary(mirrored) == '1 identified of 54, mirrored, no filter'
-    estimated = Identification((target(7),), 54, estimated=True)
-    assert summary(estimated) == '1 identified of an estimated 54, no filter'
+    assert told(54, through) == '1 identified of 54, gamma_high 1.2, gamma_low 0.25'
+    missed = '1 identified of 3, missed 6 8, no filter'
+    assert told(3, expected_ids=(6, 7, 8)) == missed
+    many = told(20, expected_ids=(*range(1, 7), *range(8, 22)))
+    assert many.endswith('missed 1 2 3 4 5 6 8 9 10 11 12 13 and 8 others, no filter')
+    assert told(54, mirrored=True) == '1 identified of 54, mirrored, no filter'
+    assert told(54, estimated=True) == '1 identified of an estimated 54, no filter'
 
 
 def test_no_size_of_a_target_crashes() -> None:
