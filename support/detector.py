@@ -8,7 +8,7 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from rcl_interfaces.srv import GetParameters, SetParametersAtomically
-from rclpy.parameter import Parameter
+from rclpy.parameter import Parameter, parameter_value_to_python
 from sensor_msgs.msg import Image
 from std_srvs.srv import Trigger
 
@@ -93,6 +93,4 @@ class DetectorProcess:
             f'{self.namespace}/detector/get_parameters',
             GetParameters.Request(names=[name]),
         )
-        return Parameter.from_parameter_msg(
-            type('Named', (), {'name': name, 'value': response.values[0]})
-        ).value
+        return parameter_value_to_python(response.values[0])

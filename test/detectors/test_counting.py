@@ -83,19 +83,6 @@ def test_images_of_more_bits_are_counted(kind):
     assert estimate_count(scene().image.astype(kind) * 4) == 6
 
 
-@pytest.mark.parametrize(
-    ('image', 'words'),
-    [
-        (np.zeros((20, 30, 3), np.uint8), 'image'),
-        (np.full((20, 30), np.nan), 'image has NaN'),
-        (np.full((20, 30), 7, np.uint8), 'image is constant'),
-    ],
-)
-def test_what_is_no_image_is_refused(image, words):
-    with pytest.raises(ValueError, match=words):
-        estimate_count(image)
-
-
 @pytest.mark.parametrize(('paper', 'ink'), [(200, 20), (20, 200)])
 def test_dots_without_a_band_are_no_targets(paper, ink):
     image = np.full((400, 600), paper, np.uint8)

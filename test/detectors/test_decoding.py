@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.codes.ring import FAMILY_NAMES, Family, canonical, family
-from ahf_ros.detectors.ring.decoding import Words, bits_at, decode, lengthened, sectors_by_phase
+from ahf_ros.detectors.ring.decoding import Words, bits_at, decode, lengthened
 from ahf_ros.detectors.ring.likelihood import SURPRISES, Evidence
 
 CODE = family('metashape12')
@@ -154,31 +154,11 @@ def test_ink_that_has_grown_is_longer_along_the_band(overhang: float) -> None:
     assert read(seen(WORD)).seen[0] > read(seen(WORD), overhang).seen[0] + 10
 
 
-@pytest.mark.parametrize(
-    ('overhang', 'expected'),
-    [(0.4, '0011100001'), (1.0, '1111110011'), (-1.0, '0001000000'), (2.0, '1111111111')],
-)
-def test_lengthened_bits(overhang: float, expected: str) -> None:
-    bits = np.array([[character == '1' for character in '0011100001']])
-    found = lengthened(bits, np.array([overhang]))
-    assert ''.join(map(str, found[0].astype(int))) == expected
-
-
 def test_each_band_is_lengthened_by_its_own_overhang() -> None:
-    bits = np.zeros((3, 2, 20), bool)
-    bits[..., 5:9] = True
-    found = lengthened(bits, np.array([-1.0, 0.0, 2.0])).sum(axis=2)
-    assert found.tolist() == [[2, 2], [4, 4], [8, 8]]
-
-
-def test_the_sectors_at_a_phase_are_those_of_a_word() -> None:
-    places = sectors_by_phase(PER_SECTOR, CODE)
-    assert places.shape == (PER_SECTOR, CODE.bits, PER_SECTOR)
-    word = CODE.word(88)
-    for phase in (0, 4, 9):
-        marked = of_word(word, phase)[0]
-        of_sectors = marked[places[phase]].mean(axis=1)
-        assert of_sectors.tolist() == [word >> bit & 1 for bit in range(12)]
+    bits = np.tile([character == '1' for character in '0011100001'], (4, 1))
+    found = lengthened(bits, np.array([0.4, 1.0, -1.0, 2.0])).astype(int)
+    expected = ['0011100001', '1111110011', '0001000000', '1111111111']
+    assert [''.join(map(str, band)) for band in found.tolist()] == expected
 
 
 def test_bands_do_not_touch_each_other() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 
 import cv2
 import numpy as np
@@ -11,7 +11,9 @@ import pytest
 
 from ahf_ros.codes.ring import FAMILY_NAMES, family
 from ahf_ros.detectors import DetectorSettings
+from ahf_ros.detectors.ring.counting import estimate_count
 from ahf_ros.detectors.ring.detector import find_hypotheses, read_image
+from ahf_ros.detectors.ring.refinement import refine_centres
 from ahf_ros.evaluation import score
 from ahf_ros.synthetic.scene import SceneSettings
 from ahf_ros.target import UNDECODED, TrueTarget
@@ -21,6 +23,7 @@ from benchmarks.lookalikes import other_sectors
 from benchmarks.sheets import Sheet, mark_sheet, random_numbers, target_sheet
 from support.scenes import SMALL, counts, errors_of, identified, rendered, scored
 
+CODE = family('metashape12')
 LIGHTS = [('dark', 'stripe'), ('bright', 'lattice')]
 
 DOUBTFUL = ('metashape20', 'bright', 'lattice')
@@ -99,8 +102,8 @@ def test_the_centre_is_the_physical_one_and_the_covariance_honest():
 
 
 def test_ellipse_and_code_are_those_of_the_target():
-    rendering = rendered(SMALL)
-    for target, true in zip(identified(rendering.image), rendering.targets, strict=True):
+    scene = rendered(SMALL)
+    for target, true in zip(identified(scene.image), scene.targets, strict=True):
         assert (target.id, target.code) == (true.id, true.code)
         assert target.semi_major == pytest.approx(true.semi_major, abs=0.1)
         assert target.semi_minor == pytest.approx(true.semi_minor, abs=0.1)
@@ -120,22 +123,11 @@ def test_distractors_leave_targets_alone():
 
 @pytest.mark.parametrize('polarity', ['dark', 'bright'])
 def test_polarity_is_found_or_obeyed(polarity):
-    rendering = rendered(replace(SMALL, polarity=polarity))
-    ids = [target.id for target in rendering.targets]
+    scene = rendered(replace(SMALL, polarity=polarity))
     other = 'bright' if polarity == 'dark' else 'dark'
-    assert [target.id for target in identified(rendering.image, polarity=polarity)] == ids
-    assert identified(rendering.image, polarity=other) == []
-
-
-def test_only_dots_between_the_smallest_and_the_largest_radius_are_reported():
-    rendering = rendered(SMALL)
-    radii = sorted(target.semi_major for target in rendering.targets)
-    between = (radii[2] + radii[3]) / 2
-    small = {target.id for target in rendering.targets if target.semi_major < between}
-    found = identified(rendering.image, max_radius=between)
-    assert {target.id for target in found} == small
-    found = identified(rendering.image, min_radius=between)
-    assert {target.id for target in found} == {target.id for target in rendering.targets} - small
+    found = identified(scene.image, polarity=polarity)
+    assert [it.id for it in found] == [it.id for it in scene.targets]
+    assert identified(scene.image, polarity=other) == []
 
 
 def test_another_family_is_not_read_into_the_targets():
@@ -149,12 +141,10 @@ def test_dots_without_a_code_are_reported_on_request():
     image = cv2.GaussianBlur(image, (0, 0), 0.7)
     assert identified(image) == []
     found = identified(image, report_undecoded=True)
-    left, right = sorted(found, key=lambda target: target.x)
-    assert (left.id, left.code) == (right.id, right.code) == (UNDECODED, 0)
-    assert (left.x, left.y) == pytest.approx((90, 100), abs=0.05)
-    assert (right.x, right.y) == pytest.approx((210, 100), abs=0.05)
-    assert max(left.confidence, right.confidence) < 0.5
-    assert {left.reason, right.reason} == {'unread'}
+    centres = np.array(sorted((it.x, it.y) for it in found))
+    assert centres == pytest.approx(np.array([(90, 100), (210, 100)]), abs=0.05)
+    assert all((it.id, it.code, it.reason) == (UNDECODED, 0, 'unread') for it in found)
+    assert max(it.confidence for it in found) < 0.5
 
 
 def test_decoded_targets_are_the_same_when_dots_are_reported():
@@ -198,11 +188,10 @@ def test_a_target_that_the_frame_cuts_is_not_guessed(name, kept):
 
 def test_a_covered_sector_is_not_guessed():
     rendering = rendered(SMALL)
-    band_inner, band_outer = family(SMALL.family).band_inner, family(SMALL.family).band_outer
     for turn in np.arange(0, 360, 45):
         image = rendering.image.copy()
         for target in rendering.targets:
-            middle = (band_inner + band_outer) / 2 * target.semi_major
+            middle = sum(CODE.band) / 2 * target.semi_major
             left = target.x + middle * np.cos(np.radians(turn)) - target.semi_major
             top = target.y + middle * np.sin(np.radians(turn)) - target.semi_major
             size = round(2 * target.semi_major)
@@ -212,20 +201,21 @@ def test_a_covered_sector_is_not_guessed():
 
 
 @pytest.mark.parametrize(
-    ('image', 'message'),
+    'image',
     [
-        (np.zeros((0, 0), np.uint8), 'image'),
-        (np.zeros((1, 1), np.uint8), 'image'),
-        (np.full((50, 50), 7, np.uint8), 'constant'),
-        (np.full((50, 50), np.nan), 'NaN'),
-        (np.zeros((50, 50, 3), np.uint8), 'shape'),
-        (np.zeros((50, 50), bool), 'bool'),
-        ('image.png', 'str'),
+        np.zeros((20, 30, 3), np.uint8),
+        np.full((20, 30), np.nan),
+        np.full((20, 30), 7, np.uint8),
+        'image.png',
     ],
+    ids=['colours', 'NaN', 'constant', 'no image'],
 )
-def test_what_is_no_image_is_refused(image, message):
-    with pytest.raises(ValueError, match=message):
-        identified(image)
+@pytest.mark.parametrize(
+    'take', [identified, estimate_count, partial(refine_centres, targets=[], family=CODE)]
+)
+def test_what_is_no_image_is_refused(take, image):
+    with pytest.raises(ValueError, match=r'image .*accepted'):
+        take(image)
 
 
 @pytest.mark.parametrize('shape', [(16, 16), (16, 3000), (17, 333)])
@@ -297,7 +287,7 @@ def test_faint_and_clear_targets_in_one_image():
 
 def test_faint_marks_that_are_no_targets_stay_unread():
     generator = np.random.default_rng(4)
-    marks = mark_sheet([other_sectors(family('metashape12'), generator) for _ in range(6)], 1)
+    marks = mark_sheet([other_sectors(CODE, generator) for _ in range(6)], 1)
     faint, clear = Exposure(levels=(130, 110, 1.0)), Exposure()
     assert len(identified(marks.photograph(faint))) <= len(identified(marks.photograph(clear)))
 
