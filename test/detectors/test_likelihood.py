@@ -156,51 +156,43 @@ def test_gaps_tell_how_often_light_has_edges() -> None:
     assert (edges(restless).ink[0, :, 1] < edges(calm).ink[0, :, 1]).all()
 
 
-def levels(of: PolarImages, spread: float) -> tuple[np.ndarray, ...]:
-    """Return what `level_evidence` is given: levels, their light, its spread and the radii."""
+def by_levels(of: PolarImages, light: float | None = 200.0, spread: float = 0.05) -> Evidence:
+    """Return what levels say under light of a known spread; None: light as it is seen."""
     radii = np.array([0.5, 1.6, 2.6, 3.1, 3.9])
     values = np.stack([of.at(np.array([radius])) for radius in radii], axis=2)
-    light = np.full_like(values, 200.0)
-    return values, light, np.full_like(values, spread), radii
+    known = values if light is None else np.full_like(values, light)
+    return level_evidence(of, values, known, np.full_like(values, spread), radii, BAND)
 
 
-@pytest.mark.parametrize('polarity', [1, -1])
-def test_levels_tell_ink_from_paper_where_light_is_known(polarity: int) -> None:
-    target = polar(200.0, polarity)
-    values, light, spread, radii = levels(target, 0.05)
-    paper = light if polarity > 0 else 0.25 * light
-    evidence = level_evidence(target, values, paper, spread, radii, BAND)
+@pytest.mark.parametrize(('polarity', 'paper'), [(1, 200.0), (-1, 50.0)])
+def test_levels_tell_ink_from_paper_where_light_is_known(polarity: int, paper: float) -> None:
+    evidence, silent, vague = (
+        by_levels(polar(200.0, polarity), paper, spread) for spread in (0.05, np.inf, 1.0)
+    )
     for half in range(2):
         assert (evidence.ink > evidence.paper)[0, half].tolist() == MARKED.tolist()
     assert evidence.dot[0] > 5
-    unknown = np.full_like(spread, np.inf)
-    silent = level_evidence(target, values, paper, unknown, radii, BAND)
     assert not silent.ink.any() and not silent.paper.any() and not silent.dot.any()
-    vague = level_evidence(target, values, paper, np.full_like(spread, 1.0), radii, BAND)
     assert np.abs(vague.ink - vague.paper).max() < np.abs(evidence.ink - evidence.paper).min()
 
 
 def test_ground_beside_the_band_that_is_not_as_predicted_speaks_against_both() -> None:
     target = polar()
     target.gray[:, :8, inside(BAND[1], 9)] = 90.0  # something lies on the margin
-    values, light, spread, radii = levels(target, 0.02)
-    evidence = level_evidence(target, values, light, spread, radii, BAND)
+    evidence = by_levels(target, spread=0.02)
     assert (evidence.ink[0, 1, :8] < evidence.ink[0, 1, 20:28] - 0.5).all()
     assert (evidence.ink[0, 0, :8] == evidence.ink[0, 0, 20:28]).all()  # of the half inside
 
 
 def test_a_dot_of_light_on_paper_is_no_ink() -> None:
-    target = polar()
-    values, _, spread, radii = levels(target, 0.05)
-    assert level_evidence(target, values, values, spread, radii, BAND).dot[0] < -5
+    assert by_levels(polar(), None).dot[0] < -5
 
 
 def test_what_covers_the_ground_covers_the_edge_beside_it_and_the_levels() -> None:
     target = polar(shade=100.0)
     target.gray[:, 5:8, inside(BAND[1], 9)] = 90.0
     of_steps = edges(target)
-    values, light, spread, radii = levels(target, 0.05)
-    seen = level_evidence(target, values, light, spread, radii, BAND)
+    seen = by_levels(target)
     both = of_steps.plus(seen)
     assert np.flatnonzero(both.covered.any(axis=1)).tolist() == [5, 6, 7]
     for name in ('paper', 'ink'):
