@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from numpy.lib.recfunctions import structured_to_unstructured, unstructured_to_structured
 
 from ahf_ros.localisation import CloudGrid, Positions, positions
 from ahf_ros.target import Target
@@ -14,6 +15,8 @@ FOCAL_LENGTH = 1000.0  # px
 NOISE = 0.1  # mm, along the ray
 CENTRE = (60.3, 50.8)  # px
 RADIUS = 8.0  # px
+ROWS, COLUMNS = np.mgrid[:100, :120]
+AWAY = np.hypot(COLUMNS - CENTRE[0], ROWS - CENTRE[1])
 
 
 def on_plane(pixels: np.ndarray, tilt: float, distance: float = 1000.0) -> np.ndarray:
@@ -25,13 +28,9 @@ def on_plane(pixels: np.ndarray, tilt: float, distance: float = 1000.0) -> np.nd
 
 def scan(tilt: float = 0.0, noise: float = 0.0, kind: np.dtype = KIND) -> np.ndarray:
     """Return a cloud of 120 x 100 points."""
-    pixels = np.stack(np.mgrid[:100, :120][::-1], axis=-1).astype(float)
-    points = on_plane(pixels, tilt)
+    points = on_plane(np.stack([COLUMNS, ROWS], axis=-1).astype(float), tilt)
     points *= 1 + noise / 1000 * np.random.default_rng(0).standard_normal((100, 120, 1))
-    cloud = np.zeros((100, 120), kind)
-    for axis, name in enumerate('xyz'):
-        cloud[name] = points[:, :, axis]
-    return cloud
+    return unstructured_to_structured(points, kind)
 
 
 def target(x: float = CENTRE[0], y: float = CENTRE[1], radius: float = RADIUS) -> Target:
@@ -48,14 +47,8 @@ def error(cloud: np.ndarray, tilt: float) -> float:
 
 
 def blank(cloud: np.ndarray, where: np.ndarray) -> np.ndarray:
-    for name in 'xyz':
-        cloud[name][where] = np.nan
+    cloud[where] = (np.nan,) * 3
     return cloud
-
-
-def distance_from_centre() -> np.ndarray:
-    rows, columns = np.mgrid[:100, :120]
-    return np.hypot(columns - CENTRE[0], rows - CENTRE[1])
 
 
 @pytest.mark.parametrize('degrees', [0, 30, 60])
@@ -67,52 +60,41 @@ def test_a_plane_gives_the_point_of_the_centre_exactly(degrees: float) -> None:
 
 def test_the_frame_of_the_cloud_does_not_matter() -> None:
     cloud = scan(0.7, kind=EXACT)
-    points = np.stack([cloud[name] for name in 'xyz'], axis=-1)
     turn, _ = np.linalg.qr(np.random.default_rng(1).standard_normal((3, 3)))
-    moved = points @ turn + (5, -200, 3000)
-    for axis, name in enumerate('xyz'):
-        cloud[name] = moved[:, :, axis]
+    moved = structured_to_unstructured(cloud) @ turn + (5, -200, 3000)
     true = on_plane(np.array(CENTRE), 0.7) @ turn + (5, -200, 3000)
-    assert found(cloud).points[0] == pytest.approx(true, abs=1e-9)
+    moved_cloud = unstructured_to_structured(moved, EXACT)
+    assert found(moved_cloud).points[0] == pytest.approx(true, abs=1e-9)
 
 
 def test_noise_is_told_and_averaged() -> None:
     cloud = scan(0.5, NOISE)
     assert found(cloud).deviations[0] == pytest.approx(NOISE, rel=0.15)
     assert error(cloud, 0.5) < NOISE / 8
+    without_dot = blank(cloud, AWAY < 1.3 * RADIUS)
+    assert error(without_dot, 0.5) < NOISE / 8
 
 
-def test_a_dot_without_points_has_a_position() -> None:
-    cloud = blank(scan(0.5, NOISE), distance_from_centre() < 1.3 * RADIUS)
-    assert error(cloud, 0.5) < NOISE / 8
-
-
-def test_points_of_another_surface_do_not_count() -> None:
+def test_points_of_another_surface_and_zeros_do_not_count() -> None:
     cloud = scan(0.5, NOISE)
-    rows, columns = np.mgrid[:100, :120]
-    cloud['z'][columns > CENTRE[0] + 5] += 30  # behind an edge beside the dot
-    cloud['z'][(rows + columns) % 9 == 0] -= 500
+    cloud['z'][CENTRE[0] + 5 < COLUMNS] += 30  # behind an edge beside the dot
+    cloud['z'][(ROWS + COLUMNS) % 9 == 0] -= 500
     assert error(cloud, 0.5) < NOISE / 4
-
-
-def test_zeros_are_no_points() -> None:
     cloud = scan(0.5)
-    cloud[distance_from_centre() < 2.2 * RADIUS] = (0, 0, 0)
+    cloud[AWAY < 2.2 * RADIUS] = (0, 0, 0)
     assert error(cloud, 0.5) < 1e-3
 
 
 def test_nothing_is_extrapolated() -> None:
-    _, columns = np.mgrid[:100, :120]
-    assert found(blank(scan(), columns < CENTRE[0])).known[0]
-    assert not found(blank(scan(), columns < CENTRE[0] + 10)).known[0]
+    assert found(blank(scan(), CENTRE[0] > COLUMNS)).known[0]
+    assert not found(blank(scan(), CENTRE[0] + 10 > COLUMNS)).known[0]
 
 
 def test_few_points_or_none_give_no_position() -> None:
-    rows, columns = np.mgrid[:100, :120]
-    sparse = blank(scan(), (rows % 3 > 0) | (columns % 3 > 0))
+    sparse = blank(scan(), (ROWS % 3 > 0) | (COLUMNS % 3 > 0))
     assert not found(sparse).known[0]
-    assert not found(blank(scan(), rows >= 0)).known[0]
-    line = blank(scan(), np.abs(rows - columns + 10) > 0)
+    assert not found(blank(scan(), ROWS >= 0)).known[0]
+    line = blank(scan(), np.abs(ROWS - COLUMNS + 10) > 0)
     assert not positions(line, [target(radius=1.0)]).known[0]
 
 

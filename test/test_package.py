@@ -17,6 +17,7 @@ from pathlib import Path
 import pytest
 
 from support import ROOT
+from support.command_line import python
 
 PACKAGE = ROOT / 'ahf_ros'
 MODULES = {
@@ -94,8 +95,7 @@ def test_everything_but_the_nodes_works_without_ros() -> None:
     names = [name for name in without if not name.endswith(('.__init__', '.__main__'))]
     assert len(names) > 50
     names += [f'ahf_ros.nodes.{name}' for name in ('settings', 'drivers', 'interfaces')]
-    command = [sys.executable, '-c', WITHOUT_ROS, *names]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    done = python('-c', WITHOUT_ROS, *names)
     assert done.returncode == 0, done.stderr
 
 

@@ -60,7 +60,7 @@ def test_clear_evidence_is_the_word_and_no_other_thing(name: str, phase: int) ->
     turn = found.starts - 2 * np.pi * phase / (code.bits * PER_SECTOR)
     assert np.cos(turn * code.bits) == pytest.approx(1)  # in any rotation
     assert found.seen == pytest.approx(FOR * code.bits * PER_SECTOR, rel=0.06)
-    # The next word differs in two sectors, which something would have to cover.
+    # The nearest other word differs in two sectors, which something would have to cover.
     assert 15 < found.margin[0] < 20 * (FOR - AGAINST)
     assert found.marked[0] > found.seen[0] / 4
     assert found.coded[0] > -6  # arcs of any length are the same ones, but for a border
