@@ -148,7 +148,7 @@ def test_a_bag(case: Case, tmp_path: Path) -> None:
 
 @pytest.fixture(scope='module')
 def nodes(graph: Any) -> Callable[[Case], Any]:
-    """Return, by a case, a node with its detector, and one that asks a node for targets.
+    """Return, by a case, its message, a node with its detector, and one that asks that node.
 
     What answers a service does not change how it is asked: two detectors are asked, one of which
     searches for a filter.
@@ -159,32 +159,29 @@ def nodes(graph: Any) -> Callable[[Case], Any]:
     from support.detector import DetectorProcess
 
     @cache
-    def with_detector(
-        detector: str, command: str
-    ) -> tuple[DetectorProcess, DetectorProcess | None]:
+    def with_detector(detector: str, command: str) -> tuple[DetectorProcess, ...]:
         own = f'detector:={detector}', f'command:={command!r}', f'allow_programs:={bool(command)}'
         other = 'detector:=service', f'service:=/{detector}/detector/identify'
         words, others = ([word for it in given for word in ('-p', it)] for given in (own, other))
         first = DetectorProcess(graph, f'/{detector}', *words)
         if detector not in ('auto', 'traditional'):
-            return first, None
+            return (first,)
         second = DetectorProcess(graph, f'/asks_{detector}', *others)
         second.until_served(image_message(image(Case()), Header()))
         return first, second
 
-    return lambda case: with_detector(case.detector, case.command)
+    def made(case: Case) -> Any:
+        message = image_message(image(case), Header(frame_id=str(case)))
+        return message, *with_detector(case.detector, case.command)
+
+    return made
 
 
 @EVERY_CASE
 def test_the_node_and_its_service_and_a_node_that_calls_it(
     case: Case, nodes: Callable[[Case], Any]
 ) -> None:
-    from std_msgs.msg import Header
-
-    from ahf_ros.nodes.image_msg import image_message
-
-    first, second = nodes(case)
-    message = image_message(image(case), Header(frame_id=str(case)))
+    message, first, *others = nodes(case)
     free = ('family', case.family), ('expected_targets', case.expected_targets)
     assert first.set(*free) == (True, '')
     live = first.answer(message)
@@ -194,10 +191,9 @@ def test_the_node_and_its_service_and_a_node_that_calls_it(
     assert response.success, response.message
     served = response.coded_targets
     assert answer(served.family, served.targets) == by_library(case)
-    if not second:
-        return
-    first.reset()
-    assert second.set(('family', case.family)) == (True, '')
-    asked = second.answer(message)
-    assert answer('', asked.targets)[1] == by_library(case)[1]
-    assert asked.family == case.family
+    for second in others:
+        first.reset()
+        assert second.set(('family', case.family)) == (True, '')
+        asked = second.answer(message)
+        assert answer('', asked.targets)[1] == by_library(case)[1]
+        assert asked.family == case.family

@@ -198,11 +198,6 @@ def test_tests_do_not_need_loggers_that_propagate() -> None:
     assert users == [], 'caplog sees nothing where launch is installed'
 
 
-def test_no_two_test_files_have_the_same_name() -> None:
-    names = Counter(file.name for file in (ROOT / 'test').rglob('test_*.py'))
-    assert [name for name, count in names.items() if count > 1] == []
-
-
 def distributed(file: str) -> bool:
     """Return whether MANIFEST.in takes a file into the source distribution."""
     for line in (ROOT / 'MANIFEST.in').read_text().splitlines():

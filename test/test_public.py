@@ -180,7 +180,8 @@ def test_type_checkers_know_the_options(tmp_path: Path) -> None:
     file = tmp_path / 'typed.py'
     file.write_text(TYPED)
     options = '--no-error-summary', '--follow-imports=silent', '--ignore-missing-imports'
-    done = python('-m', 'mypy', *options, '--cache-dir', os.devnull, file)
+    config = '--config-file', ROOT / 'pyproject.toml', '--cache-dir', os.devnull
+    done = python('-m', 'mypy', *options, *config, file)
     wrong = {int(line) for line in re.findall(r'typed\.py:(\d+): error', done.stdout)}
     assert wrong == {9, 10, 11, 12, 13}, done.stdout + done.stderr
 
