@@ -28,7 +28,7 @@ from support import bags
 from support.packages import MINE, my_detector, write_package
 from support.square_markers import needs_square_markers
 
-SCENE = {'width': 400, 'height': 300, 'targets': 4, 'dot_radius': 10.0}
+SCENE = {'width': 320, 'height': 240, 'targets': 3, 'dot_radius': 9.0}
 SCENES = {'gsi': SCENE | {'width': 560, 'height': 420, 'dot_radius': 5.0}}
 SQUARES = ('aruco_4x4_50', 'apriltag_36h11')
 BOTH = 'metashape12,aicon14'
@@ -59,7 +59,7 @@ CASES = (
     *(Case(family) for family in FAMILY_NAMES if not family.startswith(('aruco', 'apriltag'))),
     *(Case(family) for family in SQUARES),
     *(Case(families) for families in (BOTH, 'auto')),
-    Case(detector='traditional', light='stripe', expected_targets=4),
+    Case(detector='traditional', light='stripe', expected_targets=3),
     Case(detector='command', command=COMMAND),
     Case(detector=MINE),
 )
