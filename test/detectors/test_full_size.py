@@ -29,7 +29,7 @@ def check(shown: Collage, family: str) -> None:
 @pytest.mark.parametrize(
     ('printed', 'radii', 'read'),
     [
-        ('metashape12', [300.0, 150.0, 65.0, 20.0, 8.0, 4.0], 'metashape12'),
+        ('metashape12', [300.0, 100.0, 65.0, 20.0, 8.0, 4.0], 'metashape12'),
         ('aicon14', [115.0, 95.0], 'auto'),
         ('dots', [185.0, 95.0, 20.0, 8.0], 'dots'),
         ('gsi', [60.0, 20.0, 5.0], 'gsi'),
