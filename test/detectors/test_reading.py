@@ -9,7 +9,8 @@ import pytest
 
 from ahf_ros.codes.ring import FAMILY_NAMES, canonical, family
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
-from ahf_ros.detectors.ring.reading import read_bands
+from ahf_ros.detectors.ring.polar import polar_images
+from ahf_ros.detectors.ring.reading import best_growth, read_bands
 from ahf_ros.features.circle_fit import Fit
 from ahf_ros.synthetic.scene import Rendering, SceneSettings
 from support.ring import lone_dot, measured
@@ -52,6 +53,21 @@ def test_words_are_read_in_their_direction(
     assert found.marked.min() > 0
     assert found.certain.all()
     assert found.hidden.max() <= hidden
+
+
+@pytest.mark.parametrize('shift', [-1.2, -0.8, 0.8, 1.2])
+@pytest.mark.parametrize('polarity', ['dark', 'bright'])
+def test_growth_is_found_on_ink_that_has_grown(polarity: str, shift: float) -> None:
+    """To half a step of the growths that are tried, and the camera's gamma has a share in it."""
+    scene = replace(SMALL, dot_radius=12.0, polarity=polarity)
+    sign = 1 if polarity == 'dark' else -1
+    found = []
+    for of in (0.0, shift):
+        rendering = rendered(replace(scene, edge_shift=of))
+        dots = dots_of(rendering)
+        image = polar_images(rendering.image.astype(np.float32), dots, CODE.band, 120)
+        found.append(sign * best_growth(image, CODE.band) * dots.size)
+    assert np.mean(found[1] - found[0]) == pytest.approx(shift, abs=0.35)
 
 
 def sectors_at(rendering: Rendering, start: float) -> tuple[np.ndarray, np.ndarray]:
