@@ -117,6 +117,16 @@ def test_polarity_is_found_or_obeyed(polarity):
     assert identified(scene.image, polarity=other) == []
 
 
+def test_only_dots_between_the_smallest_and_the_largest_radius_are_reported():
+    scene = rendered(SMALL)
+    by_size = sorted(scene.targets, key=lambda target: target.semi_major)
+    between = (by_size[2].semi_major + by_size[3].semi_major) / 2
+    small = {target.id for target in identified(scene.image, max_radius=between)}
+    large = {target.id for target in identified(scene.image, min_radius=between)}
+    assert small == {target.id for target in by_size[:3]}
+    assert large == {target.id for target in by_size[3:]}
+
+
 def test_dots_without_a_code_are_reported_on_request():
     image = np.full((200, 300), 220, np.uint8)
     cv2.circle(image, (90, 100), 10, 30, -1)
