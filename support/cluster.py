@@ -9,12 +9,12 @@ import sys
 import time
 from contextlib import ExitStack, suppress
 from pathlib import Path
-from types import TracebackType
 
 import distributed
 
+from support import ROOT
+
 LIMIT = 300.0
-ROOT = Path(__file__).resolve().parent.parent
 
 
 def free_port() -> int:
@@ -24,24 +24,13 @@ def free_port() -> int:
         return port
 
 
-class LocalCluster:
+class LocalCluster(ExitStack):
     """Begins without a scheduler and without workers; all processes end with it."""
 
     def __init__(self, folder: Path) -> None:
+        super().__init__()
         self.address = f'tcp://127.0.0.1:{free_port()}'
         self._folder = folder
-        self._processes = ExitStack()
-
-    def __enter__(self) -> LocalCluster:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._processes.close()
 
     def scheduler(self) -> subprocess.Popen[bytes]:
         """Start a scheduler, and return once it listens."""
@@ -72,6 +61,6 @@ class LocalCluster:
             env={**os.environ, 'PYTHONPATH': str(ROOT), **environment},
             stderr=(self._folder / f'{what}.log').open('ab'),
         )
-        self._processes.callback(process.wait)
-        self._processes.callback(process.kill)
+        self.callback(process.wait)
+        self.callback(process.kill)
         return process

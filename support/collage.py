@@ -26,16 +26,9 @@ class Collage:
 
 
 def collage(radii: Sequence[float], family: str = 'metashape12', **settings: Any) -> Collage:
-    """Return an image of targets of given sizes, each in a scene of its own, with distinct IDs.
+    """Return an image of targets of given radii, px, the largest first, with distinct IDs.
 
-    Parameters
-    ----------
-    radii : sequence of float
-        Of the dots, px, the largest first.
-    family : str
-        Of the targets.
-    **settings
-        Of the scenes.
+    Each is in a scene of its own, which has the settings.
     """
     sides = [_side(radius, family) for radius in radii]
     height, width = sides[0], sides[0] + max(sides[1:], default=0)

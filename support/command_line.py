@@ -1,15 +1,30 @@
-"""The command `ahf`, in this process or in one of its own."""
+"""The command `ahf`, in this process or in one of its own, and other programs of Python."""
 
 from __future__ import annotations
 
 import os
 import subprocess
 import sys
-from pathlib import Path
+from functools import partial
 
 from ahf_ros.cli import main
+from support import ROOT
 
-ROOT = Path(__file__).resolve().parent.parent
+
+def python(
+    *arguments: object, stdin: str = '', timeout: float = 300
+) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, *map(str, arguments)],
+        input=stdin,
+        capture_output=True,
+        text=True,
+        env={**os.environ, 'PYTHONPATH': str(ROOT)},
+        timeout=timeout,
+    )
+
+
+ahf = partial(python, '-m', 'ahf_ros.cli')
 
 
 def status(*arguments: object) -> int:
@@ -18,16 +33,3 @@ def status(*arguments: object) -> int:
         return main([str(argument) for argument in arguments])
     except SystemExit as left:
         return int(left.code or 0)
-
-
-def ahf(
-    *arguments: object, stdin: str = '', timeout: float = 300
-) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, '-m', 'ahf_ros.cli', *map(str, arguments)],
-        input=stdin,
-        capture_output=True,
-        text=True,
-        env={**os.environ, 'PYTHONPATH': str(ROOT)},
-        timeout=timeout,
-    )

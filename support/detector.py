@@ -10,7 +10,7 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.srv import GetParameters, SetParametersAtomically
-from rclpy.parameter import Parameter
+from rclpy.parameter import Parameter, parameter_value_to_python
 from sensor_msgs.msg import Image
 from std_srvs.srv import Trigger
 
@@ -124,6 +124,4 @@ class DetectorProcess:
             f'{self.namespace}/detector/get_parameters',
             GetParameters.Request(names=[name]),
         )
-        return Parameter.from_parameter_msg(
-            type('Named', (), {'name': name, 'value': response.values[0]})
-        ).value
+        return parameter_value_to_python(response.values[0])

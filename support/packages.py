@@ -6,8 +6,9 @@ import runpy
 from pathlib import Path
 
 from ahf_ros.detectors import GROUP, Detector, DetectorSettings
+from support import ROOT
 
-EXAMPLE = Path(__file__).parents[1] / 'docs' / 'examples' / 'my_detector.py'
+EXAMPLE = ROOT / 'docs' / 'examples' / 'my_detector.py'
 
 MINE = 'mine'
 """Name of the detector that the package adds."""

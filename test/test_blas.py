@@ -8,6 +8,7 @@ import sys
 import threading
 
 import numpy as np
+import pytest
 from threadpoolctl import ThreadpoolController
 
 from ahf_ros.blas import one_blas_thread
@@ -42,10 +43,14 @@ def processor_time(**environment: str) -> float:
 
 
 def test_an_identification_takes_no_more_time_where_numpy_was_imported_first() -> None:
-    # Other processes make both slower now and then, so the best of a few runs count.
-    runs = [(processor_time(), processor_time(OPENBLAS_NUM_THREADS='1')) for _ in range(3)]
-    threads, one = map(min, zip(*runs, strict=True))
-    assert threads <= MAXIMUM_RATIO * one, runs
+    # Other processes make both slower now and then, so the best of up to three runs count.
+    runs = []
+    for _ in range(3):
+        runs.append((processor_time(), processor_time(OPENBLAS_NUM_THREADS='1')))
+        threads, one = map(min, zip(*runs, strict=True))
+        if threads <= MAXIMUM_RATIO * one:
+            return
+    pytest.fail(f'{runs} s with all threads and with one')
 
 
 def blas_threads() -> set[int]:

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parent.parent
+from support import ROOT
+
 TOP = ('README.md', 'CONTRIBUTING.md', 'QUALITY_DECLARATION.md')
 PAGES = [*(ROOT / name for name in TOP), *sorted((ROOT / 'docs').rglob('*.md'))]
 ROOTS = (ROOT, ROOT / 'ahf_ros')

@@ -55,37 +55,31 @@ def test_errors_are_those_of_the_right_ones():
     assert figures.rmse == pytest.approx((math.sqrt(4.5), math.sqrt(8), math.sqrt(12.5)))
 
 
-@pytest.mark.parametrize(('distance', 'kind'), [(4.9, RIGHT), (5.0, RIGHT), (5.1, FALSE)])
-def test_the_tolerance(distance, kind):
-    assert kinds(report(1, 10 + distance)) == [kind]
+TWINS = (TrueTarget(1, 10.0, 10.0), TrueTarget(1, 50.0, 10.0))
+NEAR = (TrueTarget(1, 10.0, 10.0), TrueTarget(2, 13.0, 10.0))
+
+
+@pytest.mark.parametrize(
+    ('truth', 'reported', 'expected'),
+    [
+        pytest.param(TRUTH, [report(1, 14.9)], [RIGHT], id='within the tolerance'),
+        pytest.param(TRUTH, [report(1, 15.0)], [RIGHT], id='at the tolerance'),
+        pytest.param(TRUTH, [report(1, 15.1)], [FALSE], id='beyond the tolerance'),
+        pytest.param(TRUTH, [report(1, 12), report(1, 11)], [FALSE, RIGHT], id='twice'),
+        pytest.param(TRUTH, [report(-1, 10), report(1, 11)], [FALSE, RIGHT], id='undecoded, too'),
+        pytest.param(TRUTH, [report(5, 10), report(1, 11)], [WRONG, RIGHT], id='a wrong ID, too'),
+        pytest.param(TRUTH, [report(2, 10), report(1, 300)], [WRONG, FALSE], id='right far away'),
+        pytest.param(NEAR, [report(2, 11.4), report(1, 11.6)], [RIGHT, RIGHT], id='neighbours'),
+        pytest.param(TWINS, [report(1, 10), report(1, 50)], [RIGHT, RIGHT], id='an ID twice'),
+    ],
+)
+def test_what_counts_as_what(truth, reported, expected):
+    assert kinds(*reported, truth=truth) == expected
 
 
 def test_a_target_that_is_reported_twice_is_right_once():
-    assert kinds(report(1, 12), report(1, 11)) == [FALSE, RIGHT]
     figures = score(TRUTH, [report(1, 12), report(1, 11)])
     assert (figures.right, figures.false_positives, figures.errors) == (1, 1, ((1.0, 0.0),))
-
-
-def test_an_undecoded_report_beside_a_right_one_is_false():
-    assert kinds(report(UNDECODED, 10), report(1, 11)) == [FALSE, RIGHT]
-
-
-def test_a_wrong_id_is_wrong_even_where_the_right_one_is_reported_too():
-    assert kinds(report(5, 10), report(1, 11)) == [WRONG, RIGHT]
-
-
-def test_the_right_id_far_from_its_target_is_no_excuse():
-    assert kinds(report(2, 10), report(1, 300)) == [WRONG, FALSE]
-
-
-def test_neighbours_within_the_tolerance_each_keep_their_own():
-    near = (TrueTarget(1, 10.0, 10.0), TrueTarget(2, 13.0, 10.0))
-    assert kinds(report(2, 11.4), report(1, 11.6), truth=near) == [RIGHT, RIGHT]
-
-
-def test_an_id_that_is_there_twice_is_right_twice():
-    twins = (TrueTarget(1, 10.0, 10.0), TrueTarget(1, 50.0, 10.0))
-    assert kinds(report(1, 10), report(1, 50), truth=twins) == [RIGHT, RIGHT]
 
 
 @pytest.mark.parametrize('reported', [[], [report(2, 50)], [report(UNDECODED, 50)]])

@@ -5,9 +5,8 @@ from __future__ import annotations
 import ast
 import configparser
 import re
-from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
+from support import ROOT
 
 
 def normalized(requirement: str) -> str:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import ast
 import doctest
 import inspect
+import os
 import re
-import subprocess
 import sys
 import warnings
 from pathlib import Path
@@ -30,6 +30,7 @@ from ahf_ros import (
     write_image,
 )
 from support import ROOT
+from support.command_line import python
 
 OBJECTS = [name for name in ahf_ros.__all__ if not name.isupper()]
 
@@ -61,7 +62,7 @@ def test_type_checkers_are_told_the_same_names() -> None:
 def test_nothing_is_imported_before_it_is_used() -> None:
     """Type checkers and commands that compute nothing import `ahf_ros` in no time."""
     program = "import sys, ahf_ros; assert not {'numpy', 'cv2'} & set(sys.modules)"
-    subprocess.run([sys.executable, '-c', program], check=True)
+    assert python('-c', program).returncode == 0
 
 
 @pytest.mark.parametrize('name', OBJECTS)
@@ -178,11 +179,9 @@ def test_type_checkers_know_the_options(tmp_path: Path) -> None:
     pytest.importorskip('mypy', reason='mypy is not installed')
     file = tmp_path / 'typed.py'
     file.write_text(TYPED)
-    command = [sys.executable, '-m', 'mypy', '--no-error-summary', '--follow-imports=silent']
-    options = ['--ignore-missing-imports', '--cache-dir', str(tmp_path / 'cache')]
-    done = subprocess.run(
-        [*command, *options, str(file)], cwd=ROOT, capture_output=True, text=True, check=False
-    )
+    options = '--no-error-summary', '--follow-imports=silent', '--ignore-missing-imports'
+    config = '--config-file', ROOT / 'pyproject.toml', '--cache-dir', os.devnull
+    done = python('-m', 'mypy', *options, *config, file)
     wrong = {int(line) for line in re.findall(r'typed\.py:(\d+): error', done.stdout)}
     assert wrong == {9, 10, 11, 12, 13}, done.stdout + done.stderr
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 
 import pytest
@@ -11,32 +10,21 @@ import pytest
 from ahf_ros.target import Target, TrueTarget
 from benchmarks import identification
 from benchmarks.rows import normalised_squares
-from support import ROOT
 
 NORMAL = ('--quick', '--lights', 'normal', '--groups', 'light')
 
 
-def benchmark(*arguments: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, '-m', 'benchmarks.identification', *map(str, arguments)],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=300,
-    )
-
-
-def test_a_detector_and_the_same_one_as_a_command(tmp_path):
+def test_a_detector_and_the_same_one_as_a_command(tmp_path, capsys):
     command = f'{sys.executable} -m ahf_ros.cli identify --json --family {{family}}'
     rows = []
     for number, method in enumerate([('--detector', 'traditional'), ('--command', command)]):
         path = tmp_path / f'{number}.json'
         options = ('--detector', 'traditional') if number else ()
         words = (method[0], ' '.join([method[1], *options]))
-        done = benchmark(*NORMAL, *words, '--seeds', 1, '--json', path)
-        assert done.returncode == 0, done.stderr
-        assert 'Development seeds: 1.' in done.stdout
-        assert '| light | normal 0.3 | 6 of 6 | 0 | 0 |' in done.stdout
+        assert identification.main([*NORMAL, *words, '--seeds', '1', '--json', str(path)]) == 0
+        printed = capsys.readouterr().out
+        assert 'Development seeds: 1.' in printed
+        assert '| light | normal 0.3 | 6 of 6 | 0 | 0 |' in printed
         report = json.loads(path.read_text())
         assert report['test'] is False
         rows += report['rows']
@@ -48,10 +36,10 @@ def test_a_detector_and_the_same_one_as_a_command(tmp_path):
     assert other['seconds'] > 0
 
 
-def test_seeds_for_tests_and_for_development_are_kept_apart():
-    done = benchmark(*NORMAL, '--seeds', 1, 101)
-    assert done.returncode == 2
-    assert 'accepted are all below 101 or none' in done.stderr
+def test_seeds_for_tests_and_for_development_are_kept_apart(capsys):
+    with pytest.raises(SystemExit, match='2'):
+        identification.main([*NORMAL, '--seeds', '1', '101'])
+    assert 'accepted are all below 101 or none' in capsys.readouterr().err
 
 
 def test_every_row_is_a_scene_that_can_be_made():

@@ -2,37 +2,33 @@
 
 from __future__ import annotations
 
+import io
 import json
-import subprocess
-import sys
+from contextlib import redirect_stdout
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
+from benchmarks import paper
 from benchmarks.preprocessors import PREPROCESSORS
-from support import ROOT
 
-SMALL = ('--quick', '--images', 1, '--seed', 1, '--ambients', 0.3, '--evaluations', 5)
+SMALL = (
+    '--quick --images 1 --seed 1 --jobs 1 --ambients 0.3 --evaluations 5 --lights normal stripe'
+)
 
 
-def paper(*arguments: object) -> str:
-    done = subprocess.run(
-        [sys.executable, '-m', 'benchmarks.paper', *map(str, arguments)],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=300,
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+def printed(*arguments: object) -> str:
+    with redirect_stdout(io.StringIO()) as told:
+        assert paper.main([*map(str, arguments)]) == 0
+    return told.getvalue()
 
 
 @pytest.fixture(scope='module')
 def measured(tmp_path_factory) -> tuple[str, Path]:
     path = tmp_path_factory.mktemp('paper') / 'paper.json'
-    return paper(*SMALL, '--lights', 'normal', 'stripe', '--json', path), path
+    return printed(*SMALL.split(), '--json', path), path
 
 
 def row(text: str, name: str) -> list[str]:
@@ -59,7 +55,7 @@ def test_every_method_is_in_the_json(measured):
     names = {record['method'] for record in records}
     assert {'CLAHE + traditional', 'retinex + traditional', 'AHF-ring', 'AHF-aruco'} <= names
     assert len(records) == 2 * len(names)
-    striped = next(
+    (striped,) = (
         it for it in records if (it['method'], it['light']) == ('AHF-traditional', 'stripe')
     )
     assert striped['filter']
@@ -70,7 +66,7 @@ def test_every_method_is_in_the_json(measured):
 def test_plots_come_from_an_earlier_run(measured, tmp_path):
     pytest.importorskip('matplotlib')
     text, path = measured
-    assert paper('--read', path, '--plots', tmp_path / 'plots') == text
+    assert printed('--read', path, '--plots', tmp_path / 'plots') == text
     picture = cv2.imread(str(tmp_path / 'plots' / 'recall.png'))
     assert picture.shape[1] > 300
     assert picture.std() > 10

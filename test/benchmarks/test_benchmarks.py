@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import re
-import subprocess
-import sys
 
 from support import ROOT
+from support.command_line import python
 
 PROGRAM = """
 import contextlib, io, runpy, sys
@@ -28,13 +27,7 @@ def test_every_benchmark_tells_how_it_is_used() -> None:
     files = sorted((ROOT / 'benchmarks').glob('*.py'))
     names = [file.stem for file in files if "__name__ == '__main__'" in file.read_text()]
     assert len(names) >= 10
-    done = subprocess.run(
-        [sys.executable, '-c', PROGRAM, *names],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = python('-c', PROGRAM, *names)
     assert done.returncode == 0, done.stderr
 
 

@@ -10,27 +10,23 @@ from ahf_ros.codes.square import SQUARE_NAMES
 from ahf_ros.target import Target, TrueTarget
 from benchmarks import disturbances, occluders
 from benchmarks.disturbed import Targets
-from benchmarks.exposure import Cell, Exposure
+from benchmarks.exposure import Cell, Exposure, Occluder
 from benchmarks.lookalikes import LOOKALIKES, other_sectors, other_words
-from benchmarks.sheets import (
-    CELL,
-    cell_pixels,
-    mark_sheet,
-    random_numbers,
-    target_sheet,
-)
+from benchmarks.sheets import CELL, cell_pixels, mark_sheet, random_numbers, target_sheet
 
 RADIUS = 12.0
 
 
-def cell(turn: float = 0.3, bits: int = 12) -> Cell:
-    along = np.linspace(-CELL, CELL, 601, dtype=np.float32)
-    x, y = np.meshgrid(along, along[::-1])
-    return Cell(x, y, turn, bits, 2.25, 3.5, float(along[1] - along[0]))
+ALONG = np.linspace(-CELL, CELL, 601, dtype=np.float32)
+PLACE = Cell(*np.meshgrid(ALONG, ALONG[::-1]), 0.3, 12, 2.25, 3.5, float(ALONG[1] - ALONG[0]))
+DISTANCE = np.hypot(PLACE.x, PLACE.y)
+PHASE = (np.arctan2(PLACE.y, PLACE.x) - PLACE.turn) * 12 / (2 * np.pi)
+SECTOR = np.floor(PHASE).astype(int) % 12
 
 
-def radius_and_angle(of: Cell) -> tuple[np.ndarray, np.ndarray]:
-    return np.hypot(of.x, of.y), np.arctan2(of.y, of.x)
+def drawn(occluder: Occluder, seed: int = 2) -> tuple[np.ndarray, np.ndarray]:
+    """Return which share of a cell something covers, and how gray it is."""
+    return occluder(PLACE, np.random.default_rng(seed))
 
 
 @pytest.mark.parametrize('name', ['metashape12', 'aicon14', 'aruco_4x4_50'])
@@ -90,57 +86,45 @@ def test_bright_targets_are_dark_ones_inverted():
 
 @pytest.mark.parametrize('whole', [False, True])
 def test_a_wedge_covers_its_sectors_and_nothing_else(whole):
-    place = cell()
-    share, gray = occluders.over_sectors(2, 99.0, whole=whole)(place, np.random.default_rng(1))
-    distance, angle = radius_and_angle(place)
+    share, gray = drawn(occluders.over_sectors(2, 99.0, whole=whole))
     assert gray == 99.0
-    assert share[distance < 1.15].max() == 0
-    band = (distance > 2.3) & (distance < 3.4)
+    assert share[DISTANCE < 1.15].max() == 0
+    band = (DISTANCE > 2.3) & (DISTANCE < 3.4)
     assert share[band].mean() == pytest.approx(2 / 12, abs=0.01)
     if whole:
-        sector = np.floor((angle - place.turn) * 12 / (2 * np.pi)).astype(int) % 12
-        shares = np.array([share[band & (sector == index)].mean() for index in range(12)])
+        shares = np.array([share[band & (index == SECTOR)].mean() for index in range(12)])
         assert (shares > 0.97).sum() == 2
         assert (shares < 0.03).sum() == 10
 
 
 def test_paper_and_finger_and_disc_reach_as_far_as_they_should():
-    place = cell()
-    distance, _ = radius_and_angle(place)
-    for occluder, nearest, area in (
-        (occluders.paper(2.0, 0.0), 2.0, None),
-        (occluders.disc(1.0, 0.0), 2.875 - 1, np.pi),
-    ):
-        share, _ = occluder(place, np.random.default_rng(2))
-        assert distance[share > 0.5].min() == pytest.approx(nearest, abs=0.02)
-        if area:
-            assert share.sum() * place.width**2 == pytest.approx(area, rel=0.01)
-    share, _ = occluders.finger(2.0, 0.0)(place, np.random.default_rng(2))
-    assert 1.15 < distance[share > 0.5].min() < 2.1
+    (paper, _), (disc, _), (finger, _) = map(
+        drawn, (occluders.paper(2.0, 0.0), occluders.disc(1.0, 0.0), occluders.finger(2.0, 0.0))
+    )
+    assert DISTANCE[paper > 0.5].min() == pytest.approx(2.0, abs=0.02)
+    assert DISTANCE[disc > 0.5].min() == pytest.approx(2.875 - 1, abs=0.02)
+    assert disc.sum() * PLACE.width**2 == pytest.approx(np.pi, rel=0.01)
+    assert 1.15 < DISTANCE[finger > 0.5].min() < 2.1
 
 
 def test_dirt_covers_a_little_of_the_target_and_hides_ink_and_paper():
-    place = cell()
-    distance, _ = radius_and_angle(place)
     sizes = (1 / RADIUS, 3 / RADIUS)
     for occluder, least, most in (
         (occluders.specks(40, sizes), 0.01, 0.035),
         (occluders.scratches(6, sizes), 0.1, 0.4),
     ):
-        share, gray = occluder(place, np.random.default_rng(4))
-        inside = distance < 3.5
+        share, gray = drawn(occluder, 4)
+        inside = DISTANCE < 3.5
         assert least < share[inside].mean() < most
         assert np.ptp(gray[share > 0.5]) > 100  # some is bright, some dark
-    share, _ = occluders.specks(40, sizes)(place, np.random.default_rng(4))
-    assert distance[share > 0].max() < 4
+    share, _ = drawn(occluders.specks(40, sizes), 4)
+    assert DISTANCE[share > 0].max() < 4
 
 
 def test_a_highlight_is_brightest_on_the_band():
-    place = cell()
-    added = occluders.highlight(1.0, 200.0)(place, np.random.default_rng(3))
-    distance, _ = radius_and_angle(place)
+    added = occluders.highlight(1.0, 200.0)(PLACE, np.random.default_rng(3))
     assert added.max() == pytest.approx(200, abs=1)
-    assert distance.ravel()[added.argmax()] == pytest.approx(2.875, abs=0.03)
+    assert DISTANCE.ravel()[added.argmax()] == pytest.approx(2.875, abs=0.03)
 
 
 def test_look_alikes_are_no_codewords():
@@ -150,17 +134,12 @@ def test_look_alikes_are_no_codewords():
             inks = [kind(family(name), generator) for _ in range(2)]
             assert mark_sheet(inks, 1).photograph(Exposure()).min() < 100
     code = family('metashape12')
-    place = cell()
-    jacobian = np.eye(2, dtype=np.float32) * place.width
-    distance, angle = radius_and_angle(place)
-    band = (distance > 2.4) & (distance < 3.3)
+    jacobian = np.eye(2, dtype=np.float32) * PLACE.width
+    middle = (DISTANCE > 2.4) & (DISTANCE < 3.3) & (np.abs(PHASE % 1 - 0.5) < 0.4)
     for draw in (other_words, other_sectors):
         for _ in range(20):
-            ink = draw(code, generator)(place.turn)(place.x, place.y, jacobian)
-            place_in_sector = (angle - place.turn) * 12 / (2 * np.pi) % 1
-            middle = band & (np.abs(place_in_sector - 0.5) < 0.4)
-            sector = np.floor((angle - place.turn) * 12 / (2 * np.pi)).astype(int) % 12
-            shares = np.array([ink[middle & (sector == index)].mean() for index in range(12)])
+            ink = draw(code, generator)(PLACE.turn)(PLACE.x, PLACE.y, jacobian)
+            shares = np.array([ink[middle & (index == SECTOR)].mean() for index in range(12)])
             whole = ((shares < 0.02) | (shares > 0.98)).all()
             word = int((shares > 0.5) @ (1 << np.arange(12)))
             assert not whole or code.number(word) is None

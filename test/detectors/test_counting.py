@@ -2,33 +2,38 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
 
 from ahf_ros.codes.ring import family
-from ahf_ros.detectors import DetectorSettings, create_detector
+from ahf_ros.detectors import DetectorSettings
 from ahf_ros.detectors.ring.counting import estimate_count
-from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
+from ahf_ros.synthetic.scene import Rendering, SceneSettings
+from support.scenes import identified, rendered
 
-SMALL = {'width': 900, 'height': 640, 'targets': 6}
+SMALL = SceneSettings(width=800, height=560, targets=6, seed=12)
 
 
 def scene(**changes) -> Rendering:
-    return render(SceneSettings(**{**SMALL, **changes}))
-
-
-@pytest.mark.parametrize(
-    ('light', 'ambient'),
-    [('normal', 0.3), ('stripe', 0.3), ('stripe', 0.04), ('lattice', 0.12), ('spots', 0.04)],
-)
-def test_the_count_is_right_under_any_light(light, ambient):
-    assert estimate_count(scene(light=light, ambient=ambient, seed=11).image) == 6
+    return rendered(replace(SMALL, **changes))
 
 
 @pytest.mark.parametrize(
     'changes',
     [
+        *(
+            {'light': light, 'ambient': ambient, 'seed': 11}
+            for light, ambient in (
+                ('normal', 0.3),
+                ('stripe', 0.3),
+                ('stripe', 0.04),
+                ('lattice', 0.12),
+                ('spots', 0.04),
+            )
+        ),
         {'polarity': 'bright'},
         {'family': 'aicon14'},
         {'family': 'metashape20', 'light': 'stripe'},
@@ -36,67 +41,46 @@ def test_the_count_is_right_under_any_light(light, ambient):
         {'tilt': 45.0, 'focal_length': 3.0},
     ],
 )
-def test_the_count_is_right_for_targets_of_any_kind(changes):
-    rendering = scene(**changes, seed=12)
-    wanted = DetectorSettings(family=rendering.settings.family)
-    assert estimate_count(rendering.image, wanted) == 6
+def test_the_count_is_right_under_any_light_and_for_targets_of_any_kind(changes):
+    shown = scene(**changes)
+    assert estimate_count(shown.image, DetectorSettings(family=shown.settings.family)) == 6
 
 
 @pytest.mark.parametrize('light', ['normal', 'stripe', 'lattice'])
 def test_none_is_counted_where_there_is_none(light):
-    clutter = scene(targets=0, distractors=10, light=light, seed=13)
-    assert estimate_count(clutter.image) == 0
+    assert estimate_count(scene(targets=0, distractors=10, light=light, seed=13).image) == 0
 
 
-def test_noise_is_no_target():
-    generator = np.random.default_rng(1)
-    assert estimate_count(generator.integers(0, 256, (300, 400), np.uint8)) == 0
+NOISE = np.random.default_rng(1).integers(0, 256, (300, 400), np.uint8)
+RAMP = np.arange(200, dtype=np.uint8) + np.zeros((150, 1), np.uint8)
 
 
-def test_a_ramp_shows_no_dots_at_all():
-    ramp = np.arange(200, dtype=np.uint8) + np.zeros((150, 1), np.uint8)
-    assert estimate_count(ramp) == 0
+@pytest.mark.parametrize('image', [NOISE, RAMP], ids=['noise', 'a ramp without any dots'])
+def test_what_shows_no_target_has_none(image):
+    assert estimate_count(image) == 0
 
 
 def test_targets_count_whose_bands_are_half_hidden():
-    rendering = scene(seed=14)
-    image = rendering.image.copy()
-    for target in rendering.targets:
+    shown = scene()
+    image = shown.image.copy()
+    for target in shown.targets:
         reach = 1.1 * target.semi_major * family('metashape12').band_outer
         corner = np.rint([target.x + 1.4 * target.semi_major, target.y - reach]).astype(int)
         opposite = np.rint([target.x + reach, target.y + reach]).astype(int)
         cv2.rectangle(image, tuple(corner.tolist()), tuple(opposite.tolist()), 110, -1)
-    assert len(create_detector('ring')(image)) < 6
+    assert len(identified(image)) < 6
     assert estimate_count(image) == 6
 
 
 def test_radii_and_polarity_bound_what_counts():
-    image = scene(seed=15).image
+    image = scene().image
     assert estimate_count(image, DetectorSettings(polarity='bright')) == 0
     assert estimate_count(image, DetectorSettings(max_radius=12.0)) == 0
 
 
 @pytest.mark.parametrize('kind', [np.uint16, np.float32])
 def test_images_of_more_bits_are_counted(kind):
-    assert estimate_count(scene(seed=16).image.astype(kind) * 4) == 6
-
-
-def test_the_same_image_gives_the_same_count():
-    image = scene(light='dense_lattice', ambient=0.04, seed=17).image
-    assert estimate_count(image) == estimate_count(image.copy())
-
-
-@pytest.mark.parametrize(
-    ('image', 'words'),
-    [
-        (np.zeros((20, 30, 3), np.uint8), 'image'),
-        (np.full((20, 30), np.nan), 'image has NaN'),
-        (np.full((20, 30), 7, np.uint8), 'image is constant'),
-    ],
-)
-def test_what_is_no_image_is_refused(image, words):
-    with pytest.raises(ValueError, match=words):
-        estimate_count(image)
+    assert estimate_count(scene().image.astype(kind) * 4) == 6
 
 
 @pytest.mark.parametrize(('paper', 'ink'), [(200, 20), (20, 200)])

@@ -8,13 +8,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.codes.ring import FAMILY_NAMES, Family, canonical, family
-from ahf_ros.detectors.ring.decoding import (
-    Words,
-    bits_at,
-    decode,
-    lengthened,
-    sectors_by_phase,
-)
+from ahf_ros.detectors.ring.decoding import Words, bits_at, decode, lengthened
 from ahf_ros.detectors.ring.likelihood import SURPRISES, Evidence
 
 CODE = family('metashape12')
@@ -42,8 +36,18 @@ def of_word(word: int, phase: int = 0, code: Family = CODE) -> np.ndarray:
     return bits_at(np.array([word]), np.array([phase]), PER_SECTOR, code)
 
 
+def hidden_at(clear: Evidence, covered: slice | np.ndarray) -> Evidence:
+    """Return evidence against paper and ink at some angles."""
+    paper, ink = clear.paper.copy(), clear.ink.copy()
+    paper[..., covered] = ink[..., covered] = -2.0
+    return replace(clear, paper=paper, ink=ink)
+
+
 def read(evidence: Evidence, overhang: float = 0.0, code: Family = CODE) -> Words:
     return decode(evidence, np.full(len(evidence.weight), overhang), code)
+
+
+WORD = of_word(CODE.word(30))
 
 
 @pytest.mark.parametrize('name', FAMILY_NAMES)
@@ -56,7 +60,7 @@ def test_clear_evidence_is_the_word_and_no_other_thing(name: str, phase: int) ->
     turn = found.starts - 2 * np.pi * phase / (code.bits * PER_SECTOR)
     assert np.cos(turn * code.bits) == pytest.approx(1)  # in any rotation
     assert found.seen == pytest.approx(FOR * code.bits * PER_SECTOR, rel=0.06)
-    # The next word differs in two sectors, which something would have to cover.
+    # The nearest other word differs in two sectors, which something would have to cover.
     assert 15 < found.margin[0] < 20 * (FOR - AGAINST)
     assert found.marked[0] > found.seen[0] / 4
     assert found.coded[0] > -6  # arcs of any length are the same ones, but for a border
@@ -64,11 +68,9 @@ def test_clear_evidence_is_the_word_and_no_other_thing(name: str, phase: int) ->
 
 
 def test_what_is_covered_is_found_and_says_nothing_about_the_word() -> None:
-    word = CODE.word(30)
     covered = slice(43, 58)
-    clear = seen(of_word(word))
-    evidence = replace(clear, paper=clear.paper.copy(), ink=clear.ink.copy())
-    evidence.paper[..., covered] = evidence.ink[..., covered] = -2.0
+    clear = seen(WORD)
+    evidence = hidden_at(clear, covered)
     found, whole = read(evidence), read(clear)
     assert (found.words, found.starts) == (whole.words, whole.starts)
     assert np.flatnonzero(found.hidden[0]).tolist() == list(range(120))[covered]
@@ -80,31 +82,30 @@ def test_what_is_covered_is_found_and_says_nothing_about_the_word() -> None:
 
 @pytest.mark.parametrize('start', range(0, ANGLES, 17))
 def test_a_cover_may_lie_across_the_first_angle(start: int) -> None:
-    bits = of_word(CODE.word(30))
-    clear = seen(bits)
-    borders = np.any([bits != np.roll(bits, step) for step in range(-2, 3)], axis=0)
+    clear = seen(WORD)
+    borders = np.any([np.roll(WORD, step) != WORD for step in range(-2, 3)], axis=0)
     covered = (np.arange(12) + start) % ANGLES
-    evidence = replace(clear, paper=clear.paper.copy(), ink=clear.ink.copy())
-    evidence.paper[..., covered] = evidence.ink[..., covered] = -2.0
+    evidence = hidden_at(clear, covered)
     found = read(evidence)
     assert canonical(found.words, CODE)[1].tolist() == [30]
-    hidden = set(np.flatnonzero(found.hidden[0]).tolist())
     # What may be a border of a sector is neither paper nor ink in any case.
-    assert (
-        set(covered.tolist()) - set(np.flatnonzero(borders).tolist())
-        <= hidden
-        <= set(covered.tolist())
-    )
+    hidden, at_borders = (set(np.flatnonzero(of).tolist()) for of in (found.hidden[0], borders))
+    assert set(covered.tolist()) - at_borders <= hidden <= set(covered.tolist())
 
 
 def test_two_ids_that_differ_below_a_cover_are_a_draw() -> None:
     one, other = 0b000001011111, 0b000001011001  # apart in two sectors
     differ = (of_word(one) != of_word(other))[0]
-    evidence = seen(of_word(one))
-    evidence.paper[..., differ] = evidence.ink[..., differ] = -2.0
-    found = read(evidence)
+    covered = hidden_at(seen(of_word(one)), differ)
+    found = read(covered)
     assert found.hidden[0, differ].mean() > 0.8
     assert found.margin[0] < 1
+    # What is expected wins a draw and nothing more.
+    expected = frozenset({CODE.number(other)})
+    drawn = decode(covered, np.zeros(1), CODE, expected)
+    assert canonical(drawn.words, CODE)[1].tolist() == [CODE.number(other)]
+    clear = decode(seen(of_word(one)), np.zeros(1), CODE, expected)
+    assert canonical(clear.words, CODE)[1].tolist() == [CODE.number(one)]
 
 
 def test_bare_paper_is_no_target() -> None:
@@ -122,7 +123,7 @@ def test_arcs_of_any_length_are_no_word() -> None:
 
 
 def test_the_dot_speaks_for_a_target_and_not_for_a_word() -> None:
-    clear = seen(of_word(CODE.word(30)))
+    clear = seen(WORD)
     spoken = replace(clear, dot=np.array([7.0], np.float32))
     silent, found = read(clear), read(spoken)
     assert found.marked[0] == pytest.approx(silent.marked[0] + 7)
@@ -131,7 +132,7 @@ def test_the_dot_speaks_for_a_target_and_not_for_a_word() -> None:
 
 
 def test_one_reading_never_says_more_than_its_share() -> None:
-    clear = seen(of_word(CODE.word(30)))
+    clear = seen(WORD)
     paper = clear.paper.copy()
     paper[0, :, 3] = -1000.0 if paper[0, 0, 3] > 0 else 1000.0
     found = read(replace(clear, paper=paper))
@@ -140,46 +141,24 @@ def test_one_reading_never_says_more_than_its_share() -> None:
 
 
 def test_readings_that_are_alike_count_less() -> None:
-    word = of_word(CODE.word(30))
-    full, half = read(seen(word)), read(seen(word, 0.5))
+    full, half = read(seen(WORD)), read(seen(WORD, 0.5))
     assert half.words == full.words
     assert half.seen == pytest.approx(full.seen / 2, rel=0.03)
 
 
 @pytest.mark.parametrize('overhang', [-2.0, 2.0])
 def test_ink_that_has_grown_is_longer_along_the_band(overhang: float) -> None:
-    word = of_word(CODE.word(30))
-    grown = lengthened(word, np.array([overhang]))
+    grown = lengthened(WORD, np.array([overhang]))
     assert canonical(read(seen(grown), overhang).words, CODE)[1].tolist() == [30]
     assert read(seen(grown), overhang).seen[0] > read(seen(grown)).seen[0] + 10
-    assert read(seen(word)).seen[0] > read(seen(word), overhang).seen[0] + 10
-
-
-@pytest.mark.parametrize(
-    ('overhang', 'expected'),
-    [(0.4, '0011100001'), (1.0, '1111110011'), (-1.0, '0001000000'), (2.0, '1111111111')],
-)
-def test_lengthened_bits(overhang: float, expected: str) -> None:
-    bits = np.array([[character == '1' for character in '0011100001']])
-    found = lengthened(bits, np.array([overhang]))
-    assert ''.join(map(str, found[0].astype(int))) == expected
+    assert read(seen(WORD)).seen[0] > read(seen(WORD), overhang).seen[0] + 10
 
 
 def test_each_band_is_lengthened_by_its_own_overhang() -> None:
-    bits = np.zeros((3, 2, 20), bool)
-    bits[..., 5:9] = True
-    found = lengthened(bits, np.array([-1.0, 0.0, 2.0])).sum(axis=2)
-    assert found.tolist() == [[2, 2], [4, 4], [8, 8]]
-
-
-def test_the_sectors_at_a_phase_are_those_of_a_word() -> None:
-    places = sectors_by_phase(PER_SECTOR, CODE)
-    assert places.shape == (PER_SECTOR, CODE.bits, PER_SECTOR)
-    word = CODE.word(88)
-    for phase in (0, 4, 9):
-        marked = of_word(word, phase)[0]
-        of_sectors = marked[places[phase]].mean(axis=1)
-        assert of_sectors.tolist() == [word >> bit & 1 for bit in range(12)]
+    bits = np.tile([character == '1' for character in '0011100001'], (4, 1))
+    found = lengthened(bits, np.array([0.4, 1.0, -1.0, 2.0])).astype(int)
+    expected = ['0011100001', '1111110011', '0001000000', '1111111111']
+    assert [''.join(map(str, band)) for band in found.tolist()] == expected
 
 
 def test_bands_do_not_touch_each_other() -> None:
@@ -190,35 +169,12 @@ def test_bands_do_not_touch_each_other() -> None:
     for index in range(len(marked)):
         alone = read(evidence.select([index]))
         for name in ('words', 'starts', 'marked', 'coded', 'seen', 'margin'):
-            of_both = getattr(together, name)[index], getattr(alone, name)[0]
-            assert of_both[0] == pytest.approx(
-                of_both[1], rel=0.1, abs=5
-            )  # of words at a draw, others compete
-
-
-def test_what_is_expected_wins_a_draw_and_nothing_more() -> None:
-    one, other = 0b000001011111, 0b000001011001
-    of_other = CODE.number(other)
-    differ = (of_word(one) != of_word(other))[0]
-    covered = seen(of_word(one))
-    covered.paper[..., differ] = covered.ink[..., differ] = -2.0
-    expected = frozenset({of_other})
-    drawn = decode(covered, np.zeros(1), CODE, expected)
-    assert canonical(drawn.words, CODE)[1].tolist() == [of_other]
-    clear = decode(seen(of_word(one)), np.zeros(1), CODE, expected)
-    assert canonical(clear.words, CODE)[1].tolist() == [CODE.number(one)]
+            # Of words at a draw, others compete.
+            of_it = pytest.approx(getattr(alone, name)[0], rel=0.1, abs=5)
+            assert getattr(together, name)[index] == of_it
 
 
 def test_no_band_no_word() -> None:
     found = read(seen(np.zeros((0, ANGLES), bool)))
     assert found.words.shape == found.margin.shape == (0,)
     assert found.hidden.shape == (0, ANGLES)
-
-
-def test_canonical_words_and_their_ids() -> None:
-    table = family('aicon12')
-    word = table.word(3)
-    rotated = np.array([word, word >> 1 | (word & 1) << 11, table.word(147)])
-    codes, numbers = canonical(rotated, table)
-    assert codes.tolist() == [word, word, table.word(147)]
-    assert numbers.tolist() == [3, 3, 147]

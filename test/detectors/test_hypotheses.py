@@ -10,80 +10,58 @@ import pytest
 from ahf_ros.codes.ring import family
 from ahf_ros.detectors.ring.decoding import Words
 from ahf_ros.detectors.ring.hypotheses import Hypotheses, resolve
-from ahf_ros.features import frame
-from ahf_ros.features.circle_fit import Fit
+from support.ring import made_up
 
 CODE = family('metashape12')
 RADIUS = 10.0
 
 
-def dots(x: list[float], share: float = 1.0) -> Fit:
-    """Return dots in a row."""
-    count = len(x)
-    return Fit(
-        frames=frame.affine_frames(np.array(x), 50.0, RADIUS, RADIUS, 0.0),
-        polarity=np.ones(count, int),
-        contrast=np.full(count, 0.3),
-        bright=np.full(count, 200.0),
-        share=np.full(count, share),
-        deviation=np.full(count, 0.5),
-        covariance=np.tile(np.eye(2), (count, 1, 1)),
-        blur=np.full(count, 0.8),
-        edge_shift=np.full(count, -0.3),
-    )
-
-
-def hypotheses(places: list[tuple[float, float]], odds: list[float]) -> Hypotheses:
+def hypotheses(places: list[float], odds: list[float]) -> Hypotheses:
     count = len(places)
-    x, y = np.array(places).T
     return replace(
-        Hypotheses.unread(dots(x.tolist()), CODE),
-        frames=frame.affine_frames(x, y, RADIUS, RADIUS, 0.0),
+        Hypotheses.unread(made_up(places, radius=RADIUS), CODE),
         words=np.full(count, 71),
         seen=np.array(odds, float),
         confidence=np.ones(count),
     )
 
 
-def resolved(places, odds, ids, certain=None):
-    found = hypotheses(places, odds)
-    found = replace(found, confidence=found.confidence if certain is None else np.array(certain))
+def resolved(places, odds, ids, confidence):
+    found = replace(hypotheses(places, odds), confidence=np.array(confidence, float))
     kept, certain = resolve(found, np.array(ids))
     return np.flatnonzero(kept).tolist(), certain.tolist()
 
 
-def test_dots_apart_are_all_kept():
-    assert resolved([(50, 50), (150, 50)], [30, 20], [1, 2]) == ([0, 1], [True, True])
+APART, ONE_DOT = [50, 150], [50, 51]
+SURE, FIRST = [True, True], [True, False]
 
 
-def test_of_two_readings_of_a_dot_the_first_is_kept():
-    assert resolved([(50, 50), (51, 50)], [30, 5], [1, 2]) == ([0], [True, False])
+@pytest.mark.parametrize(
+    ('places', 'odds', 'ids', 'confidence', 'kept', 'certain'),
+    [
+        pytest.param(APART, [30, 20], [1, 2], SURE, [0, 1], SURE, id='dots apart'),
+        pytest.param(ONE_DOT, [30, 5], [1, 2], SURE, [0], FIRST, id='two readings of a dot'),
+        pytest.param(ONE_DOT, [30, 20], [1, 2], SURE, [0], [False, False], id='a contested dot'),
+        pytest.param(ONE_DOT, [30, 20], [1, 1], SURE, [0], FIRST, id='readings that agree'),
+        pytest.param(ONE_DOT, [30, 20], [1, 2], FIRST, [0], FIRST, id='an uncertain rival'),
+        pytest.param(APART, [30, 29], [1, 1], FIRST, [0, 1], FIRST, id='an uncertain claim'),
+    ],
+)
+def test_readings_that_contradict_each_other(places, odds, ids, confidence, kept, certain):
+    assert resolved(places, odds, ids, confidence) == (kept, certain)
 
 
-def test_two_readings_of_a_dot_that_are_alike_in_evidence_contest_it():
-    assert resolved([(50, 50), (51, 50)], [30, 20], [1, 2]) == ([0], [False, False])
-
-
-def test_two_readings_of_a_dot_that_say_the_same_agree():
-    assert resolved([(50, 50), (51, 50)], [30, 20], [1, 1]) == ([0], [True, False])
-
-
-def test_an_uncertain_reading_contests_nothing():
-    result = resolved([(50, 50), (51, 50)], [30, 20], [1, 2], [True, False])
-    assert result == ([0], [True, False])
+def test_of_two_claims_to_an_id_the_clearly_better_one_stays():
+    places, ids = [50, 150, 250], [1, 2, 1]
+    assert resolved(places, [30, 20, 10], ids, [1, 1, 1])[1] == [True, True, False]
+    assert resolved(places, [30, 20, 16], ids, [1, 1, 1])[1] == [False, True, False]
 
 
 def test_sectors_of_a_band_that_was_read_are_no_dots():
     """2.9 radii away, between the edges of the band."""
-    in_band = (50 + 2.9 * RADIUS, 50)
-    assert resolved([(50, 50), in_band], [30, 20], [1, 1], [True, False])[0] == [0]
-    assert resolved([(50, 50), in_band], [30, 20], [1, 1], [False, False])[0] == [0, 1]
-
-
-def test_of_two_claims_to_an_id_the_clearly_better_one_stays():
-    places = [(50, 50), (150, 50), (250, 50)]
-    assert resolved(places, [30, 20, 10], [1, 2, 1])[1] == [True, True, False]
-    assert resolved(places, [30, 20, 16], [1, 2, 1])[1] == [False, True, False]
+    places = [50, 50 + 2.9 * RADIUS]
+    assert resolved(places, [30, 20], [1, 1], [True, False])[0] == [0]
+    assert resolved(places, [30, 20], [1, 1], [False, False])[0] == [0, 1]
 
 
 @pytest.mark.parametrize(
@@ -97,24 +75,19 @@ def test_of_two_claims_to_an_id_the_clearly_better_one_stays():
 def test_of_two_targets_whose_bands_overlap_only_the_surer_one_is_certain(
     apart, confidence, on_top
 ):
-    places = [(50, 50), (50 + apart, 50)]
+    places = [50, 50 + apart]
     assert resolved(places, [90, 80], [1, 2], confidence)[1] == on_top
     assert resolved(places, [90, 80], [1, 2], [True, False])[1] == [True, False]
 
 
-def test_uncertain_claims_do_not_count():
-    result = resolved([(50, 50), (150, 50)], [30, 29], [1, 1], [True, False])
-    assert result == ([0, 1], [True, False])
-
-
 def test_parts_of_finds_stay_in_order():
-    found = hypotheses([(50, 50), (150, 50), (250, 50)], [3, 2, 1])
+    found = hypotheses([50, 150, 250], [3, 2, 1])
     parts = [found.select(np.array([2])), found.select(np.array([0, 1]))]
     assert Hypotheses.joined(parts).seen.tolist() == [1, 3, 2]
 
 
 def test_readings_are_taken_over_where_they_belong():
-    fit, better = dots([10.0, 20.0], share=0.8), dots([20.5])
+    fit, better = made_up([10.0, 20.0], share=0.8), made_up([20.5])
     unread = Hypotheses.unread(fit, CODE)
     assert not unread.words.any() and not unread.confidence.any()
     assert np.isnan(unread.shift).all()
@@ -141,7 +114,7 @@ def test_readings_are_taken_over_where_they_belong():
 
 
 def test_centres_on_the_dots_of_others():
-    found = hypotheses([(50, 50), (150, 50)], [2, 1])
-    near = hypotheses([(58, 50), (162, 50)], [2, 1])
+    found = hypotheses([50, 150], [2, 1])
+    near = hypotheses([58, 162], [2, 1])
     assert near.on_dots(found).tolist() == [True, False]
     assert found.on_dots(found.select(np.zeros(2, bool))).tolist() == [False, False]

@@ -1,4 +1,4 @@
-"""What is known of an image while its targets are read."""
+"""What is known of an image while its targets are read: dots, growth, and IDs that are there."""
 
 from __future__ import annotations
 
@@ -7,30 +7,27 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ahf_ros import create_identifier
 from ahf_ros.codes.ring import family
+from ahf_ros.detectors import Expecting, create_detector
+from ahf_ros.detectors.external.guarded import guarded
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.known import NOTHING_KNOWN, Explained, Prior
-from ahf_ros.features import frame
-from ahf_ros.features.circle_fit import Fit
+from ahf_ros.evaluation import RIGHT, WRONG, judge
+from ahf_ros.target import Target
+from benchmarks import occluders
+from benchmarks.disturbances import far_apart
+from benchmarks.exposure import Exposure
+from benchmarks.sheets import target_sheet
+from support.ring import made_up
 
 CODE = family('metashape12')
 
 
-def read(certain: bool, radius: float = 10.0, share: float = 1.0) -> Hypotheses:
-    """Return a dot, and that its word is certain or not."""
-    one = np.ones(1)
-    dot = Fit(
-        frames=frame.affine_frames(100 * one, 50 * one, radius * one, radius * one, 0 * one),
-        polarity=one.astype(int),
-        contrast=one / 4,
-        bright=200 * one,
-        share=share * one,
-        deviation=one / 50,
-        covariance=np.eye(2)[None],
-        blur=0.7 * one,
-        edge_shift=0 * one,
-    )
-    return replace(Hypotheses.unread(dot, CODE), confidence=one * certain)
+def read(certain: bool, share: float = 1.0) -> Hypotheses:
+    """Return a dot of 10 px, and that its word is certain or not."""
+    dot = Hypotheses.unread(made_up([100.0], share), CODE)
+    return replace(dot, confidence=np.ones(1) * certain)
 
 
 def test_certain_targets_are_explained_with_their_bands_and_whole_dots_without() -> None:
@@ -57,3 +54,81 @@ def test_the_shift_of_certain_targets_is_probably_that_of_the_others() -> None:
     apart = Prior.after(frozenset(), np.array([-1.5, -0.5, 0.4, 1.6]))
     assert apart.deviation == NOTHING_KNOWN.deviation
     assert apart.deviation > alike.deviation > 0  # not all are lit and printed alike
+
+
+IDS = far_apart(CODE, 3, 31)
+IMAGE = np.zeros((8, 8), np.uint8)
+PAPER_ON_PAPER = Exposure(occluder=occluders.over_sectors(2, 220.0, whole=True))
+
+
+def kinds(targets, truth):
+    """Return which reports are right, wrong and false."""
+    return [verdict.kind for verdict in judge(truth, targets)]
+
+
+@pytest.fixture(scope='module')
+def covered():
+    """Return photographs of targets under paper, their truth, and what is read without IDs."""
+    sheets = [target_sheet(CODE.name, IDS, seed) for seed in (31, 32, 33)]
+    shown = [(sheet.photograph(PAPER_ON_PAPER), sheet.truth) for sheet in sheets]
+    blind = create_detector('ring')
+    return [(image, truth, kinds(blind(image), truth)) for image, truth in shown]
+
+
+def test_no_two_ids_chosen_far_apart_look_alike_where_sectors_are_covered():
+    assert len(IDS) > 5
+    looks = {}
+    for number in IDS:
+        word = int(CODE.words[number - 1])
+        for start in range(CODE.bits):
+            window = sum(1 << (start + step) % CODE.bits for step in range(3))
+            look = CODE.number(word & ~window)
+            assert look is None or look not in looks or looks[look] == number
+            looks[look] = number
+
+
+def test_paper_on_paper_turns_one_id_into_another_unless_they_are_known(covered):
+    assert any(WRONG in blind for _, _, blind in covered)  # no trace is left to see
+    informed = create_detector('ring').expecting(frozenset(IDS))
+    read = [kind for image, truth, _ in covered for kind in kinds(informed(image), truth)]
+    assert set(read) == {RIGHT}
+
+
+def test_expected_ids_reach_the_detector(covered):
+    image, truth = next((image, truth) for image, truth, blind in covered if WRONG in blind)
+    identifier = create_identifier(expected_ids=','.join(map(str, IDS)), ahf=False)
+    assert WRONG not in kinds(identifier.identify(image).targets, truth)
+
+
+def test_ids_that_are_not_expected_are_never_read_as_expected_ones():
+    sheet = target_sheet(CODE.name, IDS, 31)
+    others = frozenset(range(1, len(CODE.words) + 1)) - frozenset(IDS)
+    detector = create_detector('ring')
+    assert isinstance(detector, Expecting)
+    read = kinds(detector.expecting(others)(sheet.photograph(Exposure())), sheet.truth)
+    assert read.count(RIGHT) == len(read) > 0
+
+
+class Plugin:
+    """A detector of another package that is told which IDs are expected."""
+
+    name, family = 'mine', 'metashape12'
+
+    def __init__(self, ids=()):
+        self.ids = ids
+
+    def __call__(self, image):
+        return [Target(number, 1, 4.0, 4.0, 2.0, 2.0) for number in sorted(self.ids)]
+
+    def expecting(self, ids):
+        if 13 in ids:
+            raise RuntimeError('not that one')
+        return Plugin(ids)
+
+
+def test_a_detector_of_another_package_is_told_the_ids():
+    detector = guarded(Plugin(), 5.0)
+    assert [it.id for it in detector.expecting(frozenset({7, 3}))(IMAGE)] == [3, 7]
+    assert detector(IMAGE) == []
+    with pytest.raises(ValueError, match=r"detector 'mine' failed.*not that one"):
+        detector.expecting(frozenset({13}))

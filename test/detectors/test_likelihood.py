@@ -8,15 +8,14 @@ import numpy as np
 import pytest
 
 from ahf_ros.detectors.ring.likelihood import (
+    Evidence,
     band_edges,
     edge_evidence,
     level_evidence,
     light_edges,
     weights,
 )
-from ahf_ros.detectors.ring.polar import PolarImages, angles_of, polar_images
-from ahf_ros.features.circle_fit import fit_dots
-from ahf_ros.features.frame import affine_frames
+from ahf_ros.detectors.ring.polar import PolarImages
 from ahf_ros.imaging.image import SATURATED
 
 BAND = (2.25, 3.5)
@@ -24,6 +23,10 @@ ANGLES, CIRCLES, OUTERMOST = 60, 200, BAND[1] + 0.95
 RADII = np.linspace(0.3, OUTERMOST, CIRCLES)
 MARKED = np.arange(ANGLES) // 10 % 2 == 0
 ONE, NONE = np.ones(1), np.zeros(1)
+
+
+def edges(of: PolarImages) -> Evidence:
+    return edge_evidence(of, ONE, NONE, BAND)
 
 
 def inside(low: float, high: float) -> np.ndarray:
@@ -94,14 +97,14 @@ def test_bands_grow_on_both_sides() -> None:
 def test_what_is_neither_paper_nor_ink_speaks_against_both() -> None:
     between = polar()
     between.gray[:, :20, inside(*BAND)] = 110.0
-    evidence = edge_evidence(between, ONE, NONE, BAND)
+    evidence = edges(between)
     assert (np.maximum(evidence.paper, evidence.ink)[..., :20] < 0).all()
 
 
 def test_the_halves_of_a_band_are_seen_apart() -> None:
     half = polar()
     half.gray[:, :10, inside(3, BAND[1])] = 110.0  # only the outer edge
-    whole, seen = (edge_evidence(of, ONE, NONE, BAND) for of in (polar(), half))
+    whole, seen = map(edges, (polar(), half))
     assert seen.ink[0, 0] == pytest.approx(whole.ink[0, 0])
     assert (seen.ink[0, 1, :10] < 0).all()
     assert seen.ink[0, 1, 10:] == pytest.approx(whole.ink[0, 1, 10:])
@@ -110,7 +113,7 @@ def test_the_halves_of_a_band_are_seen_apart() -> None:
 def test_angles_that_the_image_does_not_show_say_nothing() -> None:
     reach = np.full((1, ANGLES), np.inf)
     reach[:, 5:25] = BAND[0]
-    evidence = edge_evidence(replace(polar(), reach=reach), ONE, NONE, BAND)
+    evidence = edges(replace(polar(), reach=reach))
     assert not evidence.paper[..., 5:25].any()
     assert not evidence.ink[..., 5:25].any()
     assert evidence.paper[..., 25:].all()
@@ -119,7 +122,7 @@ def test_angles_that_the_image_does_not_show_say_nothing() -> None:
 def test_white_bands_under_glare_say_nothing_but_over_exposed_paper_does() -> None:
     glare, white = polar(), polar(light=255.0, glare=np.inf)
     glare.gray[:, :20] = 255.0
-    of_glare, of_white = (edge_evidence(it, ONE, NONE, BAND) for it in (glare, white))
+    of_glare, of_white = map(edges, (glare, white))
     assert not of_glare.paper[..., :20].any()
     assert not of_glare.ink[..., :20].any()
     assert of_white.paper[..., ~MARKED].min() > 0
@@ -130,43 +133,16 @@ def test_white_bands_under_glare_say_nothing_but_over_exposed_paper_does() -> No
 def test_marks_under_glare_are_ink_though_their_steps_are_small(added: float) -> None:
     glossy = replace(polar(), glare=np.array([215.0], np.float32))
     glossy.gray[:] = np.minimum(glossy.gray + added, 255)
-    evidence = edge_evidence(glossy, ONE, NONE, BAND)
+    evidence = edges(glossy)
     assert (evidence.ink > evidence.paper)[..., MARKED].all()
     assert (evidence.ink <= evidence.paper)[..., ~MARKED].all()
-
-
-def usual_levels(image: np.ndarray) -> tuple[float, float]:
-    """Return between which levels the ground of a target in the middle of an image is usual."""
-    gray = np.minimum(image, 255).astype(np.float32)
-    frames = affine_frames([60.0], [60.0], [12.0], [12.0], [0.0])
-    dots = fit_dots(gray, frames, np.array([1]), rays=24, reach=0.3)
-    of = polar_images(gray, dots, BAND, ANGLES)
-    return float(of.shade[0]), float(of.glare[0])
-
-
-Y, X = np.mgrid[:121, :121].astype(np.float32)
-DOT = np.where(np.hypot(X - 60, Y - 60) < 12, 45.0, 180.0)
-AWAY = np.hypot(X - 95, Y - 60)
-
-
-def test_what_is_bright_with_soft_borders_is_glare_and_with_sharp_ones_light() -> None:
-    assert 185 < usual_levels(DOT)[1] < 200
-    assert usual_levels(DOT + 150 * np.exp(-0.5 * (AWAY / 12) ** 2))[1] < 220
-    assert usual_levels(np.where(AWAY < 20, 1.4, 1.0) * DOT)[1] == 256
-    assert usual_levels(DOT + 210)[1] == np.inf
-
-
-def test_what_is_dark_on_a_small_part_of_the_ground_covers_it() -> None:
-    assert 160 < usual_levels(DOT)[0] < 175
-    assert 160 < usual_levels(np.where(AWAY < 15, 0.5, 1.0) * DOT)[0] < 175
-    assert usual_levels(np.where(X < 55, 0.5, 1.0) * DOT)[0] <= 0
 
 
 def test_readings_of_neighbours_that_are_alike_share_one_weight() -> None:
     sparse, dense = weights(polar(size=60.0)), weights(polar(size=6.0))
     assert sparse.tolist() == [1.0]
     assert dense[0] == pytest.approx(2 * np.pi * 2.25 * 6 / ANGLES / 2.5)
-    small, large = (edge_evidence(polar(size=of), ONE, NONE, BAND) for of in (8.0, 16.0))
+    small, large = (edges(polar(size=of)) for of in (8.0, 16.0))
     of_paper = [(of.paper / of.weight)[0, 0, 15] for of in (small, large)]
     assert of_paper[0] == pytest.approx(of_paper[1])
 
@@ -177,95 +153,50 @@ def test_gaps_tell_how_often_light_has_edges() -> None:
     inner = np.array([BAND[0]])
     assert light_edges(calm, ONE, NONE, inner).tolist() == [0.05]
     assert light_edges(restless, ONE, NONE, inner)[0] == pytest.approx(1 / 3, abs=0.02)
-    doubtful = edge_evidence(restless, ONE, NONE, BAND)
-    certain = edge_evidence(calm, ONE, NONE, BAND)
-    assert (doubtful.ink[0, :, 1] < certain.ink[0, :, 1]).all()
+    assert (edges(restless).ink[0, :, 1] < edges(calm).ink[0, :, 1]).all()
 
 
-def levels(of: PolarImages, spread: float) -> tuple[np.ndarray, ...]:
-    """Return what `level_evidence` is given: levels, their light, its spread and the radii."""
+def by_levels(of: PolarImages, light: float | None = 200.0, spread: float = 0.05) -> Evidence:
+    """Return what levels say under light of a known spread; None: light as it is seen."""
     radii = np.array([0.5, 1.6, 2.6, 3.1, 3.9])
     values = np.stack([of.at(np.array([radius])) for radius in radii], axis=2)
-    light = np.full_like(values, 200.0)
-    return values, light, np.full_like(values, spread), radii
+    known = values if light is None else np.full_like(values, light)
+    return level_evidence(of, values, known, np.full_like(values, spread), radii, BAND)
 
 
-@pytest.mark.parametrize('polarity', [1, -1])
-def test_levels_tell_ink_from_paper_where_light_is_known(polarity: int) -> None:
-    target = polar(200.0, polarity)
-    values, light, spread, radii = levels(target, 0.05)
-    paper = light if polarity > 0 else 0.25 * light
-    evidence = level_evidence(target, values, paper, spread, radii, BAND)
+@pytest.mark.parametrize(('polarity', 'paper'), [(1, 200.0), (-1, 50.0)])
+def test_levels_tell_ink_from_paper_where_light_is_known(polarity: int, paper: float) -> None:
+    evidence, silent, vague = (
+        by_levels(polar(200.0, polarity), paper, spread) for spread in (0.05, np.inf, 1.0)
+    )
     for half in range(2):
         assert (evidence.ink > evidence.paper)[0, half].tolist() == MARKED.tolist()
     assert evidence.dot[0] > 5
-    unknown = np.full_like(spread, np.inf)
-    silent = level_evidence(target, values, paper, unknown, radii, BAND)
     assert not silent.ink.any() and not silent.paper.any() and not silent.dot.any()
-    vague = level_evidence(target, values, paper, np.full_like(spread, 1.0), radii, BAND)
     assert np.abs(vague.ink - vague.paper).max() < np.abs(evidence.ink - evidence.paper).min()
 
 
 def test_ground_beside_the_band_that_is_not_as_predicted_speaks_against_both() -> None:
     target = polar()
     target.gray[:, :8, inside(BAND[1], 9)] = 90.0  # something lies on the margin
-    values, light, spread, radii = levels(target, 0.02)
-    evidence = level_evidence(target, values, light, spread, radii, BAND)
+    evidence = by_levels(target, spread=0.02)
     assert (evidence.ink[0, 1, :8] < evidence.ink[0, 1, 20:28] - 0.5).all()
     assert (evidence.ink[0, 0, :8] == evidence.ink[0, 0, 20:28]).all()  # of the half inside
 
 
 def test_a_dot_of_light_on_paper_is_no_ink() -> None:
-    target = polar()
-    values, _, spread, radii = levels(target, 0.05)
-    assert level_evidence(target, values, values, spread, radii, BAND).dot[0] < -5
+    assert by_levels(polar(), None).dot[0] < -5
 
 
 def test_what_covers_the_ground_covers_the_edge_beside_it_and_the_levels() -> None:
     target = polar(shade=100.0)
     target.gray[:, 5:8, inside(BAND[1], 9)] = 90.0
-    edges = edge_evidence(target, ONE, NONE, BAND)
-    values, light, spread, radii = levels(target, 0.05)
-    seen = level_evidence(target, values, light, spread, radii, BAND)
-    both = edges.plus(seen)
+    of_steps = edges(target)
+    seen = by_levels(target)
+    both = of_steps.plus(seen)
     assert np.flatnonzero(both.covered.any(axis=1)).tolist() == [5, 6, 7]
     for name in ('paper', 'ink'):
-        of_edges, of_levels, of_both = (getattr(of, name)[0] for of in (edges, seen, both))
+        of_edges, of_levels, of_both = (getattr(of, name)[0] for of in (of_steps, seen, both))
         assert of_edges[1, 5:8].all() and not of_both[1, 5:8].any()
         assert np.array_equal(of_both[0, 5:8], of_edges[0, 5:8])
         assert np.array_equal(of_both[:, 8:], (of_edges + of_levels)[:, 8:])
-
-
-def test_ink_under_light() -> None:
-    paper = np.array([[100.0, 40.0]])
-    dark, bright = polar(), polar(polarity=-1)
-    assert dark.inked(paper, paper).tolist() == [[25.0, 10.0]]
-    assert bright.inked(paper, paper).tolist() == [[400.0, 160.0]]
-    # Of ink that is brighter than white the camera says only that it is white.
-    white = np.array([[SATURATED, 150.0]])
-    assert bright.inked(paper, white).tolist() == [[SATURATED, 160.0]]
-
-
-def test_circles_are_read_between_two_others() -> None:
-    image = polar()
-    slope = replace(image, gray=np.broadcast_to(RADII.astype(np.float32), (1, ANGLES, CIRCLES)))
-    for radius in (0.3, 1.234, OUTERMOST - 0.01):
-        assert slope.at(np.array([radius])) == pytest.approx(radius, abs=1e-5)
-
-
-def test_polar_images_of_an_image() -> None:
-    """A dot of 12 px with a bright quarter circle, at the right border."""
-    y, x = np.mgrid[0:120, 0:100]
-    away = np.hypot(x - 60, y - 60)
-    gray = np.where(away < 12, 50, 200).astype(np.float32)
-    frames = affine_frames([60.0], [60.0], [12.0], [12.0], [0.0])
-    dots = fit_dots(gray, frames, np.array([1]), rays=24, reach=0.45)
-    image = polar_images(gray, dots, BAND, ANGLES)
-    assert image.contrast[0] == pytest.approx(0.25, abs=0.05)
-    assert image.size[0] == pytest.approx(12, abs=0.3)
-    assert image.at(np.array([0.6])) == pytest.approx(50, abs=2)
-    assert image.at(np.array([2.0]))[image.reach >= sum(BAND) / 2] == pytest.approx(200, abs=2)
-    # Counter-clockwise as seen, from +x: first out of the image, then in it, then out of it again.
-    for radius in (sum(BAND) / 2, BAND[1]):
-        inside = 60 + radius * 12 * np.cos(angles_of(ANGLES)) < 99
-        assert ((image.reach[0] >= radius) == inside).mean() > 0.95

@@ -10,20 +10,13 @@ import pytest
 from ahf_ros.codes.ring import family
 from ahf_ros.detectors import DetectorSettings
 from ahf_ros.detectors.ring import proposals
-from ahf_ros.detectors.ring.circles import REACH
 from ahf_ros.detectors.ring.detector import find_hypotheses, report
 from ahf_ros.detectors.ring.proposals import may_be_targets
-from ahf_ros.features.circle_fit import Fit, fit_dots
-from ahf_ros.features.frame import affine_frames
 from ahf_ros.synthetic.scene import SceneSettings, render
+from support.ring import lone_dot, measured
 
+SMALL = SceneSettings(width=800, height=600, targets=4)
 FAMILIES = [family(name) for name in ('aicon14', 'metashape12')]
-
-
-def dots(gray: np.ndarray, x: list[float], y: list[float], radius: float, polarity: int) -> Fit:
-    size = np.full(len(x), radius)
-    frames = affine_frames(np.array(x), np.array(y), size, size, 0 * size)
-    return fit_dots(gray, frames, np.full(len(x), polarity), rays=24, reach=REACH, rounds=1)
 
 
 @pytest.mark.parametrize('polarity', ['dark', 'bright'])
@@ -32,21 +25,13 @@ def dots(gray: np.ndarray, x: list[float], y: list[float], radius: float, polari
 def test_middles_of_targets_are_worth_reading(
     light: str, polarity: str, edge_shift: float
 ) -> None:
-    scene = SceneSettings(
-        width=900,
-        height=600,
-        targets=4,
-        light=light,
-        polarity=polarity,
-        edge_shift=edge_shift,
-        texture=0.0,
-        seed=5,
-    )
+    kind = {'polarity': polarity, 'edge_shift': edge_shift, 'light': light}
+    scene = replace(SMALL, texture=0.0, seed=5, **kind)
     rendering = render(scene)
     gray = rendering.image.astype(np.float32)
     x, y = zip(*((it.x, it.y) for it in rendering.targets), strict=True)
     sign = 1 if polarity == 'dark' else -1
-    middles = dots(gray, list(x), list(y), scene.dot_radius + sign * edge_shift, sign)
+    middles = measured(gray, x, y, scene.dot_radius + sign * edge_shift, sign, rounds=1)
     assert may_be_targets(gray, middles, FAMILIES).all()
     assert may_be_targets(gray, middles.select(slice(0)), FAMILIES).shape == (0,)
 
@@ -54,25 +39,25 @@ def test_middles_of_targets_are_worth_reading(
 @pytest.mark.parametrize(('ink', 'paper'), [(50, 200), (200, 50)])
 @pytest.mark.parametrize('x', [150.0, 50.0])
 def test_a_dot_without_a_band_is_not_worth_reading(ink: int, paper: int, x: float) -> None:
-    columns, rows = np.meshgrid(np.arange(300), np.arange(200))
-    gray = np.where(np.hypot(columns - x, rows - 100) < 12, ink, paper).astype(np.float32)
-    alone = dots(gray, [x], [100.0], 12.0, 1 if ink < paper else -1)
+    gray = lone_dot(ink, paper, x)
+    alone = measured(gray, [x], [100.0], 12.0, 1 if ink < paper else -1, rounds=1)
     assert not may_be_targets(gray, alone, FAMILIES).any()
 
 
 @pytest.mark.parametrize(
     'scene',
     [
-        SceneSettings(light='lattice', ambient=0.3, seed=3),
-        SceneSettings(light='stripe', ambient=0.12, dot_radius=10.0, distractors=6, seed=4),
+        replace(SMALL, targets=6, light='lattice', ambient=0.3, seed=3),
+        replace(
+            SMALL, targets=6, light='stripe', ambient=0.12, dot_radius=10.0, distractors=6, seed=4
+        ),
     ],
     ids=['lattice', 'stripe'],
 )
 def test_a_glance_saves_time_and_changes_nothing(
     scene: SceneSettings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    changes = {'width': 800, 'height': 600, 'targets': 6}
-    image, settings = render(replace(scene, **changes)).image, DetectorSettings()
+    image, settings = render(scene).image, DetectorSettings()
     few = find_hypotheses(image, settings)
     monkeypatch.setattr(proposals, '_HOPEFUL', -np.inf)
     all_dots = find_hypotheses(image, settings)

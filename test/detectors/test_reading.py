@@ -3,34 +3,29 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
 import pytest
 
 from ahf_ros.codes.ring import FAMILY_NAMES, canonical, family
-from ahf_ros.detectors.ring.circles import REACH
-from ahf_ros.detectors.ring.confidence import CERTAIN, confidence, features
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.polar import polar_images
 from ahf_ros.detectors.ring.reading import best_growth, read_bands
-from ahf_ros.features import frame
-from ahf_ros.features.circle_fit import Fit, fit_dots
-from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
+from ahf_ros.features.circle_fit import Fit
+from ahf_ros.synthetic.scene import Rendering, SceneSettings
+from support.ring import lone_dot, measured
+from support.scenes import rendered
 
 SMALL = SceneSettings(width=800, height=600, targets=6, dot_radius=18.0, seed=7)
 CODE = family(SMALL.family)
-
-rendered = lru_cache(render)
+LIGHTS = ('stripe', 'lattice', 'fringe', 'shadow', 'spots')
 
 
 def dots_of(rendering: Rendering) -> Fit:
     """Return the dots of a scene, measured from where they truly are."""
-    values = [(of.x, of.y, of.semi_major, of.semi_minor, of.angle) for of in rendering.targets]
-    frames = frame.affine_frames(*np.array(values).T)
-    polarity = np.full(len(frames), 1 if rendering.settings.polarity == 'dark' else -1)
-    gray = rendering.image.astype(np.float32)
-    return fit_dots(gray, frames, polarity, rays=24, reach=REACH)
+    x, y, radii = np.array([(of.x, of.y, of.semi_major) for of in rendering.targets]).T
+    polarity = 1 if rendering.settings.polarity == 'dark' else -1
+    return measured(rendering.image, x, y, radii, polarity)
 
 
 def read(rendering: Rendering, name: str = '') -> Hypotheses:
@@ -38,28 +33,26 @@ def read(rendering: Rendering, name: str = '') -> Hypotheses:
     return read_bands(gray, dots_of(rendering), family(name or rendering.settings.family))
 
 
-@pytest.mark.parametrize('polarity', ['dark', 'bright'])
-@pytest.mark.parametrize('name', FAMILY_NAMES)
-def test_words_are_read_in_their_direction(name: str, polarity: str) -> None:
-    rendering = rendered(replace(SMALL, family=name, polarity=polarity))
-    found = read(rendering)
-    codes, numbers = canonical(found.words, family(name))
-    assert codes.tolist() == [target.code for target in rendering.targets]
-    assert numbers.tolist() == [target.id for target in rendering.targets]
-    assert found.margin.min() > 10
-    assert found.certain.all()
-    assert not found.hidden.any()
-
-
-@pytest.mark.parametrize('light', ['stripe', 'lattice', 'fringe', 'shadow', 'spots'])
-def test_light_changes_the_margin_and_not_the_words(light: str) -> None:
-    rendering = rendered(replace(SMALL, light=light))
-    found = read(rendering)
-    _, numbers = canonical(found.words, CODE)
-    assert numbers.tolist() == [target.id for target in rendering.targets]
-    assert found.margin.min() > 5
+@pytest.mark.parametrize(
+    ('changes', 'margin', 'hidden'),
+    [
+        *(({'family': name, 'polarity': 'dark'}, 10, 0) for name in FAMILY_NAMES),
+        *(({'family': name, 'polarity': 'bright'}, 10, 0) for name in FAMILY_NAMES),
+        *(({'light': light}, 5, 0.1) for light in LIGHTS),
+    ],
+)
+def test_words_are_read_in_their_direction(
+    changes: dict[str, str], margin: float, hidden: float
+) -> None:
+    shown = rendered(replace(SMALL, **changes))
+    found = read(shown)
+    codes, numbers = canonical(found.words, family(shown.settings.family))
+    assert codes.tolist() == [target.code for target in shown.targets]
+    assert numbers.tolist() == [target.id for target in shown.targets]
+    assert found.margin.min() > margin
     assert found.marked.min() > 0
-    assert found.hidden.max() < 0.1
+    assert found.certain.all()
+    assert found.hidden.max() <= hidden
 
 
 @pytest.mark.parametrize('shift', [-1.2, -0.8, 0.8, 1.2])
@@ -100,21 +93,15 @@ def test_a_covered_part_says_nothing_about_the_word(first: int) -> None:
     assert found.seen[0] < clean.seen[0]
 
 
-def test_bare_paper_is_no_target() -> None:
+@pytest.mark.parametrize('ring', [False, True], ids=['bare paper', 'a ring of ink'])
+def test_what_has_no_sectors_is_no_target(ring: bool) -> None:
     rendering = rendered(SMALL)
     _, away = sectors_at(rendering, 0.0)
-    blank = np.where((away > 1.6) & (away < 4.2), np.uint8(200), rendering.image)
-    found = read(replace(rendering, image=blank))
-    assert (found.words[0] == 0) | (found.marked[0] < 0)
-    assert found.certain.tolist() == [False] + 5 * [True]
-
-
-def test_a_ring_of_ink_is_no_word() -> None:
-    rendering = rendered(SMALL)
-    _, away = sectors_at(rendering, 0.0)
-    ring = np.where((away > 1.6) & (away < 4.2), np.uint8(200), rendering.image)
-    ring = np.where((away > 2.25) & (away < 3.5), np.uint8(60), ring)
-    found = read(replace(rendering, image=ring))
+    image = np.where((away > 1.6) & (away < 4.2), np.uint8(200), rendering.image)
+    if ring:
+        image = np.where((away > 2.25) & (away < 3.5), np.uint8(60), image)
+    found = read(replace(rendering, image=image))
+    assert ring or found.words[0] == 0 or found.marked[0] < 0
     assert found.certain.tolist() == [False] + 5 * [True]
 
 
@@ -132,25 +119,7 @@ def test_no_dots_no_readings() -> None:
 
 
 def test_a_dot_on_bare_paper_leaves_nothing_to_read() -> None:
-    columns, rows = np.meshgrid(np.arange(300), np.arange(200))
-    gray = np.where(np.hypot(columns - 150, rows - 100) < 12, 50, 200).astype(np.float32)
-    frames = frame.affine_frames([150.0], [100.0], [12.0], [12.0], [0.0])
-    dots = fit_dots(gray, frames, np.array([1]), rays=24, reach=REACH)
-    found = read_bands(gray, dots, CODE)
+    gray = lone_dot()
+    found = read_bands(gray, measured(gray, [150.0], [100.0], 12.0), CODE)
     assert found.words.tolist() == [0]
     assert not found.certain.any()
-
-
-def test_confidence_is_a_probability_that_grows_with_the_evidence() -> None:
-    found = read(rendered(SMALL))
-    sure = confidence(features(found))
-    assert len(features(found)) == 6
-    assert ((sure > 0.9) & (sure <= 1)).all()
-    assert np.array_equal(sure, found.confidence)
-    for name in ('margin', 'marked', 'seen', 'coded', 'share'):
-        values = getattr(found, name)
-        less = confidence(features(replace(found, **{name: values - np.abs(values) / 2})))
-        assert ((less >= 0) & (less <= sure)).all(), name
-    against = replace(found, marked=-found.marked, coded=found.coded - 50)
-    assert (confidence(features(against)) < CERTAIN).all()
-    assert confidence(features(replace(found, margin=0 * found.margin))).max() <= 0.5

@@ -13,23 +13,22 @@ from ahf_ros.codes.ring import family
 from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.detectors.ring.counting import estimate_count
 from ahf_ros.synthetic.covers import Cover, ring_cover
-from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
+from ahf_ros.synthetic.scene import Rendering, SceneSettings
 from ahf_ros.target import UNDECODED, Target
 from benchmarks.exposure import Exposure
 from benchmarks.sheets import mark_sheet
+from support.scenes import identified, rendered
 
-FAMILIES = ('metashape12', 'metashape20', 'aicon14')
+TWO = ('metashape12', 'aicon14')
+THREE = ('metashape12', 'metashape20', 'aicon14')
+LIGHTS = ('normal', 'stripe')
+SMALL = SceneSettings(width=480, height=360, targets=4, dot_radius=10, seed=21)
 SHARED = {'metashape12': 455, 'metashape16': 3855, 'metashape20': 31775}
 """One print."""
 
 
-@cache
-def rendering(name: str, light: str = 'normal') -> Rendering:
-    return render(
-        SceneSettings(
-            width=480, height=360, targets=4, dot_radius=10, family=name, light=light, seed=21
-        )
-    )
+def scene(name: str, light: str = 'normal') -> Rendering:
+    return rendered(replace(SMALL, family=name, light=light))
 
 
 def side_by_side(*renderings: Rendering) -> tuple[np.ndarray, list[tuple[str, int, float, float]]]:
@@ -42,10 +41,6 @@ def side_by_side(*renderings: Rendering) -> tuple[np.ndarray, list[tuple[str, in
     return np.hstack([it.image for it in renderings]), truth
 
 
-def found(image: np.ndarray, families: str) -> list[Target]:
-    return create_detector('ring', family=families)(image)
-
-
 def matches(targets: list[Target], truth: list[tuple[str, int, float, float]]) -> bool:
     """Return whether the targets are the true ones, each in its place."""
     if sorted(it.key for it in targets) != sorted((name, number) for name, number, *_ in truth):
@@ -56,30 +51,25 @@ def matches(targets: list[Target], truth: list[tuple[str, int, float, float]]) -
     )
 
 
-@pytest.mark.parametrize('light', ['normal', 'stripe'])
-@pytest.mark.parametrize('families', ['metashape12,aicon14', 'aicon14, metashape12', 'auto'])
-def test_every_target_says_its_family(families, light):
-    image, truth = side_by_side(rendering('metashape12', light), rendering('aicon14', light))
-    assert matches(found(image, families), truth)
-
-
-def test_three_families_with_bands_of_the_same_radii_or_not():
-    image, truth = side_by_side(*map(rendering, FAMILIES))
-    assert matches(found(image, 'auto'), truth)
-    assert matches(found(image, ','.join(FAMILIES)), truth)
+@pytest.mark.parametrize(
+    ('shown', 'light', 'families'),
+    [
+        (TWO, 'normal', 'aicon14, metashape12'),
+        *((TWO, light, families) for light in LIGHTS for families in (','.join(TWO), 'auto')),
+        *((THREE, 'normal', families) for families in (','.join(THREE), 'auto')),
+    ],
+)
+def test_every_target_says_its_family(shown, light, families):
+    image, truth = side_by_side(*(scene(name, light) for name in shown))
+    assert matches(identified(image, family=families), truth)
 
 
 def test_centres_are_refined_by_each_target_s_own_family():
-    image, truth = side_by_side(rendering('metashape12'), rendering('aicon14'))
-    detector = create_detector('ring', family='auto')
-    rough = [
-        Target(it.id, it.code, it.x + 0.5, it.y - 0.5, it.semi_major, it.semi_minor, it.angle)
-        for it in detector(image)
-    ]
-    named = [
-        replace(it, family=own.family) for it, own in zip(rough, detector(image), strict=True)
-    ]
-    assert matches(list(detector.refine(image, named)), truth)
+    image, truth = side_by_side(*map(scene, TWO))
+    detector = create_detector('ring', family=','.join(TWO))
+    moved = [replace(it, x=it.x + 0.5, y=it.y - 0.5) for it in detector(image)]
+    assert not matches(moved, truth)
+    assert matches(list(detector.refine(image, moved)), truth)
 
 
 def ink(name: str, word: int) -> Callable[[float], Cover]:
@@ -93,8 +83,9 @@ def sheet(*marks: tuple[str, int]) -> np.ndarray:
 
 
 def test_an_id_of_two_families_is_two_targets():
-    marks = ('metashape12', family('metashape12').word(9)), ('aicon14', family('aicon14').word(9))
-    assert [it.key for it in found(sheet(*marks), 'auto')] == [('aicon14', 9), ('metashape12', 9)]
+    image = sheet(*((name, family(name).word(9)) for name in TWO))
+    keys = [it.key for it in identified(image, family=','.join(TWO))]
+    assert keys == [('aicon14', 9), ('metashape12', 9)]
 
 
 @pytest.mark.parametrize('name', SHARED)
@@ -103,7 +94,7 @@ def test_a_print_of_three_families_is_of_the_family_beside_it(name, families):
     """The print is the same in each image; what is beside it is not."""
     others = [(name, int(family(name).words[index])) for index in (20, 40)]
     image = sheet(('metashape12', SHARED['metashape12']), *others)
-    targets = found(image, families or name)
+    targets = identified(image, family=families or name)
     assert sorted(it.code for it in targets) == sorted([SHARED[name], *(it[1] for it in others)])
     assert {it.family for it in targets} == {name}
 
@@ -111,43 +102,39 @@ def test_a_print_of_three_families_is_of_the_family_beside_it(name, families):
 @pytest.mark.parametrize('name', SHARED)
 def test_a_print_of_three_families_alone_is_of_the_one_that_is_named(name):
     image = sheet(('metashape12', SHARED['metashape12']))
-    assert [(it.family, it.code) for it in found(image, name)] == [(name, SHARED[name])]
+    assert [(it.family, it.code) for it in identified(image, family=name)] == [
+        (name, SHARED[name])
+    ]
 
 
 @pytest.mark.parametrize('families', ['auto', 'metashape16,metashape12'])
 def test_a_print_of_three_families_alone_is_of_none(families):
     image = sheet(('metashape12', SHARED['metashape12']))
-    assert found(image, families) == []
-    detector = create_detector('ring', family=families, report_undecoded=True)
-    centre = [it for it in detector(image) if it.semi_major > 8]
+    assert identified(image, family=families) == []
+    dots = identified(image, family=families, report_undecoded=True)
+    centre = [it for it in dots if it.semi_major > 8]
     assert all((it.id, it.family) == (UNDECODED, '') for it in centre)
 
 
 def test_targets_of_another_family_do_not_settle_a_print():
     marks = [('aicon14', int(family('aicon14').words[index])) for index in (20, 40, 60)]
-    targets = found(sheet(('metashape12', SHARED['metashape12']), *marks), 'auto')
+    targets = identified(sheet(('metashape12', SHARED['metashape12']), *marks), family='auto')
     assert sorted(it.code for it in targets) == sorted(word for _, word in marks)
 
 
-@pytest.mark.parametrize(
-    ('shown', 'read'), [('aicon14', 'metashape14'), ('metashape12', 'aicon12')]
-)
-def test_bands_of_other_radii_are_not_read(shown, read):
-    assert found(rendering(shown).image, read) == []
+def test_bands_of_other_radii_are_not_read():
+    assert identified(scene('aicon14').image, family='metashape14') == []
 
 
 def test_targets_of_several_families_are_counted():
-    image, truth = side_by_side(rendering('metashape12'), rendering('aicon14'))
+    image, truth = side_by_side(*map(scene, TWO))
     assert estimate_count(image, DetectorSettings(family='auto')) == len(truth)
 
 
 def test_both_prints_are_found_among_the_many_dots_of_a_lattice():
-    scene = SceneSettings(
-        width=900, height=700, targets=8, dot_radius=10, light='lattice', seed=21
-    )
-    shown = [replace(scene, family=name, ambient=0.12) for name in ('metashape12', 'aicon14')]
-    image = np.hstack([render(each).image for each in shown])
-    names = [target.family for target in found(image, 'metashape12,aicon14')]
+    wide = replace(SMALL, width=900, height=700, targets=8, light='lattice', ambient=0.12)
+    image = np.hstack([rendered(replace(wide, family=name)).image for name in TWO])
+    names = [target.family for target in identified(image, family='metashape12,aicon14')]
     assert names.count('metashape12') >= 7
     assert names.count('aicon14') >= 7
 
@@ -155,26 +142,27 @@ def test_both_prints_are_found_among_the_many_dots_of_a_lattice():
 @pytest.mark.parametrize('families', ['cct10', 'cct12'])
 @pytest.mark.parametrize('light', ['normal', 'stripe'])
 def test_rings_of_all_words_have_the_numbers_of_their_programs(families, light):
-    shown = rendering(families, light)
+    shown = scene(families, light)
     truth = [(it.family, it.id, it.x, it.y) for it in shown.targets]
-    assert matches(found(shown.image, families), truth)
+    assert matches(identified(shown.image, family=families), truth)
 
 
 def test_targets_of_a_small_family_are_not_those_of_a_larger_one_with_the_same_prints():
-    targets = found(rendering('aicon12').image, 'aicon12,cct12')
+    targets = identified(scene('aicon12').image, family='aicon12,cct12')
     assert [it.family for it in targets] == ['aicon12'] * 4
-    shown = rendering('cct12')
+    shown = scene('cct12')
     truth = [(it.family, it.id, it.x, it.y) for it in shown.targets]
-    assert matches(found(shown.image, 'cct12,aicon12'), truth)
+    assert matches(identified(shown.image, family='cct12,aicon12'), truth)
 
 
 def test_rings_of_a_data_file_are_rendered_and_identified(tmp_path):
     file = tmp_path / 'mine.yaml'
     file.write_text('family: mine\nbits: 10\nband: [1.42, 1.87]\nwords: {changes: 6}\n')
-    scene = SceneSettings(
-        width=640, height=480, targets=5, dot_radius=14, family='mine', family_file=str(file)
+    shown = rendered(
+        SceneSettings(
+            width=640, height=480, targets=5, dot_radius=14, family='mine', family_file=str(file)
+        )
     )
-    shown = render(scene)
     truth = [(it.family, it.id, it.x, it.y) for it in shown.targets]
     for families in ('mine', 'auto', 'metashape12,mine'):
         detector = create_detector('ring', family=families, family_file=str(file))

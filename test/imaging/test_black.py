@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ahf_ros.detectors import create_detector
-from ahf_ros.evaluation import score
 from ahf_ros.imaging.black import black_lift, lifted
 from ahf_ros.synthetic.scene import SceneSettings, render
+from support.scenes import scored
 
 
 @pytest.mark.parametrize(
@@ -22,19 +21,9 @@ from ahf_ros.synthetic.scene import SceneSettings, render
     ],
 )
 def test_black_ink_is_read(family: str, polarity: str, dot_radius: float, targets: int) -> None:
-    shown = render(
-        SceneSettings(
-            width=1000,
-            height=700,
-            family=family,
-            polarity=polarity,
-            dot_radius=dot_radius,
-            targets=targets,
-            black=0.0,
-            seed=7,
-        )
-    )
-    figures = score(shown, create_detector(family=family)(shown.image))
+    print_of = {'family': family, 'polarity': polarity, 'dot_radius': dot_radius, 'black': 0.0}
+    scene = SceneSettings(width=800, height=600, targets=targets, seed=7, **print_of)
+    figures = scored(render(scene), 'auto')
     assert figures.right >= targets - 1
     assert figures.wrong == figures.false_positives == 0
 

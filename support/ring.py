@@ -1,0 +1,48 @@
+"""Dots of ring targets for tests of single steps of their detector."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ahf_ros.detectors.ring.circles import REACH
+from ahf_ros.features.circle_fit import Fit, fit_dots
+from ahf_ros.features.frame import affine_frames
+
+
+def made_up(x: Sequence[float], share: float = 1.0, radius: float = 10.0) -> Fit:
+    """Return dark dots in a row at y = 50, with edges that are usual."""
+    count = len(x)
+    return Fit(
+        frames=affine_frames(np.array(x), 50.0, radius, radius, 0.0),
+        polarity=np.ones(count, int),
+        contrast=np.full(count, 0.3),
+        bright=np.full(count, 200.0),
+        share=np.full(count, share),
+        deviation=np.full(count, 0.5),
+        covariance=np.tile(np.eye(2), (count, 1, 1)),
+        blur=np.full(count, 0.8),
+        edge_shift=np.full(count, -0.3),
+    )
+
+
+def measured(
+    gray: np.ndarray,
+    x: Sequence[float] | np.ndarray,
+    y: Sequence[float] | np.ndarray,
+    radius: float | np.ndarray,
+    polarity: int = 1,
+    **options: Any,
+) -> Fit:
+    """Return dots as an image shows them, shape (height, width), from about where they are."""
+    frames = affine_frames(np.array(x), np.array(y), radius, radius, 0.0)
+    polarities = np.full(len(frames), polarity)
+    return fit_dots(gray.astype(np.float32), frames, polarities, rays=24, reach=REACH, **options)
+
+
+def lone_dot(ink: float = 50.0, paper: float = 200.0, x: float = 150.0) -> np.ndarray:
+    """Return an image of a dot of 12 px at (x, 100) without a band."""
+    columns, rows = np.meshgrid(np.arange(300), np.arange(200))
+    return np.where(np.hypot(columns - x, rows - 100) < 12, ink, paper).astype(np.float32)
