@@ -1,39 +1,70 @@
-"""`ahf learn-family`: the data file of a family from the measured dots of its targets."""
+"""`ahf learn-family`: the data file of a family, from photographs or measured dots of its targets.
+
+What computes is imported where it is used, so that `--help` and mistakes come at once.
+"""
 
 from __future__ import annotations
 
 import argparse
+import json
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from ahf_ros.cli import tell
-from ahf_ros.codes.gsi import PointFamily, point_family
-from ahf_ros.codes.gsi_learning import Learnt, learn_family, library_text, with_codes
+from ahf_ros.cli.identify import image_paths
+from ahf_ros.cli.options import add_option
+from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.interchange.files import write_whole
-from ahf_ros.interchange.point_lists import read_point_list
+from ahf_ros.settings.parameter import parameters
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from ahf_ros.codes.gsi import PointFamily
+    from ahf_ros.codes.gsi_learning import Learnt
+    from ahf_ros.detectors.ring.learning import LearntFamily
+
+_OF_DOTS = 'polarity', 'min_radius', 'max_radius'  # options
+_COLUMNS, _TILE = 6, 180  # of the contact sheet, and width of a picture, px
+_AROUND = 1.15  # radius of what is shown of a target, in that of its band
+_SAME_RADII = 0.08  # dot radii
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Give a parser the arguments of the command."""
     parser.add_argument(
-        'points',
-        metavar='POINTS.csv',
-        help='Point list with rows CODEn, NUGGETn_A and NUGGETn_7, as V-STARS writes them.',
+        'sources',
+        nargs='+',
+        metavar='SOURCE',
+        help='Photographs, or folders of these, of ring targets that nobody described; or one '
+        'point list with rows CODEn, NUGGETn_A and NUGGETn_7, as V-STARS writes them.',
     )
-    parser.add_argument('-o', '--output', required=True, metavar='FILE.json', help='Data file.')
     parser.add_argument(
+        '-o',
+        '--output',
+        required=True,
+        metavar='FILE',
+        help='Data file. For photographs, pictures of the words that were seen are beside it, in '
+        'FILE.png; a second family is FILE_2.',
+    )
+    parser.add_argument('--name', help='Name of the family. Default: the name of the data file.')
+    rings = parser.add_argument_group('photographs of rings')
+    for item in parameters(DetectorSettings):
+        if item.name in _OF_DOTS:
+            add_option(rings, item)
+    points = parser.add_argument_group('point lists')
+    points.add_argument(
         '--base',
         default='',
         metavar='FILE',
         help='Data file with the design in rough, for positions and codes that the points do not '
         'show. Default: the family of GSI.',
     )
-    parser.add_argument('--name', help='Name of the family. Default: the name of the data file.')
-    parser.add_argument('--unit', default='mm', help='Unit of the coordinates. Default: mm.')
-    parser.add_argument(
+    points.add_argument('--unit', default='mm', help='Unit of the coordinates. Default: mm.')
+    points.add_argument(
         '--dot-radius',
         type=float,
         metavar='X',
@@ -44,32 +75,153 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Write the data file and say what was learnt."""
     radius = options.dot_radius
-    if radius is not None and not 0 < radius < np.inf:
+    if radius is not None and not 0 < radius < float('inf'):
         raise ValueError(f'dot_radius is {radius!r}, accepted is a length above 0')
+    lists = [source for source in options.sources if source.lower().endswith('.csv')]
+    if lists and len(options.sources) > 1:
+        raise ValueError(
+            f'sources are {len(options.sources)} with {lists[0]!r}, accepted are photographs, or '
+            'one point list'
+        )
     try:
-        base = point_family(options.base)
-        name = options.name or Path(options.output).stem
-        learnt = learn_family(read_point_list(options.points), base, name)
-        family = replace(learnt.family, unit=options.unit, source=Path(options.points).name)
-        if radius is not None:
-            family = replace(
-                family,
-                dot_radius=radius,
-                template_radii=family.template_radii * (radius / family.dot_radius),
-                position_radii=family.position_radii * (radius / family.dot_radius),
-            )
-        family = with_codes(family, learnt.codes)
-        write_whole(options.output, library_text(family).encode())
-        point_family(options.output)
+        return _learn_points(options, lists[0]) if lists else _learn_rings(options)
     except ValueError as error:
         tell('learn-family', error)
         return 1
+
+
+def _learn_rings(options: argparse.Namespace) -> int:
+    """Learn ring families from photographs."""
+    from ahf_ros.detectors.ring.learning import MINIMUM_TARGETS, find_bands, learn_families
+    from ahf_ros.interchange.image_files import read_image
+
+    paths, problems = image_paths(options.sources)
+    for problem in problems:
+        tell('learn-family', problem)
+    settings = DetectorSettings(**{name: getattr(options, name) for name in _OF_DOTS})
+    images = []
+    for path in paths:
+        try:
+            images.append(read_image(path))
+        except ValueError as error:
+            problems.append(str(error))
+            tell('learn-family', error)
+    bands = find_bands(images, settings)
+    families = learn_families(bands)
+    if not families:
+        raise ValueError(
+            f'{len(bands.size)} dots with a concentric band of sectors in {len(images)} images; '
+            f'{MINIMUM_TARGETS} of one family are needed, and 20 tell it well'
+        )
+    output = Path(options.output)
+    for number, learnt in enumerate(families, 1):
+        file = output if number == 1 else output.with_stem(f'{output.stem}_{number}')
+        name = options.name or output.stem
+        _write_rings(file, name if number == 1 else f'{name}_{number}', learnt, images)
+    return int(bool(problems))
+
+
+def _write_rings(
+    file: Path, name: str, learnt: LearntFamily, images: Sequence[np.ndarray]
+) -> None:
+    """Write the data file of a family and its contact sheet, and say what was learnt."""
+    from ahf_ros.codes.ring import ring_family
+    from ahf_ros.interchange.image_files import write_image
+
+    inner, outer = (round(radius, 2) for radius in learnt.band)
+    count = len(learnt.words)
+    seen = f'{count} targets in {len(set(learnt.bands.image.tolist()))} of {len(images)} images'
+    rules = json.dumps(learnt.rules) if learnt.rules else 'all'
+    text = (
+        f'# Words that were seen: {", ".join(map(str, sorted(set(learnt.words.tolist()))))}\n'
+        f'family: {json.dumps(name)}\nsource: learnt from {seen}\nbits: {learnt.bits}\n'
+        f'band: [{inner:g}, {outer:g}]\nwords: {rules}\nnumbers: {{first_bit: lowest}}\n'
+    )
+    write_whole(str(file), text.encode())
+    ring_family.cache_clear()
+    ring_family(str(file))
+    write_image(file.with_suffix('.png'), _contact_sheet(learnt, images))
+    print(
+        f'{file}: {seen}, {learnt.bits} bits (log odds against the next number: '
+        f'{learnt.lead:.0f}), band {inner:g} to {outer:g}, ink {learnt.growth:+.1f} px',
+        file=sys.stderr,
+    )
+    for rule, odds in learnt.odds.items():
+        print(
+            f'{file}: {rule} {learnt.rules[rule]} holds, log odds against chance {odds:.0f}',
+            file=sys.stderr,
+        )
+    for known in _known(learnt):
+        print(f'{file}: {known} has all of these words and about this band', file=sys.stderr)
+
+
+def _known(learnt: LearntFamily) -> list[str]:
+    """Return the families of this package that may be the one that was learnt."""
+    from ahf_ros.codes import RING_NAMES
+    from ahf_ros.codes.ring import family
+
+    codes = [family(name) for name in RING_NAMES]
+    return [
+        code.name
+        for code in sorted(codes, key=lambda code: len(code.words))
+        if code.bits == learnt.bits
+        and max(abs(a - b) for a, b in zip(code.band, learnt.band, strict=True)) < _SAME_RADII
+        and (code.ids(learnt.words) > 0).all()
+    ]
+
+
+def _contact_sheet(learnt: LearntFamily, images: Sequence[np.ndarray]) -> np.ndarray:
+    """Return a picture of one target of each word, uint8, shape (height, width, 3)."""
+    import cv2
+    import numpy as np
+
+    from ahf_ros.drawing.tiles import Tile, side_by_side
+    from ahf_ros.imaging.image import as_gray
+
+    bands, tiles = learnt.bands, []
+    words, first = np.unique(learnt.words, return_index=True)
+    for word, index in zip(words.tolist(), first.tolist(), strict=True):
+        radius = _AROUND * bands.size[index] * bands.outer[index]
+        centre, side = bands.frames[index, :2, 2], round(2 * radius)
+        gray = np.clip(as_gray(images[bands.image[index]]), 0, 255).astype(np.uint8)
+        shown = cv2.getRectSubPix(gray, (side, side), tuple(centre.tolist()))
+        shown = cv2.resize(shown, (_TILE, _TILE), interpolation=cv2.INTER_AREA)
+        tiles.append(Tile(shown, str(word)))
+    blank = Tile(np.zeros((_TILE, _TILE), np.uint8), '')
+    tiles += [blank] * (-len(tiles) % _COLUMNS)
+    rows = [tiles[start : start + _COLUMNS] for start in range(0, len(tiles), _COLUMNS)]
+    return side_by_side(rows, _TILE)
+
+
+def _learn_points(options: argparse.Namespace, points: str) -> int:
+    """Learn point-distributed targets from a point list."""
+    from ahf_ros.codes.gsi import point_family
+    from ahf_ros.codes.gsi_learning import learn_family, library_text, with_codes
+    from ahf_ros.interchange.point_lists import read_point_list
+
+    radius = options.dot_radius
+    base = point_family(options.base)
+    name = options.name or Path(options.output).stem
+    learnt = learn_family(read_point_list(points), base, name)
+    family = replace(learnt.family, unit=options.unit, source=Path(points).name)
+    if radius is not None:
+        family = replace(
+            family,
+            dot_radius=radius,
+            template_radii=family.template_radii * (radius / family.dot_radius),
+            position_radii=family.position_radii * (radius / family.dot_radius),
+        )
+    family = with_codes(family, learnt.codes)
+    write_whole(options.output, library_text(family).encode())
+    point_family(options.output)
     _report(learnt, base, options)
     return 0
 
 
 def _report(learnt: Learnt, base: PointFamily, options: argparse.Namespace) -> None:
     """Say on standard error what was learnt and what was not."""
+    import numpy as np
+
     for number, reason in learnt.left_out.items():
         tell('learn-family', f'target {number} is left out: it {reason}')
     sizes = [target.scale for target in learnt.targets]

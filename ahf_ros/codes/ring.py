@@ -160,7 +160,7 @@ def conforming(
     changes: int | None = None,
     above: int = 0,
 ) -> np.ndarray:
-    """Return whether words follow rules of a family, see docs/ring_targets.md, bool, shape (k,)."""
+    """Return whether words follow rules of a family, see docs/ring_targets.md, shape (k,)."""
     good = words > above
     if parity:
         good &= marks(words, bits) % 2 == (parity == 'odd')

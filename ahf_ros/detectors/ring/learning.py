@@ -1,9 +1,9 @@
 """Families of ring targets, learnt from photographs of targets that nobody described.
 
-A dot with a concentric band of sectors is a ring target of some family. The borders of its arcs lie
-on a grid of as many places as the family has bits, but for the growth of ink, which makes all arcs
-longer by as much at either end; the same growth is in the radii of the band and of the dot. All
-targets of a family share bits, radii and rules, so that a few borders of each are enough.
+A dot with a concentric band of sectors is a ring target of some family. The borders of its arcs
+lie on a grid of as many places as the family has bits, but for the growth of ink, which makes all
+arcs longer by as much at either end; the same growth is in the radii of the band and of the dot.
+All targets of a family share bits, radii and rules, so that a few borders of each are enough.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes.cyclic import smallest_rotation
-from ahf_ros.codes.ring import borders, conforming, marks
+from ahf_ros.codes.ring import conforming
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.ring.polar import angles_of
 from ahf_ros.features import frame
@@ -46,6 +46,8 @@ _ERROR, _MINIMUM_ERROR = 0.3, 0.008  # of the place of a border: px, and rad at 
 _STRAY = 0.05  # share of borders that light makes
 _OTHER = 6.0  # log odds of another number of bits, from which a target is of another family
 _UNCLEAR = 0.25  # mean difference of sectors from paper and ink
+_MISREAD = 0.02  # share of words
+_OFTEN = 3  # targets with a word, which then is not misread
 _SAMPLED = 200_000  # words that tell how common a rule is
 _SURE = {'parity': 5.0, 'opposite_pairs': 3.0, 'changes': 7.0}  # log odds, to take a rule
 
@@ -206,13 +208,14 @@ def _learn(bands: Bands) -> tuple[np.ndarray, LearntFamily]:
     inner = np.median((some.inner * some.size + growth) / printed)
     outer = np.median((some.outer * some.size - growth) / printed)
     words, clear = _words(some, bits, growth)
-    words = words[clear]
-    rules, odds = _rules(np.unique(words), bits)
+    different, count = np.unique(words[clear], return_counts=True)
+    rules, odds = _rules(different, count >= _OFTEN, bits)
+    clear &= conforming(words, bits, **rules)
     family = LearntFamily(
         bits=bits,
         band=(float(inner), float(outer)),
         growth=growth,
-        words=words,
+        words=words[clear],
         bands=some.select(clear),
         lead=float(total.max() - np.delete(total.max(axis=1), best).max()),
         rules=rules,
@@ -257,10 +260,9 @@ def _grid_odds(bands: Bands, bits: int) -> np.ndarray:
 def _phase(place: np.ndarray, row: np.ndarray, count: int, bits: int) -> np.ndarray:
     """Return where the grids of targets begin, rad."""
     turns = np.exp(1j * bits * place)
-    sums = (np.bincount(row, of, count) for of in (turns.real, turns.imag))
-    return (
-        np.asarray(np.angle(sum(of * unit for of, unit in zip(sums, (1, 1j), strict=True)))) / bits
-    )
+    across, down = (np.bincount(row, of, count) for of in (turns.real, turns.imag))
+    phase: np.ndarray = np.arctan2(down, across) / bits
+    return phase
 
 
 def _words(bands: Bands, bits: int, growth: float) -> tuple[np.ndarray, np.ndarray]:
@@ -277,23 +279,34 @@ def _words(bands: Bands, bits: int, growth: float) -> tuple[np.ndarray, np.ndarr
     return smallest_rotation(words, bits), np.abs(levels - marked).mean(axis=1) < _UNCLEAR
 
 
-def _rules(words: np.ndarray, bits: int) -> tuple[dict[str, Any], dict[str, float]]:
-    """Return the rules that different words follow and hardly would by chance, and their odds."""
+def _rules(
+    words: np.ndarray, sure: np.ndarray, bits: int
+) -> tuple[dict[str, Any], dict[str, float]]:
+    """Return the rules that nearly all of different words follow, and their odds of chance.
+
+    Sure words follow them all; others may be misread.
+    """
     rules: dict[str, Any] = {}
     odds: dict[str, float] = {}
-    if not words.size:
-        return rules, odds
     sampled = np.random.default_rng(0).integers(1, (1 << bits) - 1, _SAMPLED)
-    odd = marks(words, bits) % 2
-    tried: dict[str, Any] = {'parity': 'odd' if odd.all() else 'even', 'opposite_pairs': 1}
-    tried['changes'] = int(borders(words, bits).max())
-    for name, value in tried.items():
-        rule = {name: value}
-        if (name == 'opposite_pairs' and bits % 2) or not conforming(words, bits, **rule).all():
-            continue
-        follow = conforming(sampled, bits, **rule)
-        likely = -len(words) * np.log(max(follow.mean(), 1 / _SAMPLED))
-        if likely > _SURE[name]:
-            rules, odds = rules | rule, odds | {name: float(likely)}
-            sampled = sampled[follow]
+    tried: dict[str, list[Any]] = {'parity': ['even', 'odd']}
+    if bits % 2 == 0:
+        tried['opposite_pairs'] = [1]
+    tried['changes'] = list(range(2, bits, 2))
+    for name, values in tried.items():
+        likely = []
+        for value in values:
+            usual = conforming(sampled, bits, **{name: value}).mean()
+            usual = np.clip(usual, 1 / _SAMPLED, 1 - 1 / _SAMPLED)
+            good = conforming(words, bits, **{name: value})
+            of_chance = [np.log((1 - _MISREAD) / usual), np.log(_MISREAD / (1 - usual))]
+            either = np.dot([good.sum(), (~good).sum()], of_chance)
+            likely.append(float(either) if good[sure].all() else -np.inf)
+        best = int(np.argmax(likely))
+        if likely[best] > _SURE[name]:
+            rule = {name: values[best]}
+            rules, odds = rules | rule, odds | {name: likely[best]}
+            sampled = sampled[conforming(sampled, bits, **rule)]
+            good = conforming(words, bits, **rule)
+            words, sure = words[good], sure[good]
     return rules, odds
