@@ -1,0 +1,124 @@
+"""Families of rings drawn at random: learnt from one image, and identified.
+
+Bits, radii and rules of words, edges that have moved, sizes and colours are drawn anew for each
+family. Seeds from 301 on are for tests, those below 100 for development.
+
+    python -m benchmarks.random_families [--seeds 301 302]
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from ahf_ros.codes.cyclic import smallest_rotation
+from ahf_ros.codes.ring import conforming, ring_family
+from ahf_ros.detectors import DetectorSettings, create_detector
+from ahf_ros.detectors.ring.learning import find_bands, learn_families
+from ahf_ros.evaluation import Score, score, total
+from ahf_ros.synthetic.scene import SceneSettings, render
+from benchmarks import report
+from benchmarks.report import table
+
+FAMILIES = 50
+"""Families of each seed."""
+
+LIGHTS = ('normal', 'stripe', 'lattice')
+"""In which they are identified; they are learnt in the first one."""
+
+RULES = ({}, {'parity': 'even'}, {'parity': 'even', 'opposite_pairs': 1}, {'changes': 6})
+"""Rules of words, one of which is drawn."""
+
+TARGETS = 20
+
+
+def random_family(file: Path, generator: np.random.Generator) -> dict[str, object]:
+    """Write the data file of a family, and return its rule."""
+    rule = dict(RULES[generator.integers(len(RULES))])
+    bits = int(generator.integers(6, 25))
+    bits += bits % 2 if 'opposite_pairs' in rule else 0
+    inner = generator.uniform(1.4, 2.6)
+    words = generator.integers(1, (1 << bits) - 1, 20_000)
+    words = np.unique(smallest_rotation(words[conforming(words, bits, **rule)], bits))
+    described = {
+        'family': 'mine',
+        'bits': bits,
+        'band': [round(inner, 3), round(inner + generator.uniform(0.45, 1.3), 3)],
+        'words': generator.permutation(words)[:60].tolist(),
+    }
+    file.write_text(json.dumps(described))
+    ring_family.cache_clear()
+    return rule
+
+
+def measured(seed: int, file: Path) -> tuple[list[tuple[bool, ...]], dict[str, Score]]:
+    """Return what was learnt rightly of each family, and what was identified by light."""
+    learnt: list[tuple[bool, ...]] = []
+    scores: dict[str, list[Score]] = {light: [] for light in LIGHTS}
+    for index in report.progress(range(FAMILIES), f'families of seed {seed}'):
+        generator = np.random.default_rng([seed, index])
+        rule = random_family(file, generator)
+        code = ring_family(str(file))
+        values = {
+            'dot_radius': float(generator.uniform(7, 16)),
+            'edge_shift': float(generator.choice([-0.5, 0.0, 0.5])),
+            'polarity': str(generator.choice(['dark', 'bright'])),
+        }
+        detector = create_detector(family='mine', family_file=str(file))
+        for light in LIGHTS:
+            scene = SceneSettings(
+                width=1600,
+                height=1200,
+                targets=min(TARGETS, len(code.words)),
+                light=light,
+                family='mine',
+                family_file=str(file),
+                seed=index,
+                **values,
+            )
+            shown = render(scene)
+            scores[light].append(score(shown, detector(shown.image)))
+            if light != LIGHTS[0]:
+                continue
+            found = learn_families(find_bands([shown.image], DetectorSettings()))
+            bits = bool(found) and found[0].bits == code.bits
+            radii = bits and np.abs(np.subtract(found[0].band, code.band)).max() < 0.03
+            words = bits and set(found[0].words.tolist()) <= set(code.words.tolist())
+            learnt.append((bits, bool(radii), words, bits and found[0].rules == rule))
+    return learnt, {light: total(of) for light, of in scores.items()}
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Print both tables as Markdown."""
+    options = report.parsed(report.parser(__doc__), arguments)
+    learnt: list[tuple[bool, ...]] = []
+    scores: dict[str, list[Score]] = {light: [] for light in LIGHTS}
+    with TemporaryDirectory() as folder:
+        for seed in options.seeds:
+            of_seed, by_light = measured(seed, Path(folder, 'mine.json'))
+            learnt += of_seed
+            for light, of in by_light.items():
+                scores[light].append(of)
+    right = [sum(of) for of in zip(*learnt, strict=True)]
+    names = ('families', 'bits right', 'radii within 0.03', 'all words right', 'rule right')
+    figures = report.about(
+        options.seeds,
+        learnt=table(names, [(len(learnt), *right)]),
+        identified=table(
+            ('light', 'targets', 'right', 'wrong', 'false positives'),
+            [
+                (light, of.expected, of.right, of.wrong, of.false_positives)
+                for light, of in ((light, total(of)) for light, of in scores.items())
+            ],
+        ),
+    )
+    page = [report.about_text(figures), '', *figures['learnt'], '', *figures['identified']]
+    report.publish(figures, '\n'.join(page), options)
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,133 @@
+"""Families of rings learnt from photographs."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from ahf_ros.codes.ring import conforming, family, ring_family
+from ahf_ros.detectors import DetectorSettings, create_detector
+from ahf_ros.detectors.ring.learning import LearntFamily, find_bands, learn_families
+from ahf_ros.interchange.image_files import read_image, write_image
+from ahf_ros.synthetic.scene import Rendering, SceneSettings
+from support.command_line import status
+from support.photographs import PANEL, needs_photographs
+from support.scenes import rendered
+
+SCENE = SceneSettings(width=1100, height=800, targets=20, dot_radius=10, seed=4)
+
+
+def shown(name: str, **changes: object) -> Rendering:
+    return rendered(replace(SCENE, family=name, **changes))
+
+
+def learnt(*images: np.ndarray) -> list[LearntFamily]:
+    return learn_families(find_bands(images, DetectorSettings()))
+
+
+@pytest.mark.parametrize(
+    ('name', 'changes'),
+    [
+        ('cct10', {}),
+        ('aicon14', {'edge_shift': 0.5, 'polarity': 'bright'}),
+        ('metashape12', {'edge_shift': -0.5, 'radius_spread': 0.3}),
+        ('metashape20', {'dot_radius': 12}),
+    ],
+)
+def test_bits_radii_and_words_of_one_image(name: str, changes: dict) -> None:
+    scene, code = shown(name, **changes), family(name)
+    (found,) = learnt(scene.image)
+    assert (found.bits, len(found.words)) == (code.bits, 20)
+    assert found.band == pytest.approx(code.band, abs=0.03)
+    assert sorted(found.words) == sorted(target.code for target in scene.targets)
+    assert found.lead > 10
+    printed = -1 if changes.get('polarity') == 'bright' else 1
+    gamma = -0.3  # px, by which it makes dark areas smaller
+    assert found.growth * printed == pytest.approx(changes.get('edge_shift', 0) + gamma, abs=0.2)
+    even = name != 'cct10'
+    assert found.rules.get('parity') == ('even' if even else None)
+    assert ('parity' in found.odds) == even
+
+
+def test_two_families_in_two_images_are_told_apart() -> None:
+    first, second = learnt(shown('cct12').image, shown('cct10', targets=12).image)
+    assert [(it.bits, len(it.words)) for it in (first, second)] == [(12, 20), (10, 12)]
+    assert [set(it.bands.image.tolist()) for it in (first, second)] == [{0}, {1}]
+
+
+def test_families_of_the_same_band_are_told_apart_by_their_borders() -> None:
+    image = np.hstack([shown('cct12').image, shown('cct14').image])
+    assert sorted((it.bits, len(it.words)) for it in learnt(image)) == [(12, 20), (14, 20)]
+
+
+def test_few_targets_and_images_without_any_are_no_family() -> None:
+    assert learnt(shown('cct10', targets=4).image) == []
+    assert learnt(shown('dots', targets=2).image, shown('aruco_4x4_50').image) == []
+    assert len(find_bands([], DetectorSettings()).size) == 0
+
+
+@needs_photographs
+def test_the_family_of_photographs() -> None:
+    (found,) = learnt(*map(read_image, sorted(PANEL.glob('*.png'))[:4]))
+    code = family('aicon14')
+    assert found.bits == 14
+    assert found.band == pytest.approx(code.band, abs=0.04)
+    assert found.rules['parity'] == 'even'
+    assert np.mean(code.ids(found.words) > 0) > 0.99
+
+
+def test_the_command_writes_a_family_that_the_detector_reads(tmp_path: Path, capsys) -> None:
+    scene = shown('metashape12')
+    write_image(tmp_path / 'a.png', scene.image)
+    output = tmp_path / 'mine.yaml'
+    assert status('learn-family', tmp_path / 'a.png', '-o', output) == 0
+    said = capsys.readouterr().err
+    assert '20 targets in 1 of 1 images, 12 bits' in said
+    assert 'parity even holds' in said
+    assert 'metashape12 has all of these words and about this band' in said
+    code = ring_family(str(output))
+    assert code.name == 'mine'
+    assert conforming(code.words, 12, parity='even').all()
+    assert cv2.imread(str(tmp_path / 'mine.png')).shape[1] == 6 * 182
+    targets = create_detector(family='mine', family_file=str(output))(scene.image)
+    assert sorted(it.id for it in targets) == sorted(it.code for it in scene.targets)
+
+
+def test_the_command_writes_two_families_and_says_what_is_wrong(tmp_path: Path, capsys) -> None:
+    write_image(tmp_path / 'a.png', shown('cct12').image)
+    write_image(tmp_path / 'b.png', shown('cct10').image)
+    (tmp_path / 'c.png').write_bytes(b'nothing')
+    output = tmp_path / 'out' / 'rings.yaml'
+    output.parent.mkdir()
+    assert status('learn-family', tmp_path, '-o', output, '--name', 'mine') == 1
+    said = capsys.readouterr().err
+    assert 'c.png' in said
+    files = sorted(output.parent.glob('*.yaml'))
+    assert [file.name for file in files] == ['rings.yaml', 'rings_2.yaml']
+    assert sorted(ring_family(str(file)).name for file in files) == ['mine', 'mine_2']
+
+
+@pytest.mark.parametrize(
+    ('name', 'message'),
+    [
+        ('aruco_4x4_50', r'0 dots with a concentric band .* in 1 images; 5 of one family'),
+        ('cct10', r'3 dots with a concentric band of sectors in 1 images; 5 of one family'),
+    ],
+)
+def test_the_command_says_that_there_is_no_family(
+    tmp_path: Path, capsys, name: str, message: str
+) -> None:
+    write_image(tmp_path / 'a.png', shown(name, targets=3).image)
+    assert status('learn-family', tmp_path / 'a.png', '-o', tmp_path / 'mine.yaml') == 1
+    assert re.search(message, capsys.readouterr().err)
+    assert not (tmp_path / 'mine.yaml').exists()
+
+
+def test_photographs_and_point_lists_are_not_learnt_together(tmp_path: Path, capsys) -> None:
+    assert status('learn-family', 'a.png', 'b.csv', '-o', tmp_path / 'mine.yaml') != 0
+    assert "sources are 2 with 'b.csv', accepted are photographs, or" in capsys.readouterr().err
