@@ -176,12 +176,14 @@ def _contact_sheet(learnt: LearntFamily, images: Sequence[np.ndarray]) -> np.nda
     import numpy as np
 
     from ahf_ros.drawing.tiles import Tile, side_by_side
+    from ahf_ros.features import frame
     from ahf_ros.imaging.image import as_gray
 
     bands, tiles = learnt.bands, []
+    major, _, _ = frame.ellipse_axes(bands.frames)
     words, first = np.unique(learnt.words, return_index=True)
     for word, index in zip(words.tolist(), first.tolist(), strict=True):
-        radius = _AROUND * bands.size[index] * bands.outer[index]
+        radius = _AROUND * major[index] * bands.outer[index]
         centre, side = bands.frames[index, :2, 2], round(2 * radius)
         gray = np.clip(as_gray(images[bands.image[index]]), 0, 255).astype(np.uint8)
         shown = cv2.getRectSubPix(gray, (side, side), tuple(centre.tolist()))

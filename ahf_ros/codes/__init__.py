@@ -23,6 +23,7 @@ VENDOR_NAMES = tuple(name for name in RING_NAMES if not name.startswith('cct'))
 ARUCO_NAMES = (
     *(f'aruco_{side}x{side}_{count}' for side in (4, 5, 6, 7) for count in (50, 100, 250, 1000)),
     'aruco_original',
+    'aruco_mip_36h12',
 )
 """Families of ArUco: cells along a side, and number of markers."""
 

@@ -21,11 +21,14 @@ def dictionary(name: str) -> Any:
             f'family is {name!r}, accepted with opencv-python-headless of at least 4.7, which has '
             f'square markers; this is OpenCV {cv2.__version__}'
         )
-    kind, _, wanted = name.partition('_')
-    member = f'DICT_APRILTAG_{wanted}' if kind == 'apriltag' else f'DICT_{wanted.upper()}'
-    if name == 'aruco_original':
-        member = 'DICT_ARUCO_ORIGINAL'
-    return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, member))
+    known = {member.lower(): member for member in dir(cv2.aruco)}
+    members = (f'dict_{name}', f'dict_{name.removeprefix("aruco_")}')
+    found = next((known[member] for member in members if member in known), None)
+    if found is None:
+        raise ValueError(
+            f'family is {name!r}, accepted with a newer OpenCV; this is {cv2.__version__}'
+        )
+    return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, found))
 
 
 def marker(name: str, number: int, cell: int) -> Any:

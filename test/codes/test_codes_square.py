@@ -15,12 +15,12 @@ pytestmark = needs_square_markers
 @pytest.mark.parametrize('name', SQUARE_NAMES)
 def test_every_dictionary_is_there_and_as_large_as_its_name_says(name):
     table = dictionary(name)
-    kind, _, wanted = name.partition('_')
-    if kind == 'aruco' and wanted != 'original':
+    wanted = name.partition('_')[2]
+    if wanted[1] == 'x':
         side, _, count = wanted.partition('_')
         assert (table.markerSize, len(table.bytesList)) == (int(side[0]), int(count))
-    if kind == 'apriltag':
-        assert table.markerSize**2 == int(wanted.partition('h')[0])
+    elif wanted != 'original':
+        assert table.markerSize**2 == int(wanted.removeprefix('mip_').partition('h')[0])
 
 
 def test_a_marker_has_a_black_border_and_its_own_bits():
@@ -42,3 +42,10 @@ def test_an_opencv_without_markers_is_named(monkeypatch):
     monkeypatch.delattr(cv2.aruco, 'ArucoDetector')
     with pytest.raises(ValueError, match=r'at least 4\.7, which has square markers; this is'):
         dictionary('aruco_4x4_50')
+
+
+def test_an_opencv_without_a_dictionary_is_named(monkeypatch):
+    for member in ('DICT_ARUCO_MIP_36h12', 'DICT_ARUCO_MIP_36H12'):
+        monkeypatch.delattr(cv2.aruco, member, raising=False)
+    with pytest.raises(ValueError, match="'aruco_mip_36h12', accepted with a newer OpenCV; this"):
+        dictionary('aruco_mip_36h12')
