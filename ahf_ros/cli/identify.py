@@ -39,6 +39,7 @@ from ahf_ros.text import shown
 if TYPE_CHECKING:
     from ahf_ros.interchange.export.survey import MeasuredImage
 
+_LOOKED_AT = 3  # images in which other rings are looked for where none are identified
 _WORTH_PROCESSES = 4  # images; fewer are identified before processes have started
 
 
@@ -132,6 +133,8 @@ def _run(options: argparse.Namespace, output: TextIO | None) -> int:
             return 1
     if results and not options.quiet:
         print(_hint(settings, identified), end='', file=sys.stderr)
+        if not identified:
+            print(_other_rings(paths), end='', file=sys.stderr)
     if not write_exports('identify', options.export, measured, control, options.quiet):
         failed = True
     return int(failed)
@@ -175,6 +178,26 @@ def _hint(settings: IdentificationSettings, identified: int) -> str:
         'N is not given, so that no filter was searched for: with --expected-targets N, AHF '
         'searches for a filter wherever an image shows fewer than N targets\n'
     )
+
+
+def _other_rings(paths: Sequence[str]) -> str:
+    """Return a line on the rings of one of the first images, of whatever family."""
+    from ahf_ros.detectors import DetectorSettings
+    from ahf_ros.detectors.ring.learning import find_bands, learn_families
+    from ahf_ros.interchange.image_files import read_image
+
+    for path in paths[:_LOOKED_AT]:
+        try:
+            families = learn_families(find_bands([read_image(path)], DetectorSettings()))
+        except ValueError:  # which the identification has said
+            continue
+        for found in families:
+            known = ' or '.join(found.known())
+            return (
+                f'{path} shows {len(found.words)} dots with a band of {found.bits} sectors: '
+                f'{f"--family {known}" if known else "ahf learn-family describes their family"}\n'
+            )
+    return ''
 
 
 def _tasks(

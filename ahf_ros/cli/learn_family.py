@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 _OF_DOTS = 'polarity', 'min_radius', 'max_radius'  # options
 _COLUMNS, _TILE = 6, 180  # of the contact sheet, and width of a picture, px
 _AROUND = 1.15  # radius of what is shown of a target, in that of its band
-_SAME_RADII = 0.08  # dot radii
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -151,23 +150,8 @@ def _write_rings(
             f'{file}: {rule} {learnt.rules[rule]} holds, log odds against chance {odds:.0f}',
             file=sys.stderr,
         )
-    for known in _known(learnt):
+    for known in learnt.known():
         print(f'{file}: {known} has all of these words and about this band', file=sys.stderr)
-
-
-def _known(learnt: LearntFamily) -> list[str]:
-    """Return the families of this package that may be the one that was learnt."""
-    from ahf_ros.codes import RING_NAMES
-    from ahf_ros.codes.ring import family
-
-    codes = [family(name) for name in RING_NAMES]
-    return [
-        code.name
-        for code in sorted(codes, key=lambda code: len(code.words))
-        if code.bits == learnt.bits
-        and max(abs(a - b) for a, b in zip(code.band, learnt.band, strict=True)) < _SAME_RADII
-        and (code.ids(learnt.words) > 0).all()
-    ]
 
 
 def _contact_sheet(learnt: LearntFamily, images: Sequence[np.ndarray]) -> np.ndarray:

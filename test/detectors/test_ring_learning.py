@@ -131,3 +131,24 @@ def test_the_command_says_that_there_is_no_family(
 def test_photographs_and_point_lists_are_not_learnt_together(tmp_path: Path, capsys) -> None:
     assert status('learn-family', 'a.png', 'b.csv', '-o', tmp_path / 'mine.yaml') != 0
     assert "sources are 2 with 'b.csv', accepted are photographs, or" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ('name', 'message'),
+    [
+        ('cct10', 'a.png shows 20 dots with a band of 10 sectors: --family cct10\n'),
+        ('aicon12', 'a.png shows 20 dots with a band of 12 sectors: --family aicon12 or cct12\n'),
+        ('mine', 'a.png shows 20 dots with a band of 9 sectors: ahf learn-family describes'),
+    ],
+)
+def test_rings_of_another_family_are_named(
+    tmp_path: Path, capsys, name: str, message: str
+) -> None:
+    file = tmp_path / 'mine.yaml'
+    file.write_text('family: mine\nbits: 9\nband: [1.6, 2.4]\nwords: all\n')
+    scene = shown(name, family_file=str(file)) if name == 'mine' else shown(name)
+    write_image(tmp_path / 'a.png', scene.image)
+    assert status('identify', tmp_path / 'a.png', '--family', 'metashape12') == 0
+    said = capsys.readouterr().err
+    assert 'targets of metashape12 were looked for' in said
+    assert message in said

@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 
 from ahf_ros.blas import one_blas_thread
+from ahf_ros.codes import RING_NAMES
 from ahf_ros.codes.cyclic import smallest_rotation
-from ahf_ros.codes.ring import conforming
+from ahf_ros.codes.ring import conforming, family
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.ring.polar import angles_of
 from ahf_ros.features import frame
@@ -47,6 +48,7 @@ _STRAY = 0.05  # share of borders that light makes
 _OTHER = 6.0  # log odds of another number of bits, from which a target is of another family
 _UNCLEAR = 0.25  # mean difference of sectors from paper and ink
 _MISREAD = 0.02  # share of words
+_SAME_RADII = 0.08  # difference of radii that are the same, dot radii
 _OFTEN = 3  # targets with a word, which then is not misread
 _SAMPLED = 200_000  # words that tell how common a rule is
 _SURE = {'parity': 5.0, 'opposite_pairs': 3.0, 'changes': 7.0}  # log odds, to take a rule
@@ -78,6 +80,17 @@ class LearntFamily:
     lead: float  # log odds of the number of bits against the next one
     rules: dict[str, Any]  # arguments of `conforming` that all words follow
     odds: dict[str, float]  # log odds of these, of chance
+
+    def known(self) -> list[str]:
+        """Return the families of this package with these words and radii, the smallest first."""
+        codes = sorted(map(family, RING_NAMES), key=lambda code: len(code.words))
+        return [
+            code.name
+            for code in codes
+            if code.bits == self.bits
+            and np.abs(np.subtract(code.band, self.band)).max() < _SAME_RADII
+            and (code.ids(self.words) > 0).all()
+        ]
 
 
 @one_blas_thread()
@@ -185,9 +198,9 @@ def learn_families(bands: Bands) -> list[LearntFamily]:
         group = np.flatnonzero(near[near.sum(axis=1).argmax()])
         if group.size < MINIMUM_TARGETS:
             break
-        members, family = _learn(some.select(group))
-        if len(family.words) >= MINIMUM_TARGETS:
-            learnt.append(family)
+        members, found = _learn(some.select(group))
+        if len(found.words) >= MINIMUM_TARGETS:
+            learnt.append(found)
         left = np.delete(left, group[members])
     return sorted(learnt, key=lambda it: -len(it.words))
 
@@ -211,7 +224,7 @@ def _learn(bands: Bands) -> tuple[np.ndarray, LearntFamily]:
     different, count = np.unique(words[clear], return_counts=True)
     rules, odds = _rules(different, count >= _OFTEN, bits)
     clear &= conforming(words, bits, **rules)
-    family = LearntFamily(
+    found = LearntFamily(
         bits=bits,
         band=(float(inner), float(outer)),
         growth=growth,
@@ -221,7 +234,7 @@ def _learn(bands: Bands) -> tuple[np.ndarray, LearntFamily]:
         rules=rules,
         odds=odds,
     )
-    return np.flatnonzero(own), family
+    return np.flatnonzero(own), found
 
 
 def _borders(bands: Bands) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
