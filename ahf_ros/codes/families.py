@@ -6,7 +6,7 @@ anything. Therefore the codes, which take numpy and OpenCV, are imported where t
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from itertools import combinations
 from typing import TYPE_CHECKING, TypeVar
@@ -47,7 +47,7 @@ Code = TypeVar('Code', 'Family', 'DotFamily', 'PointFamily')
 """The codes of families of one kind."""
 
 _SHOWN = 10  # IDs in an error
-_ALIKE = 0.65  # share of letters of a name that is suggested; tag36h11 and apriltag_36h11: 0.73
+_ALIKE = 0.65, 0.65, 0.85, 0.85  # share of letters of a name that is suggested, by `_ways`
 
 
 def families_in(text: str, files: str = '') -> tuple[str, ...]:
@@ -62,21 +62,31 @@ def families_in(text: str, files: str = '') -> tuple[str, ...]:
     --------
     >>> families_in('metashape12, aicon14')
     ('metashape12', 'aicon14')
+    >>> families_in('DICT_4X4_50'), families_in('tag36h11')
+    (('aruco_4x4_50',), ('apriltag_36h11',))
     >>> families_in('auto') == VENDOR_NAMES
     True
     """
-    names = VENDOR_NAMES if text == AUTO else tuple(part.strip() for part in text.split(','))
     kinds = {name: kind for kind, of_kind in KINDS.items() for name in of_kind}
-    if files and (text == AUTO or not set(names) <= set(kinds)):
+    given = [part.strip() for part in text.split(',')]
+    if files and not {_usual_name(name, kinds) for name in given} <= set(kinds):
         own = {name: _kind(code) for name, code in families_of(files).items()}
         kinds |= own
         if text == AUTO:
-            names += tuple(name for name, kind in own.items() if kind == 'ring')
+            given = [AUTO, *(name for name, kind in own.items() if kind == 'ring')]
+    if text == AUTO:
+        given[:1] = VENDOR_NAMES
+    names = tuple(_usual_name(name, kinds) for name in given)
     shown = f'family is {text!r}'
     for name in names:
         if name not in kinds:
             where = f'{shown}, which names {name!r}' if len(names) > 1 else shown
-            alike = get_close_matches(name.lower(), list(kinds), 1, _ALIKE)
+            alike = [
+                match
+                for way, least in zip(_ways(name), _ALIKE, strict=True)
+                for match in get_close_matches(way, list(kinds), 1, least)
+                if name
+            ]
             accepted = f'{alike[0]}, which is most like it, or another family' if alike else ''
             raise ValueError(f'{where}, accepted is {accepted or ACCEPTED}')
     if len(names) > 1:
@@ -84,10 +94,26 @@ def families_in(text: str, files: str = '') -> tuple[str, ...]:
     return names
 
 
-def check_family(text: str, files: str = '') -> None:
-    """Refuse a text that does not name one family; `files` are as for `families_in`."""
-    if len(families_in(text, files)) > 1 or text == AUTO:
+def _usual_name(name: str, kinds: Container[str]) -> str:
+    """Return the name that a family has here, where other programs write it in another way."""
+    return next((way for way in _ways(name) if way in kinds), name)
+
+
+def _ways(name: str) -> tuple[str, ...]:
+    """Return the names that a name may stand for."""
+    plain = name.lower().replace('-', '_').removeprefix('dict_')
+    return name, plain, f'aruco_{plain}', f'apriltag_{plain.removeprefix("tag")}'
+
+
+def family_in(text: str, files: str = '') -> str:
+    """Return the one family that a text names; `files` are as for `families_in`.
+
+    Raise a ValueError if it names none, or several.
+    """
+    names = families_in(text, files)
+    if len(names) > 1 or text == AUTO:
         raise ValueError(f'family is {text!r}, accepted is one family')
+    return names[0]
 
 
 def kind_of(name: str, files: str = '') -> str:

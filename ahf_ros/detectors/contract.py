@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
-from ahf_ros.codes.families import ACCEPTED, Code, families_in, family_of
+from ahf_ros.codes.families import ACCEPTED, AUTO, Code, families_in, family_of
 from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.target import Target
 
@@ -209,7 +209,9 @@ class DetectorSettings:
     def __post_init__(self) -> None:
         """Refuse values that are not accepted."""
         check_parameters(self)
-        families_in(self.family, self.family_file)
+        names = ','.join(families_in(self.family, self.family_file))
+        if self.family != AUTO and names != self.family.replace(' ', ''):
+            object.__setattr__(self, 'family', names)  # as these families are written here
         minimum, maximum = self.radii
         if minimum > maximum:
             raise ValueError(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ahf_ros.codes.designs import HALF_SIDE, Proportions, proportions
-from ahf_ros.codes.families import ONE, check_family, check_numbers, numbers_of
+from ahf_ros.codes.families import ONE, check_numbers, family_in, numbers_of
 from ahf_ros.codes.selection import select_ids
 from ahf_ros.codes.square import SQUARE_NAMES
 from ahf_ros.printing.paper import LABEL_SHEETS, Page, length_in, page_in
@@ -62,7 +62,7 @@ class SheetSettings:
     def __post_init__(self) -> None:
         """Check each parameter, and that they fit each other."""
         check_parameters(self)
-        check_family(self.family, self.family_file)
+        object.__setattr__(self, 'family', family_in(self.family, self.family_file))
         check_numbers('ids', numbers_in('ids', self.ids), (self.family,), self.family_file)
         square = self.family in SQUARE_NAMES
         if square and self.polarity != 'dark':

@@ -11,7 +11,7 @@ import numpy as np
 
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes.designs import proportions
-from ahf_ros.codes.families import ONE, check_family, code_family, kind_of, numbers_of
+from ahf_ros.codes.families import ONE, code_family, family_in, kind_of, numbers_of
 from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.synthetic.camera import Camera, Sensor, tilted_camera
 from ahf_ros.synthetic.covers import card_cover, design, distractor_cover
@@ -155,7 +155,7 @@ class SceneSettings:
             If not; the message names the field, its value and what is accepted.
         """
         check_parameters(self)
-        check_family(self.family, self.family_file)
+        object.__setattr__(self, 'family', family_in(self.family, self.family_file))
         half_view = math.hypot(self.width, self.height) / 2 / (self.width * self.focal_length)
         half_view += 0.02 / self.focal_length  # the principal point is off the middle
         steepest = math.degrees(math.atan(0.95 / half_view))

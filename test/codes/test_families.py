@@ -11,15 +11,17 @@ import pytest
 from ahf_ros.codes import ring
 from ahf_ros.codes.dots import DOTS_DESIGN
 from ahf_ros.codes.families import (
-    check_family,
     check_numbers,
     code_family,
     families_in,
     families_of,
+    family_in,
     kind_of,
     mirrored_number,
     numbers_of,
 )
+from ahf_ros.detectors import DetectorSettings
+from ahf_ros.synthetic.scene import SceneSettings
 
 
 def test_families_keep_their_order():
@@ -36,11 +38,8 @@ def test_families_keep_their_order():
             '',
             r"family is '', accepted is one of metashape12, .*; several of .*; or auto for meta",
         ),
-        (
-            'tag36h11',
-            r"family is 'tag36h11', accepted is apriltag_36h11, which is most like",
-        ),
-        ('DICT_4X4_50', r"'DICT_4X4_50', accepted is aruco_4x4_50, which is most like it"),
+        ('tag36h9', r"family is 'tag36h9', accepted is apriltag_36h1[01], which is most like"),
+        ('DICT_4X4_5', r"'DICT_4X4_5', accepted is aruco_4x4_50, which is most like it"),
         (',', r"family is ',', which names '', accepted is one of"),
         ('metashape12,', r"which names '', accepted is one of"),
         ('metashape12,ring12', r"'metashape12,ring12', which names 'ring12', accepted is one of"),
@@ -66,6 +65,25 @@ def test_families_keep_their_order():
 def test_lists_that_make_no_sense_are_refused(text, message):
     with pytest.raises(ValueError, match=message):
         families_in(text)
+
+
+@pytest.mark.parametrize(
+    ('text', 'names'),
+    [
+        ('Metashape12, AICON14', ('metashape12', 'aicon14')),
+        ('tag36h11', ('apriltag_36h11',)),
+        ('36h11', ('apriltag_36h11',)),
+        ('DICT_APRILTAG_16h5', ('apriltag_16h5',)),
+        ('DICT_6X6_250', ('aruco_6x6_250',)),
+        ('DICT_ARUCO_MIP_36h12', ('aruco_mip_36h12',)),
+        ('aruco-original', ('aruco_original',)),
+    ],
+)
+def test_names_may_be_written_as_other_programs_do(text: str, names: tuple[str, ...]) -> None:
+    assert families_in(text) == names
+    assert DetectorSettings(family=text).family == ','.join(names)
+    if len(names) == 1:
+        assert SceneSettings(family=text, targets=0).family == names[0]
 
 
 def test_ids_that_no_family_has_are_named():
@@ -121,7 +139,7 @@ def test_files_describe_more_families(files: str) -> None:
     assert code_family('mine', files).band == (1.42, 1.87)
     assert code_family('wide', files) is code_family('dots', files)
     assert code_family('metashape12', files) is ring.family('metashape12')
-    check_family('mine', files)
+    assert family_in('Mine', files) == 'mine'
     check_numbers('ids', [1, 2], ('mine',), files)
 
 
@@ -154,4 +172,4 @@ def test_files_that_do_not_fit_are_refused(files: str, tmp_path: Path) -> None:
         families_of(str(named))
     for text in ('auto', 'mine,metashape12'):
         with pytest.raises(ValueError, match=f"family is '{text}', accepted is one family"):
-            check_family(text, files)
+            family_in(text, files)
