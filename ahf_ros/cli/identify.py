@@ -95,8 +95,9 @@ def _run(options: argparse.Namespace, output: TextIO | None) -> int:
             'upright is given with export, accepted is one of them: other software counts pixels '
             'as they are stored'
         )
-    settings = settings_from(options, IdentificationSettings)
     paths, problems = image_paths(options.images)
+    beside = dict.fromkeys(Path(path).parent / 'families' for path in paths if not is_url(path))
+    settings = settings_from(options, IdentificationSettings, beside)
     for problem in problems:
         tell('identify', problem)
     jobs, tasks = _tasks(options, settings, paths)

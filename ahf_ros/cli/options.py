@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, TypeVar
 
+from ahf_ros.codes.families import files_by_name
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.filtering.settings import AdaptiveSettings
 from ahf_ros.session_settings import IdentificationSettings
@@ -145,7 +147,17 @@ def parsed_by(function: Callable[[str], Value]) -> Callable[[str], Value]:
     return parse
 
 
-def settings_from(options: argparse.Namespace, settings: type[Settings]) -> Settings:
-    """Return the settings from the values of the options, which must not contradict each other."""
-    names = [item.name for item in flat_parameters(settings)]
-    return assemble(settings, {name: getattr(options, name) for name in names})
+def settings_from(
+    options: argparse.Namespace, settings: type[Settings], folders: Iterable[Path] = ()
+) -> Settings:
+    """Return the settings from the values of the options, which must not contradict each other.
+
+    A family that is not known is described by a data file of its name, in the user's folder of
+    families or in one of the folders.
+    """
+    values = {item.name: getattr(options, item.name) for item in flat_parameters(settings)}
+    if 'family_file' in values:
+        usual = Path(os.environ.get('XDG_CONFIG_HOME') or Path.home() / '.config')
+        places = [*folders, usual / 'ahf_ros' / 'families']
+        values['family_file'] = files_by_name(values['family'], values['family_file'], places)
+    return assemble(settings, values)

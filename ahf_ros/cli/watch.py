@@ -60,7 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Identify images as they arrive, until a signal ends this process or results are lost."""
     output = sys.stdout if options.json else None
-    settings = settings_from(options, IdentificationSettings)
+    settings = settings_from(options, IdentificationSettings, [options.folder / 'families'])
     _check_overlay(options)
     jobs = options.jobs or available_cores()
     shared = shared_settings(settings, jobs, options.scheduler)

@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, TypeVar
 from ahf_ros.codes import APRILTAG_NAMES, ARUCO_NAMES, RING_NAMES, SQUARE_NAMES, VENDOR_NAMES
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from ahf_ros.codes.dots import DotFamily
     from ahf_ros.codes.gsi import PointFamily
     from ahf_ros.codes.ring import Family
@@ -46,6 +48,7 @@ ONE = f'one of {", ".join(FAMILY_NAMES)}, or the family of a family_file'
 Code = TypeVar('Code', 'Family', 'DotFamily', 'PointFamily')
 """The codes of families of one kind."""
 
+_ENDINGS = '.yaml', '.yml', '.json'  # of data files
 _SHOWN = 10  # IDs in an error
 _ALIKE = 0.65, 0.65, 0.85, 0.85  # share of letters of a name that is suggested, by `_ways`
 
@@ -183,6 +186,23 @@ def families_of(files: str) -> dict[str, Family | DotFamily | PointFamily]:
             fields['family'].refuse('a name that no other family has')
         found[code.name] = code
     return found
+
+
+def files_by_name(text: str, files: str, folders: Iterable[Path]) -> str:
+    """Return data files, separated by commas, with those of families that nothing else describes.
+
+    A family NAME of the text is described by NAME.yaml, NAME.yml or NAME.json in a folder.
+    """
+    found = [files] if files else []
+    places = list(folders)
+    for name in (part.strip() for part in text.split(',')):
+        if name == AUTO or _usual_name(name, FAMILY_NAMES) in FAMILY_NAMES:
+            continue
+        if not name.isidentifier() or (files and name in families_of(files)):
+            continue
+        paths = [folder / f'{name}{ending}' for folder in places for ending in _ENDINGS]
+        found += [str(path) for path in paths if path.is_file()][:1]
+    return ','.join(found)
 
 
 def _kind(code: Family | DotFamily | PointFamily) -> str:
