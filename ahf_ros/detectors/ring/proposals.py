@@ -26,7 +26,9 @@ from ahf_ros.features.pyramid import Octave
 
 _PER_SECTOR, _CIRCLES = 5, 36  # angles of the shortest sectors, and circles
 _PHASES = 4  # of the sectors
-_SHIFTS = (-1.2, 0.0, 1.2)  # of edges, px; readings keep farther away from these than the error
+_MAXIMUM_SHIFT = 1.2  # of edges, px
+_SHIFTS, _OF_NARROW = 3, 7  # that are tried; readings keep farther from edges than what is left
+_WIDE = 1.0  # width of a band, dot radii
 _COVER = 5.0  # price of a sector that is covered, less than where words are decoded
 _HOPEFUL = 0.1  # bound of the mean evidence of a reading, from which a band is read
 _CAP = 3.0  # evidence of a reading against bare paper
@@ -99,7 +101,8 @@ def _bound(gray: np.ndarray, dots: Fit, band: tuple[float, float], bits: set[int
     angles = _PER_SECTOR * max(bits)
     polar = polar_images(gray, dots, band, angles, _CIRCLES)
     best = np.full(len(dots.frames), -np.inf)
-    for shift in _SHIFTS:
+    tried = _SHIFTS if band[1] - band[0] >= _WIDE else _OF_NARROW
+    for shift in np.linspace(-_MAXIMUM_SHIFT, _MAXIMUM_SHIFT, tried).tolist():
         growth = growth_by(shift, polar.size)
         edges = edge_evidence(polar, 1 - growth, growth, band)
         cap = _CAP * edges.weight[:, None]
