@@ -27,7 +27,7 @@ from ahf_ros.text import printable, reason_of
 
 Item = TypeVar('Item')
 
-_LONGEST_REASON = 2000  # characters
+_MAXIMUM_REASON = 2000  # characters
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -249,7 +249,7 @@ def refusal(error: Exception) -> Remark:
 def why_refused(error: Exception) -> Remark:
     """Return in printable words why an image is refused that raises an error, whichever."""
     expected = isinstance(error, ValueError)
-    text = printable(str(error), _LONGEST_REASON) if expected else reason_of(error)
+    text = printable(str(error), _MAXIMUM_REASON) if expected else reason_of(error)
     return Remark(kind=Kind.REFUSED, text=text, error=error)
 
 

@@ -34,7 +34,7 @@ CODED_TARGETS = 'ahf_ros/msg/CodedTargetArray'
 COMPRESSED_IMAGE = 'sensor_msgs/msg/CompressedImage'
 IMAGE = 'sensor_msgs/msg/Image'
 
-LONGEST_DEFINITION = 2**17
+MAXIMUM_DEFINITION = 2**17
 """Characters of a definition of a type that is parsed, which takes seconds."""
 
 _NAMES = ('CodedTarget', 'CodedTargetArray', 'FilterState')
@@ -145,8 +145,8 @@ def as_ros2(item: Connection) -> tuple[Connection, Callable[[bytes], bytes]]:
 def _defined(item: Connection) -> Typestore:
     """Return the types in the definition of a topic."""
     text = item.msgdef.data
-    if len(text) > LONGEST_DEFINITION:
-        raise ValueError(f'it has {len(text)} characters, accepted are {LONGEST_DEFINITION}')
+    if len(text) > MAXIMUM_DEFINITION:
+        raise ValueError(f'it has {len(text)} characters, accepted are {MAXIMUM_DEFINITION}')
     if item.msgdef.format == MessageDefinitionFormat.NONE:
         raise ValueError('neither the bag nor ROS 2 Jazzy defines it')
     types: dict[str, Any] = {}

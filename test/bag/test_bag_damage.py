@@ -22,7 +22,7 @@ from rosbags.interfaces import QosDurability
 from ruamel.yaml import YAML
 
 from ahf_ros.bag import source as sources
-from ahf_ros.bag.definitions import IMAGE, LONGEST_DEFINITION, typestore
+from ahf_ros.bag.definitions import IMAGE, MAXIMUM_DEFINITION, typestore
 from ahf_ros.bag.output import Journal
 from ahf_ros.bag.source import Source
 from ahf_ros.cli import main
@@ -392,14 +392,14 @@ def test_messages_of_ros1_in_mcap_are_named(
 
 
 def test_what_takes_long_to_parse_is_copied_unparsed(tmp_path: Path) -> None:
-    definition = '\n'.join(f'uint8 x{number}' for number in range(LONGEST_DEFINITION // 9))
+    definition = '\n'.join(f'uint8 x{number}' for number in range(MAXIMUM_DEFINITION // 9))
     records = [
         *image_records(),
         mcap.schema(2, 'far/msg/Long', 'ros2msg', definition),
         mcap.channel(2, 2, '/long'),
         mcap.message(2, 5, b'12'),
     ]
-    assert len(definition) > LONGEST_DEFINITION
+    assert len(definition) > MAXIMUM_DEFINITION
     assert status(mcap.McapFile(records).write(tmp_path / 'in.mcap'), tmp_path / 'out') == 0
     assert ('/long', 5, b'12') in bags.read(tmp_path / 'out')
 

@@ -55,7 +55,7 @@ _WHOLE_MARGIN = 0.4  # about a dot whose outline is whole, dot radii
 _SMALL = 12.0  # radius up to which dots are looked for as blobs, px
 _SMALLER = 0.8  # of the smallest radius, of a blob whose edge is blurred
 _PROMISING = 0.85  # support of a hypothesis with another code than before, to be placed again
-_FARTHEST = 1.0  # that the reference point is moved by a refinement, px, or dot radii
+_MAXIMUM_MOVE = 1.0  # that the reference point is moved by a refinement, px, or dot radii
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +110,9 @@ class GsiDetector(FamilyDetector):
         frames = frame.affine_frames(*ellipses.reshape(-1, 5).T).reshape(*ellipses.shape[:2], 3, 3)
         placed = place_targets(gray, frames, polarity, *_printed(words, code), code.reach)
         moved = np.hypot(*(placed.homographies[:, :2, 2] - [(it.x, it.y) for it in dotted]).T)
-        reach = np.maximum(_FARTHEST, _FARTHEST * np.array([it.semi_minor for it in dotted]))
+        reach = np.maximum(
+            _MAXIMUM_MOVE, _MAXIMUM_MOVE * np.array([it.semi_minor for it in dotted])
+        )
         good = (moved <= reach) & (placed.share >= 0.5)
         return moved_targets(targets, dotted, _fields(placed, words, code), good)
 

@@ -20,8 +20,8 @@ from ahf_ros.features.robust import median
 from ahf_ros.imaging.black import black_lift, lifted
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
-_FAINTEST = 0.12  # step of ln of a dot
-_SMALLEST = 0.02  # the same where there is hardly any light
+_MINIMUM_STEP = 0.12  # step of ln of a dot
+_MINIMUM_DARK_STEP = 0.02  # the same where there is hardly any light
 _NOISE = 0.08  # of a step of ln, standard deviation
 _BIN = 0.06  # of ln(I + 8), of the levels of ink and paper
 _BINS = int(np.ceil(np.log((255 + LOG_OFFSET) / LOG_OFFSET) / _BIN)) + 1
@@ -36,9 +36,9 @@ _SMOOTHING /= _SMOOTHING.sum(axis=1, keepdims=True)
 _CONTRADICTED = -6.0  # evidence at a place of a template dot that nearly rules one out
 _HIDDEN = 1  # dots that are found and nevertheless so contradicted, in deep shadow
 
-_MOST_FOR, _MOST_AGAINST = 8.0, 6.0  # that one place may say on whether there is a target
+_MAXIMUM_FOR, _MAXIMUM_AGAINST = 8.0, 6.0  # that one place may say on whether there is a target
 _GREATEST_MARGIN = 14.0  # of one code over the next, beyond which it says no more
-_CLEAREST = 20.0  # that it may say for a dot on which one
+_MAXIMUM_OF_DOT = 20.0  # that it may say for a dot on which one
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +110,7 @@ def _expected_steps(sides: np.ndarray, polarity: np.ndarray, count: int) -> np.n
     brighter = _gray(sides.max(axis=3))
     ink = _ink_and_light(sides, polarity, count)[0][:, None, None]
     expected = np.log((brighter + LOG_OFFSET) / (ink * brighter + LOG_OFFSET))
-    return np.maximum(expected, _SMALLEST)
+    return np.maximum(expected, _MINIMUM_DARK_STEP)
 
 
 def _ink_and_light(
@@ -122,10 +122,10 @@ def _ink_and_light(
     usual = ((template[..., 1] - template[..., 0]) * polarity[:, None, None]).reshape(rays)
     light = _gray(template.max(axis=3)).reshape(rays)
     lit = light >= np.median(light, axis=1, keepdims=True)
-    usual = np.maximum(median(usual, lit, 0.0), _FAINTEST)
+    usual = np.maximum(median(usual, lit, 0.0), _MINIMUM_STEP)
     light = np.maximum(median(light, lit, 0.0), 1.0)
     ink = ((light + LOG_OFFSET) * np.exp(-usual) - LOG_OFFSET) / light
-    return np.clip(ink, 0.0, np.exp(-_FAINTEST)), light
+    return np.clip(ink, 0.0, np.exp(-_MINIMUM_STEP)), light
 
 
 def _gray(logarithm: np.ndarray) -> np.ndarray:
@@ -189,21 +189,21 @@ def read_codes(evidence: Evidence, scale: np.ndarray, family: PointFamily) -> Re
     places nearer to dots than two radii is these dots, and tells nothing new.
     """
     count = len(family.template)
-    limited = np.clip(evidence.ratio, -_MOST_AGAINST, _MOST_FOR)
+    limited = np.clip(evidence.ratio, -_MAXIMUM_AGAINST, _MAXIMUM_FOR)
     template, positions = limited[:, :count], limited[:, count:]
     incidence = _incidence(family)
-    scores = np.clip(evidence.ratio[:, count:], -_MOST_AGAINST, _CLEAREST) @ incidence.T
+    scores = np.clip(evidence.ratio[:, count:], -_MAXIMUM_AGAINST, _MAXIMUM_OF_DOT) @ incidence.T
     rows, best = np.arange(len(scores)), scores.argmax(axis=1)
     highest = scores[rows, best]
     scores[rows, best] = highest - _GREATEST_MARGIN
     margin = highest - scores.max(axis=1)
     marked = incidence[best] > 0
     empty = ~marked & ~_covered(marked, scale, family)
-    of_dots = np.concatenate([template, np.where(marked, positions, _MOST_FOR)], axis=1)
+    of_dots = np.concatenate([template, np.where(marked, positions, _MAXIMUM_FOR)], axis=1)
     against = np.where(empty, -positions, 0.0).sum(axis=1)
     dots = template.sum(axis=1) + np.where(marked, positions, 0.0).sum(axis=1)
     empty &= evidence.inside[:, count:]
-    most = (count + marked.sum(axis=1)) * _MOST_FOR + empty.sum(axis=1) * _MOST_AGAINST
+    most = (count + marked.sum(axis=1)) * _MAXIMUM_FOR + empty.sum(axis=1) * _MAXIMUM_AGAINST
     return Readings(
         words=family.words[best],
         margin=margin,

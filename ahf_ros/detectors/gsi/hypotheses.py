@@ -27,7 +27,7 @@ OBVIOUS = 0.99  # confidence from which a target is not weighed against others i
 
 _UNEVEN = (0.005, 0.05)  # difference of radii that counts as 1, in ln: of any dot, and in px
 _PERSPECTIVE = 0.08  # change of depth from the centre to the edge of a target, that counts as 1
-_MOST = 6.0  # of both
+_MAXIMUM = 6.0  # of both
 
 _PLAUSIBLE = 0.75  # support of a hypothesis that is followed up
 _CLEAR = 0.95  # the same, where only obvious targets are looked for; these have 1
@@ -107,8 +107,8 @@ def confidence_features(
             readings.weakest,
             readings.margin,
             placement.misplacement,
-            np.minimum(uneven, _MOST),
-            np.minimum(np.hypot(*perspective.T), _MOST),
+            np.minimum(uneven, _MAXIMUM),
+            np.minimum(np.hypot(*perspective.T), _MAXIMUM),
             placement.share,
         ],
         axis=1,

@@ -38,7 +38,7 @@ from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, DottedTarget, Target, sorted_targets
 
-_LARGEST_BIAS = 1.0
+_MAXIMUM_BIAS = 1.0
 # Distance h of a dot from its position that is accepted, in the unit of the printed design, mm.
 _DOTS = 8  # of a target
 _DISTANCE_RATIO = 2.5  # beta, of the longer half of the line of three dots to the shorter one
@@ -142,7 +142,7 @@ def decode(points: np.ndarray, code: PointFamily) -> Decoded:
     bias = distance.min(axis=2).max(axis=1, initial=0.0)
     words = np.bitwise_or.reduce(np.int64(1) << code.position_numbers[nearest], axis=1)
     order = np.lexsort((bias, members[:, code.reference]))
-    order = order[(bias[order] <= _LARGEST_BIAS) & np.isin(words[order], code.words)]
+    order = order[(bias[order] <= _MAXIMUM_BIAS) & np.isin(words[order], code.words)]
     _, first = np.unique(members[order, code.reference], return_index=True)
     return Decoded(words, members, bias).select(order[first])
 
@@ -247,7 +247,7 @@ class PublishedGsiDetector(FamilyDetector):
                     DottedTarget(
                         id=code.number(word) or 0,
                         code=word,
-                        confidence=1 - bias / _LARGEST_BIAS,
+                        confidence=1 - bias / _MAXIMUM_BIAS,
                         family='gsi',  # whichever data file describes it
                         dots=tuple(map(tuple, dots[members].tolist())),
                         template_dots=len(code.template),

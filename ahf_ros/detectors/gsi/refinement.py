@@ -22,7 +22,7 @@ from ahf_ros.imaging.black import black_lift
 _RAYS = 32  # about a dot
 _REACHES = ((2.3, 0.45), (1.1, 0.95), (0.5, 1.9))
 # Semi-minor axis of a dot, px, from where on its edge is looked for within a reach, dot radii.
-_FARTHEST, _FARTHEST_SHARE = 0.8, 0.25  # that the centre of a dot is moved: px, radii
+_MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE = 0.8, 0.25  # that the centre of a dot is moved: px, radii
 _UNMEASURED = 0.3  # standard deviation of a centre whose edge was not fitted, px
 _OUTLIER = 4.0  # standard deviations from which a dot loses its weight
 _MINIMUM_ERROR = 0.01  # of a centre, standard deviation, that edges of light cannot undercut, px
@@ -98,7 +98,7 @@ def measure_dots(gray: np.ndarray, frames: np.ndarray, polarity: np.ndarray) -> 
         moved = np.hypot(*(fit.frames[:, :2, 2] - frames[which, :2, 2]).T)
         good = fit.share >= ENOUGH
         found[which], fitted[which[good]] = good, fit.frames[good]
-        good &= moved <= np.maximum(_FARTHEST, _FARTHEST_SHARE * minor[which])
+        good &= moved <= np.maximum(_MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE * minor[which])
         near[which] = good
         covariance[which[good]] = fit.covariance[good] + _MINIMUM_ERROR**2 * np.eye(2)
     return MeasuredDots(frames=fitted, covariance=covariance, found=found, near=near)
