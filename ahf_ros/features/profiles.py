@@ -34,10 +34,7 @@ _HALF_WIDTHS = np.array([0.0, 1.0, 1.3, 1.6, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 
 _BLUR_STEP = 0.1  # distance of two blurs that filters are made for, standard deviations in px
 _ENOUGH, _ENOUGH_BLURS = 3.0, 2.5  # half width of a profile, px, or deviations of the step
 _MAXIMUM_ASIDE = 0.8  # of the two lines of a profile, from its middle, px
-_MAXIMUM_OFFSET, _OFFSETS = (
-    0.8,
-    17,
-)  # farthest offset that is tried, half widths, and number of them
+_MAXIMUM_OFFSET, _OFFSETS = 0.8, 17  # that is tried, half widths, and number of them
 _CONTRAST = 0.25  # usual gray value of dark over bright
 _MINIMUM_STEP = 1.0  # gray values, that an offset is computed from
 
