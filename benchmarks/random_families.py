@@ -51,7 +51,6 @@ def random_family(file: Path, generator: np.random.Generator) -> dict[str, objec
         'words': generator.permutation(words)[:60].tolist(),
     }
     file.write_text(json.dumps(described))
-    ring_family.cache_clear()
     return rule
 
 

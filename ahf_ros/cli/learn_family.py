@@ -137,7 +137,6 @@ def _write_rings(
         f'band: [{inner:g}, {outer:g}]\nwords: {rules}\nnumbers: {{first_bit: lowest}}\n'
     )
     write_whole(str(file), text.encode())
-    ring_family.cache_clear()
     ring_family(str(file))
     write_image(file.with_suffix('.png'), _contact_sheet(learnt, images))
     print(

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterable, Mapping, Sequence
 from difflib import get_close_matches
+from functools import lru_cache
 from itertools import combinations
+from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from ahf_ros.codes import APRILTAG_NAMES, ARUCO_NAMES, RING_NAMES, SQUARE_NAMES, VENDOR_NAMES
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from ahf_ros.codes.dots import DotFamily
     from ahf_ros.codes.gsi import PointFamily
     from ahf_ros.codes.ring import Family
@@ -169,23 +169,28 @@ def families_of(files: str) -> dict[str, Family | DotFamily | PointFamily]:
     dots, or rings, as its fields tell. Raise a ValueError, which names file, line and field, if
     one is not accepted.
     """
+    found: dict[str, Family | DotFamily | PointFamily] = {}
+    for path in (part.strip() for part in files.split(',')):
+        state = Path(path).stat() if Path(path).exists() else None
+        code = _described(path, state and (state.st_mtime_ns, state.st_size))
+        if code.name in (*RING_NAMES, *SQUARE_NAMES, *found):
+            raise ValueError(
+                f'{path}: family is {code.name!r}, accepted is a name that no other family has'
+            )
+        found[code.name] = code
+    return found
+
+
+@lru_cache(maxsize=64)
+def _described(path: str, _state: object) -> Family | DotFamily | PointFamily:
+    """Return the family that a data file describes, read once for each state of it."""
     from ahf_ros.codes import dots, gsi, ring
     from ahf_ros.codes.data_file import read_data_file
 
-    found: dict[str, Family | DotFamily | PointFamily] = {}
-    for path in (part.strip() for part in files.split(',')):
-        fields = dict(read_data_file(path).items())
-        code: Family | DotFamily | PointFamily
-        if 'template' in fields:
-            code = gsi.point_family(path)
-        elif 'dot_circle' in fields:
-            code = dots.dot_family(path)
-        else:
-            code = ring.ring_family(path)
-        if code.name in (*RING_NAMES, *SQUARE_NAMES, *found):
-            fields['family'].refuse('a name that no other family has')
-        found[code.name] = code
-    return found
+    fields = dict(read_data_file(path).items())
+    if 'template' in fields:
+        return gsi.point_family(path)
+    return dots.dot_family(path) if 'dot_circle' in fields else ring.ring_family(path)
 
 
 def files_by_name(text: str, files: str, folders: Iterable[Path]) -> str:

@@ -61,7 +61,6 @@ def family(name: str) -> Family:
     return ring_family(str(RING_FOLDER / f'{name}.json'))
 
 
-@lru_cache(maxsize=64)
 def ring_family(path: str) -> Family:
     """Return the family of ring codes that a data file describes.
 

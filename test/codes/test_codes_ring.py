@@ -155,7 +155,6 @@ def described(folder: Path, **fields: object) -> Family:
     content = {name: value for name, value in (FAMILY | fields).items() if value is not None}
     path = folder / 'family.yaml'
     path.write_text('\n'.join(f'{name}: {json.dumps(it)}' for name, it in content.items()))
-    ring_family.cache_clear()
     return ring_family(str(path))
 
 
