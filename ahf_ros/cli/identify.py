@@ -192,7 +192,8 @@ def _other_rings(paths: Sequence[str]) -> str:
             families = learn_families(find_bands([read_image(path)], DetectorSettings()))
         except ValueError:  # which the identification has said
             continue
-        for found in families:
+        if families:
+            found = families[0]
             known = ' or '.join(found.known())
             return (
                 f'{path} shows {len(found.words)} dots with a band of {found.bits} sectors: '

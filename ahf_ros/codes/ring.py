@@ -14,7 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from math import gcd
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -25,13 +25,17 @@ from ahf_ros.codes.data_file import Entry, read_data_file
 FAMILY_NAMES = VENDOR_NAMES
 """The ring code families that vendors print."""
 
-_BITS = (6, 24)
+BITS = (6, 24)
+"""Fewest and most bits of a family."""
+
 _MAXIMUM_RADIUS = 12.0  # of a band, dot radii
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Family(CyclicFamily):
     """The words of one kind of ring target, and the radii of its band, in radii of the dot."""
+
+    kind: ClassVar[str] = 'ring'
 
     band_inner: float
     band_outer: float
@@ -69,7 +73,7 @@ def ring_family(path: str) -> Family:
     fields = read_data_file(path).keys(
         ('family', 'bits', 'band'), ('words', 'codes', 'numbers', 'source')
     )
-    bits = fields['bits'].integer(*_BITS)
+    bits = fields['bits'].integer(*BITS)
     inner, outer = (
         of.number('a radius in radii of the dot', 1.0)
         for of in fields['band'].list('its inner and outer radius, in radii of the dot', (2,))
@@ -162,16 +166,16 @@ def conforming(
     """Return whether words follow rules of a family, see docs/ring_targets.md, shape (k,)."""
     good = words > above
     if parity:
-        good &= marks(words, bits) % 2 == (parity == 'odd')
+        good &= _marks(words, bits) % 2 == (parity == 'odd')
     if opposite_pairs:
         half = bits // 2
-        good &= marks(words & (words >> half) & ((1 << half) - 1), half) >= opposite_pairs
+        good &= _marks(words & (words >> half) & ((1 << half) - 1), half) >= opposite_pairs
     if changes is not None:
-        good &= borders(words, bits) <= changes
+        good &= _borders(words, bits) <= changes
     return good
 
 
-def marks(words: np.ndarray, bits: int) -> np.ndarray:
+def _marks(words: np.ndarray, bits: int) -> np.ndarray:
     """Return the numbers of ones of words."""
     count = np.zeros_like(words)
     for bit in range(bits):
@@ -179,9 +183,9 @@ def marks(words: np.ndarray, bits: int) -> np.ndarray:
     return count
 
 
-def borders(words: np.ndarray, bits: int) -> np.ndarray:
+def _borders(words: np.ndarray, bits: int) -> np.ndarray:
     """Return the numbers of borders between ones and zeros of words, read in a circle."""
-    return marks(words ^ (words >> 1 | (words & 1) << (bits - 1)), bits)
+    return _marks(words ^ (words >> 1 | (words & 1) << (bits - 1)), bits)
 
 
 def _numbers(rule: Entry | None, words: np.ndarray, bits: int) -> np.ndarray:

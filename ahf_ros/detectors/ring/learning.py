@@ -17,7 +17,8 @@ import numpy as np
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes import RING_NAMES
 from ahf_ros.codes.cyclic import smallest_rotation
-from ahf_ros.codes.ring import conforming, family
+from ahf_ros.codes.ring import BITS, conforming, family
+from ahf_ros.detectors.claims import owners
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.ring.polar import angles_of
 from ahf_ros.features import frame
@@ -25,18 +26,18 @@ from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.circle_fit import ENOUGH, NO_FITS, Fit, fit_dots
 from ahf_ros.features.dot_search import voted_dots, whole_dots
 from ahf_ros.features.pyramid import image_pyramid, octaves
-from ahf_ros.features.robust import NORMAL
+from ahf_ros.features.robust import NORMAL, median
 from ahf_ros.features.sampling import sample_circles
 from ahf_ros.imaging.image import as_gray, check_image
 
 MINIMUM_TARGETS = 5
 """Targets of a family from which it is learnt; twenty tell it well."""
 
-_BITS = range(6, 25)  # of a family
 _ANGLES = 480
 _RADII = np.arange(1.05, 5.5, 0.05)  # of circles that are read, dot radii
 _REACH, _RAYS = 0.25, 48  # of the edge of a dot: dot radii, and their number
 _DEPTH = 0.25  # share of the band at either edge that says nothing of its sectors
+_NOWHERE = 1e6  # radius of a band that is not there, dot radii
 _EXACT = 0.12  # deviation of the edges of a band from circles, dot radii
 _AGREEING = 0.6  # share of the marks of a band that begin and end there
 _MARKED = 0.03, 0.97  # share of a band that is marked
@@ -129,9 +130,9 @@ def _bands(gray: np.ndarray, fit: Fit, index: int) -> Bands:
     last = ends.argmax(axis=2)
     marked = begins.any(axis=2) & ends.any(axis=2)
     edges = [_crossing(ink, at) for at in (first, last)]
-    usual = [_median(of, marked) for of in edges]
+    usual = [median(of, marked, _NOWHERE) for of in edges]
     away = [np.abs(of - middle[:, None]) for of, middle in zip(edges, usual, strict=True)]
-    spread = NORMAL * np.maximum(*(_median(of, marked) for of in away))
+    spread = NORMAL * np.maximum(*(median(of, marked, _NOWHERE) for of in away))
     exact = marked & (np.maximum(*away) < 2 * _EXACT)
     inner, outer = (_mean(of, exact) for of in edges)
     depth = (_RADII - inner[:, None]) / np.maximum(outer - inner, 0.1)[:, None]
@@ -165,13 +166,6 @@ def _crossing(ink: np.ndarray, at: np.ndarray) -> np.ndarray:
     return crossing
 
 
-def _median(values: np.ndarray, which: np.ndarray) -> np.ndarray:
-    """Return the medians of some values of each row, large where there are none."""
-    some = np.where(which | ~which.any(axis=1, keepdims=True), values, np.nan)
-    some[~which.any(axis=1)] = 1 / np.finfo(np.float32).eps
-    return np.asarray(np.nanmedian(some, axis=1))
-
-
 def _mean(values: np.ndarray, which: np.ndarray) -> np.ndarray:
     """Return the means of some values along the last axis, 0 where there are none."""
     return np.asarray((values * which).sum(axis=-1) / np.maximum(which.sum(axis=-1), 1))
@@ -179,13 +173,15 @@ def _mean(values: np.ndarray, which: np.ndarray) -> np.ndarray:
 
 def _distinct(bands: Bands) -> Bands:
     """Return one band of each place, the one whose edges are most exactly circles."""
-    kept: list[int] = []
-    centres, reach = bands.frames[:, :2, 2], bands.size * bands.outer
-    for index in np.argsort(bands.spread, kind='stable').tolist():
-        near = np.hypot(*(centres[kept] - centres[index]).T) < reach[kept]
-        if not (near & (bands.image[kept] == bands.image[index])).any():
-            kept.append(index)
-    return bands.select(np.sort(np.array(kept, int)))
+    order = np.argsort(bands.spread, kind='stable')
+    exact = bands.select(order)
+    centres, reach = exact.frames[:, :2, 2], exact.size * exact.outer
+
+    def beside(index: int) -> np.ndarray:
+        near = np.hypot(*(centres - centres[index]).T) < reach[index]
+        return near & (exact.image == exact.image[index])
+
+    return bands.select(np.sort(order[owners(len(order), beside)]))
 
 
 def learn_families(bands: Bands) -> list[LearntFamily]:
@@ -207,7 +203,8 @@ def learn_families(bands: Bands) -> list[LearntFamily]:
 
 def _learn(bands: Bands) -> tuple[np.ndarray, LearntFamily]:
     """Return the indices of bands of one family, and this."""
-    scores = np.stack([_grid_odds(bands, bits) for bits in _BITS])  # of bits, growth, target
+    counts, arcs = range(BITS[0], BITS[1] + 1), _borders(bands)
+    scores = np.stack([_grid_odds(bands, *arcs, bits) for bits in counts])  # bits, growth, target
     unusual = 0.5 * (_GROWTH / _USUAL_GROWTH) ** 2 * MINIMUM_TARGETS
     own = np.ones(len(bands.size), bool)
     for _ in range(3):
@@ -215,7 +212,7 @@ def _learn(bands: Bands) -> tuple[np.ndarray, LearntFamily]:
         best, at = np.unravel_index(total.argmax(), total.shape)
         # Targets that another number of bits explains far better are of another family.
         own = scores[best, at] > scores[:, at].max(axis=0) - _OTHER
-    bits, growth = _BITS[int(best)], float(_GROWTH[at])
+    bits, growth = counts[int(best)], float(_GROWTH[at])
     some = bands.select(own)
     printed = some.size - growth
     inner = np.median((some.inner * some.size + growth) / printed)
@@ -251,9 +248,10 @@ def _along(bands: Bands) -> np.ndarray:
     return bands.size * (bands.inner + bands.outer) / 2
 
 
-def _grid_odds(bands: Bands, bits: int) -> np.ndarray:
+def _grid_odds(
+    bands: Bands, row: np.ndarray, angle: np.ndarray, begins: np.ndarray, bits: int
+) -> np.ndarray:
     """Return the log odds of borders on a grid against any places, by growth and target."""
-    row, angle, begins = _borders(bands)
     along, count = _along(bands), len(bands.size)
     error = np.maximum(_ERROR / along, _MINIMUM_ERROR)
     number = np.maximum(np.bincount(row, minlength=count), 1)
