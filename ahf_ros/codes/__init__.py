@@ -9,9 +9,12 @@ RING_FOLDER = Path(__file__).with_name('ring_families')
 """The data files of the families of ring targets."""
 
 
+_VENDORS = 'metashape', 'aicon', 'cct'
+
+
 def _order(name: str) -> tuple[int, int]:
     vendor = name.rstrip(digits)
-    return ('metashape', 'aicon').index(vendor) if vendor != 'cct' else 2, int(name[len(vendor) :])
+    return _VENDORS.index(vendor), int(name.removeprefix(vendor))
 
 
 RING_NAMES = tuple(sorted((path.stem for path in RING_FOLDER.glob('*.json')), key=_order))

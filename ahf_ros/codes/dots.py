@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from math import pi, sin
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -30,6 +30,8 @@ class DotFamily(CyclicFamily):
     Lengths are in radii of the disc: the radius of the circle on which the small dots stand, their
     own radius, and the inner and outer radius of the border.
     """
+
+    kind: ClassVar[str] = 'dots'
 
     dot_circle: float
     dot_radius: float

@@ -73,7 +73,7 @@ def families_in(text: str, files: str = '') -> tuple[str, ...]:
     kinds = {name: kind for kind, of_kind in KINDS.items() for name in of_kind}
     given = [part.strip() for part in text.split(',')]
     if files and not {_usual_name(name, kinds) for name in given} <= set(kinds):
-        own = {name: _kind(code) for name, code in families_of(files).items()}
+        own = {name: code.kind for name, code in families_of(files).items()}
         kinds |= own
         if text == AUTO:
             given = [AUTO, *(name for name, kind in own.items() if kind == 'ring')]
@@ -124,7 +124,7 @@ def kind_of(name: str, files: str = '') -> str:
     for kind, names in KINDS.items():
         if name in names:
             return kind
-    return _kind(families_of(files)[name])
+    return families_of(files)[name].kind
 
 
 def code_family(name: str, files: str = '') -> Family | DotFamily | PointFamily:
@@ -139,7 +139,7 @@ def code_family(name: str, files: str = '') -> Family | DotFamily | PointFamily:
     if files and name not in RING_NAMES:
         own = families_of(files)
         for code in own.values():
-            if name in (code.name, _kind(code)):
+            if name in (code.name, code.kind):
                 return code
         raise ValueError(
             f'family is {name!r}, and family_file is {files!r}, which describes {", ".join(own)}; '
@@ -208,10 +208,6 @@ def files_by_name(text: str, files: str, folders: Iterable[Path]) -> str:
         paths = [folder / f'{name}{ending}' for folder in places for ending in _ENDINGS]
         found += [str(path) for path in paths if path.is_file()][:1]
     return ','.join(found)
-
-
-def _kind(code: Family | DotFamily | PointFamily) -> str:
-    return {'PointFamily': 'gsi', 'DotFamily': 'dots'}.get(type(code).__name__, 'ring')
 
 
 def numbers_of(name: str, file: str = '') -> Sequence[int]:

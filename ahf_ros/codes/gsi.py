@@ -13,6 +13,7 @@ from functools import lru_cache
 from itertools import combinations
 from math import comb, dist
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
@@ -66,6 +67,8 @@ class PointFamily:
     words, numbers : ndarray of int64, shape (k,)
         The values of the codes, ascending and read-only, and the ID of each.
     """
+
+    kind: ClassVar[str] = 'gsi'
 
     name: str
     unit: str
