@@ -121,6 +121,13 @@ def read_data_file(path: str | Path) -> Entry:
     return Entry(source, '', 1, value)
 
 
+def pinhole_in(fields: dict[str, Entry]) -> float:
+    """Return the radius of the hole in a dot, in its radii, 0 where the fields have none."""
+    accepted = 'a radius from 0 to 0.5 radii of the dot'
+    radius = fields['pinhole'].number(accepted, 0.0) if 'pinhole' in fields else 0.0
+    return radius if radius <= 0.5 else fields['pinhole'].refuse(accepted)
+
+
 def _refuse_aliases(source: str, value: Any) -> None:
     """Refuse YAML that holds a part twice: written out, it may be of any size."""
     seen: set[int] = set()

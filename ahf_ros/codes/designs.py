@@ -20,7 +20,8 @@ from ahf_ros.codes.square import SQUARE_NAMES, marker
 HALF_SIDE = 2.4
 """Half the side of a square marker, in radii of the dot of a ring target of the same size."""
 
-_QUIET_ZONE = 4.2  # of ring targets and square markers: 3.5 for the widest band, a fifth more
+_WIDER = 1.2  # times the reach of a ring target
+_QUIET_ZONE = 4.2  # of ring targets and square markers at least: that of a band up to 3.5
 _MARGIN = 1.0  # about the outermost dot or border of the other families, in radii of the dot
 
 Point = tuple[float, float]
@@ -47,13 +48,16 @@ class Proportions:
 
     `reach` is the radius of the circle that holds all ink, `radius` that of the circle whose image
     is reported as the ellipse of the target, and `quiet_zone` that of the area that is left free.
-    `radii` has the lengths of the design by their names.
+    `radii` has the lengths of the design by their names. `pinhole` is the radius of the hole in
+    the dot, 0 for none, and `polarity` the colour of the ink, 'dark' or 'bright'.
     """
 
     reach: float
     radius: float
     quiet_zone: float
     radii: dict[str, float]
+    pinhole: float = 0.0
+    polarity: str = 'dark'
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,18 +80,23 @@ def proportions(name: str, file: str = '') -> Proportions:
         reach, radii = HALF_SIDE * 2**0.5, {'half_side': HALF_SIDE}
         return Proportions(reach=reach, radius=HALF_SIDE, quiet_zone=_QUIET_ZONE, radii=radii)
     code, radius, radii = code_family(name, file), 1.0, {'dot': 1.0}
+    pinhole, polarity = 0.0, 'dark'
     if isinstance(code, Family):
         radii |= {'band_inner': code.band_inner, 'band_outer': code.band_outer}
-        reach, quiet_zone = code.band_outer, _QUIET_ZONE
+        for number, of in enumerate(code.circles, 1):
+            radii |= {f'circle_{number}_inner': of[0], f'circle_{number}_outer': of[1]}
+        reach, quiet_zone = code.reach, max(_QUIET_ZONE, _WIDER * code.reach)
+        pinhole, polarity = code.pinhole, 'bright' if code.polarity == 'bright' else 'dark'
     elif isinstance(code, DotFamily):
         radii |= {'dot_circle': code.dot_circle, 'small_dot': code.dot_radius}
         radii |= {'ground': code.ground_radius, 'border': code.border_radius}
         reach, quiet_zone = code.border_radius, code.border_radius + _MARGIN
+        pinhole = code.pinhole
     else:
         radius = float(code.template_radii[code.reference] / code.dot_radius)
         reach = code.reach / code.dot_radius
         quiet_zone = reach + _MARGIN
-    return Proportions(reach=reach, radius=radius, quiet_zone=quiet_zone, radii=radii)
+    return Proportions(reach, radius, quiet_zone, radii, pinhole, polarity)
 
 
 def relative_reach(name: str) -> float:
@@ -146,7 +155,7 @@ def _band_contours(table: Family, word: int) -> list[Contour]:
         outer = Arc(x=0.0, y=0.0, radius=table.band_outer, start=start, extent=extent)
         inner = Arc(x=0.0, y=0.0, radius=table.band_inner, start=start + extent, extent=-extent)
         contours.append((outer, inner))
-    return contours
+    return contours + [circle(radius) for of in table.circles for radius in of]
 
 
 def _dot_ring_contours(table: DotFamily, word: int) -> list[Contour]:

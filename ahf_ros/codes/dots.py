@@ -9,7 +9,6 @@ them is canonical.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from math import pi, sin
 from pathlib import Path
 from typing import Any, ClassVar
@@ -17,7 +16,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ahf_ros.codes.cyclic import CyclicFamily, mirrored_words, smallest_rotation
-from ahf_ros.codes.data_file import read_data_file
+from ahf_ros.codes.data_file import pinhole_in, read_data_file
+from ahf_ros.codes.kept import kept_while_unchanged
 
 DOTS_DESIGN = Path(__file__).with_name('dots.json')
 """The design of rings of dots that this package prints."""
@@ -28,7 +28,7 @@ class DotFamily(CyclicFamily):
     """The code words of one kind of ring of dots, and the proportions of its print.
 
     Lengths are in radii of the disc: the radius of the circle on which the small dots stand, their
-    own radius, and the inner and outer radius of the border.
+    own radius, the inner and outer radius of the border, and the radius of the hole in the disc.
     """
 
     kind: ClassVar[str] = 'dots'
@@ -37,6 +37,7 @@ class DotFamily(CyclicFamily):
     dot_radius: float
     ground_radius: float
     border_radius: float
+    pinhole: float = 0.0
 
     def canonical(self, words: Any) -> np.ndarray:
         """Return the smallest of all words that are the same code, ndarray of int64."""
@@ -53,7 +54,7 @@ class DotFamily(CyclicFamily):
         return places
 
 
-@lru_cache(maxsize=8)
+@kept_while_unchanged
 def dot_family(path: str = '') -> DotFamily:
     """Return the family of rings of dots in a data file; our own where empty.
 
@@ -67,7 +68,9 @@ def dot_family(path: str = '') -> DotFamily:
     (76, 2)
     """
     lengths = ('dot_circle', 'dot_radius', 'ground_radius', 'border_radius')
-    fields = read_data_file(path or DOTS_DESIGN).keys(('family', 'bits', *lengths), ('source',))
+    fields = read_data_file(path or DOTS_DESIGN).keys(
+        ('family', 'bits', *lengths), ('pinhole', 'source')
+    )
     circle, radius, ground, border = (
         fields[name].number('a length in radii of the disc', 1e-3) for name in lengths
     )
@@ -93,6 +96,7 @@ def dot_family(path: str = '') -> DotFamily:
         dot_radius=radius,
         ground_radius=ground,
         border_radius=border,
+        pinhole=pinhole_in(fields),
     )
 
 

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterable, Mapping, Sequence
 from difflib import get_close_matches
-from functools import lru_cache
 from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from ahf_ros.codes import APRILTAG_NAMES, ARUCO_NAMES, RING_NAMES, SQUARE_NAMES, VENDOR_NAMES
+from ahf_ros.codes.kept import kept_while_unchanged
 
 if TYPE_CHECKING:
     from ahf_ros.codes.dots import DotFamily
@@ -171,19 +171,19 @@ def families_of(files: str) -> dict[str, Family | DotFamily | PointFamily]:
     """
     found: dict[str, Family | DotFamily | PointFamily] = {}
     for path in (part.strip() for part in files.split(',')):
-        state = Path(path).stat() if Path(path).exists() else None
-        code = _described(path, state and (state.st_mtime_ns, state.st_size))
+        code = _described(path)
         if code.name in (*RING_NAMES, *SQUARE_NAMES, *found):
-            raise ValueError(
-                f'{path}: family is {code.name!r}, accepted is a name that no other family has'
-            )
+            from ahf_ros.codes.data_file import read_data_file
+
+            name = dict(read_data_file(path).items())['family']
+            name.refuse('a name that no other family has')
         found[code.name] = code
     return found
 
 
-@lru_cache(maxsize=64)
-def _described(path: str, _state: object) -> Family | DotFamily | PointFamily:
-    """Return the family that a data file describes, read once for each state of it."""
+@kept_while_unchanged
+def _described(path: str) -> Family | DotFamily | PointFamily:
+    """Return the family that a data file describes."""
     from ahf_ros.codes import dots, gsi, ring
     from ahf_ros.codes.data_file import read_data_file
 
@@ -191,6 +191,16 @@ def _described(path: str, _state: object) -> Family | DotFamily | PointFamily:
     if 'template' in fields:
         return gsi.point_family(path)
     return dots.dot_family(path) if 'dot_circle' in fields else ring.ring_family(path)
+
+
+def colours_of(families: Sequence[str], files: str) -> str:
+    """Return the colour of the dots of families, 'dark', 'bright' or 'both'; see `code_family`."""
+    kinds = [kind_of(name, files) for name in families]
+    colours = {
+        getattr(code_family(name, files), 'polarity', 'both') if kind == 'ring' else 'both'
+        for name, kind in zip(families, kinds, strict=True)
+    }
+    return colours.pop() if len(colours) == 1 else 'both'
 
 
 def files_by_name(text: str, files: str, folders: Iterable[Path]) -> str:

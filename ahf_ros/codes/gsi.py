@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from itertools import combinations
 from math import comb, dist
 from pathlib import Path
@@ -18,6 +17,7 @@ from typing import ClassVar
 import numpy as np
 
 from ahf_ros.codes.data_file import Entry, read_data_file
+from ahf_ros.codes.kept import kept_while_unchanged
 
 GSI_LIBRARY = Path(__file__).with_name('gsi.json')
 """Template, positions and known numbers of GSI's targets."""
@@ -171,7 +171,7 @@ def valid_words(places: Mapping[int, Sequence[float]], rule: Rule) -> np.ndarray
     return np.array(sorted(words), np.int64)
 
 
-@lru_cache(maxsize=8)
+@kept_while_unchanged
 def point_family(path: str = '') -> PointFamily:
     """Return the family of point-distributed targets in a data file; GSI's own where empty.
 

@@ -20,7 +20,7 @@ import numpy as np
 
 from ahf_ros.codes import RING_FOLDER, RING_NAMES, VENDOR_NAMES
 from ahf_ros.codes.cyclic import CyclicFamily, mirrored_words, smallest_rotation
-from ahf_ros.codes.data_file import Entry, read_data_file
+from ahf_ros.codes.data_file import Entry, pinhole_in, read_data_file
 
 FAMILY_NAMES = VENDOR_NAMES
 """The ring code families that vendors print."""
@@ -28,22 +28,42 @@ FAMILY_NAMES = VENDOR_NAMES
 BITS = (6, 24)
 """Fewest and most bits of a family."""
 
-_MAXIMUM_RADIUS = 12.0  # of a band, dot radii
+POLARITIES = 'dark', 'bright', 'both'
+"""Colours that dot and marks of a family may have."""
+
+Radii = tuple[float, float]
+
+_MAXIMUM_RADIUS = 12.0  # of bands and circles, dot radii
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Family(CyclicFamily):
-    """The words of one kind of ring target, and the radii of its band, in radii of the dot."""
+    """The words of one kind of ring target, and its print; lengths are in radii of the dot.
+
+    Where the radii of the band are free, `bounds` has those of the inner and of the outer one, and
+    the radii are in their middle. `pinhole` is the radius of the hole in the dot, 0 for none,
+    `polarity` the colour of dot and marks, 'dark', 'bright' or 'both', and `circles` are further
+    rings of their colour, by their inner and outer radii.
+    """
 
     kind: ClassVar[str] = 'ring'
 
     band_inner: float
     band_outer: float
+    bounds: tuple[Radii, Radii] | None = None
+    pinhole: float = 0.0
+    polarity: str = 'both'
+    circles: tuple[Radii, ...] = ()
 
     @property
     def band(self) -> tuple[float, float]:
         """Radii of the band, in radii of the dot."""
         return self.band_inner, self.band_outer
+
+    @property
+    def reach(self) -> float:
+        """Radius of the circle that holds all ink."""
+        return max(self.band_outer, *(outer for _, outer in self.circles), 0.0)
 
 
 @cache
@@ -71,15 +91,15 @@ def ring_family(path: str) -> Family:
     A ValueError names the line and the field of what is not accepted in it.
     """
     fields = read_data_file(path).keys(
-        ('family', 'bits', 'band'), ('words', 'codes', 'numbers', 'source')
+        ('family', 'bits', 'band'),
+        ('words', 'codes', 'numbers', 'pinhole', 'polarity', 'circles', 'source'),
     )
     bits = fields['bits'].integer(*BITS)
-    inner, outer = (
-        of.number('a radius in radii of the dot', 1.0)
-        for of in fields['band'].list('its inner and outer radius, in radii of the dot', (2,))
-    )
-    if not 1 < inner < outer <= _MAXIMUM_RADIUS:
-        fields['band'].refuse(f'two radii that grow from above 1 to {_MAXIMUM_RADIUS:g} at most')
+    polarity = fields['polarity'].value if 'polarity' in fields else 'both'
+    if polarity not in POLARITIES:
+        fields['polarity'].refuse(' or '.join(POLARITIES))
+    inner, outer = bounds = _band(fields['band'])
+    circles = _circles(fields['circles'], bounds) if 'circles' in fields else ()
     if ('words' in fields) == ('codes' in fields):
         fields['family'].refuse('a family with either the field words or the field codes')
     if 'codes' in fields:
@@ -94,9 +114,40 @@ def ring_family(path: str) -> Family:
         bits=bits,
         words=words,
         numbers=numbers,
-        band_inner=inner,
-        band_outer=outer,
+        band_inner=sum(inner) / 2,
+        band_outer=sum(outer) / 2,
+        bounds=None if inner[0] == inner[1] and outer[0] == outer[1] else bounds,
+        pinhole=pinhole_in(fields),
+        polarity=polarity,
+        circles=circles,
     )
+
+
+def _band(entry: Entry) -> tuple[Radii, Radii]:
+    """Return the bounds of both radii of a band, which are equal where these are known."""
+    accepted = 'a radius in radii of the dot, or the least and the largest one'
+    bounds: list[Radii] = []
+    for of in entry.list('its inner and outer radius, in radii of the dot', (2,)):
+        ends = of.list(accepted, (2,)) if isinstance(of.value, list) else [of, of]
+        least, most = (end.number(accepted, 1.0) for end in ends)
+        bounds.append((least, most) if least <= most else of.refuse(accepted))
+    inner, outer = bounds
+    if not (inner[0] > 1 and inner[1] < outer[0] and outer[1] <= _MAXIMUM_RADIUS):
+        entry.refuse(f'two radii that grow from above 1 to {_MAXIMUM_RADIUS:g} at most')
+    return inner, outer
+
+
+def _circles(entry: Entry, band: tuple[Radii, Radii]) -> tuple[Radii, ...]:
+    """Return the inner and outer radii of further circles, which touch neither dot nor band."""
+    accepted = f'two radii that grow to {_MAXIMUM_RADIUS:g} at most, clear of all other ink'
+    taken: list[Radii] = [(0.0, 1.0), (band[0][0], band[1][1])]
+    for circle in entry.list('a list of circles, each with its inner and outer radius'):
+        inner, outer = (of.number(accepted, 1.0) for of in circle.list(accepted, (2,)))
+        clear = all(outer < low or inner > high for low, high in taken)
+        if not (inner < outer <= _MAXIMUM_RADIUS and clear):
+            circle.refuse(accepted)
+        taken.append((inner, outer))
+    return tuple(taken[2:])
 
 
 def _table(codes: Entry, bits: int) -> tuple[np.ndarray, np.ndarray]:
@@ -105,6 +156,8 @@ def _table(codes: Entry, bits: int) -> tuple[np.ndarray, np.ndarray]:
     for number, entry in codes.items():
         if not number.isdecimal() or not 0 < int(number) < 1 << 31:
             entry.refuse('a word whose name is its ID, an integer from 1 to 2147483647')
+        if int(number) in words.values():
+            entry.refuse(f'one word for the ID {int(number)}')
         words[_new_word(entry, words, bits)] = int(number)
     if not words:
         codes.refuse('a mapping of one ID at least to its word')
@@ -246,7 +299,7 @@ def words_of_print(code: Family, word: int, families: tuple[Family, ...]) -> dic
     words = {}
     for other in families:
         times, rest = divmod(other.bits, len(blocks))
-        if rest or other.band != code.band:
+        if rest or (other.band, other.circles) != (code.band, code.circles):
             continue
         spread = int(np.repeat(blocks, times) @ (1 << np.arange(other.bits)))
         if other.number(spread):

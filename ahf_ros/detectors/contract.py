@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
-from ahf_ros.codes.families import ACCEPTED, AUTO, Code, families_in, family_of
+from ahf_ros.codes.families import ACCEPTED, AUTO, Code, colours_of, families_in, family_of
 from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.target import Target
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 _MINIMUM_RADIUS = 4.0  # of a dot, px, where the user sets none
 _MINIMUM_RADII = {'gsi': 2.0, 'dots': 2.5}  # of families whose dot is small beside the target
 
-_SIGNS = {'auto': (1, -1), 'dark': (1,), 'bright': (-1,)}  # of the colour of dots
+_SIGNS = {'both': (1, -1), 'dark': (1,), 'bright': (-1,)}  # of the colour of dots
 
 
 class Unavailable(ValueError):
@@ -146,7 +146,8 @@ class DetectorSettings:
         Paths of data files, separated by commas, that describe more families, or `gsi` or `dots`
         in the place of the usual design.
     polarity : str
-        Colour of the dot against its surroundings, 'dark', 'bright', or 'auto' for both.
+        Colour of the dot against its surroundings, 'dark', 'bright', or 'auto' for that of
+        the families.
     min_radius, max_radius : float
         Bounds of the semi-major axis of the dot, px; `radii` has them with the minimum of the
         family in the place of 0.
@@ -177,8 +178,9 @@ class DetectorSettings:
     )
     polarity: str = parameter(
         'auto',
-        'Colour of the dot: dark on bright, bright on dark, or either.',
-        choices=tuple(_SIGNS),
+        'Colour of the dot: dark on bright, bright on dark, or auto: as the family, either where '
+        'it may be both.',
+        choices=('auto', 'dark', 'bright'),
     )
     min_radius: float = parameter(
         0.0,
@@ -236,7 +238,9 @@ class DetectorSettings:
     @property
     def polarities(self) -> tuple[int, ...]:
         """1 where dots may be dark, -1 where they may be bright."""
-        return _SIGNS[self.polarity]
+        if self.polarity != 'auto':
+            return _SIGNS[self.polarity]
+        return _SIGNS[colours_of(self.families, self.family_file)]
 
 
 @dataclass(frozen=True, slots=True)

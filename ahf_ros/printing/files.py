@@ -49,13 +49,13 @@ def geometry_text(sheets: Sheets) -> str:
     settings, paper = sheets.settings, sheets.settings.paper
     common = settings.proportions
     radii = {name: settings.radius * length for name, length in common.radii.items()}
-    if settings.pinhole and settings.family not in ('gsi', *SQUARE_NAMES):
-        radii['pinhole'] = settings.radius * settings.pinhole
+    if settings.hole and settings.family not in ('gsi', *SQUARE_NAMES):
+        radii['pinhole'] = settings.radius * settings.hole
     radii['quiet_zone'] = settings.radius * common.quiet_zone
     geometry = {
         'family': settings.family,
         'family_file': settings.family_file,
-        'polarity': settings.polarity,
+        'polarity': settings.colour,
         'unit': 'mm',
         'origin': 'lower left corner of the page, x to the right, y upwards',
         'page': {'name': paper.name, 'width': paper.width, 'height': paper.height},

@@ -28,7 +28,10 @@ class SheetSettings:
         minimum=0,
     )
     polarity: str = parameter(
-        'dark', 'Dark targets on white, or bright ones on black.', choices=('dark', 'bright')
+        'auto',
+        'Dark targets on white, or bright ones on black; auto: as the family, dark where it may '
+        'be either.',
+        choices=('auto', 'dark', 'bright'),
     )
     dot_radius: str = parameter(
         '',
@@ -41,9 +44,10 @@ class SheetSettings:
         form='a length such as 40mm',
     )
     pinhole: float = parameter(
-        0.05,
-        'Radius of the hole in the dot, in dot radii; 0: none. gsi and square markers have none.',
-        minimum=0.0,
+        -1.0,
+        'Radius of the hole in the dot, in dot radii; 0: none, -1: that of the family. gsi and '
+        'square markers have none.',
+        minimum=-1.0,
         maximum=0.5,
     )
     page: str = parameter(
@@ -65,7 +69,7 @@ class SheetSettings:
         object.__setattr__(self, 'family', family_in(self.family, self.family_file))
         check_numbers('ids', numbers_in('ids', self.ids), (self.family,), self.family_file)
         square = self.family in SQUARE_NAMES
-        if square and self.polarity != 'dark':
+        if square and self.colour != 'dark':
             raise ValueError(
                 f'polarity is {self.polarity!r} and family is {self.family!r}; accepted with '
                 'square markers is dark, which is what detectors read'
@@ -122,6 +126,16 @@ class SheetSettings:
     def proportions(self) -> Proportions:
         """What all targets have in common, in radii of the dot."""
         return proportions(self.family, self.family_file)
+
+    @property
+    def colour(self) -> str:
+        """Colour of the ink, 'dark' or 'bright'."""
+        return self.proportions.polarity if self.polarity == 'auto' else self.polarity
+
+    @property
+    def hole(self) -> float:
+        """Radius of the hole in the dot, in radii of the dot, 0 for none."""
+        return self.proportions.pinhole if self.pinhole < 0 else self.pinhole
 
     @property
     def on_labels(self) -> bool:

@@ -224,9 +224,9 @@ class Sheets:
 
     def _ink(self, number: int, x: float, y: float) -> Ink:
         settings = self.settings
-        design = printed_design(settings.family, number, settings.pinhole, settings.family_file)
+        design = printed_design(settings.family, number, settings.hole, settings.family_file)
         contours = design.contours
-        if settings.polarity == 'bright':
+        if settings.colour == 'bright':
             contours = (circle(settings.proportions.quiet_zone), *contours)
         return Ink(
             name=f'{settings.family} {number}', x=x, y=y, scale=settings.radius, contours=contours

@@ -90,6 +90,10 @@ def ring_cover(
         distance = np.sqrt(x * x + y * y)
         radial = _edge_width(jacobian, x, y, distance)
         inked = _dot_share(distance, radial, pinhole, growth)
+        for low, high in family.circles:
+            inked += _inside_share(distance - np.float32(low - growth), radial) * _inside_share(
+                np.float32(high + growth) - distance, radial
+            )
         margin = np.float32(2 * radial.max())
         band = (distance > inner - margin) & (distance < outer + margin)
         distance, radial, x, y = distance[band], radial[band], x[band], y[band]

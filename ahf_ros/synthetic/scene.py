@@ -52,9 +52,10 @@ class SceneSettings:
     family: str = parameter('metashape12', 'Family of the codes.', form=ONE)
     family_file: str = parameter('', 'Data files that describe families, as for the detector.')
     polarity: str = parameter(
-        'dark',
-        'Dark targets on white, or bright ones on black.',
-        choices=('dark', 'bright'),
+        'auto',
+        'Dark targets on white, or bright ones on black; auto: as the family, dark where it may '
+        'be either.',
+        choices=('auto', 'dark', 'bright'),
     )
     dot_radius: float = parameter(
         20.0, 'Semi-major axis of the central dot in the image, px.', minimum=1.0, maximum=500.0
@@ -69,7 +70,10 @@ class SceneSettings:
         0, 'Number of marks that are not coded targets: dots, rings, text, leaves.', minimum=0
     )
     pinhole: float = parameter(
-        0.05, 'Radius of the hole in the dot, in dot radii.', minimum=0.0, maximum=0.5
+        -1.0,
+        'Radius of the hole in the dot, in dot radii; -1: that of the family.',
+        minimum=-1.0,
+        maximum=0.5,
     )
     edge_shift: float = parameter(
         0.0,
@@ -188,6 +192,12 @@ class SceneSettings:
             )
 
     @property
+    def dark(self) -> bool:
+        """Whether targets are dark on white."""
+        printed = proportions(self.family, self.family_file).polarity
+        return (printed if self.polarity == 'auto' else self.polarity) == 'dark'
+
+    @property
     def free_radius(self) -> float:
         """Radius of what is left free about a target, in radii of its dot."""
         zone = proportions(self.family, self.family_file).quiet_zone
@@ -278,7 +288,7 @@ def render(settings: SceneSettings, phase: int = 0) -> Rendering:
     light = wall_radiance(camera, projector, pattern, settings.ambient, average, highest, lamp)
     if settings.texture:
         light *= paper_texture(light.shape, settings.texture, settings.dot_radius, wall)
-    ground, inked = (1.0, settings.black) if settings.polarity == 'dark' else (settings.black, 1.0)
+    ground, inked = (1.0, settings.black) if settings.dark else (settings.black, 1.0)
     plain = ground * settings.wall
     image: np.ndarray = light * np.float32(plain)
     if settings.blur:
@@ -321,11 +331,12 @@ def _coded_targets(
     free = settings.free_radius
     reach = quiet_radius(semi_major, float(camera.intrinsics[0, 0]), free)
     placements = grid_placements(camera, reach, generator)
-    gain = settings.edge_shift if settings.polarity == 'dark' else -settings.edge_shift
+    gain = settings.edge_shift if settings.dark else -settings.edge_shift
 
+    hole = settings.pinhole if settings.pinhole >= 0 else proportions(name, file).pinhole
     cards, marks, targets = [], [], []
     for number, pixel, size, turn in zip(ids, placements.centres, semi_major, turns, strict=True):
-        printed = design(name, number, turn, gain / size, settings.pinhole, file)
+        printed = design(name, number, turn, gain / size, hole, file)
         mark = mark_at(camera, pixel, size, printed.reach, printed.cover)
         x, y = camera.project(mark.centre[None])[0].tolist()
         ellipse = camera.circle(mark.centre, printed.radius * mark.radius)
