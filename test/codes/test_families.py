@@ -158,7 +158,9 @@ def test_names_that_no_file_describes_are_refused(files: str, text: str, message
 
 
 def test_files_that_do_not_fit_are_refused(files: str, tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match=r"rings\.yaml: family is 'mine', accepted is a n"):
+    with pytest.raises(
+        ValueError, match=r"rings\.yaml, line 1: family is 'mine', accepted is a n"
+    ):
         families_of(f'{files}, {tmp_path / "rings.yaml"}')
     with pytest.raises(ValueError, match=r"family is 'gsi', .* describes mine, wide; accepted is"):
         code_family('gsi', files)

@@ -24,6 +24,7 @@ from ahf_ros.detectors.ring.families import (
 from ahf_ros.detectors.ring.full_size import at_full_size
 from ahf_ros.detectors.ring.hypotheses import Hypotheses, resolve
 from ahf_ros.detectors.ring.known import WHOLE, Explained, Prior
+from ahf_ros.detectors.ring.learning import with_measured_bands
 from ahf_ros.detectors.ring.proposals import PROPOSALS, Proposal, measure_dots, propose_whole
 from ahf_ros.detectors.ring.refinement import refine_centres
 from ahf_ros.features import frame
@@ -112,7 +113,8 @@ def read_image(
     Dots are proposed in several ways, one after the other. What is read of the dots of one
     explains edges, which the next ones need not look at.
     """
-    families: Sequence[Family] = settings.codes(Family)
+    described: Sequence[Family] = settings.codes(Family)
+    families = described
     pyramid = image_pyramid(gray, settings.max_radius)
     images = (pyramid.gray, *pyramid.halves)
     found = [Hypotheses.unread(NO_FITS, families[0])]
@@ -121,6 +123,7 @@ def read_image(
         part = octave.pyramid.gray
         for propose in proposals:
             dots = propose(octave, settings.polarities, explained)
+            families = with_measured_bands(part, dots, families)
             fits, others = measure_dots(part, dots, families, keep_all=settings.report_undecoded)
             halves = images[: octave.level + 1]
             unread = at_full_size(halves, Hypotheses.unread(others, families[0]))
@@ -134,7 +137,10 @@ def read_image(
             read = at_full_size(halves, read)
             explained = Explained.joined([explained, Explained.by(read)])
             found.append(read)
-    return Hypotheses.joined(found)
+    every = Hypotheses.joined(found)
+    by_name = {code.name: code for code in described}
+    as_described = [by_name[code.name] for code in every.families]
+    return replace(every, families=np.array(as_described, object))
 
 
 def report(hypotheses: Hypotheses, settings: DetectorSettings) -> list[Target]:

@@ -8,8 +8,9 @@ All targets of a family share bits, radii and rules, so that a few borders of ea
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ import numpy as np
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes import RING_NAMES
 from ahf_ros.codes.cyclic import smallest_rotation
-from ahf_ros.codes.ring import BITS, conforming, family
+from ahf_ros.codes.ring import BITS, Family, conforming, family
 from ahf_ros.detectors.claims import owners
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.ring.polar import angles_of
@@ -25,6 +26,7 @@ from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.circle_fit import ENOUGH, NO_FITS, Fit, fit_dots
 from ahf_ros.features.dot_search import voted_dots, whole_dots
+from ahf_ros.features.dots import Dots
 from ahf_ros.features.pyramid import image_pyramid, octaves
 from ahf_ros.features.robust import NORMAL, median
 from ahf_ros.features.sampling import sample_circles
@@ -41,9 +43,13 @@ _NOWHERE = 1e6  # radius of a band that is not there, dot radii
 _EXACT = 0.12  # deviation of the edges of a band from circles, dot radii
 _AGREEING = 0.6  # share of the marks of a band that begin and end there
 _MARKED = 0.03, 0.97  # share of a band that is marked
+_CLEAREST = 200  # dots that a free band is measured on
+_LOOSE = 0.3  # by which growth of ink moves the bounds of a free band, dot radii
+_STEPS = 50  # of a dot radius, to which radii are measured
 _ALIKE = 0.15  # difference of the radii of bands of one family, dot radii
 _GROWTH = np.arange(-2.0, 2.01, 0.1)  # of ink, that is tried, px
 _USUAL_GROWTH = 0.8  # its standard deviation, px; an arc that is longer by a sector reads as well
+_UNUSUAL = 0.5 * (_GROWTH / _USUAL_GROWTH) ** 2 * MINIMUM_TARGETS  # log odds against that
 _ERROR, _MINIMUM_ERROR = 0.3, 0.008  # of the place of a border: px, and rad at least
 _STRAY = 0.05  # share of borders that light makes
 _OTHER = 6.0  # log odds of another number of bits, from which a target is of another family
@@ -106,15 +112,59 @@ def find_bands(images: Iterable[np.ndarray], settings: DetectorSettings) -> Band
         pyramid = image_pyramid(as_gray(image), settings.max_radius)
         for octave in octaves(pyramid, *settings.radii):
             gray = octave.pyramid.gray
-            fits = [NO_FITS]
-            for search in (whole_dots, voted_dots):
-                dots = search(octave.pyramid, *octave.radii, settings.polarities)
-                fits.append(fit_dots(gray, dots.frames, dots.polarity, rays=_RAYS, reach=_REACH))
-            fit = Fit.joined(fits)
-            bands = _bands(gray, fit.select(fit.share >= ENOUGH), index)
+            searches = whole_dots, voted_dots
+            kind = *octave.radii, settings.polarities
+            fits = [_fit(gray, search(octave.pyramid, *kind)) for search in searches]
+            bands = _bands(gray, Fit.joined(fits), index)
             frames = frame.enlarged(bands.frames, octave.level)
             found.append(replace(bands, frames=frames, size=bands.size * 2**octave.level))
     return _distinct(Bands.joined(found))
+
+
+def _fit(gray: np.ndarray, dots: Dots) -> Fit:
+    """Return the fits of those dots that have an edge."""
+    fit = fit_dots(gray, dots.frames, dots.polarity, rays=_RAYS, reach=_REACH)
+    return fit.select(fit.share >= ENOUGH)
+
+
+def with_measured_bands(
+    gray: np.ndarray, dots: Dots, families: Sequence[Family]
+) -> Sequence[Family]:
+    """Return families of which those with a free band have the one that clear dots show."""
+    if all(code.bounds is None for code in families):
+        return families
+    fit = _fit(gray, dots)
+    return [with_measured_band(gray, fit, code) for code in families]
+
+
+def with_measured_band(gray: np.ndarray, dots: Fit, code: Family) -> Family:
+    """Return a family whose free band has the radii that dots show, as it is where these are few.
+
+    Radii are rounded, so that there are few such families.
+    """
+    if code.bounds is None:
+        return code
+    clearest = np.argsort(-dots.share * (1 - dots.contrast), kind='stable')[:_CLEAREST]
+    bands = _bands(gray, dots.select(clearest), 0)
+    near = [
+        (of > least - _LOOSE) & (of < most + _LOOSE)
+        for of, (least, most) in zip((bands.inner, bands.outer), code.bounds, strict=True)
+    ]
+    bands = bands.select(np.logical_and(*near))
+    if len(bands.size) < MINIMUM_TARGETS:
+        return code
+    odds = _grid_odds(bands, *_borders(bands), code.bits).sum(axis=1) - _UNUSUAL
+    radii = _printed(bands, float(_GROWTH[odds.argmax()]))
+    inner, outer = (
+        round(_STEPS * min(max(of, least), most)) / _STEPS
+        for of, (least, most) in zip(radii, code.bounds, strict=True)
+    )
+    return _with_band(code, inner, outer)
+
+
+@lru_cache(maxsize=64)
+def _with_band(code: Family, inner: float, outer: float) -> Family:
+    return replace(code, band_inner=inner, band_outer=outer, bounds=None)
 
 
 def _bands(gray: np.ndarray, fit: Fit, index: int) -> Bands:
@@ -205,25 +255,21 @@ def _learn(bands: Bands) -> tuple[np.ndarray, LearntFamily]:
     """Return the indices of bands of one family, and this."""
     counts, arcs = range(BITS[0], BITS[1] + 1), _borders(bands)
     scores = np.stack([_grid_odds(bands, *arcs, bits) for bits in counts])  # bits, growth, target
-    unusual = 0.5 * (_GROWTH / _USUAL_GROWTH) ** 2 * MINIMUM_TARGETS
     own = np.ones(len(bands.size), bool)
     for _ in range(3):
-        total = scores[:, :, own].sum(axis=2) - unusual
+        total = scores[:, :, own].sum(axis=2) - _UNUSUAL
         best, at = np.unravel_index(total.argmax(), total.shape)
         # Targets that another number of bits explains far better are of another family.
         own = scores[best, at] > scores[:, at].max(axis=0) - _OTHER
     bits, growth = counts[int(best)], float(_GROWTH[at])
     some = bands.select(own)
-    printed = some.size - growth
-    inner = np.median((some.inner * some.size + growth) / printed)
-    outer = np.median((some.outer * some.size - growth) / printed)
     words, clear = _words(some, bits, growth)
     different, count = np.unique(words[clear], return_counts=True)
     rules, odds = _rules(different, count >= _OFTEN, bits)
     clear &= conforming(words, bits, **rules)
     found = LearntFamily(
         bits=bits,
-        band=(float(inner), float(outer)),
+        band=_printed(some, growth),
         growth=growth,
         words=words[clear],
         bands=some.select(clear),
@@ -232,6 +278,13 @@ def _learn(bands: Bands) -> tuple[np.ndarray, LearntFamily]:
         odds=odds,
     )
     return np.flatnonzero(own), found
+
+
+def _printed(bands: Bands, growth: float) -> tuple[float, float]:
+    """Return the radii of bands as printed, dot radii, if ink has grown on all edges, px."""
+    dot = bands.size - growth
+    inner, outer = bands.inner * bands.size + growth, bands.outer * bands.size - growth
+    return float(np.median(inner / dot)), float(np.median(outer / dot))
 
 
 def _borders(bands: Bands) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -12,6 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from ahf_ros.codes.ring import Radii
 from ahf_ros.features import frame
 from ahf_ros.features.sampling import sample
 from ahf_ros.imaging.black import lifted
@@ -35,15 +36,17 @@ def predicted_light(
     lift: np.ndarray,
     angles: np.ndarray,
     radii: np.ndarray,
-    band: tuple[float, float],
+    band: Radii,
+    circles: tuple[Radii, ...] = (),
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the gray values that paper has at points of bands, and how far they are known.
 
     The points are at angles (m,), rad, and radii (d,) of targets with frames (k, 3, 3), in which
-    black is lifted to gray values (k,). The second array is the standard deviation of the
-    logarithm of the first, infinite where no ground predicts it; both are float32, (k, m, d).
+    black is lifted to gray values (k,); `circles` are no ground. The second array is the standard
+    deviation of the logarithm of the first, infinite where no ground predicts it; both are
+    float32, (k, m, d).
     """
-    points, ground, candidates, order = _geometry(band)
+    points, ground, candidates, order = _geometry(band, circles)
     seen = np.fft.rfft2(ground, (_TRANSFORM,) * 2)
     overlap = np.fft.irfft2(np.abs(seen) ** 2, (_TRANSFORM,) * 2).ravel()[candidates]
     place = _places(band[1] + _MARGIN, angles, radii)
@@ -83,7 +86,7 @@ def predicted_light(
 
 @lru_cache(maxsize=16)
 def _geometry(
-    band: tuple[float, float],
+    band: Radii, circles: tuple[Radii, ...]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return the cells of a rectified target, its ground, the shifts compared, and their order.
 
@@ -95,6 +98,7 @@ def _geometry(
     points = np.stack(np.meshgrid(along, along), axis=-1)
     radii = np.hypot(*np.moveaxis(points, 2, 0))
     ground = ((radii > 1 + _ASIDE) & (radii < inner - _ASIDE)) | (radii > outer + _ASIDE)
+    ground &= clear_of(radii, circles, _ASIDE)
     whole = ground.astype(np.float32)
     seen = np.fft.rfft2(whole, (_TRANSFORM,) * 2)
     overlap = np.fft.irfft2(np.abs(seen) ** 2, (_TRANSFORM,) * 2)
@@ -103,6 +107,12 @@ def _geometry(
     candidates = (overlap > _OVERLAP * whole.sum()) & (away > 0) & (away <= _MAXIMUM_SHIFT)
     which = np.flatnonzero(candidates)
     return points, whole, which, np.random.default_rng(0).uniform(1, _ALIKE, len(which))
+
+
+def clear_of(radii: np.ndarray, circles: tuple[Radii, ...], aside: float = 0.1) -> np.ndarray:
+    """Return whether places at radii lie aside of the ink of circles, all in dot radii."""
+    near = [(radii > low - aside) & (radii < high + aside) for low, high in circles]
+    return np.logical_not(np.logical_or.reduce(near)) if near else np.ones(radii.shape, bool)
 
 
 def _turned(of_shifts: np.ndarray) -> np.ndarray:

@@ -18,7 +18,7 @@ from ahf_ros.detectors.ring.circles import REACH, target_circles
 from ahf_ros.detectors.ring.decoding import CLEAR, DOUBT, Words, decode
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.known import NOTHING_KNOWN, Prior
-from ahf_ros.detectors.ring.light import predicted_light
+from ahf_ros.detectors.ring.light import clear_of, predicted_light
 from ahf_ros.detectors.ring.likelihood import (
     HOPEFUL,
     Evidence,
@@ -140,14 +140,16 @@ def _settled(
     targets, polar, edges = targets.select(some), polar.select(some), edges.select(some)
     inner, outer = family.band
     of_gap, of_band = 1 + (inner - 1) * GAP, inner + (outer - inner) * DEPTHS
-    radii = np.concatenate([DOT, of_gap, of_band, outer + MARGIN])
+    of_gap, beyond = (of[clear_of(of, family.circles)] for of in (of_gap, outer + MARGIN))
+    radii = np.concatenate([DOT, of_gap, of_band, beyond])
     angles = angles_of(family.bits * PER_SECTOR)
     levels = np.maximum(sample_circles(gray, targets.frames, angles, radii), 0)
     levels = lifted(levels, polar.lift.astype(np.float32)[:, None, None])
-    light = predicted_light(gray, targets.frames, polar.lift, angles, radii, family.band)
+    printed = family.band, family.circles
+    light = predicted_light(gray, targets.frames, polar.lift, angles, radii, *printed)
     evidence = edges.plus(level_evidence(polar, levels, *light, radii, family.band))
     of_all = decode(evidence, overhang[some], family, expected)
-    hidden = of_all.hidden | (polar.reach < radii[len(DOT) + len(GAP)])
+    hidden = of_all.hidden | (polar.reach < of_band[0])
     # What speaks against no target is that of edges, so that all targets compare.
     return words.replaced(some, replace(of_all, seen=words.seen[some], hidden=hidden))
 
