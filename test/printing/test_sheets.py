@@ -210,8 +210,8 @@ def test_pages() -> None:
         ({'side': '10mm'}, "side is '10mm', accepted is a length for a family of square markers"),
         ({'labels': 'avery6450', 'page': 'A4'}, "labels is 'avery6450', accepted with page"),
         ({'labels': 'mine'}, "labels is 'mine', accepted is one of none, avery6450"),
-        ({'polarity': 'auto'}, "polarity is 'auto', accepted is one of dark, bright"),
-        ({'pinhole': 0.7}, 'pinhole is 0.7, accepted is a number from 0 to 0.5'),
+        ({'polarity': 'red'}, "polarity is 'red', accepted is one of auto, dark, bright"),
+        ({'pinhole': 0.7}, 'pinhole is 0.7, accepted is a number from -1 to 0.5'),
         pytest.param(
             {'family': 'aruco_4x4_50', 'polarity': 'bright'},
             "polarity is 'bright' and family is 'aruco_4x4_50'",

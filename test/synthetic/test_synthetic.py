@@ -306,7 +306,7 @@ def test_an_image_may_show_distractors_alone() -> None:
         ({'targets': 6.0}, r'targets is 6\.0, accepted is an integer'),
         ({'family': 'qr'}, r"family is 'qr', accepted is one of metashape12"),
         ({'light': 'disco'}, r"light is 'disco', accepted is one of normal, stripe"),
-        ({'polarity': 'auto'}, r"polarity is 'auto', accepted is one of dark, bright"),
+        ({'polarity': 'red'}, r"polarity is 'red', accepted is one of auto, dark, bright"),
         ({'dot_radius': math.nan}, r'dot_radius is nan, accepted is a number from 1'),
         ({'tilt': 75.0, 'focal_length': 1.0}, r'tilt is 75\.0, accepted is a number from 0 to 5'),
         ({'distortion': -0.3, 'focal_length': 0.6}, r'distortion is -0\.3, accepted .* of at l'),

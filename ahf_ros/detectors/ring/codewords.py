@@ -81,11 +81,13 @@ def prior(words: np.ndarray, family: Family, expected: frozenset[int]) -> np.nda
 def margins(words: np.ndarray, scores: np.ndarray, best: np.ndarray, family: Family) -> np.ndarray:
     """Return the evidence for the best words, indices (k,), over those of other IDs, shape (k,).
 
-    From words and the evidence for each, shape (k, c).
+    From words and the evidence for each, shape (k, c). Where all are rotations of one, other IDs
+    have less evidence than the last of these.
     """
     ids, rows = canonical(words, family)[1], np.arange(len(words))
     others = np.where(ids == ids[rows, best][:, None], -np.inf, scores).max(axis=1)
-    return np.where(np.isfinite(others), scores[rows, best] - others, 0)
+    others = np.where(np.isfinite(others), others, scores.min(axis=1))
+    return np.asarray(scores[rows, best] - others)
 
 
 @cache
