@@ -8,7 +8,6 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
 
     from ahf_ros.codes.gsi import PointFamily
     from ahf_ros.codes.gsi_learning import Learnt
-    from ahf_ros.detectors.ring.learning import LearntFamily
+    from ahf_ros.detectors.ring.learning import Bands, LearntFamily
 
 _OF_DOTS = 'polarity', 'min_radius', 'max_radius'  # options
 _COLUMNS, _TILE = 6, 180  # of the contact sheet, and width of a picture, px
@@ -91,57 +90,76 @@ def run(options: argparse.Namespace) -> int:
 
 def _learn_rings(options: argparse.Namespace) -> int:
     """Learn ring families from photographs."""
-    from ahf_ros.detectors.ring.learning import MINIMUM_TARGETS, find_bands, learn_families
+    from ahf_ros.detectors.ring.learning import MINIMUM_TARGETS, Bands, find_bands, learn_families
     from ahf_ros.interchange.image_files import read_image
 
     paths, problems = image_paths(options.sources)
     for problem in problems:
         tell('learn-family', problem)
     settings = DetectorSettings(**{name: getattr(options, name) for name in _OF_DOTS})
-    images = []
+    found, crops = [], {}
     for path in paths:
         try:
-            images.append(read_image(path))
+            image = read_image(path)
         except ValueError as error:
             problems.append(str(error))
             tell('learn-family', error)
-    bands = find_bands(images, settings)
+            continue
+        bands = find_bands([image], settings)
+        crops |= _crops(image, bands)
+        found.append(replace(bands, image=bands.image + len(found)))
+    if not found:
+        raise ValueError('no photograph was read, accepted is one at least')
+    bands = Bands.joined(found)
     families = learn_families(bands)
     if not families:
         raise ValueError(
-            f'{len(bands.size)} dots with a concentric band of sectors in {len(images)} images; '
+            f'{len(bands.size)} dots with a concentric band of sectors in {len(found)} images; '
             f'{MINIMUM_TARGETS} of one family are needed, and 20 tell it well'
         )
     output = Path(options.output)
     for number, learnt in enumerate(families, 1):
         file = output if number == 1 else output.with_stem(f'{output.stem}_{number}')
         name = options.name or output.stem
-        _write_rings(file, name if number == 1 else f'{name}_{number}', learnt, images)
+        _write_rings(file, name if number == 1 else f'{name}_{number}', learnt, len(found), crops)
     return int(bool(problems))
 
 
 def _write_rings(
-    file: Path, name: str, learnt: LearntFamily, images: Sequence[np.ndarray]
+    file: Path, name: str, learnt: LearntFamily, images: int, crops: dict[bytes, np.ndarray]
 ) -> None:
-    """Write the data file of a family and its contact sheet, and say what was learnt."""
+    """Write the data file of a family and its contact sheet, and say what was learnt.
+
+    From the number of images and the pictures of targets, by their frames.
+    """
     from ahf_ros.codes.ring import ring_family
     from ahf_ros.interchange.image_files import write_image
 
     inner, outer = (round(radius, 2) for radius in learnt.band)
     count = len(learnt.words)
-    seen = f'{count} targets in {len(set(learnt.bands.image.tolist()))} of {len(images)} images'
+    seen = f'{count} targets in {len(set(learnt.bands.image.tolist()))} of {images} images'
     rules = json.dumps(learnt.rules) if learnt.rules else 'all'
+    different = sorted(set(learnt.words.tolist()))
+    maybe = [
+        f'{rule} {value} cannot be told from {len(different)} words (probability {share:.2f})'
+        for rule, (value, share) in learnt.undecided.items()
+    ]
+    pinhole = round(learnt.pinhole, 2)
     text = (
-        f'# Words that were seen: {", ".join(map(str, sorted(set(learnt.words.tolist()))))}\n'
+        f'# Words that were seen: {", ".join(map(str, different))}\n'
+        f'{"".join(f"# {of}{chr(10)}" for of in maybe)}'
         f'family: {json.dumps(name)}\nsource: learnt from {seen}\nbits: {learnt.bits}\n'
-        f'band: [{inner:g}, {outer:g}]\nwords: {rules}\nnumbers: {{first_bit: lowest}}\n'
+        f'band: [{inner:g}, {outer:g}]\npolarity: {learnt.polarity}\n'
+        f'{f"pinhole: {pinhole:g}{chr(10)}" if pinhole else ""}'
+        f'words: {rules}\nnumbers: {{first_bit: lowest}}\n'
     )
     write_whole(str(file), text.encode())
     ring_family(str(file))
-    write_image(file.with_suffix('.png'), _contact_sheet(learnt, images))
+    write_image(file.with_suffix('.png'), _contact_sheet(learnt, crops))
     print(
         f'{file}: {seen}, {learnt.bits} bits (log odds against the next number: '
-        f'{learnt.lead:.0f}), band {inner:g} to {outer:g}, ink {learnt.growth:+.1f} px',
+        f'{learnt.lead:.0f}), band {inner:g} to {outer:g}, {learnt.polarity}, '
+        f'{f"pinhole {pinhole:g}, " if pinhole else ""}ink {learnt.growth:+.1f} px',
         file=sys.stderr,
     )
     for rule, odds in learnt.odds.items():
@@ -149,29 +167,38 @@ def _write_rings(
             f'{file}: {rule} {learnt.rules[rule]} holds, log odds against chance {odds:.0f}',
             file=sys.stderr,
         )
+    for of in maybe:
+        print(f'{file}: {of}', file=sys.stderr)
     for known in learnt.known():
         print(f'{file}: {known} has all of these words and about this band', file=sys.stderr)
 
 
-def _contact_sheet(learnt: LearntFamily, images: Sequence[np.ndarray]) -> np.ndarray:
-    """Return a picture of one target of each word, uint8, shape (height, width, 3)."""
+def _crops(image: np.ndarray, bands: Bands) -> dict[bytes, np.ndarray]:
+    """Return pictures of the targets of an image, by their frames, so that it need not be kept."""
     import cv2
     import numpy as np
 
-    from ahf_ros.drawing.tiles import Tile, side_by_side
     from ahf_ros.features import frame
     from ahf_ros.imaging.image import as_gray
 
-    bands, tiles = learnt.bands, []
-    major, _, _ = frame.ellipse_axes(bands.frames)
+    gray = np.clip(as_gray(image), 0, 255).astype(np.uint8)
+    sides = np.rint(2 * _AROUND * frame.ellipse_axes(bands.frames)[0] * bands.outer).astype(int)
+    crops = {}
+    for at, side in zip(bands.frames, sides.tolist(), strict=True):
+        shown = cv2.getRectSubPix(gray, (side, side), tuple(at[:2, 2].tolist()))
+        crops[at.tobytes()] = cv2.resize(shown, (_TILE, _TILE), interpolation=cv2.INTER_AREA)
+    return crops
+
+
+def _contact_sheet(learnt: LearntFamily, crops: dict[bytes, np.ndarray]) -> np.ndarray:
+    """Return a picture of one target of each word, uint8, shape (height, width, 3)."""
+    import numpy as np
+
+    from ahf_ros.drawing.tiles import Tile, side_by_side
+
     words, first = np.unique(learnt.words, return_index=True)
-    for word, index in zip(words.tolist(), first.tolist(), strict=True):
-        radius = _AROUND * major[index] * bands.outer[index]
-        centre, side = bands.frames[index, :2, 2], round(2 * radius)
-        gray = np.clip(as_gray(images[bands.image[index]]), 0, 255).astype(np.uint8)
-        shown = cv2.getRectSubPix(gray, (side, side), tuple(centre.tolist()))
-        shown = cv2.resize(shown, (_TILE, _TILE), interpolation=cv2.INTER_AREA)
-        tiles.append(Tile(shown, str(word)))
+    shown = [crops[learnt.bands.frames[index].tobytes()] for index in first]
+    tiles = [Tile(of, str(word)) for of, word in zip(shown, words.tolist(), strict=True)]
     blank = Tile(np.zeros((_TILE, _TILE), np.uint8), '')
     tiles += [blank] * (-len(tiles) % _COLUMNS)
     rows = [tiles[start : start + _COLUMNS] for start in range(0, len(tiles), _COLUMNS)]

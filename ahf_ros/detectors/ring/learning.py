@@ -37,6 +37,9 @@ MINIMUM_TARGETS = 5
 
 _ANGLES = 480
 _RADII = np.arange(1.05, 5.5, 0.05)  # of circles that are read, dot radii
+_CENTRE = np.arange(0.025, 0.4, 0.025)  # of circles about a pinhole, dot radii
+_INK, _PAPER = np.array([0.5, 0.6]), np.array([1.3, 1.4])  # of circles beside it
+_PINHOLE = 0.025  # radius of a hole that is seen, dot radii
 _REACH, _RAYS = 0.25, 48  # of the edge of a dot: dot radii, and their number
 _DEPTH = 0.25  # share of the band at either edge that says nothing of its sectors
 _NOWHERE = 1e6  # radius of a band that is not there, dot radii
@@ -58,7 +61,8 @@ _MISREAD = 0.02  # share of words
 _SAME_RADII = 0.08  # difference of radii that are the same, dot radii
 _OFTEN = 3  # targets with a word, which then is not misread
 _SAMPLED = 200_000  # words that tell how common a rule is
-_SURE = {'parity': 5.0, 'opposite_pairs': 3.0, 'changes': 7.0}  # log odds, to take a rule
+_CERTAIN, _POSSIBLE = 3.0, 0.05  # log odds of a rule that is taken, probability of one that may be
+_SURE = {'parity': 5.0, 'opposite_pairs': 3.0, 'changes': 7.0}  # these, and odds against before
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +76,7 @@ class Bands(ArrayRecord):
     outer: np.ndarray  # (k,)
     ink: np.ndarray  # (k, m), share of ink of the band at each angle, see `angles_of`
     spread: np.ndarray  # (k,), of the edges of the band about circles, dot radii
+    pinhole: np.ndarray  # (k,), radius of a hole in the dot that what its centre lacks would fill
     image: np.ndarray  # int, (k,), index of the image
 
 
@@ -87,6 +92,18 @@ class LearntFamily:
     lead: float  # log odds of the number of bits against the next one
     rules: dict[str, Any]  # arguments of `conforming` that all words follow
     odds: dict[str, float]  # log odds of these, of chance
+    undecided: dict[str, tuple[Any, float]]  # rules that may hold as well, and their probabilities
+
+    @property
+    def polarity(self) -> str:
+        """Colour of dot and marks, 'dark' or 'bright'."""
+        return 'dark' if self.bands.polarity[0] > 0 else 'bright'
+
+    @property
+    def pinhole(self) -> float:
+        """Radius of the hole in the dot, dot radii, 0 where none is seen."""
+        radius = float(np.median(self.bands.pinhole))
+        return radius if radius > _PINHOLE else 0.0
 
     def known(self) -> list[str]:
         """Return the families of this package with these words and radii, the smallest first."""
@@ -195,7 +212,7 @@ def _bands(gray: np.ndarray, fit: Fit, index: int) -> Bands:
     share = dark_part.mean(axis=1)
     good = (share > _MARKED[0]) & (share < _MARKED[1]) & (spread < _EXACT) & inside.any(axis=1)
     good &= exact.sum(axis=1) > _AGREEING * dark_part.sum(axis=1)
-    return Bands(
+    found = Bands(
         frames=fit.frames,
         size=fit.size,
         polarity=fit.polarity,
@@ -203,8 +220,22 @@ def _bands(gray: np.ndarray, fit: Fit, index: int) -> Bands:
         outer=outer,
         ink=pattern,
         spread=spread,
+        pinhole=np.zeros(len(fit.size)),
         image=np.full(len(fit.size), index),
     ).select(good)
+    return replace(found, pinhole=_holes(gray, found)) if found.size.size else found
+
+
+def _holes(gray: np.ndarray, bands: Bands) -> np.ndarray:
+    """Return the radii of the holes that would make the centres of dots as they are, (k,)."""
+    values = sample_circles(gray, bands.frames, angles_of(_ANGLES // 20), _CENTRE)
+    about, beyond = (
+        np.median(sample_circles(gray, bands.frames, angles_of(_ANGLES // 20), of), axis=(1, 2))
+        for of in (_INK, _PAPER)
+    )
+    step = np.where(np.abs(beyond - about) > 1, beyond - about, 1)
+    lack = ((values.mean(axis=1) - about[:, None]) / step[:, None]) @ _CENTRE / _CENTRE.sum()
+    return np.asarray(_CENTRE[-1] * np.sqrt(np.maximum(lack, 0)))
 
 
 def _crossing(ink: np.ndarray, at: np.ndarray) -> np.ndarray:
@@ -265,7 +296,7 @@ def _learn(bands: Bands) -> tuple[np.ndarray, LearntFamily]:
     some = bands.select(own)
     words, clear = _words(some, bits, growth)
     different, count = np.unique(words[clear], return_counts=True)
-    rules, odds = _rules(different, count >= _OFTEN, bits)
+    rules, odds, undecided = _rules(different, count >= _OFTEN, bits)
     clear &= conforming(words, bits, **rules)
     found = LearntFamily(
         bits=bits,
@@ -276,6 +307,7 @@ def _learn(bands: Bands) -> tuple[np.ndarray, LearntFamily]:
         lead=float(total.max() - np.delete(total.max(axis=1), best).max()),
         rules=rules,
         odds=odds,
+        undecided=undecided,
     )
     return np.flatnonzero(own), found
 
@@ -345,13 +377,16 @@ def _words(bands: Bands, bits: int, growth: float) -> tuple[np.ndarray, np.ndarr
 
 def _rules(
     words: np.ndarray, sure: np.ndarray, bits: int
-) -> tuple[dict[str, Any], dict[str, float]]:
+) -> tuple[dict[str, Any], dict[str, float], dict[str, tuple[Any, float]]]:
     """Return the rules that nearly all of different words follow, and their odds of chance.
 
-    Sure words follow them all; others may be misread.
+    Sure words follow them all; others may be misread. A rule is taken where it is as good as
+    certain, since one that does not hold makes targets unreadable; others that are likely enough
+    come last, with their probabilities.
     """
     rules: dict[str, Any] = {}
     odds: dict[str, float] = {}
+    undecided: dict[str, tuple[Any, float]] = {}
     sampled = np.random.default_rng(0).integers(1, (1 << bits) - 1, _SAMPLED)
     tried: dict[str, list[Any]] = {'parity': ['even', 'odd']}
     if bits % 2 == 0:
@@ -373,4 +408,8 @@ def _rules(
             sampled = sampled[conforming(sampled, bits, **rule)]
             good = conforming(words, bits, **rule)
             words, sure = words[good], sure[good]
-    return rules, odds
+            continue
+        probability = float(1 / (1 + np.exp(_SURE[name] - _CERTAIN - likely[best])))
+        if probability > _POSSIBLE:
+            undecided[name] = values[best], probability
+    return rules, odds, undecided
