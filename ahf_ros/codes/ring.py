@@ -236,6 +236,12 @@ def _marks(words: np.ndarray, bits: int) -> np.ndarray:
     return count
 
 
+@cache
+def least_marked(code: Family) -> float:
+    """Return the share of the band that has marks in the word with the fewest of these."""
+    return float(_marks(code.words, code.bits).min() / code.bits)
+
+
 def _borders(words: np.ndarray, bits: int) -> np.ndarray:
     """Return the numbers of borders between ones and zeros of words, read in a circle."""
     return _marks(words ^ (words >> 1 | (words & 1) << (bits - 1)), bits)

@@ -178,6 +178,34 @@ def test_a_data_file_gives_rules_tables_and_numbers(tmp_path: Path) -> None:
     assert described(tmp_path, words=[71], numbers=both).numbers.tolist() == [71]
 
 
+def test_a_data_file_tells_the_print(tmp_path: Path) -> None:
+    plain = described(tmp_path)
+    assert (plain.pinhole, plain.polarity, plain.circles) == (0.0, 'both', ())
+    assert (plain.bounds, plain.reach) == (None, 3.0)
+    other = described(
+        tmp_path,
+        pinhole=0.1,
+        polarity='bright',
+        circles=[[4, 4.5], [1.3, 1.5]],
+        band=[2, [3, 3.4]],
+    )
+    assert (other.pinhole, other.polarity, other.reach) == (0.1, 'bright', 4.5)
+    assert other.circles == ((4.0, 4.5), (1.3, 1.5))
+    assert other.bounds == ((2.0, 2.0), (3.0, 3.4))
+    assert other.band == (2.0, pytest.approx(3.2))
+    assert family('metashape12').pinhole == 0.05
+
+
+def test_prints_with_other_circles_are_other_prints(tmp_path: Path) -> None:
+    (tmp_path / 'circled').mkdir()
+    plain = described(tmp_path)
+    circled = described(tmp_path / 'circled', circles=[[4, 4.5]])
+    assert words_of_print(plain, 71, (plain, circled, family('aicon12'))).keys() == {
+        plain,
+        family('aicon12'),
+    }
+
+
 @pytest.mark.parametrize(
     ('fields', 'message'),
     [
@@ -202,6 +230,18 @@ def test_a_data_file_gives_rules_tables_and_numbers(tmp_path: Path) -> None:
         ({'numbers': 'mine'}, "line 5: numbers is 'mine', accepted is rank, or a mapping with"),
         ({'numbers': {'first_bit': 'x'}}, "first_bit is 'x', accepted is lowest or highest"),
         ({'family': ''}, "line 1: family is '', accepted is a text"),
+        (
+            {'words': None, 'codes': {'1': 71, '01': 3}},
+            r'codes\.01 is 3, accepted is one word for',
+        ),
+        ({'band': [[2.2, 1.8], 3]}, r'line 3: band\[0\] is .*, accepted is a radius in radii of'),
+        ({'band': [[1.8, 2.9], [2.8, 3]]}, 'line 3: band is .*, accepted is two radii that grow'),
+        ({'pinhole': 0.7}, 'line 5: pinhole is 0.7, accepted is a radius from 0 to 0.5 radii of'),
+        ({'polarity': 'white'}, "polarity is 'white', accepted is dark or bright or both"),
+        ({'circles': [4, 5]}, r'line 5: circles\[0\] is 4, accepted is two radii that grow'),
+        ({'circles': [[2.5, 3.5]]}, r'circles\[0\] is .*, accepted is two radii .*, clear of all'),
+        ({'circles': [[4, 5], [4.5, 6]]}, r'circles\[1\] is .* clear of all other ink'),
+        ({'circles': [[5, 4]]}, r'circles\[0\] is .*, accepted is two radii that grow'),
     ],
 )
 def test_data_files_that_describe_no_family_are_refused(

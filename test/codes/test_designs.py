@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,6 +19,17 @@ from support.square_markers import needs_square_markers
 ROUND = ('metashape12', 'metashape20', 'aicon14', 'gsi', 'dots')
 SQUARE = ('aruco_4x4_50', 'aruco_original', 'apriltag_25h9')
 SHARP = np.eye(2, dtype=np.float32) * np.float32(0.01)
+
+
+RINGED = """
+family: ringed
+bits: 10
+band: [2, [2.8, 3.2]]
+pinhole: 0.1
+polarity: bright
+circles: [[1.3, 1.6], [4, 4.5]]
+words: all
+"""
 
 
 def polygon(contour: Contour) -> np.ndarray:
@@ -47,15 +59,17 @@ def inside(contours: tuple[Contour, ...], points: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    'name', [*ROUND, *(pytest.param(name, marks=needs_square_markers) for name in SQUARE)]
+    'name',
+    [*ROUND, 'ringed', *(pytest.param(name, marks=needs_square_markers) for name in SQUARE)],
 )
-def test_outlines_hold_the_ink_of_rendered_targets(name: str) -> None:
-    pinhole = 0.2
-    every = numbers_of(name)
+def test_outlines_hold_the_ink_of_rendered_targets(name: str, tmp_path: Path) -> None:
+    pinhole, file = 0.2, str(tmp_path / 'ringed.yaml') if name == 'ringed' else ''
+    (tmp_path / 'ringed.yaml').write_text(RINGED)
+    every = numbers_of(name, file)
     generator = np.random.default_rng(5)
     for number in (every[0], every[len(every) // 2], every[-1]):
-        rendered = design(name, number, 0.0, 0.0, pinhole)
-        printed = printed_design(name, number, pinhole)
+        rendered = design(name, number, 0.0, 0.0, pinhole, file)
+        printed = printed_design(name, number, pinhole, file)
         assert printed.code == rendered.code
         points = generator.uniform(-1.1, 1.1, (1500, 2)) * rendered.reach
         points[:100] /= 5 * rendered.reach  # in the dot, about its hole
@@ -65,7 +79,7 @@ def test_outlines_hold_the_ink_of_rendered_targets(name: str) -> None:
         assert clear.mean() > 0.8
         assert (inside(printed.contours, points) == (ink > 0.5))[clear].all()
         assert 0.05 < (ink > 0.5).mean() < 0.7
-        outside = np.hypot(*points.T) > 1.02 * proportions(name).reach
+        outside = np.hypot(*points.T) > 1.02 * proportions(name, file).reach
         assert not ink[outside].any()
 
 
@@ -82,6 +96,22 @@ def test_outlines_of_cells_enclose_exactly_the_cells(rows: list[list[bool]]) -> 
     middles = np.argwhere(np.ones_like(cells))[:, ::-1] + 0.5
     contours = tuple(tuple(map(tuple, corners.tolist())) for corners in polygons)
     assert inside(contours, middles).tolist() == cells.ravel().tolist()
+
+
+def test_proportions_of_a_family_that_tells_more(tmp_path: Path) -> None:
+    file = tmp_path / 'ringed.yaml'
+    file.write_text(RINGED)
+    found = proportions('ringed', str(file))
+    assert (found.pinhole, found.polarity, found.reach) == (0.1, 'bright', 4.5)
+    assert found.quiet_zone == pytest.approx(5.4)
+    assert found.radii['band_outer'] == pytest.approx(3)
+    assert found.radii['circle_2_outer'] == 4.5
+    usual = [proportions(name) for name in ('metashape12', 'dots', 'gsi')]
+    assert [(it.pinhole, it.polarity) for it in usual] == [
+        (0.05, 'dark'),
+        (0.05, 'dark'),
+        (0.0, 'dark'),
+    ]
 
 
 def test_a_target_that_is_not_there_is_named() -> None:

@@ -13,6 +13,7 @@ from ahf_ros.codes.dots import DOTS_DESIGN
 from ahf_ros.codes.families import (
     check_numbers,
     code_family,
+    colours_of,
     families_in,
     families_of,
     family_in,
@@ -20,6 +21,7 @@ from ahf_ros.codes.families import (
     mirrored_number,
     numbers_of,
 )
+from ahf_ros.codes.gsi import GSI_LIBRARY
 from ahf_ros.detectors import DetectorSettings
 from ahf_ros.synthetic.scene import SceneSettings
 
@@ -155,6 +157,26 @@ def test_files_describe_more_families(files: str) -> None:
 def test_names_that_no_file_describes_are_refused(files: str, text: str, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         families_in(text, files)
+
+
+@pytest.mark.parametrize('library', [DOTS_DESIGN, GSI_LIBRARY])
+def test_a_file_that_changes_is_read_again(library: Path, tmp_path: Path) -> None:
+    file, design = tmp_path / 'mine.json', json.loads(library.read_text())
+    file.write_text(json.dumps(design | {'family': 'mine'}))
+    first = families_of(str(file))
+    assert list(first) == ['mine']
+    assert families_of(str(file))['mine'] is first['mine']
+    file.write_text(json.dumps(design | {'family': 'another'}))
+    assert list(families_of(str(file))) == ['another']
+
+
+def test_colours_of_families(files: str, tmp_path: Path) -> None:
+    bright = tmp_path / 'bright.yaml'
+    bright.write_text(RINGS.replace('mine', 'white') + 'polarity: bright\n')
+    every = f'{files}, {bright}'
+    assert colours_of(['white'], every) == 'bright'
+    for names in (['white', 'mine'], ['wide'], ['gsi'], ['metashape12'], ['aruco_4x4_50']):
+        assert colours_of(names, every) == 'both'
 
 
 def test_files_that_do_not_fit_are_refused(files: str, tmp_path: Path) -> None:

@@ -52,6 +52,19 @@ def test_bits_radii_and_words_of_one_image(name: str, changes: dict) -> None:
     even = name != 'cct10'
     assert found.rules.get('parity') == ('even' if even else None)
     assert ('parity' in found.odds) == even
+    assert found.polarity == changes.get('polarity', 'dark')
+    assert found.pinhole == pytest.approx(0.05, abs=0.04)
+
+
+def test_rules_that_few_words_cannot_tell_are_undecided() -> None:
+    (few,) = learnt(shown('metashape20', dot_radius=12, seed=1).image)
+    assert few.rules == {'parity': 'even'}
+    value, probability = few.undecided['opposite_pairs']
+    assert value == 1
+    assert 0.5 < probability < 0.95
+    (many,) = learnt(*(shown('aicon12', seed=seed).image for seed in (1, 2)))
+    assert many.rules == {'parity': 'even', 'opposite_pairs': 1}
+    assert 'opposite_pairs' not in many.undecided
 
 
 def test_two_families_in_two_images_are_told_apart() -> None:
@@ -89,9 +102,11 @@ def test_the_command_writes_a_family_that_the_detector_reads(tmp_path: Path, cap
     said = capsys.readouterr().err
     assert '20 targets in 1 of 1 images, 12 bits' in said
     assert 'parity even holds' in said
+    assert re.search(r'band 2\.2\d to 3\.\d+, dark, pinhole 0\.0\d, ink', said)
     assert 'metashape12 has all of these words and about this band' in said
     code = ring_family(str(output))
-    assert code.name == 'mine'
+    assert (code.name, code.polarity) == ('mine', 'dark')
+    assert 0 < code.pinhole < 0.1
     assert conforming(code.words, 12, parity='even').all()
     assert cv2.imread(str(tmp_path / 'mine.png')).shape[1] == 6 * 182
     targets = create_detector(family='mine', family_file=str(output))(scene.image)
@@ -116,6 +131,7 @@ def test_the_command_writes_two_families_and_says_what_is_wrong(tmp_path: Path, 
     ('name', 'message'),
     [
         ('gsi', r'0 dots with a concentric band .* in 1 images; 5 of one family'),
+        ('dots', r'0 dots with a concentric band .* in 1 images; 5 of one family'),
         ('cct10', r'2 dots with a concentric band of sectors in 1 images; 5 of one family'),
     ],
 )
@@ -126,6 +142,17 @@ def test_the_command_says_that_there_is_no_family(
     assert status('learn-family', tmp_path / 'a.png', '-o', tmp_path / 'mine.yaml') == 1
     assert re.search(message, capsys.readouterr().err)
     assert not (tmp_path / 'mine.yaml').exists()
+
+
+def test_one_target_and_no_photographs_are_no_family(tmp_path: Path, capsys) -> None:
+    output = tmp_path / 'mine.yaml'
+    write_image(tmp_path / 'a.png', shown('cct10', targets=1).image)
+    assert status('learn-family', tmp_path / 'a.png', '-o', output) == 1
+    assert '1 dots with a concentric band of sectors in 1 images' in capsys.readouterr().err
+    (tmp_path / 'a.png').write_bytes(b'nothing')
+    assert status('learn-family', tmp_path / 'a.png', '-o', output) == 1
+    assert 'no photograph was read, accepted is one at least' in capsys.readouterr().err
+    assert not output.exists()
 
 
 def test_photographs_and_point_lists_are_not_learnt_together(tmp_path: Path, capsys) -> None:

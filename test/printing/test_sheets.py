@@ -248,3 +248,15 @@ def test_the_largest_radius_is_told_and_is_accepted(values: dict) -> None:
 def test_a_page_too_small_for_anything() -> None:
     with pytest.raises(ValueError, match='dot_radius is 4 mm, accepted is no length for metash'):
         Sheets(SheetSettings(page='20x20mm')).layout  # noqa: B018
+
+
+def test_a_family_tells_its_hole_and_colour(tmp_path: Path) -> None:
+    file = tmp_path / 'mine.yaml'
+    text = 'family: mine\nbits: 8\nband: [2, 3]\nwords: all\npinhole: 0.1\npolarity: bright\n'
+    file.write_text(text)
+    settings = SheetSettings(family='mine', family_file=str(file), ids='1')
+    assert (settings.hole, settings.colour) == (0.1, 'bright')
+    changed = replace(settings, pinhole=0.0, polarity='dark')
+    assert (changed.hole, changed.colour) == (0.0, 'dark')
+    usual = replace(settings, family='metashape12')
+    assert (usual.hole, usual.colour) == (0.05, 'dark')

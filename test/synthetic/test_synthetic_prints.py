@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -99,6 +100,15 @@ def test_a_pinhole_is_white() -> None:
     mark = Mark(np.zeros(2), 12.0, 3.5, ring_cover(RING, 71, 0.0, 0.25))
     change = printed(target((0.0, 0.0), 12.0, 0.0), looking) - printed(mark, looking)
     assert change.sum() == pytest.approx(math.pi * 3.0**2, rel=0.01)
+
+
+def test_circles_are_inked_and_grow() -> None:
+    looking, circled = camera(), replace(RING, circles=((4.0, 4.5),))
+    marks = [
+        Mark(np.zeros(2), 10.0, 4.6, ring_cover(of, 71, 0.0, 0.0, 0.05)) for of in (RING, circled)
+    ]
+    change = printed(marks[1], looking) - printed(marks[0], looking)
+    assert change.sum() == pytest.approx(math.pi * (45.5**2 - 39.5**2), rel=0.01)
 
 
 def test_blocks_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -101,9 +101,11 @@ class LearntFamily:
 
     @property
     def pinhole(self) -> float:
-        """Radius of the hole in the dot, dot radii, 0 where none is seen."""
-        radius = float(np.median(self.bands.pinhole))
-        return radius if radius > _PINHOLE else 0.0
+        """Radius of the hole in the dot as printed, dot radii, 0 where none is seen."""
+        of = self.bands
+        printed = np.median((of.pinhole * of.size + self.growth) / (of.size - self.growth))
+        seen = np.median(of.pinhole) > _PINHOLE
+        return max(float(printed), _PINHOLE) if seen else 0.0
 
     def known(self) -> list[str]:
         """Return the families of this package with these words and radii, the smallest first."""

@@ -44,6 +44,9 @@ SURPRISES = (0.05, 0.5)
 HOPEFUL = 0.2
 """Mean log odds of a reading, from which a band is read on."""
 
+FEW_MARKS = 1 / 16
+"""Marked share of a band, below which words against paper have less evidence than that."""
+
 
 @dataclass(frozen=True, slots=True)
 class Evidence(ArrayRecord):

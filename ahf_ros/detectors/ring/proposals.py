@@ -14,10 +14,10 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ahf_ros.codes.ring import Family
+from ahf_ros.codes.ring import Family, least_marked
 from ahf_ros.detectors.ring.circles import RAYS, REACH
 from ahf_ros.detectors.ring.known import Explained
-from ahf_ros.detectors.ring.likelihood import edge_evidence, growth_by
+from ahf_ros.detectors.ring.likelihood import FEW_MARKS, edge_evidence, growth_by
 from ahf_ros.detectors.ring.polar import DOT, MARGIN, PART, PolarImages, polar_images
 from ahf_ros.features.circle_fit import ENOUGH, NO_FITS, Fit, fit_dots
 from ahf_ros.features.dot_search import voted_dots, whole_dots
@@ -93,7 +93,8 @@ def may_be_targets(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> n
     for code in families:
         bits.setdefault(code.band, set()).add(code.bits)
     bounds = [_bound(gray, dots, band, of_band) for band, of_band in bits.items()]
-    return np.asarray(np.max(bounds, axis=0) > _HOPEFUL)
+    least = min(1.0, *(least_marked(code) / FEW_MARKS for code in families))
+    return np.asarray(np.max(bounds, axis=0) > _HOPEFUL * least)
 
 
 def _bound(gray: np.ndarray, dots: Fit, band: tuple[float, float], bits: set[int]) -> np.ndarray:

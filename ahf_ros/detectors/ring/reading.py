@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ahf_ros.codes.ring import Family
+from ahf_ros.codes.ring import Family, least_marked
 from ahf_ros.detectors.ring.borders import border_evidence
 from ahf_ros.detectors.ring.circles import REACH, target_circles
 from ahf_ros.detectors.ring.decoding import CLEAR, DOUBT, Words, decode
@@ -20,6 +20,7 @@ from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.known import NOTHING_KNOWN, Prior
 from ahf_ros.detectors.ring.light import clear_of, predicted_light
 from ahf_ros.detectors.ring.likelihood import (
+    FEW_MARKS,
     HOPEFUL,
     Evidence,
     edge_evidence,
@@ -62,11 +63,12 @@ def _read_part(gray: np.ndarray, dots: Fit, family: Family, prior: Prior) -> Hyp
     unread = Hypotheses.unread(dots, family)
     if not len(dots.frames):
         return unread
+    hopeful = HOPEFUL * min(1.0, least_marked(family) / FEW_MARKS)
     polar = polar_images(gray, dots, family.band, family.bits * PER_SECTOR)
     growth = best_growth(polar, family.band, prior)
     edges = edge_evidence(polar, 1 - growth, growth, family.band)
     words = decode(edges, _overhang(growth, family), family, prior.expected)
-    read = np.flatnonzero(_mean_odds(words, edges.weight) > HOPEFUL)
+    read = np.flatnonzero(_mean_odds(words, edges.weight) > hopeful)
     edges, growth = edges.select(read), growth[read]
     printed = dots.select(read)
     printed = replace(printed, frames=frame.scaled(printed.frames, 1 - growth))
@@ -74,7 +76,7 @@ def _read_part(gray: np.ndarray, dots: Fit, family: Family, prior: Prior) -> Hyp
     overhang = _overhang(growth / (1 - growth), family)
     some = polar.select(read), edges, words.select(read)
     words = _settled(gray, printed, *some, overhang, family, prior.expected)
-    good = _mean_odds(words, edges.weight) > HOPEFUL
+    good = _mean_odds(words, edges.weight) > hopeful
     read, printed, words = read[good], printed.select(good), words.select(good)
     fit = _joint_fit(gray, printed, words, PER_SECTOR // 2, 1, family)
     growth = fit.polarity * fit.edge_shift / fit.size
@@ -85,7 +87,7 @@ def _read_part(gray: np.ndarray, dots: Fit, family: Family, prior: Prior) -> Hyp
     words = _settled(gray, fit, polar, edges, words, overhang, family, prior.expected)
     of_borders = border_evidence(polar, words, overhang, family)
     words = replace(words, coded=words.coded + of_borders)
-    good = _mean_odds(words, edges.weight) > HOPEFUL
+    good = _mean_odds(words, edges.weight) > hopeful
     read, fit, words = read[good], fit.select(good), words.select(good)
     fit = _joint_fit(gray, fit, words, PER_SECTOR, 2, family)
     return unread.replaced(read, Hypotheses.of(fit, words, family))

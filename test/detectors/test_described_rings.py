@@ -1,0 +1,84 @@
+"""Ring targets whose data files tell more of their print."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ahf_ros.codes.ring import ring_family
+from ahf_ros.detectors import DetectorSettings, create_detector
+from ahf_ros.detectors.ring.detector import find_hypotheses
+from ahf_ros.evaluation import score
+from ahf_ros.imaging.image import as_gray
+from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
+
+MINE = 'family: mine\nbits: 10\nband: {band}\nwords: all\n{more}'
+
+
+def described(folder: Path, more: str = '', band: object = (2.2, 3.2)) -> str:
+    """Return the path of a data file."""
+    file = folder / 'mine.yaml'
+    file.write_text(MINE.format(band=list(band), more=more))
+    return str(file)
+
+
+def shown(file: str, **changes: object) -> Rendering:
+    scene = {'width': 900, 'height': 640, 'targets': 12, 'dot_radius': 10, 'seed': 5} | changes
+    return render(SceneSettings(family='mine', family_file=file, **scene))
+
+
+def test_a_bright_family_is_rendered_and_found_bright(tmp_path: Path) -> None:
+    file = described(tmp_path, 'polarity: bright\n')
+    scene = shown(file)
+    assert np.median(scene.image) < 90
+    right = score(scene, create_detector(family='mine', family_file=file)(scene.image))
+    assert (right.right, right.wrong, right.false_positives) == (12, 0, 0)
+    dark = shown(file, polarity='dark')
+    assert create_detector(family='mine', family_file=file)(dark.image) == []
+    forced = create_detector(family='mine', family_file=file, polarity='dark')(dark.image)
+    assert score(dark, forced).right == 12
+
+
+@pytest.mark.parametrize(
+    'circles', ['[[3.7, 4.2]]', '[[1.4, 1.8]]', '[[4.2, 5], [5.5, 5.7]]'], ids=str
+)
+@pytest.mark.parametrize('light', ['normal', 'stripe'])
+def test_further_circles_do_not_disturb(tmp_path: Path, circles: str, light: str) -> None:
+    file = described(tmp_path, f'circles: {circles}\n')
+    scene = shown(file, light=light, targets=6)
+    found = score(scene, create_detector(family='mine', family_file=file)(scene.image))
+    assert found.right >= 5
+    assert found.wrong == 0
+
+
+@pytest.mark.parametrize('band', [(1.8, 3.2), (2.2, 2.8)])
+def test_a_free_band_is_measured(tmp_path: Path, band: tuple[float, float]) -> None:
+    (tmp_path / 'printed').mkdir()
+    scene = shown(described(tmp_path / 'printed', band=band))
+    file = described(tmp_path, band=([1.8, 2.2], [2.8, 3.2]))
+    found = score(scene, create_detector(family='mine', family_file=file)(scene.image))
+    exact = create_detector(family='mine', family_file=f'{tmp_path}/printed/mine.yaml')
+    assert (found.right, found.wrong) == (12, 0)
+    errors = [
+        np.hypot(*np.transpose(of.errors)) for of in (found, score(scene, exact(scene.image)))
+    ]
+    assert np.sqrt(np.mean(errors[0] ** 2)) < np.sqrt(np.mean(errors[1] ** 2)) + 0.01
+
+
+def test_hypotheses_are_of_the_family_as_described(tmp_path: Path) -> None:
+    file = described(tmp_path, band=([1.8, 2.2], [2.8, 3.2]))
+    settings = DetectorSettings(family='mine', family_file=file)
+    read = find_hypotheses(as_gray(shown(file).image), settings)
+    assert read.certain.sum() == 12
+    assert {code.bounds for code in read.families} == {((1.8, 2.2), (2.8, 3.2))}
+
+
+def test_a_single_mark_of_many_sectors_is_read(tmp_path: Path) -> None:
+    file = tmp_path / 'mine.yaml'
+    file.write_text('family: mine\nbits: 24\nband: [2, 3]\nwords: [1, 11, 27]\n')
+    scene = shown(str(file), targets=3, dot_radius=24)
+    found = create_detector(family='mine', family_file=str(file))(scene.image)
+    assert 1 in ring_family(str(file)).words
+    assert sorted(it.id for it in found) == [1, 2, 3]
