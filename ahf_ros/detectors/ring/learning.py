@@ -8,7 +8,7 @@ All targets of a family share bits, radii and rules, so that a few borders of ea
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,7 +17,7 @@ import numpy as np
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes import RING_NAMES
 from ahf_ros.codes.cyclic import smallest_rotation
-from ahf_ros.codes.ring import BITS, conforming, family
+from ahf_ros.codes.ring import BITS, Family, conforming, family
 from ahf_ros.detectors.claims import owners
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.ring.polar import angles_of
@@ -82,9 +82,12 @@ class LearntFamily:
     rules: dict[str, Any]  # arguments of `conforming` that all words follow
     odds: dict[str, float]  # log odds of these, of chance
 
-    def known(self) -> list[str]:
-        """Return the families of this package with these words and radii, the smallest first."""
-        codes = sorted(map(family, RING_NAMES), key=lambda code: len(code.words))
+    def known(self, more: Sequence[Family] = ()) -> list[str]:
+        """Return the families, of this package and more, with these words and radii.
+
+        The smallest come first.
+        """
+        codes = sorted([*map(family, RING_NAMES), *more], key=lambda code: len(code.words))
         return [
             code.name
             for code in codes

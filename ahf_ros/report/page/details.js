@@ -35,6 +35,7 @@ function summaryOf(record) {
   if (record.wrong) parts.push(`${record.wrong} wrong`);
   if (record.mirrored) parts.push('the image seems to be mirrored');
   if (record.edges) parts.push(record.edges);
+  parts.push(...record.advice);
   if (record.images.length > 1) parts.push(`stack of ${record.images.length}, ${record.combination || 'first image'}`);
   parts.push(record.filter.applied ? `filter γH ${shortNumber(record.filter.gamma_high)}, γL ${shortNumber(record.filter.gamma_low)}` : 'no filter');
   return [...parts, `${record.detector} ${record.family}`].join(' · ');
