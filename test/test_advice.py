@@ -112,3 +112,13 @@ def test_the_command_advises_on_images_without_a_target_only(tmp_path, capsys) -
     assert 'N is not given' not in said  # no filter would show `ring` more
     assert status('identify', paths[0], '--family', 'metashape12') == 0
     assert 'dots with a band' not in capsys.readouterr().err
+
+
+def test_the_report_has_the_advice(tmp_path, capsys) -> None:
+    pytest.importorskip('jinja2', reason='pages are written with jinja2')
+    write_image(tmp_path / 'a.png', shown(family='cct10'))
+    assert status('identify', tmp_path / 'a.png', '--family', 'metashape12', '--json') == 0
+    (tmp_path / 'results.jsonl').write_text(capsys.readouterr().out)
+    page = tmp_path / 'report.html'
+    assert status('report', tmp_path / 'results.jsonl', '-o', page) == 0
+    assert '"advice":["12 dots with a band of 10 sectors: --family cct10"]' in page.read_text()

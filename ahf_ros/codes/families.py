@@ -219,6 +219,32 @@ def numbers_of(name: str, file: str = '') -> Sequence[int]:
     return sorted(code_family(name, file).numbers.tolist())
 
 
+def code_reading(name: str, files: str = '') -> dict[str, int | str]:
+    """Return how code words of a family are read: `bits`, `first_bit` and `direction`.
+
+    It is empty for families whose code is no word, such as square markers, and for unknown ones.
+    `files` are as for `families_in`.
+
+    Examples
+    --------
+    >>> code_reading('metashape12')
+    {'bits': 12, 'first_bit': 'lowest', 'direction': 'counter-clockwise'}
+    """
+    from ahf_ros.codes import dots, gsi, ring
+
+    try:
+        code = code_family(name, files)
+    except ValueError:
+        return {}
+    if isinstance(code, gsi.PointFamily):
+        bits = int(code.position_numbers.max()) + 1
+        return {'bits': bits, 'first_bit': 'lowest', 'direction': 'by position'}
+    if not isinstance(code, dots.DotFamily | ring.Family):
+        return {}
+    direction = 'counter-clockwise' if isinstance(code, ring.Family) else 'either'
+    return {'bits': code.bits, 'first_bit': 'lowest', 'direction': direction}
+
+
 def check_numbers(field: str, numbers: Iterable[int], families: Sequence[str], file: str) -> None:
     """Refuse numbers that are no ID of any of some families.
 

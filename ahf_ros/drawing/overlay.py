@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 
 from ahf_ros.codes.designs import relative_reach
+from ahf_ros.doubt import DOUBTFUL_BELOW
 from ahf_ros.imaging.image import stretched_to_8_bit
 from ahf_ros.target import (
     UNDECODED,
@@ -38,9 +39,6 @@ MISSED_COLOUR: Colour = (0, 130, 255)
 DECODING_DOT_COLOUR: Colour = (255, 200, 0)  # the dots that are the code of a target of dots
 TEXT_COLOUR: Colour = (255, 255, 255)
 OUTLINE_COLOUR: Colour = (0, 0, 0)
-
-DOUBTFUL_BELOW = 0.95
-"""Confidence below which a decoded target counts as doubtful."""
 
 FONT = cv2.FONT_HERSHEY_SIMPLEX
 _FONT_HEIGHT = 22.0  # px, of a capital at scale 1

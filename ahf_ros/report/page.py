@@ -20,7 +20,7 @@ import cv2
 from ahf_ros.advice import LOOKED_AT, advice
 from ahf_ros.codes.designs import relative_reach
 from ahf_ros.detectors.contract import DetectorSettings
-from ahf_ros.drawing.overlay import DOUBTFUL_BELOW
+from ahf_ros.doubt import DOUBTFUL_BELOW, doubt
 from ahf_ros.edge_shift import edge_shift_remark
 from ahf_ros.evaluation import FALSE, RIGHT, WRONG, judge
 from ahf_ros.interchange.files import whole_file
@@ -117,6 +117,7 @@ def row(
         'missedIds': missed,
         'unexpectedIds': sorted(result.identified - known) if known is not None else [],
         'doubtful': len(likely) + sum(it.confidence < doubtful_below for it in decoded),
+        'doubts': sorted({doubt(target, result.detector) for target in decoded} - {''}),
         'unread': len(unread),
         'seconds': round(result.filter.duration, 3),
         'filter': _filter(result),
