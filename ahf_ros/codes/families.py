@@ -230,19 +230,20 @@ def code_reading(name: str, files: str = '') -> dict[str, int | str]:
     >>> code_reading('metashape12')
     {'bits': 12, 'first_bit': 'lowest', 'direction': 'counter-clockwise'}
     """
-    from ahf_ros.codes import dots, gsi, ring
+    from ahf_ros.codes import cyclic, dots, gsi
 
     try:
         code = code_family(name, files)
     except ValueError:
         return {}
-    if isinstance(code, gsi.PointFamily):
+    reading: dict[str, int | str] = {}
+    if isinstance(code, cyclic.CyclicFamily):
+        direction = 'either' if isinstance(code, dots.DotFamily) else 'counter-clockwise'
+        reading = {'bits': code.bits, 'first_bit': 'lowest', 'direction': direction}
+    elif isinstance(code, gsi.PointFamily):
         bits = int(code.position_numbers.max()) + 1
-        return {'bits': bits, 'first_bit': 'lowest', 'direction': 'by position'}
-    if not isinstance(code, dots.DotFamily | ring.Family):
-        return {}
-    direction = 'counter-clockwise' if isinstance(code, ring.Family) else 'either'
-    return {'bits': code.bits, 'first_bit': 'lowest', 'direction': direction}
+        reading = {'bits': bits, 'first_bit': 'lowest', 'direction': 'by position'}
+    return reading
 
 
 def check_numbers(field: str, numbers: Iterable[int], families: Sequence[str], file: str) -> None:
