@@ -50,7 +50,7 @@ _CIRCLE = math.sqrt(0.5)  # of the radius, what a circle reaches in both directi
 _SIDES = np.array([(1.0, 0.0), (-1.0, 0.0), (0.0, -1.0), (0.0, 1.0)])
 _STEPS = 4  # of its height, by which a label moves away from its target
 _OUTSIDE = 1e3  # cost of a label that is partly outside, against one that hides a target
-_BESIDE = 0.6  # of its height, within which a label needs no line to its target
+_BESIDE = 1.0  # of its height, within which a label needs no line to its target
 _OVERLAPPING = 2.0  # the same of one on another label
 _AMBIGUOUS, _AWAY = 0.5, 0.2  # of one nearer to another target, and of each step away
 
