@@ -1,7 +1,6 @@
 """What may help where no target is identified: only what a second look at the image measures.
 
-Targets of other families, targets that are too small, and bands of sectors of no known family
-are looked for. That takes a few identifications, so nothing here is on the way to a result.
+It takes a few identifications, so nothing here is on the way to a result.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from statistics import median
 import cv2
 import numpy as np
 
-from ahf_ros.codes.families import AUTO, code_family, families_of, kind_of
+from ahf_ros.codes.families import AUTO, families_of
 from ahf_ros.codes.ring import Family
 from ahf_ros.detectors import create_detector
 from ahf_ros.detectors.contract import DetectorSettings
@@ -38,14 +37,12 @@ _AMPLE = 1.25  # times the minimum radius, which even light needs
 _SURE = 10.0  # log odds of the number of sectors
 _MISPLACED = 1.5  # px, growth of ink that leaves a doubt of the radii of a band
 _EXACT = 0.02  # dot radii, spread of the edges of bands that light does not blur
-_ALIKE = 0.15  # dot radii, difference of bands that may be the same
-_COLOURS = {1: 'dark', -1: 'bright'}
 
 
 def advice(image: np.ndarray, settings: DetectorSettings, expected_targets: int = 0) -> list[str]:
-    """Return lines on what an image shows in which nothing was identified; none if nothing is.
+    """Return lines on what a gray image shows in which nothing was identified; often none.
 
-    `image` is a gray image, and `settings` say what was looked for in it, with N if it was known.
+    `settings` say what was looked for; `expected_targets` is N, 0 if none was given.
 
     Examples
     --------
@@ -65,7 +62,7 @@ class Adviser:
     """
 
     def __init__(self, settings: DetectorSettings, expected_targets: int = 0) -> None:
-        self.lines: tuple[str, ...] = ()
+        self.lines: list[str] = []
         self._arguments = settings, expected_targets
         self._in_a_row = 0
         self._look: threading.Thread | None = None
@@ -74,23 +71,17 @@ class Adviser:
         """Take note of the next image, and of how many targets were identified in it."""
         self._in_a_row = 0 if identified else self._in_a_row + 1
         if identified:
-            self.lines = ()
+            self.lines = []
         elif self._in_a_row == IN_A_ROW and self._look is None:
             self._look = threading.Thread(target=self._advise, args=(image,), daemon=True)
             self._look.start()
-
-    def wait(self) -> None:
-        """Return when a look that was begun has ended."""
-        if self._look:
-            self._look.join()
 
     def _advise(self, image: np.ndarray) -> None:
         with suppress(OSError):  # where a thread has no priority of its own
             os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), 19)
         with suppress(ValueError):  # which the identification has said
-            lines = tuple(advice(image, *self._arguments))
-            if self._in_a_row:
-                self.lines = lines
+            lines = advice(image, *self._arguments)
+            self.lines = lines if self._in_a_row else []
 
 
 def _lines(image: np.ndarray, settings: DetectorSettings, expected: int) -> Iterator[str]:
@@ -98,8 +89,7 @@ def _lines(image: np.ndarray, settings: DetectorSettings, expected: int) -> Iter
         yield from _of_bands(learnt, 1, settings, expected)
         return
     usual = replace(settings, family=AUTO, polarity='auto', min_radius=0.0, max_radius=1e4)
-    found = [it for it in _identified(image, usual) if it.family not in settings.families]
-    if found:
+    if found := [it for it in _identified(image, usual) if it.family not in settings.families]:
         ((name, count),) = Counter(target.family for target in found).most_common(1)
         yield f'{counted(count, "target")} of {name}: --family {name}'
         yield edge_shift_remark(median_edge_shift(found))
@@ -109,7 +99,7 @@ def _lines(image: np.ndarray, settings: DetectorSettings, expected: int) -> Iter
         yield from _of_bands(learnt, _ENLARGED, settings, expected)
     elif small := _identified(middle, replace(settings, max_radius=1e4)):
         radius = median(target.semi_major for target in small) / _ENLARGED
-        yield from _of_size(len(small), radius, settings)
+        yield _of_size(len(small), radius, settings)
 
 
 def _learnt(image: np.ndarray) -> LearntFamily | None:
@@ -122,50 +112,34 @@ def _of_bands(
     found: LearntFamily, scale: int, settings: DetectorSettings, expected: int
 ) -> Iterator[str]:
     """Yield what dots with bands say, seen in an image that was enlarged by a scale."""
-    polarity = int(np.sign(np.median(found.bands.polarity)))
-    count = len(found.words)
+    polarity, count = int(np.median(found.bands.polarity)), len(found.words)
     own = families_of(settings.family_file).values() if settings.family_file else ()
     known = found.known([code for code in own if isinstance(code, Family)])
-    size = list(_of_size(count, float(np.median(found.bands.size)) / scale, settings))
+    size = _of_size(count, float(np.median(found.bands.size)) / scale, settings)
     edges = edge_shift_remark(found.growth * polarity / scale)
     exact = scale == 1 and np.median(found.bands.spread) < _EXACT
     dots = f'{count} dots with a band of {found.bits} sectors'
     if known and not set(known) & set(settings.families):
         yield f'{dots}: --family {" or ".join(known)}'
     elif polarity not in settings.polarities:
-        yield f'{dots} are {_COLOURS[polarity]}, polarity is {settings.polarity}'
+        yield f'{dots} are {"dark" if polarity > 0 else "bright"}, polarity is {settings.polarity}'
     elif not known and exact and abs(found.growth) < _MISPLACED:
         yield f'{dots} that no known family has: `ahf learn-family` describes it'
-    elif _like_wanted(found, settings) and not (size or edges or expected):
-        yield (
-            f'{count} dots with a band are hard to read: with --expected-targets N, AHF searches '
-            'for a filter'
-        )
-    yield from size
+    elif known and not (size or edges or expected):
+        yield f'{dots} are hard to read: give --expected-targets, so that AHF searches'
+    yield size
     yield edges
 
 
-def _like_wanted(found: LearntFamily, settings: DetectorSettings) -> bool:
-    """Return whether bands have the radii of a family that was looked for."""
-    names = [it for it in settings.families if kind_of(it, settings.family_file) == 'ring']
-    wanted = [code_family(name, settings.family_file) for name in names]
-    return any(
-        np.abs(np.subtract(code.band, found.band)).max() < _ALIKE
-        for code in wanted
-        if isinstance(code, Family)
-    )
-
-
-def _of_size(count: int, radius: float, settings: DetectorSettings) -> Iterator[str]:
-    """Yield what the radius of some dots says, px."""
+def _of_size(count: int, radius: float, settings: DetectorSettings) -> str:
+    """Return what the radius of some dots says, px; nothing where it is accepted."""
     minimum, maximum = settings.radii
-    ample = _AMPLE * minimum
-    if settings.min_radius and radius < minimum:
-        yield f'{count} dots have a radius of {radius:.1f} px, min_radius is {minimum:g}'
-    elif radius < minimum:
-        yield f'{count} dots of {radius:.1f} px are too small: {ample:.2g} px are needed'
-    elif radius > maximum:
-        yield f'{count} dots have a radius of {radius:.1f} px, max_radius is {maximum:g}'
+    if minimum <= radius <= maximum:
+        return ''
+    if radius < minimum and not settings.min_radius:
+        return f'{count} dots of {radius:.1f} px are too small: {_AMPLE * minimum:.2g} px would do'
+    name, bound = ('min', minimum) if radius < minimum else ('max', maximum)
+    return f'{count} dots have a radius of {radius:.1f} px, {name}_radius is {bound:g}'
 
 
 def _identified(image: np.ndarray, settings: DetectorSettings) -> list[Target]:
@@ -175,9 +149,7 @@ def _identified(image: np.ndarray, settings: DetectorSettings) -> list[Target]:
 
 
 def _enlarged_middle(image: np.ndarray) -> np.ndarray:
-    """Return the middle of an image, enlarged."""
-    height, width = image.shape
-    share = min(1.0, (_MAXIMUM_PIXELS / image.size) ** 0.5)
-    top, left = (round((1 - share) / 2 * side) for side in (height, width))
-    part = image[top : height - top, left : width - left]
+    cut = max(0.0, 1 - (_MAXIMUM_PIXELS / image.size) ** 0.5) / 2
+    top, left = (round(cut * side) for side in image.shape)
+    part = image[top : len(image) - top, left : image.shape[1] - left]
     return cv2.resize(part, None, fx=_ENLARGED, fy=_ENLARGED, interpolation=cv2.INTER_CUBIC)

@@ -20,11 +20,6 @@ def doubt(target: Target, detector: str) -> str:
     """Return why a detector reports a target in spite of its low confidence.
 
     It is empty if the confidence is as high as usual, or the target undecoded.
-
-    Examples
-    --------
-    >>> doubt(Target(7, 19, 10.5, 20.0, 8.0, 7.5, confidence=0.8), 'ring')
-    'ring reports probabilities from 0.75 on'
     """
     if target.id == UNDECODED or target.confidence >= DOUBTFUL_BELOW:
         return ''

@@ -31,11 +31,11 @@ def shown(**changes: object) -> np.ndarray:
         ({'family': 'cct10'}, {}, ['12 dots with a band of 10 sectors: --family cct10']),
         ({}, {'family': 'apriltag_36h11'}, ['12 dots with a band of 12 sectors: --family met']),
         ({'targets': 2}, {'family': 'aicon14'}, ['2 targets of metashape12: --family met']),
-        ({'dot_radius': 3.4}, {}, [r'1[012] dots of 3\.\d px are too small: 5 px are needed']),
+        ({'dot_radius': 3.4}, {}, [r'1[012] dots of 3\.\d px are too small: 5 px would do']),
         (
             {'family': 'gsi', 'dot_radius': 1.5, 'targets': 6},
             {'family': 'gsi'},
-            [r'[56] dots of 1\.4 px are too small: 2\.5 px are needed'],
+            [r'[56] dots of 1\.4 px are too small: 2\.5 px would do'],
         ),
         ({}, {'min_radius': 14.0}, [r'12 dots have a radius of 8\.\d px, min_radius is 14']),
         ({}, {'max_radius': 6.0}, [r'12 dots have a radius of 8\.\d px, max_radius is 6']),
@@ -79,8 +79,13 @@ def test_nothing_is_said_of_what_shows_nothing() -> None:
 def test_a_filter_is_advised_where_it_may_show_more() -> None:
     image, settings = shown(dot_radius=12), DetectorSettings()
     (line,) = advice(image, settings)  # as if no band had been read
-    assert line.startswith('12 dots with a band are hard to read: with --expected-targets N, AHF')
+    assert line.startswith('12 dots with a band of 12 sectors are hard to read: give --expected-')
     assert advice(image, settings, expected_targets=12) == []
+
+
+def finish(adviser: Adviser) -> None:
+    if adviser._look:
+        adviser._look.join()
 
 
 def test_a_stream_gets_advice_once_and_only_while_nothing_is_identified() -> None:
@@ -88,17 +93,17 @@ def test_a_stream_gets_advice_once_and_only_while_nothing_is_identified() -> Non
     adviser = Adviser(DetectorSettings())
     for identified in (0,) * (IN_A_ROW - 1) + (1,) + (0,) * (IN_A_ROW - 1):
         adviser.see(image, identified)
-    adviser.wait()
-    assert adviser.lines == ()
+    finish(adviser)
+    assert adviser.lines == []
     adviser.see(image, 0)
-    adviser.wait()
-    assert adviser.lines == ('12 dots with a band of 10 sectors: --family cct10',)
+    finish(adviser)
+    assert adviser.lines == ['12 dots with a band of 10 sectors: --family cct10']
     adviser.see(image, 3)
-    assert adviser.lines == ()
+    assert adviser.lines == []
     for _ in range(2 * IN_A_ROW):
         adviser.see(image, 0)
-    adviser.wait()
-    assert adviser.lines == ()
+    finish(adviser)
+    assert adviser.lines == []
 
 
 def test_the_command_advises_on_images_without_a_target_only(tmp_path, capsys) -> None:

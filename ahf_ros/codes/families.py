@@ -7,6 +7,7 @@ anything. Therefore the codes, which take numpy and OpenCV, are imported where t
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Mapping, Sequence
+from contextlib import suppress
 from difflib import get_close_matches
 from functools import lru_cache
 from itertools import combinations
@@ -224,26 +225,17 @@ def code_reading(name: str, files: str = '') -> dict[str, int | str]:
 
     It is empty for families whose code is no word, such as square markers, and for unknown ones.
     `files` are as for `families_in`.
-
-    Examples
-    --------
-    >>> code_reading('metashape12')
-    {'bits': 12, 'first_bit': 'lowest', 'direction': 'counter-clockwise'}
     """
-    from ahf_ros.codes import cyclic, dots, gsi
+    from ahf_ros.codes import cyclic, gsi
 
-    try:
+    bits, direction = 0, 'by position'
+    with suppress(ValueError):
         code = code_family(name, files)
-    except ValueError:
-        return {}
-    reading: dict[str, int | str] = {}
-    if isinstance(code, cyclic.CyclicFamily):
-        direction = 'either' if isinstance(code, dots.DotFamily) else 'counter-clockwise'
-        reading = {'bits': code.bits, 'first_bit': 'lowest', 'direction': direction}
-    elif isinstance(code, gsi.PointFamily):
-        bits = int(code.position_numbers.max()) + 1
-        reading = {'bits': bits, 'first_bit': 'lowest', 'direction': 'by position'}
-    return reading
+        if isinstance(code, gsi.PointFamily):
+            bits = int(code.position_numbers.max()) + 1
+        elif isinstance(code, cyclic.CyclicFamily):
+            bits, direction = code.bits, 'either' if code.kind == 'dots' else 'counter-clockwise'
+    return {'bits': bits, 'first_bit': 'lowest', 'direction': direction} if bits else {}
 
 
 def check_numbers(field: str, numbers: Iterable[int], families: Sequence[str], file: str) -> None:

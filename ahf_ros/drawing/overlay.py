@@ -134,10 +134,8 @@ def _boxes(label: Label, size: tuple[float, float], gap: float) -> np.ndarray:
     reach = np.concatenate([corners, sides]).max(axis=1, initial=0.0) + gap  # of the line
     if not len(label.outline):
         reach = label.radius * np.repeat([_CIRCLE, 1.0], 4)
-    steps = size[1] * np.arange(_STEPS)[:, None, None]
-    near = centre + directions * ((reach + gap)[:, None] + steps)  # beside the target
-    middle = near + directions * np.divide(size, 2)
-    half = np.divide(size, 2)
+    away, half = size[1] * np.arange(_STEPS)[:, None, None], np.divide(size, 2)
+    middle = centre + directions * ((reach + gap)[:, None] + away + half)
     return np.concatenate([middle - half, middle + half], axis=2).reshape(-1, 4)
 
 
@@ -324,10 +322,10 @@ def _draw_labels(
     """Write the labels, in letters of one height."""
     shape: tuple[int, int] = canvas.shape[:2]
     height = max(_MINIMUM_LETTERS * unit, _LETTERS * math.hypot(*shape))
-    places = np.array([(it.x, it.y) for it in labels]).reshape(-1, 2)
-    apart = np.hypot(*(places[:, None] - places).T) + np.diag(np.full(len(labels), np.inf))
     if len(labels) > 1:
-        room = _OF_ROOM * float(np.median(apart.min(axis=1)))
+        places = np.array([(it.x, it.y) for it in labels])
+        apart = np.hypot(*(places[:, None] - places).T)
+        room = _OF_ROOM * float(np.median(np.sort(apart, axis=1)[:, 1]))
         height = min(height, max(room, _SMALLEST_LETTERS * unit))
     scale = min(height, shape[0]) / _FONT_HEIGHT
     sizes = [_text_size(label.text, scale, unit) for label in labels]

@@ -11,6 +11,7 @@ import os
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -299,11 +300,10 @@ def _template() -> Any:
 
 def _advice(result: ImageResult, folders: Sequence[Path]) -> list[str]:
     """Return what may help with an image in which nothing was identified."""
-    try:
+    with suppress(ValueError):  # an image that is not there is named with its picture
         wanted = DetectorSettings(family=result.family)
         return advice(shown_image(result, folders)[0], wanted, result.expected)
-    except ValueError:  # an image that is not there is named with its picture
-        return []
+    return []
 
 
 def _limits(available: int, results: Sequence[ImageResult]) -> list[int]:

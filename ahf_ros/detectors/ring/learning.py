@@ -83,10 +83,7 @@ class LearntFamily:
     odds: dict[str, float]  # log odds of these, of chance
 
     def known(self, more: Sequence[Family] = ()) -> list[str]:
-        """Return the families, of this package and more, with these words and radii.
-
-        The smallest come first.
-        """
+        """Return the families of this package, and more, of these words and radii, sorted."""
         codes = sorted([*map(family, RING_NAMES), *more], key=lambda code: len(code.words))
         return [
             code.name
