@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ahf_ros.drawing import overlay as overlay_module
 from ahf_ros.drawing.overlay import (
     DECODED_COLOUR,
     DOUBTFUL_COLOUR,
@@ -18,6 +19,7 @@ from ahf_ros.drawing.overlay import (
     summary,
 )
 from ahf_ros.drawing.tiles import Tile, side_by_side
+from ahf_ros.synthetic.scene import SceneSettings
 from ahf_ros.target import (
     UNDECODED,
     FilterState,
@@ -26,6 +28,7 @@ from ahf_ros.target import (
     Target,
     UndecodedTarget,
 )
+from support.scenes import rendered
 
 GRAY = np.full((240, 320), 120, np.uint8)
 
@@ -166,3 +169,43 @@ def test_no_size_of_a_target_crashes() -> None:
             target = Target(7, 7, place, place, size, size, 0.3)
             drawn = draw(np.full((60, 80), 128, np.uint8), Identification((target,)))
             assert drawn.shape == (60, 80, 3)
+
+
+def test_labels_of_a_dense_scene_stand_at_their_own_targets(monkeypatch) -> None:
+    """Of 150 real targets, side by side, no label lies on a target or on another label."""
+    scene = rendered(SceneSettings(width=900, height=650, targets=150, dot_radius=5, seed=3))
+    boxes: list[tuple[float, ...]] = []
+    named: list[Label] = []
+
+    def placed(labels, sizes, *rest):
+        corners = place_labels(labels, sizes, *rest)
+        for (left, bottom), (width, height) in zip(corners, sizes, strict=True):
+            boxes.append((left, bottom - height, left + width, bottom))
+        named.extend(labels)
+        return corners
+
+    monkeypatch.setattr(overlay_module, 'place_labels', placed)
+    overlay(scene.image, scene.targets)
+    left, top, right, bottom = np.array(boxes).T
+    x, y, radius = np.array([(it.x, it.y, it.radius) for it in named]).T
+    across = x[:, None] - np.clip(x[:, None], left, right)
+    down = y[:, None] - np.clip(y[:, None], top, bottom)
+    beyond = np.hypot(across, down) - radius[:, None]
+    assert len(boxes) == 150
+    assert beyond.min() > -2.0
+    assert np.mean(beyond.argmin(axis=0) == np.arange(150)) > 0.95
+    apart = (left[:, None] >= right) | (right[:, None] <= left)
+    apart |= (top[:, None] >= bottom) | (bottom[:, None] <= top)
+    assert apart.sum() == 150 * 149
+
+
+def test_a_label_that_has_to_move_has_a_line_to_its_target() -> None:
+    label = Label('7', 140.0, 100.0, 12.0, DECODED_COLOUR)
+    canvas = np.full((240, 320, 3), 120, np.uint8)
+    overlay_module._draw_leader(canvas, label, (190.0, 60.0, 220.0, 70.0), 1)
+    line = np.argwhere(shown(canvas, DECODED_COLOUR))
+    for end in ((70, 190), (94, 150)):
+        assert np.hypot(*(line - end).T).min() < 3.0
+    canvas[:] = 120
+    overlay_module._draw_leader(canvas, label, (150.0, 80.0, 180.0, 90.0), 1)
+    assert not shown(canvas, DECODED_COLOUR).any()

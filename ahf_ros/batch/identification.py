@@ -16,6 +16,7 @@ from ahf_ros import ending
 from ahf_ros.batch.engine import Report, no_report
 from ahf_ros.batch.task import ImageOutcome, ImageTask, Level, Message
 from ahf_ros.detectors import Detector, DetectorSettings, create_detector
+from ahf_ros.doubt import doubt
 from ahf_ros.drawing.overlay import draw, summary
 from ahf_ros.edge_shift import edge_shift_remark
 from ahf_ros.imaging.image import check_image, white_remark
@@ -59,7 +60,7 @@ def identify_images(task: ImageTask, report: Report = no_report) -> ImageOutcome
             images[path] = image
             if note:
                 messages.append(Message(note))
-    if task.minimum > 1 and len(images) < task.minimum:
+    if images and len(images) < task.minimum > 1:
         text = f'{task.paths[0]}: {len(images)} of {task.minimum} images of a stack'
         messages.append(Message(text, Level.WARNING))
     if not images:
@@ -74,6 +75,7 @@ def identify_images(task: ImageTask, report: Report = no_report) -> ImageOutcome
             search = identifier.last_search
             in_vain = search.in_vain if search and search.reason == 'patience' else 0
             messages += _messages(paths, part.split, stack.images[0], found, in_vain)
+            messages += _lines(found, detector.name)
             record = to_json(
                 found,
                 paths[0],
@@ -84,6 +86,7 @@ def identify_images(task: ImageTask, report: Report = no_report) -> ImageOutcome
                 split=part.split,
                 upright=task.upright,
                 mapping=asdict(task.settings.adaptive.filter),
+                family_file=task.settings.detection.family_file,
             )
             records.append(record)
             if overlays:
@@ -140,7 +143,7 @@ def _reported(name: str, messages: list[Message]) -> Iterator[None]:
 def _messages(
     paths: tuple[str, ...], split: str, image: np.ndarray, found: Identification, in_vain: int
 ) -> Iterator[Message]:
-    """Yield what there is to say about the result of a part of a stack, and about each target.
+    """Yield what there is to say about the result of a part of a stack.
 
     `split` says why there was a stack before it, and `in_vain` is the number of filters in a row
     that showed no more targets, after which a search ended early.
@@ -161,10 +164,15 @@ def _messages(
         remarks.append(white_remark(image))
     for remark in filter(None, remarks):
         yield Message(f'{name}: {remark}')
+
+
+def _lines(found: Identification, detector: str) -> Iterator[Message]:
+    """Yield a line about each target."""
     for target in found.targets:
+        why = doubt(target, detector)
         yield Message(
             f'{target.id:>8} {target.family:<11} {target.x:10.3f} {target.y:10.3f} px'
             f'  semi-axes {target.semi_major:.2f} {target.semi_minor:.2f} px'
-            f'  confidence {target.confidence:.3f}',
+            f'  confidence {target.confidence:.3f}{f", doubtful: {why}" if why else ""}',
             Level.DETAIL,
         )

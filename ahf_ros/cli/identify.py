@@ -39,7 +39,6 @@ from ahf_ros.text import shown
 if TYPE_CHECKING:
     from ahf_ros.interchange.export.survey import MeasuredImage
 
-_LOOKED_AT = 3  # images in which other rings are looked for where none are identified
 _WORTH_PROCESSES = 4  # images; fewer are identified before processes have started
 
 
@@ -116,6 +115,7 @@ def _run(options: argparse.Namespace, output: TextIO | None) -> int:
 
     failed = bool(problems)
     results = identified = 0
+    empty: list[str] = []
     measured: list[MeasuredImage] = []
     engine = create_engine('identify', identify_images, jobs, options.scheduler, with_machine)
     with closing(engine), progress_bar(len(tasks) > 1 and not options.quiet) as progress:
@@ -126,7 +126,9 @@ def _run(options: argparse.Namespace, output: TextIO | None) -> int:
                 failed |= outcome.failed
                 for record in outcome.records:
                     results += 1
-                    identified += sum(it['id'] != UNDECODED for it in record['targets'])
+                    count = sum(it['id'] != UNDECODED for it in record['targets'])
+                    identified += count
+                    empty += [record['image']] * (count == 0)
                     if options.export:
                         measured.append(measured_image(record, record['image']))
         except (EngineLost, Unwritable) as error:
@@ -134,8 +136,8 @@ def _run(options: argparse.Namespace, output: TextIO | None) -> int:
             return 1
     if results and not options.quiet:
         print(_hint(settings, identified), end='', file=sys.stderr)
-        if not identified:
-            print(_other_rings(paths), end='', file=sys.stderr)
+        if 2 * len(empty) >= results:
+            print(_advice(empty, settings), end='', file=sys.stderr)
     if not write_exports('identify', options.export, measured, control, options.quiet):
         failed = True
     return int(failed)
@@ -175,30 +177,32 @@ def _hint(settings: IdentificationSettings, identified: int) -> str:
         return f'targets of {family} were looked for; --family names others\n'
     if settings.expected_targets or settings.adaptive.listed or settings.estimate_expected:
         return ''
+
+    from ahf_ros.batch.identification import detector_of
+    from ahf_ros.detectors import EarlyStopping
+
+    if isinstance(detector_of(settings), EarlyStopping):  # filters show it hardly more
+        return ''
     return (
         'N is not given, so that no filter was searched for: with --expected-targets N, AHF '
         'searches for a filter wherever an image shows fewer than N targets\n'
     )
 
 
-def _other_rings(paths: Sequence[str]) -> str:
-    """Return a line on the rings of one of the first images, of whatever family."""
-    from ahf_ros.detectors import DetectorSettings
-    from ahf_ros.detectors.ring.learning import find_bands, learn_families
+def _advice(paths: Sequence[str], settings: IdentificationSettings) -> str:
+    """Return lines on the first image in which nothing was identified that shows why."""
+    from ahf_ros.advice import LOOKED_AT, advice
     from ahf_ros.interchange.image_files import read_image
 
-    for path in paths[:_LOOKED_AT]:
+    known = settings.expected_targets or len(settings.adaptive.listed)
+    known = known or int(settings.estimate_expected)
+    for path in paths[:LOOKED_AT]:
         try:
-            families = learn_families(find_bands([read_image(path)], DetectorSettings()))
+            lines = advice(read_image(path), settings.detection, known)
         except ValueError:  # which the identification has said
             continue
-        if families:
-            found = families[0]
-            known = ' or '.join(found.known())
-            return (
-                f'{path} shows {len(found.words)} dots with a band of {found.bits} sectors: '
-                f'{f"--family {known}" if known else "ahf learn-family describes their family"}\n'
-            )
+        if lines:
+            return ''.join(f'{path}: {line}\n' for line in lines)
     return ''
 
 

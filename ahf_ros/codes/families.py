@@ -7,6 +7,7 @@ anything. Therefore the codes, which take numpy and OpenCV, are imported where t
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Mapping, Sequence
+from contextlib import suppress
 from difflib import get_close_matches
 from itertools import combinations
 from pathlib import Path
@@ -227,6 +228,24 @@ def numbers_of(name: str, file: str = '') -> Sequence[int]:
     if name in SQUARE_NAMES:
         return range(len(square.dictionary(name).bytesList))
     return sorted(code_family(name, file).numbers.tolist())
+
+
+def code_reading(name: str, files: str = '') -> dict[str, int | str]:
+    """Return how code words of a family are read: `bits`, `first_bit` and `direction`.
+
+    It is empty for families whose code is no word, such as square markers, and for unknown ones.
+    `files` are as for `families_in`.
+    """
+    from ahf_ros.codes import cyclic, gsi
+
+    bits, direction = 0, 'by position'
+    with suppress(ValueError):
+        code = code_family(name, files)
+        if isinstance(code, gsi.PointFamily):
+            bits = int(code.position_numbers.max()) + 1
+        elif isinstance(code, cyclic.CyclicFamily):
+            bits, direction = code.bits, 'either' if code.kind == 'dots' else 'counter-clockwise'
+    return {'bits': bits, 'first_bit': 'lowest', 'direction': direction} if bits else {}
 
 
 def check_numbers(field: str, numbers: Iterable[int], families: Sequence[str], file: str) -> None:

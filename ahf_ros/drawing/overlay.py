@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 
 from ahf_ros.codes.designs import relative_reach
+from ahf_ros.doubt import DOUBTFUL_BELOW
 from ahf_ros.imaging.image import stretched_to_8_bit
 from ahf_ros.target import (
     UNDECODED,
@@ -39,9 +40,6 @@ DECODING_DOT_COLOUR: Colour = (255, 200, 0)  # the dots that are the code of a t
 TEXT_COLOUR: Colour = (255, 255, 255)
 OUTLINE_COLOUR: Colour = (0, 0, 0)
 
-DOUBTFUL_BELOW = 0.95
-"""Confidence below which a decoded target counts as doubtful."""
-
 FONT = cv2.FONT_HERSHEY_SIMPLEX
 _FONT_HEIGHT = 22.0  # px, of a capital at scale 1
 _SHIFT = 4  # fractional bits of the coordinates that OpenCV draws
@@ -49,10 +47,19 @@ _DASHES = 10  # of an ellipse
 
 _CORNERS = np.array([(1.0, -1.0), (1.0, 1.0), (-1.0, -1.0), (-1.0, 1.0)])  # where labels may be
 _CIRCLE = math.sqrt(0.5)  # of the radius, what a circle reaches in both directions of a corner
+_SIDES = np.array([(1.0, 0.0), (-1.0, 0.0), (0.0, -1.0), (0.0, 1.0)])
+_STEPS = 4  # of its height, by which a label moves away from its target
 _OUTSIDE = 1e3  # cost of a label that is partly outside, against one that hides a target
+_BESIDE = 1.0  # of its height, within which a label needs no line to its target
+_OVERLAPPING = 2.0  # the same of one on another label
+_AMBIGUOUS, _AWAY = 0.5, 0.2  # of one nearer to another target, and of each step away
 
 _LETTERS = 0.0105  # height, of the diagonal: legible when all of the image is on a screen
 _MINIMUM_LETTERS = 15.0  # px
+_SMALLEST_LETTERS, _OF_ROOM = (
+    9.0,
+    0.16,
+)  # px, and of distances, in crowds
 _SIDE_POINTS = 9  # at which the outline of a square is sampled
 _MAXIMUM_NAMED = 12  # IDs that the summary names at most
 
@@ -82,10 +89,11 @@ def place_labels(
 ) -> list[tuple[float, float]]:
     """Return the left and the lower border of each label, px.
 
-    A label is beside its target, `gap` px away: where it is inside the image of `shape` (height,
-    width) and hides the fewest targets and earlier labels or `taken` boxes; if several places are
-    as good, the first of upper right, lower right, upper left and lower left. `sizes` are width
-    and height of each label, px.
+    A label is beside its target, `gap` px away, or a few times its own height further where
+    there is no room: where it is inside the image of `shape` (height, width), hides the fewest
+    targets and earlier labels or `taken` boxes, and is nearest to its own target. If several
+    places are as good, the first of upper right, lower right, upper left, lower left and the
+    sides. `sizes` are width and height of each label, px.
 
     Examples
     --------
@@ -103,10 +111,15 @@ def place_labels(
         outside += np.maximum(places[:, 2:] - (width, height), 0).sum(axis=1)
         upper, lower = places[:, None, :2], places[:, None, 2:]
         nearest = np.clip(circles[:, :2], upper, lower) - circles[:, :2]
-        hides = np.hypot(nearest[..., 0], nearest[..., 1]) < 0.95 * circles[:, 2]
+        beyond = np.hypot(nearest[..., 0], nearest[..., 1]) - circles[:, 2]
+        own = beyond[:, index - len(taken)].copy()
+        beyond[:, index - len(taken)] = np.inf
         apart = (boxes[:index, :2] > lower) | (boxes[:index, 2:] < upper)
-        hidden = hides.sum(axis=1) + (~apart.any(axis=2)).sum(axis=1)
-        left, _, _, bottom = places[np.argmin(_OUTSIDE * (outside > 0) + hidden)]
+        cost = _AWAY * (np.arange(len(places)) // (len(places) // _STEPS))
+        cost += _OUTSIDE * (outside > 0) + _OVERLAPPING * (~apart.any(axis=2)).sum(axis=1)
+        cost += (beyond < -0.05 * circles[:, 2]).sum(axis=1)
+        cost += _AMBIGUOUS * (beyond.min(axis=1) < own)
+        left, _, _, bottom = places[np.argmin(cost)]
         left = max(min(left, width - size[0]), 0.0)
         bottom = min(max(bottom, size[1]), float(height))
         boxes[index] = left, bottom - size[1], left + size[0], bottom
@@ -114,15 +127,16 @@ def place_labels(
 
 
 def _boxes(label: Label, size: tuple[float, float], gap: float) -> np.ndarray:
-    """Return left, top, right and bottom of the four places of a label."""
-    centre = np.array([label.x, label.y])
-    offsets = _CORNERS[:, None] * (label.outline - centre)
-    reach = offsets.min(axis=2).max(axis=1, initial=0.0) + gap  # of the line
+    """Return left, top, right and bottom of the places of a label, the nearest first."""
+    centre, directions = np.array([label.x, label.y]), np.concatenate([_CORNERS, _SIDES])
+    offsets = directions[:, None] * (label.outline - centre)
+    corners, sides = offsets[:4].min(axis=2), offsets[4:].sum(axis=2)
+    reach = np.concatenate([corners, sides]).max(axis=1, initial=0.0) + gap  # of the line
     if not len(label.outline):
-        reach = np.full(4, _CIRCLE * label.radius)
-    near = centre + _CORNERS * (reach + gap)[:, None]  # the corner of the box beside the target
-    far = near + _CORNERS * size
-    return np.hstack([np.minimum(near, far), np.maximum(near, far)])
+        reach = label.radius * np.repeat([_CIRCLE, 1.0], 4)
+    away, half = size[1] * np.arange(_STEPS)[:, None, None], np.divide(size, 2)
+    middle = centre + directions * ((reach + gap)[:, None] + away + half)
+    return np.concatenate([middle - half, middle + half], axis=2).reshape(-1, 4)
 
 
 def draw(image: np.ndarray, identification: Identification) -> np.ndarray:
@@ -308,11 +322,30 @@ def _draw_labels(
     """Write the labels, in letters of one height."""
     shape: tuple[int, int] = canvas.shape[:2]
     height = max(_MINIMUM_LETTERS * unit, _LETTERS * math.hypot(*shape))
+    if len(labels) > 1:
+        places = np.array([(it.x, it.y) for it in labels])
+        apart = np.hypot(*(places[:, None] - places).T)
+        room = _OF_ROOM * float(np.median(np.sort(apart, axis=1)[:, 1]))
+        height = min(height, max(room, _SMALLEST_LETTERS * unit))
     scale = min(height, shape[0]) / _FONT_HEIGHT
     sizes = [_text_size(label.text, scale, unit) for label in labels]
-    places = place_labels(labels, sizes, shape, 3.0 * unit, taken)
-    for label, (left, bottom) in zip(labels, places, strict=True):
+    placed = place_labels(labels, sizes, shape, 3.0 * unit, taken)
+    for label, (left, bottom), size in zip(labels, placed, sizes, strict=True):
+        _draw_leader(canvas, label, (left, bottom - size[1], left + size[0], bottom), unit)
+    for label, (left, bottom) in zip(labels, placed, strict=True):
         _write(canvas, label.text, (round(left), round(bottom)), label.colour, scale, unit)
+
+
+def _draw_leader(canvas: np.ndarray, label: Label, box: Box, unit: int) -> None:
+    """Draw a line from a label that is not beside its target to this."""
+    centre = np.array([label.x, label.y])
+    end = np.clip(centre, box[:2], box[2:])
+    distance = float(np.hypot(*(end - centre)))
+    if distance < label.radius + _BESIDE * (box[3] - box[1]):
+        return
+    start = centre + (end - centre) * (label.radius / distance)
+    for shade, width in _strokes(label.colour, unit, unit):
+        cv2.line(canvas, _fixed(*start), _fixed(*end), shade, width, cv2.LINE_AA, _SHIFT)
 
 
 def _draw_title(canvas: np.ndarray, text: str, unit: int) -> Box:

@@ -9,6 +9,8 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
+from ahf_ros.codes.families import code_reading
+from ahf_ros.doubt import doubt
 from ahf_ros.interchange.files import RESULTS_FILE, checked_file_name, read_text
 from ahf_ros.target import DottedTarget, Identification, SquareMarker, Target, UndecodedTarget
 from ahf_ros.target_check import (
@@ -39,6 +41,7 @@ def to_json(
     split: str = '',
     upright: bool = False,
     mapping: Mapping[str, float] | None = None,
+    family_file: str = '',
 ) -> dict[str, Any]:
     """Return the JSON object of an identification.
 
@@ -47,11 +50,17 @@ def to_json(
     are identified together, `stack` holds their paths, `image` is the first, and `split` says why
     a stack was split before it. `upright` says whether images were turned as their orientation
     says. `mapping` holds the other settings of the filter, see
-    `ahf_ros.filtering.homomorphic.FilterSettings`.
+    `ahf_ros.filtering.homomorphic.FilterSettings`. `family_file` has the data files of families.
     """
     height, width = shape
     used = asdict(identification.filter) | dict(mapping or {})
     elapsed = used.pop('duration')
+    targets = identification.targets
+    readings = {
+        name: reading
+        for name in dict.fromkeys(target.family for target in targets)
+        if (reading := code_reading(name, family_file))
+    }
     several = {}
     if stack:
         several = {
@@ -72,11 +81,22 @@ def to_json(
         'expected_ids': list(identification.expected_ids),
         'mirrored': identification.mirrored,
         'edge_shift': identification.edge_shift,
-        'targets': [asdict(target) for target in identification.targets],
+        'codes': readings,
+        'targets': [
+            asdict(target) | _remarks(target, readings.get(target.family), detector)
+            for target in targets
+        ],
         'filter': used,
         'search': asdict(identification.search) if identification.search else None,
         'elapsed_s': elapsed,
     }
+
+
+def _remarks(target: Target, reading: Mapping[str, Any] | None, detector: str) -> dict[str, str]:
+    """Return the bits of a code, highest first, if it has any, and why a target is doubtful."""
+    bits = {'bits': f'{target.code:0{reading["bits"]}b}'} if reading else {}
+    why = doubt(target, detector)
+    return bits | ({'doubt': why} if why else {})
 
 
 def targets_from_json(content: Any, name: str) -> list[Target]:

@@ -85,6 +85,8 @@ class Answers:
         self._tally.answered += answer.fresh
         self._tally.latency = time.monotonic() - received
         self._tally.last = found
+        pipeline.adviser.see(answer.stack.images[0], found.count)
+        self._tally.advice = '; '.join(pipeline.adviser.lines)
         if clouds := self._clouds:
             clouds.locate(message)
         if self._detections and self._detecting:

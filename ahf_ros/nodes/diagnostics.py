@@ -67,6 +67,7 @@ class Tally:
     several: str = ''  # message about several publishers of images
     silent: str = ''  # message about images that do not arrive
     uncalibrated: str = ''  # why the last answer has no undistorted targets, if they are asked for
+    advice: str = ''  # what may help where nothing is identified in several images
     inactive: str = ''  # state of a managed node that is not active
     latency: float = 0.0  # from the arrival of the last image to its answer, s
     last: Identification = field(default_factory=lambda: Identification(()))
@@ -131,6 +132,7 @@ class Diagnostics:
             'N estimated': tally.last.estimated,
             'mirrored': tally.last.mirrored,
             'edge shift (px)': '' if shift is None else f'{shift:.2f}',
+            'advice': tally.advice,
             'filter applied': used.applied,
             'gamma_high': f'{used.gamma_high:.2f}',
             'gamma_low': f'{used.gamma_low:.2f}',
@@ -167,6 +169,7 @@ def _warning(tally: Tally, before: Tally) -> str:
         changes and f'size or encoding changed {changes} times: {tally.change}',
         tally.last.mirrored and 'the last image seems to be mirrored',
         edge_shift_remark(tally.last.edge_shift),
+        tally.advice,
         tally.uncalibrated,
     )
     return '; '.join(text for text in reports if text)

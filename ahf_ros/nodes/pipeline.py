@@ -9,6 +9,7 @@ import numpy as np
 from std_msgs.msg import Header
 
 from ahf_ros import msg
+from ahf_ros.advice import Adviser
 from ahf_ros.detectors import Detector, create_detector
 from ahf_ros.detectors.contract import Unavailable
 from ahf_ros.filtering.homomorphic import HomomorphicFilter
@@ -49,6 +50,7 @@ class Pipeline:
             identification.detector, settings=identification.detection
         )
         self._family = detector.family
+        self.adviser = Adviser(identification.detection, identification.expected_targets)
         self.stream: Stream[Header] = Stream(
             identification,
             settings.stacking,

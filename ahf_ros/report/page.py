@@ -11,14 +11,17 @@ import os
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import cv2
 
+from ahf_ros.advice import LOOKED_AT, advice
 from ahf_ros.codes.designs import relative_reach
-from ahf_ros.drawing.overlay import DOUBTFUL_BELOW
+from ahf_ros.detectors.contract import DetectorSettings
+from ahf_ros.doubt import DOUBTFUL_BELOW, doubt
 from ahf_ros.edge_shift import edge_shift_remark
 from ahf_ros.evaluation import FALSE, RIGHT, WRONG, judge
 from ahf_ros.interchange.files import whole_file
@@ -79,8 +82,9 @@ def row(
     families: Sequence[str],
     doubtful_below: float,
     truth: Sequence[TrueTarget] | None = None,
+    advised: Sequence[str] = (),
 ) -> dict[str, Any]:
-    """Return what the page knows about an image; `truth` is what it shows.
+    """Return what the page knows about an image; `truth` is what it shows, `advised` what helps.
 
     Targets have the indices of their families, and are doubtful below a confidence.
     """
@@ -108,11 +112,13 @@ def row(
         'estimated': result.estimated,
         'mirrored': result.mirrored,
         'edges': edge_shift_remark(result.edge_shift),
+        'advice': list(advised),
         'identified': identified,
         'missed': len(missed) if known is not None else max(0, expected - identified),
         'missedIds': missed,
         'unexpectedIds': sorted(result.identified - known) if known is not None else [],
         'doubtful': len(likely) + sum(it.confidence < doubtful_below for it in decoded),
+        'doubts': sorted({doubt(target, result.detector) for target in decoded} - {''}),
         'unread': len(unread),
         'seconds': round(result.filter.duration, 3),
         'filter': _filter(result),
@@ -231,9 +237,11 @@ def write_page(
     template = _template()
     families = families_of(results)
     rows = []
+    empty = [result for result in results if not result.identified][:LOOKED_AT]
     for result in results:
         shown = None if truth is None else truth.get(Path(result.image).name)
-        rows.append(_json(row(result, families, settings.doubtful_below, shown)))
+        advised = _advice(result, folders) if result in empty else []
+        rows.append(_json(row(result, families, settings.doubtful_below, shown, advised)))
     about = {
         'families': families,
         'reach': [round(relative_reach(name), 4) for name in families],
@@ -288,6 +296,14 @@ def _template() -> Any:
         lstrip_blocks=True,
     )
     return environment.get_template('page.html')
+
+
+def _advice(result: ImageResult, folders: Sequence[Path]) -> list[str]:
+    """Return what may help with an image in which nothing was identified."""
+    with suppress(ValueError):  # an image that is not there is named with its picture
+        wanted = DetectorSettings(family=result.family)
+        return advice(shown_image(result, folders)[0], wanted, result.expected)
+    return []
 
 
 def _limits(available: int, results: Sequence[ImageResult]) -> list[int]:

@@ -97,3 +97,18 @@ def test_groups_are_in_the_order_of_their_first_images():
 def test_bad_groups_are_named(folder, capsys, by, message):
     assert status('identify', folder / NAMES[0], '--stack-by', by) == 2
     assert message in capsys.readouterr().err
+
+
+def test_a_missing_file_is_no_part_of_a_stack(folder, tmp_path, capsys) -> None:
+    missing = [tmp_path / 'missing.png', tmp_path / 'gone.png']
+    assert status('identify', *missing, '--stack=2') == 1
+    said = capsys.readouterr().err.splitlines()
+    assert [line.rpartition('/')[2] for line in said] == [
+        f'{path.name} cannot be read: No such file or directory' for path in missing
+    ]
+    image = str(folder / NAMES[0])
+    assert status('identify', *missing, image, '--stack=2', '--json') == 1
+    output, errors = capsys.readouterr()
+    assert [json.loads(line)['images'] for line in output.splitlines()] == [[image]]
+    assert errors.count('No such file') == 2
+    assert 'of 2 images of a stack' in errors  # which began with a file that is there

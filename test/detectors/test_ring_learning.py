@@ -163,9 +163,9 @@ def test_photographs_and_point_lists_are_not_learnt_together(tmp_path: Path, cap
 @pytest.mark.parametrize(
     ('name', 'message'),
     [
-        ('cct10', 'a.png shows 20 dots with a band of 10 sectors: --family cct10\n'),
-        ('aicon12', 'a.png shows 20 dots with a band of 12 sectors: --family aicon12 or cct12\n'),
-        ('mine', 'a.png shows 20 dots with a band of 9 sectors: ahf learn-family describes'),
+        ('cct10', 'a.png: 20 dots with a band of 10 sectors: --family cct10\n'),
+        ('aicon12', 'a.png: 20 dots with a band of 12 sectors: --family aicon12 or cct12\n'),
+        ('mine', 'a.png: 20 dots with a band of 9 sectors that no known family has: `ahf learn-'),
     ],
 )
 def test_rings_of_another_family_are_named(

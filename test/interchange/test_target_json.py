@@ -6,8 +6,11 @@ import io
 import json
 import math
 
+import numpy as np
 import pytest
 
+from ahf_ros import SceneSettings, identify
+from ahf_ros.detectors.ring.confidence import CERTAIN
 from ahf_ros.interchange.target_json import read_results, targets_from_json, to_json
 from ahf_ros.target import (
     DottedTarget,
@@ -18,7 +21,9 @@ from ahf_ros.target import (
     Target,
     UndecodedTarget,
 )
+from support.scenes import rendered
 
+CLOCKWISE = np.array([(np.cos(it), np.sin(it)) for it in np.radians(np.arange(0, 360, 30))])
 NONE = (0.0, 0.0, 0.0, 0.0)
 
 
@@ -34,6 +39,50 @@ def test_what_becomes_json_is_read_again():
     assert (printed['edge_shift'], printed['targets'][0]['edge_shift']) == (-0.6, -0.5)
     assert (printed['elapsed_s'], printed['filter']['evaluations']) == (0.25, 9)
     assert (printed['expected_ids'], printed['search'], printed['upright']) == ([], None, False)
+
+
+def test_codes_say_how_they_are_read_and_are_read_without_that() -> None:
+    """As printed: what is inked of `bits`, clockwise, is the code of the rendering."""
+    scene = rendered(SceneSettings(width=640, height=480, targets=4, dot_radius=12, seed=3))
+    found = identify(scene.image)
+    record = to_json(found, 'a.png', (480, 640), 'metashape12', 'ring')
+    reading = {'bits': 12, 'first_bit': 'lowest', 'direction': 'counter-clockwise'}
+    assert record['codes'] == {'metashape12': reading}
+    for item, target in zip(record['targets'], found, strict=True):
+        assert (len(item['bits']), int(item['bits'], 2)) == (12, target.code)
+        band = ''.join(
+            '01'[int(scene.image[round(target.y + down), round(target.x + across)] < 100)]
+            for across, down in 2.9 * target.semi_major * CLOCKWISE
+        )
+        assert item['bits'] in {band[turn:] + band[:turn] for turn in range(12)}
+        del item['bits']
+    del record['codes']
+    assert targets_from_json(record, 'an older file') == list(found)
+
+
+def test_codes_of_other_families_say_what_they_are() -> None:
+    targets = [
+        Target(4, 4, 1.0, 2.0, 3.0, 3.0, family='apriltag_36h11'),
+        Target(2, 1 << 7 | 1 << 17, 1.0, 2.0, 3.0, 3.0, family='gsi'),
+        Target(2, 513, 1.0, 2.0, 3.0, 3.0, family='dots'),
+        Target(-1, 0, 1.0, 2.0, 3.0, 3.0),
+    ]
+    record = to_json(Identification(tuple(targets)), 'a.png', (30, 20), 'auto', 'auto')
+    assert {name: of['direction'] for name, of in record['codes'].items()} == {
+        'gsi': 'by position',
+        'dots': 'either',
+    }
+    assert [len(item.get('bits', '')) for item in record['targets']] == [0, 29, 10, 0]
+
+
+def test_low_confidences_are_explained() -> None:
+    low, high = (Target(7, 71, 1.0, 2.0, 3.0, 3.0, confidence=it) for it in (0.8, 0.99))
+    found = Identification((UndecodedTarget(-1, 0, 5.0, 6.0, 2.0, 1.0, confidence=0.4), low, high))
+    items = to_json(found, 'a.png', (30, 20), 'metashape12', 'ring')['targets']
+    why = f'ring reports probabilities from {CERTAIN} on'
+    assert [item.get('doubt', '') for item in items] == ['', why, '']
+    items = to_json(found, 'a.png', (30, 20), 'mine', 'mine')['targets']
+    assert items[1]['doubt'] == 'mine sets a lower limit of its own'
 
 
 def test_searches_and_the_reasons_of_undecoded_targets_become_json():

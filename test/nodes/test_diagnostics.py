@@ -42,3 +42,10 @@ def test_what_is_wrong_with_the_last_image_is_a_warning(
 def test_an_edge_shift_that_is_not_known_is_empty() -> None:
     status = Diagnostics('detector', Tally()).status(1.0)
     assert values(DiagnosticArray(status=[status]))['edge shift (px)'] == ''
+
+
+def test_advice_is_a_warning_while_nothing_is_identified() -> None:
+    tally = Tally(advice='12 dots with a band of 10 sectors: --family cct10')
+    status = Diagnostics('detector', tally).status(1.0)
+    assert (status.level, status.message) == (DiagnosticStatus.WARN, tally.advice)
+    assert values(DiagnosticArray(status=[status]))['advice'] == tally.advice

@@ -107,9 +107,9 @@ class LearntFamily:
         seen = np.median(of.pinhole) > _PINHOLE
         return max(float(printed), _PINHOLE) if seen else 0.0
 
-    def known(self) -> list[str]:
-        """Return the families of this package with these words and radii, the smallest first."""
-        codes = sorted(map(family, RING_NAMES), key=lambda code: len(code.words))
+    def known(self, more: Sequence[Family] = ()) -> list[str]:
+        """Return the families of this package, and more, of these words and radii, sorted."""
+        codes = sorted([*map(family, RING_NAMES), *more], key=lambda code: len(code.words))
         return [
             code.name
             for code in codes

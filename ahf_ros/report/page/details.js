@@ -31,10 +31,11 @@ function showDetails(record) {
 function summaryOf(record) {
   const parts = [`${record.identified}${record.expected ? ` of ${record.estimated ? 'an estimated ' : ''}${record.expected}` : ''} identified`];
   if (record.missed && record.expected) parts.push(`${record.missed} missed`);
-  if (record.doubtful) parts.push(`${record.doubtful} doubtful`);
+  if (record.doubtful) parts.push([`${record.doubtful} doubtful`, ...record.doubts].join(': '));
   if (record.wrong) parts.push(`${record.wrong} wrong`);
   if (record.mirrored) parts.push('the image seems to be mirrored');
   if (record.edges) parts.push(record.edges);
+  parts.push(...record.advice);
   if (record.images.length > 1) parts.push(`stack of ${record.images.length}, ${record.combination || 'first image'}`);
   parts.push(record.filter.applied ? `filter γH ${shortNumber(record.filter.gamma_high)}, γL ${shortNumber(record.filter.gamma_low)}` : 'no filter');
   return [...parts, `${record.detector} ${record.family}`].join(' · ');

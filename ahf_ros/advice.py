@@ -1,0 +1,155 @@
+"""What may help where no target is identified: only what a second look at the image measures.
+
+It takes a few identifications, so nothing here is on the way to a result.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import replace
+from statistics import median
+
+import cv2
+import numpy as np
+
+from ahf_ros.codes.families import AUTO, families_of
+from ahf_ros.codes.ring import Family
+from ahf_ros.detectors import create_detector
+from ahf_ros.detectors.contract import DetectorSettings
+from ahf_ros.detectors.ring.learning import LearntFamily, find_bands, learn_families
+from ahf_ros.edge_shift import edge_shift_remark, median_edge_shift
+from ahf_ros.target import UNDECODED, Target
+from ahf_ros.text import counted
+
+LOOKED_AT = 3
+"""Images that are worth a second look, where nothing is identified in many."""
+
+IN_A_ROW = 5
+"""Images of a stream without a target, after which one of them gets a second look."""
+
+_ENLARGED = 2  # times, where targets may be too small
+_MAXIMUM_PIXELS = 2**23  # of an image that is enlarged; the middle of a larger one is
+_AMPLE = 1.25  # times the minimum radius, which even light needs
+_SURE = 10.0  # log odds of the number of sectors
+_MISPLACED = 1.5  # px, growth of ink that leaves a doubt of the radii of a band
+_EXACT = 0.02  # dot radii, spread of the edges of bands that light does not blur
+
+
+def advice(image: np.ndarray, settings: DetectorSettings, expected_targets: int = 0) -> list[str]:
+    """Return lines on what a gray image shows in which nothing was identified; often none.
+
+    `settings` say what was looked for; `expected_targets` is N, 0 if none was given.
+
+    Examples
+    --------
+    >>> from ahf_ros import SceneSettings, render
+    >>> scene = SceneSettings(width=320, height=240, targets=3, dot_radius=8, family='aicon14')
+    >>> advice(render(scene).image, DetectorSettings(family='metashape12'))
+    ['3 targets of aicon14: --family aicon14']
+    """
+    return list(filter(None, _lines(image, settings, expected_targets)))
+
+
+class Adviser:
+    """Advice on a stream, once, after several images in a row in which nothing was identified.
+
+    The second look is taken in a thread of the lowest priority, so that no image waits for it.
+    `lines` has what it gave, until something is identified. It has the arguments of `advice`.
+    """
+
+    def __init__(self, settings: DetectorSettings, expected_targets: int = 0) -> None:
+        self.lines: list[str] = []
+        self._arguments = settings, expected_targets
+        self._in_a_row = 0
+        self._look: threading.Thread | None = None
+
+    def see(self, image: np.ndarray, identified: int) -> None:
+        """Take note of the next image, and of how many targets were identified in it."""
+        self._in_a_row = 0 if identified else self._in_a_row + 1
+        if identified:
+            self.lines = []
+        elif self._in_a_row == IN_A_ROW and self._look is None:
+            self._look = threading.Thread(target=self._advise, args=(image,), daemon=True)
+            self._look.start()
+
+    def _advise(self, image: np.ndarray) -> None:
+        with suppress(OSError):  # where a thread has no priority of its own
+            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), 19)
+        with suppress(ValueError):  # which the identification has said
+            lines = advice(image, *self._arguments)
+            self.lines = lines if self._in_a_row else []
+
+
+def _lines(image: np.ndarray, settings: DetectorSettings, expected: int) -> Iterator[str]:
+    if learnt := _learnt(image):
+        yield from _of_bands(learnt, 1, settings, expected)
+        return
+    usual = replace(settings, family=AUTO, polarity='auto', min_radius=0.0, max_radius=1e4)
+    if found := [it for it in _identified(image, usual) if it.family not in settings.families]:
+        ((name, count),) = Counter(target.family for target in found).most_common(1)
+        yield f'{counted(count, "target")} of {name}: --family {name}'
+        yield edge_shift_remark(median_edge_shift(found))
+        return
+    middle = _enlarged_middle(image)
+    if learnt := _learnt(middle):
+        yield from _of_bands(learnt, _ENLARGED, settings, expected)
+    elif small := _identified(middle, replace(settings, max_radius=1e4)):
+        radius = median(target.semi_major for target in small) / _ENLARGED
+        yield _of_size(len(small), radius, settings)
+
+
+def _learnt(image: np.ndarray) -> LearntFamily | None:
+    """Return the family of most dots with a band, if its number of sectors is sure."""
+    families = learn_families(find_bands([image], DetectorSettings()))
+    return families[0] if families and families[0].lead > _SURE else None
+
+
+def _of_bands(
+    found: LearntFamily, scale: int, settings: DetectorSettings, expected: int
+) -> Iterator[str]:
+    """Yield what dots with bands say, seen in an image that was enlarged by a scale."""
+    polarity, count = int(np.median(found.bands.polarity)), len(found.words)
+    own = families_of(settings.family_file).values() if settings.family_file else ()
+    known = found.known([code for code in own if isinstance(code, Family)])
+    size = _of_size(count, float(np.median(found.bands.size)) / scale, settings)
+    edges = edge_shift_remark(found.growth * polarity / scale)
+    exact = scale == 1 and np.median(found.bands.spread) < _EXACT
+    dots = f'{count} dots with a band of {found.bits} sectors'
+    if known and not set(known) & set(settings.families):
+        yield f'{dots}: --family {" or ".join(known)}'
+    elif polarity not in settings.polarities:
+        yield f'{dots} are {"dark" if polarity > 0 else "bright"}, polarity is {settings.polarity}'
+    elif not known and exact and abs(found.growth) < _MISPLACED:
+        yield f'{dots} that no known family has: `ahf learn-family` describes it'
+    elif known and not (size or edges or expected):
+        yield f'{dots} are hard to read: give --expected-targets, so that AHF searches'
+    yield size
+    yield edges
+
+
+def _of_size(count: int, radius: float, settings: DetectorSettings) -> str:
+    """Return what the radius of some dots says, px; nothing where it is accepted."""
+    minimum, maximum = settings.radii
+    if minimum <= radius <= maximum:
+        return ''
+    if radius < minimum and not settings.min_radius:
+        return f'{count} dots of {radius:.1f} px are too small: {_AMPLE * minimum:.2g} px would do'
+    name, bound = ('min', minimum) if radius < minimum else ('max', maximum)
+    return f'{count} dots have a radius of {radius:.1f} px, {name}_radius is {bound:g}'
+
+
+def _identified(image: np.ndarray, settings: DetectorSettings) -> list[Target]:
+    """Return the targets that the usual detector of some families identifies."""
+    detector = create_detector(settings=replace(settings, report_undecoded=False))
+    return [target for target in detector(image) if target.id != UNDECODED]
+
+
+def _enlarged_middle(image: np.ndarray) -> np.ndarray:
+    cut = max(0.0, 1 - (_MAXIMUM_PIXELS / image.size) ** 0.5) / 2
+    top, left = (round(cut * side) for side in image.shape)
+    part = image[top : len(image) - top, left : image.shape[1] - left]
+    return cv2.resize(part, None, fx=_ENLARGED, fy=_ENLARGED, interpolation=cv2.INTER_CUBIC)

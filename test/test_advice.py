@@ -1,0 +1,129 @@
+"""Advice where nothing is found: only what a second look at the image measures."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from ahf_ros.advice import IN_A_ROW, Adviser, advice
+from ahf_ros.codes.ring import ring_family
+from ahf_ros.detectors import DetectorSettings
+from ahf_ros.interchange.image_files import write_image
+from ahf_ros.synthetic.scene import SceneSettings
+from support.command_line import status
+from support.scenes import rendered
+
+SCENE = SceneSettings(width=800, height=600, targets=12, dot_radius=9, seed=3)
+
+
+def shown(**changes: object) -> np.ndarray:
+    return rendered(replace(SCENE, **changes)).image
+
+
+@pytest.mark.parametrize(
+    ('scene', 'looked_for', 'lines'),
+    [
+        ({'family': 'aicon14'}, {}, ['12 dots with a band of 14 sectors: --family aicon14 or ']),
+        ({'family': 'cct10'}, {}, ['12 dots with a band of 10 sectors: --family cct10']),
+        ({}, {'family': 'apriltag_36h11'}, ['12 dots with a band of 12 sectors: --family met']),
+        ({'targets': 2}, {'family': 'aicon14'}, ['2 targets of metashape12: --family met']),
+        ({'dot_radius': 3.4}, {}, [r'1[012] dots of 3\.\d px are too small: 5 px would do']),
+        (
+            {'family': 'gsi', 'dot_radius': 1.5, 'targets': 6},
+            {'family': 'gsi'},
+            [r'[56] dots of 1\.4 px are too small: 2\.5 px would do'],
+        ),
+        ({}, {'min_radius': 14.0}, [r'12 dots have a radius of 8\.\d px, min_radius is 14']),
+        ({}, {'max_radius': 6.0}, [r'12 dots have a radius of 8\.\d px, max_radius is 6']),
+        ({}, {'polarity': 'bright'}, ['12 dots with a band of 12 .* dark, polarity is bright']),
+        (
+            {'family': 'cct10', 'edge_shift': -1.0},
+            {},
+            ['12 dots .*: --family cct10', r'edges are 1\.[234] px too bright'],
+        ),
+    ],
+)
+def test_a_second_look_says_why_nothing_was_identified(
+    scene: dict, looked_for: dict, lines: list[str]
+) -> None:
+    given = advice(shown(**scene), DetectorSettings(**looked_for))
+    assert len(given) == len(lines)
+    for line, expected in zip(given, lines, strict=True):
+        assert re.match(expected, line)
+
+
+def test_a_family_that_nobody_knows_is_to_be_learnt(tmp_path) -> None:
+    file = tmp_path / 'mine.yaml'
+    file.write_text('family: mine\nbits: 9\nband: [1.6, 2.4]\nwords: all\n')
+    image = shown(family='mine', family_file=str(file))
+    (line,) = advice(image, DetectorSettings())
+    assert line.startswith('12 dots with a band of 9 sectors that no known family has: `ahf le')
+    (line,) = advice(image, DetectorSettings(family_file=str(file)))
+    assert line == '12 dots with a band of 9 sectors: --family mine'
+    assert ring_family(str(file)).bits == 9
+
+
+def test_nothing_is_said_of_what_shows_nothing() -> None:
+    noise = np.random.default_rng(0).integers(0, 256, (300, 400)).astype(np.uint8)
+    soft = cv2.normalize(cv2.GaussianBlur(noise, (0, 0), 3), None, 0, 255, cv2.NORM_MINMAX)
+    for image in (noise, soft, np.tile(np.arange(80, dtype=np.uint8), (60, 1))):
+        assert advice(image, DetectorSettings()) == []
+    with pytest.raises(ValueError, match='image is constant'):
+        advice(np.zeros((60, 80), np.uint8), DetectorSettings())
+
+
+def test_a_filter_is_advised_where_it_may_show_more() -> None:
+    image, settings = shown(dot_radius=12), DetectorSettings()
+    (line,) = advice(image, settings)  # as if no band had been read
+    assert line.startswith('12 dots with a band of 12 sectors are hard to read: give --expected-')
+    assert advice(image, settings, expected_targets=12) == []
+
+
+def finish(adviser: Adviser) -> None:
+    if adviser._look:
+        adviser._look.join()
+
+
+def test_a_stream_gets_advice_once_and_only_while_nothing_is_identified() -> None:
+    image = shown(family='cct10')
+    adviser = Adviser(DetectorSettings())
+    for identified in (0,) * (IN_A_ROW - 1) + (1,) + (0,) * (IN_A_ROW - 1):
+        adviser.see(image, identified)
+    finish(adviser)
+    assert adviser.lines == []
+    adviser.see(image, 0)
+    finish(adviser)
+    assert adviser.lines == ['12 dots with a band of 10 sectors: --family cct10']
+    adviser.see(image, 3)
+    assert adviser.lines == []
+    for _ in range(2 * IN_A_ROW):
+        adviser.see(image, 0)
+    finish(adviser)
+    assert adviser.lines == []
+
+
+def test_the_command_advises_on_images_without_a_target_only(tmp_path, capsys) -> None:
+    for name, family in (('a', 'metashape12'), ('b', 'cct10'), ('c', 'cct10')):
+        write_image(tmp_path / f'{name}.png', shown(family=family))
+    paths = [tmp_path / f'{name}.png' for name in 'abc']
+    assert status('identify', *paths, '--family', 'metashape12') == 0
+    said = capsys.readouterr().err
+    assert f'{paths[1]}: 12 dots with a band of 10 sectors: --family cct10\n' in said
+    assert said.count('dots with a band') == 1
+    assert 'N is not given' not in said  # no filter would show `ring` more
+    assert status('identify', paths[0], '--family', 'metashape12') == 0
+    assert 'dots with a band' not in capsys.readouterr().err
+
+
+def test_the_report_has_the_advice(tmp_path, capsys) -> None:
+    pytest.importorskip('jinja2', reason='pages are written with jinja2')
+    write_image(tmp_path / 'a.png', shown(family='cct10'))
+    assert status('identify', tmp_path / 'a.png', '--family', 'metashape12', '--json') == 0
+    (tmp_path / 'results.jsonl').write_text(capsys.readouterr().out)
+    page = tmp_path / 'report.html'
+    assert status('report', tmp_path / 'results.jsonl', '-o', page) == 0
+    assert '"advice":["12 dots with a band of 10 sectors: --family cct10"]' in page.read_text()
