@@ -1,0 +1,174 @@
+"""Reading of square markers: evidence that a quadrilateral has the cells of a marker.
+
+All cells of the grid that a dictionary has are sampled, those of the border and one more around
+it with them. Ink and paper next to each other in these two rings tell what ink and paper are in
+the light of each cell. A cell speaks for paper by where it is between these levels, but never by
+more than it would if it may be covered. What speaks for a marker is compared with what any other
+cells would have done.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from math import erf, log, sqrt
+
+import cv2
+import numpy as np
+
+from ahf_ros.codes.square import words
+from ahf_ros.features.frame import project
+from ahf_ros.features.sampling import sample
+from ahf_ros.imaging.logarithm import LOG_OFFSET
+
+_IN_CELL = (-0.2, 0.2)  # where a cell is sampled, from its centre, in cells
+_BLUR = 0.7  # of the image, standard deviation in px
+_MOST_MIXED = 0.2  # share that a cell takes from each neighbour, at most
+_REACH = 0.25  # standard deviation of the window that levels are taken from, in sides
+_MINIMUM_STEP = 0.35  # from ink to paper, in the logarithm
+_OF_USUAL = 0.4  # minimum of a step of the border, in usual ones
+_SIDE = 0.6  # minimum share of such steps of each side of the border
+_SHARPNESS = 12.0  # of a cell: its logarithmic odds, by its distance from the middle in steps
+_COVERED = 3.0  # maximum of these odds, as a cell may be covered
+_BORDER_WEIGHT = 0.3  # of the cells of the border, which are alike in other quadrilaterals, too
+_DOUBT = 4.0  # logarithmic odds against a marker that nothing but a quadrilateral speaks for
+_MINIMUM_ODDS = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Readings:
+    """Markers that quadrilaterals were read as; all of shape (k,)."""
+
+    quadrilateral: np.ndarray  # its index
+    group: np.ndarray  # of dictionaries, its index
+    number: np.ndarray  # ID
+    turn: np.ndarray  # index of the corner that is top left in the upright marker
+    odds: np.ndarray  # logarithmic, that the marker is this one
+
+
+def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]]) -> Readings:
+    """Read quadrilaterals, shape (k, 4, 2), px, of an image of uint8 as markers of dictionaries.
+
+    A group has dictionaries that begin with the same markers, the smallest first.
+    """
+    found = [np.zeros((0, 5))]
+    frames = _frames(corners)
+    sizes = {words(group[0]).shape[1] for group in groups}
+    for cells in sorted(sizes) if len(corners) else ():
+        evidence, border, which = _evidence(gray, frames, corners, cells)
+        for index, group in enumerate(groups):
+            if words(group[0]).shape[1] != cells or not len(which):
+                continue
+            prints, prior = _table(tuple(group))
+            against = -np.logaddexp(0, evidence).sum(axis=1) + evidence.shape[1] * log(2)
+            odds = evidence @ prints + against[:, None] - prior
+            best = odds.argmax(axis=1)
+            top = odds[np.arange(len(best)), best]
+            others = np.exp(odds - top[:, None]).sum(axis=1) - 1
+            total = top + border - _DOUBT - log(len(groups))
+            # Against another marker of the group, and against none of them.
+            total = -np.logaddexp(-total, np.log(np.maximum(others, 1e-30)))
+            good = total > _MINIMUM_ODDS
+            number, turn = np.divmod(best, 4)
+            columns = (which, np.full(len(best), index), number, turn, total)
+            found.append(np.stack(columns, axis=1)[good])
+    table = np.concatenate(found)
+    return Readings(*table[:, :4].T.astype(int), table[:, 4])
+
+
+@lru_cache(maxsize=32)
+def _table(group: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the cells of the markers of dictionaries in four turns, and what speaks against each.
+
+    The shapes are (cells, 4 n) and (4 n,).
+    """
+    cells = words(group[-1])
+    turned = np.stack([np.rot90(cells, turn, axes=(1, 2)) for turn in range(4)], axis=1)
+    count = np.zeros(len(cells))
+    for name in reversed(group):
+        count[: len(words(name))] = 4 * len(words(name))
+    return turned.reshape(4 * len(cells), -1).T.astype(np.float64), np.log(np.repeat(count, 4))
+
+
+def _frames(corners: np.ndarray) -> np.ndarray:
+    """Return homographies from the square about the origin with sides of 1, shape (k, 3, 3)."""
+    square = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]], np.float32)
+    found = [cv2.getPerspectiveTransform(square, of.astype(np.float32)) for of in corners]
+    return np.array(found).reshape(-1, 3, 3)
+
+
+def _evidence(
+    gray: np.ndarray, frames: np.ndarray, corners: np.ndarray, cells: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the logarithmic odds of paper of the cells of quadrilaterals that have a border.
+
+    The shapes are (k, cells^2), (k,) for what the border adds to them, and (k,) for the indices
+    of these quadrilaterals.
+    """
+    side = cells + 2
+    places = (np.arange(side + 2) - (side + 1) / 2) / side
+    grid = np.stack(np.meshgrid(places, places), axis=-1)
+    values = np.zeros((len(frames), side + 2, side + 2))
+    for x in _IN_CELL:
+        for y in _IN_CELL:
+            points = project(frames, grid + np.array([x, y]) / side)
+            values += sample(gray, points.reshape(len(frames), -1, 2)).reshape(values.shape) / 4
+    values = np.log(np.maximum(_unmixed(values, corners, side), 0) + LOG_OFFSET)
+    rings = _rings(cells)
+    flat = values.reshape(len(values), -1)
+    ink, paper = flat[:, rings.ink], flat[:, rings.paper]
+    steps = paper - ink
+    usual = np.median(steps, axis=1)[:, None]
+    clear = (steps > _OF_USUAL * usual) & (steps > _MINIMUM_STEP / 2)
+    on_sides = clear.reshape(len(clear), 4, side).mean(axis=2).min(axis=1, initial=1.0)
+    which = np.flatnonzero((usual[:, 0] > _MINIMUM_STEP) & (on_sides >= _SIDE))
+    ink, paper, clear = ink[which], paper[which], clear[which]
+    total = clear @ rings.weights
+    middle = (clear * (ink + paper) / 2) @ rings.weights / total
+    step = (clear * (paper - ink)) @ rings.weights / total
+    odds = np.clip(_SHARPNESS * (flat[which] - middle) / step, -_COVERED, _COVERED)
+    black = log(2) - np.logaddexp(0, odds[:, rings.border])
+    return odds[:, rings.inside], _BORDER_WEIGHT * black.sum(axis=1), which
+
+
+@dataclass(frozen=True, slots=True)
+class _Rings:
+    ink: np.ndarray  # (4 m,), cells of the border, side by side
+    paper: np.ndarray  # (4 m,), the cells beside them
+    border: np.ndarray  # the cells of the border, each once
+    inside: np.ndarray  # the other cells
+    weights: np.ndarray  # (4 m, n), of the cells of the border for the levels of all cells
+
+
+@lru_cache
+def _rings(cells: int) -> _Rings:
+    """Return the indices of cells in the grid of a marker, border and one more ring included."""
+    size = cells + 4
+    index = np.arange(size**2).reshape(size, size)
+    turned = [np.rot90(index, turn) for turn in range(4)]
+    ink = np.concatenate([of[1, 1:-1] for of in turned])
+    paper = np.concatenate([of[0, 1:-1] for of in turned])
+    rows, columns = np.divmod(index.ravel(), size)
+    squares = np.subtract.outer(rows[ink], rows) ** 2.0
+    squares += np.subtract.outer(columns[ink], columns) ** 2.0
+    weights = np.exp(-squares / (2 * (_REACH * size) ** 2)) + 1e-6
+    return _Rings(ink, paper, np.unique(ink), index[2:-2, 2:-2].ravel(), weights)
+
+
+def _unmixed(values: np.ndarray, corners: np.ndarray, side: int) -> np.ndarray:
+    """Return the gray values of cells, shape (k, n, n), without what blur mixed into them."""
+    lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2) / side
+    count = values.shape[1]
+    neighbours = np.eye(count, k=1) + np.eye(count, k=-1)
+    neighbours[0, 0] = neighbours[-1, -1] = 1
+    across, down = (
+        np.array([(1 - erf(cell / (2 * sqrt(2) * _BLUR))) / 2 for cell in of])
+        for of in ((lengths[:, 0] + lengths[:, 2]) / 2, (lengths[:, 1] + lengths[:, 3]) / 2)
+    )
+    mixed = [
+        np.eye(count) + np.minimum(of, _MOST_MIXED)[:, None, None] * (neighbours - 2 * np.eye(count))
+        for of in (across, down)
+    ]
+    along_columns = np.linalg.solve(mixed[1], values)
+    return np.linalg.solve(mixed[0], along_columns.transpose(0, 2, 1)).transpose(0, 2, 1)
