@@ -53,8 +53,9 @@ class SquareDetector(FamilyDetector):
 
     @property
     def name(self) -> str:
-        """Name in the registry, aruco or apriltag."""
-        return self.family.partition('_')[0]
+        """Name in the registry: aruco, apriltag, or square for both."""
+        kinds = {name.partition('_')[0] for name in self.settings.families}
+        return kinds.pop() if len(kinds) == 1 else 'square'
 
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the markers of one image; see `Detector`."""

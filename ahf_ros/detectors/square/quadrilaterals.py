@@ -60,10 +60,18 @@ def _quadrilaterals(outlines: Sequence[np.ndarray], growth: float) -> Iterator[n
         if len(outline) < 4 * _SMALLEST * 0.7:
             continue
         area = -cv2.contourArea(outline, oriented=True)
+        if area < 0:
+            continue  # of a hole
         length = cv2.arcLength(outline, closed=True)
+        around = outline
+        if area < _SOLID * length**2 / 16:
+            around = cv2.convexHull(outline)
+            area, length = cv2.contourArea(around), cv2.arcLength(around, closed=True)
         if area < max(_SOLID * length**2 / 16, _SMALLEST**2 / 2):
-            continue  # of a hole, or of a tattered region
-        polygon = cv2.approxPolyDP(outline, max(_TOLERANCE * length, 1.0), closed=True)[::-1, 0]
+            continue
+        polygon = cv2.approxPolyDP(around, max(_TOLERANCE * length, 1.0), closed=True)[::-1, 0]
+        if cv2.contourArea(polygon, oriented=True) < 0:
+            polygon = polygon[::-1]
         if not 4 <= len(polygon) <= _MAXIMUM_CORNERS:
             continue
         sides = _four_sides(polygon.astype(np.float64), length)

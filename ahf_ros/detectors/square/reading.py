@@ -29,8 +29,10 @@ _REACH = 0.25  # standard deviation of the window that levels are taken from, in
 _MINIMUM_STEP = 0.35  # from ink to paper, in the logarithm
 _OF_USUAL = 0.4  # minimum of a step of the border, in usual ones
 _SIDE = 0.6  # minimum share of such steps of each side of the border
+_POINTS, _DEPTH = 10, 0.06  # of each side where a border is looked for, distance in sides
 _SHARPNESS = 12.0  # of a cell: its logarithmic odds, by its distance from the middle in steps
 _COVERED = 3.0  # maximum of these odds, as a cell may be covered
+_PART_WEIGHT = 0.15  # of each part of a cell, which have one colour in other quadrilaterals, too
 _BORDER_WEIGHT = 0.3  # of the cells of the border, which are alike in other quadrilaterals, too
 _DOUBT = 4.0  # logarithmic odds against a marker that nothing but a quadrilateral speaks for
 _MINIMUM_ODDS = 0.0
@@ -55,23 +57,24 @@ def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]])
     found = [np.zeros((0, 5))]
     frames = _frames(corners)
     sizes = {words(group[0]).shape[1] for group in groups}
+    bordered = _bordered(gray, frames)
+    frames, corners = frames[bordered], corners[bordered]
     for cells in sorted(sizes) if len(corners) else ():
-        evidence, border, which = _evidence(gray, frames, corners, cells)
+        evidence, against, which = _evidence(gray, frames, corners, cells)
         for index, group in enumerate(groups):
             if words(group[0]).shape[1] != cells or not len(which):
                 continue
             prints, prior = _table(tuple(group))
-            against = -np.logaddexp(0, evidence).sum(axis=1) + evidence.shape[1] * log(2)
             odds = evidence @ prints + against[:, None] - prior
             best = odds.argmax(axis=1)
             top = odds[np.arange(len(best)), best]
             others = np.exp(odds - top[:, None]).sum(axis=1) - 1
-            total = top + border - _DOUBT - log(len(groups))
+            total = top - _DOUBT - log(len(groups))
             # Against another marker of the group, and against none of them.
             total = -np.logaddexp(-total, np.log(np.maximum(others, 1e-30)))
             good = total > _MINIMUM_ODDS
             number, turn = np.divmod(best, 4)
-            columns = (which, np.full(len(best), index), number, turn, total)
+            columns = (bordered[which], np.full(len(best), index), number, turn, total)
             found.append(np.stack(columns, axis=1)[good])
     table = np.concatenate(found)
     return Readings(*table[:, :4].T.astype(int), table[:, 4])
@@ -98,23 +101,51 @@ def _frames(corners: np.ndarray) -> np.ndarray:
     return np.array(found).reshape(-1, 3, 3)
 
 
+def _bordered(gray: np.ndarray, frames: np.ndarray) -> np.ndarray:
+    """Return the indices of quadrilaterals that are dark inside all sides and bright outside."""
+    if not len(frames):
+        return np.zeros(0, int)
+    along = np.linspace(-0.45, 0.45, _POINTS)
+    turns = [np.linalg.matrix_power(np.array([[0, -1], [1, 0]]), turn) for turn in range(4)]
+    ink, paper = (
+        np.log(
+            sample(
+                gray,
+                project(
+                    frames, np.stack([np.stack([along, across], axis=1) @ of for of in turns])
+                ).reshape(len(frames), -1, 2),
+            )
+            + LOG_OFFSET
+        ).reshape(-1, 4, _POINTS)
+        for across in (np.full(_POINTS, -0.5 + _DEPTH), np.full(_POINTS, -0.5 - _DEPTH))
+    )
+    seen = (paper - ink > _MINIMUM_STEP / 2).mean(axis=2).min(axis=1) >= _SIDE
+    return np.flatnonzero(seen)
+
+
 def _evidence(
     gray: np.ndarray, frames: np.ndarray, corners: np.ndarray, cells: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the logarithmic odds of paper of the cells of quadrilaterals that have a border.
+    """Return what the cells of quadrilaterals with a border say, and indices of these.
 
-    The shapes are (k, cells^2), (k,) for what the border adds to them, and (k,) for the indices
-    of these quadrilaterals.
+    It is by how much the logarithmic odds of a marker grow where a cell is paper, shape
+    (k, cells^2), and what they are where all cells are ink, (k,).
     """
     side = cells + 2
     places = (np.arange(side + 2) - (side + 1) / 2) / side
     grid = np.stack(np.meshgrid(places, places), axis=-1)
-    values = np.zeros((len(frames), side + 2, side + 2))
-    for x in _IN_CELL:
-        for y in _IN_CELL:
-            points = project(frames, grid + np.array([x, y]) / side)
-            values += sample(gray, points.reshape(len(frames), -1, 2)).reshape(values.shape) / 4
-    values = np.log(np.maximum(_unmixed(values, corners, side), 0) + LOG_OFFSET)
+    size = side + 2
+    parts = np.array(
+        [
+            sample(gray, project(frames, grid + np.array([x, y]) / side).reshape(len(frames), -1, 2))
+            for x in _IN_CELL
+            for y in _IN_CELL
+        ],
+        np.float64,
+    ).reshape(-1, len(frames), size, size)
+    whole = _unmixed(parts.mean(axis=0), corners, side)
+    parts = np.log(parts + LOG_OFFSET).reshape(len(parts), len(frames), -1)
+    values = np.log(np.maximum(whole, 0) + LOG_OFFSET)
     rings = _rings(cells)
     flat = values.reshape(len(values), -1)
     ink, paper = flat[:, rings.ink], flat[:, rings.paper]
@@ -127,9 +158,13 @@ def _evidence(
     total = clear @ rings.weights
     middle = (clear * (ink + paper) / 2) @ rings.weights / total
     step = (clear * (paper - ink)) @ rings.weights / total
-    odds = np.clip(_SHARPNESS * (flat[which] - middle) / step, -_COVERED, _COVERED)
-    black = log(2) - np.logaddexp(0, odds[:, rings.border])
-    return odds[:, rings.inside], _BORDER_WEIGHT * black.sum(axis=1), which
+    levels = np.concatenate([flat[None, which], parts[:, which]])
+    odds = np.clip(_SHARPNESS * (levels - middle) / step, -_COVERED, _COVERED)
+    weights = np.array([1.0, *[_PART_WEIGHT] * len(parts)])
+    against = np.einsum('p,pkc->kc', weights, log(2) - np.logaddexp(0, odds))
+    border = _BORDER_WEIGHT * against[:, rings.border].sum(axis=1)
+    paper = np.einsum('p,pkc->kc', weights, odds)[:, rings.inside]
+    return paper, against[:, rings.inside].sum(axis=1) + border, which
 
 
 @dataclass(frozen=True, slots=True)
