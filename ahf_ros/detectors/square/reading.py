@@ -32,10 +32,12 @@ _SIDE = 0.6  # minimum share of such steps of each side of the border
 _POINTS, _DEPTH = 10, 0.06  # of each side where a border is looked for, distance in sides
 _SHARPNESS = 12.0  # of a cell: its logarithmic odds, by its distance from the middle in steps
 _COVERED = 3.0  # maximum of these odds, as a cell may be covered
+_UNCLEAR = 1.5  # logarithmic odds against a cell that is between ink and paper
 _PART_WEIGHT = 0.15  # of each part of a cell, which have one colour in other quadrilaterals, too
 _BORDER_WEIGHT = 0.3  # of the cells of the border, which are alike in other quadrilaterals, too
-_DOUBT = 4.0  # logarithmic odds against a marker that nothing but a quadrilateral speaks for
-_MINIMUM_ODDS = 0.0
+_CORNER_WEIGHT = 0.7
+_DOUBT = 6.0  # logarithmic odds against a marker that nothing but a quadrilateral speaks for
+_MINIMUM_ODDS = 2.2  # for a marker to be reported: nine to one
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,7 +164,9 @@ def _evidence(
     odds = np.clip(_SHARPNESS * (levels - middle) / step, -_COVERED, _COVERED)
     weights = np.array([1.0, *[_PART_WEIGHT] * len(parts)])
     against = np.einsum('p,pkc->kc', weights, log(2) - np.logaddexp(0, odds))
+    against -= _UNCLEAR * (1 - np.abs(odds[0]) / _COVERED)
     border = _BORDER_WEIGHT * against[:, rings.border].sum(axis=1)
+    border += _CORNER_WEIGHT * against[:, rings.corners].sum(axis=1)
     paper = np.einsum('p,pkc->kc', weights, odds)[:, rings.inside]
     return paper, against[:, rings.inside].sum(axis=1) + border, which
 
@@ -172,6 +176,7 @@ class _Rings:
     ink: np.ndarray  # (4 m,), cells of the border, side by side
     paper: np.ndarray  # (4 m,), the cells beside them
     border: np.ndarray  # the cells of the border, each once
+    corners: np.ndarray  # those at the corners, which round and tattered regions do not have
     inside: np.ndarray  # the other cells
     weights: np.ndarray  # (4 m, n), of the cells of the border for the levels of all cells
 
@@ -188,7 +193,8 @@ def _rings(cells: int) -> _Rings:
     squares = np.subtract.outer(rows[ink], rows) ** 2.0
     squares += np.subtract.outer(columns[ink], columns) ** 2.0
     weights = np.exp(-squares / (2 * (_REACH * size) ** 2)) + 1e-6
-    return _Rings(ink, paper, np.unique(ink), index[2:-2, 2:-2].ravel(), weights)
+    corners = index[[1, 1, -2, -2], [1, -2, 1, -2]]
+    return _Rings(ink, paper, np.unique(ink), corners, index[2:-2, 2:-2].ravel(), weights)
 
 
 def _unmixed(values: np.ndarray, corners: np.ndarray, side: int) -> np.ndarray:
