@@ -22,6 +22,7 @@ _SMALLEST = 8.0  # side of a quadrilateral, px
 _SOLID = 0.3  # minimum area of a region with its holes, as a share of a square's of its perimeter
 _TOLERANCE = 0.025  # of the corners of an outline, as a share of its length
 _MAXIMUM_CORNERS = 14  # of the polygon of an outline
+_FOUR = 0.55  # minimum share of its four longest sides in the perimeter of a polygon
 _SAME_LINE = 0.15, 0.03  # sides of one line: sine of their angle, distance in perimeters
 _NEAR = 0.02, 1.2  # of points that belong to a side, as a share of the perimeter, and px
 _ENDS = 0.1  # of a side, left out at its ends, where blur rounds the corner
@@ -94,6 +95,8 @@ def _four_sides(polygon: np.ndarray, length: float) -> np.ndarray | None:
         return sides
     vectors = sides[:, 1] - sides[:, 0]
     lengths = np.hypot(*vectors.T)
+    if np.sort(lengths)[-4:].sum() < _FOUR * lengths.sum():
+        return None
     normals = np.stack([vectors[:, 1], -vectors[:, 0]], axis=1) / lengths[:, None]
     chosen: list[int] = []
     for index in np.argsort(-lengths).tolist():

@@ -67,16 +67,19 @@ def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]])
             if words(group[0]).shape[1] != cells or not len(which):
                 continue
             prints, prior = _table(tuple(group))
-            odds = evidence @ prints + against[:, None] - prior
+            odds = evidence @ prints - prior
             best = odds.argmax(axis=1)
-            top = odds[np.arange(len(best)), best]
-            others = np.exp(odds - top[:, None]).sum(axis=1) - 1
-            total = top - _DOUBT - log(len(groups))
+            total = odds[np.arange(len(best)), best] + against - _DOUBT - log(len(groups))
+            likely = np.flatnonzero(total > _MINIMUM_ODDS)
+            odds, best, total = odds[likely], best[likely], total[likely]
             # Against another marker of the group, and against none of them.
-            total = -np.logaddexp(-total, np.log(np.maximum(others, 1e-30)))
+            top = np.arange(len(best)), best
+            odds -= odds[top][:, None]
+            odds[top] = -np.inf
+            total = -np.logaddexp(-total, np.logaddexp.reduce(odds, axis=1))
             good = total > _MINIMUM_ODDS
             number, turn = np.divmod(best, 4)
-            columns = (bordered[which], np.full(len(best), index), number, turn, total)
+            columns = (bordered[which[likely]], np.full(len(best), index), number, turn, total)
             found.append(np.stack(columns, axis=1)[good])
     table = np.concatenate(found)
     return Readings(*table[:, :4].T.astype(int), table[:, 4])
@@ -93,7 +96,7 @@ def _table(group: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
     count = np.zeros(len(cells))
     for name in reversed(group):
         count[: len(words(name))] = 4 * len(words(name))
-    return turned.reshape(4 * len(cells), -1).T.astype(np.float64), np.log(np.repeat(count, 4))
+    return turned.reshape(4 * len(cells), -1).T.astype(np.float32), np.log(np.repeat(count, 4)).astype(np.float32)
 
 
 def _frames(corners: np.ndarray) -> np.ndarray:
@@ -168,7 +171,7 @@ def _evidence(
     border = _BORDER_WEIGHT * against[:, rings.border].sum(axis=1)
     border += _CORNER_WEIGHT * against[:, rings.corners].sum(axis=1)
     paper = np.einsum('p,pkc->kc', weights, odds)[:, rings.inside]
-    return paper, against[:, rings.inside].sum(axis=1) + border, which
+    return paper.astype(np.float32), against[:, rings.inside].sum(axis=1) + border, which
 
 
 @dataclass(frozen=True, slots=True)
