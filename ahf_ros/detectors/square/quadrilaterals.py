@@ -20,6 +20,7 @@ _WINDOW = 13  # in which a pixel is compared, px
 _MINIMUM_STEP = 24  # from the darkest to the brightest pixel of a window, of 255
 _SMALLEST = 8.0  # side of a quadrilateral, px
 _SOLID = 0.3  # minimum area of a region with its holes, as a share of a square's of its perimeter
+_TATTERED, _FILLED = 4.0, 0.15  # bounds of outline and area of a region whose hull is taken
 _TOLERANCE = 0.025  # of the corners of an outline, as a share of its length
 _MAXIMUM_CORNERS = 14  # of the polygon of an outline
 _FOUR = 0.55  # minimum share of its four longest sides in the perimeter of a polygon
@@ -66,6 +67,9 @@ def _quadrilaterals(outlines: Sequence[np.ndarray], growth: float) -> Iterator[n
         length = cv2.arcLength(outline, closed=True)
         around = outline
         if area < _SOLID * length**2 / 16:
+            _, _, width, height = cv2.boundingRect(outline)
+            if length > _TATTERED * (width + height) or area < _FILLED * width * height:
+                continue
             around = cv2.convexHull(outline)
             area, length = cv2.contourArea(around), cv2.arcLength(around, closed=True)
         if area < max(_SOLID * length**2 / 16, _SMALLEST**2 / 2):

@@ -37,6 +37,7 @@ _PART_WEIGHT = 0.15  # of each part of a cell, which have one colour in other qu
 _BORDER_WEIGHT = 0.3  # of the cells of the border, which are alike in other quadrilaterals, too
 _CORNER_WEIGHT = 0.7
 _DOUBT = 6.0  # logarithmic odds against a marker that nothing but a quadrilateral speaks for
+_SEVERAL = 2.0  # times the logarithm of their number, against each of several groups
 _MINIMUM_ODDS = 2.2  # for a marker to be reported: nine to one
 
 
@@ -57,6 +58,7 @@ def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]])
     A group has dictionaries that begin with the same markers, the smallest first.
     """
     found = [np.zeros((0, 5))]
+    doubt = _DOUBT + _SEVERAL * log(len(groups))
     frames = _frames(corners)
     sizes = {words(group[0]).shape[1] for group in groups}
     bordered = _bordered(gray, frames)
@@ -69,7 +71,7 @@ def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]])
             prints, prior = _table(tuple(group))
             odds = evidence @ prints - prior
             best = odds.argmax(axis=1)
-            total = odds[np.arange(len(best)), best] + against - _DOUBT - log(len(groups))
+            total = odds[np.arange(len(best)), best] + against - doubt
             likely = np.flatnonzero(total > _MINIMUM_ODDS)
             odds, best, total = odds[likely], best[likely], total[likely]
             # Against another marker of the group, and against none of them.
