@@ -288,20 +288,14 @@ def _check_list(names: Sequence[str], kinds: Mapping[str, str], shown: str) -> N
     for first, second in combinations(names, 2):
         if first == second:
             raise ValueError(f'{shown}, which names {first} twice, accepted is each family once')
-        if kinds[first] != kinds[second]:
+        if kinds[first] != kinds[second] and not {first, second} <= set(SQUARE_NAMES):
             raise ValueError(
                 f'{shown}, but {first} is read by the detector {kinds[first]} and {second} by the '
                 f'detector {kinds[second]}; accepted are families of one detector, which reads '
                 'them together'
             )
-        # Dictionaries with one number of cells begin with the same markers.
-        if first in ARUCO_NAMES and first.rpartition('_')[0] == second.rpartition('_')[0]:
-            raise ValueError(
-                f'{shown}, but targets of {first} and {second} have the same print; accepted is '
-                'one of them'
-            )
-    if kinds[names[0]] != 'ring':
+    if kinds[names[0]] not in ('ring', 'aruco', 'apriltag'):
         raise ValueError(
             f'{shown}, but the detector {kinds[names[0]]} reads one family; accepted are several '
-            f'of {", ".join(RING_NAMES)}'
+            f'of {", ".join(RING_NAMES)}, or of {", ".join(SQUARE_NAMES)}'
         )

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import cv2
+import numpy as np
 
 from ahf_ros.codes import SQUARE_NAMES
 
@@ -42,3 +44,15 @@ def marker(name: str, number: int, cell: int) -> Any:
     if not 0 <= number < count:
         raise ValueError(f'number is {number}, accepted is an integer from 0 to {count - 1}')
     return cv2.aruco.generateImageMarker(table, number, cell * (table.markerSize + 2))
+
+
+@lru_cache(maxsize=64)
+def words(name: str) -> np.ndarray:
+    """Return the cells of all markers of a dictionary, ndarray of bool, shape (k, side, side).
+
+    They are those inside the border, True where there is no ink, by ID.
+    """
+    table = dictionary(name)
+    count, side = len(table.bytesList), table.markerSize + 2
+    prints = [cv2.aruco.generateImageMarker(table, number, side) for number in range(count)]
+    return np.array(prints)[:, 1:-1, 1:-1] > 0

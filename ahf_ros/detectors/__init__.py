@@ -66,8 +66,11 @@ class _Entry(NamedTuple):
 _ENTRIES = {
     'ring': _Entry('detectors.ring.detector:RingDetector', ('ring',), several=True),
     'traditional': _Entry('detectors.traditional:TraditionalDetector', ('ring',)),
-    'aruco': _Entry('detectors.square.detector:SquareDetector', ('aruco',)),
-    'apriltag': _Entry('detectors.square.detector:SquareDetector', ('apriltag',)),
+    'aruco': _Entry('detectors.square.detector:SquareDetector', ('aruco',), several=True),
+    'apriltag': _Entry('detectors.square.detector:SquareDetector', ('apriltag',), several=True),
+    'square': _Entry(
+        'detectors.square.detector:SquareDetector', ('aruco', 'apriltag'), several=True
+    ),
     'gsi': _Entry('detectors.gsi.detector:GsiDetector', ('gsi',)),
     'gsi_published': _Entry('detectors.gsi.published:PublishedGsiDetector', ('gsi',)),
     'dots': _Entry('detectors.dots.detector:DotsDetector', ('dots',)),

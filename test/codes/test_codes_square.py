@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from ahf_ros.codes.square import SQUARE_NAMES, dictionary, marker
+from ahf_ros.codes.square import SQUARE_NAMES, dictionary, marker, words
 from support.square_markers import needs_square_markers
 
 pytestmark = needs_square_markers
@@ -29,6 +29,13 @@ def test_a_marker_has_a_black_border_and_its_own_bits():
     for of in prints:
         assert not of[:5].any() and not of[-5:].any() and not of[:, :5].any()
     assert len(np.unique([of.ravel() for of in prints], axis=0)) == 50
+
+
+def test_words_are_the_cells_of_the_prints_inside_their_borders():
+    cells = words('apriltag_25h9')
+    assert cells.shape == (35, 5, 5)
+    print_ = marker('apriltag_25h9', 7, 4)[2::4, 2::4]
+    assert np.array_equal(cells[7], print_[1:-1, 1:-1] > 0)
 
 
 def test_what_is_not_there_is_named():

@@ -32,7 +32,11 @@ from support.packages import EXAMPLE, write_package
 from support.square_markers import needs_square_markers
 
 RAMP = np.arange(60, dtype=np.uint8) + np.zeros((20, 1), np.uint8)
-SQUARES = {'aruco': 'aruco_4x4_50', 'apriltag': 'apriltag_36h11'}
+SQUARES = {
+    'aruco': 'aruco_4x4_50',
+    'apriltag': 'apriltag_36h11',
+    'square': 'aruco_4x4_50,apriltag_36h11',
+}
 
 
 ALL = [
@@ -77,7 +81,7 @@ def test_every_family_chooses_a_detector():
     ('name', 'family', 'accepted'),
     [
         ('aruco', 'metashape12', ['auto, ring, traditional, command', 'aruco_4x4_50, ']),
-        ('ring', 'apriltag_36h11', ['auto, apriltag, command', 'one of metashape12, ']),
+        ('ring', 'apriltag_36h11', ['auto, apriltag, square, command', 'one of metashape12, ']),
         ('traditional', 'auto', ['auto, ring, command', 'one of metashape12, ']),
         ('aruco', 'metashape12,aicon12', ['auto, ring, command', 'aruco_4x4_50, ']),
     ],

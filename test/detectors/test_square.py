@@ -5,12 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ahf_ros.codes import SQUARE_NAMES
 from ahf_ros.detectors import Detector, create_detector
 from ahf_ros.evaluation import score
 from ahf_ros.session import identify
 from ahf_ros.synthetic.scene import Rendering
 from ahf_ros.target import Target
-from support.scenes import counted, rendering
+from benchmarks.squares import readers
+from benchmarks.textures import textured_image
+from support.scenes import around, counted, rendering
 from support.square_markers import needs_square_markers
 
 pytestmark = needs_square_markers
@@ -59,13 +62,54 @@ def test_the_shift_that_gamma_causes_is_reported_and_does_not_change_the_size(
         assert target.semi_major == pytest.approx(true[target.id].semi_major, rel=0.002)
 
 
+def test_several_dictionaries_are_read_in_one_search():
+    for family in ('aruco_4x4_50', 'aruco_6x6_250', 'apriltag_25h9'):
+        shown = scene(family=family, targets=4)
+        found = create_detector(family=','.join(SQUARE_NAMES))(shown.image)
+        assert counted(shown, found) == (4, 0, 0)
+        # Of dictionaries that begin with the same markers, the smallest that has all of these.
+        stem, _, count = family.rpartition('_')
+        smallest = next((of for of in (50, 100, 250) if of > max(it.id for it in found)), None)
+        named = f'{stem}_{smallest}' if count.isdigit() else family
+        assert {target.family for target in found} == {named}
+    assert create_detector(family='aruco_4x4_50,apriltag_36h11').name == 'square'
+
+
+def test_hardly_any_texture_is_a_marker():
+    detect = create_detector(family=','.join(SQUARE_NAMES))
+    assert sum(len(detect(textured_image(seed))) for seed in range(101, 115)) == 0
+
+
+@pytest.mark.parametrize('gray', [0, 90, 255])
+def test_a_covered_marker_is_read(gray):
+    shown = scene(family='apriltag_36h11')
+    image = shown.image.copy()
+    for target in shown.targets:
+        side = target.semi_major * 0.5
+        image[around(target.x, target.y + 0.9 * side, 0.35 * side)] = gray
+    assert counted(shown, create_detector(family='apriltag_36h11')(image)) == (6, 0, 0)
+
+
+@pytest.mark.parametrize('light', ['normal', 'stripe'])
+def test_no_marker_less_than_apriltag_finds_and_better_centres(light):
+    pytest.importorskip('pupil_apriltags')
+    found = readers()
+    shown = scene(family='apriltag_36h11', light=light)
+    ours, theirs = (
+        score(shown, found[name](shown.image)) for name in ('ahf', 'pupil-apriltags')
+    )
+    assert ours.right == 6 >= theirs.right
+    assert ours.wrong == ours.false_positives == 0
+    assert theirs.right == 0 or ours.rmse[2] < theirs.rmse[2]
+
+
 def test_markers_of_another_dictionary_are_not_seen():
     shown = scene()
     assert create_detector(family='aruco_7x7_50')(shown.image) == []
 
 
 def test_the_filter_finds_markers_that_stripes_hide(detect):
-    shown = scene(light='stripe', ambient=0.12)
+    shown = scene(light='stripe', ambient=0.1, seed=4)
     without = score(shown, detect(shown.image))
     found = identify(shown.image, detector=detect, expected_targets=6, max_evaluations=40)
     right, wrong, false = counted(shown, found)

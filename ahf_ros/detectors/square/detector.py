@@ -1,6 +1,8 @@
-"""Identification of square markers, ArUco and AprilTag, by OpenCV's detector.
+"""Identification of square markers, ArUco and AprilTag, of several dictionaries at once.
 
-Corners and centres are measured by `ahf_ros.detectors.square.sides` in the image as received.
+Quadrilaterals are found in the image and in its halves, and read as markers by the evidence of
+their cells. Corners and centres are measured by `ahf_ros.detectors.square.sides` in the image as
+received.
 """
 
 from __future__ import annotations
@@ -13,8 +15,10 @@ from typing import Any
 import cv2
 import numpy as np
 
-from ahf_ros.codes.square import dictionary
+from ahf_ros.codes.square import words
 from ahf_ros.detectors.contract import FamilyDetector, moved_targets
+from ahf_ros.detectors.square.quadrilaterals import find_quadrilaterals
+from ahf_ros.detectors.square.reading import read
 from ahf_ros.detectors.square.sides import centres, fit_sides
 from ahf_ros.features.frame import reduced
 from ahf_ros.features.pyramid import halved
@@ -24,23 +28,34 @@ from ahf_ros.target import SquareMarker, Target, sorted_targets
 _DRAFT_DEVIATION = 0.3  # standard deviation of a centre from corners of contours, px
 _MINIMUM_SHARE = 0.3  # of the edges on each side, for a fit to be accepted
 _BORDER = 2  # cells of a marker that are its border
-_CELL = 2.5  # smallest cell of a marker that is looked for, px
+_SMALLEST_HALF = 24  # smaller side of a half that markers are looked for in, px
+_SAME_PLACE = 0.3  # distance of two readings of one marker, in sides
 _LARGE = 120.0  # side of a marker whose contour gives its corners to about two pixels, px
+
+Groups = tuple[tuple[str, ...], ...]
+"""Dictionaries; those in a group begin with the same markers, the smallest first."""
 
 
 @dataclass(frozen=True, slots=True)
 class SquareDetector(FamilyDetector):
-    """Identify the markers of one family."""
+    """Identify the markers of one family or of several."""
 
     @property
-    def design(self) -> cv2.aruco.Dictionary:
-        """Markers of the family."""
-        return dictionary(self.family)
+    def design(self) -> Groups:
+        """Dictionaries of the families."""
+        groups: dict[str, list[str]] = {}
+        for name in self.settings.families:
+            stem, _, count = name.rpartition('_')
+            groups.setdefault(stem if count.isdigit() else name, []).append(name)
+        return tuple(
+            tuple(sorted(group, key=lambda name: len(words(name)))) for group in groups.values()
+        )
 
     @property
     def name(self) -> str:
-        """Name in the registry, aruco or apriltag."""
-        return self.family.partition('_')[0]
+        """Name in the registry: aruco, apriltag, or square for both."""
+        kinds = {name.partition('_')[0] for name in self.settings.families}
+        return kinds.pop() if len(kinds) == 1 else 'square'
 
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the markers of one image; see `Detector`."""
@@ -50,20 +65,43 @@ class SquareDetector(FamilyDetector):
         """Identify the markers of one image, with the corners of contours, to about a pixel."""
         check_image(image)
         gray = np.ascontiguousarray(as_gray(image).astype(np.uint8, copy=False))
-        parameters = cv2.aruco.DetectorParameters()
-        smallest = 4 * _CELL * (self.design.markerSize + _BORDER) / max(gray.shape)
-        parameters.minMarkerPerimeterRate = min(parameters.minMarkerPerimeterRate, smallest)
-        detector = cv2.aruco.ArucoDetector(self.design, parameters)
-        corners, numbers, _ = detector.detectMarkers(gray)
-        if not corners:
+        groups = self.design
+        levels = max(0, int(log2(max(min(gray.shape) / _SMALLEST_HALF, 1))))
+        corners, readings = [np.zeros((0, 4, 2))], [np.zeros((0, 3))]
+        for level, half in enumerate(halved(gray, levels)):
+            found = find_quadrilaterals(half)
+            read_as = read(half, found, groups)
+            turned = [
+                np.roll(found[index], turn, axis=0)
+                for index, turn in zip(read_as.quadrilateral, read_as.turn, strict=True)
+            ]
+            corners.append((np.array(turned).reshape(-1, 4, 2) + 0.5) * 2**level - 0.5)
+            readings.append(np.stack([read_as.group, read_as.number, read_as.odds], axis=1))
+        places, readings_ = np.concatenate(corners), np.concatenate(readings)
+        chosen = _best(places, readings_[:, 2])
+        if not len(chosen):
             return []
-        covariances = np.tile(_DRAFT_DEVIATION**2 * np.eye(2), (len(numbers), 1, 1))
-        places = _places(
-            np.reshape(corners, (-1, 4, 2)), covariances, np.full(len(numbers), np.nan)
-        )
+        which, numbers, odds = readings_[chosen].T
+        families = [
+            next(name for name in group if len(words(name)) > numbers[which == index].max())
+            if index in which
+            else ''
+            for index, group in enumerate(groups)
+        ]
+        covariances = np.tile(_DRAFT_DEVIATION**2 * np.eye(2), (len(chosen), 1, 1))
+        confidences = 1 / (1 + np.exp(-odds))
+        fields = _places(places[chosen], covariances, np.full(len(chosen), np.nan))
         return sorted_targets(
-            SquareMarker(id=number, code=number, family=self.family, **place)
-            for number, place in zip(numbers.ravel().tolist(), places, strict=True)
+            SquareMarker(
+                id=int(number),
+                code=int(number),
+                family=families[int(index)],
+                confidence=confidence,
+                **place,
+            )
+            for index, number, confidence, place in zip(
+                which, numbers, confidences.tolist(), fields, strict=True
+            )
         )
 
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
@@ -73,15 +111,33 @@ class SquareDetector(FamilyDetector):
         that are no `SquareMarker`, stay unchanged.
         """
         check_image(image)
-        markers = [it for it in targets if isinstance(it, SquareMarker)]
-        if not markers:
-            return list(targets)
         gray = as_gray(image).astype(np.float32, copy=False)
-        cells = self.design.markerSize + _BORDER
-        corners = _from_halves(gray, np.array([it.corners for it in markers]), cells)
-        sides = fit_sides(gray, corners, cells)
-        places = _places(sides.corners, sides.covariance, sides.edge_shift)
-        return moved_targets(targets, markers, places, sides.share >= _MINIMUM_SHARE)
+        refined = list(targets)
+        for cells in {words(group[0]).shape[1] + _BORDER for group in self.design}:
+            markers = [
+                it
+                for it in targets
+                if isinstance(it, SquareMarker) and words(it.family).shape[1] + _BORDER == cells
+            ]
+            if markers:
+                corners = _from_halves(gray, np.array([it.corners for it in markers]), cells)
+                sides = fit_sides(gray, corners, cells)
+                places = _places(sides.corners, sides.covariance, sides.edge_shift)
+                good = sides.share >= _MINIMUM_SHARE
+                refined = moved_targets(refined, markers, places, good)
+        return refined
+
+
+def _best(corners: np.ndarray, odds: np.ndarray) -> list[int]:
+    """Return the indices of the readings, shape (k,), that no better one of their place beats."""
+    sizes = np.linalg.norm(corners - np.roll(corners, 2, axis=1), axis=2).max(axis=1)
+    middles = corners.mean(axis=1)
+    chosen: list[int] = []
+    for index in np.argsort(-odds, kind='stable').tolist():
+        distances = np.linalg.norm(middles[chosen] - middles[index], axis=1)
+        if (distances > _SAME_PLACE * np.maximum(sizes[chosen], sizes[index])).all():
+            chosen.append(index)
+    return chosen
 
 
 def _from_halves(gray: np.ndarray, corners: np.ndarray, cells: int) -> np.ndarray:

@@ -88,7 +88,7 @@ class Sides:
 
 def centres(corners: np.ndarray) -> np.ndarray:
     """Return the intersections of the diagonals, the images of the centres, shape (k, 2)."""
-    return _meet(corners[:, 0], corners[:, 2], corners[:, 1], corners[:, 3])
+    return meet(corners[:, 0], corners[:, 2], corners[:, 1], corners[:, 3])
 
 
 def fit_sides(gray: np.ndarray, corners: np.ndarray, cells: int) -> Sides:
@@ -275,10 +275,10 @@ def _corners(
 def _met(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Return where sides from first to second points, shape (k, 4, 2), meet those before them."""
     before, behind = (np.roll(of, 1, axis=1) for of in (first, second))
-    return _meet(before, behind, first, second)
+    return meet(before, behind, first, second)
 
 
-def _meet(
+def meet(
     first: np.ndarray, second: np.ndarray, third: np.ndarray, fourth: np.ndarray
 ) -> np.ndarray:
     """Return the intersections of lines first-second and third-fourth, shape (..., 2) all.

@@ -1,0 +1,145 @@
+"""Quadrilaterals that may be square markers: dark regions with four straight sides.
+
+A pixel is dark where it is less than the mean of the darkest and the brightest one about it. In the
+gray values this separates ink and paper in even light, in their logarithms it does
+so in any light that changes less than ink and paper do.
+Where a cover or another dark thing changes the outline, its four longest sides are left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import cv2
+import numpy as np
+
+from ahf_ros.detectors.square.sides import meet
+from ahf_ros.imaging.logarithm import LOG_OFFSET
+
+_WINDOW = 13  # in which a pixel is compared, px
+_MINIMUM_STEP = 24  # from the darkest to the brightest pixel of a window, of 255
+_SMALLEST = 8.0  # side of a quadrilateral, px
+_SOLID = 0.3  # minimum area of a region with its holes, as a share of a square's of its perimeter
+_TATTERED, _FILLED = 4.0, 0.15  # bounds of outline and area of a region whose hull is taken
+_TOLERANCE = 0.025  # of the corners of an outline, as a share of its length
+_MAXIMUM_CORNERS = 14  # of the polygon of an outline
+_FOUR = 0.55  # minimum share of its four longest sides in the perimeter of a polygon
+_SAME_LINE = 0.15, 0.03  # sides of one line: sine of their angle, distance in perimeters
+_NEAR = 0.02, 1.2  # of points that belong to a side, as a share of the perimeter, and px
+_ENDS = 0.1  # of a side, left out at its ends, where blur rounds the corner
+_FEWEST = 3  # points of a side
+_COMMON_AREA = 0.6, 1.9  # of a quadrilateral, as a share of its region's
+_LEVELS = np.arange(256)
+_SCALES = tuple(
+    (np.rint(255 * of / of[-1]).astype(np.uint8), growth)
+    for of, growth in ((_LEVELS, 0.5), (np.log(_LEVELS / LOG_OFFSET + 1), 0.9))
+)
+"""Tables of values by gray value, and distances of the outermost dark pixels from the edge, px."""
+
+
+def find_quadrilaterals(gray: np.ndarray) -> np.ndarray:
+    """Return the corners of dark quadrilaterals in an image of uint8, px, shape (k, 4, 2).
+
+    They are clockwise in the image, and known to about half a pixel.
+    """
+    window = np.ones((_WINDOW, _WINDOW), np.uint8)
+    found: list[np.ndarray] = []
+    for table, growth in _SCALES:
+        values = cv2.LUT(gray, table)
+        low, high = cv2.erode(values, window), cv2.dilate(values, window)
+        middle = cv2.addWeighted(low, 0.5, high, 0.5, 0)
+        high -= low
+        dark = cv2.compare(values, middle, cv2.CMP_LT)
+        dark &= cv2.compare(high, _MINIMUM_STEP, cv2.CMP_GT)
+        outlines, _ = cv2.findContours(dark, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
+        found += _quadrilaterals(outlines, growth)
+    return np.array(found, np.float64).reshape(-1, 4, 2)
+
+
+def _quadrilaterals(outlines: Sequence[np.ndarray], growth: float) -> Iterator[np.ndarray]:
+    """Yield the quadrilaterals of those outlines of regions that have four straight sides."""
+    for outline in outlines:
+        if len(outline) < 4 * _SMALLEST * 0.7:
+            continue
+        area = -cv2.contourArea(outline, oriented=True)
+        if area < 0:
+            continue  # of a hole
+        length = cv2.arcLength(outline, closed=True)
+        around = outline
+        if area < _SOLID * length**2 / 16:
+            _, _, width, height = cv2.boundingRect(outline)
+            if length > _TATTERED * (width + height) or area < _FILLED * width * height:
+                continue
+            around = cv2.convexHull(outline)
+            area, length = cv2.contourArea(around), cv2.arcLength(around, closed=True)
+        if area < max(_SOLID * length**2 / 16, _SMALLEST**2 / 2):
+            continue
+        polygon = cv2.approxPolyDP(around, max(_TOLERANCE * length, 1.0), closed=True)[::-1, 0]
+        if cv2.contourArea(polygon, oriented=True) < 0:
+            polygon = polygon[::-1]
+        if not 4 <= len(polygon) <= _MAXIMUM_CORNERS:
+            continue
+        sides = _four_sides(polygon.astype(np.float64), length)
+        if sides is None:
+            continue
+        corners = _fitted(sides, outline[:, 0].astype(np.float64), length, growth)
+        if corners is None:
+            continue
+        found = cv2.contourArea(corners.astype(np.float32), oriented=True)
+        if _COMMON_AREA[0] < found / area < _COMMON_AREA[1] and cv2.isContourConvex(
+            corners.astype(np.float32)
+        ):
+            yield corners
+
+
+def _four_sides(polygon: np.ndarray, length: float) -> np.ndarray | None:
+    """Return the four longest sides of a polygon, (4, 2, 2), no two on one line, in its order."""
+    sides = np.stack([polygon, np.roll(polygon, -1, axis=0)], axis=1)
+    if len(sides) == 4:
+        return sides
+    vectors = sides[:, 1] - sides[:, 0]
+    lengths = np.hypot(*vectors.T)
+    if np.sort(lengths)[-4:].sum() < _FOUR * lengths.sum():
+        return None
+    normals = np.stack([vectors[:, 1], -vectors[:, 0]], axis=1) / lengths[:, None]
+    chosen: list[int] = []
+    for index in np.argsort(-lengths).tolist():
+        same = any(
+            abs(normals[other] @ vectors[index]) < _SAME_LINE[0] * lengths[index]
+            and abs(normals[other] @ (sides[index].mean(axis=0) - sides[other, 0]))
+            < _SAME_LINE[1] * length
+            for other in chosen
+        )
+        if not same:
+            chosen.append(index)
+        if len(chosen) == 4:
+            return sides[sorted(chosen)]
+    return None
+
+
+def _fitted(
+    sides: np.ndarray, points: np.ndarray, length: float, growth: float
+) -> np.ndarray | None:
+    """Return the corners where lines fitted to the points near four sides meet, shape (4, 2)."""
+    starts, ends = sides[:, 0], sides[:, 1]
+    vectors = ends - starts
+    lengths = np.hypot(*vectors.T)[:, None]
+    along = vectors / lengths
+    normals = np.stack([along[:, 1], -along[:, 0]], axis=1)
+    offsets = normals @ points.T - (normals * starts).sum(axis=1, keepdims=True)
+    places = (along @ points.T - (along * starts).sum(axis=1, keepdims=True)) / lengths - 0.5
+    near = np.abs(offsets) < max(_NEAR[0] * length, _NEAR[1])
+    weights = (near & (np.abs(places) < 0.5 - _ENDS)).astype(np.float64)
+    count = weights.sum(axis=1)
+    if count.min() < _FEWEST:
+        return None
+    middle = (weights * places).sum(axis=1) / count
+    across = (weights * offsets).sum(axis=1) / count
+    places -= middle[:, None]
+    squares = np.maximum((weights * places**2).sum(axis=1), 1e-9)
+    slope = (weights * places * offsets).sum(axis=1) / squares
+    first, last = (across + slope * (end - middle) + growth for end in (-0.5, 0.5))
+    starts = starts + first[:, None] * normals
+    ends = ends + last[:, None] * normals
+    before = np.roll(starts, 1, axis=0), np.roll(ends, 1, axis=0)
+    return meet(*before, starts, ends)

@@ -1,0 +1,220 @@
+"""Reading of square markers: evidence that a quadrilateral has the cells of a marker.
+
+All cells of the grid that a dictionary has are sampled, those of the border and one more around
+it with them. Ink and paper next to each other in these two rings tell what ink and paper are in
+the light of each cell. A cell speaks for paper by where it is between these levels, but never by
+more than it would if it may be covered. What speaks for a marker is compared with what any other
+cells would have done.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from math import erf, log, sqrt
+
+import cv2
+import numpy as np
+
+from ahf_ros.codes.square import words
+from ahf_ros.features.frame import project
+from ahf_ros.features.sampling import sample
+from ahf_ros.imaging.logarithm import LOG_OFFSET
+
+_IN_CELL = (-0.2, 0.2)  # where a cell is sampled, from its centre, in cells
+_BLUR = 0.7  # of the image, standard deviation in px
+_MOST_MIXED = 0.2  # share that a cell takes from each neighbour, at most
+_REACH = 0.25  # standard deviation of the window that levels are taken from, in sides
+_MINIMUM_STEP = 0.35  # from ink to paper, in the logarithm
+_OF_USUAL = 0.4  # minimum of a step of the border, in usual ones
+_SIDE = 0.6  # minimum share of such steps of each side of the border
+_POINTS, _DEPTH = 10, 0.06  # of each side where a border is looked for, distance in sides
+_SHARPNESS = 12.0  # of a cell: its logarithmic odds, by its distance from the middle in steps
+_COVERED = 3.0  # maximum of these odds, as a cell may be covered
+_UNCLEAR = 1.5  # logarithmic odds against a cell that is between ink and paper
+_PART_WEIGHT = 0.15  # of each part of a cell, which have one colour in other quadrilaterals, too
+_BORDER_WEIGHT = 0.3  # of the cells of the border, which are alike in other quadrilaterals, too
+_CORNER_WEIGHT = 0.7
+_DOUBT = 6.0  # logarithmic odds against a marker that nothing but a quadrilateral speaks for
+_SEVERAL = 2.0  # times the logarithm of their number, against each of several groups
+_MINIMUM_ODDS = 2.2  # for a marker to be reported: nine to one
+
+
+@dataclass(frozen=True, slots=True)
+class Readings:
+    """Markers that quadrilaterals were read as; all of shape (k,)."""
+
+    quadrilateral: np.ndarray  # its index
+    group: np.ndarray  # of dictionaries, its index
+    number: np.ndarray  # ID
+    turn: np.ndarray  # index of the corner that is top left in the upright marker
+    odds: np.ndarray  # logarithmic, that the marker is this one
+
+
+def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]]) -> Readings:
+    """Read quadrilaterals, shape (k, 4, 2), px, of an image of uint8 as markers of dictionaries.
+
+    A group has dictionaries that begin with the same markers, the smallest first.
+    """
+    found = [np.zeros((0, 5))]
+    doubt = _DOUBT + _SEVERAL * log(len(groups))
+    frames = _frames(corners)
+    sizes = {words(group[0]).shape[1] for group in groups}
+    bordered = _bordered(gray, frames)
+    frames, corners = frames[bordered], corners[bordered]
+    for cells in sorted(sizes) if len(corners) else ():
+        evidence, against, which = _evidence(gray, frames, corners, cells)
+        for index, group in enumerate(groups):
+            if words(group[0]).shape[1] != cells or not len(which):
+                continue
+            prints, prior = _table(tuple(group))
+            odds = evidence @ prints - prior
+            best = odds.argmax(axis=1)
+            total = odds[np.arange(len(best)), best] + against - doubt
+            likely = np.flatnonzero(total > _MINIMUM_ODDS)
+            odds, best, total = odds[likely], best[likely], total[likely]
+            # Against another marker of the group, and against none of them.
+            top = np.arange(len(best)), best
+            odds -= odds[top][:, None]
+            odds[top] = -np.inf
+            total = -np.logaddexp(-total, np.logaddexp.reduce(odds, axis=1))
+            good = total > _MINIMUM_ODDS
+            number, turn = np.divmod(best, 4)
+            columns = (bordered[which[likely]], np.full(len(best), index), number, turn, total)
+            found.append(np.stack(columns, axis=1)[good])
+    table = np.concatenate(found)
+    return Readings(*table[:, :4].T.astype(int), table[:, 4])
+
+
+@lru_cache(maxsize=32)
+def _table(group: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the cells of the markers of dictionaries in four turns, and what speaks against each.
+
+    The shapes are (cells, 4 n) and (4 n,).
+    """
+    cells = words(group[-1])
+    turned = np.stack([np.rot90(cells, turn, axes=(1, 2)) for turn in range(4)], axis=1)
+    count = np.zeros(len(cells))
+    for name in reversed(group):
+        count[: len(words(name))] = 4 * len(words(name))
+    return turned.reshape(4 * len(cells), -1).T.astype(np.float32), np.log(np.repeat(count, 4)).astype(np.float32)
+
+
+def _frames(corners: np.ndarray) -> np.ndarray:
+    """Return homographies from the square about the origin with sides of 1, shape (k, 3, 3)."""
+    square = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]], np.float32)
+    found = [cv2.getPerspectiveTransform(square, of.astype(np.float32)) for of in corners]
+    return np.array(found).reshape(-1, 3, 3)
+
+
+def _bordered(gray: np.ndarray, frames: np.ndarray) -> np.ndarray:
+    """Return the indices of quadrilaterals that are dark inside all sides and bright outside."""
+    if not len(frames):
+        return np.zeros(0, int)
+    along = np.linspace(-0.45, 0.45, _POINTS)
+    turns = [np.linalg.matrix_power(np.array([[0, -1], [1, 0]]), turn) for turn in range(4)]
+    ink, paper = (
+        np.log(
+            sample(
+                gray,
+                project(
+                    frames, np.stack([np.stack([along, across], axis=1) @ of for of in turns])
+                ).reshape(len(frames), -1, 2),
+            )
+            + LOG_OFFSET
+        ).reshape(-1, 4, _POINTS)
+        for across in (np.full(_POINTS, -0.5 + _DEPTH), np.full(_POINTS, -0.5 - _DEPTH))
+    )
+    seen = (paper - ink > _MINIMUM_STEP / 2).mean(axis=2).min(axis=1) >= _SIDE
+    return np.flatnonzero(seen)
+
+
+def _evidence(
+    gray: np.ndarray, frames: np.ndarray, corners: np.ndarray, cells: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return what the cells of quadrilaterals with a border say, and indices of these.
+
+    It is by how much the logarithmic odds of a marker grow where a cell is paper, shape
+    (k, cells^2), and what they are where all cells are ink, (k,).
+    """
+    side = cells + 2
+    places = (np.arange(side + 2) - (side + 1) / 2) / side
+    grid = np.stack(np.meshgrid(places, places), axis=-1)
+    size = side + 2
+    parts = np.array(
+        [
+            sample(gray, project(frames, grid + np.array([x, y]) / side).reshape(len(frames), -1, 2))
+            for x in _IN_CELL
+            for y in _IN_CELL
+        ],
+        np.float64,
+    ).reshape(-1, len(frames), size, size)
+    whole = _unmixed(parts.mean(axis=0), corners, side)
+    parts = np.log(parts + LOG_OFFSET).reshape(len(parts), len(frames), -1)
+    values = np.log(np.maximum(whole, 0) + LOG_OFFSET)
+    rings = _rings(cells)
+    flat = values.reshape(len(values), -1)
+    ink, paper = flat[:, rings.ink], flat[:, rings.paper]
+    steps = paper - ink
+    usual = np.median(steps, axis=1)[:, None]
+    clear = (steps > _OF_USUAL * usual) & (steps > _MINIMUM_STEP / 2)
+    on_sides = clear.reshape(len(clear), 4, side).mean(axis=2).min(axis=1, initial=1.0)
+    which = np.flatnonzero((usual[:, 0] > _MINIMUM_STEP) & (on_sides >= _SIDE))
+    ink, paper, clear = ink[which], paper[which], clear[which]
+    total = clear @ rings.weights
+    middle = (clear * (ink + paper) / 2) @ rings.weights / total
+    step = (clear * (paper - ink)) @ rings.weights / total
+    levels = np.concatenate([flat[None, which], parts[:, which]])
+    odds = np.clip(_SHARPNESS * (levels - middle) / step, -_COVERED, _COVERED)
+    weights = np.array([1.0, *[_PART_WEIGHT] * len(parts)])
+    against = np.einsum('p,pkc->kc', weights, log(2) - np.logaddexp(0, odds))
+    against -= _UNCLEAR * (1 - np.abs(odds[0]) / _COVERED)
+    border = _BORDER_WEIGHT * against[:, rings.border].sum(axis=1)
+    border += _CORNER_WEIGHT * against[:, rings.corners].sum(axis=1)
+    paper = np.einsum('p,pkc->kc', weights, odds)[:, rings.inside]
+    return paper.astype(np.float32), against[:, rings.inside].sum(axis=1) + border, which
+
+
+@dataclass(frozen=True, slots=True)
+class _Rings:
+    ink: np.ndarray  # (4 m,), cells of the border, side by side
+    paper: np.ndarray  # (4 m,), the cells beside them
+    border: np.ndarray  # the cells of the border, each once
+    corners: np.ndarray  # those at the corners, which round and tattered regions do not have
+    inside: np.ndarray  # the other cells
+    weights: np.ndarray  # (4 m, n), of the cells of the border for the levels of all cells
+
+
+@lru_cache
+def _rings(cells: int) -> _Rings:
+    """Return the indices of cells in the grid of a marker, border and one more ring included."""
+    size = cells + 4
+    index = np.arange(size**2).reshape(size, size)
+    turned = [np.rot90(index, turn) for turn in range(4)]
+    ink = np.concatenate([of[1, 1:-1] for of in turned])
+    paper = np.concatenate([of[0, 1:-1] for of in turned])
+    rows, columns = np.divmod(index.ravel(), size)
+    squares = np.subtract.outer(rows[ink], rows) ** 2.0
+    squares += np.subtract.outer(columns[ink], columns) ** 2.0
+    weights = np.exp(-squares / (2 * (_REACH * size) ** 2)) + 1e-6
+    corners = index[[1, 1, -2, -2], [1, -2, 1, -2]]
+    return _Rings(ink, paper, np.unique(ink), corners, index[2:-2, 2:-2].ravel(), weights)
+
+
+def _unmixed(values: np.ndarray, corners: np.ndarray, side: int) -> np.ndarray:
+    """Return the gray values of cells, shape (k, n, n), without what blur mixed into them."""
+    lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2) / side
+    count = values.shape[1]
+    neighbours = np.eye(count, k=1) + np.eye(count, k=-1)
+    neighbours[0, 0] = neighbours[-1, -1] = 1
+    across, down = (
+        np.array([(1 - erf(cell / (2 * sqrt(2) * _BLUR))) / 2 for cell in of])
+        for of in ((lengths[:, 0] + lengths[:, 2]) / 2, (lengths[:, 1] + lengths[:, 3]) / 2)
+    )
+    mixed = [
+        np.eye(count) + np.minimum(of, _MOST_MIXED)[:, None, None] * (neighbours - 2 * np.eye(count))
+        for of in (across, down)
+    ]
+    along_columns = np.linalg.solve(mixed[1], values)
+    return np.linalg.solve(mixed[0], along_columns.transpose(0, 2, 1)).transpose(0, 2, 1)

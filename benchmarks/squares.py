@@ -1,0 +1,143 @@
+"""Square markers read by this package, by OpenCV and by AprilTag's own detector.
+
+Centres of the others are the intersections of the diagonals between their corners, OpenCV's after
+its sub-pixel refinement. Photographs have no truth: a row says how many markers each finds.
+pupil-apriltags is left out where it is not installed. Seeds from 101 on are for tests.
+
+    python -m benchmarks.squares [--seeds 301 302] [--photographs FOLDER] [--output FILE]
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from ahf_ros.codes.square import dictionary
+from ahf_ros.detectors import create_detector
+from ahf_ros.detectors.square.sides import centres
+from ahf_ros.evaluation import score
+from ahf_ros.interchange.image_files import read_image
+from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.target import Target
+from benchmarks import report
+from benchmarks.report import number
+
+FAMILY = 'apriltag_36h11'
+SCENES: dict[str, dict[str, Any]] = {
+    'even light': {},
+    'tilt 45 deg': {'tilt': 45.0},
+    'edges +0.5 px': {'edge_shift': 0.5},
+    'edges -0.5 px': {'edge_shift': -0.5},
+    'blur 1.5 px': {'blur': 1.5},
+    'dim, noisy': {'exposure': 40.0},
+    'side 24 px': {'dot_radius': 5.0},
+    'stripe 0.3': {'light': 'stripe'},
+    'stripe 0.12': {'light': 'stripe', 'ambient': 0.12},
+    'lattice 0.3': {'light': 'lattice'},
+}
+
+Reader = Callable[[np.ndarray], list[Target]]
+
+
+def readers() -> dict[str, Reader]:
+    """Return functions that find markers in images of uint8."""
+    parameters = cv2.aruco.DetectorParameters()
+    parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
+    opencv = cv2.aruco.ArucoDetector(dictionary(FAMILY), parameters)
+
+    def by_opencv(image: np.ndarray) -> list[Target]:
+        corners, numbers, _ = opencv.detectMarkers(image)
+        return _targets([] if numbers is None else numbers.ravel(), corners)
+
+    found: dict[str, Reader] = {'ahf': create_detector(family=FAMILY), 'opencv': by_opencv}
+    try:
+        from pupil_apriltags import Detector
+    except ImportError:
+        return found
+    pupil = Detector(families='tag36h11', quad_decimate=1.0)
+
+    def by_pupil(image: np.ndarray) -> list[Target]:
+        tags = pupil.detect(image)
+        # There, (0, 0) is the corner of the first pixel.
+        return _targets([tag.tag_id for tag in tags], [tag.corners - 0.5 for tag in tags])
+
+    return found | {'pupil-apriltags': by_pupil}
+
+
+def _targets(numbers: Sequence[int], corners: Sequence[np.ndarray]) -> list[Target]:
+    middles = centres(np.reshape(corners, (-1, 4, 2)).astype(np.float64))
+    return [
+        Target(int(of), int(of), float(x), float(y), 1.0, 1.0)
+        for of, (x, y) in zip(numbers, middles, strict=True)
+    ]
+
+
+def measure(seeds: Sequence[int]) -> Iterator[dict[str, Any]]:
+    """Render scenes and yield what each reader finds in them."""
+    found = readers()
+    for name, changes in report.progress(SCENES.items(), 'scenes', len(SCENES)):
+        usual = {'width': 1600, 'height': 1200, 'targets': 20, 'dot_radius': 12.0}
+        scenes = [
+            render(SceneSettings(**usual | {'family': FAMILY, 'seed': seed} | changes))
+            for seed in seeds
+        ]
+        for reader, read in found.items():
+            start = time.perf_counter()
+            results = [read(shown.image) for shown in scenes]
+            duration = time.perf_counter() - start
+            figures = [score(*pair) for pair in zip(scenes, results, strict=True)]
+            errors = np.array([error for of in figures for error in of.errors]).reshape(-1, 2)
+            yield {
+                'scene': name,
+                'reader': reader,
+                'expected': sum(of.expected for of in figures),
+                'right': sum(of.right for of in figures),
+                'wrong': sum(of.wrong + of.false_positives for of in figures),
+                'rms': float(np.sqrt((errors**2).sum(axis=1).mean())) if len(errors) else None,
+                'seconds': duration / len(scenes),
+            }
+
+
+def photographed(folder: Path) -> Iterator[dict[str, Any]]:
+    """Yield how many markers each reader finds in the photographs of a folder."""
+    found = readers()
+    for path in sorted(path for path in folder.iterdir() if path.suffix in ('.jpg', '.png')):
+        image = read_image(path)
+        yield {'scene': path.name} | {name: len(read(image)) for name, read in found.items()}
+
+
+def markdown(figures: report.Report) -> str:
+    """Return the report as tables."""
+    rows = [
+        (row['scene'], row['reader'], f'{row["right"]} of {row["expected"]}', row['wrong'])
+        + (number(row['rms'], 4), number(1000 * row['seconds'], 0))
+        for row in figures['rows']
+    ]
+    head = ('scene', 'reader', 'right', 'wrong, false', 'RMS, px', 'ms')
+    lines = [report.about_text(figures), '', *report.table(head, rows)]
+    if figures.get('photographs'):
+        head = tuple(figures['photographs'][0])
+        counts = [tuple(row.values()) for row in figures['photographs']]
+        lines += ['', *report.table(head, counts)]
+    return '\n'.join(lines)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Measure and print."""
+    made = report.parser(__doc__)
+    made.add_argument('--photographs', type=Path, help='a folder of photographs of tag36h11')
+    options = report.parsed(made, arguments)
+    figures = report.about(options.seeds)
+    figures['rows'] = list(measure(options.seeds))
+    if options.photographs:
+        figures['photographs'] = list(photographed(options.photographs))
+    report.publish(figures, markdown(figures), options)
+
+
+if __name__ == '__main__':
+    main()
