@@ -1,0 +1,416 @@
+"""The rings of CCTags: a glance at profiles, and rings that are brought onto the image.
+
+Neighbouring circles are too close for their edges to be measured one by one. So all gray values
+about a centre are compared with the rings of an ID at once. Each ray has its own light, so that
+its values are a linear function of the ink, which is that of sharp rings under a normal blur.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import product
+
+import numpy as np
+
+from ahf_ros.codes.cctag import CircleFamily
+from ahf_ros.features import frame
+from ahf_ros.features.array_record import ArrayRecord
+from ahf_ros.features.dots import Dots
+from ahf_ros.features.logistic import logistic
+from ahf_ros.features.robust import NORMAL, geman_mcclure
+from ahf_ros.features.sampling import sample_circles
+
+_RAYS = 64
+_ANGLES = 2 * np.pi * np.arange(_RAYS) / _RAYS
+_PROFILE = np.linspace(0.06, 1.3, 72)  # radii at which rays are read
+_FEW_ANGLES, _FEW_RADII = _ANGLES[::2], slice(None, None, 2)  # of a glance
+_SIZES = 1.05  # ratio of radii that share templates, and of hypotheses of the radius
+_SHIFTS, _BLURS = (-0.6, -0.3, 0.0, 0.3, 0.6), (0.6, 0.9, 1.4)  # of edges, that are tried, px
+_GROWN = (0.85, 0.9, 0.95, 1.0, 1.05)  # radii of the outermost circle, where that was found
+_PROMISING = 0.6  # share of a profile that rings explain, from which they are looked at
+_APART = 0.5  # distance of the centres of different targets, radii
+_PART = 2048, 48  # hypotheses and targets at a time, which bounds the memory
+_READINGS = 4  # IDs that are brought onto the image from a frame
+_ROUNDS = 5  # of Gauss-Newton
+_OUTLIER = 3.0  # standard deviations, that quarter the weight of a gray value
+_QUIET = 0.35  # quantile of rays, whose errors are usual
+_LEAST = 0.003  # standard deviation of gray values, of their mean
+_OTHER_CONTRAST = 0.2  # difference of the contrast of a ray, that quarters its weight
+_MAXIMUM_CHANGE = 0.08  # of a frame in a round, radii
+_USUAL_BLUR = 0.85  # of edges, px, with that of pixels and of interpolation
+_PRIOR_SHIFT, _PRIOR_BLUR, _PRIOR_PERSPECTIVE = 0.5, 0.35, 0.03  # px, of ln, in a radius
+_SHARPEST, _SOFTEST = 0.35, 1.5  # blur: px, and in narrow rings, which more of it would hide
+_MOST_SHIFT = 0.45  # of edges, in narrow rings
+_INDEPENDENT = 1.5  # distance of independent readings along a profile, px
+_SYSTEMATIC = 0.004  # standard deviation of what pixels and interpolation do to a centre, px
+_AGREEING = 0.5  # share of what a ray shows, that the rings explain
+_OF_TARGET = np.array([-27.0, 14.0, 25.0])  # of one, rays that agree, explained share
+_OF_ID = np.array([-1.0, 2.0])  # of one, margin
+
+
+@dataclass(frozen=True, slots=True)
+class Aligned(ArrayRecord):
+    """The rings of k IDs as they are brought onto an image."""
+
+    frames: np.ndarray  # (k, 3, 3), of the outermost circles as printed
+    ids: np.ndarray  # int, (k,)
+    covariance: np.ndarray  # (k, 2, 2), of centres, px^2
+    shift: np.ndarray  # (k,), by which ink has grown, px
+    blur: np.ndarray  # (k,), standard deviation, px
+    colour: np.ndarray  # (k,), 1 where ink is dark, -1 where it is bright
+    rays: np.ndarray  # (k,), share of the rays that show the rings by themselves
+    explained: np.ndarray  # (k,), share of what all rays show together
+    left: np.ndarray  # (k,), ln of the share of a ray that is not explained, on the mean
+    margin: np.ndarray  # (k,), ln of the odds against the next ID; NaN before it is known
+
+    @property
+    def edge_shift(self) -> np.ndarray:
+        """By how much what is dark has grown, px, shape (k,)."""
+        return self.shift * self.colour
+
+    @property
+    def of_target(self) -> np.ndarray:
+        """Probability that there is a target, shape (k,)."""
+        return logistic(np.stack([self.rays, self.explained], axis=1), _OF_TARGET)
+
+    @property
+    def confidence(self) -> np.ndarray:
+        """Probability that there is a target with the ID, shape (k,)."""
+        return self.of_target * logistic(self.margin[:, None], _OF_ID)
+
+
+_NOTHING = Aligned(
+    *(np.zeros((0, 3, 3)), np.zeros(0, int), np.zeros((0, 2, 2)), *np.zeros((7, 0)))
+)
+
+
+def likely_rings(
+    gray: np.ndarray,
+    circles: Dots,
+    radii: tuple[float, float],
+    polarity: int,
+    family: CircleFamily,
+) -> np.ndarray:
+    """Return the frames of outermost circles whose mean profile looks like rings, (k, 3, 3).
+
+    Any circle of a target may be among the circles. The bounds are those of the semi-major axis.
+    """
+    table = family.radii(family.numbers)
+    outer = circles.frames[circles.polarity == polarity]
+    inner = circles.frames[circles.polarity != polarity]
+    low, high = np.log([table[:, 1::2].min(), table[:, 1::2].max()])
+    steps = np.exp(np.arange(low, high, np.log(_SIZES)))
+    found = [frame.scaled(outer, np.full(len(outer), of)) for of in _GROWN]
+    found += [frame.scaled(inner, np.full(len(inner), 1 / of)) for of in steps]
+    frames = np.concatenate(found)
+    major, minor, _ = frame.ellipse_axes(frames)
+    frames = frames[(major >= radii[0]) & (major <= radii[1])]
+    starts = range(0, len(frames), _PART[0])
+    explained = np.concatenate(
+        [np.zeros(0)]
+        + [_glance(gray, frames[start : start + _PART[0]], polarity, family) for start in starts]
+    )
+    size, centres = frame.mean_radii(frames), frames[:, :2, 2]
+    kept: list[int] = []
+    for index in np.argsort(-explained, kind='stable').tolist():
+        if explained[index] < _PROMISING:
+            break
+        away = np.hypot(*(centres[kept] - centres[index]).T)
+        if not (away < _APART * np.maximum(size[kept], size[index])).any():
+            kept.append(index)
+    return frames[kept]
+
+
+def _glance(
+    gray: np.ndarray, frames: np.ndarray, polarity: int, family: CircleFamily
+) -> np.ndarray:
+    """Return the share of the mean profiles of frames that the rings of some ID explain, (k,)."""
+    along = _PROFILE[_FEW_RADII]
+    profiles = _profiles(gray, frames, polarity, _FEW_ANGLES, along)
+    explained = np.zeros(len(frames))
+    for step, some in _by_size(frames):
+        templates = _templates(family, step, (0.0,), (0.9,))[0][:, _FEW_RADII]
+        weight = np.sqrt(along / along.sum())
+        own = profiles[some] * weight
+        rings = _shares(own, templates, weight, along).max(axis=1)
+        discs = _shares(own, _discs(step)[:, _FEW_RADII], weight, along, 1).max(axis=1)
+        explained[some] = np.where(rings > discs, rings, 0.0)
+    return explained
+
+
+def _by_size(frames: np.ndarray) -> list[tuple[int, np.ndarray]]:
+    """Return steps of the radius, and the indices of the frames that have it."""
+    size = np.maximum(frame.mean_radii(frames), 1.0)
+    steps = np.rint(np.log(size) / np.log(_SIZES)).astype(int)
+    return [(step, np.flatnonzero(steps == step)) for step in np.unique(steps).tolist()]
+
+
+def _profiles(
+    gray: np.ndarray, frames: np.ndarray, polarity: int, angles: np.ndarray, along: np.ndarray
+) -> np.ndarray:
+    """Return the mean profiles of rays, each in its own light, ink downwards, shape (k, n)."""
+    values = np.maximum(sample_circles(gray, frames, angles, along), 0)
+    values /= np.maximum(values.mean(axis=2, keepdims=True), 1)
+    means: np.ndarray = polarity * values.mean(axis=1, dtype=np.float64)
+    return means
+
+
+def _shares(
+    profiles: np.ndarray,
+    templates: np.ndarray,
+    weight: np.ndarray,
+    along: np.ndarray,
+    colours: int = -1,
+) -> np.ndarray:
+    """Return the shares of weighted profiles (k, n) that templates (t, n) explain, (k, t)."""
+    line, _ = np.linalg.qr(np.stack([weight, along * weight], axis=1))
+    profiles, inks = (of - (of @ line) @ line.T for of in (profiles, templates * weight))
+    inks /= np.linalg.norm(inks, axis=1, keepdims=True)
+    total = np.maximum((profiles**2).sum(axis=1, keepdims=True), 1e-9)
+    product = profiles @ inks.T
+    shares: np.ndarray = (np.minimum(product, 0) if colours < 0 else product) ** 2 / total
+    return shares
+
+
+@lru_cache(maxsize=256)
+def _templates(
+    family: CircleFamily, step: int, shifts: tuple[float, ...], blurs: tuple[float, ...]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the ink of all IDs under shifts and blurs, shape (t, n), their IDs and shifts."""
+    size, ids = _SIZES**step, family.numbers
+    most = _MOST_SHIFT * family.narrow * size
+    edges = [of for of in product(shifts, blurs) if abs(of[0]) <= most]
+    inks = [
+        _rings(family, ids, *(np.full(len(ids), of) for of in (size, shift, blur)))[0]
+        for shift, blur in edges
+    ]
+    of_shift = np.repeat([shift for shift, _ in edges], len(ids))
+    return np.concatenate(inks), np.tile(ids, len(edges)), of_shift
+
+
+@lru_cache(maxsize=64)
+def _discs(step: int) -> np.ndarray:
+    """Return the profiles of single discs of all radii, shape (t, n)."""
+    radii = np.linspace(_PROFILE[0], _PROFILE[-1], 100)[3:-3, None]
+    return _normal_share((radii - _PROFILE) * _SIZES**step / 0.9)
+
+
+def identify(gray: np.ndarray, frames: np.ndarray, polarity: int, family: CircleFamily) -> Aligned:
+    """Return the best reading of each target about outermost circles, known to about a tenth."""
+    if not len(frames):
+        return _NOTHING
+    ids, shift = _likely_ids(gray, frames, polarity, family)
+    # The likeliest ID often brings the frame to its place even if it is the wrong one.
+    again = align(gray, frames, ids[:, 0], shift[:, 0], family).frames
+    more, more_shift = _likely_ids(gray, again, polarity, family)
+    starts = np.concatenate([np.stack([of] * _READINGS, axis=1) for of in (frames, again)], axis=1)
+    ids, shift = np.concatenate([ids, more], axis=1), np.concatenate([shift, more_shift], axis=1)
+    count = ids.shape[1]
+    every = align(gray, starts.reshape(-1, 3, 3), ids.ravel(), shift.ravel(), family)
+    left = np.where(every.colour == polarity, every.left, 0.0).reshape(-1, count)
+    rows = np.arange(len(frames))
+    first = left.argmin(axis=1)
+    best = every.select(rows * count + first)
+    others = np.where(ids == best.ids[:, None], np.inf, left).min(axis=1)
+    independent = frame.mean_radii(best.frames) * np.ptp(_PROFILE) / _INDEPENDENT
+    margin = 0.5 * independent * (others - best.left)
+    return replace(best, margin=margin).select(best.colour == polarity)
+
+
+def _likely_ids(
+    gray: np.ndarray, frames: np.ndarray, polarity: int, family: CircleFamily
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the IDs that profiles are most like, and the shifts of their edges, (k, n) both."""
+    profiles = _profiles(gray, frames, polarity, _ANGLES, _PROFILE)
+    weight = np.sqrt(_PROFILE / _PROFILE.sum())
+    ids = np.empty((len(frames), _READINGS), int)
+    shift = np.empty((len(frames), _READINGS))
+    for step, some in _by_size(frames):
+        templates, _, of_shift = _templates(family, step, _SHIFTS, _BLURS)
+        shares = _shares(profiles[some] * weight, templates, weight, _PROFILE)
+        shares = shares.reshape(len(some), -1, len(family.numbers))
+        best = shares.argmax(axis=1)
+        order = np.argsort(-shares.max(axis=1), axis=1, kind='stable')[:, :_READINGS]
+        ids[some] = order
+        place = np.take_along_axis(best, order, axis=1) * len(family.numbers)
+        shift[some] = of_shift[place]
+    return ids, shift
+
+
+def align(
+    gray: np.ndarray,
+    frames: np.ndarray,
+    ids: np.ndarray,
+    shift: np.ndarray,
+    family: CircleFamily,
+) -> Aligned:
+    """Bring the rings of IDs (k,) onto an image from frames (k, 3, 3), known to about a tenth.
+
+    `shift`, shape (k,), is the growth of ink to begin with, px.
+    """
+    parts = [slice(start, start + _PART[1]) for start in range(0, len(frames), _PART[1])]
+    return Aligned.joined(
+        [_aligned(gray, frames[part], ids[part], shift[part], family) for part in parts]
+    )
+
+
+def _aligned(
+    gray: np.ndarray,
+    frames: np.ndarray,
+    ids: np.ndarray,
+    shift: np.ndarray,
+    family: CircleFamily,
+) -> Aligned:
+    """Return what `align` does, by Gauss-Newton with robust weights."""
+    count = len(frames)
+    angle, radius = (of.ravel() for of in np.meshgrid(_ANGLES, _PROFILE, indexing='ij'))
+    basis = frame.displacement_basis(angle, radius).reshape(_RAYS, len(_PROFILE), 7)
+    blur = np.full(count, _USUAL_BLUR)
+    for _ in range(_ROUNDS):
+        size = frame.mean_radii(frames)
+        values = _lit(gray, frames)
+        ink, slope, by_shift, by_blur = _rings(family, ids, size, shift, blur)
+        rays = _robust_rays(values, ink)
+        changes = np.concatenate(
+            [
+                slope[:, None, :, None] * -basis,
+                np.broadcast_to(
+                    np.stack([by_shift, by_blur], axis=-1)[:, None], (*values.shape, 2)
+                ),
+            ],
+            axis=3,
+        )
+        columns = rays.without_light(changes * rays.step[..., None, None])
+        columns = columns.reshape(count, -1, 9)
+        weighted = columns * rays.weight.reshape(count, -1, 1)
+        variance = (rays.weight * rays.errors**2).sum(axis=(1, 2)) / rays.weight.sum(axis=(1, 2))
+        area = size**2 * (_PROFILE[1] - _PROFILE[0]) * (_ANGLES[1] - _ANGLES[0])
+        each = np.minimum(area, 1.0) / variance  # of a gray value, as pixels are independent
+        normal = columns.transpose(0, 2, 1) @ weighted * each[:, None, None]
+        right = (weighted * rays.errors.reshape(count, -1, 1)).sum(axis=1) * each[:, None]
+        priors = np.array([_PRIOR_PERSPECTIVE] * 2 + [_PRIOR_SHIFT, _PRIOR_BLUR]) ** -2
+        normal[:, range(9), range(9)] += np.concatenate([np.full(5, 1e-6), priors])
+        right[:, 7] -= priors[2] * shift
+        right[:, 8] -= priors[3] * np.log(blur / _USUAL_BLUR)
+        change = np.linalg.solve(normal, right[..., None])[..., 0]
+        limit = np.concatenate([np.full(7, _MAXIMUM_CHANGE), [0.3, 0.3]])
+        change = np.clip(change, -limit, limit)
+        frames = frame.moved(frames, change[:, :7])
+        narrow = family.narrow * size
+        shift = np.clip(shift + change[:, 7], -_MOST_SHIFT * narrow, _MOST_SHIFT * narrow)
+        blur = np.clip(
+            blur * np.exp(change[:, 8]), _SHARPEST, np.maximum(_SOFTEST * narrow, _SHARPEST)
+        )
+    covariance = np.linalg.inv(normal)[:, :2, :2]
+    affine = frame.local_affine(frames)
+    covariance = affine @ covariance @ affine.transpose(0, 2, 1) + _SYSTEMATIC**2 * np.eye(2)
+    values = _lit(gray, frames)
+    ink = _rings(family, ids, frame.mean_radii(frames), shift, blur)[0]
+    rays = _Rays.of(values, ink, np.broadcast_to(_PROFILE, values.shape))
+    left, shown = ((_PROFILE * of**2).sum(axis=2) for of in (rays.errors, rays.deviations(values)))
+    agreeing = (left < (1 - _AGREEING) * shown) & (
+        np.sign(rays.step) == np.sign(np.median(rays.step, axis=1))[:, None]
+    )
+    good = np.where(agreeing, 1.0, 1e-3)
+    explained = 1 - (good * left).sum(axis=1) / np.maximum((good * shown).sum(axis=1), 1e-9)
+    return Aligned(
+        frames=frames,
+        ids=ids,
+        covariance=covariance,
+        shift=shift,
+        blur=blur,
+        colour=-np.sign(np.median(rays.step, axis=1)),
+        rays=agreeing.mean(axis=1),
+        explained=explained,
+        left=np.log(np.maximum(left, 1e-6) / np.maximum(shown, 1e-6)).mean(axis=1),
+        margin=np.full(count, np.nan),
+    )
+
+
+def _lit(gray: np.ndarray, frames: np.ndarray) -> np.ndarray:
+    """Return the gray values of rays, each in its own light, shape (k, rays, n)."""
+    values = np.maximum(sample_circles(gray, frames, _ANGLES, _PROFILE), 0).astype(np.float64)
+    lit: np.ndarray = values / np.maximum(values.mean(axis=2, keepdims=True), 1)
+    return lit
+
+
+def _robust_rays(values: np.ndarray, ink: np.ndarray) -> _Rays:
+    """Return rays whose weights are low where edges of light disturb them.
+
+    The contrast of ink is the same wherever the light falls.
+    """
+    rays = _Rays.of(values, ink, np.broadcast_to(_PROFILE, values.shape))
+    for _ in range(2):
+        usual = np.median(rays.contrast, axis=1, keepdims=True)
+        alike = geman_mcclure(1.0, (rays.contrast - usual) / (_OTHER_CONTRAST * np.abs(usual)))
+        of_rays = np.median(np.abs(rays.errors), axis=2)
+        spread = NORMAL * np.quantile(of_rays, _QUIET, axis=1)[:, None, None]
+        weight = geman_mcclure(_PROFILE, rays.errors / (_OUTLIER * np.maximum(spread, _LEAST)))
+        rays = _Rays.of(values, ink, weight * alike[..., None])
+    return rays
+
+
+@dataclass(frozen=True, slots=True)
+class _Rays:
+    """Rays as linear functions of ink: values = paper + step ink + errors."""
+
+    weight: np.ndarray  # (k, rays, n)
+    away: np.ndarray  # of the ink, from its mean on the ray, the same shape
+    step: np.ndarray  # (k, rays)
+    errors: np.ndarray
+    contrast: np.ndarray  # of ink, (k, rays), below 0 where it is darker
+
+    @staticmethod
+    def of(values: np.ndarray, ink: np.ndarray, weight: np.ndarray) -> _Rays:
+        """Fit rays to the ink of profiles, shape (k, n)."""
+        total = np.maximum(weight.sum(axis=2), 1e-9)
+        ink = np.broadcast_to(ink[:, None], values.shape)
+        away = ink - ((weight * ink).sum(axis=2) / total)[..., None]
+        mean = ((weight * values).sum(axis=2) / total)[..., None]
+        power = np.maximum((weight * away * away).sum(axis=2), 1e-9)
+        step = (weight * away * values).sum(axis=2) / power
+        paper = mean[..., 0] - step * (weight * ink).sum(axis=2) / total
+        contrast = step / np.maximum(np.maximum(paper, paper + step), 0.1)
+        return _Rays(weight, away, step, values - mean - step[..., None] * away, contrast)
+
+    def deviations(self, values: np.ndarray) -> np.ndarray:
+        """Return the differences of values from the weighted means of their rays."""
+        total = np.maximum(self.weight.sum(axis=2, keepdims=True), 1e-9)
+        away: np.ndarray = values - (self.weight * values).sum(axis=2, keepdims=True) / total
+        return away
+
+    def without_light(self, changes: np.ndarray) -> np.ndarray:
+        """Return changes (k, rays, n, m) without what another paper and ink would explain."""
+        total = np.maximum(self.weight.sum(axis=2), 1e-9)
+        power = np.maximum((self.weight * self.away**2).sum(axis=2), 1e-9)
+        mean = np.einsum('krn,krnm->krm', self.weight, changes) / total[..., None]
+        step = np.einsum('krn,krnm->krm', self.weight * self.away, changes) / power[..., None]
+        return changes - mean[:, :, None] - self.away[..., None] * step[:, :, None]
+
+
+def _rings(
+    family: CircleFamily, ids: np.ndarray, size: np.ndarray, shift: np.ndarray, blur: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return the ink of IDs along the profile, shape (k, n), and its derivatives.
+
+    These are by the radius, in radii of the target, by the shift, px, and by ln of the blur.
+    """
+    radii = family.radii(ids)
+    sign = np.where(np.arange(radii.shape[1]) % 2 == 0, 1, -1)[:, None]
+    size, shift, blur = (of[:, None, None] for of in (size, shift, blur))
+    # Blur moves what lies near to the centre outwards, on the mean (Rice).
+    place = np.sqrt(_PROFILE**2 + (blur / size) ** 2)
+    away = (radii[..., None] * size + sign * shift - place * size) / blur
+    ink = (sign * _normal_share(away)).sum(axis=1)
+    density = np.exp(-0.5 * away**2) / np.sqrt(2 * np.pi)
+    slope = -(sign * density * size / blur).sum(axis=1)
+    by_shift = (density / blur).sum(axis=1)
+    by_blur = -(sign * density * away).sum(axis=1)
+    return ink, slope, by_shift, by_blur
+
+
+def _normal_share(x: np.ndarray) -> np.ndarray:
+    """Return the share of a normal distribution below x, to 0.0005 (Page, JRSS C 1977, 26, 75)."""
+    share: np.ndarray = 0.5 * (1 + np.tanh(np.sqrt(2 / np.pi) * (x + 0.044715 * x**3)))
+    return share
