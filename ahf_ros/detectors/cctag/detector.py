@@ -16,7 +16,7 @@ import numpy as np
 
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes.cctag import CircleFamily
-from ahf_ros.detectors.cctag.rings import Aligned, align, identify, likely_rings
+from ahf_ros.detectors.cctag.rings import Aligned, Prior, align, identify, likely_rings
 from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import FamilyDetector, moved_targets
 from ahf_ros.features import frame
@@ -31,6 +31,7 @@ from ahf_ros.target import UNDECODED, Target, sorted_targets
 
 _GAIN = 2  # of ln I, for circles that blur makes gray
 _INNERMOST = 0.25  # of the radii of circles that are looked for
+_TELLING = 0.98  # confidence of targets that tell of others
 _CERTAIN = 0.75  # confidence from which a target is reported
 _SURE_OF_TARGET = 0.9  # probability of a target, from which it is reported without its ID
 _PLAUSIBLE = 0.6  # share of rays that agree, of a target that is measured again
@@ -84,7 +85,7 @@ class CctagDetector(FamilyDetector):
         for polarity in self.settings.polarities:
             circles = _circles(octave, polarity)
             frames = likely_rings(gray, circles, octave.radii, polarity, self.design)
-            found.append(identify(gray, frames, polarity, self.design))
+            found.append(_identified(gray, frames, polarity, self.design))
         rings = Aligned.joined(found)
         decoded = rings.confidence >= _CERTAIN
         shown = decoded | (self.settings.report_undecoded & (rings.of_target >= _SURE_OF_TARGET))
@@ -95,6 +96,17 @@ class CctagDetector(FamilyDetector):
             *(rings.frames, rings.covariance, ids, rings.ids, certainty),
             *(self.design.name, rings.edge_shift),
         )
+
+
+def _identified(
+    gray: np.ndarray, frames: np.ndarray, polarity: int, family: CircleFamily
+) -> Aligned:
+    """Return the readings of targets of one colour, doubtful ones with what certain ones show."""
+    rings = identify(gray, frames, polarity, family)
+    certain = rings.confidence >= _TELLING
+    doubtful = rings.select(~certain)
+    again = identify(gray, doubtful.frames, polarity, family, Prior.after(rings.select(certain)))
+    return Aligned.joined([rings.select(certain), again])
 
 
 def _circles(octave: Octave, polarity: int) -> Dots:

@@ -31,6 +31,7 @@ _GROWN = (0.85, 0.9, 0.95, 1.0, 1.05)  # radii of the outermost circle, where th
 _PROMISING = 0.6  # share of a profile that rings explain, from which they are looked at
 _APART = 0.5  # distance of the centres of different targets, radii
 _PART = 2048, 48  # hypotheses and targets at a time, which bounds the memory
+_ENOUGH = 4  # certain targets, that tell of the edges of an image
 _READINGS = 4  # IDs that are brought onto the image from a frame
 _ROUNDS = 5  # of Gauss-Newton
 _OUTLIER = 3.0  # standard deviations, that quarter the weight of a gray value
@@ -38,15 +39,40 @@ _QUIET = 0.35  # quantile of rays, whose errors are usual
 _LEAST = 0.003  # standard deviation of gray values, of their mean
 _OTHER_CONTRAST = 0.2  # difference of the contrast of a ray, that quarters its weight
 _MAXIMUM_CHANGE = 0.08  # of a frame in a round, radii
-_USUAL_BLUR = 0.85  # of edges, px, with that of pixels and of interpolation
-_PRIOR_SHIFT, _PRIOR_BLUR, _PRIOR_PERSPECTIVE = 0.5, 0.35, 0.03  # px, of ln, in a radius
+_PRIOR_PERSPECTIVE = 0.03  # in a radius
 _SHARPEST, _SOFTEST = 0.35, 1.5  # blur: px, and in narrow rings, which more of it would hide
 _MOST_SHIFT = 0.45  # of edges, in narrow rings
 _INDEPENDENT = 1.5  # distance of independent readings along a profile, px
 _SYSTEMATIC = 0.004  # standard deviation of what pixels and interpolation do to a centre, px
 _AGREEING = 0.5  # share of what a ray shows, that the rings explain
-_OF_TARGET = np.array([-27.0, 14.0, 25.0])  # of one, rays that agree, explained share
+_OF_TARGET = np.array([-28.0, 14.0, 22.0, 4.0])  # of one, rays, explained share, plain
+_PLAIN = -5.0, 1.0  # beyond which it says no more
+_HOPELESS = -3.0  # plain, from which on other IDs are not tried
 _OF_ID = np.array([-1.0, 2.0])  # of one, margin
+
+
+@dataclass(frozen=True, slots=True)
+class Prior:
+    """What is known of the edges of an image: growth of ink and blur, px.
+
+    The deviations are standard deviations, px and of ln of the blur, which is that of the image
+    with that of pixels and of interpolation.
+    """
+
+    shift: float = 0.0
+    blur: float = 0.85
+    shift_deviation: float = 0.5
+    blur_deviation: float = 0.35
+
+    @staticmethod
+    def after(rings: Aligned) -> Prior:
+        """Return what certain targets tell of the others."""
+        if len(rings.ids) < _ENOUGH:
+            return Prior()
+        return Prior(float(np.median(rings.shift)), float(np.median(rings.blur)), 0.1, 0.1)
+
+
+_USUAL = Prior()
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +88,7 @@ class Aligned(ArrayRecord):
     rays: np.ndarray  # (k,), share of the rays that show the rings by themselves
     explained: np.ndarray  # (k,), share of what all rays show together
     left: np.ndarray  # (k,), ln of the share of a ray that is not explained, on the mean
+    plain: np.ndarray  # (k,), the same of any two edges, less that of the rings
     margin: np.ndarray  # (k,), ln of the odds against the next ID; NaN before it is known
 
     @property
@@ -72,7 +99,9 @@ class Aligned(ArrayRecord):
     @property
     def of_target(self) -> np.ndarray:
         """Probability that there is a target, shape (k,)."""
-        return logistic(np.stack([self.rays, self.explained], axis=1), _OF_TARGET)
+        return logistic(
+            np.stack([self.rays, self.explained, np.clip(self.plain, *_PLAIN)], axis=1), _OF_TARGET
+        )
 
     @property
     def confidence(self) -> np.ndarray:
@@ -80,8 +109,8 @@ class Aligned(ArrayRecord):
         return self.of_target * logistic(self.margin[:, None], _OF_ID)
 
 
-_NOTHING = Aligned(
-    *(np.zeros((0, 3, 3)), np.zeros(0, int), np.zeros((0, 2, 2)), *np.zeros((7, 0)))
+NOTHING = Aligned(
+    *(np.zeros((0, 3, 3)), np.zeros(0, int), np.zeros((0, 2, 2)), *np.zeros((8, 0)))
 )
 
 
@@ -196,22 +225,30 @@ def _discs(step: int) -> np.ndarray:
     return _normal_share((radii - _PROFILE) * _SIZES**step / 0.9)
 
 
-def identify(gray: np.ndarray, frames: np.ndarray, polarity: int, family: CircleFamily) -> Aligned:
+def identify(
+    gray: np.ndarray,
+    frames: np.ndarray,
+    polarity: int,
+    family: CircleFamily,
+    prior: Prior = _USUAL,
+) -> Aligned:
     """Return the best reading of each target about outermost circles, known to about a tenth."""
     if not len(frames):
-        return _NOTHING
+        return NOTHING
     ids, shift = _likely_ids(gray, frames, polarity, family)
     # The likeliest ID often brings the frame to its place even if it is the wrong one.
-    again = align(gray, frames, ids[:, 0], shift[:, 0], family).frames
+    first = align(gray, frames, ids[:, 0], shift[:, 0], family, prior)
+    likely = first.plain > _HOPELESS
+    frames, ids, shift, again = frames[likely], ids[likely], shift[likely], first.frames[likely]
+    if not len(frames):
+        return NOTHING
     more, more_shift = _likely_ids(gray, again, polarity, family)
     starts = np.concatenate([np.stack([of] * _READINGS, axis=1) for of in (frames, again)], axis=1)
     ids, shift = np.concatenate([ids, more], axis=1), np.concatenate([shift, more_shift], axis=1)
     count = ids.shape[1]
-    every = align(gray, starts.reshape(-1, 3, 3), ids.ravel(), shift.ravel(), family)
+    every = align(gray, starts.reshape(-1, 3, 3), ids.ravel(), shift.ravel(), family, prior)
     left = np.where(every.colour == polarity, every.left, 0.0).reshape(-1, count)
-    rows = np.arange(len(frames))
-    first = left.argmin(axis=1)
-    best = every.select(rows * count + first)
+    best = every.select(np.arange(len(frames)) * count + left.argmin(axis=1))
     others = np.where(ids == best.ids[:, None], np.inf, left).min(axis=1)
     independent = frame.mean_radii(best.frames) * np.ptp(_PROFILE) / _INDEPENDENT
     margin = 0.5 * independent * (others - best.left)
@@ -244,6 +281,7 @@ def align(
     ids: np.ndarray,
     shift: np.ndarray,
     family: CircleFamily,
+    prior: Prior = _USUAL,
 ) -> Aligned:
     """Bring the rings of IDs (k,) onto an image from frames (k, 3, 3), known to about a tenth.
 
@@ -251,7 +289,7 @@ def align(
     """
     parts = [slice(start, start + _PART[1]) for start in range(0, len(frames), _PART[1])]
     return Aligned.joined(
-        [_aligned(gray, frames[part], ids[part], shift[part], family) for part in parts]
+        [_aligned(gray, frames[part], ids[part], shift[part], family, prior) for part in parts]
     )
 
 
@@ -261,12 +299,13 @@ def _aligned(
     ids: np.ndarray,
     shift: np.ndarray,
     family: CircleFamily,
+    prior: Prior,
 ) -> Aligned:
     """Return what `align` does, by Gauss-Newton with robust weights."""
     count = len(frames)
     angle, radius = (of.ravel() for of in np.meshgrid(_ANGLES, _PROFILE, indexing='ij'))
     basis = frame.displacement_basis(angle, radius).reshape(_RAYS, len(_PROFILE), 7)
-    blur = np.full(count, _USUAL_BLUR)
+    blur = np.full(count, prior.blur)
     for _ in range(_ROUNDS):
         size = frame.mean_radii(frames)
         values = _lit(gray, frames)
@@ -289,10 +328,10 @@ def _aligned(
         each = np.minimum(area, 1.0) / variance  # of a gray value, as pixels are independent
         normal = columns.transpose(0, 2, 1) @ weighted * each[:, None, None]
         right = (weighted * rays.errors.reshape(count, -1, 1)).sum(axis=1) * each[:, None]
-        priors = np.array([_PRIOR_PERSPECTIVE] * 2 + [_PRIOR_SHIFT, _PRIOR_BLUR]) ** -2
+        priors = np.array([_PRIOR_PERSPECTIVE] * 2 + [prior.shift_deviation, prior.blur_deviation]) ** -2
         normal[:, range(9), range(9)] += np.concatenate([np.full(5, 1e-6), priors])
-        right[:, 7] -= priors[2] * shift
-        right[:, 8] -= priors[3] * np.log(blur / _USUAL_BLUR)
+        right[:, 7] -= priors[2] * (shift - prior.shift)
+        right[:, 8] -= priors[3] * np.log(blur / prior.blur)
         change = np.linalg.solve(normal, right[..., None])[..., 0]
         limit = np.concatenate([np.full(7, _MAXIMUM_CHANGE), [0.3, 0.3]])
         change = np.clip(change, -limit, limit)
@@ -324,8 +363,35 @@ def _aligned(
         rays=agreeing.mean(axis=1),
         explained=explained,
         left=np.log(np.maximum(left, 1e-6) / np.maximum(shown, 1e-6)).mean(axis=1),
+        plain=_plain(values, good, ink, blur / frame.mean_radii(frames)),
         margin=np.full(count, np.nan),
     )
+
+
+def _plain(
+    values: np.ndarray, good: np.ndarray, ink: np.ndarray, blur: np.ndarray
+) -> np.ndarray:
+    """Return by how much better rings explain a profile than two edges of any height do, (k,).
+
+    It is the difference of ln of what is left of the mean of the good rays, shape (k, rays). The
+    blur is in radii.
+    """
+    weight = np.sqrt(_PROFILE / _PROFILE.sum())
+    line, _ = np.linalg.qr(np.stack([weight, _PROFILE * weight], axis=1))
+    profiles = (good[..., None] * values).sum(axis=1) / good.sum(axis=1)[:, None] * weight
+    edges = np.linspace(_PROFILE[0], _PROFILE[-1], 66)[3:-3, None]
+    found = np.empty(len(values))
+    for index, (profile, rings) in enumerate(zip(profiles, ink * weight, strict=True)):
+        steps = _normal_share((edges - _PROFILE) / blur[index]) * weight
+        profile, rings, steps = (of - (of @ line) @ line.T for of in (profile, rings, steps))
+        total = profile @ profile
+        steps = steps / np.linalg.norm(steps, axis=1, keepdims=True)
+        along, alike = steps @ profile, steps @ steps.T
+        both = along[:, None] ** 2 + along**2 - 2 * alike * along[:, None] * along
+        shares = both / np.maximum(1 - alike**2, 1e-3) / total
+        share = (rings @ profile) ** 2 / (rings @ rings) / total
+        found[index] = np.log(max(1 - shares.max(), 1e-6) / max(1 - share, 1e-6))
+    return found
 
 
 def _lit(gray: np.ndarray, frames: np.ndarray) -> np.ndarray:
