@@ -24,6 +24,9 @@ from ahf_ros.features.sampling import sample_circles
 _RAYS = 64
 _ANGLES = 2 * np.pi * np.arange(_RAYS) / _RAYS
 _PROFILE = np.linspace(0.06, 1.3, 72)  # radii at which rays are read
+_AROUND = np.zeros((_RAYS, 5, 9))  # what each change does to the ink on rays, by powers of radii
+_AROUND[:, [0, 0, 1, 1, 1, 2, 2], range(7)] = -frame.displacement_basis(_ANGLES, np.ones(_RAYS))
+_AROUND[:, [3, 4], [7, 8]] = 1.0
 _FEW_ANGLES, _FEW_RADII = _ANGLES[::2], slice(None, None, 2)  # of a glance
 _SIZES = 1.05  # ratio of radii that share templates, and of hypotheses of the radius
 _SHIFTS, _BLURS = (-0.6, -0.3, 0.0, 0.3, 0.6), (0.6, 0.9, 1.4)  # of edges, that are tried, px
@@ -32,14 +35,15 @@ _PROMISING = 0.6  # share of a profile that rings explain, from which they are l
 _APART = 0.5  # distance of the centres of different targets, radii
 _PART = 2048, 48  # hypotheses and targets at a time, which bounds the memory
 _ENOUGH = 4  # certain targets, that tell of the edges of an image
-_READINGS = 4  # IDs that are brought onto the image from a frame
+_READINGS = 5  # IDs that are brought onto the image from a frame
 _ROUNDS = 5  # of Gauss-Newton
 _OUTLIER = 3.0  # standard deviations, that quarter the weight of a gray value
 _QUIET = 0.35  # quantile of rays, whose errors are usual
 _LEAST = 0.003  # standard deviation of gray values, of their mean
 _OTHER_CONTRAST = 0.2  # difference of the contrast of a ray, that quarters its weight
 _MAXIMUM_CHANGE = 0.08  # of a frame in a round, radii
-_PRIOR_PERSPECTIVE = 0.03  # in a radius
+_PRIOR_PERSPECTIVE = 5e-4  # change of scale in a radius, for a px of the radius
+_OF_VARIANCE = 2.0  # of gray values, that their model adds
 _SHARPEST, _SOFTEST = 0.35, 1.5  # blur: px, and in narrow rings, which more of it would hide
 _MOST_SHIFT = 0.45  # of edges, in narrow rings
 _INDEPENDENT = 1.5  # distance of independent readings along a profile, px
@@ -47,7 +51,7 @@ _SYSTEMATIC = 0.004  # standard deviation of what pixels and interpolation do to
 _AGREEING = 0.5  # share of what a ray shows, that the rings explain
 _OF_TARGET = np.array([-28.0, 14.0, 22.0, 4.0])  # of one, rays, explained share, plain
 _PLAIN = -5.0, 1.0  # beyond which it says no more
-_HOPELESS = -3.0  # plain, from which on other IDs are not tried
+_HOPELESS = -2.0  # plain, from which on other IDs are not tried
 _OF_ID = np.array([-1.0, 2.0])  # of one, margin
 
 
@@ -61,15 +65,14 @@ class Prior:
 
     shift: float = 0.0
     blur: float = 0.85
-    shift_deviation: float = 0.5
-    blur_deviation: float = 0.35
+    deviations: tuple[float, float] = (0.5, 0.35)
 
     @staticmethod
     def after(rings: Aligned) -> Prior:
         """Return what certain targets tell of the others."""
         if len(rings.ids) < _ENOUGH:
             return Prior()
-        return Prior(float(np.median(rings.shift)), float(np.median(rings.blur)), 0.1, 0.1)
+        return Prior(float(np.median(rings.shift)), float(np.median(rings.blur)), (0.1, 0.1))
 
 
 _USUAL = Prior()
@@ -109,9 +112,7 @@ class Aligned(ArrayRecord):
         return self.of_target * logistic(self.margin[:, None], _OF_ID)
 
 
-NOTHING = Aligned(
-    *(np.zeros((0, 3, 3)), np.zeros(0, int), np.zeros((0, 2, 2)), *np.zeros((8, 0)))
-)
+NOTHING = Aligned(*(np.zeros((0, 3, 3)), np.zeros(0, int), np.zeros((0, 2, 2)), *np.zeros((8, 0))))
 
 
 def likely_rings(
@@ -303,35 +304,23 @@ def _aligned(
 ) -> Aligned:
     """Return what `align` does, by Gauss-Newton with robust weights."""
     count = len(frames)
-    angle, radius = (of.ravel() for of in np.meshgrid(_ANGLES, _PROFILE, indexing='ij'))
-    basis = frame.displacement_basis(angle, radius).reshape(_RAYS, len(_PROFILE), 7)
     blur = np.full(count, prior.blur)
     for _ in range(_ROUNDS):
         size = frame.mean_radii(frames)
         values = _lit(gray, frames)
         ink, slope, by_shift, by_blur = _rings(family, ids, size, shift, blur)
         rays = _robust_rays(values, ink)
-        changes = np.concatenate(
-            [
-                slope[:, None, :, None] * -basis,
-                np.broadcast_to(
-                    np.stack([by_shift, by_blur], axis=-1)[:, None], (*values.shape, 2)
-                ),
-            ],
-            axis=3,
-        )
-        columns = rays.without_light(changes * rays.step[..., None, None])
-        columns = columns.reshape(count, -1, 9)
-        weighted = columns * rays.weight.reshape(count, -1, 1)
+        by_radius = [slope, slope * _PROFILE, slope * _PROFILE**2]
+        normal, right = rays.equations(np.stack([*by_radius, by_shift, by_blur], axis=1), ink)
         variance = (rays.weight * rays.errors**2).sum(axis=(1, 2)) / rays.weight.sum(axis=(1, 2))
         area = size**2 * (_PROFILE[1] - _PROFILE[0]) * (_ANGLES[1] - _ANGLES[0])
-        each = np.minimum(area, 1.0) / variance  # of a gray value, as pixels are independent
-        normal = columns.transpose(0, 2, 1) @ weighted * each[:, None, None]
-        right = (weighted * rays.errors.reshape(count, -1, 1)).sum(axis=1) * each[:, None]
-        priors = np.array([_PRIOR_PERSPECTIVE] * 2 + [prior.shift_deviation, prior.blur_deviation]) ** -2
-        normal[:, range(9), range(9)] += np.concatenate([np.full(5, 1e-6), priors])
-        right[:, 7] -= priors[2] * (shift - prior.shift)
-        right[:, 8] -= priors[3] * np.log(blur / prior.blur)
+        each = np.minimum(area, 1.0) / variance / _OF_VARIANCE  # pixels are independent
+        normal, right = normal * each[:, None, None], right * each[:, None]
+        normal[:, range(5), range(5)] += 1e-6
+        normal[:, [5, 6], [5, 6]] += ((_PRIOR_PERSPECTIVE * size) ** -2)[:, None]
+        normal[:, [7, 8], [7, 8]] += np.array(prior.deviations) ** -2
+        known = np.stack([shift - prior.shift, np.log(blur / prior.blur)], axis=1)
+        right[:, 7:] -= known * np.array(prior.deviations) ** -2
         change = np.linalg.solve(normal, right[..., None])[..., 0]
         limit = np.concatenate([np.full(7, _MAXIMUM_CHANGE), [0.3, 0.3]])
         change = np.clip(change, -limit, limit)
@@ -368,9 +357,7 @@ def _aligned(
     )
 
 
-def _plain(
-    values: np.ndarray, good: np.ndarray, ink: np.ndarray, blur: np.ndarray
-) -> np.ndarray:
+def _plain(values: np.ndarray, good: np.ndarray, ink: np.ndarray, blur: np.ndarray) -> np.ndarray:
     """Return by how much better rings explain a profile than two edges of any height do, (k,).
 
     It is the difference of ln of what is left of the mean of the good rays, shape (k, rays). The
@@ -446,13 +433,24 @@ class _Rays:
         away: np.ndarray = values - (self.weight * values).sum(axis=2, keepdims=True) / total
         return away
 
-    def without_light(self, changes: np.ndarray) -> np.ndarray:
-        """Return changes (k, rays, n, m) without what another paper and ink would explain."""
-        total = np.maximum(self.weight.sum(axis=2), 1e-9)
-        power = np.maximum((self.weight * self.away**2).sum(axis=2), 1e-9)
-        mean = np.einsum('krn,krnm->krm', self.weight, changes) / total[..., None]
-        step = np.einsum('krn,krnm->krm', self.weight * self.away, changes) / power[..., None]
-        return changes - mean[:, :, None] - self.away[..., None] * step[:, :, None]
+    def equations(self, changes: np.ndarray, ink: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the normal equations of the changes of a frame, of shift and of blur.
+
+        What another paper and ink of a ray would explain is left to these. The changes of the ink
+        (k, 5, n) are those by the radius, times its powers 0 to 2, by the shift and by the blur.
+        """
+        basis = np.concatenate([np.ones_like(ink)[:, None], ink[:, None], changes], axis=1)
+        products = (basis[:, :, None] * basis[:, None]).reshape(len(ink), -1, ink.shape[1])
+        moments = self.weight @ products.transpose(0, 2, 1)
+        moments = moments.reshape(*self.step.shape, 7, 7)
+        light = moments[..., :2, :2] + 1e-6 * np.eye(2)
+        mixed = moments[..., 2:, :2]
+        own = moments[..., 2:, 2:] - mixed @ np.linalg.inv(light) @ mixed.swapaxes(2, 3)
+        own *= self.step[..., None, None] ** 2
+        errors = (self.weight * self.errors) @ changes.transpose(0, 2, 1)
+        normal = (_AROUND.swapaxes(1, 2) @ own @ _AROUND).sum(axis=1)
+        right = (self.step[..., None, None] * errors[..., None, :] @ _AROUND).sum(axis=(1, 2))
+        return normal, right
 
 
 def _rings(
