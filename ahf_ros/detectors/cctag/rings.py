@@ -35,6 +35,7 @@ _PROMISING = 0.6  # share of a profile that rings explain, from which they are l
 _APART = 0.5  # distance of the centres of different targets, radii
 _PART = 2048, 48  # hypotheses and targets at a time, which bounds the memory
 _ENOUGH = 4  # certain targets, that tell of the edges of an image
+_SCALES = (0.93, 0.965, 1.0, 1.035, 1.07)  # of the radius, about a frame
 _READINGS = 5  # IDs that are brought onto the image from a frame
 _ROUNDS = 5  # of Gauss-Newton
 _OUTLIER = 3.0  # standard deviations, that quarter the weight of a gray value
@@ -49,10 +50,10 @@ _MOST_SHIFT = 0.45  # of edges, in narrow rings
 _INDEPENDENT = 1.5  # distance of independent readings along a profile, px
 _SYSTEMATIC = 0.004  # standard deviation of what pixels and interpolation do to a centre, px
 _AGREEING = 0.5  # share of what a ray shows, that the rings explain
-_OF_TARGET = np.array([-28.0, 14.0, 22.0, 4.0])  # of one, rays, explained share, plain
+_OF_TARGET = np.array([-17.5, 10.0, 15.0, 3.5])  # of one, rays, explained share, plain
 _PLAIN = -5.0, 1.0  # beyond which it says no more
 _HOPELESS = -2.0  # plain, from which on other IDs are not tried
-_OF_ID = np.array([-1.0, 2.0])  # of one, margin
+_OF_ID = np.array([-0.9, 2.2])  # of one, margin
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,8 +207,8 @@ def _shares(
 @lru_cache(maxsize=256)
 def _templates(
     family: CircleFamily, step: int, shifts: tuple[float, ...], blurs: tuple[float, ...]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the ink of all IDs under shifts and blurs, shape (t, n), their IDs and shifts."""
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the ink of all IDs under shifts and blurs, shape (t, n), and the shift of each."""
     size, ids = _SIZES**step, family.numbers
     most = _MOST_SHIFT * family.narrow * size
     edges = [of for of in product(shifts, blurs) if abs(of[0]) <= most]
@@ -215,8 +216,7 @@ def _templates(
         _rings(family, ids, *(np.full(len(ids), of) for of in (size, shift, blur)))[0]
         for shift, blur in edges
     ]
-    of_shift = np.repeat([shift for shift, _ in edges], len(ids))
-    return np.concatenate(inks), np.tile(ids, len(edges)), of_shift
+    return np.concatenate(inks), np.array([shift for shift, _ in edges])
 
 
 @lru_cache(maxsize=64)
@@ -236,20 +236,21 @@ def identify(
     """Return the best reading of each target about outermost circles, known to about a tenth."""
     if not len(frames):
         return NOTHING
-    ids, shift = _likely_ids(gray, frames, polarity, family)
+    starts, ids, shift = _likely_ids(gray, frames, polarity, family)
     # The likeliest ID often brings the frame to its place even if it is the wrong one.
-    first = align(gray, frames, ids[:, 0], shift[:, 0], family, prior)
+    first = align(gray, starts[:, 0], ids[:, 0], shift[:, 0], family, prior)
     likely = first.plain > _HOPELESS
-    frames, ids, shift, again = frames[likely], ids[likely], shift[likely], first.frames[likely]
-    if not len(frames):
+    if not likely.any():
         return NOTHING
-    more, more_shift = _likely_ids(gray, again, polarity, family)
-    starts = np.concatenate([np.stack([of] * _READINGS, axis=1) for of in (frames, again)], axis=1)
-    ids, shift = np.concatenate([ids, more], axis=1), np.concatenate([shift, more_shift], axis=1)
+    again = _likely_ids(gray, first.frames[likely], polarity, family)
+    starts, ids, shift = (
+        np.concatenate([of[likely], more], axis=1)
+        for of, more in zip((starts, ids, shift), again, strict=True)
+    )
     count = ids.shape[1]
     every = align(gray, starts.reshape(-1, 3, 3), ids.ravel(), shift.ravel(), family, prior)
     left = np.where(every.colour == polarity, every.left, 0.0).reshape(-1, count)
-    best = every.select(np.arange(len(frames)) * count + left.argmin(axis=1))
+    best = every.select(np.arange(len(ids)) * count + left.argmin(axis=1))
     others = np.where(ids == best.ids[:, None], np.inf, left).min(axis=1)
     independent = frame.mean_radii(best.frames) * np.ptp(_PROFILE) / _INDEPENDENT
     margin = 0.5 * independent * (others - best.left)
@@ -258,22 +259,23 @@ def identify(
 
 def _likely_ids(
     gray: np.ndarray, frames: np.ndarray, polarity: int, family: CircleFamily
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the IDs that profiles are most like, and the shifts of their edges, (k, n) both."""
-    profiles = _profiles(gray, frames, polarity, _ANGLES, _PROFILE)
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return frames (k, n, 3, 3) of the IDs (k, n) that profiles are most like, and their shifts."""
     weight = np.sqrt(_PROFILE / _PROFILE.sum())
-    ids = np.empty((len(frames), _READINGS), int)
-    shift = np.empty((len(frames), _READINGS))
-    for step, some in _by_size(frames):
-        templates, _, of_shift = _templates(family, step, _SHIFTS, _BLURS)
-        shares = _shares(profiles[some] * weight, templates, weight, _PROFILE)
-        shares = shares.reshape(len(some), -1, len(family.numbers))
-        best = shares.argmax(axis=1)
-        order = np.argsort(-shares.max(axis=1), axis=1, kind='stable')[:, :_READINGS]
-        ids[some] = order
-        place = np.take_along_axis(best, order, axis=1) * len(family.numbers)
-        shift[some] = of_shift[place]
-    return ids, shift
+    shape = len(_SCALES), len(frames), len(family.numbers)
+    shares, shifts = np.empty(shape), np.empty(shape)
+    scaled = np.stack([frame.scaled(frames, np.full(len(frames), of)) for of in _SCALES])
+    for of_scale, share, shift in zip(scaled, shares, shifts, strict=True):
+        profiles = _profiles(gray, of_scale, polarity, _ANGLES, _PROFILE) * weight
+        for step, some in _by_size(of_scale):
+            templates, of_shift = _templates(family, step, _SHIFTS, _BLURS)
+            found = _shares(profiles[some], templates, weight, _PROFILE)
+            found = found.reshape(len(some), -1, len(family.numbers))
+            share[some], shift[some] = found.max(axis=1), of_shift[found.argmax(axis=1)]
+    order = np.argsort(-shares.max(axis=0), axis=1, kind='stable')[:, :_READINGS]
+    rows = np.arange(len(frames))[:, None]
+    scale = shares.argmax(axis=0)[rows, order]
+    return scaled[scale, rows], order, shifts[scale, rows, order]
 
 
 def align(
