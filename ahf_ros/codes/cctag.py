@@ -39,8 +39,8 @@ class CircleFamily:
         """Return the code word of an ID, which is the same; raise a ValueError if none is."""
         if not 0 <= number < 1 << self.bits:
             raise ValueError(
-                f'ID is {number}, accepted is an integer from 0 to {(1 << self.bits) - 1} of '
-                f'{self.name}'
+                f'number is {number}, accepted is an ID of {self.name} from 0 to '
+                f'{(1 << self.bits) - 1}'
             )
         return number
 
