@@ -114,8 +114,8 @@ def printed_design(name: str, number: int, pinhole: float, file: str = '') -> Pr
     """Return the print of the target of a family with an ID; `file` is as for `code_family`.
 
     `pinhole` is the radius of the hole in the centre of the dot, in radii of the dot, 0 for none;
-    square markers, point-distributed targets and CCTags have none. Raise a ValueError if the family has no
-    such ID, too.
+    square markers, point-distributed targets and CCTags have none. Raise a ValueError if the
+    family has no such ID, too.
 
     Examples
     --------

@@ -32,7 +32,7 @@ from support.packages import EXAMPLE, write_package
 from support.square_markers import needs_square_markers
 
 RAMP = np.arange(60, dtype=np.uint8) + np.zeros((20, 1), np.uint8)
-OWN = {'cctag': 'cctag3'}
+OWN = {'gsi': 'gsi', 'dots': 'dots', 'cctag': 'cctag3'}
 SQUARES = {'aruco': 'aruco_4x4_50', 'apriltag': 'apriltag_36h11'}
 
 

@@ -49,9 +49,10 @@ _SHARPEST, _SOFTEST = 0.35, 1.5  # blur: px, and in narrow rings, which more of 
 _MOST_SHIFT = 0.45  # of edges, in narrow rings
 _INDEPENDENT = 1.5  # distance of independent readings along a profile, px
 _SYSTEMATIC = 0.004  # standard deviation of what pixels and interpolation do to a centre, px
+_CLEAREST = 0.2  # share of rays
 _AGREEING = 0.5  # share of what a ray shows, that the rings explain
-_OF_TARGET = np.array([-17.5, 10.0, 15.0, 3.5])  # of one, rays, explained share, plain
-_PLAIN = -5.0, 1.0  # beyond which it says no more
+_OF_TARGET = np.array([-15.5, -4.0, 1.2])  # of one, `clear`, `plain`
+_PLAIN = -5.0, 3.0  # beyond which it says no more
 _HOPELESS = -2.0  # plain, from which on other IDs are not tried
 _OF_ID = np.array([-0.9, 2.2])  # of one, margin
 
@@ -67,6 +68,13 @@ class Prior:
     shift: float = 0.0
     blur: float = 0.85
     deviations: tuple[float, float] = (0.5, 0.35)
+
+    def squares(self, rings: Aligned) -> np.ndarray:
+        """Return the squares of the distances from what is known, in deviations, shape (k,)."""
+        of_shift, of_blur = self.deviations
+        return ((rings.shift - self.shift) / of_shift) ** 2 + (
+            np.log(rings.blur / self.blur) / of_blur
+        ) ** 2
 
     @staticmethod
     def after(rings: Aligned) -> Prior:
@@ -90,7 +98,7 @@ class Aligned(ArrayRecord):
     blur: np.ndarray  # (k,), standard deviation, px
     colour: np.ndarray  # (k,), 1 where ink is dark, -1 where it is bright
     rays: np.ndarray  # (k,), share of the rays that show the rings by themselves
-    explained: np.ndarray  # (k,), share of what all rays show together
+    clear: np.ndarray  # (k,), ln of the share of a ray that is not explained, of clear rays
     left: np.ndarray  # (k,), ln of the share of a ray that is not explained, on the mean
     plain: np.ndarray  # (k,), the same of any two edges, less that of the rings
     margin: np.ndarray  # (k,), ln of the odds against the next ID; NaN before it is known
@@ -103,9 +111,7 @@ class Aligned(ArrayRecord):
     @property
     def of_target(self) -> np.ndarray:
         """Probability that there is a target, shape (k,)."""
-        return logistic(
-            np.stack([self.rays, self.explained, np.clip(self.plain, *_PLAIN)], axis=1), _OF_TARGET
-        )
+        return logistic(np.stack([self.clear, np.clip(self.plain, *_PLAIN)], axis=1), _OF_TARGET)
 
     @property
     def confidence(self) -> np.ndarray:
@@ -135,17 +141,17 @@ def likely_rings(
     found = [frame.scaled(outer, np.full(len(outer), of)) for of in _GROWN]
     found += [frame.scaled(inner, np.full(len(inner), 1 / of)) for of in steps]
     frames = np.concatenate(found)
-    major, minor, _ = frame.ellipse_axes(frames)
+    major = frame.ellipse_axes(frames)[0]
     frames = frames[(major >= radii[0]) & (major <= radii[1])]
     starts = range(0, len(frames), _PART[0])
-    explained = np.concatenate(
+    share = np.concatenate(
         [np.zeros(0)]
         + [_glance(gray, frames[start : start + _PART[0]], polarity, family) for start in starts]
     )
     size, centres = frame.mean_radii(frames), frames[:, :2, 2]
     kept: list[int] = []
-    for index in np.argsort(-explained, kind='stable').tolist():
-        if explained[index] < _PROMISING:
+    for index in np.argsort(-share, kind='stable').tolist():
+        if share[index] < _PROMISING:
             break
         away = np.hypot(*(centres[kept] - centres[index]).T)
         if not (away < _APART * np.maximum(size[kept], size[index])).any():
@@ -159,15 +165,15 @@ def _glance(
     """Return the share of the mean profiles of frames that the rings of some ID explain, (k,)."""
     along = _PROFILE[_FEW_RADII]
     profiles = _profiles(gray, frames, polarity, _FEW_ANGLES, along)
-    explained = np.zeros(len(frames))
+    share = np.zeros(len(frames))
     for step, some in _by_size(frames):
         templates = _templates(family, step, (0.0,), (0.9,))[0][:, _FEW_RADII]
         weight = np.sqrt(along / along.sum())
         own = profiles[some] * weight
         rings = _shares(own, templates, weight, along).max(axis=1)
         discs = _shares(own, _discs(step)[:, _FEW_RADII], weight, along, 1).max(axis=1)
-        explained[some] = np.where(rings > discs, rings, 0.0)
-    return explained
+        share[some] = np.where(rings > discs, rings, 0.0)
+    return share
 
 
 def _by_size(frames: np.ndarray) -> list[tuple[int, np.ndarray]]:
@@ -249,18 +255,18 @@ def identify(
     )
     count = ids.shape[1]
     every = align(gray, starts.reshape(-1, 3, 3), ids.ravel(), shift.ravel(), family, prior)
+    independent = frame.mean_radii(starts[:, 0]) * np.ptp(_PROFILE) / _INDEPENDENT
     left = np.where(every.colour == polarity, every.left, 0.0).reshape(-1, count)
-    best = every.select(np.arange(len(ids)) * count + left.argmin(axis=1))
-    others = np.where(ids == best.ids[:, None], np.inf, left).min(axis=1)
-    independent = frame.mean_radii(best.frames) * np.ptp(_PROFILE) / _INDEPENDENT
-    margin = 0.5 * independent * (others - best.left)
-    return replace(best, margin=margin).select(best.colour == polarity)
+    cost = (independent[:, None] * left + prior.squares(every).reshape(-1, count)) / 2
+    best = every.select(np.arange(len(ids)) * count + cost.argmin(axis=1))
+    others = np.where(ids == best.ids[:, None], np.inf, cost).min(axis=1)
+    return replace(best, margin=others - cost.min(axis=1)).select(best.colour == polarity)
 
 
 def _likely_ids(
     gray: np.ndarray, frames: np.ndarray, polarity: int, family: CircleFamily
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return frames (k, n, 3, 3) of the IDs (k, n) that profiles are most like, and their shifts."""
+    """Return frames, (k, n, 3, 3), of IDs that profiles are like, (k, n), and shifts of edges."""
     weight = np.sqrt(_PROFILE / _PROFILE.sum())
     shape = len(_SCALES), len(frames), len(family.numbers)
     shares, shifts = np.empty(shape), np.empty(shape)
@@ -273,6 +279,8 @@ def _likely_ids(
             found = found.reshape(len(some), -1, len(family.numbers))
             share[some], shift[some] = found.max(axis=1), of_shift[found.argmax(axis=1)]
     order = np.argsort(-shares.max(axis=0), axis=1, kind='stable')[:, :_READINGS]
+    # Where narrow and wide rings take turns, growth of the ink makes one word the other.
+    order = np.concatenate([order, family.numbers[-1] - order[:, :1]], axis=1)
     rows = np.arange(len(frames))[:, None]
     scale = shares.argmax(axis=0)[rows, order]
     return scaled[scale, rows], order, shifts[scale, rows, order]
@@ -343,7 +351,7 @@ def _aligned(
         np.sign(rays.step) == np.sign(np.median(rays.step, axis=1))[:, None]
     )
     good = np.where(agreeing, 1.0, 1e-3)
-    explained = 1 - (good * left).sum(axis=1) / np.maximum((good * shown).sum(axis=1), 1e-9)
+    rest = np.log(np.maximum(left, 1e-6) / np.maximum(shown, 1e-6))
     return Aligned(
         frames=frames,
         ids=ids,
@@ -352,8 +360,8 @@ def _aligned(
         blur=blur,
         colour=-np.sign(np.median(rays.step, axis=1)),
         rays=agreeing.mean(axis=1),
-        explained=explained,
-        left=np.log(np.maximum(left, 1e-6) / np.maximum(shown, 1e-6)).mean(axis=1),
+        clear=np.quantile(rest, _CLEAREST, axis=1),
+        left=rest.mean(axis=1),
         plain=_plain(values, good, ink, blur / frame.mean_radii(frames)),
         margin=np.full(count, np.nan),
     )
