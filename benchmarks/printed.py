@@ -31,7 +31,14 @@ from benchmarks.speed import seconds
 SCALE = 8.0
 """Pixels of a rendered page in a millimetre."""
 
-RADII = {'ring': '1mm', 'gsi': '0.5mm', 'dots': '1.25mm', 'aruco': '1.5mm', 'apriltag': '1.5mm'}
+RADII = {
+    'ring': '1mm',
+    'gsi': '0.5mm',
+    'dots': '1.25mm',
+    'cctag': '2mm',
+    'aruco': '1.5mm',
+    'apriltag': '1.5mm',
+}
 """Radius of the dots of each kind of families."""
 
 LARGER = {('metashape20', 'bright'): '1.5mm'}

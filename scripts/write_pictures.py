@@ -67,6 +67,7 @@ FAMILIES = {
     'cct12': 71,
     'gsi': 18,
     'dots': 23,
+    'cctag3': 9,
     'aruco_4x4_50': 7,
     'apriltag_36h11': 7,
 }

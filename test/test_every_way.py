@@ -57,7 +57,7 @@ class Case:
 
 
 CASES = (
-    *(Case(family) for family in (*VENDOR_NAMES, 'cct12', 'gsi', 'dots')),
+    *(Case(family) for family in (*VENDOR_NAMES, 'cct12', 'gsi', 'dots', 'cctag3')),
     *(Case(family) for family in SQUARES),
     *(Case(families) for families in (BOTH, 'auto')),
     Case(detector='traditional', light='stripe', expected_targets=3),

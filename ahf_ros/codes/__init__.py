@@ -33,5 +33,8 @@ ARUCO_NAMES = (
 APRILTAG_NAMES = ('apriltag_16h5', 'apriltag_25h9', 'apriltag_36h10', 'apriltag_36h11')
 """Families of AprilTag."""
 
+CCTAG_NAMES = ('cctag3', 'cctag4')
+"""Families of CCTag, by the number of their black rings."""
+
 SQUARE_NAMES = (*ARUCO_NAMES, *APRILTAG_NAMES)
 """All families of square markers."""

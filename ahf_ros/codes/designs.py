@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ahf_ros.codes.cctag import CircleFamily
 from ahf_ros.codes.dots import DotFamily
 from ahf_ros.codes.families import FAMILY_NAMES, code_family
 from ahf_ros.codes.gsi import PointFamily
@@ -23,6 +24,7 @@ HALF_SIDE = 2.4
 _WIDER = 1.2  # times the reach of a ring target
 _QUIET_ZONE = 4.2  # of ring targets and square markers at least: that of a band up to 3.5
 _MARGIN = 1.0  # about the outermost dot or border of the other families, in radii of the dot
+_CCTAG_ZONE = 1.5  # of CCTags, in radii of the outermost circle, which is their dot
 
 Point = tuple[float, float]
 
@@ -80,6 +82,8 @@ def proportions(name: str, file: str = '') -> Proportions:
         reach, radii = HALF_SIDE * 2**0.5, {'half_side': HALF_SIDE}
         return Proportions(reach=reach, radius=HALF_SIDE, quiet_zone=_QUIET_ZONE, radii=radii)
     code, radius, radii = code_family(name, file), 1.0, {'dot': 1.0}
+    if isinstance(code, CircleFamily):
+        return Proportions(reach=1.0, radius=radius, quiet_zone=_CCTAG_ZONE, radii=radii)
     pinhole, polarity = 0.0, 'dark'
     if isinstance(code, Family):
         radii |= {'band_inner': code.band_inner, 'band_outer': code.band_outer}
@@ -119,8 +123,8 @@ def printed_design(name: str, number: int, pinhole: float, file: str = '') -> Pr
     """Return the print of the target of a family with an ID; `file` is as for `code_family`.
 
     `pinhole` is the radius of the hole in the centre of the dot, in radii of the dot, 0 for none;
-    square markers and point-distributed targets have none. Raise a ValueError if the family has no
-    such ID, too.
+    square markers, point-distributed targets and CCTags have none. Raise a ValueError if the
+    family has no such ID, too.
 
     Examples
     --------
@@ -133,6 +137,9 @@ def printed_design(name: str, number: int, pinhole: float, file: str = '') -> Pr
     word = code.word(number)
     if isinstance(code, PointFamily):
         return PrintedDesign(code=word, contours=tuple(_point_contours(code, word)))
+    if isinstance(code, CircleFamily):
+        radii = code.radii(np.array([word]))[0].tolist()
+        return PrintedDesign(code=word, contours=tuple(map(circle, radii)))
     centre = [circle(1.0)] + [circle(pinhole)] * (pinhole > 0)
     if isinstance(code, Family):
         return PrintedDesign(code=word, contours=(*centre, *_band_contours(code, word)))

@@ -13,10 +13,18 @@ from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from ahf_ros.codes import APRILTAG_NAMES, ARUCO_NAMES, RING_NAMES, SQUARE_NAMES, VENDOR_NAMES
+from ahf_ros.codes import (
+    APRILTAG_NAMES,
+    ARUCO_NAMES,
+    CCTAG_NAMES,
+    RING_NAMES,
+    SQUARE_NAMES,
+    VENDOR_NAMES,
+)
 from ahf_ros.codes.kept import kept_while_unchanged
 
 if TYPE_CHECKING:
+    from ahf_ros.codes.cctag import CircleFamily
     from ahf_ros.codes.dots import DotFamily
     from ahf_ros.codes.gsi import PointFamily
     from ahf_ros.codes.ring import Family
@@ -27,6 +35,7 @@ KINDS: dict[str, tuple[str, ...]] = {
     'apriltag': APRILTAG_NAMES,
     'gsi': ('gsi',),
     'dots': ('dots',),
+    'cctag': CCTAG_NAMES,
 }
 """The families of each kind."""
 
@@ -46,7 +55,7 @@ ACCEPTED = (
 ONE = f'one of {", ".join(FAMILY_NAMES)}, or the family of a family_file'
 """The same where it is a single family."""
 
-Code = TypeVar('Code', 'Family', 'DotFamily', 'PointFamily')
+Code = TypeVar('Code', 'Family', 'DotFamily', 'PointFamily', 'CircleFamily')
 """The codes of families of one kind."""
 
 _ENDINGS = '.yaml', '.yml', '.json'  # of data files
@@ -128,15 +137,17 @@ def kind_of(name: str, files: str = '') -> str:
     return families_of(files)[name].kind
 
 
-def code_family(name: str, files: str = '') -> Family | DotFamily | PointFamily:
+def code_family(name: str, files: str = '') -> Family | DotFamily | PointFamily | CircleFamily:
     """Return the codes and the proportions of a family that is not of square markers.
 
     `files` are data files, separated by commas: of families of their own names, or of `gsi` and
     `dots` in the place of the usual design. Raise a ValueError if there is no such family, or a
     data file is not accepted.
     """
-    from ahf_ros.codes import dots, gsi, ring
+    from ahf_ros.codes import cctag, dots, gsi, ring
 
+    if name in CCTAG_NAMES:
+        return cctag.circle_family(name)
     if files and name not in RING_NAMES:
         own = families_of(files)
         for code in own.values():
@@ -173,7 +184,7 @@ def families_of(files: str) -> dict[str, Family | DotFamily | PointFamily]:
     found: dict[str, Family | DotFamily | PointFamily] = {}
     for path in (part.strip() for part in files.split(',')):
         code = _described(path)
-        if code.name in (*RING_NAMES, *SQUARE_NAMES, *found):
+        if code.name in (*RING_NAMES, *SQUARE_NAMES, *CCTAG_NAMES, *found):
             from ahf_ros.codes.data_file import read_data_file
 
             name = dict(read_data_file(path).items())['family']

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ahf_ros.codes.cctag import CircleFamily
 from ahf_ros.codes.cyclic import CyclicFamily, mirrored_words, rotated_words
 from ahf_ros.codes.dots import DotFamily
 from ahf_ros.codes.families import code_family
@@ -144,7 +145,7 @@ def _orbits(name: str, ids: np.ndarray, file: str) -> np.ndarray:
         return orbits
     code = code_family(name, file)
     words = np.array([code.word(number) for number in ids.tolist()])
-    if isinstance(code, PointFamily):
+    if isinstance(code, (PointFamily, CircleFamily)):
         return words[:, None].astype(np.uint64)
     turned = [rotated_words(words, turn, code.bits) for turn in range(code.bits)]
     if isinstance(code, DotFamily):

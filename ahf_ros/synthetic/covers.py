@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from ahf_ros.codes.cctag import CircleFamily
 from ahf_ros.codes.designs import HALF_SIDE, proportions
 from ahf_ros.codes.dots import DotFamily
 from ahf_ros.codes.families import code_family
@@ -57,7 +58,7 @@ def design(
         sector or a cell.
     pinhole : float
         Radius of the hole in the centre of the dot, in radii of the dot; 0 for none. Square
-        markers and point-distributed targets have none.
+        markers, point-distributed targets and CCTags have none.
     """
     if name in SQUARE_NAMES:
         word, cover = number, square_cover(name, number, HALF_SIDE, turn, growth)
@@ -66,6 +67,8 @@ def design(
         word = code.word(number)
         if isinstance(code, PointFamily):
             cover = _point_cover(code, word, turn, growth)
+        elif isinstance(code, CircleFamily):
+            cover = _circles_cover(code, word, growth)
         elif isinstance(code, DotFamily):
             cover = _dot_ring_cover(code, word, turn, pinhole, growth)
         else:
@@ -157,6 +160,22 @@ def _dot_ring_cover(
         border *= _inside_share(outer - distance, width)
         inked += border
         return _with_dots(inked, x, y, places, radii, jacobian)
+
+    return cover
+
+
+def _circles_cover(family: CircleFamily, word: int, growth: float) -> Cover:
+    """Return the ink of a CCTag."""
+    radii = family.radii(np.array([word]))[0].tolist()
+
+    def cover(x: np.ndarray, y: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
+        distance = np.sqrt(x * x + y * y)
+        width = _edge_width(jacobian, x, y, distance)
+        inked = np.zeros_like(distance)
+        for index, radius in enumerate(radii):
+            sign = -1 if index % 2 else 1
+            inked += sign * _inside_share(np.float32(radius + sign * growth) - distance, width)
+        return inked
 
     return cover
 

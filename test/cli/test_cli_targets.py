@@ -18,7 +18,7 @@ from support.disk import room_for
 pytest.importorskip('reportlab', reason='PDF files are written by reportlab')
 pypdfium2 = pytest.importorskip('pypdfium2', reason='PDF files are rendered by pypdfium2')
 
-ROUND = (*VENDOR_NAMES, 'cct12', 'gsi', 'dots')
+ROUND = (*VENDOR_NAMES, 'cct12', 'gsi', 'dots', 'cctag3', 'cctag4')
 PER_FAMILY = 12
 
 

@@ -16,7 +16,7 @@ from ahf_ros.codes.families import numbers_of
 from ahf_ros.synthetic.covers import design
 from support.square_markers import needs_square_markers
 
-ROUND = ('metashape12', 'metashape20', 'aicon14', 'gsi', 'dots')
+ROUND = ('metashape12', 'metashape20', 'aicon14', 'gsi', 'dots', 'cctag4')
 SQUARE = ('aruco_4x4_50', 'aruco_original', 'apriltag_25h9')
 SHARP = np.eye(2, dtype=np.float32) * np.float32(0.01)
 

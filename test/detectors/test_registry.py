@@ -32,6 +32,7 @@ from support.packages import EXAMPLE, write_package
 from support.square_markers import needs_square_markers
 
 RAMP = np.arange(60, dtype=np.uint8) + np.zeros((20, 1), np.uint8)
+OWN = {'gsi': 'gsi', 'dots': 'dots', 'cctag': 'cctag3'}
 SQUARES = {
     'aruco': 'aruco_4x4_50',
     'apriltag': 'apriltag_36h11',
@@ -48,7 +49,9 @@ ALL = [
 def made(name: str) -> Detector:
     """Return a detector of a family that it identifies."""
     kind = name.partition('_')[0]
-    family = SQUARES.get(name) or (kind if kind in ('gsi', 'dots') else 'metashape12')
+    family = SQUARES.get(name) or (
+        kind if kind in ('gsi', 'dots') else OWN.get(kind, 'metashape12')
+    )
     detector = create_detector(name, family=family, command='program')
     assert (detector.name, detector.family) == (name, family)
     return detector
@@ -73,7 +76,8 @@ def test_every_detector_is_called_as_registered_and_refuses_what_is_no_image(nam
 def test_every_family_chooses_a_detector():
     for family in FAMILY_NAMES:
         kind = family.partition('_')[0]
-        name = kind if kind in ('aruco', 'apriltag', 'gsi', 'dots') else 'ring'
+        kind = kind.rstrip('34') if kind in ('cctag3', 'cctag4') else kind
+        name = kind if kind in ('aruco', 'apriltag', 'gsi', 'dots', 'cctag') else 'ring'
         assert detector_name('auto', family) == name
 
 

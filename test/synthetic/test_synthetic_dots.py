@@ -23,7 +23,7 @@ from support.square_markers import needs_square_markers
 GSI, DOTS = point_family(), dot_family()
 NUMBER = 18
 STEP = 0.015  # of the samples, radii of the dot
-ROUND = ('metashape12', 'metashape20', 'aicon14', 'gsi', 'dots')
+ROUND = ('metashape12', 'metashape20', 'aicon14', 'gsi', 'dots', 'cctag3')
 
 
 def camera(tilt: float = 0.0) -> Camera:

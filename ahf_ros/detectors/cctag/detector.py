@@ -1,0 +1,133 @@
+"""Identification of CCTags by the profile of their rings.
+
+Blur makes narrow rings gray, so that the outermost circle has half the contrast of a dot: the
+logarithm of the image is doubled, and dots are found as all dots are. Any of the circles may be
+found. A glance at the mean profile along the radius drops what does not look like rings. About
+what is left, the rings of several IDs are brought onto the image, and the best ones are reported.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from ahf_ros.blas import one_blas_thread
+from ahf_ros.codes.cctag import CircleFamily
+from ahf_ros.detectors.cctag.rings import Aligned, Prior, align, identify, likely_rings
+from ahf_ros.detectors.claims import best_targets
+from ahf_ros.detectors.contract import FamilyDetector, moved_targets
+from ahf_ros.features import frame
+from ahf_ros.features.dot_search import voted_dots, whole_dots
+from ahf_ros.features.dots import Dots
+from ahf_ros.features.ellipse_targets import ellipse_fields, targets_from_frames
+from ahf_ros.features.large_targets import targets_of_octaves
+from ahf_ros.features.log_edges import find_edges
+from ahf_ros.features.pyramid import ImagePyramid, Octave, image_pyramid
+from ahf_ros.imaging.image import as_gray, check_image
+from ahf_ros.target import UNDECODED, Target, sorted_targets
+
+_GAIN = 2  # of ln I, for circles that blur makes gray
+_INNERMOST = 0.25  # of the radii of circles that are looked for
+_TELLING = 0.98  # confidence of targets that tell of others
+_CERTAIN = 0.75  # confidence from which a target is reported
+_SURE_OF_TARGET = 0.9  # probability of a target, from which it is reported without its ID
+_PLAUSIBLE = 0.6  # share of rays that agree, of a target that is measured again
+_MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE = 1.0, 0.1  # that a centre is moved: px, radii
+
+
+@dataclass(frozen=True, slots=True)
+class CctagDetector(FamilyDetector):
+    """Identify CCTags."""
+
+    name: ClassVar[str] = 'cctag'
+
+    @property
+    def design(self) -> CircleFamily:
+        """Printed design of the family."""
+        return self.settings.codes(CircleFamily)[0]
+
+    @one_blas_thread()
+    def __call__(self, image: np.ndarray) -> list[Target]:
+        """Identify the targets of one image; see `Detector`."""
+        check_image(image)
+        pyramid = image_pyramid(as_gray(image), self.settings.max_radius)
+        found = targets_of_octaves(pyramid, self.settings.radii, self._identify, self.refine)
+        return sorted_targets(best_targets(found, 1.0))
+
+    @one_blas_thread()
+    def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
+        """Return targets with the places that their rings have in an image; see `Refiner`.
+
+        Targets that are not decoded, and those whose rings are not found near to where they should
+        be, stay as they are.
+        """
+        check_image(image)
+        known = [target for target in targets if target.id != UNDECODED]
+        if not known:
+            return list(targets)
+        gray = as_gray(image).astype(np.float32, copy=False)
+        columns = [(it.x, it.y, it.semi_major, it.semi_minor, it.angle) for it in known]
+        start = frame.affine_frames(*np.array(columns).T)
+        shift = np.array([target.edge_shift or 0.0 for target in known])
+        of = align(gray, start, np.array([it.id for it in known]), shift, self.design)
+        moved = np.hypot(*(of.frames[:, :2, 2] - start[:, :2, 2]).T)
+        reach = np.maximum(_MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE * frame.mean_radii(start))
+        places = ellipse_fields(of.frames, of.covariance, of.edge_shift)
+        return moved_targets(targets, known, places, (moved <= reach) & (of.rays >= _PLAUSIBLE))
+
+    def _identify(self, octave: Octave) -> list[Target]:
+        """Return the targets of an octave, in its pixels."""
+        gray = octave.pyramid.gray
+        found = []
+        for polarity in self.settings.polarities:
+            circles = _circles(octave, polarity)
+            frames = likely_rings(gray, circles, octave.radii, polarity, self.design)
+            found.append(_identified(gray, frames, polarity, self.design))
+        rings = Aligned.joined(found)
+        decoded = rings.confidence >= _CERTAIN
+        shown = decoded | (self.settings.report_undecoded & (rings.of_target >= _SURE_OF_TARGET))
+        rings, decoded = rings.select(shown), decoded[shown]
+        ids = np.where(decoded, rings.ids, UNDECODED)
+        certainty = np.where(decoded, rings.confidence, 0.0)
+        return targets_from_frames(
+            *(rings.frames, rings.covariance, ids, rings.ids, certainty),
+            *(self.design.name, rings.edge_shift),
+        )
+
+
+def _identified(
+    gray: np.ndarray, frames: np.ndarray, polarity: int, family: CircleFamily
+) -> Aligned:
+    """Return the readings of targets of one colour, doubtful ones with what certain ones show."""
+    rings = identify(gray, frames, polarity, family)
+    certain = rings.confidence >= _TELLING
+    doubtful = rings.select(~certain)
+    again = identify(gray, doubtful.frames, polarity, family, Prior.after(rings.select(certain)))
+    return Aligned.joined([rings.select(certain), again])
+
+
+def _circles(octave: Octave, polarity: int) -> Dots:
+    """Return dots that may be circles of targets of one colour, in px of an octave."""
+    low, high = octave.radii
+    pyramid = _doubled(octave.pyramid)
+    found = [
+        search(pyramid, max(low * least, 2.0), high, (sign,))
+        for sign, least in ((polarity, 1.0), (-polarity, _INNERMOST))
+        for search in (whole_dots, voted_dots)
+    ]
+    if len(pyramid.halves) > 1:
+        gray, *halves = pyramid.halves
+        half = ImagePyramid(gray, tuple(halves), pyramid.logs[1:], pyramid.edges[1:])
+        dots = voted_dots(half, max(low / 2, 2.0), high / 2, (polarity,))
+        found.append(replace(dots, frames=frame.enlarged(dots.frames, 1)))
+    return Dots.joined(found)
+
+
+def _doubled(pyramid: ImagePyramid) -> ImagePyramid:
+    """Return a pyramid with twice the contrast of ln I."""
+    logs = tuple(_GAIN * log for log in pyramid.logs)
+    edges = tuple(find_edges(log) for log in logs[1:])
+    return replace(pyramid, logs=logs, edges=edges)

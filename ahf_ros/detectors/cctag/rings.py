@@ -1,0 +1,490 @@
+"""The rings of CCTags: a glance at profiles, and rings that are brought onto the image.
+
+Neighbouring circles are too close for their edges to be measured one by one. So all gray values
+about a centre are compared with the rings of an ID at once. Each ray has its own light, so that
+its values are a linear function of the ink, which is that of sharp rings under a normal blur.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import product
+
+import numpy as np
+
+from ahf_ros.codes.cctag import CircleFamily
+from ahf_ros.features import frame
+from ahf_ros.features.array_record import ArrayRecord
+from ahf_ros.features.dots import Dots
+from ahf_ros.features.logistic import logistic
+from ahf_ros.features.robust import NORMAL, geman_mcclure
+from ahf_ros.features.sampling import sample_circles
+
+_RAYS = 64
+_ANGLES = 2 * np.pi * np.arange(_RAYS) / _RAYS
+_PROFILE = np.linspace(0.06, 1.3, 72)  # radii at which rays are read
+_AROUND = np.zeros((_RAYS, 5, 9))  # what each change does to the ink on rays, by powers of radii
+_AROUND[:, [0, 0, 1, 1, 1, 2, 2], range(7)] = -frame.displacement_basis(_ANGLES, np.ones(_RAYS))
+_AROUND[:, [3, 4], [7, 8]] = 1.0
+_FEW_ANGLES, _FEW_RADII = _ANGLES[::2], slice(None, None, 2)  # of a glance
+_SIZES = 1.05  # ratio of radii that share templates, and of hypotheses of the radius
+_SHIFTS, _BLURS = (-0.6, -0.3, 0.0, 0.3, 0.6), (0.6, 0.9, 1.4)  # of edges, that are tried, px
+_GROWN = (0.85, 0.9, 0.95, 1.0, 1.05)  # radii of the outermost circle, where that was found
+_PROMISING = 0.6  # share of a profile that rings explain, from which they are looked at
+_APART = 0.5  # distance of the centres of different targets, radii
+_PART = 2048, 48  # hypotheses and targets at a time, which bounds the memory
+_ENOUGH = 4  # certain targets, that tell of the edges of an image
+_SCALES = (0.93, 0.965, 1.0, 1.035, 1.07)  # of the radius, about a frame
+_READINGS = 5  # IDs that are brought onto the image from a frame
+_ROUNDS = 5  # of Gauss-Newton
+_OUTLIER = 3.0  # standard deviations, that quarter the weight of a gray value
+_QUIET = 0.35  # quantile of rays, whose errors are usual
+_LEAST = 0.003  # standard deviation of gray values, of their mean
+_OTHER_CONTRAST = 0.2  # difference of the contrast of a ray, that quarters its weight
+_MAXIMUM_CHANGE = 0.08  # of a frame in a round, radii
+_PRIOR_PERSPECTIVE = 5e-4  # change of scale in a radius, for a px of the radius
+_OF_VARIANCE = 2.0  # of gray values, that their model adds
+_SHARPEST, _SOFTEST = 0.35, 1.5  # blur: px, and in narrow rings, which more of it would hide
+_MOST_SHIFT = 0.45  # of edges, in narrow rings
+_INDEPENDENT = 1.5  # distance of independent readings along a profile, px
+_SYSTEMATIC = 0.004  # standard deviation of what pixels and interpolation do to a centre, px
+_CLEAREST = 0.2  # share of rays
+_AGREEING = 0.5  # share of what a ray shows, that the rings explain
+_OF_TARGET = np.array([-15.5, -4.0, 1.2])  # of one, `clear`, `plain`
+_PLAIN = -5.0, 3.0  # beyond which it says no more
+_HOPELESS = -2.0  # plain, from which on other IDs are not tried
+_OF_ID = np.array([-0.9, 2.2])  # of one, margin
+
+
+@dataclass(frozen=True, slots=True)
+class Prior:
+    """What is known of the edges of an image: growth of ink and blur, px.
+
+    The deviations are standard deviations, px and of ln of the blur, which is that of the image
+    with that of pixels and of interpolation.
+    """
+
+    shift: float = 0.0
+    blur: float = 0.85
+    deviations: tuple[float, float] = (0.5, 0.35)
+
+    def squares(self, rings: Aligned) -> np.ndarray:
+        """Return the squares of the distances from what is known, in deviations, shape (k,)."""
+        of_shift, of_blur = self.deviations
+        return ((rings.shift - self.shift) / of_shift) ** 2 + (
+            np.log(rings.blur / self.blur) / of_blur
+        ) ** 2
+
+    @staticmethod
+    def after(rings: Aligned) -> Prior:
+        """Return what certain targets tell of the others."""
+        if len(rings.ids) < _ENOUGH:
+            return Prior()
+        return Prior(float(np.median(rings.shift)), float(np.median(rings.blur)), (0.1, 0.1))
+
+
+_USUAL = Prior()
+
+
+@dataclass(frozen=True, slots=True)
+class Aligned(ArrayRecord):
+    """The rings of k IDs as they are brought onto an image."""
+
+    frames: np.ndarray  # (k, 3, 3), of the outermost circles as printed
+    ids: np.ndarray  # int, (k,)
+    covariance: np.ndarray  # (k, 2, 2), of centres, px^2
+    shift: np.ndarray  # (k,), by which ink has grown, px
+    blur: np.ndarray  # (k,), standard deviation, px
+    colour: np.ndarray  # (k,), 1 where ink is dark, -1 where it is bright
+    rays: np.ndarray  # (k,), share of the rays that show the rings by themselves
+    clear: np.ndarray  # (k,), ln of the share of a ray that is not explained, of clear rays
+    left: np.ndarray  # (k,), ln of the share of a ray that is not explained, on the mean
+    plain: np.ndarray  # (k,), the same of any two edges, less that of the rings
+    margin: np.ndarray  # (k,), ln of the odds against the next ID; NaN before it is known
+
+    @property
+    def edge_shift(self) -> np.ndarray:
+        """By how much what is dark has grown, px, shape (k,)."""
+        return self.shift * self.colour
+
+    @property
+    def of_target(self) -> np.ndarray:
+        """Probability that there is a target, shape (k,)."""
+        return logistic(np.stack([self.clear, np.clip(self.plain, *_PLAIN)], axis=1), _OF_TARGET)
+
+    @property
+    def confidence(self) -> np.ndarray:
+        """Probability that there is a target with the ID, shape (k,)."""
+        return self.of_target * logistic(self.margin[:, None], _OF_ID)
+
+
+NOTHING = Aligned(*(np.zeros((0, 3, 3)), np.zeros(0, int), np.zeros((0, 2, 2)), *np.zeros((8, 0))))
+
+
+def likely_rings(
+    gray: np.ndarray,
+    circles: Dots,
+    radii: tuple[float, float],
+    polarity: int,
+    family: CircleFamily,
+) -> np.ndarray:
+    """Return the frames of outermost circles whose mean profile looks like rings, (k, 3, 3).
+
+    Any circle of a target may be among the circles. The bounds are those of the semi-major axis.
+    """
+    table = family.radii(family.numbers)
+    outer = circles.frames[circles.polarity == polarity]
+    inner = circles.frames[circles.polarity != polarity]
+    low, high = np.log([table[:, 1::2].min(), table[:, 1::2].max()])
+    steps = np.exp(np.arange(low, high, np.log(_SIZES)))
+    found = [frame.scaled(outer, np.full(len(outer), of)) for of in _GROWN]
+    found += [frame.scaled(inner, np.full(len(inner), 1 / of)) for of in steps]
+    frames = np.concatenate(found)
+    major = frame.ellipse_axes(frames)[0]
+    frames = frames[(major >= radii[0]) & (major <= radii[1])]
+    starts = range(0, len(frames), _PART[0])
+    share = np.concatenate(
+        [np.zeros(0)]
+        + [_glance(gray, frames[start : start + _PART[0]], polarity, family) for start in starts]
+    )
+    size, centres = frame.mean_radii(frames), frames[:, :2, 2]
+    kept: list[int] = []
+    for index in np.argsort(-share, kind='stable').tolist():
+        if share[index] < _PROMISING:
+            break
+        away = np.hypot(*(centres[kept] - centres[index]).T)
+        if not (away < _APART * np.maximum(size[kept], size[index])).any():
+            kept.append(index)
+    return frames[kept]
+
+
+def _glance(
+    gray: np.ndarray, frames: np.ndarray, polarity: int, family: CircleFamily
+) -> np.ndarray:
+    """Return the share of the mean profiles of frames that the rings of some ID explain, (k,)."""
+    along = _PROFILE[_FEW_RADII]
+    profiles = _profiles(gray, frames, polarity, _FEW_ANGLES, along)
+    share = np.zeros(len(frames))
+    for step, some in _by_size(frames):
+        templates = _templates(family, step, (0.0,), (0.9,))[0][:, _FEW_RADII]
+        weight = np.sqrt(along / along.sum())
+        own = profiles[some] * weight
+        rings = _shares(own, templates, weight, along).max(axis=1)
+        discs = _shares(own, _discs(step)[:, _FEW_RADII], weight, along, 1).max(axis=1)
+        share[some] = np.where(rings > discs, rings, 0.0)
+    return share
+
+
+def _by_size(frames: np.ndarray) -> list[tuple[int, np.ndarray]]:
+    """Return steps of the radius, and the indices of the frames that have it."""
+    size = np.maximum(frame.mean_radii(frames), 1.0)
+    steps = np.rint(np.log(size) / np.log(_SIZES)).astype(int)
+    return [(step, np.flatnonzero(steps == step)) for step in np.unique(steps).tolist()]
+
+
+def _profiles(
+    gray: np.ndarray, frames: np.ndarray, polarity: int, angles: np.ndarray, along: np.ndarray
+) -> np.ndarray:
+    """Return the mean profiles of rays, each in its own light, ink downwards, shape (k, n)."""
+    values = np.maximum(sample_circles(gray, frames, angles, along), 0)
+    values /= np.maximum(values.mean(axis=2, keepdims=True), 1)
+    means: np.ndarray = polarity * values.mean(axis=1, dtype=np.float64)
+    return means
+
+
+def _shares(
+    profiles: np.ndarray,
+    templates: np.ndarray,
+    weight: np.ndarray,
+    along: np.ndarray,
+    colours: int = -1,
+) -> np.ndarray:
+    """Return the shares of weighted profiles (k, n) that templates (t, n) explain, (k, t)."""
+    line, _ = np.linalg.qr(np.stack([weight, along * weight], axis=1))
+    profiles, inks = (of - (of @ line) @ line.T for of in (profiles, templates * weight))
+    inks /= np.linalg.norm(inks, axis=1, keepdims=True)
+    total = np.maximum((profiles**2).sum(axis=1, keepdims=True), 1e-9)
+    product = profiles @ inks.T
+    shares: np.ndarray = (np.minimum(product, 0) if colours < 0 else product) ** 2 / total
+    return shares
+
+
+@lru_cache(maxsize=256)
+def _templates(
+    family: CircleFamily, step: int, shifts: tuple[float, ...], blurs: tuple[float, ...]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the ink of all IDs under shifts and blurs, shape (t, n), and the shift of each."""
+    size, ids = _SIZES**step, family.numbers
+    most = _MOST_SHIFT * family.narrow * size
+    edges = [of for of in product(shifts, blurs) if abs(of[0]) <= most]
+    inks = [
+        _rings(family, ids, *(np.full(len(ids), of) for of in (size, shift, blur)))[0]
+        for shift, blur in edges
+    ]
+    return np.concatenate(inks), np.array([shift for shift, _ in edges])
+
+
+@lru_cache(maxsize=64)
+def _discs(step: int) -> np.ndarray:
+    """Return the profiles of single discs of all radii, shape (t, n)."""
+    radii = np.linspace(_PROFILE[0], _PROFILE[-1], 100)[3:-3, None]
+    return _normal_share((radii - _PROFILE) * _SIZES**step / 0.9)
+
+
+def identify(
+    gray: np.ndarray,
+    frames: np.ndarray,
+    polarity: int,
+    family: CircleFamily,
+    prior: Prior = _USUAL,
+) -> Aligned:
+    """Return the best reading of each target about outermost circles, known to about a tenth."""
+    if not len(frames):
+        return NOTHING
+    starts, ids, shift = _likely_ids(gray, frames, polarity, family)
+    # The likeliest ID often brings the frame to its place even if it is the wrong one.
+    first = align(gray, starts[:, 0], ids[:, 0], shift[:, 0], family, prior)
+    likely = first.plain > _HOPELESS
+    if not likely.any():
+        return NOTHING
+    again = _likely_ids(gray, first.frames[likely], polarity, family)
+    starts, ids, shift = (
+        np.concatenate([of[likely], more], axis=1)
+        for of, more in zip((starts, ids, shift), again, strict=True)
+    )
+    count = ids.shape[1]
+    every = align(gray, starts.reshape(-1, 3, 3), ids.ravel(), shift.ravel(), family, prior)
+    independent = frame.mean_radii(starts[:, 0]) * np.ptp(_PROFILE) / _INDEPENDENT
+    left = np.where(every.colour == polarity, every.left, 0.0).reshape(-1, count)
+    cost = (independent[:, None] * left + prior.squares(every).reshape(-1, count)) / 2
+    best = every.select(np.arange(len(ids)) * count + cost.argmin(axis=1))
+    others = np.where(ids == best.ids[:, None], np.inf, cost).min(axis=1)
+    return replace(best, margin=others - cost.min(axis=1)).select(best.colour == polarity)
+
+
+def _likely_ids(
+    gray: np.ndarray, frames: np.ndarray, polarity: int, family: CircleFamily
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return frames, (k, n, 3, 3), of IDs that profiles are like, (k, n), and shifts of edges."""
+    weight = np.sqrt(_PROFILE / _PROFILE.sum())
+    shape = len(_SCALES), len(frames), len(family.numbers)
+    shares, shifts = np.empty(shape), np.empty(shape)
+    scaled = np.stack([frame.scaled(frames, np.full(len(frames), of)) for of in _SCALES])
+    for of_scale, share, shift in zip(scaled, shares, shifts, strict=True):
+        profiles = _profiles(gray, of_scale, polarity, _ANGLES, _PROFILE) * weight
+        for step, some in _by_size(of_scale):
+            templates, of_shift = _templates(family, step, _SHIFTS, _BLURS)
+            found = _shares(profiles[some], templates, weight, _PROFILE)
+            found = found.reshape(len(some), -1, len(family.numbers))
+            share[some], shift[some] = found.max(axis=1), of_shift[found.argmax(axis=1)]
+    order = np.argsort(-shares.max(axis=0), axis=1, kind='stable')[:, :_READINGS]
+    # Where narrow and wide rings take turns, growth of the ink makes one word the other.
+    order = np.concatenate([order, family.numbers[-1] - order[:, :1]], axis=1)
+    rows = np.arange(len(frames))[:, None]
+    scale = shares.argmax(axis=0)[rows, order]
+    return scaled[scale, rows], order, shifts[scale, rows, order]
+
+
+def align(
+    gray: np.ndarray,
+    frames: np.ndarray,
+    ids: np.ndarray,
+    shift: np.ndarray,
+    family: CircleFamily,
+    prior: Prior = _USUAL,
+) -> Aligned:
+    """Bring the rings of IDs (k,) onto an image from frames (k, 3, 3), known to about a tenth.
+
+    `shift`, shape (k,), is the growth of ink to begin with, px.
+    """
+    parts = [slice(start, start + _PART[1]) for start in range(0, len(frames), _PART[1])]
+    return Aligned.joined(
+        [_aligned(gray, frames[part], ids[part], shift[part], family, prior) for part in parts]
+    )
+
+
+def _aligned(
+    gray: np.ndarray,
+    frames: np.ndarray,
+    ids: np.ndarray,
+    shift: np.ndarray,
+    family: CircleFamily,
+    prior: Prior,
+) -> Aligned:
+    """Return what `align` does, by Gauss-Newton with robust weights."""
+    count = len(frames)
+    blur = np.full(count, prior.blur)
+    for _ in range(_ROUNDS):
+        size = frame.mean_radii(frames)
+        values = _lit(gray, frames)
+        ink, slope, by_shift, by_blur = _rings(family, ids, size, shift, blur)
+        rays = _robust_rays(values, ink)
+        by_radius = [slope, slope * _PROFILE, slope * _PROFILE**2]
+        normal, right = rays.equations(np.stack([*by_radius, by_shift, by_blur], axis=1), ink)
+        variance = (rays.weight * rays.errors**2).sum(axis=(1, 2)) / rays.weight.sum(axis=(1, 2))
+        area = size**2 * (_PROFILE[1] - _PROFILE[0]) * (_ANGLES[1] - _ANGLES[0])
+        each = np.minimum(area, 1.0) / variance / _OF_VARIANCE  # pixels are independent
+        normal, right = normal * each[:, None, None], right * each[:, None]
+        normal[:, range(5), range(5)] += 1e-6
+        normal[:, [5, 6], [5, 6]] += ((_PRIOR_PERSPECTIVE * size) ** -2)[:, None]
+        normal[:, [7, 8], [7, 8]] += np.array(prior.deviations) ** -2
+        known = np.stack([shift - prior.shift, np.log(blur / prior.blur)], axis=1)
+        right[:, 7:] -= known * np.array(prior.deviations) ** -2
+        change = np.linalg.solve(normal, right[..., None])[..., 0]
+        limit = np.concatenate([np.full(7, _MAXIMUM_CHANGE), [0.3, 0.3]])
+        change = np.clip(change, -limit, limit)
+        frames = frame.moved(frames, change[:, :7])
+        narrow = family.narrow * size
+        shift = np.clip(shift + change[:, 7], -_MOST_SHIFT * narrow, _MOST_SHIFT * narrow)
+        blur = np.clip(
+            blur * np.exp(change[:, 8]), _SHARPEST, np.maximum(_SOFTEST * narrow, _SHARPEST)
+        )
+    covariance = np.linalg.inv(normal)[:, :2, :2]
+    affine = frame.local_affine(frames)
+    covariance = affine @ covariance @ affine.transpose(0, 2, 1) + _SYSTEMATIC**2 * np.eye(2)
+    values = _lit(gray, frames)
+    ink = _rings(family, ids, frame.mean_radii(frames), shift, blur)[0]
+    rays = _Rays.of(values, ink, np.broadcast_to(_PROFILE, values.shape))
+    left, shown = ((_PROFILE * of**2).sum(axis=2) for of in (rays.errors, rays.deviations(values)))
+    agreeing = (left < (1 - _AGREEING) * shown) & (
+        np.sign(rays.step) == np.sign(np.median(rays.step, axis=1))[:, None]
+    )
+    good = np.where(agreeing, 1.0, 1e-3)
+    rest = np.log(np.maximum(left, 1e-6) / np.maximum(shown, 1e-6))
+    return Aligned(
+        frames=frames,
+        ids=ids,
+        covariance=covariance,
+        shift=shift,
+        blur=blur,
+        colour=-np.sign(np.median(rays.step, axis=1)),
+        rays=agreeing.mean(axis=1),
+        clear=np.quantile(rest, _CLEAREST, axis=1),
+        left=rest.mean(axis=1),
+        plain=_plain(values, good, ink, blur / frame.mean_radii(frames)),
+        margin=np.full(count, np.nan),
+    )
+
+
+def _plain(values: np.ndarray, good: np.ndarray, ink: np.ndarray, blur: np.ndarray) -> np.ndarray:
+    """Return by how much better rings explain a profile than two edges of any height do, (k,).
+
+    It is the difference of ln of what is left of the mean of the good rays, shape (k, rays). The
+    blur is in radii.
+    """
+    weight = np.sqrt(_PROFILE / _PROFILE.sum())
+    line, _ = np.linalg.qr(np.stack([weight, _PROFILE * weight], axis=1))
+    profiles = (good[..., None] * values).sum(axis=1) / good.sum(axis=1)[:, None] * weight
+    edges = np.linspace(_PROFILE[0], _PROFILE[-1], 66)[3:-3, None]
+    found = np.empty(len(values))
+    for index, (profile, rings) in enumerate(zip(profiles, ink * weight, strict=True)):
+        steps = _normal_share((edges - _PROFILE) / blur[index]) * weight
+        profile, rings, steps = (of - (of @ line) @ line.T for of in (profile, rings, steps))
+        total = profile @ profile
+        steps = steps / np.linalg.norm(steps, axis=1, keepdims=True)
+        along, alike = steps @ profile, steps @ steps.T
+        both = along[:, None] ** 2 + along**2 - 2 * alike * along[:, None] * along
+        shares = both / np.maximum(1 - alike**2, 1e-3) / total
+        share = (rings @ profile) ** 2 / (rings @ rings) / total
+        found[index] = np.log(max(1 - shares.max(), 1e-6) / max(1 - share, 1e-6))
+    return found
+
+
+def _lit(gray: np.ndarray, frames: np.ndarray) -> np.ndarray:
+    """Return the gray values of rays, each in its own light, shape (k, rays, n)."""
+    values = np.maximum(sample_circles(gray, frames, _ANGLES, _PROFILE), 0).astype(np.float64)
+    lit: np.ndarray = values / np.maximum(values.mean(axis=2, keepdims=True), 1)
+    return lit
+
+
+def _robust_rays(values: np.ndarray, ink: np.ndarray) -> _Rays:
+    """Return rays whose weights are low where edges of light disturb them.
+
+    The contrast of ink is the same wherever the light falls.
+    """
+    rays = _Rays.of(values, ink, np.broadcast_to(_PROFILE, values.shape))
+    for _ in range(2):
+        usual = np.median(rays.contrast, axis=1, keepdims=True)
+        alike = geman_mcclure(1.0, (rays.contrast - usual) / (_OTHER_CONTRAST * np.abs(usual)))
+        of_rays = np.median(np.abs(rays.errors), axis=2)
+        spread = NORMAL * np.quantile(of_rays, _QUIET, axis=1)[:, None, None]
+        weight = geman_mcclure(_PROFILE, rays.errors / (_OUTLIER * np.maximum(spread, _LEAST)))
+        rays = _Rays.of(values, ink, weight * alike[..., None])
+    return rays
+
+
+@dataclass(frozen=True, slots=True)
+class _Rays:
+    """Rays as linear functions of ink: values = paper + step ink + errors."""
+
+    weight: np.ndarray  # (k, rays, n)
+    away: np.ndarray  # of the ink, from its mean on the ray, the same shape
+    step: np.ndarray  # (k, rays)
+    errors: np.ndarray
+    contrast: np.ndarray  # of ink, (k, rays), below 0 where it is darker
+
+    @staticmethod
+    def of(values: np.ndarray, ink: np.ndarray, weight: np.ndarray) -> _Rays:
+        """Fit rays to the ink of profiles, shape (k, n)."""
+        total = np.maximum(weight.sum(axis=2), 1e-9)
+        ink = np.broadcast_to(ink[:, None], values.shape)
+        away = ink - ((weight * ink).sum(axis=2) / total)[..., None]
+        mean = ((weight * values).sum(axis=2) / total)[..., None]
+        power = np.maximum((weight * away * away).sum(axis=2), 1e-9)
+        step = (weight * away * values).sum(axis=2) / power
+        paper = mean[..., 0] - step * (weight * ink).sum(axis=2) / total
+        contrast = step / np.maximum(np.maximum(paper, paper + step), 0.1)
+        return _Rays(weight, away, step, values - mean - step[..., None] * away, contrast)
+
+    def deviations(self, values: np.ndarray) -> np.ndarray:
+        """Return the differences of values from the weighted means of their rays."""
+        total = np.maximum(self.weight.sum(axis=2, keepdims=True), 1e-9)
+        away: np.ndarray = values - (self.weight * values).sum(axis=2, keepdims=True) / total
+        return away
+
+    def equations(self, changes: np.ndarray, ink: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the normal equations of the changes of a frame, of shift and of blur.
+
+        What another paper and ink of a ray would explain is left to these. The changes of the ink
+        (k, 5, n) are those by the radius, times its powers 0 to 2, by the shift and by the blur.
+        """
+        basis = np.concatenate([np.ones_like(ink)[:, None], ink[:, None], changes], axis=1)
+        products = (basis[:, :, None] * basis[:, None]).reshape(len(ink), -1, ink.shape[1])
+        moments = self.weight @ products.transpose(0, 2, 1)
+        moments = moments.reshape(*self.step.shape, 7, 7)
+        light = moments[..., :2, :2] + 1e-6 * np.eye(2)
+        mixed = moments[..., 2:, :2]
+        own = moments[..., 2:, 2:] - mixed @ np.linalg.inv(light) @ mixed.swapaxes(2, 3)
+        own *= self.step[..., None, None] ** 2
+        errors = (self.weight * self.errors) @ changes.transpose(0, 2, 1)
+        normal = (_AROUND.swapaxes(1, 2) @ own @ _AROUND).sum(axis=1)
+        right = (self.step[..., None, None] * errors[..., None, :] @ _AROUND).sum(axis=(1, 2))
+        return normal, right
+
+
+def _rings(
+    family: CircleFamily, ids: np.ndarray, size: np.ndarray, shift: np.ndarray, blur: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return the ink of IDs along the profile, shape (k, n), and its derivatives.
+
+    These are by the radius, in radii of the target, by the shift, px, and by ln of the blur.
+    """
+    radii = family.radii(ids)
+    sign = np.where(np.arange(radii.shape[1]) % 2 == 0, 1, -1)[:, None]
+    size, shift, blur = (of[:, None, None] for of in (size, shift, blur))
+    # Blur moves what lies near to the centre outwards, on the mean (Rice).
+    place = np.sqrt(_PROFILE**2 + (blur / size) ** 2)
+    away = (radii[..., None] * size + sign * shift - place * size) / blur
+    ink = (sign * _normal_share(away)).sum(axis=1)
+    density = np.exp(-0.5 * away**2) / np.sqrt(2 * np.pi)
+    slope = -(sign * density * size / blur).sum(axis=1)
+    by_shift = (density / blur).sum(axis=1)
+    by_blur = -(sign * density * away).sum(axis=1)
+    return ink, slope, by_shift, by_blur
+
+
+def _normal_share(x: np.ndarray) -> np.ndarray:
+    """Return the share of a normal distribution below x, to 0.0005 (Page, JRSS C 1977, 26, 75)."""
+    share: np.ndarray = 0.5 * (1 + np.tanh(np.sqrt(2 / np.pi) * (x + 0.044715 * x**3)))
+    return share
