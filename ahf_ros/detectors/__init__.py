@@ -13,7 +13,14 @@ from importlib.metadata import EntryPoint, entry_points
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, NamedTuple
 
-from ahf_ros.codes.families import FAMILY_NAMES, KINDS, check_numbers, families_in, kind_of
+from ahf_ros.codes.families import (
+    AUTO,
+    FAMILY_NAMES,
+    KINDS,
+    check_numbers,
+    families_in,
+    kind_of,
+)
 from ahf_ros.deprecation import deprecated_arguments
 from ahf_ros.detectors.contract import (
     Detector,
@@ -21,6 +28,7 @@ from ahf_ros.detectors.contract import (
     Drafter,
     EarlyStopping,
     Expecting,
+    Narrowing,
     Refiner,
 )
 from ahf_ros.settings.nested import updated
@@ -43,6 +51,7 @@ __all__ = [
     'Drafter',
     'EarlyStopping',
     'Expecting',
+    'Narrowing',
     'Refiner',
     'check_expected_ids',
     'create_detector',
@@ -54,6 +63,7 @@ GROUP = 'ahf_ros.detectors'
 """Group of the entry points by which other packages add detectors."""
 
 _AUTO = 'auto'  # stands for the detector of the family
+_SEVERAL = 'several'  # what that is where no single one reads all families
 
 
 class _Entry(NamedTuple):
@@ -130,6 +140,13 @@ def create_detector(
     name = detector_name(name, settings.family, settings.family_file)
     if name in _ADDED:
         return _added(_ADDED[name], settings)
+    if name == _SEVERAL:
+        from ahf_ros.detectors.several import several_detector
+
+        return several_detector(settings, _groups(settings.families, settings.family_file))
+    families = _families(name, settings.family, settings.family_file)
+    if families != settings.families:
+        settings = settings.narrowed(families)
     made: Detector = resolve_name(f'ahf_ros.{_ENTRIES[name].detector}')(settings)
     return made
 
@@ -137,10 +154,11 @@ def create_detector(
 def detector_name(name: str, family: str, files: str = '') -> str:
     """Return the name of a detector that identifies a family or several, see `families_in`.
 
-    It raises a ValueError if there is no such detector, or it does not identify these families.
+    It is 'several' where each family has its own, and raises a ValueError if there is no such
+    detector, or it does not identify these families.
     """
     DETECTOR.check(name)
-    families = families_in(family, files)
+    families = _families(name, family, files)
     kinds = {kind_of(of, files) for of in families}
     fitting = [
         fit
@@ -148,7 +166,7 @@ def detector_name(name: str, family: str, files: str = '') -> str:
         if kinds <= set(entry.kinds) and (entry.several or len(families) == 1)
     ]
     if name == _AUTO:
-        return fitting[0]
+        return _SEVERAL if fitting[0] == 'command' else fitting[0]
     if name in _ENTRIES and name not in fitting:
         several = ', alone or together' if _ENTRIES[name].several else ''
         raise ValueError(
@@ -157,6 +175,27 @@ def detector_name(name: str, family: str, files: str = '') -> str:
             f'{", ".join(of for kind in _ENTRIES[name].kinds for of in KINDS[kind])}{several}'
         )
     return name
+
+
+def _families(name: str, family: str, files: str) -> tuple[str, ...]:
+    """Return the families that a text names; of all, those of kinds that a detector reads."""
+    families = families_in(family, files)
+    if family != AUTO or name not in _ENTRIES:
+        return families
+    return tuple(of for of in families if kind_of(of, files) in _ENTRIES[name].kinds)
+
+
+def _groups(families: Iterable[str], files: str) -> list[tuple[str, tuple[str, ...]]]:
+    """Return the detectors of families by name, each with as many of them as it reads at once."""
+    groups: list[tuple[str, tuple[str, ...]]] = []
+    together: dict[str, list[str]] = {}
+    for family in families:
+        name = detector_name(_AUTO, family, files)
+        if _ENTRIES[name].several:
+            together.setdefault(name, []).append(family)
+        else:
+            groups.append((name, (family,)))
+    return [*((name, tuple(of)) for name, of in together.items()), *groups]
 
 
 def check_expected_ids(ids: Iterable[int], name: str, settings: DetectorSettings) -> None:
