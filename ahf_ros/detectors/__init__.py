@@ -203,16 +203,17 @@ def check_expected_ids(ids: Iterable[int], name: str, settings: DetectorSettings
 
     Detectors that are no part of this package, also as a command, may report any.
     """
-    if name in _ENTRIES and name != 'command':
+    if name in (_SEVERAL, *_ENTRIES) and name != 'command':
         check_numbers('expected_ids', ids, settings.families, settings.family_file)
 
 
 def estimator(settings: DetectorSettings) -> Callable[[np.ndarray], int]:
-    """Return the function that estimates how many targets an image shows, for rings only.
+    """Return the function that estimates how many targets an image shows, of all the rings.
 
-    It raises a ValueError if targets of the family cannot be counted.
+    It raises a ValueError if there are families whose targets cannot be counted.
     """
-    if detector_name(_AUTO, settings.family, settings.family_file) != 'ring':
+    rings = _families('ring', settings.family, settings.family_file)
+    if any(kind_of(name, settings.family_file) != 'ring' for name in rings):
         raise ValueError(
             f'estimate_expected is True and family is {settings.family!r}; accepted with this '
             f'family is False, and True with one of {", ".join(KINDS["ring"])}'
@@ -221,7 +222,7 @@ def estimator(settings: DetectorSettings) -> Callable[[np.ndarray], int]:
     def count(image: np.ndarray) -> int:
         from ahf_ros.detectors.ring.counting import estimate_count
 
-        return estimate_count(image, settings)
+        return estimate_count(image, settings.narrowed(rings))
 
     return count
 

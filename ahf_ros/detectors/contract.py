@@ -137,8 +137,13 @@ class Expecting(Protocol):
 class Narrowing(Protocol):
     """A detector of many families that can be made to look for some of them only."""
 
+    @property
+    def families(self) -> tuple[str, ...]:
+        """All families, as its targets name them."""
+        ...
+
     def narrowed(self, families: Sequence[str]) -> Detector:
-        """Return a detector of some of the families, as the targets of this one name them."""
+        """Return a detector of some of the families."""
         ...
 
 

@@ -31,17 +31,22 @@ _DIGITS = 2  # of a confidence, beyond which one is not surer than another
 
 @dataclass(frozen=True, slots=True)
 class SeveralDetector:
-    """Identify the targets of several detectors; `families` are those of each."""
+    """Identify the targets of several detectors; `of_parts` are the families of each."""
 
     settings: DetectorSettings
     parts: tuple[Detector, ...]
-    families: tuple[tuple[str, ...], ...]
+    of_parts: tuple[tuple[str, ...], ...]
     name: ClassVar[str] = 'several'
 
     @property
     def family(self) -> str:
         """The families as the settings name them."""
         return self.settings.family
+
+    @property
+    def families(self) -> tuple[str, ...]:
+        """The families one by one."""
+        return self.settings.families
 
     @property
     def patience(self) -> int:
@@ -62,7 +67,7 @@ class SeveralDetector:
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
         """Return targets with the centres that the detectors of their families find."""
         found = list(targets)
-        for part, families in zip(self.parts, self.families, strict=True):
+        for part, families in zip(self.parts, self.of_parts, strict=True):
             which = [index for index, it in enumerate(found) if it.family in families]
             if which and isinstance(part, Refiner):
                 moved = part.refine(image, [found[index] for index in which])
@@ -84,7 +89,7 @@ class SeveralDetector:
         named = [
             (number, target)
             for number, found in enumerate(results)
-            for target in self._named(self.families[number], found)
+            for target in self._named(self.of_parts[number], found)
         ]
         radii = [_radius(target) for _, target in named]
         order = sorted(
