@@ -83,13 +83,13 @@ def create_identifier(
     if isinstance(used, Detector) and listed:
         check_expected_ids(listed, used.name, settings.detection)
     wanted = settings.detection.family
-    if settings.estimate_expected and isinstance(used, Detector) and wanted != AUTO:
-        if used.family != wanted:
-            raise ValueError(
-                f'family is {wanted!r}, accepted with estimate_expected is that of the detector, '
-                f'{used.family!r}'
-            )
-    if isinstance(used, Narrowing) and used.family == AUTO:
+    families = (AUTO, used.family) if isinstance(used, Detector) else (wanted,)
+    if settings.estimate_expected and wanted not in families:
+        raise ValueError(
+            f'family is {wanted!r}, accepted with estimate_expected is that of the detector, '
+            f'{families[-1]!r}'
+        )
+    if isinstance(used, Detector) and isinstance(used, Narrowing) and used.family == AUTO:
         narrowed = partial(_narrowed, used, settings, interrupt)
         return _identifier(
             SettlingIdentifier,
@@ -117,7 +117,7 @@ def _narrowed(
 
 def _identifier(
     kind: type[Identifier],
-    used: DetectorFunction,
+    used: Detector | DetectorFunction,
     settings: IdentificationSettings,
     interrupt: Callable[[], None] | None,
     **more: Any,

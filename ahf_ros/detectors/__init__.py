@@ -141,9 +141,7 @@ def create_detector(
     if name in _ADDED:
         return _added(_ADDED[name], settings)
     if name == _SEVERAL:
-        from ahf_ros.detectors.several import several_detector
-
-        return several_detector(settings, _groups(settings.families, settings.family_file))
+        return _several(settings)
     families = _families(name, settings.family, settings.family_file)
     if families != settings.families:
         settings = settings.narrowed(families)
@@ -185,17 +183,21 @@ def _families(name: str, family: str, files: str) -> tuple[str, ...]:
     return tuple(of for of in families if kind_of(of, files) in _ENTRIES[name].kinds)
 
 
-def _groups(families: Iterable[str], files: str) -> list[tuple[str, tuple[str, ...]]]:
-    """Return the detectors of families by name, each with as many of them as it reads at once."""
-    groups: list[tuple[str, tuple[str, ...]]] = []
-    together: dict[str, list[str]] = {}
-    for family in families:
-        name = detector_name(_AUTO, family, files)
-        if _ENTRIES[name].several:
-            together.setdefault(name, []).append(family)
-        else:
-            groups.append((name, (family,)))
-    return [*((name, tuple(of)) for name, of in together.items()), *groups]
+def _several(settings: DetectorSettings) -> Detector:
+    """Return a detector for each family, or for all that one reads at once, as one detector."""
+    from ahf_ros.detectors.several import SeveralDetector
+
+    groups: dict[str, list[str]] = {}
+    for family in settings.families:
+        name = detector_name(_AUTO, family, settings.family_file)
+        groups.setdefault(name if _ENTRIES[name].several else family, []).append(family)
+    parts = tuple(create_detector(settings=settings.narrowed(of)) for of in groups.values())
+    return SeveralDetector(
+        settings,
+        parts,
+        tuple(map(tuple, groups.values())),
+        lambda families: create_detector(settings=settings.narrowed(families)),
+    )
 
 
 def check_expected_ids(ids: Iterable[int], name: str, settings: DetectorSettings) -> None:

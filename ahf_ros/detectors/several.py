@@ -6,7 +6,7 @@ of many. A place belongs to one target, the surer one, of equally sure ones the 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import hypot
 from typing import ClassVar
@@ -14,7 +14,6 @@ from typing import ClassVar
 import numpy as np
 
 from ahf_ros.codes.designs import relative_reach
-from ahf_ros.detectors import create_detector
 from ahf_ros.detectors.claims import owners
 from ahf_ros.detectors.contract import (
     Detector,
@@ -31,11 +30,15 @@ _DIGITS = 2  # of a confidence, beyond which one is not surer than another
 
 @dataclass(frozen=True, slots=True)
 class SeveralDetector:
-    """Identify the targets of several detectors; `of_parts` are the families of each."""
+    """Identify the targets of several detectors.
+
+    `of_parts` are the families of each, `narrow` is from some of all to their detector.
+    """
 
     settings: DetectorSettings
     parts: tuple[Detector, ...]
     of_parts: tuple[tuple[str, ...], ...]
+    narrow: Callable[[Sequence[str]], Detector]
     name: ClassVar[str] = 'several'
 
     @property
@@ -82,7 +85,7 @@ class SeveralDetector:
 
     def narrowed(self, families: Sequence[str]) -> Detector:
         """Return the detector of some of the families; see `Narrowing`."""
-        return create_detector(settings=self.settings.narrowed(families))
+        return self.narrow(families)
 
     def _merged(self, results: Sequence[Sequence[Target]]) -> list[Target]:
         """Return the targets of all detectors that own their places."""
@@ -118,16 +121,6 @@ class SeveralDetector:
         for target in found:
             known = target.id == UNDECODED or target.family in families
             yield target if known else replace(target, family=families[0])
-
-
-def several_detector(
-    settings: DetectorSettings, groups: Sequence[tuple[str, tuple[str, ...]]]
-) -> SeveralDetector:
-    """Return a detector of families, from the names of detectors and the families of each."""
-    parts = [
-        create_detector(name, settings=settings.narrowed(families)) for name, families in groups
-    ]
-    return SeveralDetector(settings, tuple(parts), tuple(families for _, families in groups))
 
 
 def _radius(target: Target) -> float:

@@ -38,6 +38,18 @@ def families_shown(keys: Iterable[tuple[str, int]]) -> set[str]:
     return {family for family, count in counts.items() if count > 1 or single}
 
 
+def families_line(families: Iterable[str]) -> str:
+    """Return what is said of the families that are there."""
+    return f'families: {", ".join(families)}'
+
+
+def settled_families(memory: Memory, before: Sequence[str]) -> str:
+    """Return a line if an image has settled the families, or changed them from `before`."""
+    if not memory.families or memory.families == before:
+        return ''
+    return families_line(memory.families)
+
+
 class SettlingIdentifier(Identifier):
     """Identifies targets of all families in the first images, and then of those that were there.
 
