@@ -124,7 +124,7 @@ def _identifier(
 ) -> Identifier:
     """Return what identifies with a detector, and with whatever else that can do."""
     listed = settings.adaptive.listed
-    if listed and isinstance(used, Expecting):
+    if listed and isinstance(used, Detector) and isinstance(used, Expecting):
         used = used.expecting(listed)
     return kind(
         used,
