@@ -9,8 +9,9 @@ from ahf_ros.batch.engine import Engine, finished_tasks
 from ahf_ros.batch.results import outcome_of
 from ahf_ros.batch.task import ImageTask
 from ahf_ros.codes.families import AUTO
-from ahf_ros.filtering.settling import FIRST, families_shown
+from ahf_ros.filtering.settling import FIRST
 from ahf_ros.settings.nested import updated
+from ahf_ros.target import UNDECODED
 
 _LOOK = {'ahf': False, 'expected_targets': 0, 'estimate_expected': False}
 
@@ -30,7 +31,7 @@ def settled_tasks(engine: Engine, tasks: Sequence[ImageTask]) -> Sequence[ImageT
     shown: set[str] = set()
     for item in finished_tasks(engine, first):
         for record in outcome_of(item.task, item.result).records:
-            shown |= families_shown((it['family'], it['id']) for it in record['targets'])
+            shown |= {it['family'] for it in record['targets'] if it['id'] != UNDECODED}
     every = tasks[0].settings.detection.families
     families = tuple(name for name in every if name in shown)
     return [replace(task, families=families) for task in tasks]

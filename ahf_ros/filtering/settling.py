@@ -6,7 +6,8 @@ found are looked for, and all again in an image that shows none of these.
 
 from __future__ import annotations
 
-from collections import Counter
+import math
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Any
@@ -16,14 +17,15 @@ import numpy as np
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.deprecation import deprecated_arguments
 from ahf_ros.filtering.identifier import Identifier, Memory
-from ahf_ros.filtering.trials import Trials
+from ahf_ros.filtering.trials import DetectorFunction, Trials
 from ahf_ros.imaging.stack import ImageStack
-from ahf_ros.target import UNDECODED, Identification
+from ahf_ros.target import UNDECODED, Identification, Target
 
 FIRST = 3
 """Images with targets in which all families are looked for."""
 
-_MANY = 3  # targets of one family beside which a single one of another counts for nothing
+_EVIDENCE = 2.99  # decimal logarithm of the odds on a family: one target certain to 0.999
+_CERTAIN = 1e-3  # probability that a target is wrong, below which it counts for no more
 
 
 def memory_of(families: Sequence[str]) -> Memory:
@@ -31,11 +33,20 @@ def memory_of(families: Sequence[str]) -> Memory:
     return Memory(families=tuple(families), shown=FIRST if families else 0)
 
 
-def families_shown(keys: Iterable[tuple[str, int]]) -> set[str]:
-    """Return the families that targets of some families and IDs are evidence for."""
-    counts = Counter(family for family, number in set(keys) if number != UNDECODED)
-    single = max(counts.values(), default=0) < _MANY
-    return {family for family, count in counts.items() if count > 1 or single}
+def evident(targets: Sequence[Target]) -> list[Target]:
+    """Return the targets of families that they are evidence for, and undecoded ones.
+
+    Where all families are looked for, a word of one of them is read in nearly any texture. Such
+    readings are doubtful, and few of one family.
+    """
+    evidence: defaultdict[str, float] = defaultdict(float)
+    for target in targets:
+        evidence[target.family] -= math.log10(max(1 - target.confidence, _CERTAIN))
+    return [it for it in targets if it.id == UNDECODED or evidence[it.family] > _EVIDENCE]
+
+
+def _families(targets: Iterable[Target]) -> set[str]:
+    return {target.family for target in targets if target.id != UNDECODED}
 
 
 def families_line(families: Iterable[str]) -> str:
@@ -55,7 +66,7 @@ class SettlingIdentifier(Identifier):
 
     Parameters
     ----------
-    *arguments, **options
+    detector, *arguments, draft, **options
         As for `Identifier`, with a detector of all families.
     families : sequence of str
         Their names.
@@ -65,12 +76,17 @@ class SettlingIdentifier(Identifier):
 
     def __init__(
         self,
+        detector: DetectorFunction,
         *arguments: Any,
+        draft: DetectorFunction | None = None,
         families: Sequence[str],
         narrowed: Callable[[tuple[str, ...]], Identifier],
         **options: Any,
     ) -> None:
-        super().__init__(*arguments, **options)
+        drafted = draft and (lambda image: evident(draft(image)))
+        super().__init__(
+            lambda image: evident(detector(image)), *arguments, draft=drafted, **options
+        )
         self._families = families
         self._narrowed = narrowed
         self._made: dict[tuple[str, ...], Identifier] = {}
@@ -91,7 +107,7 @@ class SettlingIdentifier(Identifier):
             families = self._ordered({*known, *self._look(stack)})
             if not families:
                 found = super().identify(stack, expected_targets=expected_targets)
-                families = self._ordered(families_shown(it.key for it in found.targets))
+                families = self._ordered(_families(found.targets))
             elif not found or families != known:
                 found = self._read(stack, families, expected_targets)
             shown = min(self.memory.shown + (found.count > 0), FIRST)
@@ -105,7 +121,7 @@ class SettlingIdentifier(Identifier):
         self._looked = trials = super()._trials(stack)
         for plain in trials.plain:
             trials.count(plain)
-            if shown := families_shown(target.key for target in trials.targets[plain]):
+            if shown := _families(trials.targets[plain]):
                 return shown
         return set()
 
