@@ -176,11 +176,15 @@ def detector_name(name: str, family: str, files: str = '') -> str:
 
 
 def _families(name: str, family: str, files: str) -> tuple[str, ...]:
-    """Return the families that a text names; of all, those of kinds that a detector reads."""
+    """Return the families that a text names; of all, those that a detector reads.
+
+    A detector that reads one at a time reads the first.
+    """
     families = families_in(family, files)
     if family != AUTO or name not in _ENTRIES:
         return families
-    return tuple(of for of in families if kind_of(of, files) in _ENTRIES[name].kinds)
+    own = tuple(of for of in families if kind_of(of, files) in _ENTRIES[name].kinds)
+    return own if _ENTRIES[name].several else own[:1]
 
 
 def _several(settings: DetectorSettings) -> Detector:

@@ -105,7 +105,16 @@ def test_families_are_settled_on_the_first_images_and_where_none_is_shown() -> N
     families = tuple(TWO.split(','))
     third = image_of('metashape12', 'aruco_mip_36h12')
     identifier = create_identifier(family='auto')
-    images = [EMPTY, image_of('metashape12'), BOTH, EMPTY, BOTH, third, image_of('aruco_mip_36h12'), third]
+    images = [
+        EMPTY,
+        image_of('metashape12'),
+        BOTH,
+        EMPTY,
+        BOTH,
+        third,
+        image_of('aruco_mip_36h12'),
+        third,
+    ]
     settled = [
         ((), 0),
         (families[:1], 1),
