@@ -22,7 +22,10 @@ def settled_tasks(engine: Engine, tasks: Sequence[ImageTask]) -> Sequence[ImageT
     The result does not depend on the engine. A single task settles its families itself, and so do
     all tasks if the first ones show no target.
     """
-    if len(tasks) < 2 or tasks[0].settings.detection.family != AUTO:
+    if len(tasks) < 2:
+        return tasks
+    settings = tasks[0].settings
+    if not AUTO == settings.detection.family == settings.detector:
         return tasks
     first = [
         replace(task, overlays=(), settings=updated(task.settings, _LOOK))
@@ -32,6 +35,5 @@ def settled_tasks(engine: Engine, tasks: Sequence[ImageTask]) -> Sequence[ImageT
     for item in finished_tasks(engine, first):
         for record in outcome_of(item.task, item.result).records:
             shown |= {it['family'] for it in record['targets'] if it['id'] != UNDECODED}
-    every = tasks[0].settings.detection.families
-    families = tuple(name for name in every if name in shown)
+    families = tuple(name for name in settings.detection.families if name in shown)
     return [replace(task, families=families) for task in tasks]

@@ -137,7 +137,7 @@ def _run(options: argparse.Namespace, output: TextIO | None) -> int:
             tell('identify', error)
             return 1
     if results and not options.quiet:
-        if shown and settings.detection.family == AUTO:
+        if shown and AUTO == settings.detection.family == settings.detector:
             print(families_line(sorted(shown)), file=sys.stderr)
         print(_hint(settings, identified), end='', file=sys.stderr)
         if not identified:
@@ -171,7 +171,9 @@ def print_outcome(command: str, outcome: ImageOutcome, output: TextIO | None, qu
 
 def _hint(settings: IdentificationSettings, identified: int) -> str:
     """Return a line that says what may help, empty if nothing does."""
-    family = settings.detection.family
+    from ahf_ros.batch.identification import detector_of
+
+    family = detector_of(settings).family
     if not identified and family == AUTO:
         return 'targets of all families were looked for\n'
     if not identified:
