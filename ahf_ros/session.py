@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ahf_ros.codes.families import mirrored_number
+from ahf_ros.codes.families import AUTO, mirrored_number
 from ahf_ros.deprecation import deprecated_arguments
 from ahf_ros.detectors import (
     Detector,
     Drafter,
     EarlyStopping,
     Expecting,
+    Narrowing,
     Refiner,
     check_expected_ids,
     create_detector,
     estimator,
 )
 from ahf_ros.filtering.identifier import Identifier
+from ahf_ros.filtering.settling import SettlingIdentifier
 from ahf_ros.filtering.trials import DetectorFunction
 from ahf_ros.imaging.stack import ImageStack
 from ahf_ros.session_settings import IdentificationSettings
@@ -79,26 +82,62 @@ def create_identifier(
     listed = settings.adaptive.listed
     if isinstance(used, Detector) and listed:
         check_expected_ids(listed, used.name, settings.detection)
-        used = used.expecting(listed) if isinstance(used, Expecting) else used
-    estimate = None
-    if settings.estimate_expected:
-        if isinstance(used, Detector) and used.family != settings.detection.family:
-            raise ValueError(
-                f'family is {settings.detection.family!r}, accepted with estimate_expected is '
-                f'that of the detector, {used.family!r}'
-            )
-        estimate = estimator(settings.detection)
-    return Identifier(
+    wanted = settings.detection.family
+    families = (AUTO, used.family) if isinstance(used, Detector) else (wanted,)
+    if settings.estimate_expected and wanted not in families:
+        raise ValueError(
+            f'family is {wanted!r}, accepted with estimate_expected is that of the detector, '
+            f'{families[-1]!r}'
+        )
+    if isinstance(used, Detector) and isinstance(used, Narrowing) and used.family == AUTO:
+        narrowed = partial(_narrowed, used, settings, interrupt)
+        return _identifier(
+            SettlingIdentifier,
+            used,
+            settings,
+            interrupt,
+            families=used.families,
+            narrowed=narrowed,
+        )
+    return _identifier(Identifier, used, settings, interrupt)
+
+
+def _narrowed(
+    detector: Narrowing,
+    settings: IdentificationSettings,
+    interrupt: Callable[[], None] | None,
+    families: tuple[str, ...],
+) -> Identifier:
+    """Return what identifies the targets of some families; N is estimated where all are rings."""
+    used = detector.narrowed(families)
+    counted = settings.estimate_expected and used.name == 'ring'
+    some = {'family': ','.join(families), 'estimate_expected': counted}
+    return _identifier(Identifier, used, updated(settings, some), interrupt)
+
+
+def _identifier(
+    kind: type[Identifier],
+    used: Detector | DetectorFunction,
+    settings: IdentificationSettings,
+    interrupt: Callable[[], None] | None,
+    **more: Any,
+) -> Identifier:
+    """Return what identifies with a detector, and with whatever else that can do."""
+    listed = settings.adaptive.listed
+    if listed and isinstance(used, Detector) and isinstance(used, Expecting):
+        used = used.expecting(listed)
+    return kind(
         used,
         settings.adaptive,
         expected_targets=settings.expected_targets,
         refine=used.refine if isinstance(used, Refiner) else None,
         draft=used.draft if isinstance(used, Drafter) else None,
-        estimate=estimate,
+        estimate=estimator(settings.detection) if settings.estimate_expected else None,
         interrupt=interrupt,
         patience=used.patience if isinstance(used, EarlyStopping) else 0,
         mirrored=lambda target: mirrored_number(target.family, target.code),
         name=f'detector {used.name!r}' if isinstance(used, Detector) else 'detector',
+        **more,
     )
 
 

@@ -16,6 +16,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 from rosbags.interfaces import Connection, ConnectionExtRosbag2, MessageDefinitionFormat
 from rosbags.rosbag2 import StoragePlugin, Writer
@@ -115,7 +116,10 @@ class Journal:
 
 def _entry(text: str) -> Entry:
     fields = json.loads(text)
-    memory = {name: value and tuple(value) for name, value in fields['memory'].items()}
+    memory: dict[str, Any] = {
+        name: tuple(value) if isinstance(value, list) else value
+        for name, value in fields['memory'].items()
+    }
     return Entry(**fields | {'memory': Memory(**memory)})
 
 

@@ -38,6 +38,7 @@ from ahf_ros.bag.output import (
 from ahf_ros.bag.source import Message, Source, seconds
 from ahf_ros.detectors import create_detector
 from ahf_ros.drawing.overlay import draw
+from ahf_ros.filtering.settling import settled_families
 from ahf_ros.interchange.files import locked
 from ahf_ros.interchange.target_messages import coded_target_array
 from ahf_ros.session_settings import IdentificationSettings, StackSettings
@@ -178,6 +179,7 @@ def _answer_images(
     answering = _Answering(task, source, topics)
     total = sum(item.msgcount for item in source.connections if item.topic in topics)
     earlier = list(journal.entries)
+    settled: dict[str, tuple[str, ...]] = {}  # families by topic
     for number, (message, last) in enumerate(_with_last(source.messages(topics))):
         if number < len(earlier):
             entry = earlier[number]
@@ -188,7 +190,9 @@ def _answer_images(
             entry, outputs = answering.answer(message, last)
             ending.check()  # the answer may be that of a program that was ended
             journal.append(entry, outputs)
-        said = '; '.join(filter(None, (entry.reason, entry.note)))
+        families = settled_families(entry.memory, settled.get(entry.topic, ()))
+        settled[entry.topic] = entry.memory.families
+        said = '; '.join(filter(None, (entry.reason, entry.note, families)))
         about = f'{entry.topic} at {seconds(entry.timestamp)} s: {said}' if said else ''
         report(number + 1, total, about)
 

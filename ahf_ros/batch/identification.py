@@ -19,6 +19,7 @@ from ahf_ros.detectors import Detector, DetectorSettings, create_detector
 from ahf_ros.doubt import doubt
 from ahf_ros.drawing.overlay import draw, summary
 from ahf_ros.edge_shift import edge_shift_remark
+from ahf_ros.filtering.settling import memory_of
 from ahf_ros.imaging.image import check_image, white_remark
 from ahf_ros.interchange.files import is_url, read_bytes, url_fingerprint
 from ahf_ros.interchange.image_files import read_noted_image, write_image
@@ -70,6 +71,7 @@ def identify_images(task: ImageTask, report: Report = no_report) -> ImageOutcome
         identifier = create_identifier(
             detector=detector, settings=task.settings, interrupt=ending.check
         )
+        identifier.memory = memory_of(task.families)
         for part, stack, found in identify_parts(identifier, list(images.values()), task.stacking):
             paths = tuple(images)[part.images.start : part.images.stop]
             search = identifier.last_search

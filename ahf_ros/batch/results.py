@@ -177,7 +177,7 @@ class Results:
 
     def _dependencies_of(self, task: ImageTask) -> dict[str, str]:
         """Return version and fingerprint of settings, which do not change while this is open."""
-        key = task.settings, task.stacking, task.stacked, task.upright
+        key = task.settings, task.stacking, task.stacked, task.upright, task.families
         if key not in self._dependencies:
             self._dependencies[key] = {'version': release(), 'settings': _fingerprint(task)}
         return self._dependencies[key]
@@ -255,6 +255,8 @@ def _fingerprint(task: ImageTask) -> str:
         'stacked': task.stacked,
         'upright': task.upright,
     }
+    if task.families:
+        values['families'] = task.families
     text = json.dumps(values, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 

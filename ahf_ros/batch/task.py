@@ -39,6 +39,7 @@ class ImageTask:
     stacked: bool = False  # whether results name all images of their stack
     minimum: int = 0  # images below which a message says that some are missing
     overlays: tuple[str, ...] = ()  # files to draw the first image of each result to
+    families: tuple[str, ...] = ()  # that other images have settled, where all are looked for
     folder: str = ''  # where paths start that are not absolute; the working folder where empty
 
     @property

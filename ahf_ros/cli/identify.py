@@ -28,7 +28,6 @@ from ahf_ros.cli.options import (
     add_target_options,
     settings_from,
 )
-from ahf_ros.codes import VENDOR_NAMES
 from ahf_ros.codes.families import AUTO
 from ahf_ros.interchange.files import RESULTS_FILE, is_url, read_text, urls_named
 from ahf_ros.session_settings import IdentificationSettings, StackSettings
@@ -111,30 +110,36 @@ def _run(options: argparse.Namespace, output: TextIO | None) -> int:
 
     from ahf_ros.batch.identification import identify_images
     from ahf_ros.batch.results import Unwritable
+    from ahf_ros.batch.settling import settled_tasks
+    from ahf_ros.filtering.settling import families_line
     from ahf_ros.interchange.export.survey import measured_image
 
     failed = bool(problems)
     results = identified = 0
     empty: list[str] = []
     measured: list[MeasuredImage] = []
+    shown: set[str] = set()
     engine = create_engine('identify', identify_images, jobs, options.scheduler, with_machine)
     with closing(engine), progress_bar(len(tasks) > 1 and not options.quiet) as progress:
-        outcomes = _outcomes(engine, tasks, options)
         try:
+            outcomes = _outcomes(engine, settled_tasks(engine, tasks), options)
             for outcome in progress.track(outcomes, total=len(tasks), description='identify'):
                 print_outcome('identify', outcome, output, options.quiet)
                 failed |= outcome.failed
                 for record in outcome.records:
                     results += 1
-                    count = sum(it['id'] != UNDECODED for it in record['targets'])
-                    identified += count
-                    empty += [record['image']] * (count == 0)
+                    found = [it for it in record['targets'] if it['id'] != UNDECODED]
+                    identified += len(found)
+                    empty += [record['image']] * (not found)
+                    shown.update(it['family'] for it in found)
                     if options.export:
                         measured.append(measured_image(record, record['image']))
         except (EngineLost, Unwritable) as error:
             tell('identify', error)
             return 1
     if results and not options.quiet:
+        if shown and AUTO == settings.detection.family == settings.detector:
+            print(families_line(sorted(shown)), file=sys.stderr)
         print(_hint(settings, identified), end='', file=sys.stderr)
         if 2 * len(empty) >= results:
             print(_advice(empty, settings), end='', file=sys.stderr)
@@ -167,12 +172,11 @@ def print_outcome(command: str, outcome: ImageOutcome, output: TextIO | None, qu
 
 def _hint(settings: IdentificationSettings, identified: int) -> str:
     """Return a line that says what may help, empty if nothing does."""
-    family = settings.detection.family
+    from ahf_ros.batch.identification import detector_of
+
+    family = detector_of(settings).family
     if not identified and family == AUTO:
-        return (
-            f'--family {AUTO} looks for {", ".join(VENDOR_NAMES)} only; other families have to be '
-            'named\n'
-        )
+        return 'targets of all families were looked for\n'
     if not identified:
         return f'targets of {family} were looked for; --family names others\n'
     if settings.expected_targets or settings.adaptive.listed or settings.estimate_expected:

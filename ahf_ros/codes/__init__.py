@@ -21,7 +21,7 @@ RING_NAMES = tuple(sorted((path.stem for path in RING_FOLDER.glob('*.json')), ke
 """Families of ring targets: vendor or program, and number of sectors."""
 
 VENDOR_NAMES = tuple(name for name in RING_NAMES if not name.startswith('cct'))
-"""Those that vendors print, which `auto` stands for. The others have nearly every word."""
+"""Those that vendors print. The others have nearly every word."""
 
 ARUCO_NAMES = (
     *(f'aruco_{side}x{side}_{count}' for side in (4, 5, 6, 7) for count in (50, 100, 250, 1000)),

@@ -6,21 +6,13 @@ anything. Therefore the codes, which take numpy and OpenCV, are imported where t
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Sequence
 from contextlib import suppress
 from difflib import get_close_matches
-from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from ahf_ros.codes import (
-    APRILTAG_NAMES,
-    ARUCO_NAMES,
-    CCTAG_NAMES,
-    RING_NAMES,
-    SQUARE_NAMES,
-    VENDOR_NAMES,
-)
+from ahf_ros.codes import APRILTAG_NAMES, ARUCO_NAMES, CCTAG_NAMES, RING_NAMES, SQUARE_NAMES
 from ahf_ros.codes.kept import kept_while_unchanged
 
 if TYPE_CHECKING:
@@ -43,12 +35,11 @@ FAMILY_NAMES = tuple(name for names in KINDS.values() for name in names)
 """The families that `family` accepts."""
 
 AUTO = 'auto'
-"""Stands for all families of `VENDOR_NAMES`."""
+"""Stands for all families of `FAMILY_NAMES` and of data files."""
 
 ACCEPTED = (
-    f'one of {", ".join(FAMILY_NAMES)}, or of a family_file; several of {", ".join(RING_NAMES)} '
-    f'and of rings of a family_file, separated by commas; or {AUTO} for {", ".join(VENDOR_NAMES)} '
-    'and rings of a family_file, and no others'
+    f'one of {", ".join(FAMILY_NAMES)}, or of a family_file; several of these, separated by '
+    f'commas; or {AUTO} for all of them'
 )
 """Description of what `family` accepts."""
 
@@ -66,29 +57,27 @@ _ALIKE = 0.65, 0.65, 0.85, 0.85  # share of letters of a name that is suggested,
 def families_in(text: str, files: str = '') -> tuple[str, ...]:
     """Return the different families that a text names, in its order.
 
-    It names a family, several ring families separated by commas, or 'auto' for those of vendors.
-    `files` are data files, separated by commas, that describe more families. Raise a ValueError
-    if there is no family; if one is unknown or named twice; if two are of different kinds or have
-    the same print; if families of their kind are not read together; or if a file is not accepted.
+    It names a family, several separated by commas, or 'auto' for all. `files` are data files,
+    separated by commas, that describe more families. Raise a ValueError if there is no family, if
+    one is unknown or named twice, or if a file is not accepted.
 
     Examples
     --------
-    >>> families_in('metashape12, aicon14')
-    ('metashape12', 'aicon14')
+    >>> families_in('metashape12, apriltag_36h11')
+    ('metashape12', 'apriltag_36h11')
     >>> families_in('DICT_4X4_50'), families_in('tag36h11')
     (('aruco_4x4_50',), ('apriltag_36h11',))
-    >>> families_in('auto') == VENDOR_NAMES
+    >>> families_in('auto') == FAMILY_NAMES
     True
     """
     kinds = {name: kind for kind, of_kind in KINDS.items() for name in of_kind}
     given = [part.strip() for part in text.split(',')]
+    own: dict[str, str] = {}
     if files and not {_usual_name(name, kinds) for name in given} <= set(kinds):
         own = {name: code.kind for name, code in families_of(files).items()}
         kinds |= own
-        if text == AUTO:
-            given = [AUTO, *(name for name, kind in own.items() if kind == 'ring')]
-    if text == AUTO:
-        given[:1] = VENDOR_NAMES
+    if text == AUTO:  # a file takes the place of a usual design
+        return tuple(name for name in kinds if name in own or name not in own.values())
     names = tuple(_usual_name(name, kinds) for name in given)
     shown = f'family is {text!r}'
     for name in names:
@@ -102,8 +91,8 @@ def families_in(text: str, files: str = '') -> tuple[str, ...]:
             ]
             accepted = f'{alike[0]}, which is most like it, or another family' if alike else ''
             raise ValueError(f'{where}, accepted is {accepted or ACCEPTED}')
-    if len(names) > 1:
-        _check_list(names, kinds, shown)
+        if sum(name in (it, own.get(it)) for it in names) > 1:
+            raise ValueError(f'{shown}, which names {name} twice, accepted is each family once')
     return names
 
 
@@ -153,10 +142,11 @@ def code_family(name: str, files: str = '') -> Family | DotFamily | PointFamily 
         for code in own.values():
             if name in (code.name, code.kind):
                 return code
-        raise ValueError(
-            f'family is {name!r}, and family_file is {files!r}, which describes {", ".join(own)}; '
-            'accepted is one of these'
-        )
+        if name not in FAMILY_NAMES:
+            raise ValueError(
+                f'family is {name!r}, and family_file is {files!r}, which describes '
+                f'{", ".join(own)}; accepted is one of these'
+            )
     if name == 'gsi':
         return gsi.point_family()
     return dots.dot_family() if name == 'dots' else ring.family(name)
@@ -292,21 +282,3 @@ def mirrored_number(name: str, code: int) -> int | None:
         return None
     family = ring.family(name)
     return family.number(cyclic.mirrored_words(code, family.bits))
-
-
-def _check_list(names: Sequence[str], kinds: Mapping[str, str], shown: str) -> None:
-    """Refuse families that cannot be read together."""
-    for first, second in combinations(names, 2):
-        if first == second:
-            raise ValueError(f'{shown}, which names {first} twice, accepted is each family once')
-        if kinds[first] != kinds[second] and not {first, second} <= set(SQUARE_NAMES):
-            raise ValueError(
-                f'{shown}, but {first} is read by the detector {kinds[first]} and {second} by the '
-                f'detector {kinds[second]}; accepted are families of one detector, which reads '
-                'them together'
-            )
-    if kinds[names[0]] not in ('ring', 'aruco', 'apriltag'):
-        raise ValueError(
-            f'{shown}, but the detector {kinds[names[0]]} reads one family; accepted are several '
-            f'of {", ".join(RING_NAMES)}, or of {", ".join(SQUARE_NAMES)}'
-        )

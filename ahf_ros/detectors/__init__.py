@@ -13,7 +13,14 @@ from importlib.metadata import EntryPoint, entry_points
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, NamedTuple
 
-from ahf_ros.codes.families import FAMILY_NAMES, KINDS, check_numbers, families_in, kind_of
+from ahf_ros.codes.families import (
+    AUTO,
+    FAMILY_NAMES,
+    KINDS,
+    check_numbers,
+    families_in,
+    kind_of,
+)
 from ahf_ros.deprecation import deprecated_arguments
 from ahf_ros.detectors.contract import (
     Detector,
@@ -21,6 +28,7 @@ from ahf_ros.detectors.contract import (
     Drafter,
     EarlyStopping,
     Expecting,
+    Narrowing,
     Refiner,
 )
 from ahf_ros.settings.nested import updated
@@ -43,6 +51,7 @@ __all__ = [
     'Drafter',
     'EarlyStopping',
     'Expecting',
+    'Narrowing',
     'Refiner',
     'check_expected_ids',
     'create_detector',
@@ -54,6 +63,7 @@ GROUP = 'ahf_ros.detectors'
 """Group of the entry points by which other packages add detectors."""
 
 _AUTO = 'auto'  # stands for the detector of the family
+_SEVERAL = 'several'  # what that is where no single one reads all families
 
 
 class _Entry(NamedTuple):
@@ -134,6 +144,11 @@ def create_detector(
     name = detector_name(name, settings.family, settings.family_file)
     if name in _ADDED:
         return _added(_ADDED[name], settings)
+    if name == _SEVERAL:
+        return _several(settings)
+    families = _families(name, settings.family, settings.family_file)
+    if families != settings.families:
+        settings = settings.narrowed(families)
     made: Detector = resolve_name(f'ahf_ros.{_ENTRIES[name].detector}')(settings)
     return made
 
@@ -141,10 +156,11 @@ def create_detector(
 def detector_name(name: str, family: str, files: str = '') -> str:
     """Return the name of a detector that identifies a family or several, see `families_in`.
 
-    It raises a ValueError if there is no such detector, or it does not identify these families.
+    It is 'several' where each family has its own, and raises a ValueError if there is no such
+    detector, or it does not identify these families.
     """
     DETECTOR.check(name)
-    families = families_in(family, files)
+    families = _families(name, family, files)
     kinds = {kind_of(of, files) for of in families}
     fitting = [
         fit
@@ -152,7 +168,7 @@ def detector_name(name: str, family: str, files: str = '') -> str:
         if kinds <= set(entry.kinds) and (entry.several or len(families) == 1)
     ]
     if name == _AUTO:
-        return fitting[0]
+        return _SEVERAL if fitting[0] == 'command' else fitting[0]
     if name in _ENTRIES and name not in fitting:
         several = ', alone or together' if _ENTRIES[name].several else ''
         raise ValueError(
@@ -163,21 +179,51 @@ def detector_name(name: str, family: str, files: str = '') -> str:
     return name
 
 
+def _families(name: str, family: str, files: str) -> tuple[str, ...]:
+    """Return the families that a text names; of all, those that a detector reads.
+
+    A detector that reads one at a time reads the first.
+    """
+    families = families_in(family, files)
+    if family != AUTO or name not in _ENTRIES:
+        return families
+    own = tuple(of for of in families if kind_of(of, files) in _ENTRIES[name].kinds)
+    return own if _ENTRIES[name].several else own[:1]
+
+
+def _several(settings: DetectorSettings) -> Detector:
+    """Return a detector for each family, or for all that one reads at once, as one detector."""
+    from ahf_ros.detectors.several import SeveralDetector
+
+    groups: dict[str, list[str]] = {}
+    for family in settings.families:
+        name = detector_name(_AUTO, family, settings.family_file)
+        groups.setdefault(name if _ENTRIES[name].several else family, []).append(family)
+    parts = tuple(create_detector(settings=settings.narrowed(of)) for of in groups.values())
+    return SeveralDetector(
+        settings,
+        parts,
+        tuple(map(tuple, groups.values())),
+        lambda families: create_detector(settings=settings.narrowed(families)),
+    )
+
+
 def check_expected_ids(ids: Iterable[int], name: str, settings: DetectorSettings) -> None:
     """Refuse IDs that a detector cannot report, by a ValueError.
 
     Detectors that are no part of this package, also as a command, may report any.
     """
-    if name in _ENTRIES and name != 'command':
+    if name in (_SEVERAL, *_ENTRIES) and name != 'command':
         check_numbers('expected_ids', ids, settings.families, settings.family_file)
 
 
 def estimator(settings: DetectorSettings) -> Callable[[np.ndarray], int]:
-    """Return the function that estimates how many targets an image shows, for rings only.
+    """Return the function that estimates how many targets an image shows, of all the rings.
 
-    It raises a ValueError if targets of the family cannot be counted.
+    It raises a ValueError if there are families whose targets cannot be counted.
     """
-    if detector_name(_AUTO, settings.family, settings.family_file) != 'ring':
+    rings = _families('ring', settings.family, settings.family_file)
+    if any(kind_of(name, settings.family_file) != 'ring' for name in rings):
         raise ValueError(
             f'estimate_expected is True and family is {settings.family!r}; accepted with this '
             f'family is False, and True with one of {", ".join(KINDS["ring"])}'
@@ -186,7 +232,7 @@ def estimator(settings: DetectorSettings) -> Callable[[np.ndarray], int]:
     def count(image: np.ndarray) -> int:
         from ahf_ros.detectors.ring.counting import estimate_count
 
-        return estimate_count(image, settings)
+        return estimate_count(image, settings.narrowed(rings))
 
     return count
 

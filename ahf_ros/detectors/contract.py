@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
-from ahf_ros.codes.families import ACCEPTED, AUTO, Code, colours_of, families_in, family_of
+from ahf_ros.codes.families import (
+    ACCEPTED,
+    AUTO,
+    Code,
+    colours_of,
+    families_in,
+    family_of,
+    kind_of,
+)
 from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.target import Target
 
@@ -15,7 +23,7 @@ if TYPE_CHECKING:
     import numpy as np
 
 _MINIMUM_RADIUS = 4.0  # of a dot, px, where the user sets none
-_MINIMUM_RADII = {'gsi': 2.0, 'dots': 2.5}  # of families whose dot is small beside the target
+_MINIMUM_RADII = {'gsi': 2.0, 'dots': 2.5}  # of kinds whose dot is small beside the target
 
 _SIGNS = {'both': (1, -1), 'dark': (1,), 'bright': (-1,)}  # of the colour of dots
 
@@ -133,6 +141,20 @@ class Expecting(Protocol):
         ...
 
 
+@runtime_checkable
+class Narrowing(Protocol):
+    """A detector of many families that can be made to look for some of them only."""
+
+    @property
+    def families(self) -> tuple[str, ...]:
+        """All families, as its targets name them."""
+        ...
+
+    def narrowed(self, families: Sequence[str]) -> Detector:
+        """Return a detector of some of the families."""
+        ...
+
+
 @dataclass(frozen=True, slots=True)
 class DetectorSettings:
     """What the targets in the image look like.
@@ -140,8 +162,8 @@ class DetectorSettings:
     Attributes
     ----------
     family : str
-        One of `ahf_ros.codes.families.FAMILY_NAMES`, several ring families separated by commas, or
-        'auto' for all of these; `families` has them one by one.
+        One of `ahf_ros.codes.families.FAMILY_NAMES`, several separated by commas, or 'auto' for
+        all; `families` has them one by one.
     family_file : str
         Paths of data files, separated by commas, that describe more families, or `gsi` or `dots`
         in the place of the usual design.
@@ -232,8 +254,14 @@ class DetectorSettings:
 
     @property
     def radii(self) -> tuple[float, float]:
-        """Bounds of the semi-major axis of the dot, px, where the family has its own minimum."""
-        return self.min_radius or _MINIMUM_RADII.get(self.family, _MINIMUM_RADIUS), self.max_radius
+        """Bounds of the semi-major axis of the dot, px, where kinds have their own minimum."""
+        kinds = {kind_of(name, self.family_file) for name in self.families}
+        smallest = min(_MINIMUM_RADII.get(kind, _MINIMUM_RADIUS) for kind in kinds)
+        return self.min_radius or smallest, self.max_radius
+
+    def narrowed(self, families: Iterable[str]) -> DetectorSettings:
+        """Return the same settings for some of the families."""
+        return replace(self, family=','.join(families))
 
     @property
     def polarities(self) -> tuple[int, ...]:

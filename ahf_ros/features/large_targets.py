@@ -33,7 +33,8 @@ def targets_of_octaves(
     found: list[Target] = []
     for octave in octaves(pyramid, *radii):
         targets = identify(octave)
-        for half in reversed((pyramid.gray, *pyramid.halves)[: octave.level]):
+        # Halves without targets may have no contrast.
+        for half in reversed((pyramid.gray, *pyramid.halves)[: octave.level if targets else 0]):
             targets = refine(half, [_enlarged(target) for target in targets])
         found += targets
     return found

@@ -67,10 +67,16 @@ class Memory:
         What to try first, see `ahf_ros.filtering.trials.Trials`; None for nothing.
     settled : tuple of 2 int or None
         n and N of the last image; None unless N was estimated.
+    families : tuple of str
+        The families that were found so far; empty unless they are to be settled.
+    shown : int
+        How many images have settled them, see `ahf_ros.filtering.settling`.
     """
 
     filter: Values | None = None
     settled: tuple[int, int] | None = None
+    families: tuple[str, ...] = ()
+    shown: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -220,7 +226,7 @@ class Identifier:
         listed = settings.listed
         expected = len(listed) or given
         estimating = not expected and self._estimate is not None
-        trials = Trials(stack, self._detector, self._draft, settings, self._name)
+        trials = self._trials(stack)
         threads = settings.threads or os.cpu_count() or 1
         with ThreadPoolExecutor(threads) if threads > 1 else nullcontext() as executor:
             choice = self._steady(trials, executor) if estimating else None
@@ -234,7 +240,7 @@ class Identifier:
             targets = fused([trials.targets[values] for values in agreeing])
         self.last_search = choice.search
         settled = (count_codes(targets), choice.expected) if estimating else None
-        self.memory = Memory(choice.remembered, settled)
+        self.memory = replace(self.memory, filter=choice.remembered, settled=settled)
         number, gains = trials.parts(choice.filter)
         received = trials.image(choice.filter)
         if self._refine and (gains or fusing or received.dtype != np.uint8):
@@ -259,6 +265,10 @@ class Identifier:
             search=_trace_of(choice.search, trials, stack) if choice.search else None,
             edge_shift=median_edge_shift(ordered),
         )
+
+    def _trials(self, stack: ImageStack) -> Trials:
+        """Return what is known of an image or stack before it is identified: nothing."""
+        return Trials(stack, self._detector, self._draft, self._settings, self._name)
 
     def _chosen(self, trials: Trials, expected: int, executor: Executor | None) -> _Choice:
         """Return what shows n targets with the smallest |N - n|; N is 0 if it is unknown."""

@@ -25,6 +25,7 @@ from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 
 from ahf_ros.detectors.contract import Unavailable
+from ahf_ros.filtering.settling import settled_families
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.answers import Answers
 from ahf_ros.nodes.diagnostics import Tally
@@ -78,6 +79,7 @@ class ImageQueue:
         self._tally = tally
         self._lock = threading.Lock()
         self._numbers = count(1)
+        self._families: tuple[str, ...] = ()  # that are settled
         self.pipeline: Pipeline  # in force
         self._begin()
         # It is never cancelled: rclpy ends the node where one thread cancels a timer that is due
@@ -199,6 +201,10 @@ class ImageQueue:
     def _publish(self, answer: Answer[Header], image: _Waiting) -> None:
         try:
             self._answers.publish(answer, image.pipeline, image.arrived)
+            memory = image.pipeline.stream.memory
+            if line := settled_families(memory, self._families):
+                self._logger.info(line)
+            self._families = memory.families
         except Exception as error:
             # No image may end the node.
             self._tell(why_refused(error))

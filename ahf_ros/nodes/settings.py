@@ -9,7 +9,7 @@ from importlib.util import find_spec
 from ahf_ros.detectors import DETECTOR, detector_name
 from ahf_ros.localisation import FULL, NEIGHBOURHOOD, CloudGrid
 from ahf_ros.session import create_identifier
-from ahf_ros.session_settings import IdentificationSettings, StackSettings
+from ahf_ros.session_settings import AnyTargetSettings, IdentificationSettings, StackSettings
 from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.synthetic.scene import SceneSettings
 
@@ -112,6 +112,7 @@ class NodeIdentificationSettings(IdentificationSettings):
         choices=(*DETECTOR.choices, SERVICE),
         read_only=True,
     )
+    detection: AnyTargetSettings = field(default_factory=AnyTargetSettings)
 
     def check_detector(self) -> None:
         """Refuse a detector that does not identify the family; a service identifies any."""

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from ahf_ros import detectors
+from ahf_ros.codes.families import KINDS
 from ahf_ros.detectors import (
     DETECTOR_NAMES,
     FAMILY_NAMES,
@@ -86,7 +87,7 @@ def test_every_family_chooses_a_detector():
     [
         ('aruco', 'metashape12', ['auto, ring, traditional, command', 'aruco_4x4_50, ']),
         ('ring', 'apriltag_36h11', ['auto, apriltag, square, command', 'one of metashape12, ']),
-        ('traditional', 'auto', ['auto, ring, command', 'one of metashape12, ']),
+        ('traditional', 'aicon12,aicon14', ['auto, ring, command', 'one of metashape12, ']),
         ('aruco', 'metashape12,aicon12', ['auto, ring, command', 'aruco_4x4_50, ']),
     ],
 )
@@ -96,6 +97,12 @@ def test_a_detector_that_does_not_identify_the_family_is_refused(name, family, a
     message = str(caught.value)
     assert message.startswith(f'detector is {name!r} and family is {family!r}; accepted with')
     assert all(part in message for part in accepted)
+
+
+def test_a_detector_reads_all_families_that_it_can():
+    names = 'auto', 'ring', 'traditional', 'gsi_published', 'command'
+    read = [create_detector(name, family='auto', command='program').family for name in names]
+    assert read == ['auto', ','.join(KINDS['ring']), 'metashape12', 'gsi', 'auto']
 
 
 def test_a_family_that_is_not_there_is_refused_with_those_that_are():

@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from ahf_ros.codes import VENDOR_NAMES
 from ahf_ros.codes.ring import family
 from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.detectors.ring.counting import estimate_count
@@ -21,6 +22,7 @@ from support.scenes import identified, rendered
 
 TWO = ('metashape12', 'aicon14')
 THREE = ('metashape12', 'metashape20', 'aicon14')
+VENDORS = ','.join(VENDOR_NAMES)
 LIGHTS = ('normal', 'stripe')
 SMALL = SceneSettings(width=480, height=360, targets=4, dot_radius=10, seed=21)
 SHARED = {'metashape12': 455, 'metashape16': 3855, 'metashape20': 31775}
@@ -56,7 +58,7 @@ def matches(targets: list[Target], truth: list[tuple[str, int, float, float]]) -
     [
         (TWO, 'normal', 'aicon14, metashape12'),
         *((TWO, light, families) for light in LIGHTS for families in (','.join(TWO), 'auto')),
-        *((THREE, 'normal', families) for families in (','.join(THREE), 'auto')),
+        *((THREE, 'normal', families) for families in (','.join(THREE), VENDORS)),
     ],
 )
 def test_every_target_says_its_family(shown, light, families):
@@ -89,7 +91,7 @@ def test_an_id_of_two_families_is_two_targets():
 
 
 @pytest.mark.parametrize('name', SHARED)
-@pytest.mark.parametrize('families', ['auto', ''])
+@pytest.mark.parametrize('families', [VENDORS, ''])
 def test_a_print_of_three_families_is_of_the_family_beside_it(name, families):
     """The print is the same in each image; what is beside it is not."""
     others = [(name, int(family(name).words[index])) for index in (20, 40)]
@@ -118,7 +120,7 @@ def test_a_print_of_three_families_alone_is_of_none(families):
 
 def test_targets_of_another_family_do_not_settle_a_print():
     marks = [('aicon14', int(family('aicon14').words[index])) for index in (20, 40, 60)]
-    targets = identified(sheet(('metashape12', SHARED['metashape12']), *marks), family='auto')
+    targets = identified(sheet(('metashape12', SHARED['metashape12']), *marks), family=VENDORS)
     assert sorted(it.code for it in targets) == sorted(word for _, word in marks)
 
 
@@ -128,7 +130,7 @@ def test_bands_of_other_radii_are_not_read():
 
 def test_targets_of_several_families_are_counted():
     image, truth = side_by_side(*map(scene, TWO))
-    assert estimate_count(image, DetectorSettings(family='auto')) == len(truth)
+    assert estimate_count(image, DetectorSettings(family=VENDORS)) == len(truth)
 
 
 def test_both_prints_are_found_among_the_many_dots_of_a_lattice():

@@ -1,0 +1,131 @@
+"""Identification of families of several kinds, each by the detector of its kind.
+
+What a detector takes for a target may be a part of another one: the dot of a ring may be one dot
+of many. A place belongs to one target, the surer one, of equally sure ones the larger.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from math import hypot
+from typing import ClassVar
+
+import numpy as np
+
+from ahf_ros.codes.designs import relative_reach
+from ahf_ros.detectors.claims import owners
+from ahf_ros.detectors.contract import (
+    Detector,
+    DetectorSettings,
+    Drafter,
+    EarlyStopping,
+    Expecting,
+    Refiner,
+)
+from ahf_ros.target import UNDECODED, DottedTarget, Target, sorted_targets
+
+_DIGITS = 2  # of a confidence, beyond which one is not surer than another
+
+
+@dataclass(frozen=True, slots=True)
+class SeveralDetector:
+    """Identify the targets of several detectors.
+
+    `of_parts` are the families of each, `narrow` is from some of all to their detector.
+    """
+
+    settings: DetectorSettings
+    parts: tuple[Detector, ...]
+    of_parts: tuple[tuple[str, ...], ...]
+    narrow: Callable[[Sequence[str]], Detector]
+    name: ClassVar[str] = 'several'
+
+    @property
+    def family(self) -> str:
+        """The families as the settings name them."""
+        return self.settings.family
+
+    @property
+    def families(self) -> tuple[str, ...]:
+        """The families one by one."""
+        return self.settings.families
+
+    @property
+    def patience(self) -> int:
+        """The longest patience; 0, for no end, where a detector has none."""
+        every = [it.patience if isinstance(it, EarlyStopping) else 0 for it in self.parts]
+        return max(every) if all(every) else 0
+
+    def __call__(self, image: np.ndarray) -> list[Target]:
+        """Identify the targets of one image; see `Detector`."""
+        return self._merged([detector(image) for detector in self.parts])
+
+    def draft(self, image: np.ndarray) -> list[Target]:
+        """Identify targets as a call does, with rough centres where a detector is faster so."""
+        return self._merged(
+            [it.draft(image) if isinstance(it, Drafter) else it(image) for it in self.parts]
+        )
+
+    def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
+        """Return targets with the centres that the detectors of their families find."""
+        found = list(targets)
+        for part, families in zip(self.parts, self.of_parts, strict=True):
+            which = [index for index, it in enumerate(found) if it.family in families]
+            if which and isinstance(part, Refiner):
+                moved = part.refine(image, [found[index] for index in which])
+                for index, target in zip(which, moved, strict=True):
+                    found[index] = target
+        return found
+
+    def expecting(self, ids: frozenset[int]) -> SeveralDetector:
+        """Return a detector that knows which IDs are likely; see `Expecting`."""
+        parts = [it.expecting(ids) if isinstance(it, Expecting) else it for it in self.parts]
+        return replace(self, parts=tuple(parts))
+
+    def narrowed(self, families: Sequence[str]) -> Detector:
+        """Return the detector of some of the families; see `Narrowing`."""
+        return self.narrow(families)
+
+    def _merged(self, results: Sequence[Sequence[Target]]) -> list[Target]:
+        """Return the targets of all detectors that own their places."""
+        named = [
+            (number, target)
+            for number, found in enumerate(results)
+            for target in self._named(self.of_parts[number], found)
+        ]
+        radii = [_radius(target) for _, target in named]
+        order = sorted(
+            range(len(named)),
+            key=lambda it: (
+                named[it][1].id == UNDECODED,
+                -round(named[it][1].confidence, _DIGITS),
+                -radii[it],
+            ),
+        )
+        x, y = np.array([(named[it][1].x, named[it][1].y) for it in order]).reshape(-1, 2).T
+        reach, of = np.array(radii)[order], np.array([named[it][0] for it in order], int)
+
+        def rivals(index: int) -> np.ndarray:
+            near = np.hypot(x - x[index], y - y[index]) < np.maximum(reach, reach[index])
+            return near & (of != of[index])
+
+        owning = owners(len(order), rivals)
+        return sorted_targets(
+            named[index][1] for index, owns in zip(order, owning, strict=True) if owns
+        )
+
+    @staticmethod
+    def _named(families: Sequence[str], found: Sequence[Target]) -> Iterator[Target]:
+        """Yield targets with the name of their family where the detector has a name for all."""
+        for target in found:
+            known = target.id == UNDECODED or target.family in families
+            yield target if known else replace(target, family=families[0])
+
+
+def _radius(target: Target) -> float:
+    """Return the radius of the narrowest circle about a target's centre that ends with it."""
+    if isinstance(target, DottedTarget) and target.dots:
+        reach = max(hypot(x - target.x, y - target.y) for x, y, *_ in target.dots)
+        return reach * target.semi_minor / target.semi_major
+    return relative_reach(target.family) * target.semi_minor

@@ -1,0 +1,201 @@
+"""Families of several kinds in one image, named or settled on the first images."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ahf_ros.bag.output import Entry, Journal, begin
+from ahf_ros.detectors import DetectorSettings, Narrowing, check_expected_ids, create_detector
+from ahf_ros.filtering.identifier import Memory
+from ahf_ros.filtering.settling import evident, settled_families
+from ahf_ros.imaging.stack import ImageStack
+from ahf_ros.interchange.image_files import write_image
+from ahf_ros.session import create_identifier
+from ahf_ros.session_settings import IdentificationSettings
+from ahf_ros.synthetic.scene import SceneSettings
+from ahf_ros.target import Identification, Target
+from support.command_line import status
+from support.scenes import rendered
+
+SMALL = SceneSettings(width=320, height=240, targets=3, dot_radius=8, seed=3)
+TWO = 'metashape12,apriltag_36h11'
+
+
+@cache
+def image_of(*families: str) -> np.ndarray:
+    """Return scenes of families side by side."""
+    return np.hstack([rendered(replace(SMALL, family=name)).image for name in families])
+
+
+BOTH = image_of('metashape12', 'apriltag_36h11')
+EMPTY = np.random.default_rng(5).normal(128, 3, (240, 640)).astype(np.uint8)
+
+
+def truth(*families: str) -> list[tuple[str, int, float, float]]:
+    return sorted(
+        (it.family, it.id, it.x + 320 * place, it.y)
+        for place, name in enumerate(families)
+        for it in rendered(replace(SMALL, family=name)).targets
+    )
+
+
+def assert_true(targets: list[Target] | tuple[Target, ...], *families: str) -> None:
+    found = sorted((it.family, it.id, it.x, it.y) for it in targets)
+    expected = truth(*families)
+    assert [it[:2] for it in found] == [it[:2] for it in expected]
+    assert np.allclose([it[2:] for it in found], [it[2:] for it in expected], atol=0.2)
+
+
+def without_time(found: Identification) -> Identification:
+    return replace(found, filter=replace(found.filter, duration=0.0))
+
+
+def test_families_of_two_kinds_are_identified_and_refined_each_by_its_detector() -> None:
+    detector = create_detector(family=TWO, min_radius=5.0)
+    assert (detector.name, detector.family) == ('several', TWO)
+    assert isinstance(detector, Narrowing)
+    found = detector(BOTH)
+    assert_true(found, *TWO.split(','))
+    moved = [replace(it, x=it.x + 0.3) for it in found]
+    assert_true(detector.refine(BOTH, moved), *TWO.split(','))
+    assert_true(detector.refine(BOTH, detector.draft(BOTH)), *TWO.split(','))
+    for name in TWO.split(','):
+        alone = create_detector(family=name, min_radius=5.0)
+        assert detector.narrowed([name])(BOTH) == alone(BOTH)
+        assert [it for it in found if it.family == name] == alone(BOTH)
+
+
+def test_the_disc_of_a_ring_of_dots_is_no_ring() -> None:
+    image = rendered(SceneSettings(width=640, height=480, targets=2, family='dots', dot_radius=8))
+    found = create_detector(family='dots,cct8,cct10,gsi')(image.image)
+    assert sorted(it.key for it in found) == sorted(it.key for it in image.targets)
+
+
+def test_each_kind_has_its_smallest_dots() -> None:
+    settings = DetectorSettings(family='metashape12,gsi')
+    assert settings.radii[0] == 2.0
+    assert settings.narrowed(['metashape12']).radii[0] == 4.0
+
+
+def test_ids_of_any_family_may_be_expected() -> None:
+    check_expected_ids([150, 580], 'several', DetectorSettings(family=TWO))
+    with pytest.raises(ValueError, match='expected_ids has 587, accepted are IDs of metashape12'):
+        check_expected_ids([587], 'several', DetectorSettings(family=TWO))
+    found = create_identifier(family=TWO, expected_targets=6).identify(BOTH)
+    assert (found.count, found.expected, found.filter.applied) == (6, 6, False)
+
+
+def test_doubtful_targets_of_few_are_no_evidence_for_a_family() -> None:
+    def target(family: str, number: int, confidence: float) -> Target:
+        return Target(number, 1, 9.0, 9.0, 5.0, 5.0, confidence=confidence, family=family)
+
+    doubtful = [target('cct8', 1, 0.95), target('cct8', 2, 0.9), target('cct9', 2, 0.98)]
+    sure = [target('aicon12', 5, 0.9995), *(target('cct12', it, 0.95) for it in range(3))]
+    undecoded = target('', -1, 0.5)
+    assert evident([*doubtful, *sure, undecoded]) == [*sure, undecoded]
+
+
+def test_families_are_settled_on_the_first_images_and_where_none_is_shown() -> None:
+    families = tuple(TWO.split(','))
+    third = image_of('metashape12', 'aruco_mip_36h12')
+    identifier = create_identifier(family='auto')
+    images = [
+        EMPTY,
+        image_of('metashape12'),
+        BOTH,
+        EMPTY,
+        BOTH,
+        third,
+        image_of('aruco_mip_36h12'),
+        third,
+    ]
+    settled = [
+        ((), 0),
+        (families[:1], 1),
+        (families, 2),
+        (families, 2),
+        (families, 3),
+        (families, 3),
+        (('metashape12', 'aruco_mip_36h12', 'apriltag_36h11'), 3),
+        (('metashape12', 'aruco_mip_36h12', 'apriltag_36h11'), 3),
+    ]
+    shown = [0, 3, 6, 0, 6, 3, 3, 6]  # ArUco's are not looked for in the first image of them
+    memories = [identifier.memory]
+    results = []
+    for image, expected, count in zip(images, settled, shown, strict=True):
+        results.append(identifier.identify(image))
+        memories.append(identifier.memory)
+        assert (identifier.memory.families, identifier.memory.shown) == expected
+        assert results[-1].count == count
+    named = create_identifier(family=TWO).identify(ImageStack((BOTH,)))
+    assert without_time(results[2]) == without_time(named)
+    # From the memory of any image, another identifier goes on in the same way.
+    for number in (3, 6):
+        other = create_identifier(family='auto')
+        other.memory = memories[number]
+        assert without_time(other.identify(images[number])) == without_time(results[number])
+        assert other.memory == memories[number + 1]
+    assert settled_families(memories[2], ()) == 'families: metashape12'
+    assert settled_families(memories[2], memories[2].families) == ''
+    identifier.reset()
+    assert identifier.memory == Memory()
+
+
+def test_a_filter_is_searched_for_with_the_families_that_are_there() -> None:
+    hard = rendered(replace(SMALL, light='stripe', ambient=0.3)).image
+    found = create_identifier(family='auto', expected_targets=4, max_evaluations=4).identify(hard)
+    named = create_identifier(expected_targets=4, max_evaluations=4).identify(hard)
+    assert found.search
+    assert without_time(found) == without_time(named)
+
+
+def test_rings_are_counted_where_they_are_settled() -> None:
+    settings = IdentificationSettings(
+        estimate_expected=True, detection=DetectorSettings(family='auto')
+    )
+    identifier = create_identifier(settings=settings)
+    found = identifier.identify(image_of('metashape12'))
+    assert (found.count, found.expected, found.estimated) == (3, 3, True)
+    found = create_identifier(settings=settings).identify(BOTH)
+    assert (found.count, found.expected, found.estimated) == (6, 0, False)
+
+
+def test_a_journal_keeps_what_is_settled(tmp_path: Path) -> None:
+    begin(tmp_path, '')
+    memory = Memory(filter=(1.5, 0.5), settled=(3, 4), families=tuple(TWO.split(',')), shown=2)
+    journal = Journal(tmp_path)
+    journal.append(Entry('image', 5, memory), [])
+    journal.close()
+    again = Journal(tmp_path)
+    assert [asdict(it) for it in again.entries] == [asdict(Entry('image', 5, memory))]
+    again.close()
+
+
+def test_a_batch_is_the_same_with_any_number_of_processes(
+    tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    images = tmp_path / 'images'
+    images.mkdir()
+    for number, image in enumerate((image_of('metashape12'), BOTH, EMPTY, BOTH, BOTH)):
+        write_image(images / f'{number}.png', image)
+    lines = []
+    for jobs in (1, 2):
+        output = tmp_path / f'output{jobs}'
+        arguments = ('identify', images, '--json', '--jobs', jobs, '--output', output)
+        assert status(*arguments) == 0
+        told = capsys.readouterr()
+        assert f'\nfamilies: {", ".join(sorted(TWO.split(",")))}\n' in told.err
+        records = [json.loads(line) for line in told.out.splitlines()]
+        for record in records:
+            record.pop('elapsed_s')
+        lines.append(records)
+    assert lines[0] == lines[1]
+    assert [len(record['targets']) for record in lines[0]] == [3, 6, 0, 6, 6]
+    assert status(*arguments) == 0
+    assert '5 of 5 results are there already' in capsys.readouterr().err
