@@ -18,7 +18,7 @@ import numpy as np
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes import RING_NAMES
 from ahf_ros.codes.cyclic import smallest_rotation
-from ahf_ros.codes.ring import BITS, Family, conforming, family
+from ahf_ros.codes.ring import BITS, Family, Radii, conforming, family
 from ahf_ros.detectors.claims import owners
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.ring.polar import angles_of
@@ -140,45 +140,39 @@ def find_bands(images: Iterable[np.ndarray], settings: DetectorSettings) -> Band
     return _distinct(Bands.joined(found))
 
 
-def _fit(gray: np.ndarray, dots: Dots) -> Fit:
+def _fit(gray: np.ndarray, dots: Dots | Fit) -> Fit:
     """Return the fits of those dots that have an edge."""
     fit = fit_dots(gray, dots.frames, dots.polarity, rays=_RAYS, reach=_REACH)
     return fit.select(fit.share >= ENOUGH)
 
 
 def with_measured_bands(
-    gray: np.ndarray, dots: Dots, families: Sequence[Family]
+    gray: np.ndarray, dots: Dots | Fit, families: Sequence[Family]
 ) -> Sequence[Family]:
-    """Return families of which those with a free band have the one that clear dots show."""
+    """Return families of which those with a free band have the one that clear dots show.
+
+    A family stays as it is where these are few. Radii are rounded, so that few families are made.
+    """
     if all(code.bounds is None for code in families):
         return families
     fit = _fit(gray, dots)
-    return [with_measured_band(gray, fit, code) for code in families]
-
-
-def with_measured_band(gray: np.ndarray, dots: Fit, code: Family) -> Family:
-    """Return a family whose free band has the radii that dots show, as it is where these are few.
-
-    Radii are rounded, so that there are few such families.
-    """
-    if code.bounds is None:
-        return code
-    clearest = np.argsort(-dots.share * (1 - dots.contrast), kind='stable')[:_CLEAREST]
-    bands = _bands(gray, dots.select(clearest), 0)
-    near = [
-        (of > least - _LOOSE) & (of < most + _LOOSE)
-        for of, (least, most) in zip((bands.inner, bands.outer), code.bounds, strict=True)
+    clearest = np.argsort(-fit.share * (1 - fit.contrast), kind='stable')[:_CLEAREST]
+    bands = _bands(gray, fit.select(clearest), 0)
+    return [
+        code if code.bounds is None else _measured(bands, code, *code.bounds) for code in families
     ]
-    bands = bands.select(np.logical_and(*near))
-    if len(bands.size) < MINIMUM_TARGETS:
+
+
+def _measured(bands: Bands, code: Family, inner: Radii, outer: Radii) -> Family:
+    """Return a family with the band that some of the bands have within bounds of its radii."""
+    near = (bands.inner > inner[0] - _LOOSE) & (bands.inner < inner[1] + _LOOSE)
+    near &= (bands.outer > outer[0] - _LOOSE) & (bands.outer < outer[1] + _LOOSE)
+    some = bands.select(near)
+    if len(some.size) < MINIMUM_TARGETS:
         return code
-    odds = _grid_odds(bands, *_borders(bands), code.bits).sum(axis=1) - _UNUSUAL
-    radii = _printed(bands, float(_GROWTH[odds.argmax()]))
-    inner, outer = (
-        round(_STEPS * min(max(of, least), most)) / _STEPS
-        for of, (least, most) in zip(radii, code.bounds, strict=True)
-    )
-    return _with_band(code, inner, outer)
+    odds = _grid_odds(some, *_borders(some), code.bits).sum(axis=1) - _UNUSUAL
+    band = np.clip(_printed(some, float(_GROWTH[odds.argmax()])), *np.transpose([inner, outer]))
+    return _with_band(code, *(np.rint(_STEPS * band) / _STEPS).tolist())
 
 
 @lru_cache(maxsize=64)
