@@ -46,7 +46,7 @@ _NOWHERE = 1e6  # radius of a band that is not there, dot radii
 _EXACT = 0.12  # deviation of the edges of a band from circles, dot radii
 _AGREEING = 0.6  # share of the marks of a band that begin and end there
 _MARKED = 0.03, 0.97  # share of a band that is marked
-_CLEAREST = 200  # dots that a free band is measured on
+_CLEAREST, _FEW = 200, 3  # dots that a free band is measured on, and least number of its bands
 _LOOSE = 0.3  # by which growth of ink moves the bounds of a free band, dot radii
 _STEPS = 50  # of a dot radius, to which radii are measured
 _ALIKE = 0.15  # difference of the radii of bands of one family, dot radii
@@ -168,7 +168,7 @@ def _measured(bands: Bands, code: Family, inner: Radii, outer: Radii) -> Family:
     near = (bands.inner > inner[0] - _LOOSE) & (bands.inner < inner[1] + _LOOSE)
     near &= (bands.outer > outer[0] - _LOOSE) & (bands.outer < outer[1] + _LOOSE)
     some = bands.select(near)
-    if len(some.size) < MINIMUM_TARGETS:
+    if len(some.size) < _FEW:
         return code
     odds = _grid_odds(some, *_borders(some), code.bits).sum(axis=1) - _UNUSUAL
     band = np.clip(_printed(some, float(_GROWTH[odds.argmax()])), *np.transpose([inner, outer]))
