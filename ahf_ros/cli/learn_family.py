@@ -97,7 +97,8 @@ def _learn_rings(options: argparse.Namespace) -> int:
     for problem in problems:
         tell('learn-family', problem)
     settings = DetectorSettings(**{name: getattr(options, name) for name in _OF_DOTS})
-    found, crops = [], {}
+    found: list[Bands] = []
+    crops: dict[bytes, np.ndarray] = {}
     for path in paths:
         try:
             image = read_image(path)

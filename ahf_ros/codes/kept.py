@@ -10,7 +10,7 @@ from typing import TypeVar
 Described = TypeVar('Described')
 
 
-def kept_while_unchanged(read: Callable[[str], Described]) -> Callable[[str], Described]:
+def kept_while_unchanged(read: Callable[[str], Described]) -> Callable[..., Described]:
     """Return a reader of data files that reads a file again only where it has changed.
 
     An empty path stands for what this package brings along, which does not change.

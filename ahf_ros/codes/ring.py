@@ -153,11 +153,13 @@ def _circles(entry: Entry, band: tuple[Radii, Radii]) -> tuple[Radii, ...]:
 def _table(codes: Entry, bits: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the words of a table by their IDs, ascending, and these."""
     words: dict[int, int] = {}
+    taken: set[int] = set()
     for number, entry in codes.items():
         if not number.isdecimal() or not 0 < int(number) < 1 << 31:
             entry.refuse('a word whose name is its ID, an integer from 1 to 2147483647')
-        if int(number) in words.values():
+        if int(number) in taken:
             entry.refuse(f'one word for the ID {int(number)}')
+        taken.add(int(number))
         words[_new_word(entry, words, bits)] = int(number)
     if not words:
         codes.refuse('a mapping of one ID at least to its word')

@@ -24,7 +24,7 @@ LIGHTS = ('stripe', 'lattice', 'fringe', 'shadow', 'spots')
 def dots_of(rendering: Rendering) -> Fit:
     """Return the dots of a scene, measured from where they truly are."""
     x, y, radii = np.array([(of.x, of.y, of.semi_major) for of in rendering.targets]).T
-    polarity = 1 if rendering.settings.polarity == 'dark' else -1
+    polarity = 1 if rendering.settings.dark else -1
     return measured(rendering.image, x, y, radii, polarity)
 
 

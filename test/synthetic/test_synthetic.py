@@ -55,7 +55,7 @@ def read_code(image: np.ndarray, target: Target, settings: SceneSettings) -> int
         columns = np.float32(target.x + along * cosine - across * sine)[None]
         rows = np.float32(target.y + along * sine + across * cosine)[None]
         values = cv2.remap(np.float32(image), columns, rows, cv2.INTER_LINEAR)[0]
-        inked = values < 128 if settings.polarity == 'dark' else values > 128
+        inked = values < 128 if settings.dark else values > 128
         contrast = float(np.abs(values - 128).min())
         best = max(best, (contrast, int((inked << np.arange(table.bits)).sum())))
     return table.number(best[1])

@@ -18,7 +18,7 @@ import numpy as np
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes import RING_NAMES
 from ahf_ros.codes.cyclic import smallest_rotation
-from ahf_ros.codes.ring import BITS, Family, conforming, family
+from ahf_ros.codes.ring import BITS, Family, Radii, conforming, family
 from ahf_ros.detectors.claims import owners
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.ring.polar import angles_of
@@ -46,7 +46,7 @@ _NOWHERE = 1e6  # radius of a band that is not there, dot radii
 _EXACT = 0.12  # deviation of the edges of a band from circles, dot radii
 _AGREEING = 0.6  # share of the marks of a band that begin and end there
 _MARKED = 0.03, 0.97  # share of a band that is marked
-_CLEAREST = 200  # dots that a free band is measured on
+_CLEAREST, _FEW = 200, 3  # dots that a free band is measured on, and least number of its bands
 _LOOSE = 0.3  # by which growth of ink moves the bounds of a free band, dot radii
 _STEPS = 50  # of a dot radius, to which radii are measured
 _ALIKE = 0.15  # difference of the radii of bands of one family, dot radii
@@ -140,45 +140,39 @@ def find_bands(images: Iterable[np.ndarray], settings: DetectorSettings) -> Band
     return _distinct(Bands.joined(found))
 
 
-def _fit(gray: np.ndarray, dots: Dots) -> Fit:
+def _fit(gray: np.ndarray, dots: Dots | Fit) -> Fit:
     """Return the fits of those dots that have an edge."""
     fit = fit_dots(gray, dots.frames, dots.polarity, rays=_RAYS, reach=_REACH)
     return fit.select(fit.share >= ENOUGH)
 
 
 def with_measured_bands(
-    gray: np.ndarray, dots: Dots, families: Sequence[Family]
+    gray: np.ndarray, dots: Dots | Fit, families: Sequence[Family]
 ) -> Sequence[Family]:
-    """Return families of which those with a free band have the one that clear dots show."""
+    """Return families of which those with a free band have the one that clear dots show.
+
+    A family stays as it is where these are few. Radii are rounded, so that few families are made.
+    """
     if all(code.bounds is None for code in families):
         return families
     fit = _fit(gray, dots)
-    return [with_measured_band(gray, fit, code) for code in families]
-
-
-def with_measured_band(gray: np.ndarray, dots: Fit, code: Family) -> Family:
-    """Return a family whose free band has the radii that dots show, as it is where these are few.
-
-    Radii are rounded, so that there are few such families.
-    """
-    if code.bounds is None:
-        return code
-    clearest = np.argsort(-dots.share * (1 - dots.contrast), kind='stable')[:_CLEAREST]
-    bands = _bands(gray, dots.select(clearest), 0)
-    near = [
-        (of > least - _LOOSE) & (of < most + _LOOSE)
-        for of, (least, most) in zip((bands.inner, bands.outer), code.bounds, strict=True)
+    clearest = np.argsort(-fit.share * (1 - fit.contrast), kind='stable')[:_CLEAREST]
+    bands = _bands(gray, fit.select(clearest), 0)
+    return [
+        code if code.bounds is None else _measured(bands, code, *code.bounds) for code in families
     ]
-    bands = bands.select(np.logical_and(*near))
-    if len(bands.size) < MINIMUM_TARGETS:
+
+
+def _measured(bands: Bands, code: Family, inner: Radii, outer: Radii) -> Family:
+    """Return a family with the band that some of the bands have within bounds of its radii."""
+    near = (bands.inner > inner[0] - _LOOSE) & (bands.inner < inner[1] + _LOOSE)
+    near &= (bands.outer > outer[0] - _LOOSE) & (bands.outer < outer[1] + _LOOSE)
+    some = bands.select(near)
+    if len(some.size) < _FEW:
         return code
-    odds = _grid_odds(bands, *_borders(bands), code.bits).sum(axis=1) - _UNUSUAL
-    radii = _printed(bands, float(_GROWTH[odds.argmax()]))
-    inner, outer = (
-        round(_STEPS * min(max(of, least), most)) / _STEPS
-        for of, (least, most) in zip(radii, code.bounds, strict=True)
-    )
-    return _with_band(code, inner, outer)
+    odds = _grid_odds(some, *_borders(some), code.bits).sum(axis=1) - _UNUSUAL
+    band = np.clip(_printed(some, float(_GROWTH[odds.argmax()])), *np.transpose([inner, outer]))
+    return _with_band(code, *(np.rint(_STEPS * band) / _STEPS).tolist())
 
 
 @lru_cache(maxsize=64)

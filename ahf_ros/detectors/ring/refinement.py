@@ -16,7 +16,7 @@ from ahf_ros.detectors.ring.circles import RAYS, REACH
 from ahf_ros.detectors.ring.full_size import with_soft_edges
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.known import Prior
-from ahf_ros.detectors.ring.learning import with_measured_band
+from ahf_ros.detectors.ring.learning import with_measured_bands
 from ahf_ros.detectors.ring.reading import read_bands
 from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import ENOUGH, Fit, fit_dots
@@ -111,7 +111,7 @@ def _agreeing(
     for name in dict.fromkeys(names[decoded].tolist() or [families[0].name]):
         of_family = decoded[names[decoded] == name]
         some = dots.select(of_family)
-        code = with_measured_band(gray, some, known[name])
+        (code,) = with_measured_bands(gray, some, [known[name]])
         read = read_bands(gray, some, code, Prior(expected))
         which = of_family
         agreed = (read.words > 0) & (canonical(read.words, code)[0] == codes[which])
