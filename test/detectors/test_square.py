@@ -95,9 +95,7 @@ def test_no_marker_less_than_apriltag_finds_and_better_centres(light):
     pytest.importorskip('pupil_apriltags')
     found = readers()
     shown = scene(family='apriltag_36h11', light=light)
-    ours, theirs = (
-        score(shown, found[name](shown.image)) for name in ('ahf', 'pupil-apriltags')
-    )
+    ours, theirs = (score(shown, found[name](shown.image)) for name in ('ahf', 'pupil-apriltags'))
     assert ours.right == 6 >= theirs.right
     assert ours.wrong == ours.false_positives == 0
     assert theirs.right == 0 or ours.rmse[2] < theirs.rmse[2]

@@ -98,7 +98,9 @@ def _table(group: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
     count = np.zeros(len(cells))
     for name in reversed(group):
         count[: len(words(name))] = 4 * len(words(name))
-    return turned.reshape(4 * len(cells), -1).T.astype(np.float32), np.log(np.repeat(count, 4)).astype(np.float32)
+    return turned.reshape(4 * len(cells), -1).T.astype(np.float32), np.log(
+        np.repeat(count, 4)
+    ).astype(np.float32)
 
 
 def _frames(corners: np.ndarray) -> np.ndarray:
@@ -144,7 +146,9 @@ def _evidence(
     size = side + 2
     parts = np.array(
         [
-            sample(gray, project(frames, grid + np.array([x, y]) / side).reshape(len(frames), -1, 2))
+            sample(
+                gray, project(frames, grid + np.array([x, y]) / side).reshape(len(frames), -1, 2)
+            )
             for x in _IN_CELL
             for y in _IN_CELL
         ],
@@ -213,7 +217,8 @@ def _unmixed(values: np.ndarray, corners: np.ndarray, side: int) -> np.ndarray:
         for of in ((lengths[:, 0] + lengths[:, 2]) / 2, (lengths[:, 1] + lengths[:, 3]) / 2)
     )
     mixed = [
-        np.eye(count) + np.minimum(of, _MOST_MIXED)[:, None, None] * (neighbours - 2 * np.eye(count))
+        np.eye(count)
+        + np.minimum(of, _MOST_MIXED)[:, None, None] * (neighbours - 2 * np.eye(count))
         for of in (across, down)
     ]
     along_columns = np.linalg.solve(mixed[1], values)
