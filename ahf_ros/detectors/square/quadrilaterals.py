@@ -1,8 +1,8 @@
 """Quadrilaterals that may be square markers: dark regions with four straight sides.
 
-A pixel is dark where it is less than the mean of the darkest and the brightest one about it. In the
-gray values this separates ink and paper in even light, in their logarithms it does
-so in any light that changes less than ink and paper do.
+A pixel is dark where it is less than the mean of the darkest and the brightest one about it. In
+gray values this separates ink and paper in even light, in their logarithms it does so in any light
+that changes less than ink and paper do.
 Where a cover or another dark thing changes the outline, its four longest sides are left.
 """
 
@@ -60,7 +60,7 @@ def find_quadrilaterals(gray: np.ndarray) -> np.ndarray:
         middle = cv2.addWeighted(low, 0.5, high, 0.5, 0)
         high -= low
         dark = cv2.compare(values, middle, cv2.CMP_LT)
-        dark &= cv2.compare(high, _MINIMUM_STEP, cv2.CMP_GT)
+        dark[high <= _MINIMUM_STEP] = 0
         outlines, _ = cv2.findContours(dark, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
         regions = [region for outline in outlines if (region := _region(outline))]
         for index in _bordered(values, regions):
