@@ -58,9 +58,9 @@ def find_quadrilaterals(gray: np.ndarray) -> np.ndarray:
         values = cv2.LUT(gray, table)
         low, high = cv2.erode(values, window), cv2.dilate(values, window)
         middle = cv2.addWeighted(low, 0.5, high, 0.5, 0)
-        high -= low
+        height = cv2.subtract(high, low)
         dark = cv2.compare(values, middle, cv2.CMP_LT)
-        dark[high <= _MINIMUM_STEP] = 0
+        dark[height <= _MINIMUM_STEP] = 0
         outlines, _ = cv2.findContours(dark, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
         regions = [region for outline in outlines if (region := _region(outline))]
         for index in _bordered(values, regions):
