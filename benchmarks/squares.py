@@ -52,7 +52,7 @@ def readers() -> dict[str, Reader]:
 
     def by_opencv(image: np.ndarray) -> list[Target]:
         corners, numbers, _ = opencv.detectMarkers(image)
-        return _targets([] if numbers is None else numbers.ravel(), corners)
+        return _targets([] if numbers is None else numbers.ravel().tolist(), corners)
 
     found: dict[str, Reader] = {'ahf': create_detector(family=FAMILY), 'opencv': by_opencv}
     try:
@@ -81,11 +81,9 @@ def measure(seeds: Sequence[int]) -> Iterator[dict[str, Any]]:
     """Render scenes and yield what each reader finds in them."""
     found = readers()
     for name, changes in report.progress(SCENES.items(), 'scenes', len(SCENES)):
-        usual = {'width': 1600, 'height': 1200, 'targets': 20, 'dot_radius': 12.0}
-        scenes = [
-            render(SceneSettings(**usual | {'family': FAMILY, 'seed': seed} | changes))
-            for seed in seeds
-        ]
+        usual: dict[str, Any] = {'width': 1600, 'height': 1200, 'targets': 20, 'dot_radius': 12.0}
+        usual |= {'family': FAMILY} | changes
+        scenes = [render(SceneSettings(**usual | {'seed': seed})) for seed in seeds]
         for reader, read in found.items():
             start = time.perf_counter()
             results = [read(shown.image) for shown in scenes]
@@ -113,11 +111,11 @@ def photographed(folder: Path) -> Iterator[dict[str, Any]]:
 
 def markdown(figures: report.Report) -> str:
     """Return the report as tables."""
-    rows = [
-        (row['scene'], row['reader'], f'{row["right"]} of {row["expected"]}', row['wrong'])
-        + (number(row['rms'], 4), number(1000 * row['seconds'], 0))
-        for row in figures['rows']
-    ]
+    rows = []
+    for row in figures['rows']:
+        right, milliseconds = f'{row["right"]} of {row["expected"]}', 1000 * row['seconds']
+        cells = (right, row['wrong'], number(row['rms'], 4), number(milliseconds, 0))
+        rows.append((row['scene'], row['reader'], *cells))
     head = ('scene', 'reader', 'right', 'wrong, false', 'RMS, px', 'ms')
     lines = [report.about_text(figures), '', *report.table(head, rows)]
     if figures.get('photographs'):

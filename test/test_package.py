@@ -49,6 +49,7 @@ ROSDEP = {
 scikit-learn threadpoolctl, which has no key."""
 
 NOT_IN_ROSDEP = {
+    'pupil_apriltags',
     'Metashape',
     'distributed',
     'fsspec',

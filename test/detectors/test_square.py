@@ -90,15 +90,14 @@ def test_a_covered_marker_is_read(gray):
     assert counted(shown, create_detector(family='apriltag_36h11')(image)) == (6, 0, 0)
 
 
-@pytest.mark.parametrize('light', ['normal', 'stripe'])
-def test_no_marker_less_than_apriltag_finds_and_better_centres(light):
+def test_no_marker_less_than_apriltag_finds_and_better_centres():
     pytest.importorskip('pupil_apriltags')
     found = readers()
-    shown = scene(family='apriltag_36h11', light=light)
+    shown = scene(family='apriltag_36h11')
     ours, theirs = (score(shown, found[name](shown.image)) for name in ('ahf', 'pupil-apriltags'))
     assert ours.right == 6 >= theirs.right
     assert ours.wrong == ours.false_positives == 0
-    assert theirs.right == 0 or ours.rmse[2] < theirs.rmse[2]
+    assert ours.rmse[2] < theirs.rmse[2]
 
 
 def test_markers_of_another_dictionary_are_not_seen():

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from math import ceil, isnan, log2
 from typing import Any
 
-import cv2
 import numpy as np
 
 from ahf_ros.codes.square import words
@@ -77,11 +76,11 @@ class SquareDetector(FamilyDetector):
             ]
             corners.append((np.array(turned).reshape(-1, 4, 2) + 0.5) * 2**level - 0.5)
             readings.append(np.stack([read_as.group, read_as.number, read_as.odds], axis=1))
-        places, readings_ = np.concatenate(corners), np.concatenate(readings)
-        chosen = _best(places, readings_[:, 2])
+        places, rows = np.concatenate(corners), np.concatenate(readings)
+        chosen = _best(places, rows[:, 2])
         if not len(chosen):
             return []
-        which, numbers, odds = readings_[chosen].T
+        which, numbers, odds = rows[chosen].T
         families = [
             next(name for name in group if len(words(name)) > numbers[which == index].max())
             if index in which

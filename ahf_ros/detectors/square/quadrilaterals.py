@@ -1,19 +1,20 @@
 """Quadrilaterals that may be square markers: dark regions with four straight sides.
 
-A pixel is dark where it is less than the mean of the darkest and the brightest one about it. In the
-gray values this separates ink and paper in even light, in their logarithms it does
-so in any light that changes less than ink and paper do.
+A pixel is dark where it is less than the mean of the darkest and the brightest one about it. In
+gray values this separates ink and paper in even light, in their logarithms it does so in any light
+that changes less than ink and paper do.
 Where a cover or another dark thing changes the outline, its four longest sides are left.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import cv2
 import numpy as np
 
 from ahf_ros.detectors.square.sides import meet
+from ahf_ros.features.sampling import sample
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
 _WINDOW = 13  # in which a pixel is compared, px
@@ -29,12 +30,21 @@ _NEAR = 0.02, 1.2  # of points that belong to a side, as a share of the perimete
 _ENDS = 0.1  # of a side, left out at its ends, where blur rounds the corner
 _FEWEST = 3  # points of a side
 _COMMON_AREA = 0.6, 1.9  # of a quadrilateral, as a share of its region's
+_DEPTH, _SIDE = 0.12, 0.2  # of samples beside a side, to the middle; share of them with a step
+_ALONG = np.linspace(0.06, 0.94, 10)  # a side, where they are
 _LEVELS = np.arange(256)
 _SCALES = tuple(
     (np.rint(255 * of / of[-1]).astype(np.uint8), growth)
     for of, growth in ((_LEVELS, 0.5), (np.log(_LEVELS / LOG_OFFSET + 1), 0.9))
 )
 """Tables of values by gray value, and distances of the outermost dark pixels from the edge, px."""
+
+
+class _Region(NamedTuple):
+    sides: np.ndarray  # (4, 2, 2), px, clockwise in the image
+    outline: np.ndarray  # (n, 2), its outermost pixels
+    length: float  # of its outline, or of that of its hull, px
+    area: float  # with its holes, px^2
 
 
 def find_quadrilaterals(gray: np.ndarray) -> np.ndarray:
@@ -48,80 +58,98 @@ def find_quadrilaterals(gray: np.ndarray) -> np.ndarray:
         values = cv2.LUT(gray, table)
         low, high = cv2.erode(values, window), cv2.dilate(values, window)
         middle = cv2.addWeighted(low, 0.5, high, 0.5, 0)
-        high -= low
+        height = cv2.subtract(high, low)
         dark = cv2.compare(values, middle, cv2.CMP_LT)
-        dark &= cv2.compare(high, _MINIMUM_STEP, cv2.CMP_GT)
+        dark[height <= _MINIMUM_STEP] = 0
         outlines, _ = cv2.findContours(dark, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
-        found += _quadrilaterals(outlines, growth)
+        regions = [region for outline in outlines if (region := _region(outline))]
+        for index in _bordered(values, regions):
+            corners = _fitted(regions[index], growth)
+            if corners is not None and cv2.isContourConvex(corners.astype(np.float32)):
+                found.append(corners)
     return np.array(found, np.float64).reshape(-1, 4, 2)
 
 
-def _quadrilaterals(outlines: Sequence[np.ndarray], growth: float) -> Iterator[np.ndarray]:
-    """Yield the quadrilaterals of those outlines of regions that have four straight sides."""
-    for outline in outlines:
-        if len(outline) < 4 * _SMALLEST * 0.7:
-            continue
-        area = -cv2.contourArea(outline, oriented=True)
-        if area < 0:
-            continue  # of a hole
-        length = cv2.arcLength(outline, closed=True)
-        around = outline
-        if area < _SOLID * length**2 / 16:
-            _, _, width, height = cv2.boundingRect(outline)
-            if length > _TATTERED * (width + height) or area < _FILLED * width * height:
-                continue
-            around = cv2.convexHull(outline)
-            area, length = cv2.contourArea(around), cv2.arcLength(around, closed=True)
-        if area < max(_SOLID * length**2 / 16, _SMALLEST**2 / 2):
-            continue
-        polygon = cv2.approxPolyDP(around, max(_TOLERANCE * length, 1.0), closed=True)[::-1, 0]
-        if cv2.contourArea(polygon, oriented=True) < 0:
-            polygon = polygon[::-1]
-        if not 4 <= len(polygon) <= _MAXIMUM_CORNERS:
-            continue
-        sides = _four_sides(polygon.astype(np.float64), length)
-        if sides is None:
-            continue
-        corners = _fitted(sides, outline[:, 0].astype(np.float64), length, growth)
-        if corners is None:
-            continue
-        found = cv2.contourArea(corners.astype(np.float32), oriented=True)
-        if _COMMON_AREA[0] < found / area < _COMMON_AREA[1] and cv2.isContourConvex(
-            corners.astype(np.float32)
-        ):
-            yield corners
+def _region(outline: np.ndarray) -> _Region | None:
+    """Return the sides of the region in an outline if it has four straight ones."""
+    if len(outline) < 4 * _SMALLEST * 0.7:
+        return None
+    area = -cv2.contourArea(outline, oriented=True)
+    if area < 0:
+        return None  # of a hole
+    length = cv2.arcLength(outline, closed=True)
+    around = outline
+    if area < _SOLID * length**2 / 16:
+        _, _, width, height = cv2.boundingRect(outline)
+        if length > _TATTERED * (width + height) or area < _FILLED * width * height:
+            return None
+        around = cv2.convexHull(outline)
+        area, length = cv2.contourArea(around), cv2.arcLength(around, closed=True)
+    if area < max(_SOLID * length**2 / 16, _SMALLEST**2 / 2):
+        return None
+    polygon = cv2.approxPolyDP(around, max(_TOLERANCE * length, 1.0), closed=True)[::-1, 0]
+    if not 4 <= len(polygon) <= _MAXIMUM_CORNERS:
+        return None
+    if cv2.contourArea(polygon, oriented=True) < 0:
+        polygon = polygon[::-1]
+    sides = _four_sides(polygon.astype(np.float64), length)
+    return None if sides is None else _Region(sides, outline[:, 0], length, area)
+
+
+def _bordered(values: np.ndarray, regions: list[_Region]) -> np.ndarray:
+    """Return the indices of regions whose sides meet about them, dark inside, bright outside."""
+    if not regions:
+        return np.zeros(0, int)
+    sides = np.array([region.sides for region in regions])
+    before = np.roll(sides, 1, axis=1)
+    corners = meet(before[:, :, 0], before[:, :, 1], sides[:, :, 0], sides[:, :, 1])
+    after = np.roll(corners, -1, axis=1)
+    x, y = np.moveaxis(corners, 2, 0)
+    areas = (x * after[..., 1] - y * after[..., 0]).sum(axis=1) / 2
+    ratio = areas / np.array([region.area for region in regions])
+    which = np.flatnonzero((ratio > _COMMON_AREA[0]) & (ratio < _COMMON_AREA[1]))
+    corners, after = corners[which, :, None], after[which, :, None]
+    points = corners + _ALONG[:, None] * (after - corners)
+    aside = _DEPTH * (corners.mean(axis=1, keepdims=True) - points)
+    shape = len(which), 4 * len(_ALONG), 2
+    if not len(which):
+        return which
+    ink, paper = (
+        sample(values, (points + of).reshape(shape)).reshape(points.shape[:3]).astype(np.float64)
+        for of in (aside, -aside)
+    )
+    seen = (paper - ink > _MINIMUM_STEP / 4).mean(axis=2).min(axis=1) >= _SIDE
+    return which[seen]
 
 
 def _four_sides(polygon: np.ndarray, length: float) -> np.ndarray | None:
     """Return the four longest sides of a polygon, (4, 2, 2), no two on one line, in its order."""
-    sides = np.stack([polygon, np.roll(polygon, -1, axis=0)], axis=1)
-    if len(sides) == 4:
-        return sides
-    vectors = sides[:, 1] - sides[:, 0]
-    lengths = np.hypot(*vectors.T)
+    ends = np.concatenate([polygon[1:], polygon[:1]])
+    vectors = ends - polygon
+    lengths = np.hypot(vectors[:, 0], vectors[:, 1])
     if np.sort(lengths)[-4:].sum() < _FOUR * lengths.sum():
         return None
+    sides = np.stack([polygon, ends], axis=1)
+    if len(sides) == 4:
+        return sides
     normals = np.stack([vectors[:, 1], -vectors[:, 0]], axis=1) / lengths[:, None]
+    middles = (sides[:, 0] + sides[:, 1]) / 2
+    aside = normals @ middles.T - (normals * sides[:, 0]).sum(axis=1)[:, None]
+    same = np.abs(normals @ vectors.T) < _SAME_LINE[0] * lengths
+    same &= np.abs(aside) < _SAME_LINE[1] * length
     chosen: list[int] = []
     for index in np.argsort(-lengths).tolist():
-        same = any(
-            abs(normals[other] @ vectors[index]) < _SAME_LINE[0] * lengths[index]
-            and abs(normals[other] @ (sides[index].mean(axis=0) - sides[other, 0]))
-            < _SAME_LINE[1] * length
-            for other in chosen
-        )
-        if not same:
+        if not same[chosen, index].any():
             chosen.append(index)
         if len(chosen) == 4:
             return sides[sorted(chosen)]
     return None
 
 
-def _fitted(
-    sides: np.ndarray, points: np.ndarray, length: float, growth: float
-) -> np.ndarray | None:
+def _fitted(region: _Region, growth: float) -> np.ndarray | None:
     """Return the corners where lines fitted to the points near four sides meet, shape (4, 2)."""
-    starts, ends = sides[:, 0], sides[:, 1]
+    starts, ends = region.sides[:, 0], region.sides[:, 1]
+    points, length = region.outline.astype(np.float64), region.length
     vectors = ends - starts
     lengths = np.hypot(*vectors.T)[:, None]
     along = vectors / lengths

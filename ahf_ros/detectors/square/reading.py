@@ -84,7 +84,8 @@ def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]])
             columns = (bordered[which[likely]], np.full(len(best), index), number, turn, total)
             found.append(np.stack(columns, axis=1)[good])
     table = np.concatenate(found)
-    return Readings(*table[:, :4].T.astype(int), table[:, 4])
+    which, group, number, turn = table[:, :4].T.astype(int)
+    return Readings(which, group, number, turn, table[:, 4])
 
 
 @lru_cache(maxsize=32)
@@ -155,7 +156,7 @@ def _evidence(
         np.float64,
     ).reshape(-1, len(frames), size, size)
     whole = _unmixed(parts.mean(axis=0), corners, side)
-    parts = np.log(parts + LOG_OFFSET).reshape(len(parts), len(frames), -1)
+    logs = np.log(parts + LOG_OFFSET).reshape(len(parts), len(frames), -1)
     values = np.log(np.maximum(whole, 0) + LOG_OFFSET)
     rings = _rings(cells)
     flat = values.reshape(len(values), -1)
@@ -169,7 +170,7 @@ def _evidence(
     total = clear @ rings.weights
     middle = (clear * (ink + paper) / 2) @ rings.weights / total
     step = (clear * (paper - ink)) @ rings.weights / total
-    levels = np.concatenate([flat[None, which], parts[:, which]])
+    levels = np.concatenate([flat[None, which], logs[:, which]])
     odds = np.clip(_SHARPNESS * (levels - middle) / step, -_COVERED, _COVERED)
     weights = np.array([1.0, *[_PART_WEIGHT] * len(parts)])
     against = np.einsum('p,pkc->kc', weights, log(2) - np.logaddexp(0, odds))
