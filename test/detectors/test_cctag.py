@@ -34,7 +34,7 @@ def errors(shown: Rendering, found: list) -> np.ndarray:
         ('cctag3', {'dot_radius': 60.0, 'targets': 4}, 0.02),
         ('cctag3', {'tilt': 40.0, 'dot_radius': 20.0, 'targets': 6}, 0.03),
         ('cctag3', {'edge_shift': 0.5}, 0.03),
-        ('cctag3', {'edge_shift': -0.5}, 0.03),
+        ('cctag3', {'edge_shift': -0.5, 'dot_radius': 24.0, 'targets': 4}, 0.03),
         ('cctag3', {'light': 'stripe', 'ambient': 0.3, 'dot_radius': 20.0, 'targets': 6}, 0.05),
     ],
 )

@@ -31,14 +31,14 @@ _FEW_ANGLES, _FEW_RADII = _ANGLES[::2], slice(None, None, 2)  # of a glance
 _SIZES = 1.05  # ratio of radii that share templates, and of hypotheses of the radius
 _SHIFTS, _BLURS = (-0.6, -0.3, 0.0, 0.3, 0.6), (0.6, 0.9, 1.4)  # of edges, that are tried, px
 _GROWN = (0.85, 0.9, 0.95, 1.0, 1.05)  # radii of the outermost circle, where that was found
+_NARROWEST = 0.7  # ring that is read, px; blur hides others
 _PROMISING = 0.6  # share of a profile that rings explain, from which they are looked at
 _APART = 0.5  # distance of the centres of different targets, radii
 _PART = 2048, 48  # hypotheses and targets at a time, which bounds the memory
 _ENOUGH = 4  # certain targets, that tell of the edges of an image
 _SCALES = (0.93, 0.965, 1.0, 1.035, 1.07)  # of the radius, about a frame
 _READINGS = 5  # IDs that are brought onto the image from a frame
-_ROUNDS = 5  # of Gauss-Newton
-_OUTLIER = 3.0  # standard deviations, that quarter the weight of a gray value
+_OUTLIERS = 12.0, 8.0, 5.0, 3.0, 3.0  # deviations that quarter a weight, in rounds of Gauss-Newton
 _QUIET = 0.35  # quantile of rays, whose errors are usual
 _LEAST = 0.003  # standard deviation of gray values, of their mean
 _OTHER_CONTRAST = 0.2  # difference of the contrast of a ray, that quarters its weight
@@ -143,6 +143,7 @@ def likely_rings(
     frames = np.concatenate(found)
     major = frame.ellipse_axes(frames)[0]
     frames = frames[(major >= radii[0]) & (major <= radii[1])]
+    frames = frames[frame.mean_radii(frames) * family.narrow >= _NARROWEST]
     starts = range(0, len(frames), _PART[0])
     share = np.concatenate(
         [np.zeros(0)]
@@ -260,6 +261,7 @@ def identify(
     cost = (independent[:, None] * left + prior.squares(every).reshape(-1, count)) / 2
     best = every.select(np.arange(len(ids)) * count + cost.argmin(axis=1))
     others = np.where(ids == best.ids[:, None], np.inf, cost).min(axis=1)
+    best = align(gray, best.frames, best.ids, best.shift, family, prior)
     return replace(best, margin=others - cost.min(axis=1)).select(best.colour == polarity)
 
 
@@ -315,11 +317,11 @@ def _aligned(
     """Return what `align` does, by Gauss-Newton with robust weights."""
     count = len(frames)
     blur = np.full(count, prior.blur)
-    for _ in range(_ROUNDS):
+    for outlier in _OUTLIERS:
         size = frame.mean_radii(frames)
         values = _lit(gray, frames)
         ink, slope, by_shift, by_blur = _rings(family, ids, size, shift, blur)
-        rays = _robust_rays(values, ink)
+        rays = _robust_rays(values, ink, outlier)
         by_radius = [slope, slope * _PROFILE, slope * _PROFILE**2]
         normal, right = rays.equations(np.stack([*by_radius, by_shift, by_blur], axis=1), ink)
         variance = (rays.weight * rays.errors**2).sum(axis=(1, 2)) / rays.weight.sum(axis=(1, 2))
@@ -398,7 +400,7 @@ def _lit(gray: np.ndarray, frames: np.ndarray) -> np.ndarray:
     return lit
 
 
-def _robust_rays(values: np.ndarray, ink: np.ndarray) -> _Rays:
+def _robust_rays(values: np.ndarray, ink: np.ndarray, outlier: float) -> _Rays:
     """Return rays whose weights are low where edges of light disturb them.
 
     The contrast of ink is the same wherever the light falls.
@@ -409,7 +411,7 @@ def _robust_rays(values: np.ndarray, ink: np.ndarray) -> _Rays:
         alike = geman_mcclure(1.0, (rays.contrast - usual) / (_OTHER_CONTRAST * np.abs(usual)))
         of_rays = np.median(np.abs(rays.errors), axis=2)
         spread = NORMAL * np.quantile(of_rays, _QUIET, axis=1)[:, None, None]
-        weight = geman_mcclure(_PROFILE, rays.errors / (_OUTLIER * np.maximum(spread, _LEAST)))
+        weight = geman_mcclure(_PROFILE, rays.errors / (outlier * np.maximum(spread, _LEAST)))
         rays = _Rays.of(values, ink, weight * alike[..., None])
     return rays
 
