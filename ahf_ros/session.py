@@ -81,7 +81,10 @@ def create_identifier(
     used = detector or create_detector(settings.detector, settings=settings.detection)
     listed = settings.adaptive.listed
     if isinstance(used, Detector) and listed:
-        check_expected_ids(listed, used.name, settings.detection)
+        looked_for = settings.detection
+        if isinstance(used, Narrowing):
+            looked_for = looked_for.narrowed(used.families)
+        check_expected_ids(listed, used.name, looked_for)
     wanted = settings.detection.family
     families = (AUTO, used.family) if isinstance(used, Detector) else (wanted,)
     if settings.estimate_expected and wanted not in families:

@@ -33,7 +33,7 @@ SCENE = {'width': 320, 'height': 240, 'targets': 3, 'dot_radius': 9.0}
 SCENES = {'gsi': SCENE | {'width': 560, 'height': 420, 'dot_radius': 5.0}}
 SQUARES = ('aruco_4x4_50', 'apriltag_36h11')
 BOTH = 'metashape12,aicon14'
-SHOWN = {'auto': 'metashape12,gsi'}
+SHOWN = {'auto': 'metashape12,dots'}
 COMMAND = f'{sys.executable} -m ahf_ros.cli identify --json'
 
 

@@ -197,6 +197,12 @@ def _several(settings: DetectorSettings) -> Detector:
 
     groups: dict[str, list[str]] = {}
     for family in settings.families:
+        try:
+            create_detector(settings=settings.narrowed([family]))
+        except ValueError:
+            if settings.family != AUTO:
+                raise
+            continue  # square markers, which an old OpenCV does not have
         name = detector_name(_AUTO, family, settings.family_file)
         groups.setdefault(name if _ENTRIES[name].several else family, []).append(family)
     parts = tuple(create_detector(settings=settings.narrowed(of)) for of in groups.values())

@@ -49,7 +49,7 @@ class SeveralDetector:
     @property
     def families(self) -> tuple[str, ...]:
         """The families one by one."""
-        return self.settings.families
+        return tuple(name for families in self.of_parts for name in families)
 
     @property
     def patience(self) -> int:

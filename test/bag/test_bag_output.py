@@ -11,7 +11,9 @@ from ahf_ros.bag.output import JOURNAL, Entry, Journal, begin, begun_with, remov
 from ahf_ros.filtering.identifier import Memory
 
 ENTRIES = [
-    Entry('/image', 10**18 + number, Memory((1 + number / 3, 0.13), (number, 54)))
+    Entry(
+        '/image', 10**18 + number, Memory((1 + number / 3, 0.13), (number, 54), ('gsi', 'dots'), 2)
+    )
     for number in range(12)
 ]
 REFUSED = Entry('/image', 7, Memory(), 'no image', 'a note')
