@@ -14,31 +14,38 @@ import numpy as np
 from ahf_ros.codes.ring import Family, words_of_print
 from ahf_ros.detectors.ring.decoding import DOUBT
 from ahf_ros.detectors.ring.families import decoded, present_families
-from ahf_ros.detectors.ring.proposals import HOPEFUL, Print, bounds, measure_likely
+from ahf_ros.detectors.ring.proposals import HOPEFUL, bounds, measure_likely
 from ahf_ros.detectors.ring.reading import read_bands
 from ahf_ros.features.circle_fit import ENOUGH, Fit
 
-CLEAREST = 48
-"""Dots of an image that tell its families."""
-
+_CLEAREST = 48  # dots that tell the family of an image
+_FURTHER = 24  # dots that tell whether there are more
 _SAMPLE = 12  # of those that seem to have a print, which are read first
 _MORE = 3  # times as many, where these show nothing
 _NEARLY = 0.05  # mean evidence of a reading, by which a print is as good as the best one
 _PRINTS = 3  # the most likely ones, which are tried on the same dots
 
 
-def choose_families(
-    gray: np.ndarray, dots: Fit, families: Sequence[Family], most: int | None = None
-) -> list[Family]:
+def choose_families(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> list[Family]:
     """Return as few of some families as have all words of the print that the clearest dots show.
 
-    Where these show none, further ones are looked at, up to `most`.
+    Where these show none, further ones are looked at.
     """
-    if not families:
-        return []
-    order = np.argsort(-dots.share * (1 - dots.contrast), kind='stable')[:most]
-    shown = (_words_shown(gray, dots.select(some), families) for some in _growing(order, CLEAREST))
+    order = np.argsort(-dots.share * (1 - dots.contrast), kind='stable')
+    shown = (
+        _words_shown(gray, dots.select(some), families) for some in _growing(order, _CLEAREST)
+    )
     return present_families(next(filter(None, shown), []))[0]
+
+
+def further_families(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> list[Family]:
+    """Return the same for dots that no family explains, most of which are none of targets."""
+    if not families or not len(dots.frames):
+        return []
+    finest = {code.band: code.bits for code in sorted(families, key=lambda code: code.bits)}
+    mean = bounds(gray, dots, list(finest.items())).max(axis=0)
+    some = dots.select(np.argsort(-mean, kind='stable')[:_FURTHER])
+    return present_families(_words_shown(gray, some, families))[0]
 
 
 def _growing(order: np.ndarray, count: int) -> Iterator[np.ndarray]:

@@ -15,7 +15,7 @@ import numpy as np
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes.ring import Family
 from ahf_ros.detectors.contract import DetectorSettings
-from ahf_ros.detectors.ring.choice import CLEAREST, choose_families
+from ahf_ros.detectors.ring.choice import choose_families, further_families
 from ahf_ros.detectors.ring.families import decoded, read_families, settle_same_prints
 from ahf_ros.detectors.ring.full_size import at_full_size
 from ahf_ros.detectors.ring.hypotheses import Hypotheses, resolve
@@ -134,7 +134,7 @@ def read_image(
         return Explained.joined([explained, Explained.by(found[-1])])
 
     for octave in octaves(pyramid, *settings.radii):
-        part = octave.pyramid.gray
+        part, fits = octave.pyramid.gray, [NO_FITS]
         for propose in proposals:
             proposed = propose(octave, settings.polarities, explained)
             dots = measure_dots(part, proposed, covariances=settings.report_undecoded)
@@ -146,13 +146,14 @@ def read_image(
             unread = full_size(octave, Hypotheses.unread(others, families[0]))
             explained = Explained.joined([explained, Explained.by(unread)])
             explained = read_dots(octave, likely, codes)
-            measured.append((octave, dots))
+            fits.append(dots)
+        measured.append((octave, Fit.joined(fits)))
     for octave, dots in measured:
         part = octave.pyramid.gray
-        while shown and len(dots.frames):
+        while shown:
             dots = dots.select(~explained.on_targets(dots.frames, octave.level))
             left = [code for code in families if code not in shown]
-            codes = choose_families(part, dots, left, most=CLEAREST)
+            codes = further_families(part, dots, left)
             if not codes:
                 break
             explained = read_dots(octave, measure_likely(part, dots, codes)[0], codes)

@@ -108,7 +108,10 @@ def bounds(gray: np.ndarray, dots: Fit, prints: Sequence[Print]) -> np.ndarray:
     best = np.full((len(prints), len(dots.frames)), -np.inf)
     for band in dict.fromkeys(band for band, _ in prints):
         of_band = [index for index, (radii, _) in enumerate(prints) if radii == band]
-        best[of_band] = _bounds(gray, dots, band, [prints[index][1] for index in of_band])
+        bits = [prints[index][1] for index in of_band]
+        for start in range(0, len(dots.frames), PART):
+            part = slice(start, start + PART)
+            best[of_band, part] = _bounds(gray, dots.select(part), band, bits)
     return best
 
 
