@@ -19,7 +19,8 @@ from ahf_ros.detectors.ring.reading import read_bands
 from ahf_ros.features.circle_fit import ENOUGH, Fit
 
 _CLEAREST = 48  # dots that tell the family of an image
-_FURTHER = 24  # dots that tell whether there are more
+_CLEAR = 0.5  # bound of the mean evidence of a reading, which spots of light hardly reach
+_ROUGH = (0.0,)  # shifts of edges that are tried to find these, px
 _SAMPLE = 12  # of those that seem to have a print, which are read first
 _MORE = 3  # times as many, where these show nothing
 _NEARLY = 0.05  # mean evidence of a reading, by which a print is as good as the best one
@@ -40,12 +41,13 @@ def choose_families(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> 
 
 def further_families(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> list[Family]:
     """Return the same for dots that no family explains, most of which are none of targets."""
+    dots = dots.select(dots.share >= ENOUGH)
     if not families or not len(dots.frames):
         return []
     finest = {code.band: code.bits for code in sorted(families, key=lambda code: code.bits)}
-    mean = bounds(gray, dots, list(finest.items())).max(axis=0)
-    some = dots.select(np.argsort(-mean, kind='stable')[:_FURTHER])
-    return present_families(_words_shown(gray, some, families))[0]
+    mean = bounds(gray, dots, list(finest.items()), _ROUGH).max(axis=0)
+    order = np.argsort(-mean, kind='stable')[: np.count_nonzero(mean > _CLEAR)][:_CLEAREST]
+    return present_families(_words_shown(gray, dots.select(order), families))[0]
 
 
 def _growing(order: np.ndarray, count: int) -> Iterator[np.ndarray]:

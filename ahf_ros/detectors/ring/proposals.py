@@ -103,27 +103,36 @@ def may_be_targets(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> n
     return np.asarray(bounds(gray, dots, prints).max(axis=0) > HOPEFUL)
 
 
-def bounds(gray: np.ndarray, dots: Fit, prints: Sequence[Print]) -> np.ndarray:
-    """Return bounds of the mean evidence of readings for words of prints, shape (prints, k)."""
+def bounds(
+    gray: np.ndarray, dots: Fit, prints: Sequence[Print], shifts: Sequence[float] = ()
+) -> np.ndarray:
+    """Return bounds of the mean evidence of readings for words of prints, shape (prints, k).
+
+    For edges with some shifts, px; without any, with those that are usual.
+    """
     best = np.full((len(prints), len(dots.frames)), -np.inf)
     for band in dict.fromkeys(band for band, _ in prints):
         of_band = [index for index, (radii, _) in enumerate(prints) if radii == band]
         bits = [prints[index][1] for index in of_band]
         for start in range(0, len(dots.frames), PART):
             part = slice(start, start + PART)
-            best[of_band, part] = _bounds(gray, dots.select(part), band, bits)
+            best[of_band, part] = _bounds(gray, dots.select(part), band, bits, shifts)
     return best
 
 
 def _bounds(
-    gray: np.ndarray, dots: Fit, band: tuple[float, float], bits: Sequence[int]
+    gray: np.ndarray,
+    dots: Fit,
+    band: tuple[float, float],
+    bits: Sequence[int],
+    shifts: Sequence[float],
 ) -> np.ndarray:
     """Return the same for some numbers of sectors in one band, shape (numbers, k)."""
     angles = _PER_SECTOR * max(bits)
     polar = polar_images(gray, dots, band, angles, _CIRCLES)
     best = np.full((len(bits), len(dots.frames)), -np.inf)
     tried = _SHIFTS if band[1] - band[0] >= _WIDE else _OF_NARROW
-    for shift in np.linspace(-_MAXIMUM_SHIFT, _MAXIMUM_SHIFT, tried).tolist():
+    for shift in shifts or np.linspace(-_MAXIMUM_SHIFT, _MAXIMUM_SHIFT, tried).tolist():
         growth = growth_by(shift, polar.size)
         edges = edge_evidence(polar, 1 - growth, growth, band)
         cap = _CAP * edges.weight[:, None]
