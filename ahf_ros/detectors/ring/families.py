@@ -58,8 +58,8 @@ def _against_rivals(
     certain = np.flatnonzero(found.certain)
     order = certain[np.argsort(found.coded[certain], kind='stable')]
     first = order[: min(_FIRST, (found.coded[certain] < 0).sum())]
-    read = {code.name for code in families}
-    rivals = [family(name) for name in FAMILY_NAMES if name not in read]
+    known = [family(name) for name in FAMILY_NAMES]
+    rivals = [rival for rival in known if not any(_has_all(code, rival) for code in families)]
     confidence = found.confidence.copy()
     for some in (first, order[len(first) :]):
         if not some.size or not rivals:
@@ -72,6 +72,12 @@ def _against_rivals(
         if contested.mean() < 0.5:
             break
     return replace(found, confidence=confidence)
+
+
+def _has_all(code: Family, other: Family) -> bool:
+    """Return whether a family has all words of another one, in the same print."""
+    same = (code.band, code.bits) == (other.band, other.bits)
+    return same and bool(np.isin(other.words, code.words).all())
 
 
 def _odds(read: Hypotheses) -> np.ndarray:
