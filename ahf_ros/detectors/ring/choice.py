@@ -18,10 +18,10 @@ from ahf_ros.detectors.ring.proposals import HOPEFUL, bounds, measure_likely
 from ahf_ros.detectors.ring.reading import read_bands
 from ahf_ros.features.circle_fit import ENOUGH, Fit
 
-_CLEAREST = 48  # dots that tell the family of an image
+_CLEAREST = 32  # dots that tell the family of an image
 _CLEAR = 0.5  # bound of the mean evidence of a reading, which spots of light hardly reach
 _ROUGH = (0.0,)  # shifts of edges that are tried to find these, px
-_SAMPLE = 12  # of those that seem to have a print, which are read first
+_SAMPLE = 8  # of those that seem to have a print, which are read first
 _MORE = 3  # times as many, where these show nothing
 _NEARLY = 0.05  # mean evidence of a reading, by which a print is as good as the best one
 _PRINTS = 3  # the most likely ones, which are tried on the same dots
