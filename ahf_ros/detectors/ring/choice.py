@@ -20,6 +20,7 @@ from ahf_ros.features.circle_fit import ENOUGH, Fit
 
 _CLEAREST = 32  # dots that tell the family of an image
 _CLEAR = 0.5  # bound of the mean evidence of a reading, which spots of light hardly reach
+_SEVERAL = 3  # words that show a family where no dot is so clear
 _ROUGH = (0.0,)  # shifts of edges that are tried to find these, px
 _SAMPLE = 8  # of those that seem to have a print, which are read first
 _MORE = 3  # times as many, where these show nothing
@@ -72,9 +73,10 @@ def _words_shown(
         # Whatever has a number of sectors has its multiples as well.
         same = [code for code in families if code.band == band and bits % code.bits == 0]
         same.sort(key=lambda code: len(code.words))
+        words: list[tuple[Family, int]] = []
         for some in _growing(np.flatnonzero(likely[best]), _SAMPLE):
-            words = _read(gray, dots.select(some), same)
-            if words:
+            words += _read(gray, dots.select(some), same)
+            if len(words) >= _SEVERAL or (words and mean[best, some].max() > _CLEAR):
                 return [words_of_print(code, word, tuple(families)) for code, word in words]
     return []
 
