@@ -59,7 +59,7 @@ def test_a_glance_saves_time_and_changes_nothing(
 ) -> None:
     image, settings = render(scene).image, DetectorSettings()
     few = find_hypotheses(image, settings)
-    monkeypatch.setattr(proposals, '_HOPEFUL', -np.inf)
+    monkeypatch.setattr(proposals, 'HOPEFUL', -np.inf)
     all_dots = find_hypotheses(image, settings)
     assert len(all_dots.words) > 1.2 * len(few.words)
     targets, expected = report(few, settings), report(all_dots, settings)

@@ -9,15 +9,17 @@ from functools import cache
 import numpy as np
 import pytest
 
-from ahf_ros.codes import VENDOR_NAMES
+from ahf_ros.codes import RING_NAMES, VENDOR_NAMES
 from ahf_ros.codes.ring import family
 from ahf_ros.detectors import DetectorSettings, create_detector
+from ahf_ros.detectors.ring.choice import choose_families, further_families
 from ahf_ros.detectors.ring.counting import estimate_count
 from ahf_ros.synthetic.covers import Cover, ring_cover
 from ahf_ros.synthetic.scene import Rendering, SceneSettings
 from ahf_ros.target import UNDECODED, Target
 from benchmarks.exposure import Exposure
 from benchmarks.sheets import mark_sheet
+from support.ring import measured
 from support.scenes import identified, rendered
 
 TWO = ('metashape12', 'aicon14')
@@ -64,6 +66,27 @@ def matches(targets: list[Target], truth: list[tuple[str, int, float, float]]) -
 def test_every_target_says_its_family(shown, light, families):
     image, truth = side_by_side(*(scene(name, light) for name in shown))
     assert matches(identified(image, family=families), truth)
+
+
+@pytest.mark.parametrize('name', RING_NAMES)
+def test_all_families_together_read_what_the_one_that_is_there_reads(name):
+    image = rendered(
+        replace(SMALL, width=800, height=600, targets=8, family=name, light='stripe')
+    ).image
+    alone, together = (identified(image, family=of) for of in (name, ','.join(RING_NAMES)))
+    assert len(alone) >= 7
+    assert [it.key for it in together] == [it.key for it in alone]
+
+
+def test_families_that_no_dot_shows_are_not_chosen():
+    shown = scene('metashape14')
+    gray = shown.image.astype(np.float32)
+    x, y = zip(*((it.x, it.y) for it in shown.targets), strict=True)
+    dots = measured(gray, x, y, 10.0, 1, rounds=1)
+    others = [family(name) for name in ('cct14', 'aicon14')]
+    for choose in (choose_families, further_families):
+        assert choose(gray, dots, [*others, family('metashape14')]) == [family('metashape14')]
+        assert choose(gray, dots, others) == []
 
 
 def test_centres_are_refined_by_each_target_s_own_family():

@@ -6,7 +6,7 @@ from functools import cache, lru_cache
 
 import numpy as np
 
-from ahf_ros.codes.cyclic import rotated_words, smallest_rotation
+from ahf_ros.codes.cyclic import rotated_words
 from ahf_ros.codes.ring import Family, canonical
 
 _EXHAUSTIVE = 50_000  # rotations of words, up to which all of them compete
@@ -107,7 +107,7 @@ def _near_rotations(
     certain = (sectors > 0) @ (1 << np.arange(family.bits)) & ~(1 << uncertain).sum(axis=1)
     choices = np.arange(1 << _UNCERTAIN)[:, None] >> np.arange(_UNCERTAIN) & 1
     words = np.unique(certain[:, None] + (1 << uncertain) @ choices.T)
-    valid = words[np.isin(smallest_rotation(words, family.bits), family.words)]
+    valid = words[family.ids(words) > 0]
     # At least two words have to compete.
     words = np.concatenate([valid, family.words[:2], _expected_rotations(family, expected)])
     return _with_ones(np.unique(words), family.bits)

@@ -15,22 +15,24 @@ import numpy as np
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes.ring import Family
 from ahf_ros.detectors.contract import DetectorSettings
-from ahf_ros.detectors.ring.families import (
-    by_clear_dots,
-    decoded,
-    read_families,
-    settle_same_prints,
-)
+from ahf_ros.detectors.ring.choice import choose_families, further_families
+from ahf_ros.detectors.ring.families import decoded, read_families, settle_same_prints
 from ahf_ros.detectors.ring.full_size import at_full_size
 from ahf_ros.detectors.ring.hypotheses import Hypotheses, resolve
 from ahf_ros.detectors.ring.known import WHOLE, Explained, Prior
 from ahf_ros.detectors.ring.learning import with_measured_bands
-from ahf_ros.detectors.ring.proposals import PROPOSALS, Proposal, measure_dots, propose_whole
+from ahf_ros.detectors.ring.proposals import (
+    PROPOSALS,
+    Proposal,
+    measure_dots,
+    measure_likely,
+    propose_whole,
+)
 from ahf_ros.detectors.ring.refinement import refine_centres
 from ahf_ros.features import frame
-from ahf_ros.features.circle_fit import NO_FITS
+from ahf_ros.features.circle_fit import NO_FITS, Fit
 from ahf_ros.features.ellipse_targets import targets_from_frames
-from ahf_ros.features.pyramid import image_pyramid, octaves
+from ahf_ros.features.pyramid import Octave, image_pyramid, octaves
 from ahf_ros.imaging.faint import faint_parts
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, Target, UndecodedTarget, sorted_targets
@@ -115,31 +117,55 @@ def read_image(
     """
     described: Sequence[Family] = settings.codes(Family)
     families = described
+    shown = list(families) if len(families) == 1 else []
     pyramid = image_pyramid(gray, settings.max_radius)
     images = (pyramid.gray, *pyramid.halves)
     found = [Hypotheses.unread(NO_FITS, families[0])]
     explained = Explained.by(found[0])
+    measured: list[tuple[Octave, Fit]] = []
+
+    def full_size(octave: Octave, read: Hypotheses) -> Hypotheses:
+        return at_full_size(images[: octave.level + 1], read)
+
+    def read_dots(octave: Octave, dots: Fit, codes: Sequence[Family]) -> Explained:
+        if not len(dots.frames):
+            return explained
+        shifts = explained.shifts[explained.certain] / 2**octave.level
+        read = read_families(octave.pyramid.gray, dots, codes, Prior.after(expected, shifts))
+        found.append(full_size(octave, read))
+        return Explained.joined([explained, Explained.by(found[-1])])
+
     for octave in octaves(pyramid, *settings.radii):
-        part = octave.pyramid.gray
+        part, fits = octave.pyramid.gray, [NO_FITS]
         for propose in proposals:
-            dots = propose(octave, settings.polarities, explained)
+            proposed = propose(octave, settings.polarities, explained)
+            dots = measure_dots(part, proposed, covariances=settings.report_undecoded)
             families = with_measured_bands(part, dots, families)
-            fits, others = measure_dots(part, dots, families, keep_all=settings.report_undecoded)
-            halves = images[: octave.level + 1]
-            unread = at_full_size(halves, Hypotheses.unread(others, families[0]))
+            by_name = {code.name: code for code in families}
+            shown = [by_name[code.name] for code in shown]
+            shown = shown or choose_families(part, dots, families)
+            codes = shown or families[:1]
+            likely, others = measure_likely(
+                part, dots, None if settings.report_undecoded else codes
+            )
+            unread = full_size(octave, Hypotheses.unread(others, families[0]))
             explained = Explained.joined([explained, Explained.by(unread)])
-            if not len(fits.frames):
-                continue
-            if not explained.certain.any():
-                families = by_clear_dots(part, fits, families)
-            shifts = explained.shifts[explained.certain] / 2**octave.level
-            read = read_families(part, fits, families, Prior.after(expected, shifts))
-            read = at_full_size(halves, read)
-            explained = Explained.joined([explained, Explained.by(read)])
-            found.append(read)
+            explained = read_dots(octave, likely, codes)
+            fits.append(dots)
+        measured.append((octave, Fit.joined(fits)))
+    for octave, dots in measured:
+        part = octave.pyramid.gray
+        while shown:
+            dots = dots.select(~explained.on_targets(dots.frames, octave.level))
+            left = [code for code in families if code not in shown]
+            codes = further_families(part, dots, left)
+            if not codes:
+                break
+            explained = read_dots(octave, measure_likely(part, dots, codes)[0], codes)
+            shown = shown + codes
     every = Hypotheses.joined(found)
-    by_name = {code.name: code for code in described}
-    as_described = [by_name[code.name] for code in every.families]
+    named = {code.name: code for code in described}
+    as_described = [named[code.name] for code in every.families]
     return replace(every, families=np.array(as_described, object))
 
 

@@ -20,21 +20,8 @@ from ahf_ros.detectors.ring.reading import read_bands
 from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import Fit
 
-_CLEAREST = 48  # dots that tell which family comes first
 _FIRST = 8  # doubtful words that rivals read first
 _DOUBT = 0.05  # odds of another family that has all prints, up to which one is sure
-
-
-def by_clear_dots(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> list[Family]:
-    """Return families in the order of how many of the clearest dots are theirs."""
-    if len(families) == 1 or not len(dots.frames):
-        return list(families)
-    clearest = np.argsort(-dots.share * (1 - dots.contrast), kind='stable')[:_CLEAREST]
-    some = dots.select(clearest)
-    odds = np.stack([_odds(read_bands(gray, some, code)) for code in families])
-    certain = np.isfinite(odds.max(axis=0))
-    won = np.bincount(odds.argmax(axis=0)[certain], minlength=len(families))
-    return [families[index] for index in np.argsort(-won, kind='stable')]
 
 
 def read_families(
@@ -71,8 +58,8 @@ def _against_rivals(
     certain = np.flatnonzero(found.certain)
     order = certain[np.argsort(found.coded[certain], kind='stable')]
     first = order[: min(_FIRST, (found.coded[certain] < 0).sum())]
-    read = {code.name for code in families}
-    rivals = [family(name) for name in FAMILY_NAMES if name not in read]
+    known = [family(name) for name in FAMILY_NAMES]
+    rivals = [rival for rival in known if not any(_has_all(code, rival) for code in families)]
     confidence = found.confidence.copy()
     for some in (first, order[len(first) :]):
         if not some.size or not rivals:
@@ -85,6 +72,12 @@ def _against_rivals(
         if contested.mean() < 0.5:
             break
     return replace(found, confidence=confidence)
+
+
+def _has_all(code: Family, other: Family) -> bool:
+    """Return whether a family has all words of another one, in the same print."""
+    same = (code.band, code.bits) == (other.band, other.bits)
+    return same and bool(np.isin(other.words, code.words).all())
 
 
 def _odds(read: Hypotheses) -> np.ndarray:
@@ -129,7 +122,7 @@ def settle_same_prints(hypotheses: Hypotheses, families: Sequence[Family]) -> Hy
         index: words_of_print(hypotheses.families[index], int(codes[index]), tuple(families))
         for index in certain
     }
-    present, sure = _present(list(prints.values()))
+    present, sure = present_families(list(prints.values()))
     options = {
         index: {code: word for code, word in words.items() if code in present}
         for index, words in prints.items()
@@ -154,7 +147,7 @@ def settle_same_prints(hypotheses: Hypotheses, families: Sequence[Family]) -> Hy
     return replace(hypotheses, words=words, confidence=confidence, families=of_families)
 
 
-def _present(prints: Sequence[dict[Family, int]]) -> tuple[list[Family], set[Family]]:
+def present_families(prints: Sequence[dict[Family, int]]) -> tuple[list[Family], set[Family]]:
     """Return the fewest families that have all prints, and those that no other may stand for."""
     left, present, sure = list(prints), [], set()
     while left:

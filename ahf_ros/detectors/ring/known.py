@@ -59,6 +59,13 @@ class Explained(ArrayRecord):
         outlines = frame.circle_outlines(read.frames, radii)
         return Explained(read.frames, outlines, radii * minor, certain, read.edge_shift)
 
+    def on_targets(self, frames: np.ndarray, level: int) -> np.ndarray:
+        """Return whether dots lie on certain targets, (k,), in the image halved `level` times."""
+        centres = frame.enlarged(frames, level)[:, None, :2, 2]
+        away = centres - self.frames[self.certain][:, :2, 2]
+        near = np.hypot(away[..., 0], away[..., 1]) < self.sizes[self.certain]
+        return np.asarray(near.any(axis=1))
+
     def outlines_in(self, level: int) -> np.ndarray:
         """Return the outlines with edges in the image that is halved `level` times, its px."""
         return frame.reduced(self.outlines[self.sizes > 2**level], level)

@@ -30,9 +30,14 @@ _MAXIMUM_SHIFT = 1.2  # of edges, px
 _SHIFTS, _OF_NARROW = 3, 7  # that are tried; readings keep farther from edges than what is left
 _WIDE = 1.0  # width of a band, dot radii
 _COVER = 5.0  # price of a sector that is covered, less than where words are decoded
-_HOPEFUL = 0.1  # bound of the mean evidence of a reading, from which a band is read
 _CAP = 3.0  # evidence of a reading against bare paper
 _ALIKE, _BEYOND = 0.15, 0.5  # difference of ln, and share of what is beyond, that show a hole
+
+HOPEFUL = 0.1
+"""Bound of the mean evidence of a reading, from which a band is read."""
+
+Print = tuple[tuple[float, float], int]
+"""Radii of a band, in dot radii, and number of its sectors."""
 
 Proposal = Callable[[Octave, Sequence[int], Explained], Dots]
 """From an octave, the polarities of dots and what is explained already to dots of the octave."""
@@ -53,22 +58,27 @@ PROPOSALS: tuple[Proposal, ...] = (propose_whole, propose_voted)
 """The ways to propose dots, the fastest first."""
 
 
-def measure_dots(
-    gray: np.ndarray, dots: Dots, families: Sequence[Family], *, keep_all: bool = False
-) -> tuple[Fit, Fit]:
-    """Return the fits of the dots whose bands are worth reading, and those of the others.
+def measure_dots(gray: np.ndarray, dots: Dots, *, covariances: bool = False) -> Fit:
+    """Return the fits of dots."""
+    parts = (dots.select(slice(start, start + PART)) for start in range(0, len(dots.frames), PART))
+    return Fit.joined([NO_FITS, *(_fit(gray, part, covariances=covariances) for part in parts)])
 
-    With `keep_all`, dots that are no middles of targets are measured as well.
+
+def measure_likely(
+    gray: np.ndarray, dots: Fit, families: Sequence[Family] | None
+) -> tuple[Fit, Fit]:
+    """Return better fits of the dots whose bands are worth reading, and those of the others.
+
+    Without families, all dots are worth it.
     """
     worth, others = [NO_FITS], [NO_FITS]
     for start in range(0, len(dots.frames), PART):
         part = dots.select(slice(start, start + PART))
-        fit = _fit(gray, part, covariances=keep_all)
-        if not keep_all:
-            likely = may_be_targets(gray, fit, families)
-            others.append(fit.select(~likely))
-            fit = fit.select(likely)
-        worth.append(_fit(gray, fit))
+        if families is not None:
+            likely = may_be_targets(gray, part, families)
+            others.append(part.select(~likely))
+            part = part.select(likely)
+        worth.append(_fit(gray, part))
     fit = Fit.joined(worth)
     return fit.select(fit.share >= ENOUGH), Fit.joined(others)
 
@@ -89,30 +99,50 @@ def _fit(gray: np.ndarray, dots: Dots | Fit, *, covariances: bool = True) -> Fit
 
 def may_be_targets(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> np.ndarray:
     """Return whether dots may be the middles of targets of any family, shape (k,)."""
-    bits: dict[tuple[float, float], set[int]] = {}
-    for code in families:
-        bits.setdefault(code.band, set()).add(code.bits)
-    bounds = [_bound(gray, dots, band, of_band) for band, of_band in bits.items()]
+    prints = list(dict.fromkeys((code.band, code.bits) for code in families))
     least = min(1.0, *(least_marked(code) / FEW_MARKS for code in families))
-    return np.asarray(np.max(bounds, axis=0) > _HOPEFUL * least)
+    return np.asarray(bounds(gray, dots, prints).max(axis=0) > least * HOPEFUL)
 
 
-def _bound(gray: np.ndarray, dots: Fit, band: tuple[float, float], bits: set[int]) -> np.ndarray:
-    """Return a bound of the mean evidence of readings for words of some lengths, shape (k,)."""
+def bounds(
+    gray: np.ndarray, dots: Fit, prints: Sequence[Print], shifts: Sequence[float] = ()
+) -> np.ndarray:
+    """Return bounds of the mean evidence of readings for words of prints, shape (prints, k).
+
+    For edges with some shifts, px; without any, with those that are usual.
+    """
+    best = np.full((len(prints), len(dots.frames)), -np.inf)
+    for band in dict.fromkeys(band for band, _ in prints):
+        of_band = [index for index, (radii, _) in enumerate(prints) if radii == band]
+        bits = [prints[index][1] for index in of_band]
+        for start in range(0, len(dots.frames), PART):
+            part = slice(start, start + PART)
+            best[of_band, part] = _bounds(gray, dots.select(part), band, bits, shifts)
+    return best
+
+
+def _bounds(
+    gray: np.ndarray,
+    dots: Fit,
+    band: tuple[float, float],
+    bits: Sequence[int],
+    shifts: Sequence[float],
+) -> np.ndarray:
+    """Return the same for some numbers of sectors in one band, shape (numbers, k)."""
     angles = _PER_SECTOR * max(bits)
     polar = polar_images(gray, dots, band, angles, _CIRCLES)
-    best = np.full(len(dots.frames), -np.inf)
+    best = np.full((len(bits), len(dots.frames)), -np.inf)
     tried = _SHIFTS if band[1] - band[0] >= _WIDE else _OF_NARROW
-    for shift in np.linspace(-_MAXIMUM_SHIFT, _MAXIMUM_SHIFT, tried).tolist():
+    for shift in shifts or np.linspace(-_MAXIMUM_SHIFT, _MAXIMUM_SHIFT, tried).tolist():
         growth = growth_by(shift, polar.size)
         edges = edge_evidence(polar, 1 - growth, growth, band)
         cap = _CAP * edges.weight[:, None]
-        for count in bits:
+        for index, count in enumerate(bits):
             paper, ink = (_of_sectors(of.sum(axis=1), count) for of in (edges.paper, edges.ink))
             of_word = np.maximum(np.maximum(paper, ink), -_COVER).sum(axis=2)
             marked = _of_sectors(np.clip((edges.ink - edges.paper).sum(axis=1), -cap, cap), count)
             bound = np.minimum(of_word, np.maximum(marked, 0).sum(axis=2)).max(axis=1)
-            best = np.maximum(best, bound / (angles * edges.weight))
+            best[index] = np.maximum(best[index], bound / (angles * edges.weight))
     return np.where(_holes(polar, band), -np.inf, best)
 
 

@@ -1,0 +1,95 @@
+"""The families that an image shows, chosen on its clearest dots.
+
+A glance at a dot bounds the evidence for each print, which is a band and a number of sectors. That
+of the right print is nearly always the highest, so that a few readings tell the families, and
+those that none of the clearest dots shows are not read at all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from ahf_ros.codes.ring import Family, words_of_print
+from ahf_ros.detectors.ring.decoding import DOUBT
+from ahf_ros.detectors.ring.families import decoded, present_families
+from ahf_ros.detectors.ring.proposals import HOPEFUL, bounds, measure_likely
+from ahf_ros.detectors.ring.reading import read_bands
+from ahf_ros.features.circle_fit import ENOUGH, Fit
+
+_CLEAREST = 32  # dots that tell the family of an image
+_CLEAR = 0.5  # bound of the mean evidence of a reading, which spots of light hardly reach
+_SEVERAL = 3  # words that show a family where no dot is so clear
+_ROUGH = (0.0,)  # shifts of edges that are tried to find these, px
+_SAMPLE = 8  # of those that seem to have a print, which are read first
+_MORE = 3  # times as many, where these show nothing
+_NEARLY = 0.05  # mean evidence of a reading, by which a print is as good as the best one
+_PRINTS = 3  # the most likely ones, which are tried on the same dots
+
+
+def choose_families(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> list[Family]:
+    """Return as few of some families as have all words of the print that the clearest dots show.
+
+    Where these show none, further ones are looked at.
+    """
+    order = np.argsort(-dots.share * (1 - dots.contrast), kind='stable')
+    shown = (
+        _words_shown(gray, dots.select(some), families) for some in _growing(order, _CLEAREST)
+    )
+    return present_families(next(filter(None, shown), []))[0]
+
+
+def further_families(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> list[Family]:
+    """Return the same for dots that no family explains, most of which are none of targets."""
+    dots = dots.select(dots.share >= ENOUGH)
+    if not families or not len(dots.frames):
+        return []
+    finest = {code.band: code.bits for code in sorted(families, key=lambda code: code.bits)}
+    mean = bounds(gray, dots, list(finest.items()), _ROUGH).max(axis=0)
+    order = np.argsort(-mean, kind='stable')[: np.count_nonzero(mean > _CLEAR)][:_CLEAREST]
+    return present_families(_words_shown(gray, dots.select(order), families))[0]
+
+
+def _growing(order: np.ndarray, count: int) -> Iterator[np.ndarray]:
+    """Yield the first `count` indices, and then parts that grow."""
+    start = 0
+    while start < len(order):
+        yield order[start : start + count]
+        start, count = start + count, _MORE * count
+
+
+def _words_shown(
+    gray: np.ndarray, dots: Fit, families: Sequence[Family]
+) -> list[dict[Family, int]]:
+    """Return words of the likeliest print of some dots that has any, by family."""
+    prints = list(dict.fromkeys((code.band, code.bits) for code in families))
+    mean = bounds(gray, dots, prints)
+    hopeful = (mean.max(axis=0) > HOPEFUL) & (dots.share >= ENOUGH)
+    dots, mean = dots.select(hopeful), mean[:, hopeful]
+    likely = mean > mean.max(axis=0, initial=-np.inf) - _NEARLY
+    for best in np.argsort(-np.maximum(mean, 0).sum(axis=1), kind='stable')[:_PRINTS].tolist():
+        band, bits = prints[best]
+        # Whatever has a number of sectors has its multiples as well.
+        same = [code for code in families if code.band == band and bits % code.bits == 0]
+        same.sort(key=lambda code: len(code.words))
+        words: list[tuple[Family, int]] = []
+        for some in _growing(np.flatnonzero(likely[best]), _SAMPLE):
+            words += _read(gray, dots.select(some), same)
+            if len(words) >= _SEVERAL or (words and mean[best, some].max() > _CLEAR):
+                return [words_of_print(code, word, tuple(families)) for code, word in words]
+    return []
+
+
+def _read(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> list[tuple[Family, int]]:
+    """Return the words of dots, by the first of some families that explains their bands."""
+    words: list[tuple[Family, int]] = []
+    dots, _ = measure_likely(gray, dots, None)
+    for code in families:
+        if not len(dots.frames):
+            break
+        read = read_bands(gray, dots, code)
+        shown = read.certain & (read.coded > -DOUBT)
+        words += [(code, word) for word in decoded(read)[1][shown].tolist()]
+        dots = dots.select(~shown)
+    return words
