@@ -16,7 +16,7 @@ from ahf_ros.features.circle_fit import Fit
 
 _CLEARLY = 2.0  # times the evidence of another claim to the same ID or dot
 _FOREIGN = 10.0  # log odds of arcs of any length against a word, which is none then
-_WHOLE_BAND = 0.8  # share of the edges of a word that are in their place, where there are arcs
+_ROUND = 0.6  # share of the edges of a word that are in their place, where there is a band
 _OVERLAP = 0.92  # of the radii of two targets, at which the paper of one hides marks of the other
 _ON_TOP = 3.0  # times as sure of its word as of what lies below it
 
@@ -133,7 +133,7 @@ def among_others(hypotheses: Hypotheses) -> Hypotheses:
     than words, a single word that is not quite clear is one by chance.
     """
     certain, confidence = hypotheses.certain, hypotheses.confidence
-    foreign = (hypotheses.coded < -_FOREIGN) & (hypotheses.share > _WHOLE_BAND) & ~certain
+    foreign = (hypotheses.coded < -_FOREIGN) & (hypotheses.share > _ROUND) & ~certain
     others = np.zeros(len(certain))
     for code in dict.fromkeys(hypotheses.families):
         own = hypotheses.families == code
