@@ -10,12 +10,13 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from ahf_ros.codes.ring import Family, sectors
-from ahf_ros.synthetic.covers import ring_cover, stamp_cover
-from benchmarks.sheets import Ink
+from ahf_ros.codes.ring import BITS, Family, sectors
+from ahf_ros.synthetic.covers import Cover, ring_cover, stamp_cover
+from benchmarks.sheets import CELL, Ink
 
 _FINE = 61  # sectors of arcs of any length; a prime, so that they meet no sectors of a family
-_NUMBERS = (9, 10, 11, 13, 14, 15, 16, 17, 18, 20, 22)
+_SHIFTS = np.linspace(-0.2, 0.2, 41)  # of edges, dot radii
+_APART = 0.15  # of radii from those that a shift of edges explains, dot radii
 _SIDE = 256  # px of a stamp
 _MIDDLE = (_SIDE // 2, _SIDE // 2)
 _REACH = 3.8  # half of the side of clutter, dot radii
@@ -31,7 +32,7 @@ def random_arcs(family: Family, generator: np.random.Generator) -> Ink:
 def other_sectors(family: Family, generator: np.random.Generator) -> Ink:
     """Return a dot and a band whose number of sectors is not that of a family."""
     while True:
-        bits = int(generator.choice(_NUMBERS))
+        bits = int(generator.integers(BITS[0], BITS[1] + 1))
         word = int(generator.integers(1, (1 << bits) - 1))
         if not _fits(word, bits, family.bits):
             return _ring(replace(family, bits=bits), word)
@@ -46,11 +47,42 @@ def other_words(family: Family, generator: np.random.Generator) -> Ink:
 
 
 def other_radii(family: Family, generator: np.random.Generator) -> Ink:
-    """Return a dot and a codeword of a family in a band that is too far inside or outside."""
+    """Return a dot and a codeword of a family in a band whose radii no shift of edges explains."""
     word = int(generator.choice(family.words))
-    scale = 1 + generator.choice([-1, 1]) * generator.uniform(0.18, 0.25)
-    inner, outer = family.band_inner * scale, family.band_outer * scale
-    return _ring(replace(family, band_inner=inner, band_outer=outer), word)
+    inner, outer = family.band
+    explained = np.stack([inner - _SHIFTS, outer + _SHIFTS], axis=1) / (1 + _SHIFTS[:, None])
+    while True:
+        start = generator.uniform(1.4, 2.8)
+        band = start, start + generator.uniform(0.45, 1.4)
+        if np.abs(explained - band).max(axis=1).min() > _APART:
+            return _ring(replace(family, band_inner=band[0], band_outer=band[1]), word)
+
+
+def two_bands(family: Family, generator: np.random.Generator) -> Ink:
+    """Return a dot and two bands, as RAD targets have, of as many sectors as a family has."""
+    radii = 1 + np.cumsum(generator.uniform(0.3, 0.8, 4))
+    words = generator.integers(1, (1 << family.bits) - 1, 2).tolist()
+    first, second = (
+        _ring(replace(family, band_inner=inner, band_outer=outer), word)
+        for (inner, outer), word in zip(radii.reshape(2, 2).tolist(), words, strict=True)
+    )
+
+    def ink(turn: float) -> Cover:
+        covers = first(turn), second(turn)
+        return lambda *place: np.maximum(*(cover(*place) for cover in covers))
+
+    return ink
+
+
+def cctag(_family: Family, generator: np.random.Generator) -> Ink:
+    """Return concentric circles of three or four rings, about paper or about a dot."""
+    stamp = np.zeros((_SIDE, _SIDE), np.uint8)
+    widths = generator.uniform(1, 3, 2 * generator.integers(3, 5))
+    radii = np.cumsum(widths) / widths.sum()
+    first = int(generator.integers(2))
+    for index, radius in enumerate(radii[::-1].tolist()):
+        _circle(stamp, 0.95 * radius, 255 * ((index + first + 1) % 2))
+    return lambda turn: stamp_cover(stamp, min(1 / radii[0], CELL - 0.2), turn)
 
 
 def clutter(_family: Family, generator: np.random.Generator) -> Ink:
@@ -66,6 +98,8 @@ LOOKALIKES: dict[str, Callable[[Family, np.random.Generator], Ink]] = {
     'other numbers of sectors': other_sectors,
     'other words': other_words,
     'other radii of the band': other_radii,
+    'two bands (RAD)': two_bands,
+    'concentric circles (CCTag)': cctag,
     'clutter': clutter,
 }
 """Kinds of marks that are no targets of a family."""

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 
 from ahf_ros.codes.ring import family
-from ahf_ros.detectors import DetectorSettings
+from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.detectors.ring.detector import find_hypotheses
+from ahf_ros.detectors.ring.hypotheses import Hypotheses, among_others
 from benchmarks.disturbed import Targets
 from benchmarks.exposure import Exposure
 from benchmarks.lookalikes import LOOKALIKES
@@ -34,3 +38,25 @@ def test_other_arcs_end_anywhere() -> None:
     inks = [LOOKALIKES['random arcs'](family('metashape12'), generator) for _ in range(24)]
     found = odds(mark_sheet(inks, 3))
     assert np.median(found) < -10  # measured: -29
+
+
+@pytest.mark.parametrize('name', ['metashape12', 'aicon14'])
+def test_marks_of_no_family_are_not_reported(name: str) -> None:
+    generator = np.random.default_rng(35)
+    kinds = [draw for kind, draw in LOOKALIKES.items() if kind != 'clutter']
+    inks = [draw(family(name), generator) for _ in range(9) for draw in kinds]
+    assert not create_detector(family=name)(mark_sheet(inks, 35).photograph(Exposure()))
+
+
+def test_a_word_among_arcs_has_to_be_clear() -> None:
+    generator = np.random.default_rng(6)
+    arcs = [LOOKALIKES['random arcs'](family('metashape12'), generator) for _ in range(24)]
+    foreign = find_hypotheses(mark_sheet(arcs, 6).photograph(Exposure()), SETTINGS)
+    (sheet,) = Targets('metashape12', 1, 6).sheets()
+    target = find_hypotheses(sheet.photograph(Exposure()), SETTINGS)
+    target = target.select(target.certain)
+    clear, doubtful = (replace(target, confidence=np.array([of])) for of in (0.998, 0.9))
+    for word, reported in ((clear, True), (doubtful, False)):
+        assert among_others(word).confidence == word.confidence
+        found = among_others(Hypotheses.joined([word, foreign]))
+        assert found.certain[0] == reported

@@ -7,6 +7,8 @@ another number of sectors, end anywhere.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ahf_ros.codes.ring import Family
@@ -20,21 +22,48 @@ _BESIDE = 3  # angles on either side of a border
 _CONTRAST = 0.5  # share of the step of a mark, from which a border is seen
 _ERROR, _PIXELS = 0.15, 0.4  # standard deviation of the place of a border, angles and px
 _ANYWHERE = 0.1  # share of borders that light moves
+_UNSEEN = 2.3  # price of an end that is not seen, as of one that is anywhere
+_MOST = 0.7  # share of ends that are not seen, from which there are no marks
+_RARE = 14.0  # log odds of a cover against a word that no family has
 
 
-def border_evidence(
+def with_ends(
+    polar: PolarImages, words: Words, overhang: np.ndarray, lit: np.ndarray, family: Family
+) -> Words:
+    """Return words with the evidence of where their arcs end, and the margin that this leaves.
+
+    `overhang`, shape (k,), is by how many angles ink is longer at either end than its sectors;
+    `lit`, shape (k,), the probability of edges of light, which move ends and hide them. A word
+    that no family has competes with words that need a cover.
+    """
+    odds, seen, unseen = _ends(polar, words, overhang, family)
+    other, _, unseen_of_other = _ends(polar, words.as_they_look(), overhang, family)
+    ahead = words.ahead + other - odds - _UNSEEN * (unseen_of_other - unseen)
+    margin = np.where(words.other == words.words, np.inf, _RARE - ahead)
+    few = unseen > _MOST * (seen + unseen)
+    return replace(
+        words,
+        margin=np.minimum(words.margin, margin),
+        coded=words.coded + odds,
+        ends=np.where(odds < 0, odds * (1 - 2 * lit), odds) - _UNSEEN * np.where(few, unseen, 0),
+    )
+
+
+def _ends(
     polar: PolarImages, words: Words, overhang: np.ndarray, family: Family
-) -> np.ndarray:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the log odds that arcs end where the sectors do, against anywhere near, shape (k,).
 
-    `overhang`, shape (k,), is by how many angles ink is longer at either end than its sectors.
+    With them come the numbers of ends that are seen, and of those that nothing hides and that are
+    not seen.
     """
     count, (inner, outer) = words.hidden.shape[1], family.band
     radii = inner + (outer - inner) * np.tile(DEPTHS, (len(overhang), 1)).T
     levels = np.mean([polar.at(of) for of in radii], axis=0)
     phases = np.rint(words.starts * count / (2 * np.pi)).astype(int)
     bits = bits_at(words.words, phases, count // family.bits, family)
-    rows, places = np.nonzero(bits != np.roll(bits, 1, axis=1))
+    ends = bits != np.roll(bits, 1, axis=1)
+    rows, places = np.nonzero(ends)
     about = levels[rows[:, None], (places[:, None] + np.arange(-_BESIDE, _BESIDE)) % count]
     begins = bits[rows, places]
     about = np.where(begins[:, None], about, about[:, ::-1])  # paper first
@@ -50,4 +79,7 @@ def border_evidence(
     away -= median(away, known, 0.0)[:, None]  # frames may be turned by a part of an angle
     error = np.hypot(_ERROR, _PIXELS * count / (np.pi * (inner + outer) * polar.size))[:, None]
     odds = np.log((1 - _ANYWHERE) * normal(away, error) * _BESIDE + _ANYWHERE)
-    return np.asarray((odds * known).sum(axis=1))
+    steps = range(-_BESIDE, _BESIDE + 1)
+    hidden = np.logical_or.reduce([np.roll(words.hidden, step, axis=1) for step in steps])
+    unseen = np.count_nonzero(ends & ~hidden & ~known, axis=1)
+    return (odds * known).sum(axis=1), np.count_nonzero(known, axis=1), unseen

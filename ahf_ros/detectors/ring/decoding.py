@@ -52,6 +52,12 @@ class Words(ArrayRecord):
         Log odds of the word against bare paper, and against anything.
     coded : ndarray of float64, shape (k,)
         Log odds of the word against arcs of ink of any length, whose ends have no price.
+    ends : ndarray of float64, shape (k,)
+        Log odds that these end where sectors do, against anywhere; see `borders`.
+    other : ndarray of int64, shape (k,)
+        The sectors as they look, in the same rotation, whether or not a family has that word.
+    ahead : ndarray of float64, shape (k,)
+        Log odds of these against the word and what covers it.
     seen : ndarray of float64, shape (k,)
         Log odds of the word, where it is not covered, against anything.
     hidden : ndarray of bool, shape (k, m)
@@ -63,8 +69,15 @@ class Words(ArrayRecord):
     margin: np.ndarray
     marked: np.ndarray
     coded: np.ndarray
+    ends: np.ndarray
+    other: np.ndarray
+    ahead: np.ndarray
     seen: np.ndarray
     hidden: np.ndarray
+
+    def as_they_look(self) -> Words:
+        """Return the sectors as they look in place of words that something covers."""
+        return replace(self, words=self.other, hidden=np.zeros_like(self.hidden))
 
     @staticmethod
     def none(count: int, angles: int = 1) -> Words:
@@ -75,6 +88,9 @@ class Words(ArrayRecord):
             margin=np.zeros(count),
             marked=np.zeros(count),
             coded=np.zeros(count),
+            ends=np.zeros(count),
+            other=np.zeros(count, np.int64),
+            ahead=np.zeros(count),
             seen=np.zeros(count),
             hidden=np.zeros((count, angles), bool),
         )
@@ -130,12 +146,16 @@ def decode(
     hidden |= (some.paper == 0) & (some.ink == 0)
     score = scores[rows, best].astype(np.float64)
     bare = np.maximum(turned.paper.sum(axis=1), 0)
+    other, of_other = _sectors_as_they_look(some, phases[rows, best], per_sector)
     found = Words(
         words=words[rows, best],
         starts=2 * np.pi * phases[rows, best] / angles,
         margin=margin.astype(np.float64),
         marked=score - bare + some.dot,
         coded=score - _free_paths(turned) - _BORDER * _borders(bits[rows, best], hidden),
+        ends=np.zeros(len(read)),
+        other=other,
+        ahead=of_other - score,
         seen=score,
         hidden=hidden,
     )
@@ -224,6 +244,25 @@ def _along_words(evidence: Evidence, along: np.ndarray) -> np.ndarray:
     seen = np.where(along, ink, paper)
     border = (along != np.roll(along, 1, axis=0)) | (along != np.roll(along, -1, axis=0))
     return np.where(border, np.maximum(np.maximum(paper, ink), 0), seen)
+
+
+def _sectors_as_they_look(
+    evidence: Evidence, phases: np.ndarray, per_sector: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the sectors from a phase on as each looks best, and the evidence for them, (k,) each.
+
+    Angles next to a border may lie to either side of it, as they may along words.
+    """
+    count = evidence.paper.shape[1]
+    order = (phases[:, None] + np.arange(count)) % count
+    paper, ink = (
+        np.take_along_axis(of, order, axis=1).reshape(len(of), -1, per_sector)
+        for of in (evidence.paper, evidence.ink)
+    )
+    either = np.maximum(np.maximum(paper, ink), 0)[..., [0, -1]].sum(axis=(1, 2))
+    of_paper, of_ink = (of[..., 1:-1].sum(axis=2) for of in (paper, ink))
+    words = (of_ink > of_paper) @ (1 << np.arange(paper.shape[1]))
+    return words, (np.maximum(of_paper, of_ink).sum(axis=1) + either).astype(np.float64)
 
 
 def _covered_paths(seen: np.ndarray, as_paper: np.ndarray, of: Evidence) -> np.ndarray:

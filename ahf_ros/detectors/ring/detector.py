@@ -18,7 +18,7 @@ from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.ring.choice import choose_families, further_families
 from ahf_ros.detectors.ring.families import decoded, read_families, settle_same_prints
 from ahf_ros.detectors.ring.full_size import at_full_size
-from ahf_ros.detectors.ring.hypotheses import Hypotheses, resolve
+from ahf_ros.detectors.ring.hypotheses import Hypotheses, among_others, resolve
 from ahf_ros.detectors.ring.known import WHOLE, Explained, Prior
 from ahf_ros.detectors.ring.learning import with_measured_bands
 from ahf_ros.detectors.ring.proposals import (
@@ -175,7 +175,8 @@ def report(hypotheses: Hypotheses, settings: DetectorSettings) -> list[Target]:
     whole = settings.report_undecoded & (hypotheses.share >= WHOLE)
     minimum, maximum = settings.radii
     of_size = (major >= minimum) & (major <= maximum)
-    hypotheses = settle_same_prints(hypotheses.select(of_size), settings.codes(Family))
+    hypotheses = among_others(hypotheses.select(of_size))
+    hypotheses = settle_same_prints(hypotheses, settings.codes(Family))
     whole = whole[of_size]
     hypotheses = hypotheses.select(hypotheses.certain | whole)
     hypotheses = hypotheses.select(np.lexsort((-hypotheses.seen, ~hypotheses.certain)))

@@ -15,6 +15,8 @@ from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.circle_fit import Fit
 
 _CLEARLY = 2.0  # times the evidence of another claim to the same ID or dot
+_FOREIGN = 10.0  # log odds of arcs of any length against a word, which is none then
+_ROUND = 0.6  # share of the edges of a word that are in their place, where there is a band
 _OVERLAP = 0.92  # of the radii of two targets, at which the paper of one hides marks of the other
 _ON_TOP = 3.0  # times as sure of its word as of what lies below it
 
@@ -43,7 +45,7 @@ class Hypotheses(ArrayRecord):
         In the rotation read; 0 where there is none.
     starts : ndarray of float64, shape (k,)
         Where in the frame the sector of the lowest bit starts, rad counter-clockwise from +x.
-    margin, marked, coded, seen : ndarray of float64, shape (k,)
+    margin, marked, coded, ends, seen : ndarray of float64, shape (k,)
         Log odds of the word, see `ahf_ros.detectors.ring.decoding.Words`.
     hidden : ndarray of float64, shape (k,)
         Share of the band that something covers.
@@ -65,6 +67,7 @@ class Hypotheses(ArrayRecord):
     margin: np.ndarray
     marked: np.ndarray
     coded: np.ndarray
+    ends: np.ndarray
     seen: np.ndarray
     hidden: np.ndarray
     families: np.ndarray
@@ -109,6 +112,7 @@ class Hypotheses(ArrayRecord):
             margin=words.margin,
             marked=words.marked,
             coded=words.coded,
+            ends=words.ends,
             seen=words.seen,
             hidden=words.hidden.mean(axis=1),
             families=np.full(len(words.words), family, object),
@@ -120,6 +124,23 @@ class Hypotheses(ArrayRecord):
     def unread(dots: Fit, family: Family) -> Hypotheses:
         """Return dots without words."""
         return Hypotheses.of(dots, Words.none(len(dots.frames)), family)
+
+
+def among_others(hypotheses: Hypotheses) -> Hypotheses:
+    """Return hypotheses of an image, less certain where most bands are of no family that is read.
+
+    Targets of one image share a family. Where arcs of any length explain most whole bands better
+    than words, a single word that is not quite clear is one by chance.
+    """
+    certain, confidence = hypotheses.certain, hypotheses.confidence
+    foreign = (hypotheses.coded < -_FOREIGN) & (hypotheses.share > _ROUND) & ~certain
+    others = np.zeros(len(certain))
+    for code in dict.fromkeys(hypotheses.families):
+        own = hypotheses.families == code
+        alike = (certain * confidence)[own].sum() - certain * confidence
+        others[own] = ((alike + 0.5) / (foreign[own].sum() + 0.5))[own]
+    odds = np.minimum(others, 1)
+    return replace(hypotheses, confidence=confidence * odds / (1 - confidence * (1 - odds)))
 
 
 def resolve(hypotheses: Hypotheses, ids: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
