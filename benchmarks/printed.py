@@ -47,7 +47,7 @@ LARGER = {('metashape20', 'bright'): '1.5mm'}
 HEAD = """# Printed targets
 
 Every ID of every family, printed by `ahf targets` on A5 as PDF, rendered by PDFium at 8 px/mm and
-identified. The radius of the dot is 4 to 12 px, of CCTags 24 px (`RADII` in `benchmarks/printed.py`). Ink reflects
+identified. The radius of the dot is 4 to 12 px (`RADII` in `benchmarks/printed.py`). Ink reflects
 6 % of the light, the blur of the lens is 0.7 px. The error is the largest distance of a centre
 from where it was printed. Bright targets of `metashape20` have dots of 12 px: with dots of 8 px,
 542 of them were left undecoded, none was wrong. The machine was busy.
