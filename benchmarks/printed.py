@@ -35,7 +35,7 @@ RADII = {
     'ring': '1mm',
     'gsi': '0.5mm',
     'dots': '1.25mm',
-    'cctag': '2mm',
+    'cctag': '3mm',
     'aruco': '1.5mm',
     'apriltag': '1.5mm',
 }

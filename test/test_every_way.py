@@ -30,7 +30,10 @@ from support.packages import MINE, my_detector, write_package
 from support.square_markers import needs_square_markers
 
 SCENE = {'width': 320, 'height': 240, 'targets': 3, 'dot_radius': 9.0}
-SCENES = {'gsi': SCENE | {'width': 560, 'height': 420, 'dot_radius': 5.0}}
+SCENES = {
+    'gsi': SCENE | {'width': 560, 'height': 420, 'dot_radius': 5.0},
+    'cctag3': SCENE | {'dot_radius': 14.0},
+}
 SQUARES = ('aruco_4x4_50', 'apriltag_36h11')
 BOTH = 'metashape12,aicon14'
 SHOWN = {'auto': 'metashape12,dots'}

@@ -70,16 +70,11 @@ def mask_of(polygons: Iterable[np.ndarray], shape: tuple[int, ...]) -> np.ndarra
     return mask
 
 
-def find_edges(
-    log: np.ndarray, weak_edge: float = _WEAK_EDGE, strong_edge: float = _STRONG_EDGE
-) -> LogEdges:
-    """Return the edges of a logarithmic image, ndarray of int16, shape (height, width).
-
-    Edges begin at strong steps of ln I and go on along weak ones.
-    """
+def find_edges(log: np.ndarray) -> LogEdges:
+    """Return the edges of a logarithmic image, ndarray of int16, shape (height, width)."""
     dx = cv2.Scharr(log, cv2.CV_16S, 1, 0, scale=1 / 32)
     dy = cv2.Scharr(log, cv2.CV_16S, 0, 1, scale=1 / 32)
-    weak, strong = weak_edge * LOG_SCALE, strong_edge * LOG_SCALE
+    weak, strong = _WEAK_EDGE * LOG_SCALE, _STRONG_EDGE * LOG_SCALE
     marked = cv2.Canny(dx, dy, weak, strong, L2gradient=True)
     pixels = cv2.findNonZero(marked)
     pixels = np.zeros((0, 2), np.int32) if pixels is None else pixels.reshape(-1, 2)

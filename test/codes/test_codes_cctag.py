@@ -29,7 +29,7 @@ def test_radii_are_those_of_the_published_tables(
     assert 100 * radii == pytest.approx([100, *percent])
 
 
-@pytest.mark.parametrize(('name', 'count'), zip(CCTAG_NAMES, (32, 128), strict=True))
+@pytest.mark.parametrize(('name', 'count'), [*zip(CCTAG_NAMES, (32, 128), strict=True)])
 def test_every_id_has_circles_of_its_own(name: str, count: int) -> None:
     code = circle_family(name)
     assert numbers_of(name) == list(range(count))
