@@ -23,7 +23,6 @@ _CONTRAST = 0.5  # share of the step of a mark, from which a border is seen
 _ERROR, _PIXELS = 0.15, 0.4  # standard deviation of the place of a border, angles and px
 _ANYWHERE = 0.1  # share of borders that light moves
 _UNSEEN = 2.3  # price of an end that is not seen, as of one that is anywhere
-_MOST = 0.7  # share of ends that are not seen, from which there are no marks
 _RARE = 14.0  # log odds of a cover against a word that no family has
 
 
@@ -36,26 +35,24 @@ def with_ends(
     `lit`, shape (k,), the probability of edges of light, which move ends and hide them. A word
     that no family has competes with words that need a cover.
     """
-    odds, seen, unseen = _ends(polar, words, overhang, family)
-    other, _, unseen_of_other = _ends(polar, words.as_they_look(), overhang, family)
+    odds, unseen = _ends(polar, words, overhang, family)
+    other, unseen_of_other = _ends(polar, words.as_they_look(), overhang, family)
     ahead = words.ahead + other - odds - _UNSEEN * (unseen_of_other - unseen)
     margin = np.where(words.other == words.words, np.inf, _RARE - ahead)
-    few = unseen > _MOST * (seen + unseen)
     return replace(
         words,
         margin=np.minimum(words.margin, margin),
         coded=words.coded + odds,
-        ends=np.where(odds < 0, odds * (1 - 2 * lit), odds) - _UNSEEN * np.where(few, unseen, 0),
+        ends=np.where(odds < 0, odds * (1 - 2 * lit), odds),
     )
 
 
 def _ends(
     polar: PolarImages, words: Words, overhang: np.ndarray, family: Family
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray]:
     """Return the log odds that arcs end where the sectors do, against anywhere near, shape (k,).
 
-    With them come the numbers of ends that are seen, and of those that nothing hides and that are
-    not seen.
+    With them come the numbers of ends that nothing hides and that are not seen.
     """
     count, (inner, outer) = words.hidden.shape[1], family.band
     radii = inner + (outer - inner) * np.tile(DEPTHS, (len(overhang), 1)).T
@@ -82,4 +79,4 @@ def _ends(
     steps = range(-_BESIDE, _BESIDE + 1)
     hidden = np.logical_or.reduce([np.roll(words.hidden, step, axis=1) for step in steps])
     unseen = np.count_nonzero(ends & ~hidden & ~known, axis=1)
-    return (odds * known).sum(axis=1), np.count_nonzero(known, axis=1), unseen
+    return (odds * known).sum(axis=1), unseen

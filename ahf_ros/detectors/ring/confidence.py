@@ -28,7 +28,6 @@ WEIGHTS = Path(__file__).with_name('fitted_weights.json')
 """The data file, which says what made it."""
 
 _OF_TARGET = np.concatenate(read_weights(WEIGHTS, 'confidence', 'intercept', 'weights'))
-_CLEAR_ENDS = 2.0  # log odds of the ends of arcs that leave no doubt of them
 _OF_MARGIN = np.array([-1.0, 1.0])  # one or two log odds leave a doubt
 
 
@@ -37,8 +36,8 @@ def features(read: Hypotheses) -> np.ndarray:
 
     Logarithm of the log odds of words against the next ID; root of the log odds of arcs of ink of
     any length against them, negative; the share of the expected edges that are in their place, and
-    that of the band that is seen; what the log odds that arcs end where sectors do lack to be
-    clear, negative.
+    that of the band that is seen; the log odds that arcs end where sectors do, where these are
+    negative.
     """
     return np.stack(
         [
@@ -46,7 +45,7 @@ def features(read: Hypotheses) -> np.ndarray:
             -np.sqrt(np.maximum(-read.coded, 0)),
             read.share,
             1 - read.hidden,
-            np.minimum(read.ends - _CLEAR_ENDS, 0),
+            np.minimum(read.ends, 0),
         ],
         axis=1,
     )
