@@ -22,6 +22,7 @@ from ahf_ros.detectors import create_detector
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.ring.learning import LearntFamily, find_bands, learn_families
 from ahf_ros.edge_shift import edge_shift_remark, median_edge_shift
+from ahf_ros.filtering.settling import evident
 from ahf_ros.target import UNDECODED, Target
 from ahf_ros.text import counted
 
@@ -89,7 +90,8 @@ def _lines(image: np.ndarray, settings: DetectorSettings, expected: int) -> Iter
         yield from _of_bands(learnt, 1, settings, expected)
         return
     usual = replace(settings, family=AUTO, polarity='auto', min_radius=0.0, max_radius=1e4)
-    if found := [it for it in _identified(image, usual) if it.family not in settings.families]:
+    found = evident(_identified(image, usual))
+    if found := [it for it in found if it.family not in settings.families]:
         ((name, count),) = Counter(target.family for target in found).most_common(1)
         yield f'{counted(count, "target")} of {name}: --family {name}'
         yield edge_shift_remark(median_edge_shift(found))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ahf_ros.codes import VENDOR_NAMES
 from ahf_ros.detectors.ring.counting import estimate_count
 from ahf_ros.evaluation import score
 from ahf_ros.synthetic.scene import SceneSettings, render
@@ -15,8 +16,8 @@ from support.square_markers import needs_square_markers
 MAXIMUM_ERROR = 0.05
 """Of a centre of any size, px."""
 
-
 SQUARE = 'aruco_4x4_50'
+VENDORS = ','.join(VENDOR_NAMES)
 
 
 def check(shown: Collage, family: str) -> None:
@@ -30,14 +31,14 @@ def check(shown: Collage, family: str) -> None:
     ('printed', 'radii', 'read'),
     [
         ('metashape12', [300.0, 100.0, 65.0, 20.0, 8.0, 4.0], 'metashape12'),
-        ('aicon14', [115.0, 95.0], 'auto'),
+        ('aicon14', [115.0, 95.0], VENDORS),
         ('dots', [185.0, 95.0, 20.0, 8.0], 'dots'),
         ('gsi', [60.0, 20.0, 5.0], 'gsi'),
         pytest.param(SQUARE, [150.0, 20.0, 6.0], SQUARE, marks=needs_square_markers),
     ],
 )
 def test_dots_of_any_size_in_one_image(printed, radii, read):
-    check(collage(radii, printed, seed=5 if read == 'auto' else 0), read)
+    check(collage(radii, printed, seed=5 if read == VENDORS else 0), read)
 
 
 @pytest.mark.parametrize(
