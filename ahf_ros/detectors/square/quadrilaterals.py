@@ -60,16 +60,20 @@ def find_quadrilaterals(gray: np.ndarray) -> np.ndarray:
         middle = cv2.addWeighted(low, 0.5, high, 0.5, 0)
         height = cv2.subtract(high, low)
         dark = cv2.compare(values, middle, cv2.CMP_LT)
-        dark[height <= _MINIMUM_STEP] = 0
+        dark &= cv2.compare(height, _MINIMUM_STEP, cv2.CMP_GT)
         outlines, _ = cv2.findContours(dark, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
         regions = [region for outline in outlines if (region := _region(outline))]
         sides, four = _four_sides(regions)
         areas = np.array([regions[index].area for index in four])
         for index in _bordered(values, sides, areas):
-            corners = _fitted(regions[four[index]], sides[index], growth)
-            if corners is not None and cv2.isContourConvex(corners.astype(np.float32)):
-                found.append(corners)
-    return np.array(found, np.float64).reshape(-1, 4, 2)
+            lines = _fitted(regions[four[index]], sides[index], growth)
+            if lines is not None:
+                found.append(lines)
+    lines = np.array(found, np.float64).reshape(-1, 4, 2, 2)
+    before = np.roll(lines, 1, axis=1)
+    corners = meet(before[:, :, 0], before[:, :, 1], lines[:, :, 0], lines[:, :, 1])
+    convex = [cv2.isContourConvex(of) for of in corners.astype(np.float32)]
+    return corners[np.array(convex, bool)]
 
 
 def _region(outline: np.ndarray) -> _Region | None:
@@ -142,7 +146,7 @@ def _four_sides(regions: list[_Region]) -> tuple[np.ndarray, np.ndarray]:
     which = np.flatnonzero(longest >= _FOUR * lengths.sum(axis=1))
     starts, ends, vectors, lengths = (of[which] for of in (starts, ends, vectors, lengths))
     aside = _SAME_LINE[1] * np.array([regions[index].length for index in which])[:, None]
-    chosen = np.zeros(lengths.shape, bool)
+    chosen = used[which] & (counts[which] == 4)[:, None]
     order = np.argsort(-lengths, axis=1, kind='stable')
     rows = np.arange(len(which))
     for rank in range(_MAXIMUM_CORNERS):
@@ -159,7 +163,7 @@ def _four_sides(regions: list[_Region]) -> tuple[np.ndarray, np.ndarray]:
         same = (
             turned & (np.abs(_cross(others, offset)) < aside[rows] * lengths[rows]) & chosen[rows]
         )
-        chosen[rows, index] = (counts[which[rows]] == 4) | ~same.any(axis=1)
+        chosen[rows, index] = ~same.any(axis=1)
     four = chosen.sum(axis=1) == 4
     sides = np.stack([starts, ends], axis=2)[four][chosen[four]]
     return sides.reshape(-1, 4, 2, 2), which[four]
@@ -171,7 +175,7 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def _fitted(region: _Region, sides: np.ndarray, growth: float) -> np.ndarray | None:
-    """Return the corners where lines fitted to the points near four sides meet, shape (4, 2)."""
+    """Return the ends of lines fitted to the points near four sides, shape (4, 2, 2)."""
     starts, ends = sides[:, 0], sides[:, 1]
     points, length = region.outline.astype(np.float64), region.length
     vectors = ends - starts
@@ -191,7 +195,4 @@ def _fitted(region: _Region, sides: np.ndarray, growth: float) -> np.ndarray | N
     squares = np.maximum((weights * places**2).sum(axis=1), 1e-9)
     slope = (weights * places * offsets).sum(axis=1) / squares
     first, last = (across + slope * (end - middle) + growth for end in (-0.5, 0.5))
-    starts = starts + first[:, None] * normals
-    ends = ends + last[:, None] * normals
-    before = np.roll(starts, 1, axis=0), np.roll(ends, 1, axis=0)
-    return meet(*before, starts, ends)
+    return sides + np.stack([first, last], axis=1)[..., None] * normals[:, None]

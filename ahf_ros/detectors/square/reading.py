@@ -79,7 +79,9 @@ def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]])
             top = np.arange(len(best)), best
             odds -= odds[top][:, None]
             odds[top] = -np.inf
-            total = -np.logaddexp(-total, np.logaddexp.reduce(odds, axis=1))
+            second = odds.max(axis=1, initial=-np.inf)
+            others = second + np.log(np.exp(odds - second[:, None]).sum(axis=1))
+            total = -np.logaddexp(-total, others)
             good = total > _MINIMUM_ODDS
             number, turn = np.divmod(best, 4)
             columns = (bordered[which[likely]], np.full(len(best), index), number, turn, total)
