@@ -60,15 +60,15 @@ def find_quadrilaterals(gray: np.ndarray) -> np.ndarray:
         middle = cv2.addWeighted(low, 0.5, high, 0.5, 0)
         height = cv2.subtract(high, low)
         dark = cv2.compare(values, middle, cv2.CMP_LT)
-        dark &= cv2.compare(height, _MINIMUM_STEP, cv2.CMP_GT)
+        dark *= height > _MINIMUM_STEP
         outlines, _ = cv2.findContours(dark, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
         regions = [region for outline in outlines if (region := _region(outline))]
         sides, four = _four_sides(regions)
         areas = np.array([regions[index].area for index in four])
         for index in _bordered(values, sides, areas):
-            lines = _fitted(regions[four[index]], sides[index], growth)
-            if lines is not None:
-                found.append(lines)
+            fitted = _fitted(regions[four[index]], sides[index], growth)
+            if fitted is not None:
+                found.append(fitted)
     lines = np.array(found, np.float64).reshape(-1, 4, 2, 2)
     before = np.roll(lines, 1, axis=1)
     corners = meet(before[:, :, 0], before[:, :, 1], lines[:, :, 0], lines[:, :, 1])
