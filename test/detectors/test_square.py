@@ -80,6 +80,11 @@ def test_hardly_any_texture_is_a_marker():
     assert sum(len(detect(textured_image(seed))) for seed in range(101, 115)) == 0
 
 
+@pytest.mark.parametrize(('family', 'seed'), [('aruco_4x4_1000', 4), ('aruco_4x4_50', 39)])
+def test_letters_are_no_markers_with_few_edges(family, seed):
+    assert create_detector(family=family)(textured_image(seed)) == []
+
+
 @pytest.mark.parametrize('gray', [0, 90, 255])
 def test_a_covered_marker_is_read(gray):
     shown = scene(family='apriltag_36h11')

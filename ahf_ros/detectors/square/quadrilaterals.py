@@ -41,7 +41,7 @@ _SCALES = tuple(
 
 
 class _Region(NamedTuple):
-    sides: np.ndarray  # (4, 2, 2), px, clockwise in the image
+    polygon: np.ndarray  # (m, 2), px, clockwise in the image
     outline: np.ndarray  # (n, 2), its outermost pixels
     length: float  # of its outline, or of that of its hull, px
     area: float  # with its holes, px^2
@@ -60,18 +60,24 @@ def find_quadrilaterals(gray: np.ndarray) -> np.ndarray:
         middle = cv2.addWeighted(low, 0.5, high, 0.5, 0)
         height = cv2.subtract(high, low)
         dark = cv2.compare(values, middle, cv2.CMP_LT)
-        dark[height <= _MINIMUM_STEP] = 0
+        dark *= height > _MINIMUM_STEP
         outlines, _ = cv2.findContours(dark, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
         regions = [region for outline in outlines if (region := _region(outline))]
-        for index in _bordered(values, regions):
-            corners = _fitted(regions[index], growth)
-            if corners is not None and cv2.isContourConvex(corners.astype(np.float32)):
-                found.append(corners)
-    return np.array(found, np.float64).reshape(-1, 4, 2)
+        sides, four = _four_sides(regions)
+        areas = np.array([regions[index].area for index in four])
+        for index in _bordered(values, sides, areas):
+            fitted = _fitted(regions[four[index]], sides[index], growth)
+            if fitted is not None:
+                found.append(fitted)
+    lines = np.array(found, np.float64).reshape(-1, 4, 2, 2)
+    before = np.roll(lines, 1, axis=1)
+    corners = meet(before[:, :, 0], before[:, :, 1], lines[:, :, 0], lines[:, :, 1])
+    convex = [cv2.isContourConvex(of) for of in corners.astype(np.float32)]
+    return corners[np.array(convex, bool)]
 
 
 def _region(outline: np.ndarray) -> _Region | None:
-    """Return the sides of the region in an outline if it has four straight ones."""
+    """Return the region in an outline if it may have four straight sides."""
     if len(outline) < 4 * _SMALLEST * 0.7:
         return None
     area = -cv2.contourArea(outline, oriented=True)
@@ -92,21 +98,20 @@ def _region(outline: np.ndarray) -> _Region | None:
         return None
     if cv2.contourArea(polygon, oriented=True) < 0:
         polygon = polygon[::-1]
-    sides = _four_sides(polygon.astype(np.float64), length)
-    return None if sides is None else _Region(sides, outline[:, 0], length, area)
+    return _Region(polygon, outline[:, 0], length, area)
 
 
-def _bordered(values: np.ndarray, regions: list[_Region]) -> np.ndarray:
-    """Return the indices of regions whose sides meet about them, dark inside, bright outside."""
-    if not regions:
-        return np.zeros(0, int)
-    sides = np.array([region.sides for region in regions])
+def _bordered(values: np.ndarray, sides: np.ndarray, regions: np.ndarray) -> np.ndarray:
+    """Return the indices of sides that meet about their regions, dark inside, bright outside.
+
+    The sides have the shape (k, 4, 2, 2), the areas of their regions (k,).
+    """
     before = np.roll(sides, 1, axis=1)
     corners = meet(before[:, :, 0], before[:, :, 1], sides[:, :, 0], sides[:, :, 1])
     after = np.roll(corners, -1, axis=1)
     x, y = np.moveaxis(corners, 2, 0)
     areas = (x * after[..., 1] - y * after[..., 0]).sum(axis=1) / 2
-    ratio = areas / np.array([region.area for region in regions])
+    ratio = areas / regions
     which = np.flatnonzero((ratio > _COMMON_AREA[0]) & (ratio < _COMMON_AREA[1]))
     corners, after = corners[which, :, None], after[which, :, None]
     points = corners + _ALONG[:, None] * (after - corners)
@@ -122,33 +127,56 @@ def _bordered(values: np.ndarray, regions: list[_Region]) -> np.ndarray:
     return which[seen]
 
 
-def _four_sides(polygon: np.ndarray, length: float) -> np.ndarray | None:
-    """Return the four longest sides of a polygon, (4, 2, 2), no two on one line, in its order."""
-    ends = np.concatenate([polygon[1:], polygon[:1]])
-    vectors = ends - polygon
-    lengths = np.hypot(vectors[:, 0], vectors[:, 1])
-    if np.sort(lengths)[-4:].sum() < _FOUR * lengths.sum():
-        return None
-    sides = np.stack([polygon, ends], axis=1)
-    if len(sides) == 4:
-        return sides
-    normals = np.stack([vectors[:, 1], -vectors[:, 0]], axis=1) / lengths[:, None]
-    middles = (sides[:, 0] + sides[:, 1]) / 2
-    aside = normals @ middles.T - (normals * sides[:, 0]).sum(axis=1)[:, None]
-    same = np.abs(normals @ vectors.T) < _SAME_LINE[0] * lengths
-    same &= np.abs(aside) < _SAME_LINE[1] * length
-    chosen: list[int] = []
-    for index in np.argsort(-lengths).tolist():
-        if not same[chosen, index].any():
-            chosen.append(index)
-        if len(chosen) == 4:
-            return sides[sorted(chosen)]
-    return None
+def _four_sides(regions: list[_Region]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the four longest sides of polygons, (k, 4, 2, 2), and the indices of their regions.
+
+    They are in the order of the polygon, and no two are on one line; polygons without four such
+    sides have none.
+    """
+    counts = np.array([len(region.polygon) for region in regions], int)
+    used = np.arange(_MAXIMUM_CORNERS) < counts[:, None]
+    starts = np.zeros((*used.shape, 2))
+    if len(regions):
+        starts[used] = np.concatenate([region.polygon for region in regions])
+    ends = np.roll(starts, -1, axis=1)
+    ends[np.arange(len(regions)), counts - 1] = starts[:, 0]
+    vectors = np.where(used[..., None], ends - starts, 0)
+    lengths = np.hypot(vectors[..., 0], vectors[..., 1])
+    longest = np.sort(lengths, axis=1)[:, -4:].sum(axis=1)
+    which = np.flatnonzero(longest >= _FOUR * lengths.sum(axis=1))
+    starts, ends, vectors, lengths = (of[which] for of in (starts, ends, vectors, lengths))
+    aside = _SAME_LINE[1] * np.array([regions[index].length for index in which])[:, None]
+    chosen = used[which] & (counts[which] == 4)[:, None]
+    order = np.argsort(-lengths, axis=1, kind='stable')
+    rows = np.arange(len(which))
+    for rank in range(_MAXIMUM_CORNERS):
+        rows = rows[(counts[which[rows]] > rank) & (chosen[rows].sum(axis=1) < 4)]
+        if not len(rows):
+            break
+        index = order[rows, rank]
+        vector, others = vectors[rows, index, None], vectors[rows]
+        offset = starts[rows, index, None] + vector / 2 - starts[rows]
+        turned = (
+            np.abs(_cross(others, vector))
+            < _SAME_LINE[0] * lengths[rows] * lengths[rows, index, None]
+        )
+        same = (
+            turned & (np.abs(_cross(others, offset)) < aside[rows] * lengths[rows]) & chosen[rows]
+        )
+        chosen[rows, index] = ~same.any(axis=1)
+    four = chosen.sum(axis=1) == 4
+    sides = np.stack([starts, ends], axis=2)[four][chosen[four]]
+    return sides.reshape(-1, 4, 2, 2), which[four]
 
 
-def _fitted(region: _Region, growth: float) -> np.ndarray | None:
-    """Return the corners where lines fitted to the points near four sides meet, shape (4, 2)."""
-    starts, ends = region.sides[:, 0], region.sides[:, 1]
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return the cross products of vectors, shape (..., 2)."""
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
+def _fitted(region: _Region, sides: np.ndarray, growth: float) -> np.ndarray | None:
+    """Return the ends of lines fitted to the points near four sides, shape (4, 2, 2)."""
+    starts, ends = sides[:, 0], sides[:, 1]
     points, length = region.outline.astype(np.float64), region.length
     vectors = ends - starts
     lengths = np.hypot(*vectors.T)[:, None]
@@ -167,7 +195,4 @@ def _fitted(region: _Region, growth: float) -> np.ndarray | None:
     squares = np.maximum((weights * places**2).sum(axis=1), 1e-9)
     slope = (weights * places * offsets).sum(axis=1) / squares
     first, last = (across + slope * (end - middle) + growth for end in (-0.5, 0.5))
-    starts = starts + first[:, None] * normals
-    ends = ends + last[:, None] * normals
-    before = np.roll(starts, 1, axis=0), np.roll(ends, 1, axis=0)
-    return meet(*before, starts, ends)
+    return sides + np.stack([first, last], axis=1)[..., None] * normals[:, None]

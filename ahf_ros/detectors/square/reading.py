@@ -37,6 +37,7 @@ _PART_WEIGHT = 0.15  # of each part of a cell, which have one colour in other qu
 _BORDER_WEIGHT = 0.3  # of the cells of the border, which are alike in other quadrilaterals, too
 _CORNER_WEIGHT = 0.7
 _DOUBT = 6.0  # logarithmic odds against a marker that nothing but a quadrilateral speaks for
+_PLAIN = 0.35  # logarithmic odds against a marker, for each edge less than random cells have
 _SEVERAL = 2.0  # times the logarithm of their number, against each of several groups
 _MINIMUM_ODDS = 2.2  # for a marker to be reported: nine to one
 
@@ -68,17 +69,19 @@ def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]])
         for index, group in enumerate(groups):
             if words(group[0]).shape[1] != cells or not len(which):
                 continue
-            prints, prior = _table(tuple(group))
+            prints, prior, plain = _table(tuple(group))
             odds = evidence @ prints - prior
             best = odds.argmax(axis=1)
-            total = odds[np.arange(len(best)), best] + against - doubt
+            total = odds[np.arange(len(best)), best] + against - doubt - plain[best]
             likely = np.flatnonzero(total > _MINIMUM_ODDS)
             odds, best, total = odds[likely], best[likely], total[likely]
             # Against another marker of the group, and against none of them.
             top = np.arange(len(best)), best
             odds -= odds[top][:, None]
             odds[top] = -np.inf
-            total = -np.logaddexp(-total, np.logaddexp.reduce(odds, axis=1))
+            second = odds.max(axis=1, initial=-np.inf)
+            others = second + np.log(np.exp(odds - second[:, None]).sum(axis=1))
+            total = -np.logaddexp(-total, others)
             good = total > _MINIMUM_ODDS
             number, turn = np.divmod(best, 4)
             columns = (bordered[which[likely]], np.full(len(best), index), number, turn, total)
@@ -89,19 +92,25 @@ def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]])
 
 
 @lru_cache(maxsize=32)
-def _table(group: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
+def _table(group: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the cells of the markers of dictionaries in four turns, and what speaks against each.
 
-    The shapes are (cells, 4 n) and (4 n,).
+    Other markers do, and letters and the like, which have few edges between cells; these are two
+    terms. The shapes are (cells, 4 n) and twice (4 n,).
     """
     cells = words(group[-1])
     turned = np.stack([np.rot90(cells, turn, axes=(1, 2)) for turn in range(4)], axis=1)
     count = np.zeros(len(cells))
     for name in reversed(group):
         count[: len(words(name))] = 4 * len(words(name))
-    return turned.reshape(4 * len(cells), -1).T.astype(np.float32), np.log(
-        np.repeat(count, 4)
-    ).astype(np.float32)
+    bordered = np.pad(cells, ((0, 0), (1, 1), (1, 1)))
+    edges = sum(np.diff(bordered, axis=axis).sum(axis=(1, 2)) for axis in (1, 2))
+    usual = cells.shape[1] * (cells.shape[1] + 1)
+    return (
+        turned.reshape(4 * len(cells), -1).T.astype(np.float32),
+        np.log(np.repeat(count, 4)).astype(np.float32),
+        np.repeat(_PLAIN * np.maximum(usual - edges, 0), 4),
+    )
 
 
 def _frames(corners: np.ndarray) -> np.ndarray:
