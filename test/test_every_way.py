@@ -32,11 +32,12 @@ from support.square_markers import needs_square_markers
 SCENE = {'width': 320, 'height': 240, 'targets': 3, 'dot_radius': 9.0}
 SCENES = {
     'gsi': SCENE | {'width': 560, 'height': 420, 'dot_radius': 5.0},
+    'aicon14': SCENE | {'targets': 4},  # fewer may be of `cct14`
     'cctag3': SCENE | {'dot_radius': 14.0},
 }
 SQUARES = ('aruco_4x4_50', 'apriltag_36h11')
 BOTH = 'metashape12,aicon14'
-SHOWN = {'auto': 'metashape12,dots'}
+SHOWN = {'auto': f'{BOTH},dots'}
 COMMAND = f'{sys.executable} -m ahf_ros.cli identify --json'
 
 

@@ -203,8 +203,8 @@ def _several(settings: DetectorSettings) -> Detector:
             if settings.family != AUTO:
                 raise
             continue  # square markers, which an old OpenCV does not have
-        name = detector_name(_AUTO, family, settings.family_file)
-        groups.setdefault(name if _ENTRIES[name].several else family, []).append(family)
+        entry = _ENTRIES[detector_name(_AUTO, family, settings.family_file)]
+        groups.setdefault(entry.detector if entry.several else family, []).append(family)
     parts = tuple(create_detector(settings=settings.narrowed(of)) for of in groups.values())
     return SeveralDetector(
         settings,

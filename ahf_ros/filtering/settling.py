@@ -25,6 +25,7 @@ FIRST = 3
 """Images with targets in which all families are looked for."""
 
 _EVIDENCE = 2.99  # decimal logarithm of the odds on a family: one target certain to 0.999
+_DOUBTFUL = 0.9  # confidence up to which words are read in nearly any texture
 _CERTAIN = 1e-3  # probability that a target is wrong, below which it counts for no more
 
 
@@ -36,12 +37,13 @@ def memory_of(families: Sequence[str]) -> Memory:
 def evident(targets: Sequence[Target]) -> list[Target]:
     """Return the targets of families that they are evidence for, and undecoded ones.
 
-    Where all families are looked for, a word of one of them is read in nearly any texture. Such
-    readings are doubtful, and few of one family.
+    Where all families are looked for, words of some are read in nearly any texture. Most are
+    doubtful, which is no evidence, and the others are few of one family.
     """
     evidence: defaultdict[str, float] = defaultdict(float)
     for target in targets:
-        evidence[target.family] -= math.log10(max(1 - target.confidence, _CERTAIN))
+        if target.confidence > _DOUBTFUL:
+            evidence[target.family] -= math.log10(max(1 - target.confidence, _CERTAIN))
     return [it for it in targets if it.id == UNDECODED or evidence[it.family] > _EVIDENCE]
 
 

@@ -9,11 +9,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from ahf_ros.codes import RING_NAMES, VENDOR_NAMES
+from ahf_ros.codes import RING_NAMES
 from ahf_ros.codes.ring import family
-from ahf_ros.detectors import DetectorSettings, create_detector
+from ahf_ros.detectors import DetectorSettings, create_detector, estimator
 from ahf_ros.detectors.ring.choice import choose_families, further_families
-from ahf_ros.detectors.ring.counting import estimate_count
 from ahf_ros.synthetic.covers import Cover, ring_cover
 from ahf_ros.synthetic.scene import Rendering, SceneSettings
 from ahf_ros.target import UNDECODED, Target
@@ -24,7 +23,6 @@ from support.scenes import identified, rendered
 
 TWO = ('metashape12', 'aicon14')
 THREE = ('metashape12', 'metashape20', 'aicon14')
-VENDORS = ','.join(VENDOR_NAMES)
 LIGHTS = ('normal', 'stripe')
 SMALL = SceneSettings(width=480, height=360, targets=4, dot_radius=10, seed=21)
 SHARED = {'metashape12': 455, 'metashape16': 3855, 'metashape20': 31775}
@@ -60,7 +58,7 @@ def matches(targets: list[Target], truth: list[tuple[str, int, float, float]]) -
     [
         (TWO, 'normal', 'aicon14, metashape12'),
         *((TWO, light, families) for light in LIGHTS for families in (','.join(TWO), 'auto')),
-        *((THREE, 'normal', families) for families in (','.join(THREE), VENDORS)),
+        *((THREE, 'normal', families) for families in (','.join(THREE), 'auto')),
     ],
 )
 def test_every_target_says_its_family(shown, light, families):
@@ -114,7 +112,7 @@ def test_an_id_of_two_families_is_two_targets():
 
 
 @pytest.mark.parametrize('name', SHARED)
-@pytest.mark.parametrize('families', [VENDORS, ''])
+@pytest.mark.parametrize('families', ['auto', ''])
 def test_a_print_of_three_families_is_of_the_family_beside_it(name, families):
     """The print is the same in each image; what is beside it is not."""
     others = [(name, int(family(name).words[index])) for index in (20, 40)]
@@ -142,8 +140,8 @@ def test_a_print_of_three_families_alone_is_of_none(families):
 
 
 def test_targets_of_another_family_do_not_settle_a_print():
-    marks = [('aicon14', int(family('aicon14').words[index])) for index in (20, 40, 60)]
-    targets = identified(sheet(('metashape12', SHARED['metashape12']), *marks), family=VENDORS)
+    marks = [('aicon14', int(family('aicon14').words[index])) for index in (20, 40, 60, 80)]
+    targets = identified(sheet(('metashape12', SHARED['metashape12']), *marks), family='auto')
     assert sorted(it.code for it in targets) == sorted(word for _, word in marks)
 
 
@@ -153,7 +151,7 @@ def test_bands_of_other_radii_are_not_read():
 
 def test_targets_of_several_families_are_counted():
     image, truth = side_by_side(*map(scene, TWO))
-    assert estimate_count(image, DetectorSettings(family=VENDORS)) == len(truth)
+    assert estimator(DetectorSettings(family='auto'))(image) == len(truth)
 
 
 def test_both_prints_are_found_among_the_many_dots_of_a_lattice():

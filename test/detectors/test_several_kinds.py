@@ -99,6 +99,7 @@ def test_doubtful_targets_of_few_are_no_evidence_for_a_family() -> None:
         return Target(number, 1, 9.0, 9.0, 5.0, 5.0, confidence=confidence, family=family)
 
     doubtful = [target('cct8', 1, 0.95), target('cct8', 2, 0.9), target('cct9', 2, 0.98)]
+    doubtful += [target('cctag3', 5, 0.89), target('cctag3', 21, 0.99), target('cctag3', 28, 0.76)]
     sure = [target('aicon12', 5, 0.9995), *(target('cct12', it, 0.95) for it in range(3))]
     undecoded = target('', -1, 0.5)
     assert evident([*doubtful, *sure, undecoded]) == [*sure, undecoded]
