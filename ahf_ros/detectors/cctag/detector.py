@@ -21,6 +21,7 @@ from ahf_ros.detectors.cctag.rings import Aligned, Prior, align, identify, likel
 from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import FamilyDetector, moved_targets
 from ahf_ros.features import frame
+from ahf_ros.features.candidates import find_peaks
 from ahf_ros.features.dot_search import voted_dots, whole_dots
 from ahf_ros.features.dots import Dots
 from ahf_ros.features.ellipse_targets import ellipse_fields, targets_from_frames
@@ -32,6 +33,8 @@ from ahf_ros.target import UNDECODED, Target, sorted_targets
 
 _GAIN = 2  # of ln I, for circles that blur makes gray
 _INNERMOST = 0.25  # of the radii of circles that are looked for
+_COMMON_CENTRE = 8.0, 20.0  # radii of targets whose rings vote together for their centre, px
+_COMMON_CENTRE_STEP, _COMMON_CENTRE_VOTES, _COMMON_CENTRE_SIZES = 1.0, 2.0, 1.25
 _TELLING = 0.98  # confidence of targets that tell of others
 _CERTAIN = 0.75  # confidence from which a target is reported
 _SURE_OF_TARGET = 0.9  # probability of a target, from which it is reported without its ID
@@ -149,7 +152,31 @@ def _circles(octave: Octave, polarity: int) -> Dots:
         half = ImagePyramid(gray, tuple(halves), pyramid.logs[1:], pyramid.edges[1:])
         dots = voted_dots(half, max(low / 2, 2.0), high / 2, (polarity,))
         found.append(replace(dots, frames=frame.enlarged(dots.frames, 1)))
+    if low < _COMMON_CENTRE[1] and octave.level == 0:
+        found.append(_common_centres(pyramid.logs[0], max(low, _COMMON_CENTRE[0]), polarity))
     return Dots.joined(found)
+
+
+def _common_centres(log: np.ndarray, low: float, polarity: int) -> Dots:
+    """Return circles of several radii, about the points that the edges of many circles face.
+
+    Narrow rings are too close for a dot to be told from the next. What they share is the centre.
+    """
+    high = _COMMON_CENTRE[1]
+    edges = find_edges(log).curved(2 * high)
+    steps = np.arange(_COMMON_CENTRE_STEP, high, _COMMON_CENTRE_STEP, dtype=np.float32)
+    steps = np.concatenate([-steps, steps])[:, None]
+    margin = int(high) + 2
+    columns = (edges.x + np.float32(margin + 0.5) + steps * edges.unit_x).astype(np.int32).ravel()
+    rows = (edges.y + np.float32(margin + 0.5) + steps * edges.unit_y).astype(np.int32).ravel()
+    tall, wide = (side + 2 * margin for side in log.shape)
+    needed = _COMMON_CENTRE_VOTES * 2 * np.pi * low
+    peaks = find_peaks(columns, rows, (1, tall, wide), needed, int(low / 2))
+    radii = np.exp(np.arange(np.log(low), np.log(high), np.log(_COMMON_CENTRE_SIZES)))
+    x, y = (np.repeat(of - margin, len(radii)) for of in (peaks.x, peaks.y))
+    size = np.tile(radii, len(peaks.x))
+    frames = frame.affine_frames(x, y, size, size, np.zeros(len(x)))
+    return Dots(frames, np.full(len(x), polarity), np.ones(len(x)))
 
 
 def _doubled(pyramid: ImagePyramid) -> ImagePyramid:
