@@ -38,6 +38,7 @@ _PART = 2048, 48  # hypotheses and targets at a time, which bounds the memory
 _ENOUGH = 4  # certain targets, that tell of the edges of an image
 _SCALES = (0.93, 0.965, 1.0, 1.035, 1.07)  # of the radius, about a frame
 _READINGS = 5  # IDs that are brought onto the image from a frame
+_REPEATS, _STAYING = 6, 0.1  # until the square of a move is a small part of the variance
 _OUTLIERS = 12.0, 8.0, 5.0, 3.0, 3.0  # deviations that quarter a weight, in rounds of Gauss-Newton
 _QUIET = 0.35  # quantile of rays, whose errors are usual
 _LEAST = 0.003  # standard deviation of gray values, of their mean
@@ -261,8 +262,27 @@ def identify(
     cost = (independent[:, None] * left + prior.squares(every).reshape(-1, count)) / 2
     best = every.select(np.arange(len(ids)) * count + cost.argmin(axis=1))
     others = np.where(ids == best.ids[:, None], np.inf, cost).min(axis=1)
-    best = align(gray, best.frames, best.ids, best.shift, family, prior)
+    best = _settled(gray, best, family, prior)
     return replace(best, margin=others - cost.min(axis=1)).select(best.colour == polarity)
+
+
+def _settled(gray: np.ndarray, rings: Aligned, family: CircleFamily, prior: Prior) -> Aligned:
+    """Return rings brought onto the image until they stay; what still moves is as uncertain."""
+    moving = np.arange(len(rings.ids))
+    for _ in range(_REPEATS):
+        some = rings.select(moving)
+        again = align(gray, some.frames, some.ids, some.shift, family, prior)
+        away = again.frames[:, :2, 2] - some.frames[:, :2, 2]
+        spread = away[:, :, None] * away[:, None]
+        again = replace(again, covariance=again.covariance + spread)
+        rings = rings.replaced(moving, again)
+        moving = moving[
+            (away**2).sum(axis=1)
+            > _STAYING * np.trace(again.covariance - spread, axis1=1, axis2=2)
+        ]
+        if not len(moving):
+            break
+    return rings
 
 
 def _likely_ids(
