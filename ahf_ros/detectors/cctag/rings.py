@@ -217,13 +217,17 @@ def _templates(
     family: CircleFamily, step: int, shifts: tuple[float, ...], blurs: tuple[float, ...]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the ink of all IDs under shifts and blurs, shape (t, n), and the shift of each."""
-    size, ids = _SIZES**step, family.numbers
+    size, table = _SIZES**step, family.radii(family.numbers)
+    # IDs share circles, so that there are few to compute.
+    signed, inverse = np.unique((table * _signs(table)).round(6), return_inverse=True)
+    radii, sign = np.abs(signed)[:, None], np.sign(signed)[:, None]
     most = _MOST_SHIFT * family.narrow * size
     edges = [of for of in product(shifts, blurs) if abs(of[0]) <= most]
-    inks = [
-        _rings(family, ids, *(np.full(len(ids), of) for of in (size, shift, blur)))[0]
-        for shift, blur in edges
-    ]
+    inks = []
+    for shift, blur in edges:
+        place = np.hypot(_PROFILE, blur / size)
+        circles = sign * _normal_share(((radii - place) * size + sign * shift) / blur)
+        inks.append(circles[inverse.reshape(table.shape)].sum(axis=1))
     return np.concatenate(inks), np.array([shift for shift, _ in edges])
 
 
@@ -493,7 +497,7 @@ def _rings(
     These are by the radius, in radii of the target, by the shift, px, and by ln of the blur.
     """
     radii = family.radii(ids)
-    sign = np.where(np.arange(radii.shape[1]) % 2 == 0, 1, -1)[:, None]
+    sign = _signs(radii)[:, None]
     size, shift, blur = (of[:, None, None] for of in (size, shift, blur))
     # Blur moves what lies near to the centre outwards, on the mean (Rice).
     place = np.sqrt(_PROFILE**2 + (blur / size) ** 2)
@@ -504,6 +508,11 @@ def _rings(
     by_shift = (density / blur).sum(axis=1)
     by_blur = -(sign * density * away).sum(axis=1)
     return ink, slope, by_shift, by_blur
+
+
+def _signs(radii: np.ndarray) -> np.ndarray:
+    """Return 1 for circles that ink fills, -1 for those that paper fills, from shape (k, n)."""
+    return np.where(np.arange(radii.shape[1]) % 2 == 0, 1, -1)
 
 
 def _normal_share(x: np.ndarray) -> np.ndarray:
