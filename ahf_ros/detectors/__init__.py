@@ -85,7 +85,7 @@ _ENTRIES = {
     'gsi_published': _Entry('detectors.gsi.published:PublishedGsiDetector', ('gsi',)),
     'dots': _Entry('detectors.dots.detector:DotsDetector', ('dots',)),
     'dots_published': _Entry('detectors.dots.published:PublishedDotsDetector', ('dots',)),
-    'cctag': _Entry('detectors.cctag.detector:CctagDetector', ('cctag',)),
+    'cctag': _Entry('detectors.cctag.detector:CctagDetector', ('cctag',), several=True),
     'command': _Entry('detectors.external.command:CommandDetector', tuple(KINDS), several=True),
 }
 

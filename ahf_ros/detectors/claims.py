@@ -48,17 +48,19 @@ def leading(scores: np.ndarray, certain: np.ndarray, rivals: Rivals, times: floa
 
 
 def best_targets(targets: Sequence[_Target], reach: float = 0.0) -> list[_Target]:
-    """Return the most certain target of each place and each ID, decoded ones first.
+    """Return the most certain target of each place and each ID of a family, decoded ones first.
 
     No other lies in the reach of a target, in radii of its dot. Where it is 0 only IDs count.
     """
     order = sorted(targets, key=lambda it: (it.id == UNDECODED, -it.confidence, it.y, it.x))
     x, y, minor = np.array([(it.x, it.y, it.semi_minor) for it in order]).reshape(-1, 3).T
     ids, radii = np.array([it.id for it in order]), reach * minor
+    families = np.array([it.family for it in order])
 
     def rivals(index: int) -> np.ndarray:
         near = np.hypot(x - x[index], y - y[index]) < np.minimum(radii, radii[index])
-        return near | (ids == ids[index]) & (ids != UNDECODED)
+        same = (ids == ids[index]) & (families == families[index])
+        return near | same & (ids != UNDECODED)
 
     owning = owners(len(order), rivals)
     return [target for target, owns in zip(order, owning, strict=True) if owns]

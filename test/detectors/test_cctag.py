@@ -7,11 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ahf_ros.codes import CCTAG_NAMES
 from ahf_ros.detectors import create_detector
 from ahf_ros.synthetic.scene import Rendering
 from support.scenes import counted, rendering
 
-SIZE = {'width': 640, 'height': 480, 'targets': 8, 'dot_radius': 14.0, 'seed': 2}
+SIZE = {'width': 560, 'height': 420, 'targets': 6, 'dot_radius': 14.0, 'seed': 2}
+
+LARGE = {'width': 640, 'height': 480}
 
 
 def scene(family: str = 'cctag3', **changes: object) -> Rendering:
@@ -31,11 +34,15 @@ def errors(shown: Rendering, found: list) -> np.ndarray:
         ('cctag4', {}, 0.02),
         ('cctag3', {'polarity': 'bright'}, 0.02),
         ('cctag3', {'dot_radius': 10.0}, 0.03),
-        ('cctag3', {'dot_radius': 60.0, 'targets': 4}, 0.02),
-        ('cctag3', {'tilt': 40.0, 'dot_radius': 20.0, 'targets': 6}, 0.03),
+        ('cctag3', {'dot_radius': 60.0, 'targets': 2}, 0.02),
+        ('cctag3', {'tilt': 40.0, 'dot_radius': 20.0, 'targets': 4}, 0.03),
         ('cctag3', {'edge_shift': 0.5}, 0.03),
         ('cctag3', {'edge_shift': -0.5, 'dot_radius': 24.0, 'targets': 4}, 0.03),
-        ('cctag3', {'light': 'stripe', 'ambient': 0.3, 'dot_radius': 20.0, 'targets': 6}, 0.05),
+        (
+            'cctag3',
+            {'light': 'stripe', 'ambient': 0.3, 'dot_radius': 20.0, **LARGE},
+            0.05,
+        ),
     ],
 )
 def test_targets_are_identified_where_they_are(family: str, changes: dict, limit: float) -> None:
@@ -47,18 +54,47 @@ def test_targets_are_identified_where_they_are(family: str, changes: dict, limit
     assert all(target.code == target.id and target.family == family for target in found)
 
 
+@pytest.mark.parametrize('family', CCTAG_NAMES)
+def test_small_targets_are_found_in_stripes(family: str) -> None:
+    shown = scene(family, light='stripe', ambient=0.3, dot_radius=12.0, targets=10)
+    found = create_detector(family=family)(shown.image)
+    right, wrong, false = counted(shown, found)
+    assert right >= 9
+    assert (wrong, false) == (0, 0)
+    assert np.abs(errors(shown, found)).max() < 0.3
+
+
 def test_the_growth_of_ink_is_reported() -> None:
-    shown = scene(edge_shift=0.4, gamma=1.0, dot_radius=20.0, targets=6)
+    shown = scene(edge_shift=0.4, gamma=1.0, dot_radius=20.0, targets=3)
     found = create_detector(family='cctag3')(shown.image)
-    assert [target.edge_shift for target in found] == pytest.approx([0.4] * 6, abs=0.1)
+    assert [target.edge_shift for target in found] == pytest.approx([0.4] * 3, abs=0.1)
 
 
 @pytest.mark.parametrize('family', ['metashape12', 'aicon14', 'dots'])
 @pytest.mark.parametrize('light', ['normal', 'lattice'])
 def test_targets_of_other_families_are_none(family: str, light: str) -> None:
-    shown = scene(family, dot_radius=8.0, targets=4, light=light, ambient=0.3)
-    for name in ('cctag3', 'cctag4'):
-        assert create_detector(family=name)(shown.image) == []
+    shown = scene(
+        family, width=420, height=320, dot_radius=8.0, targets=2, light=light, ambient=0.3
+    )
+    assert create_detector(family='cctag3,cctag4')(shown.image) == []
+
+
+def test_both_families_are_read_in_one_search() -> None:
+    three, four = (scene(family, width=360, height=280, targets=3) for family in CCTAG_NAMES)
+    both = np.hstack([three.image, four.image])
+    detector = create_detector(family='cctag3,cctag4')
+    assert detector.name == 'cctag'
+    found = detector(both)
+    assert sorted((it.family, it.id) for it in found) == sorted(
+        (name, it.id)
+        for name, of in zip(CCTAG_NAMES, (three, four), strict=True)
+        for it in of.targets
+    )
+    moved = [replace(target, x=target.x + 0.3) for target in found]
+    places = [[(it.x, it.y) for it in of] for of in (found, detector.refine(both, moved))]
+    assert np.array(places[1]) == pytest.approx(np.array(places[0]), abs=0.05)
+    alone = create_detector(family='cctag4')(both)
+    assert alone == [it for it in found if it.family == 'cctag4']
 
 
 def test_refinement_finds_the_place_again() -> None:

@@ -15,11 +15,13 @@ from typing import ClassVar
 import numpy as np
 
 from ahf_ros.blas import one_blas_thread
-from ahf_ros.codes.cctag import CircleFamily
+from ahf_ros.codes import CCTAG_NAMES
+from ahf_ros.codes.cctag import CircleFamily, circle_family
 from ahf_ros.detectors.cctag.rings import Aligned, Prior, align, identify, likely_rings
 from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import FamilyDetector, moved_targets
 from ahf_ros.features import frame
+from ahf_ros.features.candidates import find_peaks
 from ahf_ros.features.dot_search import voted_dots, whole_dots
 from ahf_ros.features.dots import Dots
 from ahf_ros.features.ellipse_targets import ellipse_fields, targets_from_frames
@@ -31,23 +33,26 @@ from ahf_ros.target import UNDECODED, Target, sorted_targets
 
 _GAIN = 2  # of ln I, for circles that blur makes gray
 _INNERMOST = 0.25  # of the radii of circles that are looked for
+_COMMON_CENTRE = 8.0, 20.0  # radii of targets whose rings vote together for their centre, px
+_COMMON_CENTRE_STEP, _COMMON_CENTRE_VOTES, _COMMON_CENTRE_SIZES = 1.0, 2.0, 1.25
 _TELLING = 0.98  # confidence of targets that tell of others
 _CERTAIN = 0.75  # confidence from which a target is reported
 _SURE_OF_TARGET = 0.9  # probability of a target, from which it is reported without its ID
 _PLAUSIBLE = 0.6  # share of rays that agree, of a target that is measured again
+_SAME_PLACE = 0.5  # distance of two readings of one target, radii
 _MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE = 1.0, 0.1  # that a centre is moved: px, radii
 
 
 @dataclass(frozen=True, slots=True)
 class CctagDetector(FamilyDetector):
-    """Identify CCTags."""
+    """Identify the CCTags of one family or of several."""
 
     name: ClassVar[str] = 'cctag'
 
     @property
-    def design(self) -> CircleFamily:
-        """Printed design of the family."""
-        return self.settings.codes(CircleFamily)[0]
+    def design(self) -> tuple[CircleFamily, ...]:
+        """Printed designs of the families."""
+        return self.settings.codes(CircleFamily)
 
     @one_blas_thread()
     def __call__(self, image: np.ndarray) -> list[Target]:
@@ -65,18 +70,22 @@ class CctagDetector(FamilyDetector):
         be, stay as they are.
         """
         check_image(image)
-        known = [target for target in targets if target.id != UNDECODED]
-        if not known:
-            return list(targets)
         gray = as_gray(image).astype(np.float32, copy=False)
-        columns = [(it.x, it.y, it.semi_major, it.semi_minor, it.angle) for it in known]
-        start = frame.affine_frames(*np.array(columns).T)
-        shift = np.array([target.edge_shift or 0.0 for target in known])
-        of = align(gray, start, np.array([it.id for it in known]), shift, self.design)
-        moved = np.hypot(*(of.frames[:, :2, 2] - start[:, :2, 2]).T)
-        reach = np.maximum(_MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE * frame.mean_radii(start))
-        places = ellipse_fields(of.frames, of.covariance, of.edge_shift)
-        return moved_targets(targets, known, places, (moved <= reach) & (of.rays >= _PLAUSIBLE))
+        refined = list(targets)
+        for family in self.design:
+            known = [it for it in targets if it.id != UNDECODED and it.family == family.name]
+            if not known:
+                continue
+            columns = [(it.x, it.y, it.semi_major, it.semi_minor, it.angle) for it in known]
+            start = frame.affine_frames(*np.array(columns).T)
+            shift = np.array([target.edge_shift or 0.0 for target in known])
+            of = align(gray, start, np.array([it.id for it in known]), shift, family)
+            moved = np.hypot(*(of.frames[:, :2, 2] - start[:, :2, 2]).T)
+            reach = np.maximum(_MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE * frame.mean_radii(start))
+            places = ellipse_fields(of.frames, of.covariance, of.edge_shift)
+            good = (moved <= reach) & (of.rays >= _PLAUSIBLE)
+            refined = moved_targets(refined, known, places, good)
+        return refined
 
     def _identify(self, octave: Octave) -> list[Target]:
         """Return the targets of an octave, in its pixels."""
@@ -84,9 +93,14 @@ class CctagDetector(FamilyDetector):
         found = []
         for polarity in self.settings.polarities:
             circles = _circles(octave, polarity)
-            frames = likely_rings(gray, circles, octave.radii, polarity, self.design)
-            found.append(_identified(gray, frames, polarity, self.design))
-        rings = Aligned.joined(found)
+            for family in self.design:
+                frames = likely_rings(gray, circles, octave.radii, polarity, family)
+                rings = _identified(gray, frames, polarity, family)
+                found += self._shown(_owning(gray, rings, polarity, family), family.name)
+        return found
+
+    def _shown(self, rings: Aligned, family: str) -> list[Target]:
+        """Return the targets of the readings that are sure enough."""
         decoded = rings.confidence >= _CERTAIN
         shown = decoded | (self.settings.report_undecoded & (rings.of_target >= _SURE_OF_TARGET))
         rings, decoded = rings.select(shown), decoded[shown]
@@ -94,7 +108,7 @@ class CctagDetector(FamilyDetector):
         certainty = np.where(decoded, rings.confidence, 0.0)
         return targets_from_frames(
             *(rings.frames, rings.covariance, ids, rings.ids, certainty),
-            *(self.design.name, rings.edge_shift),
+            *(family, rings.edge_shift),
         )
 
 
@@ -107,6 +121,21 @@ def _identified(
     doubtful = rings.select(~certain)
     again = identify(gray, doubtful.frames, polarity, family, Prior.after(rings.select(certain)))
     return Aligned.joined([rings.select(certain), again])
+
+
+def _owning(gray: np.ndarray, rings: Aligned, polarity: int, family: CircleFamily) -> Aligned:
+    """Return the readings less those of doubtful targets that another family explains better."""
+    doubtful = np.flatnonzero((rings.of_target >= _CERTAIN) & (rings.confidence < _TELLING))
+    beaten = np.zeros(len(rings.ids), bool)
+    for name in CCTAG_NAMES:
+        if name == family.name:
+            continue
+        others = identify(gray, rings.frames[doubtful], polarity, circle_family(name))
+        for index in doubtful.tolist():
+            away = np.hypot(*(others.frames[:, :2, 2] - rings.frames[index, :2, 2]).T)
+            near = away < _SAME_PLACE * frame.mean_radii(others.frames)
+            beaten[index] |= (others.left[near] < rings.left[index]).any()
+    return rings.select(~beaten)
 
 
 def _circles(octave: Octave, polarity: int) -> Dots:
@@ -123,7 +152,31 @@ def _circles(octave: Octave, polarity: int) -> Dots:
         half = ImagePyramid(gray, tuple(halves), pyramid.logs[1:], pyramid.edges[1:])
         dots = voted_dots(half, max(low / 2, 2.0), high / 2, (polarity,))
         found.append(replace(dots, frames=frame.enlarged(dots.frames, 1)))
+    if low < _COMMON_CENTRE[1] and octave.level == 0:
+        found.append(_common_centres(pyramid.logs[0], max(low, _COMMON_CENTRE[0]), polarity))
     return Dots.joined(found)
+
+
+def _common_centres(log: np.ndarray, low: float, polarity: int) -> Dots:
+    """Return circles of several radii, about the points that the edges of many circles face.
+
+    Narrow rings are too close for a dot to be told from the next. What they share is the centre.
+    """
+    high = _COMMON_CENTRE[1]
+    edges = find_edges(log).curved(2 * high)
+    steps = np.arange(_COMMON_CENTRE_STEP, high, _COMMON_CENTRE_STEP, dtype=np.float32)
+    steps = np.concatenate([-steps, steps])[:, None]
+    margin = int(high) + 2
+    columns = (edges.x + np.float32(margin + 0.5) + steps * edges.unit_x).astype(np.int32).ravel()
+    rows = (edges.y + np.float32(margin + 0.5) + steps * edges.unit_y).astype(np.int32).ravel()
+    tall, wide = (side + 2 * margin for side in log.shape)
+    needed = _COMMON_CENTRE_VOTES * 2 * np.pi * low
+    peaks = find_peaks(columns, rows, (1, tall, wide), needed, int(low / 2))
+    radii = np.exp(np.arange(np.log(low), np.log(high), np.log(_COMMON_CENTRE_SIZES)))
+    x, y = (np.repeat(of - margin, len(radii)) for of in (peaks.x, peaks.y))
+    size = np.tile(radii, len(peaks.x))
+    frames = frame.affine_frames(x, y, size, size, np.zeros(len(x)))
+    return Dots(frames, np.full(len(x), polarity), np.ones(len(x)))
 
 
 def _doubled(pyramid: ImagePyramid) -> ImagePyramid:

@@ -38,6 +38,7 @@ _PART = 2048, 48  # hypotheses and targets at a time, which bounds the memory
 _ENOUGH = 4  # certain targets, that tell of the edges of an image
 _SCALES = (0.93, 0.965, 1.0, 1.035, 1.07)  # of the radius, about a frame
 _READINGS = 5  # IDs that are brought onto the image from a frame
+_REPEATS, _STAYING = 6, 0.1  # until the square of a move is a small part of the variance
 _OUTLIERS = 12.0, 8.0, 5.0, 3.0, 3.0  # deviations that quarter a weight, in rounds of Gauss-Newton
 _QUIET = 0.35  # quantile of rays, whose errors are usual
 _LEAST = 0.003  # standard deviation of gray values, of their mean
@@ -216,13 +217,17 @@ def _templates(
     family: CircleFamily, step: int, shifts: tuple[float, ...], blurs: tuple[float, ...]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the ink of all IDs under shifts and blurs, shape (t, n), and the shift of each."""
-    size, ids = _SIZES**step, family.numbers
+    size, table = _SIZES**step, family.radii(family.numbers)
+    # IDs share circles, so that there are few to compute.
+    signed, inverse = np.unique((table * _signs(table)).round(6), return_inverse=True)
+    radii, sign = np.abs(signed)[:, None], np.sign(signed)[:, None]
     most = _MOST_SHIFT * family.narrow * size
     edges = [of for of in product(shifts, blurs) if abs(of[0]) <= most]
-    inks = [
-        _rings(family, ids, *(np.full(len(ids), of) for of in (size, shift, blur)))[0]
-        for shift, blur in edges
-    ]
+    inks = []
+    for shift, blur in edges:
+        place = np.hypot(_PROFILE, blur / size)
+        circles = sign * _normal_share(((radii - place) * size + sign * shift) / blur)
+        inks.append(circles[inverse.reshape(table.shape)].sum(axis=1))
     return np.concatenate(inks), np.array([shift for shift, _ in edges])
 
 
@@ -261,8 +266,27 @@ def identify(
     cost = (independent[:, None] * left + prior.squares(every).reshape(-1, count)) / 2
     best = every.select(np.arange(len(ids)) * count + cost.argmin(axis=1))
     others = np.where(ids == best.ids[:, None], np.inf, cost).min(axis=1)
-    best = align(gray, best.frames, best.ids, best.shift, family, prior)
+    best = _settled(gray, best, family, prior)
     return replace(best, margin=others - cost.min(axis=1)).select(best.colour == polarity)
+
+
+def _settled(gray: np.ndarray, rings: Aligned, family: CircleFamily, prior: Prior) -> Aligned:
+    """Return rings brought onto the image until they stay; what still moves is as uncertain."""
+    moving = np.arange(len(rings.ids))
+    for _ in range(_REPEATS):
+        some = rings.select(moving)
+        again = align(gray, some.frames, some.ids, some.shift, family, prior)
+        away = again.frames[:, :2, 2] - some.frames[:, :2, 2]
+        spread = away[:, :, None] * away[:, None]
+        again = replace(again, covariance=again.covariance + spread)
+        rings = rings.replaced(moving, again)
+        moving = moving[
+            (away**2).sum(axis=1)
+            > _STAYING * np.trace(again.covariance - spread, axis1=1, axis2=2)
+        ]
+        if not len(moving):
+            break
+    return rings
 
 
 def _likely_ids(
@@ -473,7 +497,7 @@ def _rings(
     These are by the radius, in radii of the target, by the shift, px, and by ln of the blur.
     """
     radii = family.radii(ids)
-    sign = np.where(np.arange(radii.shape[1]) % 2 == 0, 1, -1)[:, None]
+    sign = _signs(radii)[:, None]
     size, shift, blur = (of[:, None, None] for of in (size, shift, blur))
     # Blur moves what lies near to the centre outwards, on the mean (Rice).
     place = np.sqrt(_PROFILE**2 + (blur / size) ** 2)
@@ -484,6 +508,11 @@ def _rings(
     by_shift = (density / blur).sum(axis=1)
     by_blur = -(sign * density * away).sum(axis=1)
     return ink, slope, by_shift, by_blur
+
+
+def _signs(radii: np.ndarray) -> np.ndarray:
+    """Return 1 for circles that ink fills, -1 for those that paper fills, from shape (k, n)."""
+    return np.where(np.arange(radii.shape[1]) % 2 == 0, 1, -1)
 
 
 def _normal_share(x: np.ndarray) -> np.ndarray:
