@@ -182,7 +182,6 @@ def _hint(settings: IdentificationSettings, identified: int) -> str:
     if settings.expected_targets or settings.adaptive.listed or settings.estimate_expected:
         return ''
 
-    from ahf_ros.batch.identification import detector_of
     from ahf_ros.detectors import EarlyStopping
 
     if isinstance(detector_of(settings), EarlyStopping):  # filters show it hardly more

@@ -38,7 +38,7 @@ _BORDER_WEIGHT = 0.3  # of the cells of the border, which are alike in other qua
 _CORNER_WEIGHT = 0.7
 _DOUBT = 6.0  # logarithmic odds against a marker that nothing but a quadrilateral speaks for
 _PLAIN = 0.35  # logarithmic odds against a marker, for each edge less than random cells have
-_SEVERAL = 2.0  # times the logarithm of their number, against each of several groups
+_SEVERAL = 3.5  # times the logarithm of their number, against each of several groups
 _MINIMUM_ODDS = 2.2  # for a marker to be reported: nine to one
 
 
@@ -75,15 +75,16 @@ def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]])
             total = odds[np.arange(len(best)), best] + against - doubt - plain[best]
             likely = np.flatnonzero(total > _MINIMUM_ODDS)
             odds, best, total = odds[likely], best[likely], total[likely]
-            # Against another marker of the group, and against none of them.
-            top = np.arange(len(best)), best
-            odds -= odds[top][:, None]
-            odds[top] = -np.inf
+            # Against another marker of the group, and against none of them. A turn of the same
+            # one is no other: some are symmetric.
+            number, turn = np.divmod(best, 4)
+            rows = np.arange(len(best))[:, None]
+            odds -= odds[rows, best[:, None]]
+            odds[rows, 4 * number[:, None] + np.arange(4)] = -np.inf
             second = odds.max(axis=1, initial=-np.inf)
             others = second + np.log(np.exp(odds - second[:, None]).sum(axis=1))
             total = -np.logaddexp(-total, others)
             good = total > _MINIMUM_ODDS
-            number, turn = np.divmod(best, 4)
             columns = (bordered[which[likely]], np.full(len(best), index), number, turn, total)
             found.append(np.stack(columns, axis=1)[good])
     table = np.concatenate(found)
