@@ -36,6 +36,7 @@ _INNERMOST = 0.25  # of the radii of circles that are looked for
 _COMMON_CENTRE = 8.0, 20.0  # radii of targets whose rings vote together for their centre, px
 _COMMON_CENTRE_STEP, _COMMON_CENTRE_VOTES, _COMMON_CENTRE_SIZES = 1.0, 2.0, 1.25
 _TELLING = 0.98  # confidence of targets that tell of others
+_POSSIBLE = 0.01  # probability of a target, from which it is read again
 _CERTAIN = 0.75  # confidence from which a target is reported
 _SURE_OF_TARGET = 0.9  # probability of a target, from which it is reported without its ID
 _PLAUSIBLE = 0.6  # share of rays that agree, of a target that is measured again
@@ -118,7 +119,7 @@ def _identified(
     """Return the readings of targets of one colour, doubtful ones with what certain ones show."""
     rings = identify(gray, frames, polarity, family)
     certain = rings.confidence >= _TELLING
-    doubtful = rings.select(~certain)
+    doubtful = rings.select(~certain & (rings.of_target >= _POSSIBLE))
     again = identify(gray, doubtful.frames, polarity, family, Prior.after(rings.select(certain)))
     return Aligned.joined([rings.select(certain), again])
 

@@ -432,7 +432,8 @@ def _robust_rays(values: np.ndarray, ink: np.ndarray, outlier: float) -> _Rays:
     rays = _Rays.of(values, ink, np.broadcast_to(_PROFILE, values.shape))
     for _ in range(2):
         usual = np.median(rays.contrast, axis=1, keepdims=True)
-        alike = geman_mcclure(1.0, (rays.contrast - usual) / (_OTHER_CONTRAST * np.abs(usual)))
+        unlike = (rays.contrast - usual) / (_OTHER_CONTRAST * np.maximum(np.abs(usual), 1e-9))
+        alike = geman_mcclure(1.0, unlike)
         of_rays = np.median(np.abs(rays.errors), axis=2)
         spread = NORMAL * np.quantile(of_rays, _QUIET, axis=1)[:, None, None]
         weight = geman_mcclure(_PROFILE, rays.errors / (outlier * np.maximum(spread, _LEAST)))

@@ -74,6 +74,15 @@ def _against_rivals(
     return replace(found, confidence=confidence)
 
 
+def _narrowest(words: dict[Family, int]) -> dict[Family, int]:
+    """Return words of a print without those of families that have all words of another one."""
+    return {
+        code: word
+        for code, word in words.items()
+        if not any(_has_all(code, of) and len(of.words) < len(code.words) for of in words)
+    }
+
+
 def _has_all(code: Family, other: Family) -> bool:
     """Return whether a family has all words of another one, in the same print."""
     same = (code.band, code.bits) == (other.band, other.bits)
@@ -112,9 +121,8 @@ def decoded(hypotheses: Hypotheses) -> tuple[np.ndarray, np.ndarray, np.ndarray]
 def settle_same_prints(hypotheses: Hypotheses, families: Sequence[Family]) -> Hypotheses:
     """Assign prints shared by several families to one of them, or mark them uncertain.
 
-    The families of an image are as few as explain all of its targets, and of those that explain
-    the same ones that with the fewest words. Where two of these have a print, the nearest target
-    that only one of them has tells which it is.
+    Where two families of an image have a print, it is of the one whose words the other has all, or
+    the nearest target that only one of them has tells which it is.
     """
     codes = decoded(hypotheses)[1]
     certain = np.flatnonzero(hypotheses.certain).tolist()
@@ -124,7 +132,7 @@ def settle_same_prints(hypotheses: Hypotheses, families: Sequence[Family]) -> Hy
     }
     present, sure = present_families(list(prints.values()))
     options = {
-        index: {code: word for code, word in words.items() if code in present}
+        index: _narrowest({code: word for code, word in words.items() if code in present})
         for index, words in prints.items()
     }
     clear = np.array([index for index, words in options.items() if len(words) == 1], int)
@@ -148,11 +156,23 @@ def settle_same_prints(hypotheses: Hypotheses, families: Sequence[Family]) -> Hy
 
 
 def present_families(prints: Sequence[dict[Family, int]]) -> tuple[list[Family], set[Family]]:
-    """Return the fewest families that have all prints, and those that no other may stand for."""
+    """Return the families that say all prints in the fewest nats, and those that are sure.
+
+    No other may stand for these. A print costs the logarithm of the number of words of its family,
+    and what it takes to say which of the families of the image it is of. One family is likelier.
+    """
     left, present, sure = list(prints), [], set()
     while left:
         count = {code: sum(code in of for of in left) for of in left for code in of}
-        best = min(count, key=lambda code: (-count[code], len(code.words)))
+        most = max(len(code.words) for code in count)
+
+        def cost(code: Family, own: int, every: int = len(left), most: int = most) -> float:
+            others = every - own
+            mixed = -own * np.log(own / every) - others * np.log(max(others, 1) / every)
+            further = -np.log(_DOUBT) if others else 0.0
+            return float(own * np.log(len(code.words)) + others * np.log(most) + mixed + further)
+
+        best = min(count, key=lambda code: (cost(code, count[code]), len(code.words)))
         covered = [of for of in left if best in of]
         different = len({of[best] for of in covered})
         rivals = set.intersection(*(set(of) for of in covered)) - {best}
