@@ -56,10 +56,7 @@ _AMBIGUOUS, _AWAY = 0.5, 0.2  # of one nearer to another target, and of each ste
 
 _LETTERS = 0.0105  # height, of the diagonal: legible when all of the image is on a screen
 _MINIMUM_LETTERS = 15.0  # px
-_SMALLEST_LETTERS, _OF_ROOM = (
-    9.0,
-    0.16,
-)  # px, and of distances, in crowds
+_SMALLEST_LETTERS, _OF_ROOM = 9.0, 0.16  # in crowds: px, and share of distances
 _SIDE_POINTS = 9  # at which the outline of a square is sampled
 _MAXIMUM_NAMED = 12  # IDs that the summary names at most
 

@@ -35,8 +35,11 @@ def with_ends(
     `lit`, shape (k,), the probability of edges of light, which move ends and hide them. A word
     that no family has competes with words that need a cover.
     """
-    odds, unseen = _ends(polar, words, overhang, family)
-    other, unseen_of_other = _ends(polar, words.as_they_look(), overhang, family)
+    inner, outer = family.band
+    radii = inner + (outer - inner) * np.tile(DEPTHS, (len(overhang), 1)).T
+    levels = np.mean([polar.at(of) for of in radii], axis=0)
+    odds, unseen = _ends(polar, levels, words, overhang, family)
+    other, unseen_of_other = _ends(polar, levels, words.as_they_look(), overhang, family)
     ahead = words.ahead + other - odds - _UNSEEN * (unseen_of_other - unseen)
     margin = np.where(words.other == words.words, np.inf, _RARE - ahead)
     return replace(
@@ -48,15 +51,14 @@ def with_ends(
 
 
 def _ends(
-    polar: PolarImages, words: Words, overhang: np.ndarray, family: Family
+    polar: PolarImages, levels: np.ndarray, words: Words, overhang: np.ndarray, family: Family
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the log odds that arcs end where the sectors do, against anywhere near, shape (k,).
 
-    With them come the numbers of ends that nothing hides and that are not seen.
+    `levels` are the mean gray values across the band, shape (k, m), at all angles. With the odds
+    come the numbers of ends that nothing hides and that are not seen.
     """
     count, (inner, outer) = words.hidden.shape[1], family.band
-    radii = inner + (outer - inner) * np.tile(DEPTHS, (len(overhang), 1)).T
-    levels = np.mean([polar.at(of) for of in radii], axis=0)
     phases = np.rint(words.starts * count / (2 * np.pi)).astype(int)
     bits = bits_at(words.words, phases, count // family.bits, family)
     ends = bits != np.roll(bits, 1, axis=1)

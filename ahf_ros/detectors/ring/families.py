@@ -165,14 +165,13 @@ def present_families(prints: Sequence[dict[Family, int]]) -> tuple[list[Family],
     while left:
         count = {code: sum(code in of for of in left) for of in left for code in of}
         most = max(len(code.words) for code in count)
-
-        def cost(code: Family, own: int, every: int = len(left), most: int = most) -> float:
-            others = every - own
-            mixed = -own * np.log(own / every) - others * np.log(max(others, 1) / every)
-            further = -np.log(_DOUBT) if others else 0.0
-            return float(own * np.log(len(code.words)) + others * np.log(most) + mixed + further)
-
-        best = min(count, key=lambda code: (cost(code, count[code]), len(code.words)))
+        best = min(
+            count,
+            key=lambda code: (
+                _nats(count[code], len(code.words), len(left) - count[code], most),
+                len(code.words),
+            ),
+        )
         covered = [of for of in left if best in of]
         different = len({of[best] for of in covered})
         rivals = set.intersection(*(set(of) for of in covered)) - {best}
@@ -183,3 +182,11 @@ def present_families(prints: Sequence[dict[Family, int]]) -> tuple[list[Family],
             sure.add(best)
         left = [of for of in left if best not in of]
     return present, sure
+
+
+def _nats(own: int, words: int, others: int, most: int) -> float:
+    """Return what prints cost: `own` in a family of some words, others in further ones of most."""
+    every = own + others
+    mixed = -own * np.log(own / every) - others * np.log(max(others, 1) / every)
+    further = -np.log(_DOUBT) if others else 0.0
+    return float(own * np.log(words) + others * np.log(most) + mixed + further)
