@@ -41,6 +41,7 @@ ROSDEP = {
     'rich': 'python3-rich',
     'rosbags': 'python3-rosbags-pip',
     'ruamel': 'python3-ruamel.yaml',
+    'scipy': 'python3-scipy',
     'threadpoolctl': 'python3-sklearn',
     'yaml': 'python3-yaml',
     'zstandard': 'mcap-ros2-support',

@@ -1,0 +1,56 @@
+"""What was computed: cameras, poses and points, with their covariances and what was left out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ahf_ros.orientation.network import FloatArray, Network, Rejection
+
+
+@dataclass(frozen=True)
+class Start:
+    """Approximate values of a connected group of photographs, in any frame and scale.
+
+    Photographs and points that are not in the group are NaN.
+    """
+
+    calibrations: FloatArray
+    """(cameras, parameters) in the order of `camera.PARAMETERS`."""
+    rotations: FloatArray
+    """(photographs, 3, 3) from world to camera: X_camera = R (X - position)."""
+    positions: FloatArray
+    """(photographs, 3) centres of projection."""
+    points: FloatArray
+    """(points, 3)."""
+    used: NDArray[np.bool_]
+    """(observations,) those that agree with these values."""
+
+
+@dataclass(frozen=True)
+class Solution:
+    """An adjusted network; arrays as in `Start`, NaN for what could not be determined.
+
+    Covariances hold the a-priori weights, scaled by the square of `sigma0` where `scaled` says so.
+    A pose's 6x6 covariance is of (position, rotation vector in the camera's frame, rad).
+    """
+
+    network: Network
+    start: Start
+    residuals: FloatArray
+    """(observations, 2) measured minus computed, px."""
+    normalised: FloatArray
+    """(observations,) residuals over their standard deviations, as the w-test sees them."""
+    camera_covariances: tuple[FloatArray, ...]
+    """One (parameters, parameters) a camera, zero for parameters that were kept fixed."""
+    released: tuple[tuple[str, ...], ...]
+    """Names of the parameters that were estimated, for each camera."""
+    pose_covariances: FloatArray
+    covariance_of_points: FloatArray
+    """(3 points, 3 points), all of it."""
+    sigma0: float
+    redundancy: int
+    rejected: tuple[Rejection, ...]
+    warnings: tuple[str, ...]
