@@ -2,26 +2,14 @@
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 
+from ahf_ros.orientation.camera import project
 from ahf_ros.orientation.network import CameraView, Network, Observations
 from ahf_ros.orientation.solution import Solution, Start
 
 CALIBRATION = np.array([1500.0, 803.0, 596.0, -0.08, 0.02, 0.001, 2e-4, -1e-4, 1e-4, 2e-5])
 SIZE = 1600, 1200
-
-
-def projected(
-    calibration: np.ndarray, rotation: np.ndarray, position: np.ndarray, points: np.ndarray
-) -> np.ndarray:
-    """Return where Brown's model shows points, with OpenCV's own functions."""
-    f, cx, cy, k1, k2, k3, p1, p2, affinity, shear = calibration
-    local = (points - position) @ rotation.T
-    none = np.zeros(3)
-    lens = np.array([k1, k2, p1, p2, k3])
-    (x, y) = cv2.projectPoints(local, none, none, np.eye(3), lens)[0][:, 0].T
-    return np.column_stack((cx + f * ((1 + affinity) * x + shear * y), cy + f * y))
 
 
 def looking(position: np.ndarray, roll: float) -> np.ndarray:
@@ -47,7 +35,7 @@ def solution(photographs: int = 6, targets: int = 12, unit: str = 'mm') -> Solut
     rotations = np.array([looking(at, rolls[i]) for i, at in enumerate(positions)])
     photograph, point = (it.ravel() for it in np.indices((photographs, targets)))
     exact = np.concatenate(
-        [projected(CALIBRATION, *pose, points) for pose in zip(rotations, positions, strict=True)]
+        [project(CALIBRATION, *pose, points) for pose in zip(rotations, positions, strict=True)]
     )
     errors = 0.02 * source.standard_normal(exact.shape)
     observations = Observations(

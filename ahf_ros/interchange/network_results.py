@@ -6,17 +6,20 @@ import io
 import json
 import math
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ahf_ros.interchange.files import csv_table, read_bytes, read_text, write_whole
 from ahf_ros.interchange.target_json import parsed_json
-from ahf_ros.orientation.coordinates import Coordinates
+from ahf_ros.orientation.camera import PARAMETERS
 from ahf_ros.orientation.network import FloatArray, IntArray, Rejection
+from ahf_ros.orientation.points import MeasuredPoints
 from ahf_ros.orientation.solution import Solution
 from ahf_ros.text import shown
 
@@ -26,11 +29,6 @@ COVARIANCE_FILE = 'covariance_of_points.npz'
 
 DISTORTION = ('k1', 'k2', 'k3', 'p1', 'p2', 'shear')
 """Parameters of a lens in network.json; its affinity is that of fx to fy."""
-
-PARAMETERS = ('f', 'cx', 'cy', 'k1', 'k2', 'k3', 'p1', 'p2', 'affinity', 'shear')
-"""Order of the covariance of a camera, and of `OrientedNetwork.calibrations`."""
-
-_ASYMMETRY = 1e-6  # of a covariance, as a share of the product of two standard deviations
 
 
 @dataclass(frozen=True)
@@ -43,12 +41,13 @@ class CameraSize:
 
 
 @dataclass(frozen=True)
-class OrientedNetwork(Coordinates):
-    """What `read_network` reads: coordinates, and the cameras and photographs that gave them.
+class OrientedNetwork:
+    """What `read_network` reads: measured points, and the cameras and photographs behind them.
 
     Arrays are as those of `ahf_ros.orientation.solution.Solution`, of oriented photographs only.
     """
 
+    points: MeasuredPoints
     rays: IntArray
     cameras: tuple[CameraSize, ...]
     calibrations: FloatArray
@@ -62,20 +61,31 @@ class OrientedNetwork(Coordinates):
     warnings: tuple[str, ...]
 
 
+def measured_points(solution: Solution) -> MeasuredPoints:
+    """Return the targets that an adjusted network determines, with their covariance."""
+    known = np.flatnonzero(np.isfinite(solution.start.points).all(axis=1))
+    rows = (3 * known[:, None] + np.arange(3)).ravel()
+    return MeasuredPoints(
+        names=tuple(solution.network.targets[index] for index in known),
+        xyz=solution.start.points[known],
+        covariance=solution.covariance_of_points[np.ix_(rows, rows)],
+        sigma0=float(solution.sigma0),
+        redundancy=int(solution.redundancy),
+        unit=solution.network.unit,
+    )
+
+
 def network_files(solution: Solution) -> dict[str, bytes]:
     """Return network.json, points.csv and the covariance of all points, by the names of the files.
 
     Photographs and targets that could not be determined are left out, and named in the warnings.
     """
     network, values = solution.network, solution.start
-    known = np.flatnonzero(np.isfinite(values.points).all(axis=1))
-    names = [network.targets[index] for index in known]
-    rows = (3 * known[:, None] + np.arange(3)).ravel()
-    covariance = solution.covariance_of_points[np.ix_(rows, rows)]
-    rays = rays_of(solution)[known]
+    known = np.isfinite(values.points).all(axis=1)
+    points, rays = measured_points(solution), rays_of(solution)[known]
     record = {
-        'sigma0': float(solution.sigma0),
-        'redundancy': int(solution.redundancy),
+        'sigma0': points.sigma0,
+        'redundancy': points.redundancy,
         'unit': network.unit,
         'cameras': _cameras(solution),
         'images': [
@@ -90,7 +100,7 @@ def network_files(solution: Solution) -> dict[str, bytes]:
         ],
         'points': [
             {'id': name, **dict(zip('xyz', point, strict=True)), 'rays': int(number)}
-            for name, point, number in zip(names, values.points[known].tolist(), rays, strict=True)
+            for name, point, number in zip(points.names, points.xyz.tolist(), rays, strict=True)
         ],
         'covariance_of_points': COVARIANCE_FILE,
         'rejected': [
@@ -106,8 +116,8 @@ def network_files(solution: Solution) -> dict[str, bytes]:
     }
     return {
         NETWORK_FILE: json.dumps(record, indent=1, allow_nan=False).encode() + b'\n',
-        POINTS_FILE: _points_table(names, values.points[known], covariance, rays),
-        COVARIANCE_FILE: _archive({'ids': np.array(names, str), 'covariance': covariance}),
+        POINTS_FILE: _points_table(points, rays),
+        COVARIANCE_FILE: _archive(points),
     }
 
 
@@ -119,9 +129,9 @@ def write_network(folder: str | Path, solution: Solution) -> tuple[Path, ...]:
     return tuple(Path(folder) / name for name in files)
 
 
-def oriented(solution: Solution) -> np.ndarray:
+def oriented(solution: Solution) -> NDArray[np.bool_]:
     """Return which photographs have a pose, bool of shape (photographs,)."""
-    finite: np.ndarray = np.isfinite(solution.start.positions).all(axis=1)
+    finite: NDArray[np.bool_] = np.isfinite(solution.start.positions).all(axis=1)
     return finite
 
 
@@ -173,25 +183,24 @@ def _left_out(solution: Solution) -> list[str]:
     ]
 
 
-def _points_table(
-    names: Sequence[str], points: FloatArray, covariance: FloatArray, rays: IntArray
-) -> bytes:
+def _points_table(points: MeasuredPoints, rays: IntArray) -> bytes:
     """Return coordinates, their standard deviations, rays and covariances of each point."""
     sides = [('x', 'y'), ('x', 'z'), ('y', 'z')]
     header = ['id', 'x', 'y', 'z', 'sigma_x', 'sigma_y', 'sigma_z', 'rays']
     table: list[Sequence[object]] = [[*header, *(f'covariance_{a}{b}' for a, b in sides)]]
-    for index, name in enumerate(names):
-        block = covariance[3 * index : 3 * index + 3, 3 * index : 3 * index + 3]
+    for index, name in enumerate(points.names):
+        block = points.covariance[3 * index : 3 * index + 3, 3 * index : 3 * index + 3]
         sigma = np.sqrt(np.maximum(np.diag(block), 0))
         mixed = [f'{block["xyz".index(a), "xyz".index(b)]:.9g}' for a, b in sides]
-        place = [f'{value:.12g}' for value in points[index]]
+        place = [f'{value:.12g}' for value in points.xyz[index]]
         table.append([name, *place, *(f'{it:.9g}' for it in sigma), int(rays[index]), *mixed])
     return csv_table(table)
 
 
-def _archive(arrays: Mapping[str, np.ndarray]) -> bytes:
+def _archive(points: MeasuredPoints) -> bytes:
+    """Return an npz of the IDs and the covariance, in whose order of x, y and z they are."""
     file = io.BytesIO()
-    np.savez_compressed(file, **arrays)
+    np.savez_compressed(file, ids=np.array(points.names, str), covariance=points.covariance)
     return file.getvalue()
 
 
@@ -205,21 +214,23 @@ def read_network(folder: str | Path) -> OrientedNetwork:
     record = _Record(content, str(path))
     points = record.rows('points')
     names = tuple(it.text('id') for it in points)
-    if len(set(names)) < len(names):
-        raise ValueError(f'{path}: points has an id twice, accepted is one point an id')
+    if twice := [name for name, number in Counter(names).items() if number > 1]:
+        raise ValueError(f'{path}: points have {twice[0]!r} twice, accepted is one point an id')
     cameras = record.rows('cameras')
     images = record.rows('images')
     numbers = {it.text('name'): index for index, it in enumerate(cameras)}
     for it in images:
         if it.text('camera') not in numbers:
             raise ValueError(f'{it.where}: camera is {shown(it.text("camera"))}, not in cameras')
+    xyz = _stacked([[it.number(axis) for axis in 'xyz'] for it in points], (3,))
+    covariance = _covariance_of(path.parent / record.text('covariance_of_points'), names)
+    sigma0, redundancy = record.number('sigma0'), int(record.number('redundancy'))
+    try:
+        measured = MeasuredPoints(names, xyz, covariance, sigma0, redundancy, record.text('unit'))
+    except ValueError as error:
+        raise ValueError(f'{path}: {error}') from error
     return OrientedNetwork(
-        names=names,
-        points=_stacked([[it.number(axis) for axis in 'xyz'] for it in points], (3,)),
-        covariance=_covariance_of(path.parent / record.text('covariance_of_points'), names),
-        sigma0=record.number('sigma0'),
-        redundancy=int(record.number('redundancy')),
-        unit=record.text('unit'),
+        points=measured,
         rays=np.array([int(it.number('rays')) for it in points], np.int64),
         cameras=tuple(
             CameraSize(it.text('name'), int(it.number('width')), int(it.number('height')))
@@ -278,10 +289,6 @@ def _covariance_of(path: Path, names: tuple[str, ...]) -> FloatArray:
             f'{path} is of {len(ids)} points and has the shape {covariance.shape}, accepted is '
             f'the covariance of the {len(names)} points of {NETWORK_FILE}'
         )
-    deviations = np.sqrt(np.maximum(np.diag(covariance), 0))
-    limits = _ASYMMETRY * np.multiply.outer(deviations, deviations)
-    if not (np.abs(covariance - covariance.T) <= limits).all():  # also where it is not finite
-        raise ValueError(f'{path} is no covariance, accepted is a symmetric matrix of numbers')
     place = {str(name): index for index, name in enumerate(ids)}
     rows = np.array([3 * place[name] + axis for name in names for axis in range(3)], int)
     ordered: FloatArray = covariance[np.ix_(rows, rows)]
