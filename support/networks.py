@@ -1,0 +1,68 @@
+"""A small network whose coordinates, poses and observations are known without any error."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ahf_ros.orientation.camera import project
+from ahf_ros.orientation.network import CameraView, Network, Observations
+from ahf_ros.orientation.solution import Solution, Start
+
+CALIBRATION = np.array([1500.0, 803.0, 596.0, -0.08, 0.02, 0.001, 2e-4, -1e-4, 1e-4, 2e-5])
+SIZE = 1600, 1200
+
+
+def looking(position: np.ndarray, roll: float) -> np.ndarray:
+    """Return the rotation of a camera that looks at the origin, rolled about its axis, rad."""
+    forward = -position / np.linalg.norm(position)
+    right = np.cross(forward, (0.0, 0.0, 1.0))
+    right /= np.linalg.norm(right)
+    upright = np.array([right, np.cross(forward, right), forward])
+    turn = np.array([[np.cos(roll), np.sin(roll), 0], [-np.sin(roll), np.cos(roll), 0], [0, 0, 1]])
+    return np.asarray(turn @ upright)
+
+
+def solution(photographs: int = 6, targets: int = 12, unit: str = 'mm') -> Solution:
+    """Return an adjusted network of targets in a volume of 600 x 400 x 200, all of them seen.
+
+    Its covariances are those of a Gauss-Markov model with made-up derivatives: right in form.
+    """
+    source = np.random.default_rng(7)
+    points = source.uniform(-1, 1, (targets, 3)) * (300, 200, 100)
+    angles = np.linspace(0.0, 1.6, photographs)
+    positions = 1400 * np.column_stack((np.cos(angles), np.sin(angles), 0.4 + 0.1 * angles))
+    rolls = [0.0, np.pi / 2] * photographs
+    rotations = np.array([looking(at, rolls[i]) for i, at in enumerate(positions)])
+    photograph, point = (it.ravel() for it in np.indices((photographs, targets)))
+    exact = np.concatenate(
+        [project(CALIBRATION, *pose, points) for pose in zip(rotations, positions, strict=True)]
+    )
+    errors = 0.02 * source.standard_normal(exact.shape)
+    observations = Observations(
+        photograph, point, exact + errors, np.tile(0.02**2 * np.eye(2), (len(exact), 1, 1))
+    )
+    network = Network(
+        photographs=tuple(f'view_{index}.jpg' for index in range(photographs)),
+        camera_of=np.zeros(photographs, np.int64),
+        cameras=(CameraView('camera', *SIZE),),
+        targets=tuple(str(number) for number in range(1, targets + 1)),
+        observations=observations,
+        unit=unit,
+    )
+    start = Start(CALIBRATION[None], rotations, positions, points, np.ones(len(exact), np.bool_))
+    rows = 0.01 * source.standard_normal((3 * targets, 3 * targets))
+    sigmas = np.array([0.3, 0.2, 0.2, 1e-4, 1e-4, 1e-4, 1e-6, 1e-6, 0, 0])
+    return Solution(
+        network=network,
+        start=start,
+        residuals=errors,
+        normalised=np.hypot(*errors.T) / 0.02,
+        camera_covariances=(np.diag(sigmas**2),),
+        released=(('f', 'cx', 'cy', 'k1', 'k2', 'k3', 'p1', 'p2'),),
+        pose_covariances=np.tile(np.diag([4e-4] * 3 + [1e-8] * 3), (photographs, 1, 1)),
+        covariance_of_points=rows @ rows.T / len(rows),
+        sigma0=0.98,
+        redundancy=2 * len(exact) - 6 * photographs - 3 * targets - 8 + 7,
+        rejected=(),
+        warnings=(),
+    )
