@@ -7,12 +7,13 @@ and radial distortion unknown, inner constraints, and a scale bar where the scal
 coordinates are those of the linearised adjustment, with all correlations and with the variance of
 unit weight of its own residuals, in a frame of its own.
 
-A movement of 5 sigma is that of one target, any, in any direction e, by 5 sqrt(e' C e), with C the
-covariance of the movement against all other targets that `compare` reports. *Found* are movements
-that make the epochs incongruent, *located* those whose target is the first that is named, *alone*
-those where no other one is. *Bound* is the power of one F-test of the right target at the same
-level with Bonferroni's correction. *Quarter* moves a quarter of the targets together by 10 sigma
-of each, and counts where all of these are named and no other one is.
+A movement of 5 sigma is that of one target, any, in any direction e, by 5 sqrt(e' C e). C is the
+covariance of its difference x2 - x1 in the datum of all targets, or, *conditional*, of the
+movement against all others that `compare` reports, its best estimate and no larger. *Found* are
+movements that make the epochs incongruent, *located* those whose target is the first that is
+named, *alone* those where no other one is. *Bound* is the power of one F-test of the right target
+at the same level with Bonferroni's correction. *Quarter* moves a quarter of the targets together
+by 10 of the largest conditional sigmas, and counts where these and no others are named.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ import numpy as np
 
 from ahf_ros.orientation.camera import PARAMETERS, linearise, pinhole, rotation_matrices
 from ahf_ros.orientation.congruence import LEVEL, compare
-from ahf_ros.orientation.datum import movements
+from ahf_ros.orientation.datum import movements, s_transform
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.points import MeasuredPoints
 from benchmarks.report import Report, about, about_text, parsed, parser, progress, publish, table
@@ -38,6 +39,7 @@ NOISE = 0.05
 """Standard deviation of image points, px."""
 BAR_SIGMA = 2e-5
 """Standard deviation of a scale bar, as a share of its length."""
+_OUTCOMES = 'found', 'located', 'alone', 'bound'
 _FREE = [PARAMETERS.index(name) for name in ('f', 'k1')]
 
 
@@ -163,18 +165,29 @@ def figures(field: Field, bar: bool, runs: int, rng: np.random.Generator) -> dic
         for it in epochs
     ]
     covariances = np.array([it.covariance for it in compare(*exact).movements])
+    together = sum(
+        s_transform(xyz, it.covariance, np.ones(len(xyz)), scale=not bar)[1] for it in epochs
+    )
+    each = np.arange(len(xyz))
+    differences = together.reshape(len(xyz), 3, len(xyz), 3)[each, :, each]
     degrees = sum(it.redundancy for it in epochs)
     critical = f.isf(LEVEL * 0.8 / field.targets, 3, degrees)
-    hits, bounds, quarters = [], [], []
-    for _ in range(runs // 4):
-        target, movement = int(rng.integers(field.targets)), still.copy()
-        movement[target] = _movement(covariances[target], SIGMAS, rng)
-        noncentral = movement[target] @ np.linalg.solve(covariances[target], movement[target])
-        bounds.append(ncf.sf(critical, 3, degrees, noncentral))
-        found = compare(epochs[0].measured(still, rng), epochs[1].measured(movement, rng))
-        first = found.moved[:1] == (f'{target}',)
-        hits.append((not found.congruent, first, first and len(found.moved) == 1))
-
+    shares = {}
+    for kind, sigmas in (('', differences), ('conditional_', covariances)):
+        hits, bounds = [], []
+        for _ in range(runs // 4):
+            target, movement = int(rng.integers(field.targets)), still.copy()
+            movement[target] = _movement(sigmas[target], SIGMAS, rng)
+            strength = movement[target] @ np.linalg.solve(covariances[target], movement[target])
+            bounds.append(ncf.sf(critical, 3, degrees, strength))
+            found = compare(epochs[0].measured(still, rng), epochs[1].measured(movement, rng))
+            first = found.moved[:1] == (f'{target}',)
+            hits.append((not found.congruent, first, first and len(found.moved) == 1))
+        outcomes = dict(zip(_OUTCOMES[:3], np.mean(hits, axis=0), strict=True))
+        outcomes['bound'] = np.mean(bounds)
+        shares |= {f'{kind}{name}': float(value) for name, value in outcomes.items()}
+    quarters = []
+    for _ in range(runs // 20):
         several = rng.permutation(field.targets)[: max(field.targets // 4, 2)]
         direction = rng.standard_normal(3)
         sigma = np.sqrt(np.linalg.eigvalsh(covariances[several])[:, -1].max())
@@ -190,8 +203,7 @@ def figures(field: Field, bar: bool, runs: int, rng: np.random.Generator) -> dic
         'redundancy': degrees,
         'false_alarms': float(np.mean(alarms)),
         'false_alarms_of_sum': float(np.mean(by_sum)),
-        **dict(zip(('found', 'located', 'alone'), np.mean(hits, axis=0).tolist(), strict=True)),
-        'bound': float(np.mean(bounds)),
+        **shares,
         'quarter': float(np.mean(quarters)),
     }
 
@@ -210,14 +222,15 @@ def _movement(covariance: FloatArray, sigmas: float, rng: np.random.Generator) -
 
 def page(report: Report) -> str:
     """Return the table in Markdown."""
-    shares = 'false_alarms', 'false_alarms_of_sum', 'found', 'located', 'alone', 'bound', 'quarter'
+    kinds = [f'{kind}{name}' for kind in ('', 'conditional_') for name in _OUTCOMES]
+    shares = ['false_alarms', 'false_alarms_of_sum', *kinds, 'quarter']
     head = 'field', 'targets', 'photographs', 'scale', 'redundancy'
     rows = [
         [*(row[name] for name in head), *(f'{100 * row[name]:.1f}' for name in shares)]
         for row in report['rows']
     ]
-    titles = 'false alarms %', 'of T alone %', 'found %', 'located %', 'alone %', 'bound %'
-    lines = table([*head, *titles, 'quarter %'], rows)
+    titles = [f'{name.replace("_", " ")} %' for name in shares]
+    lines = table([*head, *titles], rows)
     return '\n'.join([*lines, '', f'{report["runs"]} runs a row. {about_text(report)}'])
 
 

@@ -8,7 +8,8 @@ Q = Q1 + Q2 and the pooled variance of unit weight s2 of f = f1 + f2 degrees of 
 
 where nothing moved [1]_. P depends on no datum. With u = P d, a target i that leaves the datum
 takes the share r_i = u_i' P_ii^-1 u_i of d' P d with it. Its movement against the others is
-P_ii^-1 u_i with the cofactors P_ii^-1, and r_i / (3 s2) ~ F(3, f) tests it alone [2]_.
+P_ii^-1 u_i with the cofactors P_ii^-1, and r_i / (3 s2) ~ F(3, f) tests it alone [2]_. That is
+its best estimate if the others stood still, and the same for targets that are out of the datum.
 
 T sees many small movements and loses that of a single target among many: of 40 targets, one that
 moves by 5 standard deviations is seen in 4 of 10 cases. The tests of single targets, with
@@ -365,7 +366,13 @@ def _tested(epochs: _Epochs, datum: NDArray[np.bool_]) -> _State:
     pulls = (weights @ difference[datum].ravel()).reshape(-1, 3)
     inverse = np.empty((len(first), 3, 3))
     inverse[datum] = _blocks(weights)
-    covariances = _blocks(covariance)
+    # What the movements of the datum, which are errors, say of those of the other targets.
+    gain = covariance[np.ix_(~rows, rows)] @ weights
+    difference[~datum] -= (gain @ difference[datum].ravel()).reshape(-1, 3)
+    covariances = np.empty_like(inverse)
+    covariances[~datum] = _blocks(
+        covariance[np.ix_(~rows, ~rows)] - gain @ covariance[np.ix_(rows, ~rows)]
+    )
     covariances[datum] = np.linalg.pinv(inverse[datum], _SINGULAR, hermitian=True)
     inverse[~datum] = np.linalg.pinv(covariances[~datum], _SINGULAR, hermitian=True)
     difference[datum] = np.einsum('nij,nj->ni', covariances[datum], pulls)
