@@ -131,8 +131,7 @@ def write_network(folder: str | Path, solution: Solution) -> tuple[Path, ...]:
 
 def oriented(solution: Solution) -> NDArray[np.bool_]:
     """Return which photographs have a pose, bool of shape (photographs,)."""
-    finite: NDArray[np.bool_] = np.isfinite(solution.start.positions).all(axis=1)
-    return finite
+    return np.asarray(np.isfinite(solution.start.positions).all(axis=1))
 
 
 def rays_of(solution: Solution) -> IntArray:
