@@ -38,16 +38,18 @@ class Exif:
     pixels: float | None = None
 
 
-def read_exif(path: str | Path, width: int, height: int) -> Exif:
-    """Return the Exif data of an image of this size, empty where there are none.
+def read_exif(path: str | Path) -> tuple[Exif, tuple[int, int]]:
+    """Return the Exif data of an image file, empty where there are none, and width and height.
 
-    A ValueError names a file that cannot be read.
+    These are 0 px where the format is not known. A ValueError names a file that cannot be read.
     """
-    content = read_bytes(path) if is_url(str(path)) else _beginning(Path(path))
-    fields = exif_fields(read_header(content).exif)
+    header = read_header(read_bytes(path) if is_url(str(path)) else _beginning(Path(path)))
+    size = header.width, header.height
+    fields = exif_fields(header.exif)
     length = fields.get(_FOCAL_LENGTH, 0.0)
     name = f'{fields.get(_MAKE, "")} {fields.get(_MODEL, "")}'.strip()
-    return Exif(name, fields.get(_SERIAL_NUMBER, ''), length, _pixels(fields, width, height))
+    pixels = _pixels(fields, *size) if all(size) else None
+    return Exif(name, fields.get(_SERIAL_NUMBER, ''), length, pixels), size
 
 
 def equivalent_in_px(millimetres: float, width: int, height: int) -> float:

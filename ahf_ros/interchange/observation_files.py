@@ -53,10 +53,8 @@ class ObservedPhotograph:
     upright: bool = False
 
 
-def read_observations(
-    path: str | Path, origin: float = 0.0
-) -> tuple[tuple[ObservedPhotograph, ...], str]:
-    """Return the photographs in a file with their image points, and the file's format.
+def read_observations(path: str | Path, origin: float = 0.0) -> tuple[ObservedPhotograph, ...]:
+    """Return the photographs in a file with their image points.
 
     A file that ends with .csv is a table with the columns image, id, x and y; width and height,
     family, and sigma (px), sigma_x and sigma_y, or variance_x, covariance_xy and variance_y may be
@@ -66,10 +64,8 @@ def read_observations(
     """
     if str(path).lower().endswith('.csv'):
         photographs = _of_table(path, origin)
-        kind = 'csv'
     else:
         photographs = [_of_record(content, where) for where, content in json_lines(path)]
-        kind = 'json'
     seen: set[str] = set()
     for photograph in photographs:
         if photograph.path in seen:
@@ -79,7 +75,7 @@ def read_observations(
         raise ValueError(
             f'{path} has no identified target, accepted are photographs that show some'
         )
-    return tuple(photographs), kind
+    return tuple(photographs)
 
 
 def _of_record(content: Any, where: str) -> ObservedPhotograph:

@@ -44,7 +44,7 @@ def saved(path: Path, *records: Mapping[str, Any] | str) -> Path:
 
 
 def read(path: Path, *records: Mapping[str, Any] | str) -> tuple[ObservedPhotograph, ...]:
-    return read_observations(saved(path, *records))[0]
+    return read_observations(saved(path, *records))
 
 
 @pytest.fixture()
@@ -143,7 +143,7 @@ def test_tables_of_other_programs_are_read(
     for separator in ',;':
         lines = f'image,id,x,y,{columns},width,height', f'a.tif,P7,5.5,6.5,{values},800,600'
         path = table(tmp_path, *(line.replace(',', separator) for line in lines))
-        (photograph,) = read_observations(path, origin=0.5)[0]
+        (photograph,) = read_observations(path, origin=0.5)
         (point,) = photograph.points
         assert (photograph.path, photograph.width, photograph.height) == ('a.tif', 800, 600)
         assert (point.name, point.xy) == ('P7', (5.0, 6.0))
@@ -177,7 +177,7 @@ def test_bad_tables_are_refused(tmp_path: Path, lines: list[str], message: str) 
 
 
 def test_a_photograph_of_unknown_size_is_refused(tmp_path: Path) -> None:
-    found = read_observations(table(tmp_path, 'image,id,x,y', 'a.tif,1,2,3'))[0]
+    found = read_observations(table(tmp_path, 'image,id,x,y', 'a.tif,1,2,3'))
     with pytest.raises(ValueError, match=r'the size of a\.tif is not known'):
         make_network(found, NOTHING)
     known = replace(NOTHING, sizes={'a.tif': (800, 600)})
@@ -321,13 +321,14 @@ def photograph(path: Path, exif: bytes) -> Path:
 
 
 def test_a_photograph_says_its_camera_and_focal_length(tmp_path: Path) -> None:
-    found = read_exif(photograph(tmp_path / 'a.jpg', exif_block(36)), 80, 60)
+    found, size = read_exif(photograph(tmp_path / 'a.jpg', exif_block(36)))
+    assert size == (80, 60)
     assert (found.camera, found.focal_length) == ('Maker M1', 24.0)
     assert found.pixels == pytest.approx(36 / np.hypot(36, 24) * 100)
-    assert read_exif(photograph(tmp_path / 'b.jpg', exif_block(0)), 80, 60).pixels is None
-    assert read_exif(photograph(tmp_path / 'c.jpg', exif_block(36)[:50]), 80, 60).pixels is None
+    assert read_exif(photograph(tmp_path / 'b.jpg', exif_block(0)))[0].pixels is None
+    assert read_exif(photograph(tmp_path / 'c.jpg', exif_block(36)[:50]))[0].pixels is None
     with pytest.raises(ValueError, match='cannot be read'):
-        read_exif(tmp_path / 'gone.jpg', 80, 60)
+        read_exif(tmp_path / 'gone.jpg')
 
 
 def known_network(results: Path, **known: Any) -> tuple[Network, list[str]]:
