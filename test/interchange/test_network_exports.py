@@ -94,7 +94,7 @@ def test_pycolmap_reads_the_model(tmp_path: Path) -> None:
         assert point.track.length() == 6
     for index, image in model.images.items():
         centre = image.projection_center()
-        np.testing.assert_allclose(centre, wanted.start.positions[index - 1], rtol=1e-9)
+        np.testing.assert_allclose(centre, wanted.start.positions[index - 1], atol=1e-9)
         for seen in image.points2D:
             shown = image.project_point(model.points3D[seen.point3D_id].xyz)
             np.testing.assert_allclose(shown, seen.xy, atol=1e-5)

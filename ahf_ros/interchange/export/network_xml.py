@@ -1,8 +1,8 @@
 """Adjusted networks as XML: cameras and markers of Metashape, orientation of MMVII.
 
 Metashape has (0, 0) at the corner of the first pixel, so that 0.5 is added; MMVII has it at the
-centre. Both have our model of the lens with p1 and p2 exchanged; MMVII applies affinity and shear before
-the distortion, which makes a difference of their product.
+centre. Both have our model of the lens with p1 and p2 exchanged; MMVII applies affinity and shear
+before the distortion, which makes a difference of their product.
 """
 
 from __future__ import annotations
