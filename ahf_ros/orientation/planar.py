@@ -5,10 +5,13 @@ Collins and Bartoli (2014), Infinitesimal Plane-based Pose Estimation.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 
 from ahf_ros.orientation.network import FloatArray
+from ahf_ros.orientation.solution import Start
 
 FLAT = 0.02
 """Points are a plane where their spread across it is less than this share of that along it."""
@@ -56,19 +59,22 @@ def planar_poses(points: FloatArray, xy: FloatArray) -> list[tuple[FloatArray, F
     return poses
 
 
-def mirrored(
-    points: FloatArray, rotations: FloatArray, positions: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def mirrored(start: Start) -> Start:
     """Return the network that looks the same where perspective is weak (Necker's reversal).
 
-    Points (n, 3) are mirrored at their own mean plane. Each camera sees them under the same first
-    two axes, mirrored: a plane stays as it is and gets each camera's other planar pose.
+    Points are mirrored at their mean plane. Each camera sees them under the same first two axes,
+    mirrored: a plane stays as it is, and all cameras get their other planar pose.
     """
+    points = start.points[np.isfinite(start.points[:, 0])]
     _, axes = principal_axes(points)
     mirror = np.eye(3) - 2 * np.outer(axes[2], axes[2])
     centre = points.mean(axis=0)
-    depth_axis = np.diag([1.0, 1.0, -1.0])
-    turned = depth_axis @ rotations @ mirror
-    seen = np.einsum('kij,kj->ki', rotations, centre - positions)
-    shifted = centre - np.einsum('kji,kj->ki', turned, seen)
-    return centre + (points - centre) @ mirror, turned, shifted
+    rotations = np.diag([1.0, 1.0, -1.0]) @ start.rotations @ mirror
+    seen = np.einsum('kij,kj->ki', start.rotations, centre - start.positions)
+    positions = centre - np.einsum('kji,kj->ki', rotations, seen)
+    return replace(
+        start,
+        points=centre + (start.points - centre) @ mirror,
+        rotations=rotations,
+        positions=positions,
+    )

@@ -26,7 +26,8 @@ BOUND = 3.5
 class RelativeOrientation:
     """The pose of the second photograph in the frame of the first, with a base of length one.
 
-    `criterion` is GRIC, the smaller the better; `angle` the median angle in rad of the rays.
+    `criterion` is GRIC, the smaller the better; `angle` the median angle in rad of the rays,
+    `scale` the robust standard deviation of the errors, normalised.
     """
 
     rotation: FloatArray
@@ -34,6 +35,7 @@ class RelativeOrientation:
     agrees: NDArray[np.bool_]
     criterion: float
     angle: float
+    scale: float
 
 
 def relative_orientations(
@@ -211,4 +213,4 @@ def _rated(
     own = _least_median_scale(residuals, parameters, scale)
     agrees = (np.abs(residuals) <= BOUND * own) & _before_both(rotation, shift, first, second)
     angle = float(np.median(angles[agrees])) if agrees.any() else 0.0
-    return RelativeOrientation(rotation, -rotation.T @ shift, agrees, float(criterion), angle)
+    return RelativeOrientation(rotation, -rotation.T @ shift, agrees, float(criterion), angle, own)
