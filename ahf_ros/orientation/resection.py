@@ -18,6 +18,9 @@ FEWEST_POINTS = 5
 SAMPLES = 60
 """Triples that are tried: of 60, one is free of wrong IDs with certainty while half are right."""
 
+MOST_STARTS = 4
+"""Poses of samples that are improved, the best that differ by more than 8 degrees."""
+
 BOUND = 4.0
 """Standard deviations beyond which a point does not agree."""
 
@@ -48,26 +51,21 @@ def resections(points: FloatArray, xy: FloatArray, sigma: FloatArray) -> list[Re
     """
     if len(points) < FEWEST_POINTS:
         return []
-    candidates = list(_sampled(points, xy))
-    if is_flat(points):
-        candidates += planar_poses(points, xy)
+    planar = planar_poses(points, xy) if is_flat(points) else []
+    candidates = [*_sampled(points, xy), *planar]
     if not candidates:
         return []
-    rotations = np.array([rotation for rotation, _ in candidates])
-    positions = np.array([position for _, position in candidates])
+    rotations, positions = (np.array(part) for part in zip(*candidates, strict=True))
     ratio = _errors(rotations, positions, points, xy) / sigma
     enough = _half(len(points))
     scores = np.partition(ratio, enough - 1, axis=1)[:, enough - 1]
-    found: list[Resection] = []
-    for index in np.argsort(scores, kind='stable'):
-        if scores[index] > 10 * scores.min() + 30 or len(found) == 3:
-            break
-        rotation, position = rotations[index], positions[index]
-        if any(_alike(rotation, position, other, points) for other in found):
-            continue
-        pose = _weighted(rotation, position, points, xy, sigma)
-        if pose is not None and not any(_alike(*pose, other, points) for other in found):
-            found.append(_rated(*pose, points, xy, sigma))
+    ordered = (candidates[index] for index in np.argsort(scores, kind='stable'))
+    improved: list[Pose] = []
+    for pose in [*_distinct(ordered, points, 0.15, MOST_STARTS), *planar]:
+        better = _weighted(*pose, points, xy, sigma)
+        improved += [better] if better is not None else []
+    poses = _distinct(improved, points, 0.02, len(improved))
+    found = [_rated(*pose, points, xy, sigma) for pose in poses]
     if not found:
         return []
     scale = max(min(one.scale for one in found), 1.0)
@@ -104,14 +102,22 @@ def _errors(
     return np.where(seen[..., 2] > 0, distance, np.inf)
 
 
-def _alike(
-    rotation: FloatArray, position: FloatArray, other: Resection, points: FloatArray
-) -> bool:
-    """Return whether two poses are one minimum: within 2 degrees and 2 % of the distance."""
-    distance = np.linalg.norm(points.mean(axis=0) - other.position)
-    moved = np.linalg.norm(position - other.position)
-    turned = np.arccos(np.clip((np.trace(rotation @ other.rotation.T) - 1) / 2, -1, 1))
-    return bool(moved < 0.02 * distance and turned < np.radians(2))
+def _distinct(poses: Iterable[Pose], points: FloatArray, least: float, most: int) -> list[Pose]:
+    """Return the first poses that differ by `least`, in rad or as a share of the distance."""
+    kept: list[Pose] = []
+    centre = points.mean(axis=0)
+    for rotation, position in poses:
+        if len(kept) == most:
+            break
+        distance = np.linalg.norm(centre - position)
+        for other, place in kept:
+            cosine = (np.sum(rotation * other) - 1) / 2
+            near = np.linalg.norm(position - place) < least * distance
+            if near and cosine > np.cos(least):
+                break
+        else:
+            kept.append((rotation, position))
+    return kept
 
 
 def _weighted(
@@ -122,46 +128,42 @@ def _weighted(
     sigma: FloatArray,
 ) -> Pose | None:
     """Return the pose after weighted Gauss-Newton steps with Cauchy's weights, None if it fails."""
-    damping, before = 1e-6, np.inf
-    best: Pose = rotation, position
+    before = np.inf
     for _ in range(25):
         seen = (points - position) @ rotation.T
         if np.any(seen[:, 2] <= 0) and np.sum(seen[:, 2] > 0) < _half(len(points)):
             return None
-        depth = np.where(seen[:, 2:] > 0, seen[:, 2:], np.nan)
-        image = seen[:, :2] / depth
-        rest = np.nan_to_num((xy - image) / sigma[:, None], nan=0.0)
-        scale = max(1.0, 1.5 * float(np.median(np.linalg.norm(rest, axis=1))))
-        squared = np.sum(rest**2, axis=1) / (3 * scale) ** 2
-        weight = np.where(np.isnan(depth[:, 0]), 0, 1 / np.sqrt(1 + squared))
-        ray = np.stack(
-            [
-                np.stack([1 / depth[:, 0], 0 * depth[:, 0], -image[:, 0] / depth[:, 0]], axis=1),
-                np.stack([0 * depth[:, 0], 1 / depth[:, 0], -image[:, 1] / depth[:, 0]], axis=1),
-            ],
-            axis=1,
-        )
+        before_camera = seen[:, 2] > 0
+        inverse = 1 / np.where(before_camera, seen[:, 2], np.inf)
+        image = seen[:, :2] * inverse[:, None]
+        rest = np.where(before_camera[:, None], (xy - image) / sigma[:, None], 0)
+        squared = np.sum(rest**2, axis=1)
+        scale = max(1.0, 1.5 * float(np.sqrt(np.median(squared))))
+        squared /= (3 * scale) ** 2
+        weight = before_camera / np.sqrt(1 + squared)
+        ray = np.zeros((len(points), 2, 3))
+        ray[:, 0, 0] = ray[:, 1, 1] = inverse
+        ray[:, :, 2] = -image * inverse[:, None]
         # A small turn w in the camera's frame moves X_camera by w x X_camera.
         turn = np.cross(seen[:, None], ray)
         jacobian = np.concatenate([turn, -ray @ rotation], axis=2) / sigma[:, None, None]
-        jacobian = np.nan_to_num(jacobian * weight[:, None, None]).reshape(-1, 6)
+        jacobian = (jacobian * weight[:, None, None]).reshape(-1, 6)
         normal = jacobian.T @ jacobian
         right = jacobian.T @ (rest * weight[:, None]).ravel()
         cost = float(np.sum(np.log1p(squared)) * scale**2)
-        normal[np.diag_indices(6)] *= 1 + damping
+        normal[np.diag_indices(6)] *= 1 + 1e-6
         try:
             step = np.linalg.solve(normal, right)
         except np.linalg.LinAlgError:
             return None
-        best = rotation, position
         rotation = cv2.Rodrigues(step[:3])[0] @ rotation
         position = position + step[3:]
         if not np.isfinite(position).all():
             return None
-        if abs(before - cost) <= 1e-7 * cost:
+        if abs(before - cost) <= 1e-6 * cost:
             break
         before = cost
-    return (rotation, position) if np.isfinite(position).all() else best
+    return rotation, position
 
 
 def _rated(
