@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 
@@ -23,8 +24,9 @@ from ahf_ros.orientation.views import View, lengths_of, spread_of, views_of
 
 MOST_SEEDS = 5
 
-SINGLY = 50
-"""Up to so many photographs each is followed by an adjustment; then they come in batches."""
+BATCH = 4
+"""One photograph for so many oriented ones, at least one, is added between two adjustments: the
+values stay as good as after each single one, in a quarter of the time."""
 
 LARGEST_FOCAL_SIGMA = 0.03
 """Relative standard deviation beyond which a free focal length is not accepted."""
@@ -64,7 +66,7 @@ def _largest(network: Network, views: Sequence[View], among: Sequence[int]) -> S
     """Return what grows largest of the best seeds, of several equally large ones the best."""
     best: tuple[float, float] | None = None
     result: Start | None = None
-    for seed in seeds(network, views, among)[:MOST_SEEDS]:
+    for seed in islice(seeds(network, views, among), MOST_SEEDS):
         start = _grown(network, views, seed, among)
         if start is None:
             continue
@@ -131,10 +133,7 @@ def _next(
         if number >= FEWEST_POINTS and number > postponed.get(index, 0)
     ]
     able.sort(key=lambda index: (-known[index], index))
-    done = len(oriented(start))
-    if done < SINGLY:
-        return able[:1]
-    return [index for index in able if known[index] >= known[able[0]] // 2][: done // 2]
+    return able[: max(1, len(oriented(start)) // BATCH)]
 
 
 def _pose(

@@ -29,7 +29,8 @@ STEPS = np.geomspace(0.5, 4.0, 14)
 
 FEWEST_COMMON = 6
 MOST_PHOTOGRAPHS = 40
-MOST_TRIPLES = 8
+MOST_TRIPLES = 9
+AT_A_TIME = 3
 
 BOUND = 4.0
 """Standard deviations to which a residual counts."""
@@ -70,13 +71,19 @@ def known_calibrations(network: Network) -> FloatArray:
     return rows
 
 
-def seeds(network: Network, views: Sequence[View], among: Sequence[int]) -> list[Seed]:
-    """Return approximate values of triples of the photographs `among`, the best first."""
+def seeds(network: Network, views: Sequence[View], among: Sequence[int]) -> Iterator[Seed]:
+    """Yield approximate values of triples of the photographs `among`.
+
+    Triples come in the order of what their image points promise, a few at a time, and of these
+    the best first.
+    """
     known = known_calibrations(network)
-    found: list[Seed] = []
-    for triple in _triples(views, among, np.isfinite(known[:, 0])):
-        found += _seeds_of(network, views, triple, known)
-    return sorted(found, key=lambda seed: seed.rank)
+    triples = _triples(views, among, np.isfinite(known[:, 0]))
+    for begin in range(0, len(triples), AT_A_TIME):
+        found: list[Seed] = []
+        for triple in triples[begin : begin + AT_A_TIME]:
+            found += _seeds_of(network, views, triple, known)
+        yield from sorted(found, key=lambda seed: seed.rank)
 
 
 def _triples(
