@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ahf_ros.orientation.camera import project
-from ahf_ros.orientation.network import CameraView, Network, Observations
+from ahf_ros.orientation.network import (
+    CameraView,
+    ControlPoint,
+    Network,
+    Observations,
+    ScaleBar,
+)
 from ahf_ros.orientation.solution import Solution, Start
 
 CALIBRATION = np.array([1500.0, 803.0, 596.0, -0.08, 0.02, 0.001, 2e-4, -1e-4, 1e-4, 2e-5])
@@ -20,6 +28,25 @@ def looking(position: np.ndarray, roll: float) -> np.ndarray:
     upright = np.array([right, np.cross(forward, right), forward])
     turn = np.array([[np.cos(roll), np.sin(roll), 0], [-np.sin(roll), np.cos(roll), 0], [0, 0, 1]])
     return np.asarray(turn @ upright)
+
+
+def known(network: Network) -> Network:
+    """Return a network with scale bars and control points, one of each a check."""
+    points = solution().start.points
+    bars = [
+        ScaleBar(
+            (network.targets[a], network.targets[b]),
+            float(np.linalg.norm(points[a] - points[b])) + 0.02,
+            0.05,
+            check,
+        )
+        for a, b, check in ((0, 1, False), (2, 3, True))
+    ]
+    control = [
+        ControlPoint(network.targets[index], points[index] - 0.01, 0.0004 * np.eye(3), check)
+        for index, check in ((4, False), (5, True))
+    ]
+    return replace(network, bars=tuple(bars), control=tuple(control))
 
 
 def solution(photographs: int = 6, targets: int = 12, unit: str = 'mm') -> Solution:

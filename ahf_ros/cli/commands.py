@@ -23,6 +23,10 @@ COMMANDS = {
         'Hand the output of `ahf identify --json` to other photogrammetric software.',
     ),
     'report': ('cli.report', 'Make one page to look at of the output of `ahf identify --json`.'),
+    'orient': (
+        'cli.orient',
+        'Compute coordinates of targets, poses and calibrations from identified targets alone.',
+    ),
     'learn-family': (
         'cli.learn_family',
         'Learn template, positions and numbers of point-distributed targets from a survey.',

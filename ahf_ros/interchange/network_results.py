@@ -13,14 +13,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ahf_ros.interchange.files import csv_table, read_bytes, read_text, write_whole
+from ahf_ros.interchange.network_tables import calibration_files, tables
 from ahf_ros.interchange.target_json import parsed_json
 from ahf_ros.orientation.camera import PARAMETERS
 from ahf_ros.orientation.network import FloatArray, IntArray, Rejection
 from ahf_ros.orientation.points import MeasuredPoints
 from ahf_ros.orientation.solution import Solution
+from ahf_ros.orientation.strength import oriented, rays_of
 from ahf_ros.text import shown
 
 NETWORK_FILE = 'network.json'
@@ -110,7 +111,7 @@ def network_files(solution: Solution) -> dict[str, bytes]:
                 'reason': it.reason,
                 'normalised_residual': it.normalised_residual,
             }
-            for it in solution.rejected
+            for it in rejections(solution)
         ],
         'warnings': [*solution.warnings, *_left_out(solution)],
     }
@@ -121,24 +122,21 @@ def network_files(solution: Solution) -> dict[str, bytes]:
     }
 
 
+def rejections(solution: Solution) -> list[Rejection]:
+    """Return what was set aside from the start, and what the adjustment rejected."""
+    aside = [it for it in solution.network.set_aside if it not in solution.rejected]
+    return [*aside, *solution.rejected]
+
+
 def write_network(folder: str | Path, solution: Solution) -> tuple[Path, ...]:
-    """Write an adjusted network to a folder, each file as a whole, and return the paths."""
-    files = network_files(solution)
+    """Write an adjusted network to a folder, each file as a whole, and return the paths.
+
+    These are `network_files`, and calibrations, poses, residuals and checks.
+    """
+    files = network_files(solution) | calibration_files(solution) | tables(solution)
     for name, content in files.items():
         write_whole(Path(folder) / name, content)
     return tuple(Path(folder) / name for name in files)
-
-
-def oriented(solution: Solution) -> NDArray[np.bool_]:
-    """Return which photographs have a pose, bool of shape (photographs,)."""
-    finite: NDArray[np.bool_] = np.isfinite(solution.start.positions).all(axis=1)
-    return finite
-
-
-def rays_of(solution: Solution) -> IntArray:
-    """Return the number of observations of each target that the adjustment used."""
-    used = solution.network.observations.point[solution.start.used]
-    return np.bincount(used, minlength=len(solution.network.targets)).astype(np.int64)
 
 
 def _cameras(solution: Solution) -> list[dict[str, Any]]:

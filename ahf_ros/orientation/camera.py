@@ -11,8 +11,8 @@ and the image point in px, with (0, 0) at the centre of the first pixel,
 
     u = cx + f ((1 + affinity) x'' + shear y''),   v = cy + f y''.
 
-That is the forward model. Backward, as DBAT, PhotoModeler and Australis have it, the same terms are
-a correction at the measured place (x_m, y_m): (x, y) = (x_m, y_m) + d(x_m, y_m).
+That is the forward model. Backward, as DBAT, PhotoModeler and Australis have it, the same terms
+are a correction at the measured place (x_m, y_m): (x, y) = (x_m, y_m) + d(x_m, y_m).
 
 References
 ----------
@@ -36,7 +36,7 @@ _INVERTED = 1e-12  # largest step of the last one, in focal lengths
 class Linearised(NamedTuple):
     """Image points (n, 2) and their derivatives by calibration, pose and point.
 
-    These are (n, 2, 10), (n, 2, 6) and (n, 2, 3). A pose is changed by its position and by a
+    They are (n, 2, 10), (n, 2, 6) and (n, 2, 3). A pose is changed by its position and by a
     rotation vector in the frame of the camera, R <- exp([r]x) R.
     """
 
@@ -54,25 +54,36 @@ def pinhole(focal_length: float, width: int, height: int) -> FloatArray:
 
 
 def project(
-    calibration: FloatArray, rotation: FloatArray, position: FloatArray, points: FloatArray
+    calibration: FloatArray,
+    rotation: FloatArray,
+    position: FloatArray,
+    points: FloatArray,
+    measured: FloatArray | None = None,
 ) -> FloatArray:
     """Return the images (n, 2) in px of points (n, 3); NaN behind the camera.
 
-    Calibration, rotation and position are one or one a point.
+    Calibration, rotation and position are one or one a point. With measured image points (n, 2),
+    the distortion is the backward one at these places.
     """
+    calibration = np.asarray(calibration, dtype=float)
     seen = _rotated(rotation, points - position)
     with np.errstate(divide='ignore', invalid='ignore'):
         ideal = seen[:, :2] / np.where(seen[:, 2:] > 0, seen[:, 2:], np.nan)
-    calibration = np.asarray(calibration, dtype=float)
-    return _imaged(calibration, ideal + _distortion(calibration, ideal))
+    if measured is None:
+        return _imaged(calibration, ideal + _distortion(calibration, ideal))
+    correction = _distortion(calibration, measured_places(calibration, measured))
+    return _imaged(calibration, ideal - correction)
 
 
-def undistort(calibration: FloatArray, xy: FloatArray) -> FloatArray:
+def undistort(calibration: FloatArray, xy: FloatArray, backward: bool = False) -> FloatArray:
     """Return the places (n, 2) in the plane z = 1 whose images are xy in px, by Newton's method.
 
-    A place that the distortion never reaches is NaN.
+    A place that the distortion never reaches is NaN. Calibrations are one or one a point.
     """
+    calibration = np.asarray(calibration, dtype=float)
     distorted = measured_places(calibration, xy)
+    if backward:
+        return distorted + _distortion(calibration, distorted)
     ideal = distorted.copy()
     step = np.zeros_like(ideal)
     with np.errstate(all='ignore'):

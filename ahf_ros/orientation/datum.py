@@ -14,7 +14,7 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, Optional
+from typing import Literal
 
 import numpy as np
 
@@ -35,7 +35,7 @@ class Datum:
     - None: `control` if there are control points, else `inner`.
     """
 
-    kind: Optional[Literal['inner', 'control', 'fixed']] = None
+    kind: Literal['inner', 'control', 'fixed'] | None = None
     targets: tuple[str, ...] = ()
 
 
