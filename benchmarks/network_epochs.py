@@ -8,9 +8,9 @@ coordinates are those of the linearised adjustment, with all correlations and wi
 unit weight of its own residuals, in a frame of its own.
 
 A movement of 5 sigma is that of one target, any, in any direction e, by 5 sqrt(e' C e). C is the
-covariance of its difference x2 - x1 in the datum of all targets, or, *conditional*, of the
-movement against all others that `compare` reports, its best estimate and no larger. *Found* are
-movements that make the epochs incongruent, *located* those whose target is the first that is
+covariance of its difference x2 - x1 in the datum of all others, or, *conditional*, of the best
+estimate of its movement against them, which `compare` reports and which is smaller: the residuals
+of the others tell a part of its errors. *Found* are movements that make the epochs incongruent, *located* those whose target is the first that is
 named, *alone* those where no other one is. *Bound* is the power of one F-test of the right target
 at the same level with Bonferroni's correction. *Quarter* moves a quarter of the targets together
 by 10 of the largest conditional sigmas, and counts where these and no others are named.
@@ -165,13 +165,9 @@ def figures(field: Field, bar: bool, runs: int, rng: np.random.Generator) -> dic
         for it in epochs
     ]
     covariances = np.array([it.covariance for it in compare(*exact).movements])
-    together = sum(
-        s_transform(xyz, it.covariance, np.ones(len(xyz)), scale=not bar)[1] for it in epochs
-    )
-    each = np.arange(len(xyz))
-    differences = together.reshape(len(xyz), 3, len(xyz), 3)[each, :, each]
+    differences = _differences(xyz, epochs[0].covariance + epochs[1].covariance, bar)
     degrees = sum(it.redundancy for it in epochs)
-    critical = f.isf(LEVEL * 0.8 / field.targets, 3, degrees)
+    critical = f.isf(LEVEL * 0.9 / field.targets, 3, degrees)
     shares = {}
     for kind, sigmas in (('', differences), ('conditional_', covariances)):
         hits, bounds = [], []
@@ -206,6 +202,16 @@ def figures(field: Field, bar: bool, runs: int, rng: np.random.Generator) -> dic
         **shares,
         'quarter': float(np.mean(quarters)),
     }
+
+
+def _differences(xyz: FloatArray, covariance: FloatArray, bar: bool) -> FloatArray:
+    """Return the covariances (n, 3, 3) of differences, each in the datum of all other targets."""
+    differences = []
+    for index in range(len(xyz)):
+        others = np.arange(len(xyz)) != index
+        moved = s_transform(xyz, covariance, others.astype(float), scale=not bar)[1]
+        differences.append(moved[3 * index : 3 * index + 3, 3 * index : 3 * index + 3])
+    return np.array(differences)
 
 
 def names(field: Field) -> tuple[str, ...]:

@@ -27,6 +27,11 @@ COMMANDS = {
         'cli.orient',
         'Compute coordinates of targets, poses and calibrations from identified targets alone.',
     ),
+    'measure': (
+        'cli.measure',
+        'Measure distances, deviations from nominal coordinates and length errors in a network.',
+    ),
+    'compare': ('cli.compare', 'Find the targets that moved between two networks.'),
     'learn-family': (
         'cli.learn_family',
         'Learn template, positions and numbers of point-distributed targets from a survey.',

@@ -79,6 +79,11 @@ def similarity_between(source: FloatArray, target: FloatArray, scale: bool) -> S
     return Similarity(rotation, aim - factor * rotation @ centre, factor)
 
 
+def unaligned(points: MeasuredPoints) -> Alignment:
+    """Return points as they are, in the frame of nominal ones already."""
+    return Alignment(Similarity(np.eye(3), np.zeros(3)), points, ())
+
+
 def best_fit(
     points: MeasuredPoints,
     nominal: Mapping[str, FloatArray],

@@ -13,8 +13,8 @@ its best estimate if the others stood still, and the same for targets that are o
 
 T sees many small movements and loses that of a single target among many: of 40 targets, one that
 moves by 5 standard deviations is seen in 4 of 10 cases. The tests of single targets, with
-Bonferroni's correction, are the other way round. So both are made, at a fifth and at four fifths
-of the level.
+Bonferroni's correction, are the other way round. So both are made, at shares of the level whose
+sum is a little above one, since both often fail together.
 While either fails, the target with the largest share leaves the datum. One that is not significant
 in the datum that remains comes back.
 
@@ -41,8 +41,8 @@ from ahf_ros.text import counted
 LEVEL = 0.05
 """Share of pairs of epochs without movement that a test may take for one with."""
 
-_SHARE = 0.2
-"""Of the level, for the test of all targets together."""
+_TOGETHER, _ALONE = 0.2, 0.9
+"""Of the level, for the test of all targets and for those of single ones; measured together 1.0."""
 
 _MINIMUM = 3  # targets of a datum
 _SINGULAR = 1e-9
@@ -387,14 +387,14 @@ def _tested(epochs: _Epochs, datum: NDArray[np.bool_]) -> _State:
         difference,
         covariances,
         statistics,
-        np.minimum(single * len(first) / (1 - _SHARE), 1.0),
+        np.minimum(single * len(first) / _ALONE, 1.0),
         GlobalTest(
             int(datum.sum()),
             statistic,
             rank,
             epochs.degrees,
             float(_f_probability(rank, epochs.degrees, statistic)),
-            _SHARE * epochs.level,
+            _TOGETHER * epochs.level,
         ),
     )
 

@@ -1,0 +1,34 @@
+"""Tables for people, on standard error, and IDs in options."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+_ROWS = 30
+"""Rows that are shown; files and JSON have all."""
+
+
+def identifiers(text: str) -> tuple[str, ...]:
+    """Return IDs that commas separate, each once."""
+    names = tuple(it.strip() for it in text.split(','))
+    if not all(names) or len(set(names)) < len(names):
+        raise ValueError(f'{text!r} is no list of IDs, accepted is A,B,C with each ID once')
+    return names
+
+
+def print_table(title: str, head: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    """Print a table, numbers to the right; of long ones the first rows."""
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    rows = list(rows)
+    table = Table(title=escape(title), title_justify='left', title_style='bold')
+    for number, name in enumerate(head):
+        table.add_column(escape(name), justify='right' if number else 'left')
+    for row in rows[:_ROWS]:
+        table.add_row(*map(escape, row))
+    if len(rows) > _ROWS:
+        table.add_row(f'and {len(rows) - _ROWS} more', *[''] * (len(head) - 1))
+    console = Console(stderr=True)
+    console.print(table, width=None if console.is_terminal else 120)
