@@ -10,10 +10,11 @@ unit weight of its own residuals, in a frame of its own.
 A movement of 5 sigma is that of one target, any, in any direction e, by 5 sqrt(e' C e). C is the
 covariance of its difference x2 - x1 in the datum of all others, or, *conditional*, of the best
 estimate of its movement against them, which `compare` reports and which is smaller: the residuals
-of the others tell a part of its errors. *Found* are movements that make the epochs incongruent, *located* those whose target is the first that is
-named, *alone* those where no other one is. *Bound* is the power of one F-test of the right target
-at the same level with Bonferroni's correction. *Quarter* moves a quarter of the targets together
-by 10 of the largest conditional sigmas, and counts where these and no others are named.
+of the others tell a part of its errors. *Found* are movements that make the epochs incongruent,
+*located* those whose target is the first that is named, *alone* those where no other one is.
+*Bound* is the power of one F-test of the right target at the same level with Bonferroni's
+correction. *Quarter* moves a quarter of the targets together by 10 of the largest conditional
+sigmas, and counts where these and no others are named.
 """
 
 from __future__ import annotations

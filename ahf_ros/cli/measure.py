@@ -158,8 +158,13 @@ def _aligned(
         if len(names) == 3:
             names = (*names, *names[:2], names[0])
         return three_two_one(points, nominal, plane=names[:3], line=names[3:5], point=names[5])
-    weights = options.weights or 'covariance'
-    return best_fit(points, nominal, on=names, scale=kind == 'similarity', weights=weights)
+    return best_fit(
+        points,
+        nominal,
+        on=names,
+        scale=kind == 'similarity',
+        weights='equal' if options.weights == 'equal' else 'covariance',
+    )
 
 
 def _pair(text: str) -> tuple[str, str]:
@@ -193,10 +198,10 @@ def _show(
         rows = [(' to '.join(it.ends), f'{it.length:.6g}', f'{it.sigma:.2g}') for it in far]
         print_table('Distances', ('targets', f'distance{unit}', 'sigma'), rows)
     if off:
-        head = 'target', f'dx{unit}', 'dy', 'dz', 'distance', 'sigma x', 'y', 'z', ''
+        axes = f'dx{unit}', 'dy', 'dz'
         print_table(
             'Measured minus nominal',
-            head,
+            ('target', *axes, 'distance', 'sigma x', 'y', 'z', ''),
             [
                 (
                     it.name,

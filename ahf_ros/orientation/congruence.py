@@ -42,7 +42,7 @@ LEVEL = 0.05
 """Share of pairs of epochs without movement that a test may take for one with."""
 
 _TOGETHER, _ALONE = 0.2, 0.9
-"""Of the level, for the test of all targets and for those of single ones; measured together 1.0."""
+"""Of the level, for the test of all targets and for those of single ones: together one, measured."""
 
 _MINIMUM = 3  # targets of a datum
 _SINGULAR = 1e-9
@@ -107,7 +107,7 @@ class Movement:
     def sigma(self) -> float:
         """Standard deviation of the movement in its own direction."""
         direction = self.xyz / (self.length or 1.0)
-        return float(np.sqrt(max(direction @ self.covariance @ direction, 0.0)))
+        return float(np.sqrt(max(float(direction @ self.covariance @ direction), 0.0)))
 
 
 @dataclass(frozen=True)
@@ -456,6 +456,6 @@ def _warnings(
         )
     left = states[0].datum & ~last.datum & ~moved
     if left.any():
-        listed = ', '.join(names[index] for index in np.flatnonzero(left))
+        listed = ', '.join(name for name, out in zip(names, left, strict=True) if out)
         warnings.append(f'Targets that left the datum and are not significant alone: {listed}.')
     return warnings
