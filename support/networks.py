@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
+from ahf_ros.interchange.target_json import to_json
 from ahf_ros.orientation.camera import project
 from ahf_ros.orientation.network import (
     CameraView,
@@ -15,6 +17,7 @@ from ahf_ros.orientation.network import (
     ScaleBar,
 )
 from ahf_ros.orientation.solution import Solution, Start
+from ahf_ros.target import Identification, Target
 
 CALIBRATION = np.array([1500.0, 803.0, 596.0, -0.08, 0.02, 0.001, 2e-4, -1e-4, 1e-4, 2e-5])
 SIZE = 1600, 1200
@@ -93,3 +96,21 @@ def solution(photographs: int = 6, targets: int = 12, unit: str = 'mm') -> Solut
         rejected=(),
         warnings=(),
     )
+
+
+def records(of: Network, size: tuple[int, int] = SIZE) -> list[dict[str, Any]]:
+    """Return the image points of a network as `ahf identify --json` prints them."""
+    seen = of.observations
+    found = []
+    for index, name in enumerate(of.photographs):
+        targets = tuple(
+            Target(
+                int(of.targets[seen.point[row]]),
+                *(19, *seen.xy[row].tolist(), 4.0, 3.5),
+                covariance=tuple(seen.covariance[row].ravel().tolist()),
+                family='cct12',
+            )
+            for row in np.flatnonzero(seen.photograph == index)
+        )
+        found.append(to_json(Identification(targets), name, size[::-1], 'cct12', 'ring'))
+    return found

@@ -73,6 +73,7 @@ def measured_points(solution: Solution) -> MeasuredPoints:
         sigma0=float(solution.sigma0),
         redundancy=int(solution.redundancy),
         unit=solution.network.unit,
+        scaled=solution.scaled,
     )
 
 
@@ -196,9 +197,17 @@ def _points_table(points: MeasuredPoints, rays: IntArray) -> bytes:
 
 
 def _archive(points: MeasuredPoints) -> bytes:
-    """Return an npz of the IDs and the covariance, in whose order of x, y and z they are."""
+    """Return an npz of the IDs and the covariance, in whose order of x, y and z they are.
+
+    `scaled` says whether it, like those of network.json, is multiplied by the square of sigma0.
+    """
     file = io.BytesIO()
-    np.savez_compressed(file, ids=np.array(points.names, str), covariance=points.covariance)
+    np.savez_compressed(
+        file,
+        ids=np.array(points.names, str),
+        covariance=points.covariance,
+        scaled=np.array(points.scaled),
+    )
     return file.getvalue()
 
 
@@ -221,10 +230,12 @@ def read_network(folder: str | Path) -> OrientedNetwork:
         if it.text('camera') not in numbers:
             raise ValueError(f'{it.where}: camera is {shown(it.text("camera"))}, not in cameras')
     xyz = _stacked([[it.number(axis) for axis in 'xyz'] for it in points], (3,))
-    covariance = _covariance_of(path.parent / record.text('covariance_of_points'), names)
+    archive = path.parent / record.text('covariance_of_points')
+    covariance, scaled = _covariance_of(archive, names)
     sigma0, redundancy = record.number('sigma0'), int(record.number('redundancy'))
     try:
-        measured = MeasuredPoints(names, xyz, covariance, sigma0, redundancy, record.text('unit'))
+        unit = record.text('unit')
+        measured = MeasuredPoints(names, xyz, covariance, sigma0, redundancy, unit, scaled)
     except ValueError as error:
         raise ValueError(f'{path}: {error}') from error
     return OrientedNetwork(
@@ -274,11 +285,12 @@ def _stacked(rows: Sequence[Any], shape: tuple[int, ...]) -> FloatArray:
     return np.array(rows, float).reshape(len(rows), *shape)
 
 
-def _covariance_of(path: Path, names: tuple[str, ...]) -> FloatArray:
-    """Return the covariance of the points of these names, in their order."""
+def _covariance_of(path: Path, names: tuple[str, ...]) -> tuple[FloatArray, bool]:
+    """Return the covariance of the points of these names in their order, and if it is scaled."""
     try:
         with np.load(io.BytesIO(read_bytes(path)), allow_pickle=False) as archive:
             ids, covariance = archive['ids'].tolist(), np.array(archive['covariance'], float)
+            scaled = bool(archive['scaled'])
     except (KeyError, EOFError, zipfile.BadZipFile) as error:
         raise ValueError(f'{path} is damaged, accepted is what ahf orient writes') from error
     size = 3 * len(ids)
@@ -289,8 +301,7 @@ def _covariance_of(path: Path, names: tuple[str, ...]) -> FloatArray:
         )
     place = {str(name): index for index, name in enumerate(ids)}
     rows = np.array([3 * place[name] + axis for name in names for axis in range(3)], int)
-    ordered: FloatArray = covariance[np.ix_(rows, rows)]
-    return ordered
+    return covariance[np.ix_(rows, rows)], scaled
 
 
 @dataclass(frozen=True)

@@ -42,6 +42,7 @@ def incomplete() -> Solution:
         covariance_of_points=covariance,
         rejected=(Rejection('view_1.jpg', '9', (1.0, 2.0), 'another target', -7.25),),
         warnings=('no scale',),
+        scaled=True,
     )
 
 
@@ -55,6 +56,7 @@ def test_a_network_is_read_back_as_it_was_written(tmp_path: Path) -> None:
         np.testing.assert_array_equal(points.xyz, ours.xyz)
         np.testing.assert_array_equal(points.covariance, ours.covariance)
         assert (points.sigma0, points.redundancy, points.unit) == (0.98, ours.redundancy, 'mm')
+        assert points.scaled
         kept = [0, 1, 2, 3, 5]
         assert found.photographs == tuple(wanted.network.photographs[index] for index in kept)
         np.testing.assert_array_equal(found.rotations, wanted.start.rotations[kept])
@@ -125,7 +127,7 @@ def test_a_covariance_that_is_none_is_named(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match='damaged'):
         read_network(tmp_path)
     ids = np.array([str(number) for number in range(1, 13)])
-    np.savez(path, ids=ids, covariance=np.full((36, 36), np.nan))
+    np.savez(path, ids=ids, covariance=np.full((36, 36), np.nan), scaled=False)
     with pytest.raises(ValueError, match='covariance has 1296 entries that'):
         read_network(tmp_path)
     path.unlink()
