@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ahf_ros.cli import tell
 from ahf_ros.cli.options import add_option, add_quiet, parsed_by
-from ahf_ros.cli.tables import identifiers, print_table
+from ahf_ros.cli.tables import decimals, identifiers, print_table
 from ahf_ros.settings.parameter import Parameter
 
 if TYPE_CHECKING:
@@ -100,9 +100,15 @@ def _show(found: Comparison) -> None:
     """Print tests and movements for people, those that moved first."""
     unit = found.unit or 'units of the first epoch'
     tests = [
-        (str(it.targets), f'{it.statistic:.3f}', f'{it.rank}', f'{it.degrees}', _share(it), limit)
+        (
+            str(it.targets),
+            f'{it.statistic:.3f}',
+            str(it.rank),
+            str(it.degrees),
+            f'{it.probability:.2g}',
+            f'{it.level:.3g}',
+        )
         for it in found.tests
-        for limit in [f'{it.level:.3f}']
     ]
     print_table(
         'Congruence test, ' + ('shape only' if found.free_scale else 'with scale'),
@@ -110,12 +116,13 @@ def _show(found: Comparison) -> None:
         tests,
     )
     items = sorted(found.movements, key=lambda it: (not it.moved, -it.statistic))
+    digits = decimals(it.sigma for it in items)
     rows = [
         (
             it.name,
-            *(f'{value:+.4g}' for value in it.xyz),
-            f'{it.length:.4g}',
-            f'{it.sigma:.2g}',
+            *(f'{value:+.{digits}f}' for value in it.xyz),
+            f'{it.length:.{digits}f}',
+            f'{it.sigma:.{digits}f}',
             f'{it.probability:.2g}',
             'moved' if it.moved else '' if it.in_datum else 'not in the datum',
         )
@@ -124,10 +131,6 @@ def _show(found: Comparison) -> None:
     head = 'target', f'dx, {unit}', 'dy', 'dz', 'length', 'sigma', 'probability', ''
     print_table('Movements', head, rows)
     print(_verdict(found), file=sys.stderr)
-
-
-def _share(test: Any) -> str:
-    return f'{test.probability:.2g}'
 
 
 def _verdict(found: Comparison) -> str:

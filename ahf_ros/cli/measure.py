@@ -11,11 +11,17 @@ from typing import TYPE_CHECKING, Any
 
 from ahf_ros.cli import tell
 from ahf_ros.cli.options import add_quiet, parsed_by
-from ahf_ros.cli.tables import identifiers, print_table
+from ahf_ros.cli.tables import decimals, identifiers, print_table
 
 if TYPE_CHECKING:
     from ahf_ros.orientation.alignment import Alignment
-    from ahf_ros.orientation.measurement import Deviation, Distance, LengthTest, PermissibleError
+    from ahf_ros.orientation.measurement import (
+        Deviation,
+        Distance,
+        LengthError,
+        LengthTest,
+        PermissibleError,
+    )
     from ahf_ros.orientation.network import FloatArray
     from ahf_ros.orientation.points import MeasuredPoints
 
@@ -195,9 +201,14 @@ def _show(
     """Print what was measured for people."""
     unit = f', {points.unit}' if points.unit else ', no scale'
     if far:
-        rows = [(' to '.join(it.ends), f'{it.length:.6g}', f'{it.sigma:.2g}') for it in far]
+        digits = decimals(it.sigma for it in far)
+        rows = [
+            (' to '.join(it.ends), f'{it.length:.{digits}f}', f'{it.sigma:.{digits}f}')
+            for it in far
+        ]
         print_table('Distances', ('targets', f'distance{unit}', 'sigma'), rows)
     if off:
+        digits = decimals(value for it in off for value in it.sigmas)
         axes = f'dx{unit}', 'dy', 'dz'
         print_table(
             'Measured minus nominal',
@@ -205,17 +216,18 @@ def _show(
             [
                 (
                     it.name,
-                    *(f'{value:+.4g}' for value in it.xyz),
-                    f'{it.distance:.4g}',
-                    *(f'{value:.2g}' for value in it.sigmas),
+                    *(f'{value:+.{digits}f}' for value in it.xyz),
+                    f'{it.distance:.{digits}f}',
+                    *(f'{value:.{digits}f}' for value in it.sigmas),
                     'aligned' if it.used else '',
                 )
                 for it in off
             ],
         )
     if test:
+        digits = decimals(it.sigma for it in test.errors)
         head = 'targets', 'line', f'calibrated{unit}', 'error', 'sigma', 'permissible', ''
-        print_table('Length errors', head, [_length_row(it) for it in test.errors])
+        print_table('Length errors', head, [_length_row(it, digits) for it in test.errors])
         largest, passed = test.largest, test.passed
         text = f'largest length error: {largest.error:+.4g} {points.unit}'
         if passed is not None:
@@ -223,14 +235,14 @@ def _show(
         print(text, file=sys.stderr)
 
 
-def _length_row(it: Any) -> tuple[str, ...]:
+def _length_row(it: LengthError, digits: int) -> tuple[str, ...]:
     return (
         ' to '.join(it.ends),
         it.line,
-        f'{it.calibrated:.6g}',
-        f'{it.error:+.4g}',
-        f'{it.sigma:.2g}',
-        '' if it.permissible is None else f'{it.permissible:.4g}',
+        f'{it.calibrated:.{digits}f}',
+        f'{it.error:+.{digits}f}',
+        f'{it.sigma:.{digits}f}',
+        '' if it.permissible is None else f'{it.permissible:.{digits}f}',
         'too large' if it.within is False else '',
     )
 

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
+import sys
 from collections.abc import Iterable, Sequence
 
 _ROWS = 30
 """Rows that are shown; files and JSON have all."""
+
+_WIDTH = 120  # characters
 
 
 def identifiers(text: str) -> tuple[str, ...]:
@@ -30,5 +34,11 @@ def print_table(title: str, head: Sequence[str], rows: Iterable[Sequence[str]]) 
         table.add_row(*map(escape, row))
     if len(rows) > _ROWS:
         table.add_row(f'and {len(rows) - _ROWS} more', *[''] * (len(head) - 1))
-    console = Console(stderr=True)
-    console.print(table, width=None if console.is_terminal else 120)
+    # A pipe has no width; cells are not broken there.
+    Console(stderr=True, width=None if sys.stderr.isatty() else _WIDTH).print(table)
+
+
+def decimals(sigmas: Iterable[float]) -> int:
+    """Return how many decimals show the smallest standard deviation above 0 with two digits."""
+    above = [it for it in sigmas if it > 0]
+    return min(max(1 - math.floor(math.log10(min(above))), 0), 12) if above else 6
