@@ -10,6 +10,7 @@ _ROWS = 30
 """Rows that are shown; files and JSON have all."""
 
 _WIDTH = 120  # characters
+_HELD = 1e-6  # of the largest standard deviation: what is held by an alignment, and rounding
 
 
 def identifiers(text: str) -> tuple[str, ...]:
@@ -39,6 +40,7 @@ def print_table(title: str, head: Sequence[str], rows: Iterable[Sequence[str]]) 
 
 
 def decimals(sigmas: Iterable[float]) -> int:
-    """Return how many decimals show the smallest standard deviation above 0 with two digits."""
-    above = [it for it in sigmas if it > 0]
+    """Return how many decimals show the smallest standard deviation with two digits."""
+    listed = list(sigmas)
+    above = [it for it in listed if it > _HELD * max(listed)]
     return min(max(1 - math.floor(math.log10(min(above))), 0), 12) if above else 6

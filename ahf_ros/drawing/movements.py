@@ -38,7 +38,11 @@ def movements_figure(comparison: Comparison) -> str:
     """
     places = np.array([it.place for it in comparison.movements])
     centred = places - places.mean(axis=0)
-    axes = np.linalg.svd(centred, full_matrices=True)[2]
+    axes = np.linalg.svd(centred, full_matrices=True)[2].copy()
+    if axes[2, 2] < 0:
+        axes[2] *= -1
+    if np.linalg.det(axes) < 0:  # or the views would be mirrored
+        axes[1] *= -1
     flat = centred @ axes.T
     scale = (_VIEW - 2 * _MARGIN) / float(np.ptp(flat[:, 0]))
     longest = max(_size(it) for it in comparison.movements)

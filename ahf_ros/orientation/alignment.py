@@ -100,11 +100,12 @@ def best_fit(
     """
     _check_scale(points, scale)
     used = _checked_names(points, nominal, on)
+    given = points.chosen(used).covariance
 
     def condition(movement: Similarity, free: FloatArray) -> FloatArray:
         if weights == 'equal':
             return free.T
-        covariance = movement.turned(points.chosen(used).covariance)
+        covariance = movement.turned(given)
         completed = covariance + np.trace(covariance) / len(free) * free @ free.T
         try:
             return np.linalg.solve(completed, free).T

@@ -16,7 +16,7 @@ moves by 5 standard deviations is seen in 4 of 10 cases. The tests of single tar
 Bonferroni's correction, are the other way round. So both are made, at shares of the level whose
 sum is a little above one, since both often fail together.
 While either fails, the target with the largest share leaves the datum. One that is not significant
-in the datum that remains comes back.
+against the datum that remains comes back.
 
 References
 ----------
@@ -42,9 +42,10 @@ LEVEL = 0.05
 """Share of pairs of epochs without movement that a test may take for one with."""
 
 _TOGETHER, _ALONE = 0.2, 0.9
-"""Of the level, for the test of all targets and for those of single ones: together one, measured."""
+"""Of the level, for the test of all targets and those of single ones; measured, together one."""
 
 _MINIMUM = 3  # targets of a datum
+_TRIALS = 200  # fits to three targets; all of one half in all but 1 of 10^10 searches
 _SINGULAR = 1e-9
 """Of the mean variance: smaller ones are those of coordinates that were not measured."""
 
@@ -317,17 +318,38 @@ def _weighted(
 
 
 def _localised(epochs: _Epochs, candidates: NDArray[np.bool_]) -> list[_State]:
-    """Return what the tests say of the first datum, and of each that a target left or entered."""
-    states, returned = [_tested(epochs, candidates)], np.zeros_like(candidates)
+    """Return what the tests say of the first datum, and of each that a target left or entered.
+
+    Where many targets moved together, their movement smears over the others, and targets leave
+    until too few are left. Then the datum starts from the half that fits best.
+    """
+    half = max(int(candidates.sum()) // 2 + 1, _MINIMUM)
+    states = _reduced(epochs, candidates, half)
+    if candidates.sum() == half or _passes(states[-1], states[-1].datum, epochs.level):
+        return states
+    others = _reduced(epochs, _best_half(epochs, candidates, half), _MINIMUM)
+    enlarged = others[-1].datum | (candidates & (others[-1].probabilities >= epochs.level))
+    others += _reduced(epochs, enlarged, half)
+    last = others[-1]
+    found = last.datum.sum() >= half and _passes(last, last.datum, epochs.level)
+    return [states[0], *others] if found else states
+
+
+def _reduced(epochs: _Epochs, datum: NDArray[np.bool_], least: int) -> list[_State]:
+    """Return what the tests say while targets leave a datum until it passes or `least` are left.
+
+    One that left and is not significant against the others comes back, once.
+    """
+    states, returned = [_tested(epochs, datum)], np.zeros_like(datum)
     while not _passes(states[-1], states[-1].datum, epochs.level):
         state = states[-1]
         leaving = _leaving(epochs, state)
-        if leaving is None or 2 * (state.datum.sum() - 1) <= candidates.sum():
+        if leaving is None or state.datum.sum() <= least:
             break
         datum = state.datum.copy()
         datum[leaving] = False
         states.append(_tested(epochs, datum))
-        back = candidates & ~datum & ~returned & (states[-1].probabilities >= epochs.level)
+        back = states[0].datum & ~datum & ~returned & (states[-1].probabilities >= epochs.level)
         back[leaving] = False
         if back.any():
             index = np.flatnonzero(back)[np.argmin(states[-1].statistics[back])]
@@ -335,6 +357,27 @@ def _localised(epochs: _Epochs, candidates: NDArray[np.bool_]) -> list[_State]:
             datum[index] = returned[index] = True
             states.append(_tested(epochs, datum))
     return states
+
+
+def _best_half(epochs: _Epochs, candidates: NDArray[np.bool_], half: int) -> NDArray[np.bool_]:
+    """Return the half of the candidates whose largest movement is least, by fits to three.
+
+    Rousseeuw, Least median of squares regression, J. Am. Stat. Assoc. 1984, 79, 871.
+    """
+    first, second = epochs.xyz
+    places, rng = np.flatnonzero(candidates), np.random.default_rng(0)
+    best, chosen = np.inf, candidates
+    for _ in range(_TRIALS):
+        three = rng.choice(places, _MINIMUM, replace=False)
+        if on_a_line(first[three]) or on_a_line(second[three]):
+            continue
+        fit = similarity_between(second[three], first[three], epochs.free_scale)
+        distances = np.linalg.norm(fit.moved(second) - first, axis=1)
+        nearest = places[np.argsort(distances[places])[:half]]
+        if distances[nearest[-1]] < best:
+            best, chosen = distances[nearest[-1]], np.zeros_like(candidates)
+            chosen[nearest] = True
+    return chosen
 
 
 def _leaving(epochs: _Epochs, state: _State) -> int | None:
