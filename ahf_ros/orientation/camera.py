@@ -75,12 +75,15 @@ def project(
     return _imaged(calibration, ideal - correction)
 
 
-def undistort(calibration: FloatArray, xy: FloatArray) -> FloatArray:
+def undistort(calibration: FloatArray, xy: FloatArray, backward: bool = False) -> FloatArray:
     """Return the places (n, 2) in the plane z = 1 whose images are xy in px, by Newton's method.
 
-    A place that the distortion never reaches is NaN.
+    A place that the distortion never reaches is NaN. Calibrations are one or one a point.
     """
+    calibration = np.asarray(calibration, dtype=float)
     distorted = measured_places(calibration, xy)
+    if backward:
+        return distorted + _distortion(calibration, distorted)
     ideal = distorted.copy()
     step = np.zeros_like(ideal)
     with np.errstate(all='ignore'):

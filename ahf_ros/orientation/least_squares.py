@@ -95,14 +95,10 @@ def minimise(
             if abs(promised) < _CONVERGED + _ROUNDING * before:
                 return normals.changed(layout, state, poses, rest), True
             trial = normals.changed(layout, state, poses, rest)
-            at_trial = knowledge(trial)
-            after = (
-                _losses(normals.whitened_lengths(layout, trial), spread, loss)[0] + at_trial.cost
-            )
-            # the exact penalty of what holds exactly [2]_
-            penalty = 2 * np.abs(multipliers)
-            after += penalty @ np.abs(at_trial.border()[1])
-            if after < before + penalty @ np.abs(gaps):
+            known = knowledge(trial)
+            after = _losses(normals.whitened_lengths(layout, trial), spread, loss)[0] + known.cost
+            penalty = 2 * np.abs(multipliers)  # of what has to hold exactly [2]_
+            if after + penalty @ np.abs(known.border()[1]) < before + penalty @ np.abs(gaps):
                 state, damping = trial, max(damping / 10, np.finfo(float).eps)
                 break
             damping *= 10

@@ -23,7 +23,7 @@ from ahf_ros.orientation.solution import Start
 
 _FEWEST_POINTS = 3  # of a photograph: six coordinates determine a pose
 _FEWEST_RAYS = 2  # of a point
-_BEHIND = 1e6  # residual in standard deviations of a point behind the camera
+BEHIND = 1e6  # residual in standard deviations of a point behind the camera
 _MEDIAN = np.sqrt(2 * np.log(2))  # of the length of a normal 2-vector
 
 
@@ -145,6 +145,23 @@ def lay_out(
     )
 
 
+def extended(network: Network, layout: Layout) -> Layout:
+    """Return the layout with all observations between its photographs and points, used or not."""
+    observations = network.observations
+    inside = np.isin(observations.photograph, layout.photographs)
+    chosen = np.flatnonzero(inside & np.isin(observations.point, layout.points))
+    photographs = observations.photograph[chosen]
+    return replace(
+        layout,
+        observations=chosen,
+        photograph=np.searchsorted(layout.photographs, photographs),
+        point=np.searchsorted(layout.points, observations.point[chosen]),
+        camera=network.camera_of[photographs],
+        xy=observations.xy[chosen],
+        whitening=np.linalg.inv(np.linalg.cholesky(observations.covariance[chosen])),
+    )
+
+
 def predicted_in_front(network: Network, start: Start) -> NDArray[np.bool_]:
     """Return which observations (m,) have a pose, and a point in front of it."""
     observations = network.observations
@@ -155,22 +172,36 @@ def predicted_in_front(network: Network, start: Start) -> NDArray[np.bool_]:
 
 def residuals(layout: Layout, state: Start) -> FloatArray:
     """Return measured minus computed image points (m, 2) in px; NaN behind the camera."""
-    photographs = layout.photographs[layout.photograph]
-    computed = camera.project(
-        state.calibrations[layout.camera],
-        state.rotations[photographs],
-        state.positions[photographs],
-        state.points[layout.points[layout.point]],
-        layout.xy if layout.backward else None,
-    )
-    return layout.xy - computed
+    points = state.points[layout.points[layout.point]]
+    return _residuals(layout, state, np.arange(len(layout.xy)), points)
+
+
+def lengths_at(layout: Layout, state: Start, rows: IntArray, points: FloatArray) -> FloatArray:
+    """Return the residuals' lengths (n,) in standard deviations, were points (n, 3) those of rows.
+
+    They are `BEHIND` where a point is behind the camera.
+    """
+    whitened = layout.whitening[rows] @ _residuals(layout, state, rows, points)[:, :, None]
+    lengths = np.linalg.norm(whitened[:, :, 0], axis=1)
+    return np.nan_to_num(lengths, nan=BEHIND, posinf=BEHIND)
 
 
 def whitened_lengths(layout: Layout, state: Start) -> FloatArray:
-    """Return the residuals' lengths (m,) in standard deviations, large behind the camera."""
-    whitened = layout.whitening @ residuals(layout, state)[:, :, None]
-    lengths = np.linalg.norm(whitened[:, :, 0], axis=1)
-    return np.nan_to_num(lengths, nan=_BEHIND, posinf=_BEHIND)
+    """Return the residuals' lengths (m,) in standard deviations, `BEHIND` behind the camera."""
+    points = state.points[layout.points[layout.point]]
+    return lengths_at(layout, state, np.arange(len(layout.xy)), points)
+
+
+def _residuals(layout: Layout, state: Start, rows: IntArray, points: FloatArray) -> FloatArray:
+    photographs = layout.photographs[layout.photograph[rows]]
+    computed = camera.project(
+        state.calibrations[layout.camera[rows]],
+        state.rotations[photographs],
+        state.positions[photographs],
+        points,
+        layout.xy[rows] if layout.backward else None,
+    )
+    return layout.xy[rows] - computed
 
 
 def robust_spread(lengths: FloatArray) -> float:
@@ -229,11 +260,11 @@ def assemble(layout: Layout, design: Design, weights: FloatArray) -> Normals:
         layout.photograph[:, None, None],
         np.arange(6)[:, None],
         coordinates[layout.point][:, None, :],
-    ] = _products(pose, point)
+    ] = products(pose, point)
     rest = np.zeros((unknowns, unknowns))
     rest_right = np.zeros(unknowns)
-    rest[coordinates[:, :, None], coordinates[:, None, :]] = rays.sum(_products(point, point))
-    rest_right[coordinates] = rays.sum(_products(point, right)[:, :, 0])
+    rest[coordinates[:, :, None], coordinates[:, None, :]] = rays.sum(products(point, point))
+    rest_right[coordinates] = rays.sum(products(point, right)[:, :, 0])
     columns = layout.columns
     for index in np.flatnonzero(layout.free.any(axis=1)):
         free = layout.free[index]
@@ -242,10 +273,10 @@ def assemble(layout: Layout, design: Design, weights: FloatArray) -> Normals:
         part = calibration[mine][:, :, free]
         of_images = Groups.by(layout.photograph[mine])
         mixed[of_images.labels[:, None, None], np.arange(6)[:, None], own] = of_images.sum(
-            _products(pose[mine], part)
+            products(pose[mine], part)
         )
         of_points = Groups.by(layout.point[mine])
-        block = of_points.sum(_products(point[mine], part)).reshape(-1, len(own))
+        block = of_points.sum(products(point[mine], part)).reshape(-1, len(own))
         rows = coordinates[of_points.labels].reshape(-1)
         rest[rows[:, None], own] = block
         rest[own[:, None], rows] = block.T
@@ -253,10 +284,10 @@ def assemble(layout: Layout, design: Design, weights: FloatArray) -> Normals:
         rest[own[:, None], own] = flat.T @ flat
         rest_right[own] = flat.T @ right[mine].reshape(-1)
     return Normals(
-        images.sum(_products(pose, pose)),
+        images.sum(products(pose, pose)),
         mixed,
         rest,
-        images.sum(_products(pose, right)[:, :, 0]),
+        images.sum(products(pose, right)[:, :, 0]),
         rest_right,
     )
 
@@ -276,7 +307,7 @@ class Reduced:
 
 def reduce(normals: Normals) -> Reduced:
     """Eliminate the poses by their Schur complement."""
-    factor = np.linalg.cholesky(normals.pose)
+    factor = np.asarray(np.linalg.cholesky(normals.pose), dtype=float)
     half = np.linalg.solve(factor, normals.mixed)
     half_right = np.linalg.solve(factor, normals.pose_right[:, :, None])[:, :, 0]
     flat = half.reshape(-1, half.shape[2])
@@ -288,7 +319,7 @@ def reduce(normals: Normals) -> Reduced:
         half_right,
         matrix,
         normals.rest_right - flat.T @ half_right.reshape(-1),
-        1 / np.sqrt(np.maximum(np.diag(matrix), least)),
+        np.maximum(np.diag(matrix), least) ** -0.5,
     )
 
 
@@ -300,30 +331,12 @@ def solve(
     With the border's columns H (u, h), the changes x of the rest fulfil H'x = gap.
     """
     scale = reduced.scale
-    bordered, size = _bordered(reduced, border)
-    changes = np.linalg.solve(bordered, np.concatenate([scale * reduced.right, gap / size]))
+    matrix, size = bordered(reduced, border)
+    changes = np.linalg.solve(matrix, np.concatenate([scale * reduced.right, gap / size]))
     rest = scale * changes[: len(scale)]
     left = reduced.half_right - reduced.half @ rest
     poses = np.linalg.solve(reduced.factor.transpose(0, 2, 1), left[:, :, None])[:, :, 0]
     return poses, rest, changes[len(scale) :] / size
-
-
-def covariance_of_rest(reduced: Reduced, border: FloatArray) -> FloatArray:
-    """Return the covariance (u, u) of points and calibrations in the datum of the border."""
-    scale = reduced.scale
-    bordered, _ = _bordered(reduced, border)
-    inverse = np.linalg.inv(bordered)[: len(scale), : len(scale)]
-    covariance = scale[:, None] * inverse * scale
-    return (covariance + covariance.T) / 2
-
-
-def covariance_of_poses(reduced: Reduced, rest: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return covariances (n, 6, 6) of poses, and (n, 6, u) of poses with the rest."""
-    inverse = np.linalg.inv(reduced.factor)
-    transposed = inverse.transpose(0, 2, 1)
-    by_rest = -transposed @ reduced.half
-    crossed = (by_rest.reshape(-1, len(rest)) @ rest).reshape(by_rest.shape)
-    return transposed @ inverse + crossed @ by_rest.transpose(0, 2, 1), crossed
 
 
 def changed(layout: Layout, state: Start, poses: FloatArray, rest: FloatArray) -> Start:
@@ -345,12 +358,12 @@ def changed(layout: Layout, state: Start, poses: FloatArray, rest: FloatArray) -
     )
 
 
-def _products(left: FloatArray, right: FloatArray) -> FloatArray:
+def products(left: FloatArray, right: FloatArray) -> FloatArray:
     """Return A'B (m, a, b) of rows' blocks (m, 2, a) and (m, 2, b)."""
     return left[:, 0, :, None] * right[:, 0, None, :] + left[:, 1, :, None] * right[:, 1, None, :]
 
 
-def _bordered(reduced: Reduced, border: FloatArray) -> tuple[FloatArray, FloatArray]:
+def bordered(reduced: Reduced, border: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the scaled and bordered matrix, and the sizes (h,) that its border had."""
     scale = reduced.scale
     columns = scale[:, None] * border
