@@ -68,6 +68,14 @@ def orient(
     ValueError
         If nothing can be oriented, or what fits is not the only thing that fits. The message says
         why and what to photograph.
+
+    Examples
+    --------
+    >>> from ahf_ros.orientation.simulation import simulated
+    >>> network, _ = simulated(photographs=8, targets=24)
+    >>> (solution,) = orient(network)
+    >>> solution.start.points.shape, solution.covariance_of_points.shape
+    ((24, 3), (72, 72))
     """
     network = once_a_photograph(network)
     _check(network)
