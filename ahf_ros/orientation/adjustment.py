@@ -103,6 +103,9 @@ def adjust(
 ) -> Solution:
     """Adjust a network and return coordinates, poses and cameras with their covariances.
 
+    A bundle adjustment [3]_ of image points and of what is known [1]_, with tests of single
+    observations [2]_.
+
     Parameters
     ----------
     network : Network
