@@ -77,7 +77,7 @@ def rendered(
 
 
 def looking(along: FloatArray, roll: float) -> FloatArray:
-    """Return a rotation from world to camera that looks along a unit vector, rolled by an angle."""
+    """Return a rotation from world to camera that looks along a unit vector and is rolled."""
     up = np.array([0, 1, 0]) if abs(along[1]) < 0.9 else np.array([1, 0, 0])
     right = np.cross(along, up)
     right = right / np.linalg.norm(right)

@@ -9,28 +9,12 @@ import numpy as np
 
 from ahf_ros.interchange.target_json import to_json
 from ahf_ros.orientation.camera import project
-from ahf_ros.orientation.network import (
-    CameraView,
-    ControlPoint,
-    Network,
-    Observations,
-    ScaleBar,
-)
-from ahf_ros.orientation.solution import Solution, Start
+from ahf_ros.orientation.network import ControlPoint, Network, ScaleBar
+from ahf_ros.orientation.simulation import SIZE, simulated
+from ahf_ros.orientation.solution import Solution
 from ahf_ros.target import Identification, Target
 
 CALIBRATION = np.array([1500.0, 803.0, 596.0, -0.08, 0.02, 0.001, 2e-4, -1e-4, 1e-4, 2e-5])
-SIZE = 1600, 1200
-
-
-def looking(position: np.ndarray, roll: float) -> np.ndarray:
-    """Return the rotation of a camera that looks at the origin, rolled about its axis, rad."""
-    forward = -position / np.linalg.norm(position)
-    right = np.cross(forward, (0.0, 0.0, 1.0))
-    right /= np.linalg.norm(right)
-    upright = np.array([right, np.cross(forward, right), forward])
-    turn = np.array([[np.cos(roll), np.sin(roll), 0], [-np.sin(roll), np.cos(roll), 0], [0, 0, 1]])
-    return np.asarray(turn @ upright)
 
 
 def known(network: Network) -> Network:
@@ -53,37 +37,18 @@ def known(network: Network) -> Network:
 
 
 def solution(photographs: int = 6, targets: int = 12, unit: str = 'mm') -> Solution:
-    """Return an adjusted network of targets in a volume of 600 x 400 x 200, all of them seen.
+    """Return an adjusted network of targets in a volume, all of them seen in all photographs.
 
-    Its covariances are those of a Gauss-Markov model with made-up derivatives: right in form.
+    Its coordinates are the true ones, its residuals the noise; its covariances are made up.
     """
-    source = np.random.default_rng(7)
-    points = source.uniform(-1, 1, (targets, 3)) * (300, 200, 100)
-    angles = np.linspace(0.0, 1.6, photographs)
-    positions = 1400 * np.column_stack((np.cos(angles), np.sin(angles), 0.4 + 0.1 * angles))
-    rolls = [0.0, np.pi / 2] * photographs
-    rotations = np.array([looking(at, rolls[i]) for i, at in enumerate(positions)])
-    photograph, point = (it.ravel() for it in np.indices((photographs, targets)))
-    exact = np.concatenate(
-        [project(CALIBRATION, *pose, points) for pose in zip(rotations, positions, strict=True)]
-    )
-    errors = 0.02 * source.standard_normal(exact.shape)
-    observations = Observations(
-        photograph, point, exact + errors, np.tile(0.02**2 * np.eye(2), (len(exact), 1, 1))
-    )
-    network = Network(
-        photographs=tuple(f'view_{index}.jpg' for index in range(photographs)),
-        camera_of=np.zeros(photographs, np.int64),
-        cameras=(CameraView('camera', *SIZE),),
-        targets=tuple(str(number) for number in range(1, targets + 1)),
-        observations=observations,
-        unit=unit,
-    )
-    start = Start(CALIBRATION[None], rotations, positions, points, np.ones(len(exact), np.bool_))
-    rows = 0.01 * source.standard_normal((3 * targets, 3 * targets))
+    network, start = simulated(photographs, targets, calibration=CALIBRATION)
+    seen = network.observations
+    poses = start.rotations[seen.photograph], start.positions[seen.photograph]
+    errors = seen.xy - project(CALIBRATION, *poses, start.points[seen.point])
+    rows = 0.01 * np.random.default_rng(8).standard_normal((3 * targets, 3 * targets))
     sigmas = np.array([0.3, 0.2, 0.2, 1e-4, 1e-4, 1e-4, 1e-6, 1e-6, 0, 0])
     return Solution(
-        network=network,
+        network=replace(network, unit=unit),
         start=start,
         residuals=errors,
         normalised=np.hypot(*errors.T) / 0.02,
@@ -92,7 +57,7 @@ def solution(photographs: int = 6, targets: int = 12, unit: str = 'mm') -> Solut
         pose_covariances=np.tile(np.diag([4e-4] * 3 + [1e-8] * 3), (photographs, 1, 1)),
         covariance_of_points=rows @ rows.T / len(rows),
         sigma0=0.98,
-        redundancy=2 * len(exact) - 6 * photographs - 3 * targets - 8 + 7,
+        redundancy=2 * len(errors) - 6 * photographs - 3 * targets - 8 + 7,
         rejected=(),
         warnings=(),
     )

@@ -269,9 +269,10 @@ def _write(solution: Solution, number: int, options: argparse.Namespace) -> bool
         return place / f'group_{number + 1}' if number else place
 
     folder = folder_in(options.output)
+    title = Path(options.observations).name
     steps: list[Callable[[], object]] = [
         partial(write_network, folder, solution),
-        partial(write_network_page, folder / REPORT_FILE, solution, str(options.observations)),
+        partial(write_network_page, folder / REPORT_FILE, solution, title),
         *(
             partial(write_network_export, name, folder_in(place), solution)
             for name, place in options.export

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -26,9 +26,9 @@ class CameraKnowledge:
     are `adjusted`, too.
     """
 
-    names: Mapping[str, str]
-    exif: Mapping[str, Exif]
-    sizes: Mapping[str, tuple[int, int]]
+    names: Mapping[str, str] = field(default_factory=dict)
+    exif: Mapping[str, Exif] = field(default_factory=dict)
+    sizes: Mapping[str, tuple[int, int]] = field(default_factory=dict)
     calibrations: Sequence[CameraFile] = ()
     adjusted: bool = False
     focal_length: Callable[[int, int], float] | None = None

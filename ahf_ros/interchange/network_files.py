@@ -28,7 +28,7 @@ _SINGULAR = 1e-9  # least ratio of the variances of an image point along its axe
 
 def make_network(
     photographs: Sequence[ObservedPhotograph],
-    cameras: CameraKnowledge,
+    cameras: CameraKnowledge | None = None,
     bars: Sequence[ScaleBar] = (),
     control: Sequence[ControlPoint] = (),
     *,
@@ -45,7 +45,7 @@ def make_network(
     """
     notes: list[str] = []
     names = _photograph_names(photographs)
-    views, camera_of = camera_views(photographs, names, cameras, notes)
+    views, camera_of = camera_views(photographs, names, cameras or CameraKnowledge(), notes)
     labels = _labels(photographs)
     rows: list[tuple[int, str, ImagePoint]] = []
     aside: list[Rejection] = []

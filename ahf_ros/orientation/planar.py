@@ -18,7 +18,7 @@ FLAT = 0.02
 
 
 def principal_axes(points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return standard deviations (d,) of points (n, d) along their principal axes, and the axes."""
+    """Return standard deviations (d,) of points (n, d) along principal axes, and the axes."""
     centred = points - points.mean(axis=0)
     _, values, axes = np.linalg.svd(centred, full_matrices=False)
     spread = np.zeros(points.shape[1])

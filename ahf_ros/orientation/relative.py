@@ -63,7 +63,7 @@ def relative_orientations(
 
 
 def sampson_errors(essential: FloatArray, first: FloatArray, second: FloatArray) -> FloatArray:
-    """Return first-order distances (n,) from the epipolar constraint (Hartley and Zisserman, 11.4)."""
+    """Return distances (n,) from the epipolar constraint (Hartley and Zisserman, 11.4)."""
     a = np.column_stack([first, np.ones(len(first))])
     b = np.column_stack([second, np.ones(len(second))])
     line, back = a @ essential.T, b @ essential
@@ -102,7 +102,7 @@ def _essential(
 def _in_front(
     essential: FloatArray, first: FloatArray, second: FloatArray, sigma: float
 ) -> tuple[FloatArray, FloatArray] | None:
-    """Return that of the four poses of an essential matrix with most points before both cameras."""
+    """Return the pose of an essential matrix with most points before both cameras."""
     if not np.isfinite(essential).all():
         return None
     one, other, shift = cv2.decomposeEssentialMat(essential)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ahf_ros.orientation.camera import rotation_matrices
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.planar import is_flat, planar_poses
 
@@ -20,6 +21,8 @@ SAMPLES = 60
 
 MOST_STARTS = 4
 """Poses of samples that are improved, the best that differ by more than 8 degrees."""
+
+ROUNDS = 15
 
 BOUND = 4.0
 """Standard deviations beyond which a point does not agree."""
@@ -60,11 +63,8 @@ def resections(points: FloatArray, xy: FloatArray, sigma: FloatArray) -> list[Re
     enough = _half(len(points))
     scores = np.partition(ratio, enough - 1, axis=1)[:, enough - 1]
     ordered = (candidates[index] for index in np.argsort(scores, kind='stable'))
-    improved: list[Pose] = []
-    for pose in [*_distinct(ordered, points, 0.15, MOST_STARTS), *planar]:
-        better = _weighted(*pose, points, xy, sigma)
-        improved += [better] if better is not None else []
-    poses = _distinct(improved, points, 0.02, len(improved))
+    poses = [*_distinct(ordered, points, 0.15, MOST_STARTS), *planar]
+    poses = _distinct(_improved(poses, points, xy, sigma), points, 0.02, len(poses))
     found = [_rated(*pose, points, xy, sigma) for pose in poses]
     if not found:
         return []
@@ -120,50 +120,53 @@ def _distinct(poses: Iterable[Pose], points: FloatArray, least: float, most: int
     return kept
 
 
-def _weighted(
-    rotation: FloatArray,
-    position: FloatArray,
-    points: FloatArray,
-    xy: FloatArray,
-    sigma: FloatArray,
-) -> Pose | None:
-    """Return the pose after weighted Gauss-Newton steps with Cauchy's weights, None if it fails."""
-    before = np.inf
-    for _ in range(25):
-        seen = (points - position) @ rotation.T
-        if np.any(seen[:, 2] <= 0) and np.sum(seen[:, 2] > 0) < _half(len(points)):
-            return None
-        before_camera = seen[:, 2] > 0
-        inverse = 1 / np.where(before_camera, seen[:, 2], np.inf)
-        image = seen[:, :2] * inverse[:, None]
-        rest = np.where(before_camera[:, None], (xy - image) / sigma[:, None], 0)
-        squared = np.sum(rest**2, axis=1)
-        scale = max(1.0, 1.5 * float(np.sqrt(np.median(squared))))
-        squared /= (3 * scale) ** 2
-        weight = before_camera / np.sqrt(1 + squared)
-        ray = np.zeros((len(points), 2, 3))
-        ray[:, 0, 0] = ray[:, 1, 1] = inverse
-        ray[:, :, 2] = -image * inverse[:, None]
-        # A small turn w in the camera's frame moves X_camera by w x X_camera.
-        turn = np.cross(seen[:, None], ray)
-        jacobian = np.concatenate([turn, -ray @ rotation], axis=2) / sigma[:, None, None]
-        jacobian = (jacobian * weight[:, None, None]).reshape(-1, 6)
-        normal = jacobian.T @ jacobian
-        right = jacobian.T @ (rest * weight[:, None]).ravel()
-        cost = float(np.sum(np.log1p(squared)) * scale**2)
-        normal[np.diag_indices(6)] *= 1 + 1e-6
-        try:
-            step = np.linalg.solve(normal, right)
-        except np.linalg.LinAlgError:
-            return None
-        rotation = cv2.Rodrigues(step[:3])[0] @ rotation
-        position = position + step[3:]
-        if not np.isfinite(position).all():
-            return None
-        if abs(before - cost) <= 1e-6 * cost:
+def _improved(
+    poses: Sequence[Pose], points: FloatArray, xy: FloatArray, sigma: FloatArray
+) -> list[Pose]:
+    """Return the poses after weighted Gauss-Newton steps with Cauchy's weights, all side by side.
+
+    Poses that see fewer than half of the points before them are dropped.
+    """
+    rotations, positions = (np.array(part) for part in zip(*poses, strict=True))
+    count, number = len(poses), len(points)
+    before = np.full(count, np.inf)
+    for _ in range(ROUNDS):
+        seen = np.einsum('kij,knj->kni', rotations, points - positions[:, None])
+        front = seen[..., 2] > 0
+        inverse = 1 / np.where(front, seen[..., 2], np.inf)
+        image = seen[..., :2] * inverse[..., None]
+        rest = np.where(front[..., None], (xy - image) / sigma[:, None], 0)
+        squared = np.sum(rest**2, axis=2)
+        scale = np.maximum(1, 1.5 * np.sqrt(np.median(squared, axis=1)))[:, None]
+        relative = squared / (3 * scale) ** 2
+        weight = front / np.sqrt(1 + relative)
+        cost = np.sum(np.log1p(relative), axis=1) * scale[:, 0] ** 2
+        if np.all(np.abs(before - cost) <= 1e-6 * cost):
             break
         before = cost
-    return rotation, position
+        ray = np.zeros((count, number, 2, 3))
+        ray[..., 0, 0] = ray[..., 1, 1] = inverse
+        ray[..., 2] = -image * inverse[..., None]
+        # A small turn w in the camera's frame moves X_camera by w x X_camera.
+        turn = np.cross(seen[:, :, None], ray)
+        jacobian = np.concatenate([turn, -ray @ rotations[:, None]], axis=3)
+        jacobian *= (weight / sigma)[..., None, None]
+        jacobian = jacobian.reshape(count, 2 * number, 6)
+        transposed = jacobian.transpose(0, 2, 1)
+        normal = transposed @ jacobian
+        diagonal = np.arange(6)
+        normal[:, diagonal, diagonal] *= 1 + 1e-6
+        normal[:, diagonal, diagonal] += np.finfo(float).tiny
+        right = transposed @ (rest * weight[..., None]).reshape(count, 2 * number, 1)
+        try:
+            step = np.linalg.solve(normal, right)[..., 0]
+        except np.linalg.LinAlgError:
+            break
+        step = np.where(np.isfinite(step), step, 0)
+        rotations = rotation_matrices(step[:, :3]) @ rotations
+        positions = positions + step[:, 3:]
+    kept = front.sum(axis=1) >= _half(number)
+    return list(zip(rotations[kept], positions[kept], strict=True))
 
 
 def _rated(

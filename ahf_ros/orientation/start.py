@@ -16,7 +16,8 @@ import numpy as np
 from ahf_ros.orientation.adjustment import refine
 from ahf_ros.orientation.camera import pinhole
 from ahf_ros.orientation.network import FloatArray, IntArray, Network
-from ahf_ros.orientation.resection import ALIKE, FEWEST_POINTS, Resection, resections
+from ahf_ros.orientation.planar import mirrored
+from ahf_ros.orientation.resection import ALIKE, BOUND, FEWEST_POINTS, Resection, resections
 from ahf_ros.orientation.solution import Start
 from ahf_ros.orientation.triangulation import intersect
 from ahf_ros.orientation.triples import STEPS, Seed, focal_sigma, known_calibrations, seeds
@@ -30,6 +31,9 @@ values stay as good as after each single one, in a quarter of the time."""
 
 LARGEST_FOCAL_SIGMA = 0.03
 """Relative standard deviation beyond which a free focal length is not accepted."""
+
+ONE_MINIMUM = np.radians(0.5)
+"""Networks whose photographs are turned against each other by less are the same."""
 
 WORST = 6.0
 """Robust spread of a photograph, in those of the network, up to which its pose is accepted."""
@@ -52,7 +56,8 @@ def starts(network: Network) -> list[Start]:
         start = _largest(network, views, remaining)
         if start is None:
             break
-        found.append(start)
+        other, excess = reversal(network, start)
+        found.append(other if excess < 0 else start)
         remaining = [index for index in remaining if np.isnan(start.positions[index, 0])]
     return found
 
@@ -60,6 +65,28 @@ def starts(network: Network) -> list[Start]:
 def oriented(start: Start) -> IntArray:
     """Return the indices of photographs that have a pose."""
     return np.flatnonzero(np.isfinite(start.positions[:, 0]))
+
+
+def reversal(network: Network, start: Start) -> tuple[Start, float]:
+    """Return the mirror image of a network, adjusted, and its chi-square less that of the network.
+
+    Infinite where the mirror image does not exist, or is the network itself.
+    """
+    try:
+        other = _adjusted(network, mirrored(start), rounds=15)
+    except (ValueError, np.linalg.LinAlgError):
+        return start, np.inf
+    group = oriented(start)
+    turns, others = (
+        each.rotations[group[1:]] @ each.rotations[group[0]].T for each in (start, other)
+    )
+    cosines = (np.einsum('kij,kij->k', turns, others) - 1) / 2
+    if not np.isfinite(cosines).all() or np.all(cosines > np.cos(ONE_MINIMUM)):
+        return start, np.inf
+    lengths = [np.nan_to_num(lengths_of(network, each), nan=0.0) for each in (start, other)]
+    spread = min(spread_of(each[each > 0]) for each in lengths)
+    costs = [float(np.sum(np.minimum(each / spread, BOUND) ** 2)) for each in lengths]
+    return other, costs[1] - costs[0]
 
 
 def _largest(network: Network, views: Sequence[View], among: Sequence[int]) -> Start | None:

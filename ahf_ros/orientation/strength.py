@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ahf_ros.orientation.calibration import rolled
 from ahf_ros.orientation.network import FloatArray, IntArray
 from ahf_ros.orientation.solution import Solution
 
@@ -18,8 +18,6 @@ FEW_RAYS = 3
 SMALL_ANGLE = math.radians(30)
 """Angle between the outermost rays below which depth is much less certain than the rest."""
 
-_ROLLED = math.radians(60)  # between two photographs, that separate principal point and poses
-_FACING = 0.5  # least cosine between the axes of photographs whose roll is compared
 _FEW_POINTS = 6  # observations, with which a pose has hardly a check
 _COVERED = 0.7  # of the half diagonal, that observations should reach
 _NAMED = 12  # targets or photographs in a line of advice
@@ -126,7 +124,7 @@ def _of_cameras(solution: Solution) -> list[str]:
         taken = (network.camera_of == place) & oriented(solution)
         if view.fixed or not taken.any():
             continue
-        if not _rolled(values.rotations[taken]):
+        if not rolled(values.rotations[taken]):
             advice.append(
                 f'Camera {view.name}: no photograph is rolled by 90 degrees about its axis. Roll '
                 'some, so that the principal point can be determined.'
@@ -141,16 +139,6 @@ def _of_cameras(solution: Solution) -> list[str]:
                 'corners. Fill the images, so that the distortion is known there, too.'
             )
     return advice
-
-
-def _rolled(rotations: FloatArray) -> bool:
-    """Return whether two photographs that look alike are rolled against each other."""
-    for first, second in combinations(rotations, 2):
-        relative = first @ second.T
-        roll = math.atan2(relative[1, 0] - relative[0, 1], relative[0, 0] + relative[1, 1])
-        if relative[2, 2] > _FACING and abs(roll) > _ROLLED:
-            return True
-    return False
 
 
 def _of_scale(solution: Solution) -> list[str]:

@@ -17,7 +17,7 @@ SMALLEST_ANGLE = np.radians(5.0)
 """Rays that meet under less do not determine a point."""
 
 MOST_PAIRS = 24
-"""Pairs of rays a point is tried from: enough where a third of its rays belong to other targets."""
+"""Pairs of rays a point is tried from: enough where a third of its rays are wrong."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Intersection:
 
 
 def directions(rotations: FloatArray, xy: FloatArray) -> FloatArray:
-    """Return unit vectors (n, 3) in the world of rays at normalised `xy` (n, 2) in cameras (n, 3, 3)."""
+    """Return unit rays (n, 3) in the world at normalised `xy` (n, 2) of cameras (n, 3, 3)."""
     rays = np.concatenate([xy, np.ones((len(xy), 1))], axis=1)
     rays = np.einsum('nji,nj->ni', rotations, rays)
     return rays / np.linalg.norm(rays, axis=1, keepdims=True)

@@ -18,6 +18,7 @@ from ahf_ros.orientation.datum import movements
 from ahf_ros.orientation.least_squares import Conditions, normal_equations
 from ahf_ros.orientation.network import FloatArray, Network
 from ahf_ros.orientation.planar import mirrored
+from ahf_ros.orientation.precision import precision
 from ahf_ros.orientation.relative import relative_orientations
 from ahf_ros.orientation.resection import resections
 from ahf_ros.orientation.solution import Start
@@ -300,8 +301,7 @@ def focal_sigma(network: Network, start: Start, free: tuple[str, ...]) -> float:
         return Conditions(rows, np.zeros(7), np.zeros(7))
 
     try:
-        reduced, border = normal_equations(layout, start, datum)
-        covariance = normals.covariance_of_rest(reduced, border)
+        covariance = precision(*normal_equations(layout, start, datum)).rest
     except np.linalg.LinAlgError:
         return np.inf
     variance = covariance[focal, focal]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ahf_ros.orientation import normals
 from ahf_ros.orientation.adjustment import free_parameters
@@ -28,7 +27,7 @@ class View:
     rows: IntArray
 
     def normalised(self, calibrations: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return (n, 2) places in the plane z = 1, zero where the lens has none, and their sigma."""
+        """Return places (n, 2) in the plane z = 1, zero where there is none, and their sigma."""
         calibration = calibrations[self.camera]
         places = undistort(calibration, self.xy)
         lost = ~np.isfinite(places).all(axis=1)
@@ -86,6 +85,6 @@ def lengths_of(network: Network, start: Start) -> FloatArray:
 
 
 def spread_of(lengths: FloatArray) -> float:
-    """Return the robust standard deviation of residuals in units of the given ones, one or more."""
+    """Return the robust spread of residuals in standard deviations, at least one."""
     known = lengths[~np.isnan(lengths)]
     return max(1.0, normals.robust_spread(known)) if len(known) else np.inf

@@ -17,6 +17,7 @@ PICTURE = 300  # px, width of a figure of an image
 CELLS = 12  # columns of the map of a sensor
 NAMED = 150  # targets, above which they have no names in the figures
 _MARGIN = 28
+_NAME = 16, 9  # px, that a name takes
 _ALONE = 0.6  # of the extent of the network, below which targets are shown alone, too
 _ELLIPSE = 0.025  # of the width of a view: size that the median ellipse is enlarged to
 _ARROW = 0.03  # of the width of an image: size that the median residual is enlarged to
@@ -159,6 +160,7 @@ def _view(solution: Solution, axes: FloatArray, with_cameras: bool) -> tuple[str
         forward = solution.start.rotations[index][2] @ axes.T
         parts.append(_camera(place, forward, solution.network.photographs[index]))
     names = [solution.network.targets[index] for index in np.flatnonzero(known)]
+    written: list[tuple[float, float]] = []
     for name, (x, y), ellipse in zip(names, placed(points), ellipses, strict=True):
         major, minor, angle = ellipse
         parts.append(
@@ -167,10 +169,16 @@ def _view(solution: Solution, axes: FloatArray, with_cameras: bool) -> tuple[str
             f'transform="translate({x:.1f} {y:.1f}) rotate({-math.degrees(angle):.1f})"/>'
             f'<circle cx="{x:.1f}" cy="{y:.1f}" r="1.4"/>'
         )
-        if len(names) <= NAMED:
+        if len(names) <= NAMED and all(_apart(x - u, y - v) for u, v in written):
+            written.append((x, y))
             parts.append(f'<text x="{x + 4:.1f}" y="{y - 4:.1f}">{escape(name)}</text>')
         parts.append('</g>')
     return _svg(*VIEW, parts, 'view'), step, enlarged
+
+
+def _apart(across: float, down: float) -> bool:
+    """Return whether two names at this distance, px, can be read."""
+    return abs(across) > _NAME[0] or abs(down) > _NAME[1]
 
 
 def _blocks(solution: Solution, known: np.ndarray) -> Iterator[FloatArray]:

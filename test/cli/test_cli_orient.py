@@ -24,6 +24,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a file of results, in a folder with a calibration, scale bars and control points."""
     folder = tmp_path_factory.mktemp('results')
     lines = [json.dumps(it) for it in records(TRUE.network)]
+    lines.append(json.dumps(json.loads(lines[0]) | {'image': 'empty.jpg', 'targets': []}))
     (folder / 'results.jsonl').write_text('\n'.join(lines))
     camera = ros_yaml('camera', *SIZE, CALIBRATION, np.zeros((10, 10)))
     (folder / 'camera.yaml').write_bytes(camera)
@@ -61,7 +62,15 @@ def test_coordinates_come_from_results_alone(
     np.testing.assert_allclose(found.calibrations[0], CALIBRATION, rtol=1e-6, atol=3e-5)
     told = capsys.readouterr()
     assert told.out == ''
-    for text in ('sigma0', '3 to 4', 'check', 'scale bar 1 to 99 is not used', 'rays a target'):
+    for text in (
+        '8 of 9',
+        'empty.jpg',
+        'sigma0',
+        '3 to 4',
+        'check',
+        'scale bar 1 to 99 is not used',
+        'rays a target',
+    ):
         assert text in told.err
     files = {it.name for it in folder.iterdir()}
     assert files >= {'network.json', 'points.csv', 'report.html', 'poses.csv', 'residuals.csv'}
