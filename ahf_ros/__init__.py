@@ -26,10 +26,13 @@ _MODULES = {
     'Target': 'target',
     'TrueTarget': 'target',
     'UndecodedTarget': 'target',
+    'adjust': 'orientation.adjustment',
+    'compare': 'orientation.congruence',
     'create_detector': 'detectors',
     'create_identifier': 'session',
     'draw': 'drawing.overlay',
     'identify': 'session',
+    'orient': 'orientation.orient',
     'read_image': 'interchange.image_files',
     'render': 'synthetic.scene',
     'score': 'evaluation',
@@ -49,6 +52,9 @@ if TYPE_CHECKING:  # which takes what is imported `as` itself for public
     from ahf_ros.imaging.stack import ImageStack as ImageStack
     from ahf_ros.interchange.image_files import read_image as read_image
     from ahf_ros.interchange.image_files import write_image as write_image
+    from ahf_ros.orientation.adjustment import adjust as adjust
+    from ahf_ros.orientation.congruence import compare as compare
+    from ahf_ros.orientation.orient import orient as orient
     from ahf_ros.session import create_identifier as create_identifier
     from ahf_ros.session import identify as identify
     from ahf_ros.session_settings import IdentificationSettings as IdentificationSettings

@@ -39,10 +39,19 @@ def main(arguments: list[str]) -> int:
     options += ['--quiet', '--fail-on-warning', '--keep-going', f'--conf-dir={ROOT / "docs"}']
     status = sphinx([*options, str(ROOT), str(folder)])
     (folder / 'index.html').write_text(FORWARD)
+    status = status or oriented(folder / 'docs' / 'network_example')
     for page in loading(folder):
         print(f'{page}: loads from another host', file=sys.stderr)
         status = 1
     return status
+
+
+def oriented(folder: Path) -> int:
+    """Orient the example of docs/network.md, and return the exit status."""
+    from ahf_ros.cli import main as ahf
+
+    points, bars = (ROOT / 'docs' / 'examples' / f'panel{it}.csv' for it in ('', '_bars'))
+    return ahf(['orient', str(points), '--scale-bars', str(bars), '-o', str(folder), '--quiet'])
 
 
 def loading(folder: Path) -> list[Path]:

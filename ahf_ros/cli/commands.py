@@ -23,6 +23,15 @@ COMMANDS = {
         'Hand the output of `ahf identify --json` to other photogrammetric software.',
     ),
     'report': ('cli.report', 'Make one page to look at of the output of `ahf identify --json`.'),
+    'orient': (
+        'cli.orient',
+        'Compute coordinates of targets, poses and calibrations from identified targets alone.',
+    ),
+    'measure': (
+        'cli.measure',
+        'Measure distances, deviations from nominal coordinates and length errors in a network.',
+    ),
+    'compare': ('cli.compare', 'Find the targets that moved between two networks.'),
     'learn-family': (
         'cli.learn_family',
         'Learn template, positions and numbers of point-distributed targets from a survey.',

@@ -54,3 +54,8 @@ class Solution:
     redundancy: int
     rejected: tuple[Rejection, ...]
     warnings: tuple[str, ...]
+    scaled: bool = False
+    """Whether covariances are scaled: where the test of the variance of unit weight refuses 1."""
+    backward: bool = False
+    """Whether distortion is a correction at the measured place; see `camera`."""
+    converged: bool = True

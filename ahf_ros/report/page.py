@@ -234,7 +234,7 @@ def write_page(
     images as they are done. The texts that are returned say what is wrong with images. A
     ValueError says so if the file cannot be written, or jinja2 is not installed.
     """
-    template = _template()
+    template = page_template('page.html')
     families = families_of(results)
     rows = []
     empty = [result for result in results if not result.identified][:LOOKED_AT]
@@ -248,7 +248,7 @@ def write_page(
         'doubtfulBelow': settings.doubtful_below,
         'maxSize': settings.max_size,
     }
-    style = (_PAGE / 'style.css').read_text(encoding='utf-8')
+    style = page_style('style.css')
     script = '\n'.join((_PAGE / f'{it}.js').read_text(encoding='utf-8') for it in _SCRIPTS)
     taken = sum(map(len, rows)) + len(style) + len(script)
     limits = _limits(round(1e6 * settings.max_size) - taken, results)
@@ -281,7 +281,13 @@ def write_page(
     return [problems[index] for index in sorted(problems)]
 
 
-def _template() -> Any:
+def page_style(name: str) -> str:
+    """Return the colours of all pages and the styles of one."""
+    return '\n'.join((_PAGE / it).read_text(encoding='utf-8') for it in ('colours.css', name))
+
+
+def page_template(name: str) -> Any:
+    """Return a template of jinja2, or raise a ValueError that says how to install that."""
     try:
         from jinja2 import Environment, FileSystemLoader, StrictUndefined
     except ImportError as error:
@@ -295,7 +301,7 @@ def _template() -> Any:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    return environment.get_template('page.html')
+    return environment.get_template(name)
 
 
 def _advice(result: ImageResult, folders: Sequence[Path]) -> list[str]:

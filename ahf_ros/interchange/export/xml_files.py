@@ -46,7 +46,7 @@ def metashape_files(survey: Survey) -> dict[str, bytes]:
             found = {'camera_id': str(index), 'pinned': 'true', **place}
             SubElement(elements[mark.label], 'location', found)
     script = Path(metashape_console.__file__)
-    return {'markers.xml': _serialised(document), script.name: script.read_bytes()}
+    return {'markers.xml': serialised(document), script.name: script.read_bytes()}
 
 
 def mmvii_files(survey: Survey) -> dict[str, bytes]:
@@ -71,7 +71,7 @@ def mmvii_files(survey: Survey) -> dict[str, bytes]:
             for mark in photograph.marks
         ]
         name = {'NameIm': f'"{photograph.name}"'}
-        files[f'{folder}/MesIm-{photograph.name}.xml'] = _mmvii_file('SetMesIm', name, marks)
+        files[f'{folder}/MesIm-{photograph.name}.xml'] = _measures('SetMesIm', name, marks)
     if survey.control:
         points = [
             {
@@ -82,20 +82,26 @@ def mmvii_files(survey: Survey) -> dict[str, bytes]:
             for label, point in survey.control.items()
         ]
         name = {'NameSet': f'"{NAME}"'}
-        files[f'{folder}/MesGCP-{NAME}.xml'] = _mmvii_file('SetGCP', name, points)
+        files[f'{folder}/MesGCP-{NAME}.xml'] = _measures('SetGCP', name, points)
     return files
 
 
-def _mmvii_file(tag: str, name: dict[str, str], measures: list[dict[str, str]]) -> bytes:
-    """Return a document of MMVII's serialisation."""
-    root = Element('Root')
-    _add_texts(root, {'Type': '"MMVII_Serialization"', 'Version': '"0.0.0"'})
-    content = SubElement(SubElement(root, 'Data'), tag)
+def _measures(tag: str, name: dict[str, str], measures: list[dict[str, str]]) -> bytes:
+    """Return a document of MMVII with a set of measures."""
+    content = Element(tag)
     _add_texts(content, name)
     items = SubElement(content, 'Measures')
     for measure in measures:
         _add_texts(SubElement(items, 'el'), measure)
-    return _serialised(root)
+    return mmvii_file(content)
+
+
+def mmvii_file(content: Element) -> bytes:
+    """Return a document of MMVII's serialisation."""
+    root = Element('Root')
+    _add_texts(root, {'Type': '"MMVII_Serialization"', 'Version': '"0.0.0"'})
+    SubElement(root, 'Data').append(content)
+    return serialised(root)
 
 
 def _add_texts(parent: Element, texts: dict[str, str]) -> None:
@@ -103,7 +109,7 @@ def _add_texts(parent: Element, texts: dict[str, str]) -> None:
         SubElement(parent, tag).text = text
 
 
-def _serialised(root: Element) -> bytes:
+def serialised(root: Element) -> bytes:
     """Return an indented XML document."""
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding='UTF-8', xml_declaration=True) + b'\n'

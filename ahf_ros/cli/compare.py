@@ -1,0 +1,201 @@
+"""`ahf compare`: which targets moved between two epochs."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ahf_ros.cli import tell
+from ahf_ros.cli.options import add_option, add_quiet, parsed_by
+from ahf_ros.cli.tables import decimals, identifiers, print_table
+from ahf_ros.settings.parameter import Parameter
+
+if TYPE_CHECKING:
+    from ahf_ros.orientation.congruence import Comparison
+
+_FORMATS = '.csv', '.svg'
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Give a parser the arguments of the command."""
+    parser.add_argument('first', metavar='EPOCH1', help='Folder that ahf orient wrote.')
+    parser.add_argument('second', metavar='EPOCH2', help='The same, of the later epoch.')
+    parser.add_argument(
+        '-o',
+        '--output',
+        action='append',
+        default=[],
+        type=parsed_by(_output),
+        metavar='FILE',
+        help='Also write the movements: as a table, FILE.csv, or as a picture, FILE.svg. '
+        'Repeatable.',
+    )
+    parser.add_argument(
+        '--stable',
+        type=parsed_by(identifiers),
+        default=(),
+        metavar='ID,ID,...',
+        help='Targets that may have stood still, three or more, and more than half of them did. '
+        'Default: all that are in both epochs.',
+    )
+    parser.add_argument(
+        '--scale',
+        choices=('fixed', 'free'),
+        help='Whether sizes are compared, or shapes only. Default: free where an epoch has no '
+        'scale.',
+    )
+    text = 'Share of epochs without movement that are taken for ones with.'
+    add_option(parser, Parameter('level', 0.05, text, minimum=1e-6, maximum=0.5))
+    parser.add_argument(
+        '--json', action='store_true', help='Print one JSON object on standard output.'
+    )
+    add_quiet(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Compare the epochs, show what moved, and write files."""
+    from ahf_ros.interchange.files import csv_table, write_whole
+    from ahf_ros.interchange.network_results import read_network
+    from ahf_ros.orientation.congruence import compare
+
+    try:
+        epochs = [read_network(path).points for path in (options.first, options.second)]
+        found = compare(
+            *epochs,
+            stable=options.stable,
+            free_scale=None if options.scale is None else options.scale == 'free',
+            level=options.level,
+        )
+        for path in options.output:
+            if path.suffix.lower() == '.csv':
+                write_whole(path, csv_table(_rows(found)))
+            else:
+                from ahf_ros.drawing.movements import movements_figure
+
+                write_whole(path, movements_figure(found).encode())
+    except (ValueError, ModuleNotFoundError) as error:
+        tell('compare', error)
+        return 1
+    if options.json:
+        print(json.dumps(_record(found)))
+    if not options.quiet:
+        _show(found)
+    for warning in found.warnings:
+        tell('compare', warning)
+    return 0
+
+
+def _output(text: str) -> Path:
+    path = Path(text)
+    if path.suffix.lower() not in _FORMATS:
+        raise ValueError(f'{text} has another ending, accepted are {" and ".join(_FORMATS)}')
+    return path
+
+
+def _show(found: Comparison) -> None:
+    """Print tests and movements for people, those that moved first."""
+    unit = found.unit or 'units of the first epoch'
+    tests = [
+        (
+            str(it.targets),
+            f'{it.statistic:.3f}',
+            str(it.rank),
+            str(it.degrees),
+            f'{it.probability:.2g}',
+            f'{it.level:.3g}',
+        )
+        for it in found.tests
+    ]
+    print_table(
+        'Congruence test, ' + ('shape only' if found.free_scale else 'with scale'),
+        ('targets of the datum', 'T', 'rank', 'redundancy', 'probability', 'limit'),
+        tests,
+    )
+    items = sorted(found.movements, key=lambda it: (not it.moved, -it.statistic))
+    digits = decimals(it.sigma for it in items)
+    rows = [
+        (
+            it.name,
+            *(f'{value:+.{digits}f}' for value in it.xyz),
+            f'{it.length:.{digits}f}',
+            f'{it.sigma:.{digits}f}',
+            f'{it.probability:.2g}',
+            'moved' if it.moved else '' if it.in_datum else 'not in the datum',
+        )
+        for it in items
+    ]
+    head = 'target', f'dx, {unit}', 'dy', 'dz', 'length', 'sigma', 'probability', ''
+    print_table('Movements', head, rows)
+    print(_verdict(found), file=sys.stderr)
+
+
+def _verdict(found: Comparison) -> str:
+    if found.moved:
+        return f'moved: {", ".join(found.moved)}'
+    if found.congruent:
+        return 'no target moved, as far as the tests see'
+    return 'the epochs differ, but no target can be named that moved'
+
+
+def _rows(found: Comparison) -> Iterator[list[object]]:
+    """Yield the rows of the table of movements."""
+    yield [
+        *('id', 'x', 'y', 'z', 'dx', 'dy', 'dz', 'length', 'sigma'),
+        *(f'covariance_{it}' for it in ('xx', 'xy', 'xz', 'yy', 'yz', 'zz')),
+        *('statistic', 'probability', 'in_datum', 'moved'),
+    ]
+    for it in found.movements:
+        entries = it.covariance[[0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]]
+        numbers = [*it.place, *it.xyz, it.length, it.sigma, *entries]
+        tests = [f'{it.statistic:.6g}', f'{it.probability:.6g}', int(it.in_datum), int(it.moved)]
+        yield [it.name, *(f'{value:.9g}' for value in numbers), *tests]
+
+
+def _record(found: Comparison) -> dict[str, Any]:
+    """Return what was found as a JSON object."""
+    variances = found.variances
+    return {
+        'congruent': found.congruent,
+        'moved': list(found.moved),
+        'level': found.level,
+        'free_scale': found.free_scale,
+        'unit': found.unit,
+        'variances': {
+            'ratio': variances.ratio,
+            'probability': variances.probability,
+            'equal': variances.equal,
+        },
+        'tests': [
+            {
+                'targets': it.targets,
+                'statistic': it.statistic,
+                'rank': it.rank,
+                'redundancy': it.degrees,
+                'probability': it.probability,
+                'level': it.level,
+            }
+            for it in found.tests
+        ],
+        'movements': [
+            {
+                'id': it.name,
+                'place': it.place.tolist(),
+                'movement': it.xyz.tolist(),
+                'covariance': it.covariance.tolist(),
+                'length': it.length,
+                'sigma': it.sigma,
+                'statistic': it.statistic,
+                'probability': it.probability,
+                'in_datum': it.in_datum,
+                'moved': it.moved,
+            }
+            for it in found.movements
+        ],
+        'only_first': list(found.only_first),
+        'only_second': list(found.only_second),
+        'warnings': list(found.warnings),
+    }

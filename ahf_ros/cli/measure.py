@@ -1,0 +1,317 @@
+"""`ahf measure`: distances, deviations from nominal coordinates, errors of calibrated lengths."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ahf_ros.cli import tell
+from ahf_ros.cli.options import add_quiet, parsed_by
+from ahf_ros.cli.tables import decimals, identifiers, print_table
+
+if TYPE_CHECKING:
+    from ahf_ros.orientation.alignment import Alignment
+    from ahf_ros.orientation.measurement import (
+        Deviation,
+        Distance,
+        LengthError,
+        LengthTest,
+        PermissibleError,
+    )
+    from ahf_ros.orientation.network import FloatArray
+    from ahf_ros.orientation.points import MeasuredPoints
+
+_ALIGNMENTS = 'best-fit', 'similarity', '3-2-1', 'none'
+
+_Measured = tuple[list['Distance'], list['Deviation'], 'LengthTest | None']
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Give a parser the arguments of the command."""
+    parser.add_argument('network', metavar='NETWORK', help='Folder that ahf orient wrote.')
+    parser.add_argument(
+        '--distance',
+        action='append',
+        default=[],
+        type=parsed_by(_pair),
+        metavar='ID,ID',
+        help='Measure the distance of two targets. Repeatable. Default: all distances, if neither '
+        'nominal coordinates nor lengths are given.',
+    )
+    nominal = parser.add_argument_group('nominal coordinates')
+    nominal.add_argument(
+        '--nominal',
+        metavar='POINTS.csv',
+        help='Compare the coordinates with nominal ones: ID, x, y, z.',
+    )
+    nominal.add_argument(
+        '--align',
+        choices=_ALIGNMENTS,
+        help='How: best-fit, rigid; similarity, with a scale; 3-2-1; or none, if both are in one '
+        'frame. Default: best-fit, or similarity where the network has no scale.',
+    )
+    nominal.add_argument(
+        '--align-on',
+        type=parsed_by(identifiers),
+        default=(),
+        metavar='ID,ID,...',
+        help='Targets of the alignment. For 3-2-1 these are three across z, two across y, one '
+        'along x; or only three: a plane, the first two a line, the first one a point. '
+        'Default: all.',
+    )
+    nominal.add_argument(
+        '--weights',
+        choices=('covariance', 'equal'),
+        help='Weights of a best fit. Default: covariance, the inverse of the whole of it.',
+    )
+    lengths = parser.add_argument_group('calibrated lengths')
+    lengths.add_argument(
+        '--lengths',
+        metavar='LENGTHS.csv',
+        help='Test calibrated lengths as VDI/VDE 2634-1 does: id_1, id_2, length, and perhaps '
+        'sigma and line.',
+    )
+    lengths.add_argument(
+        '--permissible',
+        type=parsed_by(_permissible),
+        metavar='A[,K[,B]]',
+        help='Maximum permissible error of a length L: A + L/K, and not above B.',
+    )
+    parser.add_argument(
+        '-o',
+        '--output',
+        type=Path,
+        metavar='DIR',
+        help='Also write tables: distances.csv, deviations.csv, lengths.csv.',
+    )
+    parser.add_argument(
+        '--json', action='store_true', help='Print one JSON object on standard output.'
+    )
+    add_quiet(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Measure, and return 1 if a file cannot be used or a length error is not permissible."""
+    from ahf_ros.interchange.network_results import read_network
+
+    _check(options)
+    try:
+        points = read_network(options.network).points
+        found = _measured(options, points)
+        if options.output:
+            _write(options.output, *found)
+    except (ValueError, ModuleNotFoundError) as error:
+        tell('measure', error)
+        return 1
+    if options.json:
+        print(json.dumps(_record(points, *found)))
+    if not options.quiet:
+        _show(points, *found)
+    lengths = found[2]
+    for remark in lengths.remarks if lengths else ():
+        tell('measure', remark)
+    return int(lengths is not None and lengths.passed is False)
+
+
+def _check(options: argparse.Namespace) -> None:
+    """Raise a ValueError if options need another one that is not given."""
+    for name in ('align', 'align_on', 'weights'):
+        if getattr(options, name) and not options.nominal:
+            raise ValueError(f'{name} is given without nominal, accepted is both')
+    if options.permissible and not options.lengths:
+        raise ValueError('permissible is given without lengths, accepted is both')
+    if options.weights and options.align in ('3-2-1', 'none'):
+        raise ValueError(f'weights is given with {options.align}, accepted is a best fit')
+    if options.align == '3-2-1' and len(options.align_on) not in (3, 6):
+        raise ValueError(f'align_on has {len(options.align_on)} IDs, accepted are three or six')
+    if options.align == 'none' and options.align_on:
+        raise ValueError('align_on is given with none, accepted is an alignment')
+
+
+def _measured(options: argparse.Namespace, points: MeasuredPoints) -> _Measured:
+    """Return distances, deviations and the test of lengths, as far as they are asked for."""
+    from ahf_ros.interchange.length_files import read_lengths
+    from ahf_ros.interchange.point_lists import read_point_list
+    from ahf_ros.orientation.measurement import deviations, distances, length_errors
+
+    far: list[Distance] = []
+    if options.distance or not (options.nominal or options.lengths):
+        far = distances(points, options.distance or None)
+    off: list[Deviation] = []
+    if options.nominal:
+        nominal = read_point_list(options.nominal)
+        off = deviations(_aligned(options, points, nominal), nominal)
+    test = None
+    if options.lengths:
+        test = length_errors(points, read_lengths(options.lengths), options.permissible)
+    return far, off, test
+
+
+def _aligned(
+    options: argparse.Namespace, points: MeasuredPoints, nominal: dict[str, FloatArray]
+) -> Alignment:
+    from ahf_ros.orientation.alignment import best_fit, three_two_one, unaligned
+
+    kind = options.align or ('best-fit' if points.unit else 'similarity')
+    if kind == 'none':
+        return unaligned(points)
+    names = options.align_on
+    if kind == '3-2-1':
+        if len(names) == 3:
+            names = (*names, *names[:2], names[0])
+        return three_two_one(points, nominal, plane=names[:3], line=names[3:5], point=names[5])
+    return best_fit(
+        points,
+        nominal,
+        on=names,
+        scale=kind == 'similarity',
+        weights='equal' if options.weights == 'equal' else 'covariance',
+    )
+
+
+def _pair(text: str) -> tuple[str, str]:
+    names = identifiers(text)
+    if len(names) != 2:
+        raise ValueError(f'{text!r} is {len(names)} IDs, accepted are two')
+    return names[0], names[1]
+
+
+def _permissible(text: str) -> PermissibleError:
+    from ahf_ros.orientation.measurement import PermissibleError
+
+    try:
+        numbers = [float(it) for it in text.split(',')]
+    except ValueError:
+        numbers = []
+    if not 1 <= len(numbers) <= 3:
+        raise ValueError(f'{text!r} is no permissible error, accepted is A, A,K or A,K,B')
+    return PermissibleError(*numbers)
+
+
+def _show(
+    points: MeasuredPoints,
+    far: Sequence[Distance],
+    off: Sequence[Deviation],
+    test: LengthTest | None,
+) -> None:
+    """Print what was measured for people."""
+    unit = f', {points.unit}' if points.unit else ', no scale'
+    if far:
+        digits = decimals(it.sigma for it in far)
+        rows = [
+            (' to '.join(it.ends), f'{it.length:.{digits}f}', f'{it.sigma:.{digits}f}')
+            for it in far
+        ]
+        print_table('Distances', ('targets', f'distance{unit}', 'sigma'), rows)
+    if off:
+        digits = decimals(value for it in off for value in it.sigmas)
+        axes = f'dx{unit}', 'dy', 'dz'
+        print_table(
+            'Measured minus nominal',
+            ('target', *axes, 'distance', 'sigma x', 'y', 'z', ''),
+            [
+                (
+                    it.name,
+                    *(f'{value:+.{digits}f}' for value in it.xyz),
+                    f'{it.distance:.{digits}f}',
+                    *(f'{value:.{digits}f}' for value in it.sigmas),
+                    'aligned' if it.used else '',
+                )
+                for it in off
+            ],
+        )
+    if test:
+        digits = decimals(it.sigma for it in test.errors)
+        head = 'targets', 'line', f'calibrated{unit}', 'error', 'sigma', 'permissible', ''
+        print_table('Length errors', head, [_length_row(it, digits) for it in test.errors])
+        largest, passed = test.largest, test.passed
+        text = f'largest length error: {largest.error:+.4g} {points.unit}'
+        if passed is not None:
+            text += ', all are permissible' if passed else ', NOT all are permissible'
+        print(text, file=sys.stderr)
+
+
+def _length_row(it: LengthError, digits: int) -> tuple[str, ...]:
+    return (
+        ' to '.join(it.ends),
+        it.line,
+        f'{it.calibrated:.{digits}f}',
+        f'{it.error:+.{digits}f}',
+        f'{it.sigma:.{digits}f}',
+        '' if it.permissible is None else f'{it.permissible:.{digits}f}',
+        'too large' if it.within is False else '',
+    )
+
+
+def _write(
+    folder: Path, far: Sequence[Distance], off: Sequence[Deviation], test: LengthTest | None
+) -> None:
+    """Write the tables of what was measured."""
+    from ahf_ros.interchange.files import csv_table, write_whole
+
+    tables: dict[str, list[list[object]]] = {}
+    if far:
+        tables['distances'] = [['id_1', 'id_2', 'distance', 'sigma']]
+        tables['distances'] += [[*it.ends, f'{it.length:.9g}', f'{it.sigma:.6g}'] for it in far]
+    if off:
+        sigmas = ['sigma_x', 'sigma_y', 'sigma_z']
+        tables['deviations'] = [['id', 'dx', 'dy', 'dz', 'distance', *sigmas, 'aligned']]
+        for item in off:
+            numbers = [*item.xyz, item.distance, *item.sigmas]
+            cells = [f'{value:.9g}' for value in numbers]
+            tables['deviations'].append([item.name, *cells, int(item.used)])
+    if test:
+        head = ['id_1', 'id_2', 'line', 'calibrated', 'measured', 'error', 'sigma', 'permissible']
+        tables['lengths'] = [[*head]]
+        for it in test.errors:
+            numbers = [it.calibrated, it.measured, it.error, it.sigma]
+            limit = '' if it.permissible is None else f'{it.permissible:.9g}'
+            cells = [f'{value:.9g}' for value in numbers]
+            tables['lengths'].append([*it.ends, it.line, *cells, limit])
+    for name, rows in tables.items():
+        write_whole(folder / f'{name}.csv', csv_table(rows))
+
+
+def _record(
+    points: MeasuredPoints,
+    far: Sequence[Distance],
+    off: Sequence[Deviation],
+    test: LengthTest | None,
+) -> dict[str, Any]:
+    """Return what was measured as a JSON object."""
+    record: dict[str, Any] = {'unit': points.unit}
+    if far:
+        record['distances'] = [
+            {'ids': list(it.ends), 'distance': it.length, 'sigma': it.sigma} for it in far
+        ]
+    if off:
+        record['deviations'] = [
+            {
+                'id': it.name,
+                'deviation': it.xyz.tolist(),
+                'covariance': it.covariance.tolist(),
+                'distance': it.distance,
+                'aligned': it.used,
+            }
+            for it in off
+        ]
+    if test:
+        record['lengths'] = [
+            {
+                'ids': list(it.ends),
+                'line': it.line,
+                'calibrated': it.calibrated,
+                'measured': it.measured,
+                'error': it.error,
+                'sigma': it.sigma,
+                'permissible': it.permissible,
+                'within': it.within,
+            }
+            for it in test.errors
+        ]
+        record['remarks'] = list(test.remarks)
+    return record

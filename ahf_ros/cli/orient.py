@@ -1,0 +1,290 @@
+"""`ahf orient`: coordinates of targets, poses and calibrations from identified targets alone.
+
+What computes is imported where it is used, so that `ahf orient --help` is fast.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ahf_ros.cli import tell
+from ahf_ros.cli.options import add_option, add_quiet, parsed_by
+from ahf_ros.settings.parameter import Parameter
+
+if TYPE_CHECKING:
+    from ahf_ros.interchange.exif import Exif
+    from ahf_ros.interchange.network_cameras import CameraKnowledge
+    from ahf_ros.interchange.observation_files import ObservedPhotograph
+    from ahf_ros.orientation.network import Network
+    from ahf_ros.orientation.solution import Solution
+
+REPORT_FILE = 'report.html'
+
+_LENGTH = re.compile(r'(?P<number>[0-9.]+(e[+-]?[0-9]+)?) *(?P<unit>px|mm)?', re.IGNORECASE)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Give a parser the arguments of the command."""
+    parser.add_argument(
+        'observations',
+        metavar='RESULTS.jsonl',
+        help='Output of ahf identify --json, - is standard input; or a table of another program '
+        'that ends with .csv: image, id, x, y, and perhaps sigma, width and height.',
+    )
+    parser.add_argument(
+        '-o', '--output', type=Path, required=True, metavar='DIR', help='Folder to write.'
+    )
+    _add_camera_arguments(parser.add_argument_group('cameras'))
+    _add_object_arguments(parser.add_argument_group('object'))
+    _add_observation_arguments(parser.add_argument_group('observations'))
+    parser.add_argument(
+        '--export',
+        action='append',
+        default=[],
+        type=parsed_by(_export),
+        metavar='FORMAT=DIR',
+        help='Also write cameras, poses and targets for other software: colmap, metashape or '
+        'mmvii. Repeatable.',
+    )
+    add_quiet(parser)
+
+
+def _add_camera_arguments(group: argparse._ArgumentGroup) -> None:
+    group.add_argument(
+        '--calibration',
+        action='append',
+        default=[],
+        metavar='CAMERA.yaml',
+        help='Calibration of a camera, as ROS (camera_info) or OpenCV write it. Repeatable.',
+    )
+    group.add_argument(
+        '--adjust-calibration',
+        action='store_true',
+        help='Adjust given calibrations, too; without this they are kept as they are.',
+    )
+    group.add_argument(
+        '--focal-length',
+        type=parsed_by(_focal_length),
+        metavar='LENGTH',
+        help='Start value of the focal length: 3200px, or 35mm as its equivalent on film, by the '
+        'diagonal. Without it, Exif data are used, and nothing where there are none.',
+    )
+    group.add_argument(
+        '--cameras',
+        metavar='CAMERAS.csv',
+        help='Which camera took which photograph: image, camera. Without it, photographs of one '
+        'size, and one camera and focal length in their Exif data, are of one camera.',
+    )
+    group.add_argument(
+        '--images',
+        type=Path,
+        action='append',
+        default=[],
+        metavar='DIR',
+        help='Folder that the photographs have moved to; their Exif data are read. Repeatable.',
+    )
+
+
+def _add_object_arguments(group: argparse._ArgumentGroup) -> None:
+    group.add_argument(
+        '--scale-bars',
+        metavar='BARS.csv',
+        help='Known distances: id_1, id_2, length, sigma, and perhaps role, control or check.',
+    )
+    group.add_argument(
+        '--control',
+        metavar='POINTS.csv',
+        help='Known coordinates: id, x, y, z, and perhaps sigma_x, sigma_y, sigma_z or '
+        'covariance_xx to covariance_zz, and role, control or check.',
+    )
+    text = 'Standard deviation of control points where the table has none; 0 fixes them.'
+    add_option(group, Parameter('control_sigma', 0.0, text, minimum=0.0))
+    add_option(group, Parameter('unit', 'mm', 'Unit of scale bars and control points.'))
+    group.add_argument(
+        '--datum',
+        type=parsed_by(_datum),
+        metavar='DATUM',
+        help='Frame of the coordinates: inner (constraints on all targets) or inner:ID,ID,...; '
+        'control; fixed:ID,ID,ID (origin, x axis, plane z = 0). Default: control if there are '
+        'control points, else inner.',
+    )
+
+
+def _add_observation_arguments(group: argparse._ArgumentGroup) -> None:
+    text = 'Standard deviation of coordinates of image points without covariance, px.'
+    add_option(group, Parameter('sigma', 0.1, text, minimum=1e-4, maximum=100.0))
+    text = (
+        'Coordinates that a table has at the centre of the first pixel, px: 0, or 0.5 where '
+        '(0, 0) is the corner of the image.'
+    )
+    add_option(group, Parameter('origin', 0.0, text, minimum=0.0, maximum=1.0))
+
+
+def _focal_length(text: str) -> tuple[float, str]:
+    match = _LENGTH.fullmatch(text.strip())
+    with suppress(ValueError):
+        if match and float(match['number']) > 0:
+            return float(match['number']), (match['unit'] or 'px').lower()
+    raise ValueError(f'focal_length is {text!r}, accepted is a length such as 3200px or 35mm')
+
+
+def _datum(text: str) -> tuple[str, tuple[str, ...]]:
+    kind, _, names = text.partition(':')
+    targets = tuple(name.strip() for name in names.split(',') if name.strip())
+    accepted = {'inner': True, 'control': not targets, 'fixed': len(targets) in (0, 3)}
+    if not accepted.get(kind, False):
+        raise ValueError(
+            f'datum is {text!r}, accepted is inner, inner:ID,ID,..., control, fixed or '
+            'fixed:ID,ID,ID'
+        )
+    return kind, targets
+
+
+def _export(text: str) -> tuple[str, Path]:
+    from ahf_ros.interchange.export.networks import NETWORK_FORMATS
+
+    name, _, folder = text.partition('=')
+    if name not in NETWORK_FORMATS or not folder:
+        raise ValueError(
+            f'export is {text!r}, accepted is FORMAT=DIR with a format of '
+            f'{", ".join(NETWORK_FORMATS)}'
+        )
+    return name, Path(folder)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Orient the photographs, and write each group of them that hangs together."""
+    try:
+        network, notes = _network(options)
+        solutions = _oriented(network, options)
+        if not solutions:
+            raise ValueError('no photograph could be oriented')
+    except ValueError as error:
+        tell('orient', error)
+        return 1
+    solutions = [
+        replace(it, warnings=(*notes, *_of_groups(solutions, number), *it.warnings))
+        for number, it in enumerate(solutions)
+    ]
+    written = [_write(it, number, options) for number, it in enumerate(solutions)]
+    return int(not all(written))
+
+
+def _network(options: argparse.Namespace) -> tuple[Network, list[str]]:
+    """Return the network that the options describe, and notes for the user."""
+    from ahf_ros.interchange.control_files import read_control, read_scale_bars
+    from ahf_ros.interchange.network_files import make_network
+    from ahf_ros.interchange.observation_files import read_observations
+
+    photographs = read_observations(options.observations, options.origin)
+    return make_network(
+        photographs,
+        _cameras(photographs, options),
+        read_scale_bars(options.scale_bars) if options.scale_bars else (),
+        read_control(options.control, options.control_sigma) if options.control else (),
+        unit=options.unit,
+        sigma=options.sigma,
+    )
+
+
+def _cameras(
+    photographs: Sequence[ObservedPhotograph], options: argparse.Namespace
+) -> CameraKnowledge:
+    from ahf_ros.interchange.camera_files import read_camera
+    from ahf_ros.interchange.network_cameras import CameraKnowledge, read_cameras
+
+    exif, sizes = _noted(photographs, options)
+    return CameraKnowledge(
+        names=read_cameras(options.cameras) if options.cameras else {},
+        exif=exif,
+        sizes=sizes,
+        calibrations=[read_camera(path) for path in options.calibration],
+        adjusted=options.adjust_calibration,
+        focal_length=_in_px(options.focal_length),
+    )
+
+
+def _noted(
+    photographs: Sequence[ObservedPhotograph], options: argparse.Namespace
+) -> tuple[dict[str, Exif], dict[str, tuple[int, int]]]:
+    """Return Exif data and sizes of the photographs that are at hand."""
+    from ahf_ros.interchange.exif import read_exif
+    from ahf_ros.report.images import find_image
+
+    exif, sizes = {}, {}
+    source = Path(options.observations)
+    for photograph in photographs:
+        with suppress(ValueError):  # what is not there, or no image, says nothing
+            path = find_image(photograph.path, source, options.images)
+            found, size = read_exif(path)
+            exif[photograph.path] = found
+            if all(size):
+                sizes[photograph.path] = size
+    return exif, sizes
+
+
+def _in_px(length: tuple[float, str] | None) -> Callable[[int, int], float] | None:
+    if length is None:
+        return None
+    from ahf_ros.interchange.exif import equivalent_in_px
+
+    number, unit = length
+    if unit == 'px':
+        return lambda width, height: number
+    return lambda width, height: equivalent_in_px(number, width, height)
+
+
+def _oriented(network: Network, options: argparse.Namespace) -> list[Solution]:
+    from ahf_ros.orientation.datum import Datum
+    from ahf_ros.orientation.orient import orient
+
+    return orient(network, datum=Datum(*options.datum) if options.datum else Datum())
+
+
+def _of_groups(solutions: Sequence[Solution], number: int) -> tuple[str, ...]:
+    """Return what a group is told of the others."""
+    if len(solutions) == 1:
+        return ()
+    return (
+        f'group {number + 1} of {len(solutions)} that have too few targets in common, each in a '
+        'frame of its own',
+    )
+
+
+def _write(solution: Solution, number: int, options: argparse.Namespace) -> bool:
+    """Write a network and its exports, print what was found, and return whether all is written."""
+    from ahf_ros.cli.network_table import print_network
+    from ahf_ros.interchange.export.networks import write_network_export
+    from ahf_ros.interchange.network_results import write_network
+    from ahf_ros.report.network_page import write_network_page
+
+    def folder_in(place: Path) -> Path:
+        return place / f'group_{number + 1}' if number else place
+
+    folder = folder_in(options.output)
+    title = Path(options.observations).name
+    steps: list[Callable[[], object]] = [
+        partial(write_network, folder, solution),
+        partial(write_network_page, folder / REPORT_FILE, solution, title),
+        *(
+            partial(write_network_export, name, folder_in(place), solution)
+            for name, place in options.export
+        ),
+    ]
+    written = True
+    for step in steps:
+        try:
+            step()
+        except ValueError as error:
+            tell('orient', error)
+            written = False
+    if not options.quiet:
+        print_network(solution, str(folder))
+    return written

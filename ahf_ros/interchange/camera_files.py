@@ -1,0 +1,221 @@
+"""Calibrations of cameras as YAML, as ROS and as OpenCV write them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from ahf_ros.interchange.files import read_text
+from ahf_ros.orientation.camera import PARAMETERS
+from ahf_ros.orientation.network import FloatArray
+from ahf_ros.text import reason_of, shown
+
+BROWN = ('', 'plumb_bob', 'rational_polynomial')
+"""Models of distortion that are read; of the last one, only without a denominator."""
+
+_COEFFICIENTS = ('k1', 'k2', 'p1', 'p2', 'k3')  # in the order of ROS and OpenCV
+_NAMES: Mapping[str, Sequence[str]] = {
+    'width': ('image_width', 'width'),
+    'height': ('image_height', 'height'),
+    'matrix': ('camera_matrix', 'Camera_Matrix', 'K', 'k'),
+    'distortion': ('distortion_coefficients', 'Distortion_Coefficients', 'D', 'd'),
+}
+"""What files call a field: those of ROS, and those of OpenCV's samples."""
+
+
+@dataclass(frozen=True)
+class CameraFile:
+    """A calibration in the order of `PARAMETERS`, and the size of its images in px."""
+
+    path: str
+    name: str
+    width: int
+    height: int
+    calibration: FloatArray
+
+    def check(self, image: str, width: int, height: int) -> None:
+        """Raise a ValueError that names both sizes if an image has another one."""
+        if (width, height) == (self.width, self.height):
+            return
+        turned = ''
+        if (height, width) == (self.width, self.height):
+            turned = '; portrait and landscape differ: identify without --upright'
+        raise ValueError(
+            f'{self.path} is of images of {self.width} x {self.height} px, {image} has '
+            f'{width} x {height} px, accepted is the same size{turned}'
+        )
+
+
+def read_camera(path: str | Path) -> CameraFile:
+    """Return the calibration in a file of ROS (camera_info) or of OpenCV (FileStorage).
+
+    A ValueError names the file, and the field that is missing, damaged or of another model.
+    """
+    content = _parsed(read_text(path), str(path))
+    width, height = (_whole(content, name, path) for name in ('width', 'height'))
+    matrix = _numbers(content, 'matrix', path)
+    distortion = _numbers(content, 'distortion', path, required=False)
+    if len(matrix) != 9:
+        raise ValueError(f'{path}: camera_matrix has {len(matrix)} numbers, accepted are 9')
+    fx, shear, cx, _, fy, cy = matrix[:6]
+    if not (fx > 0 and fy > 0):
+        raise ValueError(
+            f'{path}: camera_matrix has the focal lengths {fx:g} and {fy:g}, accepted are numbers '
+            'above 0'
+        )
+    model = content.get('distortion_model') or ''
+    if model not in BROWN:
+        raise ValueError(
+            f"{path}: distortion_model is {shown(model)}, accepted is plumb_bob, Brown's"
+        )
+    if len(distortion) not in (0, 4, 5, 8, 12, 14) or any(distortion[5:]):
+        raise ValueError(
+            f'{path}: distortion_coefficients are {distortion}, accepted are 4 or 5 numbers: '
+            'k1, k2, p1, p2, k3'
+        )
+    value = dict.fromkeys(PARAMETERS, 0.0) | {'f': fy, 'cx': cx, 'cy': cy}
+    value |= dict(zip(_COEFFICIENTS, distortion, strict=False))
+    value |= {'affinity': fx / fy - 1, 'shear': shear / fy}
+    name = content.get('camera_name') or Path(path).stem
+    calibration = np.array([value[it] for it in PARAMETERS])
+    return CameraFile(str(path), str(name), width, height, calibration)
+
+
+def ros_yaml(
+    name: str, width: int, height: int, calibration: FloatArray, covariance: FloatArray
+) -> bytes:
+    """Return a calibration as ROS' camera_calibration_parsers read it.
+
+    Standard deviations and correlations of the parameters follow, which those leave alone. ROS
+    has no shear: it is dropped.
+    """
+    matrix, distortion = _opencv(calibration)
+    rows = [
+        f'image_width: {width}',
+        f'image_height: {height}',
+        f'camera_name: {_quoted(name)}',
+        _ros_matrix('camera_matrix', matrix),
+        'distortion_model: plumb_bob',
+        _ros_matrix('distortion_coefficients', distortion[None]),
+        _ros_matrix('rectification_matrix', np.eye(3)),
+        _ros_matrix('projection_matrix', np.column_stack((matrix, np.zeros(3)))),
+        f'parameters: [{", ".join(PARAMETERS)}]',
+        _ros_matrix('standard_deviations', _deviations(covariance)[None]),
+        _ros_matrix('correlations', _correlations(covariance)),
+    ]
+    return ('\n'.join(rows) + '\n').encode()
+
+
+def opencv_yaml(
+    name: str, width: int, height: int, calibration: FloatArray, covariance: FloatArray
+) -> bytes:
+    """Return a calibration as cv2.FileStorage reads it, with the same fields as `ros_yaml`."""
+    matrix, distortion = _opencv(calibration)
+    rows = [
+        '%YAML:1.0',
+        '---',
+        f'image_width: {width}',
+        f'image_height: {height}',
+        f'camera_name: {_quoted(name)}',
+        _opencv_matrix('camera_matrix', matrix),
+        _opencv_matrix('distortion_coefficients', distortion[None]),
+        f'parameters: [ {", ".join(PARAMETERS)} ]',
+        _opencv_matrix('standard_deviations', _deviations(covariance)[None]),
+        _opencv_matrix('correlations', _correlations(covariance)),
+    ]
+    return ('\n'.join(rows) + '\n').encode()
+
+
+def _opencv(calibration: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return camera matrix and distortion (5,) without the shear, which OpenCV does not have."""
+    value = dict(zip(PARAMETERS, calibration, strict=True))
+    f = value['f']
+    matrix = np.array(
+        [[f * (1 + value['affinity']), 0, value['cx']], [0, f, value['cy']], [0, 0, 1]]
+    )
+    return matrix, np.array([value[it] for it in _COEFFICIENTS])
+
+
+def _deviations(covariance: FloatArray) -> FloatArray:
+    return np.sqrt(np.maximum(np.diag(covariance), 0))
+
+
+def _correlations(covariance: FloatArray) -> FloatArray:
+    """Return correlations, those of parameters that were kept fixed as 0."""
+    sigma = _deviations(covariance)
+    free = np.where(sigma > 0, sigma, 1)
+    return np.where(np.eye(len(sigma), dtype=bool), 1, covariance / np.multiply.outer(free, free))
+
+
+def _listed(matrix: FloatArray) -> str:
+    return ', '.join(f'{value:.12g}' if value % 1 else f'{value:.1f}' for value in matrix.ravel())
+
+
+def _ros_matrix(name: str, matrix: FloatArray) -> str:
+    rows, columns = matrix.shape
+    return f'{name}:\n  rows: {rows}\n  cols: {columns}\n  data: [{_listed(matrix)}]'
+
+
+def _opencv_matrix(name: str, matrix: FloatArray) -> str:
+    rows, columns = matrix.shape
+    return (
+        f'{name}: !!opencv-matrix\n   rows: {rows}\n   cols: {columns}\n   dt: d\n'
+        f'   data: [ {_listed(matrix)} ]'
+    )
+
+
+def _quoted(name: str) -> str:
+    escaped = name.replace('\\', '\\\\').replace('"', '\\"')
+    return f'"{escaped}"'
+
+
+def _parsed(text: str, path: str) -> dict[str, Any]:
+    """Return the mapping in YAML of ROS or of OpenCV, whose first line is no YAML."""
+    lines = text.splitlines()
+    if lines and lines[0].startswith('%YAML'):
+        lines[0] = ''
+    text = '\n'.join(lines).replace('!!opencv-matrix', '')
+    try:
+        content = YAML(typ='safe', pure=True).load(text)
+    except (YAMLError, ValueError) as error:
+        raise ValueError(f'{path} is not YAML: {reason_of(error)}') from error
+    if not isinstance(content, dict):
+        raise ValueError(f'{path} has no fields, accepted is a calibration of ROS or OpenCV')
+    return content
+
+
+def _field(content: dict[str, Any], name: str) -> Any:
+    return next((content[it] for it in _NAMES[name] if it in content), None)
+
+
+def _whole(content: dict[str, Any], name: str, path: str | Path) -> int:
+    value = _field(content, name)
+    if isinstance(value, bool) or not isinstance(value, int) or value < 1:
+        raise ValueError(
+            f'{path}: image_{name} is {shown(value)}, accepted is the size of the images in px'
+        )
+    return value
+
+
+def _numbers(
+    content: dict[str, Any], name: str, path: str | Path, required: bool = True
+) -> list[float]:
+    """Return the numbers of a matrix, row after row."""
+    value = _field(content, name)
+    if value is None and not required:
+        return []
+    found = value.get('data') if isinstance(value, dict) else value
+    rows = found if isinstance(found, list) else [math.nan]
+    flat = [it for row in rows for it in (row if isinstance(row, list) else [row])]
+    if not all(type(it) in (int, float) and math.isfinite(it) for it in flat):
+        raise ValueError(
+            f'{path}: {_NAMES[name][0]} is {shown(found)}, accepted are finite numbers'
+        )
+    return [float(it) for it in flat]

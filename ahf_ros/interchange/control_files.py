@@ -1,0 +1,70 @@
+"""Known lengths and known coordinates: scale bars and control points as tables."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ahf_ros.interchange.tables import Row, one_of, read_table
+from ahf_ros.orientation.network import ControlPoint, FloatArray, ScaleBar
+
+ROLES = ('control', 'check')
+_SIGMAS = ('sigma_x', 'sigma_y', 'sigma_z')
+_ENTRIES = tuple(f'covariance_{it}' for it in ('xx', 'xy', 'xz', 'yy', 'yz', 'zz'))
+_MIXED = tuple(f'covariance_{it}' for it in ('xy', 'xz', 'yz'))  # beside sigmas, as in points.csv
+
+
+def read_scale_bars(path: str | Path) -> tuple[ScaleBar, ...]:
+    """Return scale bars from a table with id_1, id_2, length, sigma and, perhaps, role."""
+    _, rows = read_table(path, ('id_1', 'id_2', 'length', 'sigma'))
+    bars = []
+    for row in rows:
+        ends = row.text('id_1'), row.text('id_2')
+        if ends[0] == ends[1]:
+            raise ValueError(f'{row.where}: both ends are {ends[0]}, accepted are two targets')
+        check = row.choice('role', ROLES, 'control') == 'check'
+        bars.append(ScaleBar(ends, row.positive('length'), row.positive('sigma'), check))
+    return tuple(bars)
+
+
+def read_control(path: str | Path, sigma: float = 0.0) -> tuple[ControlPoint, ...]:
+    """Return control points from a table with id, x, y, z and, perhaps, role.
+
+    Their precision is in sigma_x, sigma_y, sigma_z, perhaps with covariance_xy, covariance_xz,
+    covariance_yz as in our points.csv, or in covariance_xx to covariance_zz. `sigma` counts where
+    the table says nothing; 0 fixes a point.
+    """
+    columns, rows = read_table(path, ('id', 'x', 'y', 'z'))
+    whole = 'covariance_xx' in columns
+    group = one_of(path, columns, [_SIGMAS, _ENTRIES if whole else ('covariance_xx',)])
+    points: dict[str, ControlPoint] = {}
+    for row in rows:
+        name = row.text('id')
+        if name in points:
+            raise ValueError(f'{row.where}: {name} is there twice, accepted is one row a point')
+        covariance = _covariance(row, group, sigma)
+        smallest = np.linalg.eigvalsh(covariance)[0]
+        if smallest < -1e-9 * np.abs(covariance).max():
+            raise ValueError(
+                f'{row.where}: the covariance has the eigenvalue {smallest:.3g}, accepted is none '
+                'below 0'
+            )
+        xyz = np.array([row.number(axis) for axis in 'xyz'])
+        check = row.choice('role', ROLES, 'control') == 'check'
+        points[name] = ControlPoint(name, xyz, covariance, check)
+    return tuple(points.values())
+
+
+def _covariance(row: Row, group: int, sigma: float) -> FloatArray:
+    """Return the covariance of a control point by the columns that the table has."""
+    covariance = sigma**2 * np.eye(3)
+    if group == 0:
+        covariance = np.diag([row.number(name, 0) ** 2 for name in _SIGMAS])
+        if all(name in row.cells for name in _MIXED):
+            covariance[np.triu_indices(3, 1)] = [row.number(name) for name in _MIXED]
+    elif group == 1:
+        covariance[np.triu_indices(3)] = [row.number(name) for name in _ENTRIES]
+    upper = np.triu(covariance, 1)
+    complete: FloatArray = np.diag(np.diag(covariance)) + upper + upper.T
+    return complete

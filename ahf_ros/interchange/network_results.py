@@ -1,0 +1,356 @@
+"""Adjusted networks as files: network.json, points.csv and the covariance of all points."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import zipfile
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ahf_ros.interchange.files import csv_table, read_bytes, read_text, write_whole
+from ahf_ros.interchange.network_tables import calibration_files, tables
+from ahf_ros.interchange.target_json import parsed_json
+from ahf_ros.orientation.camera import PARAMETERS
+from ahf_ros.orientation.network import FloatArray, IntArray, Rejection
+from ahf_ros.orientation.points import MeasuredPoints
+from ahf_ros.orientation.solution import Solution
+from ahf_ros.orientation.strength import oriented, rays_of
+from ahf_ros.text import shown
+
+NETWORK_FILE = 'network.json'
+POINTS_FILE = 'points.csv'
+COVARIANCE_FILE = 'covariance_of_points.npz'
+
+DISTORTION = ('k1', 'k2', 'k3', 'p1', 'p2', 'shear')
+"""Parameters of a lens in network.json; its affinity is that of fx to fy."""
+
+
+@dataclass(frozen=True)
+class CameraSize:
+    """Name of a camera, and width and height of its images, px."""
+
+    name: str
+    width: int
+    height: int
+
+
+@dataclass(frozen=True)
+class OrientedNetwork:
+    """What `read_network` reads: measured points, and the cameras and photographs behind them.
+
+    Arrays are as those of `ahf_ros.orientation.solution.Solution`, of oriented photographs only.
+    """
+
+    points: MeasuredPoints
+    rays: IntArray
+    cameras: tuple[CameraSize, ...]
+    calibrations: FloatArray
+    camera_covariances: tuple[FloatArray, ...]
+    photographs: tuple[str, ...]
+    camera_of: IntArray
+    rotations: FloatArray
+    positions: FloatArray
+    pose_covariances: FloatArray
+    rejected: tuple[Rejection, ...]
+    warnings: tuple[str, ...]
+
+
+def measured_points(solution: Solution) -> MeasuredPoints:
+    """Return the targets that an adjusted network determines, with their covariance."""
+    known = np.flatnonzero(np.isfinite(solution.start.points).all(axis=1))
+    rows = (3 * known[:, None] + np.arange(3)).ravel()
+    return MeasuredPoints(
+        names=tuple(solution.network.targets[index] for index in known),
+        xyz=solution.start.points[known],
+        covariance=solution.covariance_of_points[np.ix_(rows, rows)],
+        sigma0=float(solution.sigma0),
+        redundancy=int(solution.redundancy),
+        unit=solution.network.unit,
+        scaled=solution.scaled,
+    )
+
+
+def network_files(solution: Solution) -> dict[str, bytes]:
+    """Return network.json, points.csv and the covariance of all points, by the names of the files.
+
+    Photographs and targets that could not be determined are left out, and named in the warnings.
+    """
+    network, values = solution.network, solution.start
+    known = np.isfinite(values.points).all(axis=1)
+    points, rays = measured_points(solution), rays_of(solution)[known]
+    record = {
+        'sigma0': points.sigma0,
+        'redundancy': points.redundancy,
+        'unit': network.unit,
+        'cameras': _cameras(solution),
+        'images': [
+            {
+                'image': network.photographs[index],
+                'camera': network.cameras[network.camera_of[index]].name,
+                'rotation': values.rotations[index].tolist(),
+                'position': values.positions[index].tolist(),
+                'covariance': solution.pose_covariances[index].tolist(),
+            }
+            for index in np.flatnonzero(oriented(solution))
+        ],
+        'points': [
+            {'id': name, **dict(zip('xyz', point, strict=True)), 'rays': int(number)}
+            for name, point, number in zip(points.names, points.xyz.tolist(), rays, strict=True)
+        ],
+        'covariance_of_points': COVARIANCE_FILE,
+        'rejected': [
+            {
+                'image': it.photograph,
+                'id': it.target,
+                'reason': it.reason,
+                'normalised_residual': it.normalised_residual,
+            }
+            for it in rejections(solution)
+        ],
+        'warnings': [*solution.warnings, *_left_out(solution)],
+    }
+    return {
+        NETWORK_FILE: json.dumps(record, indent=1, allow_nan=False).encode() + b'\n',
+        POINTS_FILE: _points_table(points, rays),
+        COVARIANCE_FILE: _archive(points),
+    }
+
+
+def rejections(solution: Solution) -> list[Rejection]:
+    """Return what was set aside from the start, and what the adjustment rejected."""
+    aside = [it for it in solution.network.set_aside if it not in solution.rejected]
+    return [*aside, *solution.rejected]
+
+
+def write_network(folder: str | Path, solution: Solution) -> tuple[Path, ...]:
+    """Write an adjusted network to a folder, each file as a whole, and return the paths.
+
+    These are `network_files`, and calibrations, poses, residuals and checks.
+    """
+    files = network_files(solution) | calibration_files(solution) | tables(solution)
+    for name, content in files.items():
+        write_whole(Path(folder) / name, content)
+    return tuple(Path(folder) / name for name in files)
+
+
+def _cameras(solution: Solution) -> list[dict[str, Any]]:
+    cameras = []
+    for view, calibration, covariance in zip(
+        solution.network.cameras,
+        solution.start.calibrations,
+        solution.camera_covariances,
+        strict=True,
+    ):
+        if not np.isfinite(calibration).all():
+            continue
+        value = dict(zip(PARAMETERS, calibration.tolist(), strict=True))
+        cameras.append(
+            {
+                'name': view.name,
+                'width': view.width,
+                'height': view.height,
+                'fx': value['f'] * (1 + value['affinity']),
+                'fy': value['f'],
+                'cx': value['cx'],
+                'cy': value['cy'],
+                'distortion': {name: value[name] for name in DISTORTION},
+                'covariance': covariance.tolist(),
+            }
+        )
+    return cameras
+
+
+def _left_out(solution: Solution) -> list[str]:
+    """Return which photographs and targets the solution has no values for."""
+    network = solution.network
+    without = np.flatnonzero(~oriented(solution))
+    unknown = np.flatnonzero(~np.isfinite(solution.start.points).all(axis=1))
+    return [
+        f'{what} without {lacking}: {", ".join(names[index] for index in indices)}'
+        for what, lacking, names, indices in (
+            ('photographs', 'a pose', network.photographs, without),
+            ('targets', 'coordinates', network.targets, unknown),
+        )
+        if len(indices)
+    ]
+
+
+def _points_table(points: MeasuredPoints, rays: IntArray) -> bytes:
+    """Return coordinates, their standard deviations, rays and covariances of each point."""
+    sides = [('x', 'y'), ('x', 'z'), ('y', 'z')]
+    header = ['id', 'x', 'y', 'z', 'sigma_x', 'sigma_y', 'sigma_z', 'rays']
+    table: list[Sequence[object]] = [[*header, *(f'covariance_{a}{b}' for a, b in sides)]]
+    for index, name in enumerate(points.names):
+        block = points.covariance[3 * index : 3 * index + 3, 3 * index : 3 * index + 3]
+        sigma = np.sqrt(np.maximum(np.diag(block), 0))
+        mixed = [f'{block["xyz".index(a), "xyz".index(b)]:.9g}' for a, b in sides]
+        place = [f'{value:.12g}' for value in points.xyz[index]]
+        table.append([name, *place, *(f'{it:.9g}' for it in sigma), int(rays[index]), *mixed])
+    return csv_table(table)
+
+
+def _archive(points: MeasuredPoints) -> bytes:
+    """Return an npz of the IDs and the covariance, in whose order of x, y and z they are.
+
+    `scaled` says whether it, like those of network.json, is multiplied by the square of sigma0.
+    """
+    file = io.BytesIO()
+    np.savez_compressed(
+        file,
+        ids=np.array(points.names, str),
+        covariance=points.covariance,
+        scaled=np.array(points.scaled),
+    )
+    return file.getvalue()
+
+
+def read_network(folder: str | Path) -> OrientedNetwork:
+    """Return the network that `ahf orient` wrote to a folder, or whose network.json is named.
+
+    A ValueError names what is missing, damaged, or of another version.
+    """
+    path = Path(folder) / NETWORK_FILE if Path(folder).is_dir() else Path(folder)
+    content = parsed_json(read_text(path), str(path))
+    record = _Record(content, str(path))
+    points = record.rows('points')
+    names = tuple(it.text('id') for it in points)
+    if twice := [name for name, number in Counter(names).items() if number > 1]:
+        raise ValueError(f'{path}: points have {twice[0]!r} twice, accepted is one point an id')
+    cameras = record.rows('cameras')
+    images = record.rows('images')
+    numbers = {it.text('name'): index for index, it in enumerate(cameras)}
+    for it in images:
+        if it.text('camera') not in numbers:
+            raise ValueError(f'{it.where}: camera is {shown(it.text("camera"))}, not in cameras')
+    xyz = _stacked([[it.number(axis) for axis in 'xyz'] for it in points], (3,))
+    archive = path.parent / record.text('covariance_of_points')
+    covariance, scaled = _covariance_of(archive, names)
+    sigma0, redundancy = record.number('sigma0'), int(record.number('redundancy'))
+    try:
+        unit = record.text('unit')
+        measured = MeasuredPoints(names, xyz, covariance, sigma0, redundancy, unit, scaled)
+    except ValueError as error:
+        raise ValueError(f'{path}: {error}') from error
+    return OrientedNetwork(
+        points=measured,
+        rays=np.array([int(it.number('rays')) for it in points], np.int64),
+        cameras=tuple(
+            CameraSize(it.text('name'), int(it.number('width')), int(it.number('height')))
+            for it in cameras
+        ),
+        calibrations=_stacked([_calibration(it) for it in cameras], (len(PARAMETERS),)),
+        camera_covariances=tuple(
+            it.matrix('covariance', (len(PARAMETERS), len(PARAMETERS))) for it in cameras
+        ),
+        photographs=tuple(it.text('image') for it in images),
+        camera_of=np.array([numbers[it.text('camera')] for it in images], np.int64),
+        rotations=_stacked([it.matrix('rotation', (3, 3)) for it in images], (3, 3)),
+        positions=_stacked([it.matrix('position', (3,)) for it in images], (3,)),
+        pose_covariances=_stacked([it.matrix('covariance', (6, 6)) for it in images], (6, 6)),
+        rejected=tuple(_rejection(it) for it in record.rows('rejected')),
+        warnings=tuple(str(it) for it in record.value('warnings', list)),
+    )
+
+
+def _calibration(camera: _Record) -> list[float]:
+    distortion = camera.record('distortion')
+    value = {name: distortion.number(name) for name in DISTORTION}
+    value |= {name: camera.number(name) for name in ('cx', 'cy')}
+    value['f'] = camera.number('fy')
+    if not value['f'] > 0:
+        raise ValueError(f'{camera.where}: fy is {value["f"]:g}, accepted is a number above 0')
+    value['affinity'] = camera.number('fx') / value['f'] - 1
+    return [value[name] for name in PARAMETERS]
+
+
+def _rejection(item: _Record) -> Rejection:
+    residual = item.content.get('normalised_residual')
+    return Rejection(
+        photograph=item.text('image'),
+        target=item.text('id'),
+        xy=(math.nan, math.nan),
+        reason=item.text('reason'),
+        normalised_residual=None if residual is None else item.number('normalised_residual'),
+    )
+
+
+def _stacked(rows: Sequence[Any], shape: tuple[int, ...]) -> FloatArray:
+    return np.array(rows, float).reshape(len(rows), *shape)
+
+
+def _covariance_of(path: Path, names: tuple[str, ...]) -> tuple[FloatArray, bool]:
+    """Return the covariance of the points of these names in their order, and if it is scaled."""
+    try:
+        with np.load(io.BytesIO(read_bytes(path)), allow_pickle=False) as archive:
+            ids, covariance = archive['ids'].tolist(), np.array(archive['covariance'], float)
+            scaled = bool(archive['scaled'])
+    except (KeyError, EOFError, zipfile.BadZipFile) as error:
+        raise ValueError(f'{path} is damaged, accepted is what ahf orient writes') from error
+    size = 3 * len(ids)
+    if sorted(map(str, ids)) != sorted(names) or covariance.shape != (size, size):
+        raise ValueError(
+            f'{path} is of {len(ids)} points and has the shape {covariance.shape}, accepted is '
+            f'the covariance of the {len(names)} points of {NETWORK_FILE}'
+        )
+    place = {str(name): index for index, name in enumerate(ids)}
+    rows = np.array([3 * place[name] + axis for name in names for axis in range(3)], int)
+    return covariance[np.ix_(rows, rows)], scaled
+
+
+@dataclass(frozen=True)
+class _Record:
+    """An object of network.json, whose fields are checked where they are read."""
+
+    content: Any
+    where: str
+
+    def value(self, name: str, kind: type) -> Any:
+        if not isinstance(self.content, dict) or name not in self.content:
+            raise ValueError(
+                f'{self.where} has no {name!r}, accepted is what ahf orient of this version writes'
+            )
+        value = self.content[name]
+        if not isinstance(value, kind):
+            raise ValueError(f'{self.where}: {name} is {shown(value)}, accepted is a {kind}')
+        return value
+
+    def text(self, name: str) -> str:
+        text: str = self.value(name, str)
+        return text
+
+    def number(self, name: str) -> float:
+        value = self.value(name, object)
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            raise ValueError(f'{self.where}: {name} is {shown(value)}, accepted is a number')
+        if not math.isfinite(value):
+            raise ValueError(f'{self.where}: {name} is {value}, accepted is a finite number')
+        return float(value)
+
+    def record(self, name: str) -> _Record:
+        return _Record(self.value(name, dict), f'{self.where}: {name}')
+
+    def rows(self, name: str) -> list[_Record]:
+        return [
+            _Record(it, f'{self.where}: {name} {number}')
+            for number, it in enumerate(self.value(name, list), start=1)
+        ]
+
+    def matrix(self, name: str, shape: tuple[int, ...]) -> FloatArray:
+        value = self.value(name, list)
+        try:
+            matrix = np.array(value, float)
+        except (TypeError, ValueError):
+            matrix = np.full(shape, math.nan)
+        if matrix.shape != shape or not np.isfinite(matrix).all():
+            raise ValueError(
+                f'{self.where}: {name} is {shown(value)}, accepted are finite numbers in the '
+                f'shape {shape}'
+            )
+        return matrix

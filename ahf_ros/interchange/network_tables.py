@@ -1,0 +1,120 @@
+"""What an adjusted network says beside its coordinates: calibrations, poses, residuals, checks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ahf_ros.interchange.camera_files import opencv_yaml, ros_yaml
+from ahf_ros.interchange.files import csv_table
+from ahf_ros.orientation.deviations import bar_deviations, control_deviations
+from ahf_ros.orientation.network import FloatArray
+from ahf_ros.orientation.solution import Solution
+from ahf_ros.orientation.strength import oriented
+
+Table = list[Sequence[object]]
+
+
+def calibration_files(solution: Solution) -> dict[str, bytes]:
+    """Return the calibration of each camera for ROS and for OpenCV, by the names of files."""
+    files = {}
+    views = solution.network.cameras
+    for index, view in enumerate(views):
+        calibration = solution.start.calibrations[index]
+        if not np.isfinite(calibration).all():
+            continue
+        stem = 'camera' if len(views) == 1 else f'camera_{index + 1}'
+        for suffix, write in (('ros', ros_yaml), ('opencv', opencv_yaml)):
+            files[f'{stem}_{suffix}.yaml'] = write(
+                *(view.name, view.width, view.height),
+                calibration,
+                solution.camera_covariances[index],
+            )
+    return files
+
+
+def tables(solution: Solution) -> dict[str, bytes]:
+    """Return poses, residuals and, where there are any, scale bars and control points as CSV."""
+    found = {'poses.csv': _poses(solution), 'residuals.csv': _residuals(solution)}
+    if bars := _bars(solution):
+        found['scale_bars.csv'] = bars
+    if control := _control(solution):
+        found['control.csv'] = control
+    return {name: csv_table(rows) for name, rows in found.items()}
+
+
+def quaternion(rotation: FloatArray) -> FloatArray:
+    """Return the unit quaternion x, y, z, w of a rotation matrix, w not negative.
+
+    It is the eigenvector of the largest eigenvalue of a symmetric matrix (Bar-Itzhack 2000), which
+    is well conditioned for every rotation.
+    """
+    r = rotation
+    matrix = np.array(
+        [
+            [r[0, 0] - r[1, 1] - r[2, 2], 0, 0, 0],
+            [r[1, 0] + r[0, 1], r[1, 1] - r[0, 0] - r[2, 2], 0, 0],
+            [r[2, 0] + r[0, 2], r[2, 1] + r[1, 2], r[2, 2] - r[0, 0] - r[1, 1], 0],
+            [r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1], np.trace(r)],
+        ]
+    )
+    vector: FloatArray = np.linalg.eigh(matrix)[1][:, -1]  # of the lower triangle
+    return vector if vector[3] >= 0 else -vector
+
+
+def _poses(solution: Solution) -> Table:
+    """Return poses as ROS has them: the camera's frame in the world, optical axes, x y z w."""
+    network, values = solution.network, solution.start
+    sigmas = [f'sigma_{it}' for it in ('x', 'y', 'z', 'rx', 'ry', 'rz')]
+    rows: Table = [['image', 'camera', 'x', 'y', 'z', 'qx', 'qy', 'qz', 'qw', *sigmas]]
+    for index in np.flatnonzero(oriented(solution)):
+        variances = np.diag(solution.pose_covariances[index])
+        numbers = [*values.positions[index], *quaternion(values.rotations[index].T)]
+        numbers += list(np.sqrt(np.maximum(variances, 0)))
+        camera = network.cameras[network.camera_of[index]].name
+        rows.append([network.photographs[index], camera, *(f'{it:.10g}' for it in numbers)])
+    return rows
+
+
+def _residuals(solution: Solution) -> Table:
+    """Return measured minus computed image points, empty where nothing could be computed."""
+    network, seen = solution.network, solution.network.observations
+    rows: Table = [['image', 'id', 'x', 'y', 'residual_x', 'residual_y', 'normalised', 'used']]
+    for index, (photograph, point) in enumerate(zip(seen.photograph, seen.point, strict=True)):
+        numbers = [*solution.residuals[index], solution.normalised[index]]
+        rows.append(
+            [
+                network.photographs[photograph],
+                network.targets[point],
+                *(f'{value:.6f}' for value in seen.xy[index]),
+                *(f'{value:.6g}' if np.isfinite(value) else '' for value in numbers),
+                int(solution.start.used[index]),
+            ]
+        )
+    return rows
+
+
+def _bars(solution: Solution) -> Table:
+    rows: Table = [
+        [
+            *('id_1', 'id_2', 'length', 'sigma', 'role'),
+            *('computed', 'deviation', 'sigma_deviation'),
+        ]
+    ]
+    for it in bar_deviations(solution):
+        numbers = [f'{value:.9g}' for value in (it.length, it.deviation, it.sigma)]
+        role = 'check' if it.bar.check else 'control'
+        rows.append([*it.bar.ends, it.bar.length, it.bar.sigma, role, *numbers])
+    return rows if len(rows) > 1 else []
+
+
+def _control(solution: Solution) -> Table:
+    deviations = [f'deviation_{axis}' for axis in 'xyz']
+    sigmas = [f'sigma_{axis}' for axis in 'xyz']
+    rows: Table = [['id', 'x', 'y', 'z', 'role', *deviations, *sigmas]]
+    for it in control_deviations(solution):
+        numbers = [f'{value:.9g}' for value in (*it.deviation, *it.sigma)]
+        role = 'check' if it.point.check else 'control'
+        rows.append([it.point.name, *it.point.xyz.tolist(), role, *numbers])
+    return rows if len(rows) > 1 else []

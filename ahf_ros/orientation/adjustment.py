@@ -1,0 +1,334 @@
+"""Bundle adjustment: from approximate values and observations to coordinates.
+
+`refine` is the light one, robust and without covariances, for the search of approximate values.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ahf_ros.orientation import normals
+from ahf_ros.orientation.calibration import released
+from ahf_ros.orientation.camera import PARAMETERS
+from ahf_ros.orientation.checks import check_network
+from ahf_ros.orientation.datum import Datum, movements
+from ahf_ros.orientation.knowledge import gathered, kind, knowledge
+from ahf_ros.orientation.least_squares import (
+    Conditions,
+    Knowledge,
+    Loss,
+    minimise,
+    normal_equations,
+)
+from ahf_ros.orientation.network import FloatArray, IntArray, Network, Rejection
+from ahf_ros.orientation.normals import Layout
+from ahf_ros.orientation.placing import placed
+from ahf_ros.orientation.precision import precision
+from ahf_ros.orientation.rejection import Adjusted, adjusted, rejections, relocated, tested
+from ahf_ros.orientation.solution import Solution, Start
+from ahf_ros.orientation.testing import CRITICAL, UnitWeight, unit_weight
+
+_AGREES = 5.0  # standard deviations, or robust ones, of an observation that agrees
+_ZOOMED = 0.01  # change of a photograph's focal length that is another zoom
+_CHECKED = 1e-6  # share of a variance that others must leave for a condition to be tested
+_NEEDED = (
+    'no used observation has a pose and a point in front of it, expected photographs with three '
+    'points and points with two rays'
+)
+
+
+def refine(
+    network: Network,
+    start: Start,
+    free: tuple[str, ...] = (),
+    loss: Loss = 'cauchy',
+    *,
+    rounds: int = 30,
+) -> Start:
+    """Return approximate values bettered by a robust adjustment of the used observations.
+
+    Bars and control points are not used, and the frame stays about where it was. The parameters
+    in `free` are estimated for every camera that is not fixed. Photographs with fewer than three
+    and points with fewer than two used observations keep their values. Afterwards those
+    observations are used, of all with a pose and a point, that agree with the values to five
+    standard deviations, or five robust ones where the residuals are larger.
+
+    Raises `ValueError` if nothing is left that could be adjusted.
+    """
+    layout = normals.lay_out(network, start, start.used, free_parameters(network, free))
+    if not len(layout.xy):
+        raise ValueError('start: nothing to refine; ' + _NEEDED)
+
+    def datum(state: Start) -> Conditions:
+        rows = np.zeros((7, layout.unknowns))
+        rows[:, : 3 * len(layout.points)] = movements(state.points[layout.points]).T
+        return Conditions(rows, np.zeros(7), np.zeros(7))
+
+    refined, _ = minimise(layout, start, datum, loss, rounds)
+    return replace(refined, used=agreeing(network, refined, layout))
+
+
+def free_parameters(network: Network, names: tuple[str, ...]) -> NDArray[np.bool_]:
+    """Return the mask (cameras, parameters) of named parameters of cameras that are not fixed."""
+    unknown = set(names) - set(PARAMETERS)
+    if unknown:
+        raise ValueError(f'free: {sorted(unknown)} is no parameter, expected {list(PARAMETERS)}')
+    mask = np.array([name in names for name in PARAMETERS])
+    return np.array([mask & (not view.fixed) for view in network.cameras])
+
+
+def agreeing(network: Network, state: Start, adjusted: Layout) -> NDArray[np.bool_]:
+    """Return which observations (m,), adjusted or not, agree with the values."""
+    everything = np.ones(len(network.observations.xy), dtype=bool)
+    every = normals.lay_out(network, state, everything, adjusted.free, backward=adjusted.backward)
+    lengths = normals.whitened_lengths(every, state)
+    among = np.isin(every.observations, adjusted.observations)
+    spread = max(1.0, normals.robust_spread(lengths[among]))
+    used = np.zeros(len(network.observations.xy), dtype=bool)
+    used[every.observations[lengths < _AGREES * spread]] = True
+    return used
+
+
+def adjust(
+    network: Network,
+    start: Start,
+    datum: Datum | None = None,
+    release: tuple[str, ...] | None = None,
+    test: bool = True,
+    *,
+    backward: bool = False,
+) -> Solution:
+    """Adjust a network and return coordinates, poses and cameras with their covariances.
+
+    A bundle adjustment [3]_ of image points and of what is known [1]_, with tests of single
+    observations [2]_.
+
+    Parameters
+    ----------
+    network : Network
+        What was observed and is known.
+    start : Start
+        Approximate values, in any frame and scale. Photographs and points that are NaN are no
+        part of the adjustment.
+    datum : Datum, optional
+        The frame of the coordinates. Without one, that of control points where there are some,
+        else inner constraints on all targets.
+    release : tuple of str, optional
+        Names of `camera.PARAMETERS` that are estimated for each camera that is not fixed. Without
+        it, those that the network determines are released in stages.
+    test : bool
+        Whether wrong observations are found and left out, and targets at two places.
+    backward : bool
+        Whether distortion is a correction at the measured place, as DBAT and PhotoModeler have it.
+
+    Returns
+    -------
+    Solution
+        Covariances are scaled by the variance of unit weight where its test refuses 1.
+
+    Raises
+    ------
+    ValueError
+        For observations that are not finite or have a singular covariance, for bars or control
+        points that contradict each other or the photographs, for a datum without a frame, and
+        where nothing is left to adjust.
+
+    References
+    ----------
+    .. [1] Förstner & Wrobel, Photogrammetric Computer Vision, Springer 2016, chapter 15.
+    .. [2] Baarda, A testing procedure for use in geodetic networks, 1968.
+    .. [3] Triggs et al., Bundle adjustment: a modern synthesis, 2000.
+
+    Examples
+    --------
+    >>> from ahf_ros.orientation.simulation import simulated
+    >>> network, start = simulated(photographs=8, targets=24)
+    >>> solution = adjust(network, start)
+    >>> 0.8 < solution.sigma0 < 1.2, solution.rejected
+    (True, ())
+    """
+    check_network(network)
+    start, datum, warnings = placed(network, start, datum or Datum())
+    has_control = kind(network, datum) == 'control'
+    known_points = np.isin(
+        network.targets, [point.name for point in network.control if not point.check]
+    )
+
+    def lay_out(state: Start, free: NDArray[np.bool_]) -> Layout:
+        layout = normals.lay_out(
+            network,
+            state,
+            state.used,
+            free,
+            known=known_points if has_control else None,
+            backward=backward,
+        )
+        if not len(layout.xy):
+            raise ValueError('start: nothing to adjust; ' + _NEEDED)
+        return layout
+
+    def known(layout: Layout) -> Knowledge:
+        return knowledge(layout, gathered(network, layout, datum))
+
+    def fit(free: NDArray[np.bool_], state: Start) -> tuple[Start, tuple[FloatArray, ...]]:
+        layout = lay_out(state, free)
+        fitted, _ = minimise(layout, state, known(layout), 'cauchy' if test else 'squares')
+        if test:
+            fitted = replace(fitted, used=agreeing(network, fitted, layout))
+            layout = lay_out(fitted, free)
+        covariance = precision(*normal_equations(layout, fitted, known(layout))).rest
+        spread = normals.robust_spread(normals.whitened_lengths(layout, fitted))
+        return fitted, _of_cameras(layout, max(1.0, spread) ** 2 * covariance)
+
+    if release is None:
+        free, state, of_cameras = released(network, start, fit)
+        warnings += of_cameras
+    else:
+        free, state = free_parameters(network, release), start
+    if test:
+        state, _ = fit(free, state)
+        layout = lay_out(state, free)
+        warnings += zoomed(network, layout, state)
+        spread = max(1.0, normals.robust_spread(normals.whitened_lengths(layout, state)))
+        state = relocated(network, state, layout, spread)
+        result = tested(
+            network,
+            state,
+            lambda now: lay_out(now, free),
+            known,
+            lambda done: weight(done).plausible,
+        )
+    else:
+        result = adjusted(network, state, lambda now: lay_out(now, free), known)
+    return _solution(network, datum, result, warnings, test)
+
+
+def weight(result: Adjusted) -> UnitWeight:
+    """Return the variance of unit weight of an adjustment, with its test."""
+    layout, conditions = result.layout, result.knowledge(result.state)
+    lengths = normals.whitened_lengths(layout, result.state)
+    unknowns = layout.unknowns + 6 * len(layout.photographs)
+    redundancy = layout.xy.size + len(conditions.gaps) - unknowns
+    return unit_weight(float((lengths**2).sum()) + conditions.cost, redundancy)
+
+
+def _solution(
+    network: Network, datum: Datum, result: Adjusted, warnings: tuple[str, ...], test: bool
+) -> Solution:
+    """Return an adjustment in the network's order, with what was rejected."""
+    layout, every, unit = result.layout, result.every, weight(result)
+    factor = 1.0 if unit.plausible else unit.sigma0**2
+    covariance = factor * result.precision.rest
+    adjusted_points = np.isin(np.arange(len(network.targets)), layout.points)
+    poses = np.full((len(network.photographs), 6, 6), np.nan)
+    poses[layout.photographs] = factor * result.precision.poses
+    points = np.full((3 * len(network.targets),) * 2, np.nan)
+    coordinates = np.flatnonzero(np.repeat(adjusted_points, 3))
+    points[np.ix_(coordinates, coordinates)] = covariance[: len(coordinates), : len(coordinates)]
+    residuals = np.full(network.observations.xy.shape, np.nan)
+    residuals[every.observations] = normals.residuals(every, result.state)
+    normalised = np.full(len(residuals), np.nan)
+    normalised[every.observations] = result.lengths / np.sqrt(factor)
+    rejected: tuple[Rejection, ...] = ()
+    if test:
+        rejected, of_targets = rejections(network, result)
+        warnings += of_targets + doubtful(network, result, datum, np.sqrt(factor))
+    if not result.converged:
+        warnings += ('the adjustment did not converge: its coordinates are not final',)
+    used = np.zeros(len(residuals), dtype=bool)
+    used[layout.observations] = True
+    state = replace(
+        result.state,
+        used=used,
+        rotations=_only(result.state.rotations, layout.photographs),
+        positions=_only(result.state.positions, layout.photographs),
+        points=_only(result.state.points, layout.points),
+    )
+    return Solution(
+        network,
+        state,
+        residuals,
+        normalised,
+        _of_cameras(layout, covariance),
+        tuple(tuple(np.array(PARAMETERS)[mask].tolist()) for mask in layout.free),
+        poses,
+        points,
+        unit.sigma0,
+        unit.redundancy,
+        network.set_aside + rejected,
+        warnings,
+        scaled=not unit.plausible,
+        backward=layout.backward,
+        converged=result.converged,
+    )
+
+
+def doubtful(network: Network, result: Adjusted, datum: Datum, sigma0: float) -> tuple[str, ...]:
+    """Return warnings of bars and control points whose tests fail; they are used all the same."""
+    known = gathered(network, result.layout, datum)
+    names = ['scale bar ' + '-'.join(bar.ends) for bar in known.bars]
+    names += [f'control point {point.name}' for point in known.control for _ in range(3)]
+    conditions = result.knowledge(result.state)
+    rows, gaps = conditions.rows[: len(names)], conditions.gaps[: len(names)]
+    variances = conditions.variances[: len(names)]
+    computed = ((rows @ result.precision.rest) * rows).sum(axis=1)
+    checked = variances - computed > _CHECKED * variances
+    with np.errstate(invalid='ignore', divide='ignore'):
+        tests = np.abs(gaps) / np.sqrt(variances - computed) / sigma0
+    failed = {
+        name: f'{gap:.4g} {network.unit}'.rstrip() + f', {size:.1f} standard deviations'
+        for name, gap, size, tested in zip(names, gaps, tests, checked, strict=True)
+        if tested and size > CRITICAL
+    }
+    return tuple(
+        f'{name} contradicts the rest: known minus adjusted {text}'
+        for name, text in failed.items()
+    )
+
+
+def zoomed(network: Network, layout: Layout, state: Start) -> tuple[str, ...]:
+    """Return warnings of photographs whose focal length is not that of their camera.
+
+    A change of the focal length of each photograph alone is estimated with its pose, all else
+    kept: the score test of one more parameter.
+    """
+    design = normals.linearise(replace(layout, free=np.ones_like(layout.free)), state)
+    spread = max(1.0, normals.robust_spread(normals.whitened_lengths(layout, state)))
+    images = normals.Groups.by(layout.photograph)
+    pose, focal = design.by_pose, design.by_calibration[:, :, :1]
+    right = design.misclosure[:, :, None]
+    mixed = images.sum(normals.products(pose, focal))
+    half = np.linalg.solve(images.sum(normals.products(pose, pose)), mixed)
+    transposed = half.transpose(0, 2, 1)
+    matrix = images.sum(normals.products(focal, focal)) - transposed @ mixed
+    change = images.sum(normals.products(focal, right))
+    change = (change - transposed @ images.sum(normals.products(pose, right))) / matrix
+    change, sigma = change[:, 0, 0], spread / np.sqrt(matrix[:, 0, 0])
+    cameras = network.camera_of[layout.photographs]
+    relative = change / state.calibrations[cameras, 0]
+    other = (np.abs(relative) > _ZOOMED) & (np.abs(change) > 2 * CRITICAL * sigma)
+    warnings = []
+    for camera in np.unique(cameras[other]):
+        photographs = layout.photographs[other & (cameras == camera)]
+        warnings.append(
+            f'camera {network.cameras[camera].name}: {len(photographs)} photographs, such as '
+            f'{network.photographs[photographs[0]]}, have another focal length than the rest; '
+            'expected one zoom for a camera: give them a camera of their own'
+        )
+    return tuple(warnings)
+
+
+def _of_cameras(layout: Layout, covariance: FloatArray) -> tuple[FloatArray, ...]:
+    """Return the covariances (10, 10) of each camera's parameters, zero where kept fixed."""
+    padded = np.pad(covariance, (0, 1))
+    return tuple(padded[np.ix_(columns, columns)] for columns in layout.columns)
+
+
+def _only(values: FloatArray, places: IntArray) -> FloatArray:
+    """Return values with NaN outside the given places."""
+    kept = np.full_like(values, np.nan)
+    kept[places] = values[places]
+    return kept

@@ -1,0 +1,332 @@
+"""From image points and IDs to coordinates, and in words why where that is not possible."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+
+from ahf_ros.orientation.adjustment import adjust
+from ahf_ros.orientation.camera import pinhole
+from ahf_ros.orientation.datum import Datum
+from ahf_ros.orientation.network import FloatArray, IntArray, Network, Rejection
+from ahf_ros.orientation.planar import principal_axes
+from ahf_ros.orientation.resection import FEWEST_POINTS, Resection, resections
+from ahf_ros.orientation.solution import Solution, Start
+from ahf_ros.orientation.start import WORST, oriented, reversal, starts
+from ahf_ros.orientation.triples import FEWEST_COMMON, STEPS, known_calibrations
+from ahf_ros.orientation.views import View, lengths_of, spread_of, views_of
+from ahf_ros.text import counted
+
+LINE = 0.01
+"""Targets are on a line where their spread across it is less than this share of that along it."""
+
+CONTRADICTING = 0.6
+"""Share of observations that must agree for a network to be believed."""
+
+ZOOMED = 0.03
+"""Relative difference of a photograph's focal length that is no error of its camera's."""
+
+NAMED = 8
+"""Photographs or targets that a message names."""
+
+TILT = (
+    'take some that are tilted by 30 to 45 degrees from different sides, and roll the camera by '
+    '90 degrees for some'
+)
+
+
+def orient(
+    network: Network,
+    datum: Datum | None = None,
+    release: tuple[str, ...] | None = None,
+    test: bool = True,
+) -> list[Solution]:
+    """Orient photographs and compute targets without any approximate values, and adjust them.
+
+    Parameters
+    ----------
+    network : Network
+        What was observed and is known. A target that is twice in a photograph is set aside there.
+    datum : Datum, optional
+        The frame of the coordinates, as for `adjust`.
+    release : tuple of str, optional
+        Parameters of the cameras that are estimated, as for `adjust`.
+    test : bool
+        Whether wrong observations are found and left out.
+
+    Returns
+    -------
+    list of Solution
+        One for each group of photographs that hang together, the largest first. Their warnings say
+        which photographs and targets are in none, and why.
+
+    Raises
+    ------
+    ValueError
+        If nothing can be oriented, or what fits is not the only thing that fits. The message says
+        why and what to photograph.
+
+    Examples
+    --------
+    >>> from ahf_ros.orientation.simulation import simulated
+    >>> network, _ = simulated(photographs=8, targets=24)
+    >>> (solution,) = orient(network)
+    >>> solution.start.points.shape, solution.covariance_of_points.shape
+    ((24, 3), (72, 72))
+    """
+    network = once_a_photograph(network)
+    _check(network)
+    refused: list[str] = []
+    solutions: list[Solution] = []
+    for start in starts(network):
+        reason = _ambiguous(network, start)
+        if reason is None:
+            solution = adjust(network, _without_lens(network, start), datum, release, test)
+            reason = _doubtful(solution)
+        if reason is None:
+            solutions.append(solution)
+        else:
+            refused.append(reason)
+    if not solutions:
+        raise ValueError(refused[0] if refused else _why_not(network))
+    left = _left_out(network, solutions)
+    first = solutions[0]
+    return [
+        replace(first, warnings=first.warnings + tuple(refused) + left + _zooms(solutions)),
+        *solutions[1:],
+    ]
+
+
+def _without_lens(network: Network, start: Start) -> Start:
+    """Return the values with what is known of the lenses, and nothing where nothing is.
+
+    The adjustment releases a parameter where it differs from what it was. Found values are none.
+    """
+    calibrations = start.calibrations.copy()
+    for camera, view in enumerate(network.cameras):
+        given = view.calibration
+        size = view.width, view.height
+        calibrations[camera] = pinhole(calibrations[camera, 0], *size) if given is None else given
+    return replace(start, calibrations=calibrations)
+
+
+def once_a_photograph(network: Network) -> Network:
+    """Return the network without targets that are twice in a photograph: both are set aside."""
+    observed = network.observations
+    key = observed.photograph * len(network.targets) + observed.point
+    _, inverse, counts = np.unique(key, return_inverse=True, return_counts=True)
+    twice = counts[inverse.ravel()] > 1
+    if not twice.any():
+        return network
+    aside = tuple(
+        Rejection(
+            network.photographs[observed.photograph[row]],
+            network.targets[observed.point[row]],
+            (float(observed.xy[row, 0]), float(observed.xy[row, 1])),
+            'its ID is more than once in the photograph',
+        )
+        for row in np.flatnonzero(twice)
+    )
+    kept = replace(
+        observed,
+        photograph=observed.photograph[~twice],
+        point=observed.point[~twice],
+        xy=observed.xy[~twice],
+        covariance=observed.covariance[~twice],
+    )
+    return replace(network, observations=kept, set_aside=network.set_aside + aside)
+
+
+def _check(network: Network) -> None:
+    """Raise `ValueError` where too little was observed for anything."""
+    seen = np.bincount(network.observations.point, minlength=len(network.targets))
+    targets = int(np.sum(seen > 1))
+    photographs = len(np.unique(network.observations.photograph))
+    needed = f'expected {FEWEST_COMMON} or more that three photographs have in common'
+    if not targets:
+        raise ValueError(f'targets: no ID is seen in two photographs, {needed}')
+    if photographs < 3:
+        raise ValueError(
+            f'photographs: {photographs} with targets, expected three or more: what two say is '
+            'checked by nothing. Take more from other directions'
+        )
+    if targets < FEWEST_COMMON:
+        raise ValueError(f'targets: {targets} in two or more photographs, {needed}')
+    if all(_in_line(view.xy) for view in views_of(network) if len(view.points) > 2):
+        raise ValueError(
+            'targets: all of them lie on a line, which determines no pose. Put some beside it'
+        )
+
+
+def _in_line(xy: FloatArray) -> bool:
+    """Return whether image points (n, 2) lie on a line, most of them."""
+    for _ in range(2):
+        spread, axes = principal_axes(xy)
+        across = np.abs((xy - np.median(xy, axis=0)) @ axes[1])
+        xy = xy[across <= 6 * np.median(across) + 1e-9]
+        if len(xy) < 3:
+            return True
+    spread, _ = principal_axes(xy)
+    return bool(spread[1] < LINE * spread[0])
+
+
+def _why_not(network: Network) -> str:
+    """Return why no three photographs have approximate values."""
+    views = views_of(network)
+    able = [index for index, view in enumerate(views) if len(view.points) >= FEWEST_COMMON]
+    sets = {index: set(views[index].points.tolist()) for index in able[:60]}
+    pairs = {pair: len(sets[pair[0]] & sets[pair[1]]) for pair in combinations(sets, 2)}
+    most = max(pairs.values(), default=0)
+    if most < FEWEST_COMMON:
+        named = ''
+        if most:
+            a, b = max(pairs, key=lambda pair: pairs[pair])
+            named = f' ({network.photographs[a]} and {network.photographs[b]})'
+        return (
+            f'photographs: no two have more than {counted(most, "target")} in common{named}, '
+            f'expected {FEWEST_COMMON} or more in three. Take photographs that overlap'
+        )
+    if not np.isfinite(known_calibrations(network)[:, 0]).any():
+        return (
+            'focal length: no three photographs agree with any from 0.5 to 4 image widths. '
+            f'Give a calibration or a focal length, or more photographs: {TILT}'
+        )
+    return (
+        'photographs: no three of them determine each other. Take photographs of the same targets '
+        'from directions that are 20 to 90 degrees apart'
+    )
+
+
+def _ambiguous(network: Network, start: Start) -> str | None:
+    """Return in words that the network's mirror image fits as well, None if it does not."""
+    if reversal(network, start)[1] > 2.0:
+        return None
+    return (
+        f'photographs: {_names(network.photographs, oriented(start))} fit two arrangements, which '
+        'are mirror images of each other, equally well. Take some from nearer, with a shorter '
+        'focal length, or from directions that differ more'
+    )
+
+
+def _doubtful(solution: Solution) -> str | None:
+    """Return in words why an adjusted network is not believed, None if it is."""
+    network, start = solution.network, solution.start
+    photographs = oriented(start)
+    names = _names(network.photographs, photographs)
+    known = known_calibrations(network)[:, 0]
+    for camera in np.unique(network.camera_of[photographs]):
+        if not np.isfinite(known[camera]) and 'f' not in solution.released[camera]:
+            return (
+                f'camera {network.cameras[camera].name}: its focal length cannot be determined '
+                f'from {names}, which look in about the same direction. Give a calibration or a '
+                f'focal length, or {TILT}'
+            )
+    observed = network.observations
+    belongs = np.isfinite(start.positions[observed.photograph, 0])
+    share = float(np.mean(start.used[belongs])) if belongs.any() else 0.0
+    if share < CONTRADICTING:
+        return (
+            f'photographs: only {share:.0%} of the observations in {names} agree with each other, '
+            f'expected {CONTRADICTING:.0%} or more. Check IDs, cameras and whether targets moved'
+        )
+    return None
+
+
+def _left_out(network: Network, solutions: Sequence[Solution]) -> tuple[str, ...]:
+    """Return warnings of photographs that are in no solution, and of their zoom."""
+    posed = np.zeros(len(network.photographs), dtype=bool)
+    placed = np.zeros(len(network.targets), dtype=bool)
+    for solution in solutions:
+        posed[oriented(solution.start)] = True
+        placed |= np.isfinite(solution.start.points[:, 0])
+    views = views_of(network)
+    few, alike, zoomed = [], [], []
+    start = solutions[0].start
+    for index in np.flatnonzero(~posed):
+        seen = np.isfinite(start.points[views[index].points, 0])
+        if seen.sum() < FEWEST_POINTS:
+            few.append(index)
+        elif (factor := _zoom(network, views[index], start)) is not None:
+            zoomed.append((index, factor))
+        else:
+            alike.append(index)
+    warnings = []
+    if few:
+        warnings.append(
+            f'{_names(network.photographs, few)}: not oriented, fewer than {FEWEST_POINTS} '
+            'targets with coordinates. Take photographs between them and the others'
+        )
+    if alike:
+        warnings.append(
+            f'{_names(network.photographs, alike)}: not oriented, no pose fits well or two fit '
+            'alike. Check their IDs, and take others that are tilted or from nearer'
+        )
+    for index, factor in zoomed:
+        warnings.append(
+            f'{network.photographs[index]}: not oriented, its focal length is about {factor:.2f} '
+            f'times that of camera {network.cameras[views[index].camera].name}. Photographs of '
+            'another zoom need a camera of their own'
+        )
+    seen = np.bincount(network.observations.point, minlength=len(network.targets)) > 0
+    if lost := np.flatnonzero(~placed & seen).tolist():
+        warnings.append(
+            f'targets {_names(network.targets, lost)}: no coordinates, fewer than two rays that '
+            'agree and meet under 5 degrees or more. Take more photographs of them'
+        )
+    return tuple(warnings)
+
+
+def _zoom(network: Network, view: View, start: Start) -> float | None:
+    """Return a photograph's focal length over its camera's where it alone fits, or None."""
+    calibration = start.calibrations[view.camera]
+    if not np.isfinite(calibration[0]):
+        return None
+    spread = spread_of(lengths_of(network, start))
+
+    def fit(factor: float) -> tuple[float, Resection | None]:
+        changed = start.calibrations.copy()
+        changed[view.camera, 0] *= factor
+        xy, sigma = view.normalised(changed)
+        seen = np.isfinite(start.points[view.points, 0])
+        poses = resections(start.points[view.points[seen]], xy[seen], sigma[seen] * spread)
+        return (poses[0].scale, poses[0]) if poses else (np.inf, None)
+
+    camera = network.cameras[view.camera]
+    width = max(camera.width, camera.height)
+    factors = list(STEPS * width / calibration[0])
+    best = min(factors, key=lambda factor: fit(factor)[0])
+    step = STEPS[1] / STEPS[0]
+    for _ in range(6):
+        step = np.sqrt(step)
+        best = min((best / step, best, best * step), key=lambda factor: fit(factor)[0])
+    alone, own = fit(best)[0], fit(1.0)[0]
+    return best if abs(best - 1) > ZOOMED and alone < WORST and alone < own / 3 else None
+
+
+def _zooms(solutions: Sequence[Solution]) -> tuple[str, ...]:
+    """Return warnings of cameras whose focal length differs between groups of photographs."""
+    network = solutions[0].network
+    warnings = []
+    for camera, view in enumerate(network.cameras):
+        lengths = [
+            float(solution.start.calibrations[camera, 0])
+            for solution in solutions
+            if np.any(network.camera_of[oriented(solution.start)] == camera)
+        ]
+        if lengths and max(lengths) > (1 + ZOOMED) * min(lengths):
+            text = ', '.join(f'{length:.0f}' for length in lengths)
+            warnings.append(
+                f'camera {view.name}: its focal length is {text} px in groups of photographs. '
+                'Photographs of another zoom need a camera of their own'
+            )
+    return tuple(warnings)
+
+
+def _names(names: Sequence[str], indices: Sequence[int] | IntArray) -> str:
+    """Return some of the names, and how many there are more."""
+    shown = ', '.join(names[index] for index in indices[:NAMED])
+    more = len(indices) - NAMED
+    return f'{shown} and {more} more' if more > 0 else shown

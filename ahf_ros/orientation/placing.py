@@ -1,0 +1,223 @@
+"""Approximate values are brought into the frame of control points and the scale of bars.
+
+Here gross contradictions are found, before an adjustment would spread them over all coordinates:
+other units, mirrored axes, exchanged names. Small ones are left to the tests of the adjustment.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+
+import numpy as np
+
+from ahf_ros.orientation.datum import Datum
+from ahf_ros.orientation.knowledge import kind, moved, similarity
+from ahf_ros.orientation.network import FloatArray, Network
+from ahf_ros.orientation.solution import Start
+
+_MISFIT = 0.15  # of control points, relative to their extent, that no approximate value explains
+_STRETCH = 1.2  # ratio of lengths that none explains
+_UNITS = (10, 100, 1000, 25.4, 304.8)
+
+
+def placed(network: Network, start: Start, datum: Datum) -> tuple[Start, Datum, tuple[str, ...]]:
+    """Return approximate values in the frame and scale of what is known, the datum, and warnings.
+
+    The datum has names of three targets where it is `fixed`. Raises `ValueError` for bars or
+    control points that contradict each other, with the ones that do so.
+    """
+    index = {name: place for place, name in enumerate(network.targets)}
+    warnings = []
+    control = [point for point in network.control if not point.check]
+    seen = [point for point in control if np.isfinite(_at(start, index, point.name)).all()]
+    unseen = sorted({point.name for point in control} - {point.name for point in seen})
+    if unseen:
+        warnings.append(f'control: {_listed(unseen)} is in no two photographs and not used')
+    if datum.kind == 'control' and not seen:
+        raise ValueError('datum: control without a control point that is seen, expected some')
+    known = np.array([point.xyz for point in seen]).reshape(-1, 3)
+    here = np.array([_at(start, index, point.name) for point in seen]).reshape(-1, 3)
+    if len(seen) >= 3:
+        _check_control(tuple(point.name for point in seen), here, known)
+        start = moved(start, *similarity(here, known))
+    elif seen and datum.kind == 'control':
+        warnings.append(
+            f'control: {len(seen)} points hold no frame, inner constraints hold the rest of it'
+        )
+    start, of_bars = _scaled(network, start, index, len(seen) >= 2)
+    if len(seen) in (1, 2):
+        here = np.array([_at(start, index, point.name) for point in seen])
+        start = moved(start, 1.0, np.eye(3), known[0] - here[0])
+        start = _turned(start, known, here) if len(seen) == 2 else start
+    if kind(network, datum) == 'fixed':
+        datum = Datum('fixed', datum.targets or _large_triangle(network, start))
+    _check_datum(start, index, datum)
+    if datum.kind == 'fixed':
+        start = _axes(start, np.array([_at(start, index, name) for name in datum.targets]))
+    return start, datum, (*warnings, *of_bars)
+
+
+def _at(start: Start, index: dict[str, int], name: str) -> FloatArray:
+    """Return the coordinates (3,) of a target, NaN where it has none."""
+    return start.points[index[name]] if name in index else np.full(3, np.nan)
+
+
+def _scaled(
+    network: Network, start: Start, index: dict[str, int], scaled: bool
+) -> tuple[Start, tuple[str, ...]]:
+    """Return values in the scale of bars, unless control gives it, and warnings of unseen bars.
+
+    Bars that contradict each other, or the control points, raise `ValueError`.
+    """
+    warnings, ratios, names = [], [], []
+    for bar in network.bars:
+        distance = np.linalg.norm(_at(start, index, bar.ends[1]) - _at(start, index, bar.ends[0]))
+        name = '-'.join(bar.ends)
+        if not np.isfinite(distance):
+            ends = [end for end in bar.ends if not np.isfinite(_at(start, index, end)).all()]
+            warnings.append(
+                f'scale bar {name}: {_listed(ends)} is in no two photographs, the bar is not used'
+            )
+        elif distance == 0:
+            raise ValueError(f'scale bar {name}: both ends have the same place')
+        elif not bar.check:
+            ratios.append(float(bar.length / distance))
+            names.append(name)
+    if not ratios:
+        return start, tuple(warnings)
+    usual = 1.0 if scaled else float(np.median(ratios))
+    wrong = [place for place, ratio in enumerate(ratios) if _stretch(ratio / usual) > _STRETCH]
+    if wrong:
+        others = 'control points' if scaled else 'other scale bars'
+        each = ', '.join(
+            f'{names[place]} is {ratios[place] / usual:.4g} times as long as the {others} say'
+            for place in wrong
+        )
+        raise ValueError(
+            f'scale bars contradict: {each}{_unit([ratios[p] / usual for p in wrong])}'
+        )
+    if not scaled:
+        start = moved(start, usual, np.eye(3), np.zeros(3))
+    return start, tuple(warnings)
+
+
+def _stretch(ratio: float) -> float:
+    """Return the ratio or its inverse, whichever is larger."""
+    return max(ratio, 1 / ratio)
+
+
+def _unit(ratios: list[float]) -> str:
+    """Return a hint where all ratios are that of two units of length."""
+    for unit in _UNITS:
+        if all(_stretch(_stretch(ratio) / unit) < _STRETCH for ratio in ratios):
+            return f'; a factor of {unit:g}: expected all lengths in one unit'
+    return ''
+
+
+def _check_control(names: tuple[str, ...], here: FloatArray, known: FloatArray) -> None:
+    """Raise `ValueError` if no similarity brings points here (n, 3) near the known ones."""
+    if _misfit(here, known) < _MISFIT:
+        return
+    if len(names) > 3 and _misfit(here * [1, 1, -1], known) < _MISFIT:
+        raise ValueError(
+            'control points are mirrored, expected right-handed axes: change the sign of one axis '
+            'or exchange two'
+        )
+    for explanation, changed_here, changed in _explanations(names, here, known):
+        if _misfit(changed_here, changed) < _MISFIT:
+            raise ValueError(f'control points contradict the photographs: {explanation}')
+    raise ValueError(
+        f'control points contradict the photographs: {_listed(list(names))} do not have the shape '
+        'of the network, whatever pair is exchanged or point left out; expected the coordinates '
+        'of these IDs'
+    )
+
+
+def _explanations(
+    names: tuple[str, ...], here: FloatArray, known: FloatArray
+) -> Iterator[tuple[str, FloatArray, FloatArray]]:
+    """Yield what may be wrong, with points here and known ones as they then are.
+
+    Three points in any order have a similar triangle only by chance, so an exchange is seen of
+    three points, one that is alone wrong of four.
+    """
+    for unit in _UNITS:
+        for place in range(len(names)):
+            for factor in (unit, 1 / unit):
+                changed = known.copy()
+                changed[place] *= factor
+                yield f'{names[place]} is in another unit (factor {unit:g})', here, changed
+    for first, second in combinations(range(len(names)), 2):
+        changed = known.copy()
+        changed[[first, second]] = known[[second, first]]
+        yield f'{names[first]} and {names[second]} are exchanged', here, changed
+    if len(names) > 3:
+        for place, name in enumerate(names):
+            rest = np.arange(len(names)) != place
+            yield f'{name} alone does not fit the others', here[rest], known[rest]
+
+
+def _misfit(here: FloatArray, known: FloatArray) -> float:
+    """Return the largest deviation after a similarity, relative to the known points' extent."""
+    factor, rotation, shift = similarity(here, known)
+    deviations = np.linalg.norm(factor * here @ rotation.T + shift - known, axis=1)
+    extent = np.sqrt(((known - known.mean(axis=0)) ** 2).sum(axis=1).mean())
+    return float(deviations.max() / extent) if extent > 0 else np.inf
+
+
+def _turned(start: Start, known: FloatArray, here: FloatArray) -> Start:
+    """Turn and, without bars, scale the network about the first of two points to the second."""
+    old, new = here[1] - here[0], known[1] - known[0]
+    middle = old / np.linalg.norm(old) + new / np.linalg.norm(new)
+    if np.linalg.norm(middle) < 1e-9:  # opposite: any half turn across them
+        middle = np.linalg.svd(old[None])[2][1]
+    middle = middle / np.linalg.norm(middle)
+    rotation = 2 * np.outer(middle, middle) - np.eye(3)
+    factor = float(np.linalg.norm(new) / np.linalg.norm(old))
+    return moved(start, factor, rotation, known[0] - factor * rotation @ known[0])
+
+
+def _large_triangle(network: Network, start: Start) -> tuple[str, ...]:
+    """Return the names of three targets that span a large triangle."""
+    points = start.points
+    first = np.nanargmax(np.linalg.norm(points - np.nanmean(points, axis=0), axis=1))
+    from_first = points - points[first]
+    second = np.nanargmax(np.linalg.norm(from_first, axis=1))
+    third = np.nanargmax(np.linalg.norm(np.cross(from_first, from_first[second]), axis=1))
+    return tuple(network.targets[place] for place in (first, second, third))
+
+
+def _check_datum(start: Start, index: dict[str, int], datum: Datum) -> None:
+    """Raise `ValueError` unless the named targets of a datum are seen and not on a line."""
+    if not datum.targets:
+        return
+    points = np.array([_at(start, index, name) for name in datum.targets])
+    finite = np.isfinite(points).all(axis=1)
+    unseen = [name for name, found in zip(datum.targets, finite, strict=True) if not found]
+    if unseen:
+        raise ValueError(
+            f'datum: {_listed(unseen)} is in no two photographs, expected seen targets'
+        )
+    if datum.kind == 'fixed' and len(points) != 3:
+        raise ValueError(f'datum: {len(points)} fixed targets, expected 3')
+    sizes = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    if len(points) < 3 or sizes[1] < 1e-3 * sizes[0]:
+        raise ValueError(
+            f'datum: {_listed(list(datum.targets))} hold no frame, expected three or more targets '
+            'that are not on a line'
+        )
+
+
+def _axes(start: Start, points: FloatArray) -> Start:
+    """Return values whose frame has its origin, x axis and plane z = 0 at three points (3, 3)."""
+    x = points[1] - points[0]
+    z = np.cross(x, points[2] - points[0])
+    x, z = x / np.linalg.norm(x), z / np.linalg.norm(z)
+    rotation = np.stack([x, np.cross(z, x), z])
+    return moved(start, 1.0, rotation, -rotation @ points[0])
+
+
+def _listed(names: list[str]) -> str:
+    """Return up to six names as text."""
+    return ', '.join(names[:6]) + (f' and {len(names) - 6} more' if len(names) > 6 else '')

@@ -1,0 +1,196 @@
+"""Observations are taken off and on again, one by one, until the tests agree with the adjustment.
+
+Then each one that is off gets its reason: the place of another target, a second place of its own,
+or none that is known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ahf_ros.orientation import normals
+from ahf_ros.orientation.least_squares import Knowledge, minimise, normal_equations
+from ahf_ros.orientation.network import FloatArray, Network, Rejection
+from ahf_ros.orientation.normals import Layout
+from ahf_ros.orientation.places import places
+from ahf_ros.orientation.precision import Precision, precision
+from ahf_ros.orientation.solution import Start
+from ahf_ros.orientation.testing import CRITICAL, normalised, worst
+
+_ROUNDS = 60  # of tests; each takes off one observation of a photograph and a target at most
+_SUSPECT = (
+    0.25  # share of a target's rays that disagree, from which on a second place is looked for
+)
+_SECOND_PLACE = 3  # rays that meet at it, unless all that are off do
+
+Mask = NDArray[np.bool_]
+LayOut = Callable[[Start], Layout]
+"""Lays out the used observations of a state."""
+
+
+@dataclass(frozen=True)
+class Adjusted:
+    """An adjustment: its layout, values and precision for unit weights, and how it was tested.
+
+    `every` is the layout of all observations between its photographs and points, `lengths` their
+    normalised residuals by `spread`, the standard deviation of unit weight that they were tested
+    with.
+    """
+
+    layout: Layout
+    state: Start
+    knowledge: Knowledge
+    precision: Precision
+    every: Layout
+    used: Mask
+    lengths: FloatArray
+    spread: float
+    converged: bool
+
+
+def adjusted(
+    network: Network, state: Start, lay_out: LayOut, known: Callable[[Layout], Knowledge]
+) -> Adjusted:
+    """Return the least-squares adjustment of the used observations, with tests of all."""
+    layout = lay_out(state)
+    knowledge = known(layout)
+    state, converged = minimise(layout, state, knowledge)
+    reduced, border = normal_equations(layout, state, knowledge)
+    covariances = precision(reduced, border)
+    every = normals.extended(network, layout)
+    used = np.isin(every.observations, layout.observations)
+    design = normals.linearise(every, state)
+    lengths = normalised(every, state, design, covariances, used)
+    spread = normals.robust_spread(lengths[used & np.isfinite(lengths)])
+    return Adjusted(layout, state, knowledge, covariances, every, used, lengths, spread, converged)
+
+
+def tested(
+    network: Network,
+    state: Start,
+    lay_out: LayOut,
+    known: Callable[[Layout], Knowledge],
+    plausible: Callable[[Adjusted], bool],
+) -> Adjusted:
+    """Return the adjustment after Baarda's tests, observations off and on until none changes.
+
+    Residuals are tested with unit weights, or with the robust variance of unit weight where 1 is
+    not plausible. An observation comes on again once.
+    """
+    returned = np.zeros(len(network.observations.xy), dtype=bool)
+    for _ in range(_ROUNDS):
+        result = adjusted(network, state, lay_out, known)
+        if plausible(result):
+            result = replace(result, spread=1.0)
+        every, lengths = result.every, result.lengths / result.spread
+        off = worst(every, np.where(lengths > CRITICAL, lengths, 0), result.used)
+        on = ~result.used & (lengths < CRITICAL) & ~returned[every.observations]
+        if not (off.any() or on.any()):
+            break
+        returned[every.observations[on]] = True
+        used = np.zeros(len(returned), dtype=bool)
+        used[every.observations[(result.used & ~off) | on]] = True
+        state = replace(result.state, used=used)
+    return result
+
+
+def relocated(network: Network, state: Start, layout: Layout, spread: float) -> Start:
+    """Return values in which each suspect target is where most of its rays meet.
+
+    Suspect is a target of which a quarter of the rays disagrees: it may lie between two places, or
+    at the lesser one.
+    """
+    everything = np.ones(len(network.observations.xy), dtype=bool)
+    wider = replace(layout, points=np.arange(len(network.targets)))
+    every = normals.extended(network, wider)
+    tolerance = CRITICAL * spread
+    points, used = state.points.copy(), state.used & everything
+    agrees = state.used[every.observations]
+    rays = np.bincount(every.point, minlength=len(points))
+    wrong = np.bincount(every.point[~agrees], minlength=len(points))
+    for target in np.flatnonzero((wrong >= 2) & (wrong >= _SUSPECT * rays)):
+        rows = np.flatnonzero(every.point == target)
+        found = places(every, state, rows, tolerance)
+        if found and len(found[0].rows) > rays[target] - wrong[target]:
+            points[target] = found[0].point
+            used[every.observations[rows]] = np.isin(rows, found[0].rows)
+    return replace(state, points=points, used=used)
+
+
+def rejections(
+    network: Network, result: Adjusted
+) -> tuple[tuple[Rejection, ...], tuple[str, ...]]:
+    """Return what is off with its reason, and warnings of targets at two places."""
+    every, state = result.every, result.state
+    lengths = result.lengths / result.spread
+    reasons: dict[int, str] = {}
+    warnings = []
+    tolerance = CRITICAL * result.spread
+    off = np.flatnonzero(~result.used)
+    for target in np.unique(every.point[off]):
+        rows = off[every.point[off] == target]
+        for place in places(every, state, rows, tolerance):
+            if len(place.rows) < min(_SECOND_PLACE, len(rows)):
+                continue  # two of many wrong rays meet somewhere by chance
+            moved = place.point - state.points[every.points[target]]
+            name = network.targets[every.points[target]]
+            distance = f'{np.linalg.norm(moved):.4g} {network.unit}'.strip()
+            reasons.update(
+                (int(row), f'same ID at two places: a second one {distance} away')
+                for row in place.rows
+            )
+            kept = int((result.used & (every.point == target)).sum())
+            warnings.append(
+                f'target {name} is at two places, {distance} apart: seen at the one that is kept '
+                f'in {kept} photographs, at the other in {len(place.rows)}'
+            )
+    for row in off:
+        other = _other_target(every, state, int(row), tolerance)
+        if other is not None:
+            reasons[int(row)] = f'wrong ID: the place of target {network.targets[other]}'
+    rejected = [
+        _rejection(
+            network,
+            int(every.observations[row]),
+            reasons.get(int(row), 'does not fit the other photographs'),
+            float(lengths[row]),
+        )
+        for row in off
+    ]
+    rejected += [
+        _rejection(network, int(place), 'in fewer than two photographs that agree', None)
+        for place in _unchecked(network, result)
+    ]
+    return tuple(rejected), tuple(warnings)
+
+
+def _other_target(every: Layout, state: Start, row: int, tolerance: float) -> int | None:
+    """Return the index of another target whose image is where a row was measured, if any."""
+    points = state.points[every.points]
+    rows = np.full(len(points), row)
+    lengths = normals.lengths_at(every, state, rows, points)
+    nearest = int(lengths.argmin())
+    return int(every.points[nearest]) if lengths[nearest] < tolerance else None
+
+
+def _unchecked(network: Network, result: Adjusted) -> NDArray[np.int64]:
+    """Return observations in adjusted photographs of targets that have too few rays."""
+    observations = network.observations
+    inside = np.isin(observations.photograph, result.every.photographs)
+    return np.flatnonzero(inside & ~np.isin(observations.point, result.every.points))
+
+
+def _rejection(network: Network, observation: int, reason: str, length: float | None) -> Rejection:
+    observations = network.observations
+    x, y = observations.xy[observation]
+    return Rejection(
+        network.photographs[observations.photograph[observation]],
+        network.targets[observations.point[observation]],
+        (float(x), float(y)),
+        reason,
+        length,
+    )

@@ -1,0 +1,278 @@
+"""Approximate values of a whole network without knowing any: seeds of three photographs, growth.
+
+A seed grows by resection of the photographs that see enough of its points and by triangulation of
+the points that enough of its photographs see. Photographs that do not hang together with the rest
+are oriented each group by itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import islice
+
+import numpy as np
+
+from ahf_ros.orientation.adjustment import refine
+from ahf_ros.orientation.camera import pinhole
+from ahf_ros.orientation.network import FloatArray, IntArray, Network
+from ahf_ros.orientation.planar import mirrored
+from ahf_ros.orientation.resection import ALIKE, BOUND, FEWEST_POINTS, Resection, resections
+from ahf_ros.orientation.solution import Start
+from ahf_ros.orientation.triangulation import intersect
+from ahf_ros.orientation.triples import STEPS, Seed, focal_sigma, known_calibrations, seeds
+from ahf_ros.orientation.views import View, lengths_of, spread_of, views_of
+
+MOST_SEEDS = 5
+
+BATCH = 4
+"""One photograph for so many oriented ones, at least one, is added between two adjustments: the
+values stay as good as after each single one, in a quarter of the time."""
+
+LARGEST_FOCAL_SIGMA = 0.03
+"""Relative standard deviation beyond which a free focal length is not accepted."""
+
+ONE_MINIMUM = np.radians(0.5)
+"""Networks whose photographs are turned against each other by less are the same."""
+
+WORST = 6.0
+"""Robust spread of a photograph, in those of the network, up to which its pose is accepted."""
+
+LENS = (('k1', 4), ('k2', 8), ('cx', 10), ('cy', 10))
+"""What is released of a lens while residuals exceed their standard deviations, and from how many
+photographs on."""
+
+
+def starts(network: Network) -> list[Start]:
+    """Return approximate values of each connected group of photographs, the largest first.
+
+    Groups without approximate values are left out. The same network gives the same values, bit for
+    bit: what is sampled at random is sampled with fixed seeds.
+    """
+    views = views_of(network)
+    remaining = [index for index, view in enumerate(views) if len(view.points) >= FEWEST_POINTS]
+    found: list[Start] = []
+    while len(remaining) > 2:
+        start = _largest(network, views, remaining)
+        if start is None:
+            break
+        other, excess = reversal(network, start)
+        found.append(other if excess < 0 else start)
+        remaining = [index for index in remaining if np.isnan(start.positions[index, 0])]
+    return found
+
+
+def oriented(start: Start) -> IntArray:
+    """Return the indices of photographs that have a pose."""
+    return np.flatnonzero(np.isfinite(start.positions[:, 0]))
+
+
+def reversal(network: Network, start: Start) -> tuple[Start, float]:
+    """Return the mirror image of a network, adjusted, and its chi-square less that of the network.
+
+    Infinite where the mirror image does not exist, or is the network itself.
+    """
+    try:
+        other = _adjusted(network, mirrored(start), rounds=15)
+    except (ValueError, np.linalg.LinAlgError):
+        return start, np.inf
+    group = oriented(start)
+    turns, others = (
+        each.rotations[group[1:]] @ each.rotations[group[0]].T for each in (start, other)
+    )
+    cosines = (np.einsum('kij,kij->k', turns, others) - 1) / 2
+    if not np.isfinite(cosines).all() or np.all(cosines > np.cos(ONE_MINIMUM)):
+        return start, np.inf
+    lengths = [np.nan_to_num(lengths_of(network, each), nan=0.0) for each in (start, other)]
+    spread = min(spread_of(each[each > 0]) for each in lengths)
+    costs = [float(np.sum(np.minimum(each / spread, BOUND) ** 2)) for each in lengths]
+    return other, costs[1] - costs[0]
+
+
+def _largest(network: Network, views: Sequence[View], among: Sequence[int]) -> Start | None:
+    """Return what grows largest of the best seeds, of several equally large ones the best."""
+    best: tuple[float, float] | None = None
+    result: Start | None = None
+    for seed in islice(seeds(network, views, among), MOST_SEEDS):
+        start = _grown(network, views, seed, among)
+        if start is None:
+            continue
+        lengths = lengths_of(network, start)
+        number = len(oriented(start))
+        rating = (-number, spread_of(lengths) / max(float(np.mean(start.used)), 1e-9))
+        if best is None or rating < best:
+            best, result = rating, start
+        known = ~np.isnan(lengths)
+        if number == len(among) and np.mean(start.used[known]) > 0.9:
+            break
+    return result
+
+
+def _grown(
+    network: Network, views: Sequence[View], seed: Seed, among: Sequence[int]
+) -> Start | None:
+    """Return the values of all photographs and points that a seed reaches."""
+    start = seed.start
+    postponed: dict[int, int] = {}
+    try:
+        start = _adjusted(network, start)
+        while True:
+            start = _intersected(network, views, start)
+            chosen = _next(views, start, among, postponed)
+            if not chosen:
+                break
+            spread = spread_of(lengths_of(network, start))
+            added = 0
+            for photograph in chosen:
+                pose, calibration = _pose(network, views[photograph], start, spread)
+                if pose is None:
+                    postponed[photograph] = _known(views[photograph], start)
+                    continue
+                start = _with_pose(start, views[photograph], photograph, pose, calibration)
+                added += 1
+            if added:
+                start = _adjusted(network, start)
+        return _intersected(network, views, _adjusted(network, start, rounds=30))
+    except (ValueError, np.linalg.LinAlgError):
+        return None
+
+
+def _known(view: View, start: Start) -> int:
+    """Return how many points of a photograph have coordinates."""
+    return int(np.isfinite(start.points[view.points, 0]).sum())
+
+
+def _next(
+    views: Sequence[View], start: Start, among: Sequence[int], postponed: dict[int, int]
+) -> list[int]:
+    """Return the photographs to orient next, those with most known points first.
+
+    A photograph that was postponed comes again when more of its points are known.
+    """
+    known = {
+        index: _known(views[index], start)
+        for index in among
+        if np.isnan(start.positions[index, 0])
+    }
+    able = [
+        index
+        for index, number in known.items()
+        if number >= FEWEST_POINTS and number > postponed.get(index, 0)
+    ]
+    able.sort(key=lambda index: (-known[index], index))
+    return able[: max(1, len(oriented(start)) // BATCH)]
+
+
+def _pose(
+    network: Network, view: View, start: Start, spread: float
+) -> tuple[Resection | None, FloatArray]:
+    """Return the pose of a photograph and its calibration; None while it is not certain.
+
+    Where nothing is known of its camera, focal lengths are scanned.
+    """
+    calibration = start.calibrations[view.camera]
+    seen = np.isfinite(start.points[view.points, 0])
+    if np.isfinite(calibration[0]):
+        poses = _poses(view, start, seen, calibration, spread)
+    else:
+        camera = network.cameras[view.camera]
+        width = max(camera.width, camera.height)
+        tried = [pinhole(step * width, camera.width, camera.height) for step in STEPS]
+        each = [(_poses(view, start, seen, one, spread), one) for one in tried]
+        able = [(poses, one) for poses, one in each if poses]
+        if not able:
+            return None, calibration
+        poses, calibration = min(able, key=lambda pair: pair[0][0].scale * pair[1][0])
+    if not poses or poses[0].agrees.sum() < max(FEWEST_POINTS, seen.sum() / 2):
+        return None, calibration
+    doubtful = len(poses) > 1 and poses[1].chi_square < poses[0].chi_square + ALIKE
+    bad = poses[0].scale > WORST and np.isfinite(start.calibrations[view.camera, 0])
+    return (None if doubtful or bad else poses[0]), calibration
+
+
+def _poses(
+    view: View, start: Start, seen: FloatArray, calibration: FloatArray, spread: float
+) -> list[Resection]:
+    """Return the poses of a photograph with a calibration."""
+    calibrations = start.calibrations.copy()
+    calibrations[view.camera] = calibration
+    xy, sigma = view.normalised(calibrations)
+    return resections(start.points[view.points[seen]], xy[seen], sigma[seen] * spread)
+
+
+def _with_pose(
+    start: Start, view: View, photograph: int, pose: Resection, calibration: FloatArray
+) -> Start:
+    """Return the values with one photograph more."""
+    rotations, positions = start.rotations.copy(), start.positions.copy()
+    calibrations, used = start.calibrations.copy(), start.used.copy()
+    rotations[photograph], positions[photograph] = pose.rotation, pose.position
+    calibrations[view.camera] = calibration
+    seen = np.isfinite(start.points[view.points, 0])
+    used[view.rows[seen]] = pose.agrees
+    return replace(
+        start, rotations=rotations, positions=positions, calibrations=calibrations, used=used
+    )
+
+
+def _intersected(network: Network, views: Sequence[View], start: Start) -> Start:
+    """Return the values with every point that enough rays determine.
+
+    Points on which their rays agree stay; others are intersected anew, and dropped if that fails.
+    """
+    observed = network.observations
+    spread = spread_of(lengths_of(network, start))
+    posed = np.isfinite(start.positions[observed.photograph, 0])
+    rays = np.bincount(observed.point[posed], minlength=len(network.targets))
+    agree = np.bincount(observed.point[posed & start.used], minlength=len(network.targets))
+    settled = np.isfinite(start.points[:, 0]) & (agree >= 2) & (agree >= 0.7 * rays)
+    wanted = np.flatnonzero(~settled & (rays >= 2))
+    points, used = start.points.copy(), start.used.copy()
+    points[~settled] = np.nan
+    if not len(wanted):
+        return replace(start, points=points)
+    places = np.zeros((len(observed.xy), 2))
+    sigmas = np.full(len(observed.xy), np.inf)
+    for photograph in oriented(start):
+        view = views[photograph]
+        places[view.rows], sigmas[view.rows] = view.normalised(start.calibrations)
+    posed &= np.isfinite(sigmas)
+    for point in wanted:
+        rows = np.flatnonzero(posed & (observed.point == point))
+        images = observed.photograph[rows]
+        met = intersect(
+            start.rotations[images], start.positions[images], places[rows], spread * sigmas[rows]
+        )
+        used[rows] = False
+        if met is not None:
+            points[point] = met.xyz
+            used[rows] = met.agrees
+    return replace(start, points=points, used=used)
+
+
+def _adjusted(network: Network, start: Start, rounds: int = 8) -> Start:
+    """Return the values after a robust adjustment of what the photographs determine so far.
+
+    Focal lengths that nobody gave are free; others, and the lens, when they become certain and
+    residuals ask for them.
+    """
+    photographs = len(oriented(start))
+    given = np.isfinite(known_calibrations(network)[:, 0])
+    free: tuple[str, ...] = ()
+    held = tuple(
+        replace(camera, fixed=camera.fixed or bool(known))
+        for camera, known in zip(network.cameras, given, strict=True)
+    )
+    if not given.all():
+        free = ('f',)
+    start = refine(replace(network, cameras=held), start, free, rounds=rounds)
+    spread = spread_of(lengths_of(network, start))
+    lens = tuple(name for name, least in LENS if photographs >= least)
+    if spread < 2 or not lens or all(camera.fixed for camera in network.cameras):
+        return start
+    free = ('f', *lens)
+    tried = refine(network, start, free, rounds=rounds)
+    if focal_sigma(network, tried, free) * spread > LARGEST_FOCAL_SIGMA:
+        return start
+    better = spread_of(lengths_of(network, tried)) < 0.9 * spread
+    return tried if better else start

@@ -1,0 +1,160 @@
+"""How strong the geometry of a network is, and what to photograph next where it is weak."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ahf_ros.orientation.calibration import rolled
+from ahf_ros.orientation.network import FloatArray, IntArray
+from ahf_ros.orientation.solution import Solution
+
+FEW_RAYS = 3
+"""Number of rays with which a wrong one is noticed but cannot be named."""
+
+SMALL_ANGLE = math.radians(30)
+"""Angle between the outermost rays below which depth is much less certain than the rest."""
+
+_FEW_POINTS = 6  # observations, with which a pose has hardly a check
+_COVERED = 0.7  # of the half diagonal, that observations should reach
+_NAMED = 12  # targets or photographs in a line of advice
+_WEAK = 3.0  # times the median, of the largest standard deviation of a target
+
+
+def oriented(solution: Solution) -> NDArray[np.bool_]:
+    """Return which photographs have a pose, (photographs,)."""
+    return np.asarray(np.isfinite(solution.start.positions).all(axis=1))
+
+
+def determined(solution: Solution) -> NDArray[np.bool_]:
+    """Return which targets have coordinates, (points,)."""
+    return np.asarray(np.isfinite(solution.start.points).all(axis=1))
+
+
+def rays_of(solution: Solution) -> IntArray:
+    """Return the number of observations of each target that the adjustment used."""
+    used = solution.network.observations.point[solution.start.used]
+    return np.bincount(used, minlength=len(solution.network.targets)).astype(np.int64)
+
+
+def largest_angles(solution: Solution) -> FloatArray:
+    """Return the largest angle between two used rays of each target, rad; NaN below two rays."""
+    network, values = solution.network, solution.start
+    angles = np.full(len(network.targets), np.nan)
+    observed = network.observations
+    for target in range(len(network.targets)):
+        photographs = observed.photograph[(observed.point == target) & values.used]
+        directions = values.positions[photographs] - values.points[target]
+        directions = directions[np.isfinite(directions).all(axis=1)]
+        if len(directions) > 1:
+            directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+            angles[target] = math.acos(np.clip((directions @ directions.T).min(), -1, 1))
+    return angles
+
+
+def semi_axes(solution: Solution) -> FloatArray:
+    """Return the standard deviations along the axes of each target's ellipsoid, largest first."""
+    count = len(solution.network.targets)
+    blocks = solution.covariance_of_points.reshape(count, 3, count, 3)
+    own = blocks[np.arange(count), :, np.arange(count)]
+    axes = np.full((count, 3), np.nan)
+    known = np.isfinite(own).all(axis=(1, 2))
+    axes[known] = np.sqrt(np.maximum(np.linalg.eigvalsh(own[known]), 0))[:, ::-1]
+    return axes
+
+
+def what_to_photograph(solution: Solution) -> list[str]:
+    """Return what would make a weak network stronger, one sentence a weakness."""
+    network = solution.network
+    known = determined(solution)
+    rays, angles, largest = rays_of(solution), largest_angles(solution), semi_axes(solution)[:, 0]
+    advice = []
+    if np.any(few := known & (rays < FEW_RAYS)):
+        advice.append(
+            f'Photograph {_named(network.targets, few)} again, from another side: two rays only, '
+            'so that a wrong ID is not noticed.'
+        )
+    if np.any(flat := known & (angles < SMALL_ANGLE)):
+        advice.append(
+            f'Photograph {_named(network.targets, flat)} from further to the side: all rays are '
+            f'within {math.degrees(SMALL_ANGLE):g} degrees, so that the depth is uncertain.'
+        )
+    typical = float(np.median(largest[known])) if known.any() else math.nan
+    weak = known & (largest > _WEAK * typical) & ~few & ~flat
+    if np.any(weak):
+        advice.append(
+            f'Photograph {_named(network.targets, weak)} more often: the standard deviation is '
+            f'above {_WEAK:g} times the usual one.'
+        )
+    if np.any(~known):
+        advice.append(
+            f'Photograph {_named(network.targets, ~known)} from two sides or more: no coordinates.'
+        )
+    return [*advice, *_of_photographs(solution), *_of_cameras(solution), *_of_scale(solution)]
+
+
+def _of_photographs(solution: Solution) -> list[str]:
+    network, values = solution.network, solution.start
+    posed = oriented(solution)
+    number = np.bincount(
+        network.observations.photograph[values.used], minlength=len(network.photographs)
+    )
+    advice = []
+    if np.any(~posed):
+        advice.append(
+            f'{_named(network.photographs, ~posed)}: no pose. Take photographs in between that '
+            'show six or more of the same targets as others.'
+        )
+    if np.any(few := posed & (number < _FEW_POINTS)):
+        advice.append(
+            f'{_named(network.photographs, few)}: fewer than {_FEW_POINTS} targets. Step back, or '
+            'add targets.'
+        )
+    return advice
+
+
+def _of_cameras(solution: Solution) -> list[str]:
+    """Return what would determine the calibrations better."""
+    network, values = solution.network, solution.start
+    advice = []
+    for place, view in enumerate(network.cameras):
+        taken = (network.camera_of == place) & oriented(solution)
+        if view.fixed or not taken.any():
+            continue
+        if not rolled(values.rotations[taken]):
+            advice.append(
+                f'Camera {view.name}: no photograph is rolled by 90 degrees about its axis. Roll '
+                'some, so that the principal point can be determined.'
+            )
+        seen = taken[network.observations.photograph] & values.used
+        centre = (np.array([view.width, view.height]) - 1) / 2
+        reached = np.linalg.norm(network.observations.xy[seen] - centre, axis=1)
+        share = float(np.quantile(reached, 0.98) / np.linalg.norm(centre)) if seen.any() else 0.0
+        if share < _COVERED:
+            advice.append(
+                f'Camera {view.name}: targets reach only {100 * share:.0f} % of the way to the '
+                'corners. Fill the images, so that the distortion is known there, too.'
+            )
+    return advice
+
+
+def _of_scale(solution: Solution) -> list[str]:
+    network = solution.network
+    if not network.unit:
+        return ['Add a scale bar or control points: the network has no scale.']
+    if not any([it.check for it in network.bars] + [it.check for it in network.control]):
+        return [
+            'Keep a scale bar or a control point as a check (role check): nothing that was not '
+            'used says how good the scale is.'
+        ]
+    return []
+
+
+def _named(names: Sequence[str], chosen: np.ndarray) -> str:
+    """Return the first of the chosen names, and the number of the others."""
+    some = [name for name, one in zip(names, chosen, strict=True) if one]
+    more = f' and {len(some) - _NAMED} more' if len(some) > _NAMED else ''
+    return ', '.join(some[:_NAMED]) + more

@@ -1,0 +1,336 @@
+"""The beginning of a network: three photographs that determine each other, and the focal length.
+
+Two photographs of a plane have two relative orientations and fit any focal length; three do not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from ahf_ros.orientation import normals
+from ahf_ros.orientation.adjustment import free_parameters, refine
+from ahf_ros.orientation.camera import PARAMETERS, pinhole
+from ahf_ros.orientation.datum import movements
+from ahf_ros.orientation.least_squares import Conditions, normal_equations
+from ahf_ros.orientation.network import FloatArray, Network
+from ahf_ros.orientation.planar import mirrored
+from ahf_ros.orientation.precision import precision
+from ahf_ros.orientation.relative import relative_orientations
+from ahf_ros.orientation.resection import resections
+from ahf_ros.orientation.solution import Start
+from ahf_ros.orientation.triangulation import SMALLEST_ANGLE, directions, midpoints
+from ahf_ros.orientation.views import View, lengths_of, part_of, spread_of
+
+STEPS = np.geomspace(0.5, 4.0, 14)
+"""Focal lengths that are tried where none is known, in widths of the image: 17 % apart."""
+
+FEWEST_COMMON = 6
+MOST_PHOTOGRAPHS = 40
+MOST_TRIPLES = 9
+AT_A_TIME = 3
+
+BOUND = 4.0
+"""Standard deviations to which a residual counts."""
+
+
+@dataclass(frozen=True)
+class Seed:
+    """Approximate values of a few photographs.
+
+    `spread` is the robust standard deviation of the residuals in units of the given ones, `angle`
+    the median over points of the largest angle of their rays in rad, and `focal_sigma` the
+    standard deviation of the focal length over itself, zero where it is known.
+    """
+
+    photographs: tuple[int, ...]
+    start: Start
+    spread: float
+    cost: float
+    angle: float
+    focal_sigma: float
+
+    @property
+    def rank(self) -> float:
+        """The smaller the better: uncertain points and an uncertain focal length."""
+        number = int(np.isfinite(self.start.points[:, 0]).sum())
+        precision = self.spread / (min(self.angle, 0.8) * np.sqrt(number))
+        return float(precision * (1 + (self.focal_sigma / 0.02) ** 2))
+
+
+def known_calibrations(network: Network) -> FloatArray:
+    """Return the calibrations (cameras, parameters) that are given, NaN where none is."""
+    rows = np.full((len(network.cameras), len(PARAMETERS)), np.nan)
+    for index, view in enumerate(network.cameras):
+        if view.calibration is not None:
+            rows[index] = view.calibration
+        elif view.focal_length is not None:
+            rows[index] = pinhole(view.focal_length, view.width, view.height)
+    return rows
+
+
+def seeds(network: Network, views: Sequence[View], among: Sequence[int]) -> Iterator[Seed]:
+    """Yield approximate values of triples of the photographs `among`.
+
+    Triples come in the order of what their image points promise, a few at a time, and of these
+    the best first.
+    """
+    known = known_calibrations(network)
+    triples = _triples(views, among, np.isfinite(known[:, 0]))
+    for begin in range(0, len(triples), AT_A_TIME):
+        found: list[Seed] = []
+        for triple in triples[begin : begin + AT_A_TIME]:
+            found += _seeds_of(network, views, triple, known)
+        yield from sorted(found, key=lambda seed: seed.rank)
+
+
+def _triples(
+    views: Sequence[View], among: Sequence[int], known: FloatArray
+) -> list[tuple[int, int, int]]:
+    """Return triples with many common points under different perspective, the best first.
+
+    At most one camera of a triple may be without a focal length.
+    """
+    most = sorted(among, key=lambda index: (-len(views[index].points), index))[:MOST_PHOTOGRAPHS]
+    worth: dict[tuple[int, int], float] = {}
+    for a, b in combinations(sorted(most), 2):
+        value = _worth(views[a], views[b])
+        if value > 0:
+            worth[a, b] = value
+    pairs = sorted(worth, key=lambda pair: (-worth[pair], pair))[:60]
+    rated: dict[tuple[int, int, int], float] = {}
+    for a, b in pairs:
+        for c in most:
+            triple = tuple(sorted((a, b, c)))
+            if c in (a, b) or triple in rated:
+                continue
+            unknown = {views[index].camera for index in triple}
+            if sum(not known[camera] for camera in unknown) > 1:
+                continue
+            common = _common(views, triple)
+            sides = [worth.get(pair, 0.0) for pair in combinations(triple, 2)]
+            if common >= FEWEST_COMMON and min(sides) > 0:
+                share = 1 - np.exp(-common / 15)
+                rated[triple] = share * float(np.sum(np.sqrt(sides)))
+    chosen: list[tuple[int, int, int]] = []
+    for triple in sorted(rated, key=lambda one: (-rated[one], one)):
+        if all(len(set(triple) & set(other)) < 2 for other in chosen):
+            chosen.append(triple)
+    rest = [one for one in sorted(rated, key=lambda one: (-rated[one], one)) if one not in chosen]
+    return (chosen + rest)[:MOST_TRIPLES]
+
+
+def _common(views: Sequence[View], triple: Sequence[int]) -> int:
+    """Return the number of points that all three photographs show."""
+    a, b, c = (views[index].points for index in triple)
+    return len(np.intersect1d(np.intersect1d(a, b, True), c, True))
+
+
+def _worth(first: View, second: View) -> float:
+    """Return how much two photographs differ by more than a movement in the image, from 0 to 1.
+
+    An affine map between them leaves parallax and perspective as residuals, and its two stretches
+    differ where a plane is seen from different sides. Neither needs a focal length.
+    """
+    _, a, b = np.intersect1d(first.points, second.points, True, return_indices=True)
+    if len(a) < FEWEST_COMMON:
+        return 0.0
+    source, target = first.xy[a], second.xy[b]
+    source, target = source - np.median(source, axis=0), target - np.median(target, axis=0)
+    size = np.median(np.linalg.norm(target, axis=1))
+    system = np.column_stack([source, np.ones(len(source))])
+    for _ in range(2):
+        solution = np.linalg.lstsq(system, target, rcond=None)[0]
+        rest = np.linalg.norm(target - system @ solution, axis=1)
+        good = rest <= 4 * np.median(rest) + 1e-9
+        system, target = system[good], target[good]
+    stretches = np.linalg.svd(solution[:2], compute_uv=False)
+    if size <= 0 or stretches[1] <= 0:
+        return 0.0
+    differs = np.median(rest) / size + 0.3 * np.log(stretches[0] / stretches[1])
+    return float(min(differs, 0.5) * (1 - np.exp(-len(a) / 15)) + 1e-6)
+
+
+@dataclass(frozen=True)
+class _Hypothesis:
+    score: float
+    start: Start
+
+
+def _seeds_of(
+    network: Network, views: Sequence[View], triple: tuple[int, int, int], known: FloatArray
+) -> list[Seed]:
+    """Return the approximate values that three photographs allow."""
+    part, rows = part_of(network, np.array(triple))
+    cameras = sorted({views[index].camera for index in triple})
+    unknown = [camera for camera in cameras if not np.isfinite(known[camera, 0])]
+    own = [views[index] for index in triple]
+    if not unknown:
+        hypotheses = sorted(_hypotheses(part, own, known), key=lambda one: one.score)[:4]
+        free: tuple[str, ...] = ()
+    else:
+        free = ('f',)
+        hypotheses = _scanned(part, own, known, unknown[0])
+        held = (replace(one, fixed=index != unknown[0]) for index, one in enumerate(part.cameras))
+        part = replace(part, cameras=tuple(held))
+    found: list[Seed] = []
+    for hypothesis in hypotheses:
+        seed = _refined(part, hypothesis.start, triple, free, unknown)
+        if seed is None:
+            continue
+        found.append(seed)
+    if found:
+        best = min(found, key=lambda one: one.cost)
+        seed = _refined(part, mirrored(best.start), triple, free, unknown)
+        found += [seed] if seed is not None else []
+    return [_whole(network, seed, rows) for seed in _different(found)]
+
+
+def _different(found: list[Seed]) -> list[Seed]:
+    """Return the seed of least cost and those that fit about as well and are not the same."""
+    found = sorted(found, key=lambda seed: seed.cost)
+    kept: list[Seed] = []
+    for seed in found:
+        near = not kept or seed.cost < 1.5 * kept[0].cost + 10 * kept[0].spread ** 2
+        if near and not any(_same(seed, other) for other in kept):
+            kept.append(seed)
+    return kept[:2]
+
+
+def _same(seed: Seed, other: Seed) -> bool:
+    """Return whether two seeds have the same relative rotations, to half a degree."""
+    turns = seed.start.rotations[1:] @ seed.start.rotations[0].T
+    others = other.start.rotations[1:] @ other.start.rotations[0].T
+    cosines = (np.einsum('kij,kij->k', turns, others) - 1) / 2
+    return bool(np.all(cosines > np.cos(np.radians(0.5))))
+
+
+def _scanned(
+    part: Network, own: Sequence[View], known: FloatArray, camera: int
+) -> list[_Hypothesis]:
+    """Return the best hypotheses at the local minima over the focal length."""
+    view = part.cameras[camera]
+    steps: list[_Hypothesis | None] = []
+    for step in STEPS:
+        calibrations = known.copy()
+        calibrations[camera] = pinhole(
+            step * max(view.width, view.height), view.width, view.height
+        )
+        steps.append(
+            min(_hypotheses(part, own, calibrations), key=lambda one: one.score, default=None)
+        )
+    scores = np.array([np.inf if one is None else one.score for one in steps])
+    padded = np.concatenate([[np.inf], scores, [np.inf]])
+    lowest = np.flatnonzero((scores <= padded[:-2]) & (scores <= padded[2:]) & np.isfinite(scores))
+    best = lowest[np.argsort(scores[lowest], kind='stable')][:3]
+    return [one for one in (steps[index] for index in best) if one is not None]
+
+
+def _hypotheses(
+    part: Network, own: Sequence[View], calibrations: FloatArray
+) -> Iterator[_Hypothesis]:
+    """Yield starts of three photographs: two by relative orientation, the third by resection."""
+    first, second, third = own
+    xy, sigma = zip(*(view.normalised(calibrations) for view in own), strict=True)
+    _, a, b = np.intersect1d(first.points, second.points, True, return_indices=True)
+    typical = float(np.median(np.concatenate([sigma[0][a], sigma[1][b]])))
+    for pair in relative_orientations(xy[0][a], xy[1][b], typical)[:3]:
+        good = pair.agrees
+        rays = directions(np.broadcast_to(np.eye(3), (len(a), 3, 3)), xy[0][a])
+        others = directions(np.broadcast_to(pair.rotation, (len(b), 3, 3)), xy[1][b])
+        points = np.full((len(part.targets), 3), np.nan)
+        points[first.points[a[good]]] = midpoints(rays, others, np.zeros(3), pair.position)[good]
+        seen = np.isfinite(points[third.points, 0])
+        poses = resections(points[third.points[seen]], xy[2][seen], sigma[2][seen])
+        for pose in poses[:2]:
+            start = Start(
+                calibrations,
+                np.stack([np.eye(3), pair.rotation, pose.rotation]),
+                np.stack([np.zeros(3), pair.position, pose.position]),
+                points,
+                np.isfinite(points[part.observations.point, 0]),
+            )
+            yield _Hypothesis(max(pair.scale / typical, pose.scale), start)
+
+
+def _refined(
+    part: Network,
+    start: Start,
+    triple: tuple[int, int, int],
+    free: tuple[str, ...],
+    unknown: list[int],
+) -> Seed | None:
+    """Return the seed after a robust adjustment, None where it fails."""
+    try:
+        start = refine(part, start, (), rounds=6)
+        start = refine(part, start, free, rounds=15)
+    except (ValueError, np.linalg.LinAlgError):
+        return None
+    focal = start.calibrations[unknown, 0]
+    widths = np.array([max(part.cameras[one].width, part.cameras[one].height) for one in unknown])
+    if np.any(focal < 0.3 * widths) or np.any(focal > 8 * widths):
+        return None
+    lengths = lengths_of(part, start)
+    spread = spread_of(lengths)
+    if not np.isfinite(spread):
+        return None
+    cost = float(
+        np.sum(np.minimum(np.nan_to_num(lengths[~np.isnan(lengths)]), BOUND * spread) ** 2)
+    )
+    angle = median_angle(part, start)
+    if angle < SMALLEST_ANGLE / 2:
+        return None
+    sigma = spread * focal_sigma(part, start, free) if unknown else 0.0
+    return Seed(triple, start, spread, cost, angle, sigma)
+
+
+def focal_sigma(network: Network, start: Start, free: tuple[str, ...]) -> float:
+    """Return the largest relative standard deviation of a free focal length, for unit weights."""
+    mask = free_parameters(network, free)
+    layout = normals.lay_out(network, start, start.used, mask)
+    focal = layout.columns[layout.free[:, 0], 0]
+    if not len(focal):
+        return 0.0 if len(layout.xy) else np.inf
+
+    def datum(state: Start) -> Conditions:
+        rows = np.zeros((7, layout.unknowns))
+        rows[:, : 3 * len(layout.points)] = movements(state.points[layout.points]).T
+        return Conditions(rows, np.zeros(7), np.zeros(7))
+
+    try:
+        covariance = precision(*normal_equations(layout, start, datum)).rest
+    except np.linalg.LinAlgError:
+        return np.inf
+    variance = covariance[focal, focal]
+    if np.any(variance <= 0) or not np.isfinite(variance).all():
+        return np.inf
+    return float(np.max(np.sqrt(variance) / start.calibrations[layout.free[:, 0], 0]))
+
+
+def median_angle(network: Network, start: Start) -> float:
+    """Return the median over points of the largest angle in rad of their used rays."""
+    observed = network.observations
+    rows = np.flatnonzero(start.used)
+    rays = start.points[observed.point[rows]] - start.positions[observed.photograph[rows]]
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    angles = []
+    for point in np.unique(observed.point[rows]):
+        own = rays[observed.point[rows] == point]
+        angles.append(np.arccos(np.clip(np.min(own @ own.T), -1, 1)))
+    return float(np.median(angles)) if angles else 0.0
+
+
+def _whole(network: Network, seed: Seed, rows: FloatArray) -> Seed:
+    """Return a seed whose arrays are those of the whole network."""
+    count = len(network.photographs)
+    rotations, positions = np.full((count, 3, 3), np.nan), np.full((count, 3), np.nan)
+    used = np.zeros(len(network.observations.xy), dtype=bool)
+    rotations[list(seed.photographs)] = seed.start.rotations
+    positions[list(seed.photographs)] = seed.start.positions
+    used[rows] = seed.start.used
+    return replace(
+        seed, start=replace(seed.start, rotations=rotations, positions=positions, used=used)
+    )

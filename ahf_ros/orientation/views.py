@@ -1,0 +1,90 @@
+"""Observations by photograph, and which of them agree with approximate values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ahf_ros.orientation import normals
+from ahf_ros.orientation.adjustment import free_parameters
+from ahf_ros.orientation.camera import undistort
+from ahf_ros.orientation.network import FloatArray, IntArray, Network
+from ahf_ros.orientation.solution import Start
+
+
+@dataclass(frozen=True)
+class View:
+    """What one photograph shows: points by index in ascending order, px, and rows in the network.
+
+    `sigma` (n,) is the standard deviation of a coordinate in px, the mean of both.
+    """
+
+    camera: int
+    points: IntArray
+    xy: FloatArray
+    sigma: FloatArray
+    rows: IntArray
+
+    def normalised(self, calibrations: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return places (n, 2) in the plane z = 1, zero where there is none, and their sigma."""
+        calibration = calibrations[self.camera]
+        places = undistort(calibration, self.xy)
+        lost = ~np.isfinite(places).all(axis=1)
+        sigma = self.sigma / calibration[0]
+        sigma[lost] = np.inf
+        return np.nan_to_num(places), sigma
+
+
+def views_of(network: Network) -> list[View]:
+    """Return what each photograph shows; of targets seen twice in one, the first place."""
+    observed = network.observations
+    sigma = np.sqrt(np.trace(observed.covariance, axis1=1, axis2=2) / 2)
+    made = []
+    for photograph, camera in enumerate(network.camera_of):
+        rows = np.flatnonzero(observed.photograph == photograph)
+        points, first = np.unique(observed.point[rows], return_index=True)
+        rows = rows[first]
+        made.append(View(int(camera), points, observed.xy[rows], sigma[rows], rows))
+    return made
+
+
+def part_of(network: Network, photographs: IntArray) -> tuple[Network, IntArray]:
+    """Return a network of some photographs with all points, and the rows of its observations."""
+    observed = network.observations
+    index = np.full(len(network.photographs), -1)
+    index[photographs] = np.arange(len(photographs))
+    rows = np.flatnonzero(index[observed.photograph] >= 0)
+    part = replace(
+        observed,
+        photograph=index[observed.photograph[rows]],
+        point=observed.point[rows],
+        xy=observed.xy[rows],
+        covariance=observed.covariance[rows],
+    )
+    names = tuple(network.photographs[photograph] for photograph in photographs)
+    cameras = network.camera_of[photographs]
+    return replace(network, photographs=names, camera_of=cameras, observations=part), rows
+
+
+def lengths_of(network: Network, start: Start) -> FloatArray:
+    """Return residuals (m,) in standard deviations, NaN where pose or point are not known.
+
+    Points behind a camera that has a pose have infinite ones.
+    """
+    observed = network.observations
+    known = np.isfinite(start.positions[observed.photograph, 0])
+    known &= np.isfinite(start.points[observed.point, 0])
+    lengths = np.full(len(observed.xy), np.nan)
+    lengths[known] = np.inf
+    every = np.ones(len(known), dtype=bool)
+    layout = normals.lay_out(network, start, every, free_parameters(network, ()))
+    if len(layout.xy):
+        lengths[layout.observations] = normals.whitened_lengths(layout, start)
+    return lengths
+
+
+def spread_of(lengths: FloatArray) -> float:
+    """Return the robust spread of residuals in standard deviations, at least one."""
+    known = lengths[~np.isnan(lengths)]
+    return max(1.0, normals.robust_spread(known)) if len(known) else np.inf

@@ -1,0 +1,166 @@
+"""The page of a network: one HTML file without scripts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ahf_ros.interchange.files import write_whole
+from ahf_ros.interchange.network_results import rejections
+from ahf_ros.orientation.camera import PARAMETERS
+from ahf_ros.orientation.deviations import bar_deviations, control_deviations
+from ahf_ros.orientation.solution import Solution
+from ahf_ros.orientation.strength import (
+    FEW_RAYS,
+    SMALL_ANGLE,
+    determined,
+    largest_angles,
+    oriented,
+    rays_of,
+    semi_axes,
+    what_to_photograph,
+)
+from ahf_ros.report.network_figures import enlargement, image_figure, sensor_map, views
+from ahf_ros.report.page import page_style, page_template
+
+_PICTURES = 60  # photographs whose residuals are drawn: those with the largest ones
+_CORRELATED = 0.7  # correlation of two parameters of a camera that is listed
+
+
+def write_network_page(path: Path, solution: Solution, title: str) -> None:
+    """Write the page of a network to a file that is never there in part.
+
+    A ValueError says so if the file cannot be written, or jinja2 is not installed.
+    """
+    text = page_template('network.html').render(
+        title=title, style=page_style('network.css'), **_content(solution)
+    )
+    write_whole(path, text.encode('utf-8', 'backslashreplace'))
+
+
+def _content(solution: Solution) -> dict[str, Any]:
+    enlarged = enlargement(solution)
+    photographs = _photographs(solution)
+    drawn = sorted(photographs, key=lambda it: -it['largest'])[:_PICTURES]
+    shown = {it['index'] for it in drawn}
+    return {
+        'unit': solution.network.unit,
+        'summary': _summary(solution),
+        'warnings': solution.warnings,
+        'advice': what_to_photograph(solution),
+        'views': views(solution),
+        'targets': _targets(solution),
+        'photographs': photographs,
+        'pictures': [
+            (it['name'], image_figure(solution, it['index'], enlarged))
+            for it in photographs
+            if it['index'] in shown
+        ],
+        'enlarged': enlarged,
+        'cameras': _cameras(solution, enlarged),
+        'bars': bar_deviations(solution),
+        'control': control_deviations(solution),
+        'rejected': rejections(solution),
+    }
+
+
+def _summary(solution: Solution) -> list[tuple[str, str]]:
+    known, posed, used = determined(solution), oriented(solution), solution.start.used
+    axes = semi_axes(solution)[known]
+    rms = np.sqrt((solution.residuals[used] ** 2).mean()) if used.any() else np.nan
+    unit = solution.network.unit or 'in units of the network, which has no scale'
+    rows = [
+        ('photographs', f'{posed.sum()} of {len(posed)}'),
+        ('targets', f'{known.sum()} of {len(known)}'),
+        ('image points used', f'{used.sum()} of {len(used)}'),
+        ('RMS residual', f'{rms:.4f} px'),
+        ('sigma0', f'{solution.sigma0:.3f}, redundancy {solution.redundancy}'),
+    ]
+    if len(axes):
+        middle, largest = np.median(axes[:, 0]), axes[:, 0].max()
+        rows.append(('largest standard deviation', f'median {middle:.3g}, at most {largest:.3g}'))
+        rows.append(('unit', unit))
+    return rows
+
+
+def _targets(solution: Solution) -> list[dict[str, Any]]:
+    known, rays = determined(solution), rays_of(solution)
+    angles, axes = largest_angles(solution), semi_axes(solution)
+    sigmas = np.sqrt(np.maximum(np.diag(solution.covariance_of_points), 0)).reshape(-1, 3)
+    longest = np.nanmax(axes[:, 0], initial=0) or 1.0
+    return [
+        {
+            'name': solution.network.targets[index],
+            'xyz': solution.start.points[index],
+            'sigmas': sigmas[index],
+            'rays': int(rays[index]),
+            'few': rays[index] < FEW_RAYS,
+            'angle': float(np.degrees(angles[index])),
+            'small': not angles[index] >= SMALL_ANGLE,
+            'largest': axes[index, 0],
+            'share': float(axes[index, 0] / longest),
+        }
+        for index in np.flatnonzero(known)
+    ]
+
+
+def _photographs(solution: Solution) -> list[dict[str, Any]]:
+    network, seen = solution.network, solution.network.observations
+    rows = []
+    posed = oriented(solution)
+    for index, name in enumerate(network.photographs):
+        here = seen.photograph == index
+        residuals = solution.residuals[here & solution.start.used]
+        lengths = np.linalg.norm(residuals, axis=1)
+        rows.append(
+            {
+                'index': index,
+                'name': name,
+                'posed': bool(posed[index]),
+                'camera': network.cameras[network.camera_of[index]].name,
+                'used': len(residuals),
+                'seen': int(here.sum()),
+                'rms': float(np.sqrt((residuals**2).mean())) if len(residuals) else None,
+                'largest': float(lengths.max(initial=0)),
+            }
+        )
+    return rows
+
+
+def _cameras(solution: Solution, enlarged: float) -> list[dict[str, Any]]:
+    cameras = []
+    for index, view in enumerate(solution.network.cameras):
+        values = solution.start.calibrations[index]
+        if not np.isfinite(values).all():
+            continue
+        sigma = np.sqrt(np.maximum(np.diag(solution.camera_covariances[index]), 0))
+        free = [PARAMETERS.index(name) for name in solution.released[index]]
+        correlated = [
+            (PARAMETERS[first], PARAMETERS[second], correlation)
+            for place, first in enumerate(free)
+            for second in free[:place]
+            if sigma[first] > 0
+            and sigma[second] > 0
+            and abs(
+                correlation := solution.camera_covariances[index][first, second]
+                / (sigma[first] * sigma[second])
+            )
+            > _CORRELATED
+        ]
+        cameras.append(
+            {
+                'name': view.name,
+                'size': f'{view.width} x {view.height} px',
+                'rows': [
+                    (name, values[place], sigma[place] if place in free else None)
+                    for place, name in enumerate(PARAMETERS)
+                    if place in free or values[place]
+                ],
+                'correlated': correlated,
+                'map': sensor_map(solution, index, 3 * enlarged),
+                'map_enlarged': 3 * enlarged,
+            }
+        )
+    return cameras

@@ -1,0 +1,257 @@
+"""How often the congruence test of two epochs raises a false alarm, and what it finds.
+
+    python -m benchmarks.network_epochs [--runs 2000] [--seeds 301]
+
+Each epoch is a bundle of its own photographs: image points with normal errors, poses, focal length
+and radial distortion unknown, inner constraints, and a scale bar where the scale is fixed. Its
+coordinates are those of the linearised adjustment, with all correlations and with the variance of
+unit weight of its own residuals, in a frame of its own.
+
+A movement of 5 sigma is that of one target, any, in any direction e, by 5 sqrt(e' C e). C is the
+covariance of its difference x2 - x1 in the datum of all others, or, *conditional*, of the best
+estimate of its movement against them, which `compare` reports and which is smaller: the residuals
+of the others tell a part of its errors. *Found* are movements that make the epochs incongruent,
+*located* those whose target is the first that is named, *alone* those where no other one is.
+*Bound* is the power of one F-test of the right target at the same level with Bonferroni's
+correction. *Quarter* moves a quarter of the targets together by 10 of the largest conditional
+sigmas, and counts where these and no others are named.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ahf_ros.orientation.camera import PARAMETERS, linearise, pinhole, rotation_matrices
+from ahf_ros.orientation.congruence import LEVEL, compare
+from ahf_ros.orientation.datum import movements, s_transform
+from ahf_ros.orientation.network import FloatArray
+from ahf_ros.orientation.points import MeasuredPoints
+from benchmarks.report import Report, about, about_text, parsed, parser, progress, publish, table
+
+FIRST_SEED = 301
+RUNS = 2000
+SIGMAS = 5.0
+WIDTH, HEIGHT, FOCAL_LENGTH = 4000, 3000, 4200.0
+NOISE = 0.05
+"""Standard deviation of image points, px."""
+BAR_SIGMA = 2e-5
+"""Standard deviation of a scale bar, as a share of its length."""
+_OUTCOMES = 'found', 'located', 'alone', 'bound'
+_FREE = [PARAMETERS.index(name) for name in ('f', 'k1')]
+
+
+@dataclass(frozen=True)
+class Field:
+    """A field of targets, in units of length, and how many photographs are taken of it."""
+
+    name: str
+    extent: tuple[float, float, float]
+    targets: int
+    photographs: int
+
+
+FIELDS = (
+    Field('wall', (1.0, 0.7, 0.0), 20, 10),
+    Field('box', (1.0, 0.8, 0.6), 8, 8),
+    Field('machine', (1.0, 0.8, 0.6), 24, 16),
+    Field('beam', (3.0, 0.2, 0.1), 14, 12),
+    Field('hall', (1.0, 1.0, 0.4), 60, 40),
+)
+
+
+class Epoch:
+    """The linearised adjustment of a bundle: errors of image points in, coordinates out."""
+
+    def __init__(self, xyz: FloatArray, photographs: int, bar: bool, rng: np.random.Generator):
+        design = _design(xyz, photographs, rng)
+        free = movements(xyz, scale=not bar)
+        if bar:
+            row = np.zeros((1, design.shape[1]))
+            difference = xyz[1] - xyz[0]
+            row[0, :3] = -difference / (difference @ difference) / BAR_SIGMA
+            row[0, 3:6] = -row[0, :3]
+            design = np.vstack([design, row])
+        size, count = 3 * len(xyz), design.shape[1]
+        border = np.zeros((count, free.shape[1]))
+        border[:size] = free
+        scale = 1 / np.linalg.norm(design, axis=0)  # so that inverting loses no digits
+        border *= scale[:, None]
+        border /= np.linalg.norm(border, axis=0)
+        normal = (design * scale).T @ (design * scale)
+        bordered = np.block([[normal, border], [border.T, np.zeros((free.shape[1],) * 2)]])
+        inverse = np.linalg.inv(bordered)[:count, :count] * scale[:, None] * scale
+        self.xyz, self.bar, self.design = xyz, bar, design
+        self.gain = inverse @ design.T
+        self.covariance = inverse[:size, :size]
+        self.redundancy = len(design) - count + free.shape[1]
+
+    def measured(self, moved: FloatArray, rng: np.random.Generator) -> MeasuredPoints:
+        """Return coordinates of targets that have moved by (n, 3), in a frame of the epoch."""
+        errors = rng.standard_normal(len(self.design))
+        change = self.gain @ errors
+        variance = errors @ (errors - self.design @ change) / self.redundancy
+        xyz = self.xyz + moved + change[: self.xyz.size].reshape(-1, 3)
+        turn = rotation_matrices(rng.normal(0, 1, (1, 3)))[0]
+        scale = 1.0 if self.bar else float(rng.uniform(0.5, 2))
+        blocks = np.kron(np.eye(len(xyz)), scale * turn)
+        return MeasuredPoints(
+            tuple(f'{index}' for index in range(len(xyz))),
+            scale * xyz @ turn.T + rng.normal(0, 1, 3),
+            blocks @ self.covariance @ blocks.T,
+            float(np.sqrt(variance)),
+            self.redundancy,
+            'm' if self.bar else '',
+        )
+
+
+def _design(xyz: FloatArray, photographs: int, rng: np.random.Generator) -> FloatArray:
+    """Return the derivatives of image points, in their standard deviations, by all unknowns.
+
+    These are the points, the poses, and the focal length and k1 of the camera.
+    """
+    calibration = pinhole(FOCAL_LENGTH, WIDTH, HEIGHT)
+    reach = np.linalg.norm(xyz - xyz.mean(axis=0), axis=1).max()
+    distance = 2.3 * FOCAL_LENGTH / HEIGHT * reach
+    rows = []
+    for index in range(photographs):
+        tilt, around = np.radians(rng.uniform(15, 50)), 2 * np.pi * (index + rng.random())
+        around /= photographs / 3  # three rounds
+        out = np.array(
+            [np.sin(tilt) * np.cos(around), np.sin(tilt) * np.sin(around), np.cos(tilt)]
+        )
+        forward = -out
+        right = np.cross([0.0, 1.0, 0.0], forward)
+        right /= np.linalg.norm(right)
+        upright = np.stack([right, np.cross(forward, right), forward])
+        roll = rotation_matrices(np.array([[0, 0, np.pi / 2 * (index % 4)]]))[0]
+        seen = linearise(calibration, roll @ upright, xyz.mean(axis=0) + distance * out, xyz)
+        block = np.zeros((len(xyz), 2, 3 * len(xyz) + 6 * photographs + len(_FREE)))
+        for point in range(len(xyz)):
+            block[point, :, 3 * point : 3 * point + 3] = seen.by_point[point]
+        start = 3 * len(xyz) + 6 * index
+        block[:, :, start : start + 6] = seen.by_pose
+        block[:, :, -len(_FREE) :] = seen.by_calibration[:, :, _FREE]
+        shown = (seen.xy > 0).all(axis=1) & (seen.xy < (WIDTH, HEIGHT)).all(axis=1)
+        shown &= rng.random(len(xyz)) > 0.1
+        rows.append(block[shown].reshape(-1, block.shape[2]))
+    return np.vstack(rows) / NOISE
+
+
+def cases(runs: int, seed: int) -> Iterator[dict[str, object]]:
+    """Yield the figures of each field, with its scale fixed and free."""
+    for field in progress(FIELDS, 'networks'):
+        for bar in (True, False):
+            yield figures(field, bar, runs, np.random.default_rng(seed))
+
+
+def figures(field: Field, bar: bool, runs: int, rng: np.random.Generator) -> dict[str, object]:
+    """Return how often the test is right, for one field; movements in a quarter of the runs."""
+    from scipy.stats import f, ncf
+
+    xyz = rng.uniform(-0.5, 0.5, (field.targets, 3)) * field.extent
+    epochs = [Epoch(xyz, field.photographs, bar, rng) for _ in range(2)]
+    still = np.zeros_like(xyz)
+    alarms, by_sum = [], []
+    for _ in range(runs):
+        found = compare(*(epoch.measured(still, rng) for epoch in epochs))
+        alarms.append(not found.congruent)
+        by_sum.append(found.tests[0].probability < LEVEL)
+
+    exact = [
+        MeasuredPoints(names(field), xyz, it.covariance, 1.0, it.redundancy, 'm' if bar else '')
+        for it in epochs
+    ]
+    covariances = np.array([it.covariance for it in compare(*exact).movements])
+    differences = _differences(xyz, epochs[0].covariance + epochs[1].covariance, bar)
+    degrees = sum(it.redundancy for it in epochs)
+    critical = f.isf(LEVEL * 0.9 / field.targets, 3, degrees)
+    shares = {}
+    for kind, sigmas in (('', differences), ('conditional_', covariances)):
+        hits, bounds = [], []
+        for _ in range(runs // 4):
+            target, movement = int(rng.integers(field.targets)), still.copy()
+            movement[target] = _movement(sigmas[target], SIGMAS, rng)
+            strength = movement[target] @ np.linalg.solve(covariances[target], movement[target])
+            bounds.append(ncf.sf(critical, 3, degrees, strength))
+            found = compare(epochs[0].measured(still, rng), epochs[1].measured(movement, rng))
+            first = found.moved[:1] == (f'{target}',)
+            hits.append((not found.congruent, first, first and len(found.moved) == 1))
+        outcomes = dict(zip(_OUTCOMES[:3], np.mean(hits, axis=0), strict=True))
+        outcomes['bound'] = np.mean(bounds)
+        shares |= {f'{kind}{name}': float(value) for name, value in outcomes.items()}
+    quarters = []
+    for _ in range(runs // 20):
+        several = rng.permutation(field.targets)[: max(field.targets // 4, 2)]
+        direction = rng.standard_normal(3)
+        sigma = np.sqrt(np.linalg.eigvalsh(covariances[several])[:, -1].max())
+        movement = still.copy()
+        movement[several] = 10 * sigma * direction / np.linalg.norm(direction)
+        found = compare(epochs[0].measured(still, rng), epochs[1].measured(movement, rng))
+        quarters.append(set(found.moved) == {f'{index}' for index in several})
+    return {
+        'field': field.name,
+        'targets': field.targets,
+        'photographs': field.photographs,
+        'scale': 'fixed' if bar else 'free',
+        'redundancy': degrees,
+        'false_alarms': float(np.mean(alarms)),
+        'false_alarms_of_sum': float(np.mean(by_sum)),
+        **shares,
+        'quarter': float(np.mean(quarters)),
+    }
+
+
+def _differences(xyz: FloatArray, covariance: FloatArray, bar: bool) -> FloatArray:
+    """Return the covariances (n, 3, 3) of differences, each in the datum of all other targets."""
+    differences = []
+    for index in range(len(xyz)):
+        others = np.arange(len(xyz)) != index
+        moved = s_transform(xyz, covariance, others.astype(float), scale=not bar)[1]
+        differences.append(moved[3 * index : 3 * index + 3, 3 * index : 3 * index + 3])
+    return np.array(differences)
+
+
+def names(field: Field) -> tuple[str, ...]:
+    """Return the names of the targets of a field."""
+    return tuple(f'{index}' for index in range(field.targets))
+
+
+def _movement(covariance: FloatArray, sigmas: float, rng: np.random.Generator) -> FloatArray:
+    """Return a movement in any direction, of some standard deviations in this direction."""
+    direction = rng.standard_normal(3)
+    direction /= np.linalg.norm(direction)
+    return sigmas * np.sqrt(direction @ covariance @ direction) * direction
+
+
+def page(report: Report) -> str:
+    """Return the table in Markdown."""
+    kinds = [f'{kind}{name}' for kind in ('', 'conditional_') for name in _OUTCOMES]
+    shares = ['false_alarms', 'false_alarms_of_sum', *kinds, 'quarter']
+    head = 'field', 'targets', 'photographs', 'scale', 'redundancy'
+    rows = [
+        [*(row[name] for name in head), *(f'{100 * row[name]:.1f}' for name in shares)]
+        for row in report['rows']
+    ]
+    titles = [f'{name.replace("_", " ")} %' for name in shares]
+    lines = table([*head, *titles], rows)
+    return '\n'.join([*lines, '', f'{report["runs"]} runs a row. {about_text(report)}'])
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print the table."""
+    made = parser(__doc__)
+    made.set_defaults(seeds=[FIRST_SEED])
+    made.add_argument('--runs', type=int, default=RUNS, help='pairs of epochs without movement')
+    options = parsed(made, arguments)
+    rows = [row for seed in options.seeds for row in cases(options.runs, seed)]
+    report = about(options.seeds, runs=options.runs, rows=rows)
+    publish(report, page(report), options)
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

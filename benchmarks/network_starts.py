@@ -1,0 +1,96 @@
+"""Networks from noise on exact projections, and the panel's photographs, without start values.
+
+A network counts as oriented where all its photographs are, as refused where `orient` raises or
+warns, and as silently wrong where it does neither and its points are off the truth.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ahf_ros.orientation.camera import pinhole, project
+from ahf_ros.orientation.network import CameraView, FloatArray, Network, Observations
+
+WIDTH, HEIGHT = 3000, 2000
+NOISE = 0.05
+"""Standard deviation of a coordinate in px."""
+
+
+@dataclass(frozen=True)
+class Rendered:
+    """A network with its truth: points (n, 3), and the targets whose IDs are wrong by rows."""
+
+    network: Network
+    points: FloatArray
+    wrong: FloatArray
+
+
+def rendered(
+    seed: int, *, flat: bool, known: bool, wrong: float = 0.0, photographs: int = 0
+) -> Rendered:
+    """Return a random network: 8 to 60 photographs of 20 to 150 targets, tilted and rolled."""
+    random = np.random.default_rng(seed)
+    count = photographs or int(random.integers(8, 61))
+    number = int(random.integers(20, 151))
+    focal = WIDTH * random.uniform(0.7, 2.5)
+    points = random.uniform(-1, 1, (number, 3)) * [1, random.uniform(0.5, 1), 0.5]
+    if flat:
+        points[:, 2] = 0
+    calibration = pinhole(focal, WIDTH, HEIGHT)
+    rows, rotations, positions = [], [], []
+    tilt = np.radians(random.uniform(15, 50))
+    for _ in range(count):
+        around = random.uniform(0, 2 * np.pi)
+        lean = random.uniform(0.3, 1) * tilt
+        away = np.array(
+            [np.sin(lean) * np.cos(around), np.sin(lean) * np.sin(around), np.cos(lean)]
+        )
+        distance = random.uniform(0.7, 1.3) * 2 * focal / WIDTH
+        rotations.append(looking(-away, random.uniform(0, 2 * np.pi)))
+        positions.append(random.uniform(-0.4, 0.4, 3) * [1, 1, 0] + distance * away)
+    for photograph in range(count):
+        xy = project(calibration, rotations[photograph], positions[photograph], points)
+        inside = np.all((xy > 10) & (xy < [WIDTH - 10, HEIGHT - 10]), axis=1)
+        inside &= random.random(number) < 0.9
+        rows += [(photograph, point, *xy[point]) for point in np.flatnonzero(inside)]
+    table = np.array(rows)
+    xy = table[:, 2:] + random.normal(0, NOISE, (len(table), 2))
+    ids = table[:, 1].astype(int)
+    photograph = table[:, 0].astype(int)
+    false = random.random(len(table)) < wrong
+    for row in np.flatnonzero(false):
+        free = np.setdiff1d(np.arange(number), ids[photograph == photograph[row]])
+        if len(free):
+            ids[row] = random.choice(free)
+    view = CameraView('camera', WIDTH, HEIGHT, focal if known else None)
+    covariance = np.broadcast_to(NOISE**2 * np.eye(2), (len(table), 2, 2))
+    network = Network(
+        tuple(f'{index}.png' for index in range(count)),
+        np.zeros(count, dtype=int),
+        (view,),
+        tuple(str(index) for index in range(number)),
+        Observations(photograph, ids, xy, covariance),
+    )
+    return Rendered(network, points, false)
+
+
+def looking(along: FloatArray, roll: float) -> FloatArray:
+    """Return a rotation from world to camera that looks along a unit vector and is rolled."""
+    up = np.array([0, 1, 0]) if abs(along[1]) < 0.9 else np.array([1, 0, 0])
+    right = np.cross(along, up)
+    right = right / np.linalg.norm(right)
+    rotation = np.array([right, np.cross(along, right), along])
+    turn = np.array([[np.cos(roll), -np.sin(roll), 0], [np.sin(roll), np.cos(roll), 0], [0, 0, 1]])
+    return turn @ rotation
+
+
+def deviations(points: FloatArray, truth: FloatArray) -> FloatArray:
+    """Return what is left of points (n, 3) against the truth after a similarity transform."""
+    source, target = points - points.mean(axis=0), truth - truth.mean(axis=0)
+    left, values, right = np.linalg.svd(target.T @ source)
+    sign = np.diag([1, 1, np.linalg.det(left @ right)])
+    rotation = left @ sign @ right
+    scale = np.sum(values * np.diag(sign)) / np.sum(source**2)
+    return scale * source @ rotation.T - target

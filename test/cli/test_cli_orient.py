@@ -1,0 +1,142 @@
+"""`ahf orient`: from results to a folder with coordinates."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ahf_ros.interchange.camera_files import ros_yaml
+from ahf_ros.interchange.network_results import read_network
+from support.command_line import status
+from support.networks import CALIBRATION, SIZE, records, solution
+
+pytest.importorskip('scipy')
+
+TRUE = solution(photographs=8, targets=24)
+
+
+@pytest.fixture(scope='module')
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a file of results, in a folder with a calibration, scale bars and control points."""
+    folder = tmp_path_factory.mktemp('results')
+    lines = [json.dumps(it) for it in records(TRUE.network)]
+    lines.append(json.dumps(json.loads(lines[0]) | {'image': 'empty.jpg', 'targets': []}))
+    (folder / 'results.jsonl').write_text('\n'.join(lines))
+    camera = ros_yaml('camera', *SIZE, CALIBRATION, np.zeros((10, 10)))
+    (folder / 'camera.yaml').write_bytes(camera)
+    points = TRUE.start.points
+    with (folder / 'bars.csv').open('w', newline='') as file:
+        rows = [('id_1', 'id_2', 'length', 'sigma', 'role')]
+        for first, second, role in ((0, 1, 'control'), (2, 3, 'check')):
+            length = float(np.linalg.norm(points[first] - points[second]))
+            rows.append((f'{first + 1}', f'{second + 1}', f'{length:.6f}', '0.01', role))
+        csv.writer(file).writerows([*rows, ('1', '99', '5', '1', 'check')])
+    with (folder / 'points.csv').open('w', newline='') as file:
+        given = [(name, *xyz) for name, xyz in zip(TRUE.network.targets, points, strict=True)]
+        csv.writer(file).writerows([('id', 'x', 'y', 'z'), *given[:6]])
+    return folder / 'results.jsonl'
+
+
+def distances(points: np.ndarray) -> np.ndarray:
+    return np.asarray(np.linalg.norm(points[:, None] - points, axis=2))
+
+
+def test_coordinates_come_from_results_alone(
+    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """With a calibration and a scale bar, all distances are right."""
+    folder = tmp_path / 'network'
+    exports = [f'--export={name}={tmp_path / name}' for name in ('colmap', 'metashape', 'mmvii')]
+    known_lengths = '--scale-bars', results.parent / 'bars.csv'
+    camera = '--calibration', results.parent / 'camera.yaml'
+    assert status('orient', results, '-o', folder, *camera, *known_lengths, *exports) == 0
+    found = read_network(folder)
+    assert found.points.names == TRUE.network.targets and len(found.photographs) == 8
+    assert found.points.unit == 'mm'
+    error = distances(found.points.xyz) - distances(TRUE.start.points)
+    assert np.abs(error).max() < 0.2
+    np.testing.assert_allclose(found.calibrations[0], CALIBRATION, rtol=1e-6, atol=3e-5)
+    told = capsys.readouterr()
+    assert told.out == ''
+    for text in (
+        '8 of 9',
+        'empty.jpg',
+        'sigma0',
+        '3 to 4',
+        'check',
+        'scale bar 1 to 99 is not used',
+        'rays a target',
+    ):
+        assert text in told.err
+    files = {it.name for it in folder.iterdir()}
+    assert files >= {'network.json', 'points.csv', 'report.html', 'poses.csv', 'residuals.csv'}
+    assert files >= {'camera_ros.yaml', 'camera_opencv.yaml', 'scale_bars.csv'}
+    for name in ('colmap/cameras.txt', 'metashape/cameras.xml', 'mmvii/MMVII-PhgrProj'):
+        assert (tmp_path / name).exists()
+    with (folder / 'scale_bars.csv').open(newline='') as file:
+        used, check = csv.DictReader(file)
+    assert used['role'] == 'control' and abs(float(used['deviation'])) < 0.02
+    assert abs(float(check['deviation'])) < 4 * float(check['sigma_deviation'])
+
+
+def test_control_points_give_their_frame(results: Path, tmp_path: Path) -> None:
+    options = ('--calibration', results.parent / 'camera.yaml', '--quiet')
+    control = ('--control', results.parent / 'points.csv', '--control-sigma', 0.01, '--unit', 'm')
+    assert status('orient', results, '-o', tmp_path, *options, *control) == 0
+    found = read_network(tmp_path)
+    assert found.points.unit == 'm'
+    assert np.abs(found.points.xyz - TRUE.start.points).max() < 0.2
+    assert (tmp_path / 'control.csv').exists()
+
+
+@pytest.mark.parametrize(
+    ('options', 'message'),
+    [
+        (['--datum', 'free'], "datum is 'free', accepted is inner"),
+        (['--datum', 'fixed:1,2'], "datum is 'fixed:1,2'"),
+        (['--focal-length', '35 cm'], "focal_length is '35 cm', accepted is a length such as"),
+        (['--focal-length', '0mm'], "focal_length is '0mm'"),
+        (
+            ['--export', 'opf=x'],
+            "export is 'opf=x', accepted is FORMAT=DIR with a format of colmap",
+        ),
+        (['--sigma', '0'], "sigma is '0'"),
+    ],
+)
+def test_options_that_are_not_accepted(
+    results: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    options: list[str],
+    message: str,
+) -> None:
+    assert status('orient', results, '-o', tmp_path / 'out', *options) == 2
+    assert message in ' '.join(capsys.readouterr().err.split())
+    assert not (tmp_path / 'out').exists()
+
+
+def test_files_that_cannot_be_used(
+    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Each of them is named, nothing is written, and the exit status is 1."""
+    (tmp_path / 'empty.jsonl').touch()
+    (tmp_path / 'other.yaml').write_bytes(
+        ros_yaml('camera', 800, 600, CALIBRATION, np.zeros((10, 10)))
+    )
+    (tmp_path / 'bars.csv').write_text('id_1,id_2,length,sigma\n98,99,5,1\n')
+    (tmp_path / 'two.jsonl').write_text('\n'.join(results.read_text().splitlines()[:1]))
+    for arguments, message in (
+        ([tmp_path / 'empty.jsonl'], 'has no identified target'),
+        ([tmp_path / 'gone.jsonl'], 'cannot be read'),
+        ([results, '--calibration', tmp_path / 'other.yaml'], 'of 800 x 600 px'),
+        ([results, '--scale-bars', tmp_path / 'bars.csv'], 'no scale bar has both ends'),
+        ([tmp_path / 'two.jsonl'], ''),
+    ):
+        assert status('orient', *arguments, '-o', tmp_path / 'out') == 1
+        told = capsys.readouterr().err
+        assert told.startswith('ahf orient: ') and message in told
+        assert not (tmp_path / 'out').exists()
