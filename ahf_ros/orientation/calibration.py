@@ -1,7 +1,8 @@
 """Self-calibration: which parameters of a camera a network determines.
 
-Parameters are released in stages [1]_. Of each stage those stay that differ significantly from
-what they were and are not correlated with others so much that neither means anything alone [2]_.
+Parameters are released in stages [1]_. Those stay that are not correlated with others so much that
+neither means anything alone [2]_, and in the end those that differ significantly from what they
+were.
 
 References
 ----------
@@ -12,6 +13,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,40 +31,48 @@ _ROLLED = np.deg2rad(60)  # between photographs that separate the principal poin
 _FACING = 0.5  # cosine between the axes of photographs whose roll is compared
 _COMPARED = 100  # photographs of a camera whose roll is compared, spread evenly
 
+_RADIAL = [PARAMETERS.index(name) for name in ('k1', 'k2', 'k3')]
+_UNDETERMINED = (
+    'camera {}: these photographs do not determine the focal length, it stays as it was; take '
+    'some tilted by 30 to 45 degrees against each other, or give a calibration'
+)
+
 Mask = NDArray[np.bool_]
 Fit = Callable[[Mask, Start], tuple[Start, tuple[FloatArray, ...]]]
 """Adjusts with free parameters (cameras, parameters): values and covariances of calibrations."""
 
 
 def released(network: Network, start: Start, fit: Fit) -> tuple[Mask, Start, tuple[str, ...]]:
-    """Return the free parameters (cameras, parameters) stage by stage, the values, and warnings.
+    """Return the free parameters (cameras, parameters), values to begin with, and warnings.
 
     The focal length is released where its standard deviation is below 3 % of it, the principal
-    point only where photographs are rolled.
+    point only where photographs are rolled. What is not significant is found at the end, since a
+    parameter may be so only beside others.
     """
     free = np.zeros((len(network.cameras), len(PARAMETERS)), dtype=bool)
     state, warnings = start, []
     open_cameras = [place for place, view in enumerate(network.cameras) if not view.fixed]
-    for stage in STAGES:
+    for stage in (*STAGES, ()):
         trial = free.copy()
         for place in open_cameras:
             if stage != ('cx', 'cy') or rolled(start.rotations[network.camera_of == place]):
                 trial[place, [PARAMETERS.index(name) for name in stage]] = True
-        while (trial & ~free).any():
-            fitted, covariances = fit(trial, state)
-            weak = _weak(trial & ~free, trial, fitted, state, covariances)
-            if not weak:
-                free, state = trial, fitted
-                break
-            for place, parameter in weak:
-                trial[place, parameter] = False
-                if parameter == 0:
-                    warnings.append(
-                        f'camera {network.cameras[place].name}: these photographs do not '
-                        'determine the focal length, it stays as it was; take some tilted by 30 '
-                        'to 45 degrees against each other, or give a calibration'
-                    )
-    return free, state, tuple(warnings)
+        if stage and (trial == free).all():
+            continue
+        fitted, covariances = fit(trial, state)
+        free = trial.copy()
+        for place in open_cameras:
+            change = fitted.calibrations[place] - start.calibrations[place]
+            if stage == ('f',):
+                sigma = np.sqrt(covariances[place][0, 0])
+                free[place, 0] = sigma < _FOCAL_LENGTH * fitted.calibrations[place, 0]
+                if not free[place, 0]:
+                    warnings.append(_UNDETERMINED.format(network.cameras[place].name))
+            free[place] = _apart(change, covariances[place], free[place], significant=not stage)
+        if (free == trial).all():
+            state = fitted
+    kept = np.where(free, state.calibrations, start.calibrations)
+    return free, replace(state, calibrations=kept), tuple(warnings)
 
 
 def rolled(rotations: FloatArray) -> bool:
@@ -78,34 +88,30 @@ def rolled(rotations: FloatArray) -> bool:
     return bool(((relative[..., 2, 2] > _FACING) & (np.abs(roll) > _ROLLED)).any())
 
 
-def _weak(
-    new: Mask, free: Mask, fitted: Start, before: Start, covariances: tuple[FloatArray, ...]
-) -> list[tuple[int, int]]:
-    """Return the new parameters to be left out, as pairs of camera and parameter.
+def _apart(change: FloatArray, covariance: FloatArray, free: Mask, significant: bool) -> Mask:
+    """Return which free parameters (10,) stay: those that mean something beside each other.
 
-    Those are of each camera the most correlated one, or else all where none is significant, or
-    else the least significant.
+    Of two that are too much correlated, that of less significance goes, and if asked for all that
+    are not significant go, the least significant first. The others change as if it had been kept
+    fixed. The radial parameters are coefficients of one polynomial: their correlation means
+    nothing.
     """
-    weak = []
-    for place in np.flatnonzero(new.any(axis=1)):
-        variances = np.diag(covariances[place])
-        with np.errstate(invalid='ignore', divide='ignore'):
-            sigma = np.sqrt(variances)
-            correlation = np.abs(covariances[place] / np.outer(sigma, sigma))
-            change = fitted.calibrations[place] - before.calibrations[place]
-            size = np.nan_to_num(np.abs(change) / sigma)
-        if new[place, 0]:
-            if not sigma[0] < _FOCAL_LENGTH * fitted.calibrations[place, 0]:
-                weak.append((int(place), 0))
-            continue
-        np.fill_diagonal(correlation, 0)
-        correlation = np.where(free[place] & free[place][:, None], correlation, 0)
-        largest = np.where(new[place], correlation.max(axis=0), 0)
-        smallest = np.where(new[place], size, np.inf)
-        if largest.max() > _CORRELATED:
-            weak.append((int(place), int(largest.argmax())))
-        elif size[new[place]].max() < _SIGNIFICANT:
-            weak += [(int(place), int(parameter)) for parameter in np.flatnonzero(new[place])]
-        elif smallest.min() < _SIGNIFICANT:
-            weak.append((int(place), int(smallest.argmin())))
-    return weak
+    free = free.copy()
+    while True:
+        places = np.flatnonzero(free)
+        sigma = np.sqrt(np.diag(covariance)[places])
+        size = np.abs(change[places]) / sigma
+        size[places == 0] = np.inf  # a focal length of zero is no hypothesis
+        correlation = np.abs(covariance[np.ix_(places, places)] / np.outer(sigma, sigma))
+        radial = np.isin(places, _RADIAL)
+        correlation[np.outer(radial, radial) | np.eye(len(places), dtype=bool)] = 0
+        involved = correlation.max(axis=0, initial=0) > _CORRELATED
+        weak = involved | (significant & (size < _SIGNIFICANT))
+        weak[places == 0] = False
+        if not weak.any():
+            return free
+        left = places[np.argmin(np.where(weak, size, np.inf))]
+        gain = covariance[:, left] / covariance[left, left]
+        change = change - gain * change[left]
+        covariance = covariance - np.outer(gain, covariance[left])
+        free[left] = False
