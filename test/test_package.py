@@ -33,6 +33,7 @@ ROSDEP = {
     'cv2': 'python3-opencv',
     'hypothesis': 'python3-hypothesis',
     'jinja2': 'python3-jinja2',
+    'PIL': 'python3-pil',
     'matplotlib': 'python3-matplotlib',
     'mcap': 'mcap-ros2-support',
     'numpy': 'python3-numpy',

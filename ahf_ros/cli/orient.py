@@ -166,7 +166,7 @@ def run(options: argparse.Namespace) -> int:
         solutions = _oriented(network, options)
         if not solutions:
             raise ValueError('no photograph could be oriented')
-    except ValueError as error:
+    except (ValueError, ModuleNotFoundError) as error:
         tell('orient', error)
         return 1
     solutions = [

@@ -3,26 +3,23 @@
 from __future__ import annotations
 
 import math
-import struct
+import warnings
 from contextlib import suppress
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 from ahf_ros.interchange.files import is_url, read_bytes
-from ahf_ros.interchange.image_files import read_header
 
 FILM_DIAGONAL = math.hypot(36, 24)
 """Diagonal of a film frame, mm, which equivalent focal lengths refer to (CIPA DCG-001)."""
 
-_MAKE, _MODEL, _MORE = 271, 272, 34665  # tags; the last one points to the directory of the others
+_MAKE, _MODEL, _MORE = 271, 272, 34665  # tags; the last one has those of the photograph
 _FOCAL_LENGTH, _RESOLUTION, _RESOLUTION_UNIT = 37386, 41486, 41488
 _WIDTH, _EQUIVALENT, _SERIAL_NUMBER = 40962, 41989, 42033
-_LAYOUTS = {2: 's', 3: 'H', 4: 'L', 5: 'LL'}  # of values, by the type of a field
 _UNITS = {2: 25.4, 3: 10.0, 4: 1.0}  # mm, of resolutions
 _LEAST, _MOST = 0.2, 50.0  # focal lengths that are believed, in diagonals of the image
-_FIELDS = 1024  # of a directory, that are read at most
-_BEGINNING = 2**20  # bytes of a file, which Exif data of photographs do not exceed
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,14 +39,27 @@ def read_exif(path: str | Path) -> tuple[Exif, tuple[int, int]]:
     """Return the Exif data of an image file, empty where there are none, and width and height.
 
     These are 0 px where the format is not known. A ValueError names a file that cannot be read.
+    Raises `ModuleNotFoundError` without Pillow.
     """
-    header = read_header(read_bytes(path) if is_url(str(path)) else _beginning(Path(path)))
-    size = header.width, header.height
-    fields = exif_fields(header.exif)
-    length = fields.get(_FOCAL_LENGTH, 0.0)
-    name = f'{fields.get(_MAKE, "")} {fields.get(_MODEL, "")}'.strip()
-    pixels = _pixels(fields, *size) if all(size) else None
-    return Exif(name, fields.get(_SERIAL_NUMBER, ''), length, pixels), size
+    try:
+        from PIL import Image, UnidentifiedImageError
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError(
+            "Pillow is needed to read Exif data: pip install 'ahf_ros[orient]'"
+        ) from error
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter('ignore')  # large images, damaged fields
+            with Image.open(BytesIO(read_bytes(path)) if is_url(str(path)) else path) as image:
+                size, exif = image.size, image.getexif()
+                fields = {**exif, **exif.get_ifd(_MORE)}
+    except (UnidentifiedImageError, Image.DecompressionBombError):
+        return Exif(), (0, 0)
+    except OSError as error:
+        raise ValueError(f'{path} cannot be read: {error.strerror or error}') from error
+    name = f'{_text(fields, _MAKE)} {_text(fields, _MODEL)}'.strip()
+    length, serial = _number(fields, _FOCAL_LENGTH), _text(fields, _SERIAL_NUMBER)
+    return Exif(name, serial, length, _pixels(fields, *size)), size
 
 
 def equivalent_in_px(millimetres: float, width: int, height: int) -> float:
@@ -57,56 +67,26 @@ def equivalent_in_px(millimetres: float, width: int, height: int) -> float:
     return millimetres * math.hypot(width, height) / FILM_DIAGONAL
 
 
-def exif_fields(content: bytes) -> dict[int, Any]:
-    """Return texts and numbers of Exif data by their tags; fields that are damaged are absent."""
-    fields: dict[int, Any] = {}
-    with suppress(struct.error):
-        order = '<' if content[:2] == b'II' else '>'
-        (start,) = struct.unpack_from(f'{order}L', content, 4)
-        fields |= _directory(content, order, start)
-        if isinstance(fields.get(_MORE), int):
-            fields |= _directory(content, order, fields[_MORE])
-    return fields
+def _text(fields: dict[int, Any], tag: int) -> str:
+    text = str(fields.get(tag, '')).split('\0')[0]
+    return ''.join(it for it in text if it.isprintable()).strip()
 
 
-def _beginning(path: Path) -> bytes:
-    try:
-        with path.open('rb') as file:
-            return file.read(_BEGINNING)
-    except OSError as error:
-        raise ValueError(f'{path} cannot be read: {error.strerror}') from error
-
-
-def _directory(content: bytes, order: str, start: int) -> dict[int, Any]:
-    fields: dict[int, Any] = {}
-    (count,) = struct.unpack_from(f'{order}H', content, start)
-    for number in range(min(count, _FIELDS)):
-        place = start + 2 + 12 * number
-        with suppress(struct.error, ZeroDivisionError):
-            tag, kind, values = struct.unpack_from(f'{order}HHL', content, place)
-            if kind not in _LAYOUTS or (kind != 2 and values != 1) or values > len(content):
-                continue
-            layout = f'{order}{values}s' if kind == 2 else order + _LAYOUTS[kind]
-            place += 8
-            if struct.calcsize(layout) > 4:
-                (place,) = struct.unpack_from(f'{order}L', content, place)
-            found = struct.unpack_from(layout, content, place)
-            if kind == 2:
-                text = found[0].split(b'\0')[0].decode('utf-8', 'replace')
-                fields[tag] = ''.join(it for it in text if it.isprintable()).strip()
-            else:
-                fields[tag] = found[0] / found[1] if kind == 5 else found[0]
-    return fields
+def _number(fields: dict[int, Any], tag: int) -> float:
+    """Return a number that is finite, 0 where there is none."""
+    with suppress(TypeError, ValueError, ZeroDivisionError):
+        number = float(fields.get(tag, 0))
+        return number if math.isfinite(number) else 0.0
+    return 0.0
 
 
 def _pixels(fields: dict[int, Any], width: int, height: int) -> float | None:
     """Return the focal length in px, from the pitch of the pixels or the equivalent on film."""
+    unit = _UNITS.get(fields.get(_RESOLUTION_UNIT, 0), math.inf)
+    enlarged = max(width, height) / (_number(fields, _WIDTH) or max(width, height))
     lengths = [
-        fields.get(_FOCAL_LENGTH, 0.0)
-        * fields.get(_RESOLUTION, 0.0)
-        / _UNITS.get(fields.get(_RESOLUTION_UNIT, 0), math.inf)
-        * (max(width, height) / (fields.get(_WIDTH) or max(width, height))),
-        equivalent_in_px(fields.get(_EQUIVALENT, 0), width, height),
+        _number(fields, _FOCAL_LENGTH) * _number(fields, _RESOLUTION) / unit * enlarged,
+        equivalent_in_px(_number(fields, _EQUIVALENT), width, height),
     ]
     diagonal = math.hypot(width, height)
     return next((it for it in lengths if _LEAST < it / diagonal < _MOST), None)

@@ -166,14 +166,13 @@ class ImageHeader:
     """What an image file says of itself.
 
     A width or height of 0 px is not known. `orientation` is as in Exif, 1 to 8. `orientation_at`
-    is its place in a TIFF file and its layout for `struct`. `exif` are the Exif data, if any.
+    is its place in a TIFF file and its layout for `struct`.
     """
 
     width: int = 0
     height: int = 0
     orientation: int = UPRIGHT
     orientation_at: tuple[int, str] | None = None
-    exif: bytes = b''
 
 
 def read_header(content: bytes) -> ImageHeader:
@@ -193,20 +192,20 @@ def read_header(content: bytes) -> ImageHeader:
 
 def _png(content: bytes) -> ImageHeader:
     width, height = struct.unpack_from('>LL', content, 16)
-    exif = b''
+    orientation = UPRIGHT
     place = len(_PNG)
     while place + 8 <= len(content):
         size, kind = struct.unpack_from('>L4s', content, place)
         if kind == b'eXIf':
-            exif = content[place + 8 : place + 8 + size]
+            orientation = _exif(content[place + 8 : place + 8 + size])
         if kind in (b'eXIf', b'IDAT', b'IEND'):
             break
         place += 12 + size
-    return ImageHeader(width, height, _orientation(exif), exif=exif)
+    return ImageHeader(width, height, orientation)
 
 
 def _jpeg(content: bytes) -> ImageHeader:
-    exif = b''
+    orientation = UPRIGHT
     place = 2
     while place + 4 <= len(content) and content[place] == 0xFF:
         marker = content[place + 1]
@@ -216,14 +215,14 @@ def _jpeg(content: bytes) -> ImageHeader:
         (size,) = struct.unpack_from('>H', content, place + 2)
         if marker in _FRAMES:
             height, width = struct.unpack_from('>HH', content, place + 5)
-            return ImageHeader(width, height, _orientation(exif), exif=exif)
+            return ImageHeader(width, height, orientation)
         if marker == 0xE1 and content[place + 4 : place + 10] == b'Exif\0\0':
-            exif = content[place + 10 : place + 2 + size]
+            orientation = _exif(content[place + 10 : place + 2 + size])
         place += 2 + size
-    return ImageHeader(orientation=_orientation(exif), exif=exif)
+    return ImageHeader(orientation=orientation)
 
 
-def _orientation(content: bytes) -> int:
+def _exif(content: bytes) -> int:
     """Return the orientation in Exif data, which are a TIFF file without pixels."""
     with suppress(*_DAMAGES):
         return _tiff(content).orientation
@@ -248,4 +247,4 @@ def _tiff(content: bytes) -> ImageHeader:
         place += struct.calcsize(order + word)
     width, height = (found.get(tag, (0, None))[0] for tag in (_WIDTH, _HEIGHT))
     orientation, orientation_at = found.get(_ORIENTATION, (UPRIGHT, None))
-    return ImageHeader(width, height, orientation, orientation_at, content)
+    return ImageHeader(width, height, orientation, orientation_at)
