@@ -81,9 +81,10 @@ def rolled(rotations: FloatArray) -> bool:
 def _weak(
     new: Mask, free: Mask, fitted: Start, before: Start, covariances: tuple[FloatArray, ...]
 ) -> list[tuple[int, int]]:
-    """Return the worst new parameter of each camera that has one: camera, parameter.
+    """Return the new parameters to be left out, as pairs of camera and parameter.
 
-    That is the most correlated one, or else the least significant.
+    Those are of each camera the most correlated one, or else all where none is significant, or
+    else the least significant.
     """
     weak = []
     for place in np.flatnonzero(new.any(axis=1)):
@@ -103,6 +104,8 @@ def _weak(
         smallest = np.where(new[place], size, np.inf)
         if largest.max() > _CORRELATED:
             weak.append((int(place), int(largest.argmax())))
+        elif size[new[place]].max() < _SIGNIFICANT:
+            weak += [(int(place), int(parameter)) for parameter in np.flatnonzero(new[place])]
         elif smallest.min() < _SIGNIFICANT:
             weak.append((int(place), int(smallest.argmin())))
     return weak

@@ -24,6 +24,7 @@ Loss = Literal['squares', 'cauchy', 'geman_mcclure']
 _FIRST_DAMPING = 1e-3
 _LARGEST_DAMPING = 1e10
 _CONVERGED = 1e-9  # decrease of the sum of weighted squares that a step promises
+_ROBUST_CONVERGED = 1e-2  # ... under a robust loss, which only prepares tests
 _ROUNDING = 1e-13  # ... relative to the sum
 _TUNING = 3.0  # standard deviations at which robust weights fall
 
@@ -77,6 +78,7 @@ def minimise(
     where that is larger; it is computed anew in each round.
     """
     damping = _FIRST_DAMPING
+    enough = _CONVERGED if loss == 'squares' else _ROBUST_CONVERGED
     for _ in range(rounds):
         lengths = normals.whitened_lengths(layout, state)
         spread = 1.0 if loss == 'squares' else max(1.0, normals.robust_spread(lengths))
@@ -92,7 +94,7 @@ def minimise(
             promised = float(
                 (equations.pose_right * poses).sum() + equations.rest_right @ rest
             ) + float(2 * np.abs(multipliers) @ np.abs(gaps))
-            if abs(promised) < _CONVERGED + _ROUNDING * before:
+            if abs(promised) < enough * spread**2 + _ROUNDING * before:
                 return normals.changed(layout, state, poses, rest), True
             trial = normals.changed(layout, state, poses, rest)
             known = knowledge(trial)

@@ -25,6 +25,7 @@ _ROUNDS = 60  # of tests; each takes off one observation of a photograph and a t
 _SUSPECT = (
     0.25  # share of a target's rays that disagree, from which on a second place is looked for
 )
+_SECOND_PLACE = 3  # rays that meet at it, unless all that are off do
 
 Mask = NDArray[np.bool_]
 LayOut = Callable[[Start], Layout]
@@ -133,6 +134,8 @@ def rejections(
     for target in np.unique(every.point[off]):
         rows = off[every.point[off] == target]
         for place in places(every, state, rows, tolerance):
+            if len(place.rows) < min(_SECOND_PLACE, len(rows)):
+                continue  # two of many wrong rays meet somewhere by chance
             moved = place.point - state.points[every.points[target]]
             name = network.targets[every.points[target]]
             distance = f'{np.linalg.norm(moved):.4g} {network.unit}'.strip()

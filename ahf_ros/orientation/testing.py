@@ -48,12 +48,12 @@ def unit_weight(cost: float, redundancy: int) -> UnitWeight:
     if redundancy <= 0:
         return UnitWeight(1.0, redundancy, True)
     try:
-        from scipy.stats import chi2
+        from scipy.special import chdtri
     except ModuleNotFoundError as error:
         raise ModuleNotFoundError(
             "scipy is needed to test an adjustment: pip install 'ahf_ros[orient]'"
         ) from error
-    low, high = chi2.ppf([SIGNIFICANCE / 2, 1 - SIGNIFICANCE / 2], redundancy)
+    low, high = chdtri(redundancy, [1 - SIGNIFICANCE / 2, SIGNIFICANCE / 2])
     return UnitWeight(float(np.sqrt(cost / redundancy)), redundancy, bool(low <= cost <= high))
 
 
