@@ -15,7 +15,7 @@ from ahf_ros.orientation.network import FloatArray, IntArray, Network, Rejection
 from ahf_ros.orientation.planar import principal_axes
 from ahf_ros.orientation.resection import FEWEST_POINTS, Resection, resections
 from ahf_ros.orientation.solution import Solution, Start
-from ahf_ros.orientation.start import WORST, oriented, reversal, starts
+from ahf_ros.orientation.start import oriented, reversal, starts
 from ahf_ros.orientation.triples import FEWEST_COMMON, STEPS, known_calibrations
 from ahf_ros.orientation.views import View, lengths_of, spread_of, views_of
 from ahf_ros.text import counted
@@ -28,6 +28,9 @@ CONTRADICTING = 0.6
 
 ZOOMED = 0.03
 """Relative difference of a photograph's focal length that is no error of its camera's."""
+
+FITS = 6.0
+"""Robust spread of a photograph, in those of the network, that another zoom must reach."""
 
 NAMED = 8
 """Photographs or targets that a message names."""
@@ -71,11 +74,22 @@ def orient(
 
     Examples
     --------
-    >>> from ahf_ros.orientation.simulation import simulated
-    >>> network, _ = simulated(photographs=8, targets=24)
+    >>> import cv2
+    >>> from ahf_ros.orientation.camera import project
+    >>> from ahf_ros.orientation.network import CameraView, Observations
+    >>> source = np.random.default_rng(1)
+    >>> points, turns = source.uniform(-1, 1, (20, 3)), source.uniform(-0.5, 0.5, (6, 3))
+    >>> rotations = [cv2.Rodrigues(turn + (0, 0, roll))[0] for roll, turn in enumerate(turns)]
+    >>> lens = pinhole(1500.0, 1600, 1200)
+    >>> xy = np.concatenate([project(lens, it, -5 * it[2], points) for it in rotations])
+    >>> photograph, point = np.divmod(np.arange(len(xy)), len(points))
+    >>> seen = Observations(photograph, point, xy, np.tile(1e-4 * np.eye(2), (len(xy), 1, 1)))
+    >>> cameras = (CameraView('camera', 1600, 1200),)
+    >>> names = tuple('123456'), tuple('ABCDEFGHIJKLMNOPQRST')
+    >>> network = Network(names[0], np.zeros(6, int), cameras, names[1], seen)
     >>> (solution,) = orient(network)
-    >>> solution.start.points.shape, solution.covariance_of_points.shape
-    ((24, 3), (72, 72))
+    >>> round(float(solution.start.calibrations[0, 0]), 2), solution.covariance_of_points.shape
+    (1500.0, (60, 60))
     """
     network = once_a_photograph(network)
     _check(network)
@@ -303,7 +317,7 @@ def _zoom(network: Network, view: View, start: Start) -> float | None:
         step = np.sqrt(step)
         best = min((best / step, best, best * step), key=lambda factor: fit(factor)[0])
     alone, own = fit(best)[0], fit(1.0)[0]
-    return best if abs(best - 1) > ZOOMED and alone < WORST and alone < own / 3 else None
+    return best if abs(best - 1) > ZOOMED and alone < FITS and alone < own / 3 else None
 
 
 def _zooms(solutions: Sequence[Solution]) -> tuple[str, ...]:
