@@ -1,9 +1,10 @@
 """Figures of networks: adjustment, covariances, wrong IDs, and other programs beside it.
 
-    python -m benchmarks.network --table camcal|ellipsoids|outliers|scale|colmap [--seed 301]
+    python -m benchmarks.network --table camcal|colmap|ellipsoids|outliers|panel|scale|starts [--seed 301]
         [--runs N]
 
-`camcal` needs `AHF_NETWORKS`, the folder of published networks, and `colmap` needs pycolmap.
+`camcal` needs `AHF_NETWORKS`, the folder of published networks, `panel` needs `AHF_PHOTOS`, that
+of photographs, and `colmap` needs pycolmap.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from benchmarks import (
     network_ellipsoids,
     network_outliers,
     network_scale,
+    network_starts,
 )
 
 TABLES: dict[str, Callable[[int, int | None], list[str]]] = {
@@ -24,6 +26,8 @@ TABLES: dict[str, Callable[[int, int | None], list[str]]] = {
     'ellipsoids': lambda seed, runs: network_ellipsoids.table([seed], runs or 125),
     'outliers': lambda seed, runs: network_outliers.table([seed], runs or 25),
     'scale': lambda seed, runs: network_scale.table([seed]),
+    'panel': lambda seed, runs: network_starts.panel(),
+    'starts': lambda seed, runs: network_starts.starts_table([seed], runs or 250),
     'colmap': lambda seed, runs: network_colmap.table([seed]),
 }
 

@@ -6,13 +6,28 @@ warns, and as silently wrong where it does neither and its points are off the tr
 
 from __future__ import annotations
 
+import csv
+import os
+import time
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
+from ahf_ros import identify, read_image
 from ahf_ros.orientation.camera import pinhole, project
-from ahf_ros.orientation.network import CameraView, FloatArray, IntArray, Network, Observations
+from ahf_ros.orientation.network import (
+    CameraView,
+    FloatArray,
+    IntArray,
+    Network,
+    Observations,
+)
+from ahf_ros.orientation.orient import orient
+from ahf_ros.orientation.solution import Solution
+from benchmarks.report import number, table
 
 WIDTH, HEIGHT = 3000, 2000
 NOISE = 0.05
@@ -121,3 +136,151 @@ def deviations(points: FloatArray, truth: FloatArray) -> FloatArray:
     rotation = left @ sign @ right
     scale = np.sum(values * np.diag(sign)) / np.sum(source**2)
     return scale * source @ rotation.T - target
+
+
+def starts_table(seeds: Sequence[int], runs: int) -> list[str]:
+    """Return how many random networks were oriented, refused, and silently wrong."""
+    rows = []
+    for flat in (False, True):
+        for known in (True, False):
+            counts: Counter[str] = Counter()
+            times = []
+            for run in range(runs):
+                seen = rendered(1000 * seeds[0] + run, flat=flat, known=known)
+                started = time.perf_counter()
+                counts[outcome(seen)] += 1
+                times.append(time.perf_counter() - started)
+            kinds = ('oriented', 'in part, said', 'refused', 'wrong')
+            shares = (f'{counts[kind]} ({counts[kind] / runs:.1%})' for kind in kinds)
+            field = 'plane' if flat else 'space'
+            focal = 'known' if known else 'unknown'
+            rows.append((field, focal, *shares, number(float(np.median(times)), 1)))
+    head = ('field', 'focal length', 'oriented', 'in part, said', 'refused', 'silently wrong', 's')
+    return table(head, rows)
+
+
+def outcome(seen: Rendered) -> str:
+    """Return what became of a network: see the module."""
+    try:
+        solution = orient(seen.network)[0]
+    except ValueError:
+        return 'refused'
+    start = solution.start
+    known = np.flatnonzero(np.isfinite(start.points[:, 0]))
+    rows = (3 * known[:, None] + np.arange(3)).ravel()
+    variances = np.diag(solution.covariance_of_points)[rows].reshape(-1, 3).sum(axis=1)
+    wrong = np.linalg.norm(deviations(start.points[known], seen.points[known]), axis=1)
+    scale = np.linalg.norm(seen.points[known].std(axis=0)) / np.linalg.norm(
+        start.points[known].std(axis=0)
+    )
+    if np.median(wrong / (scale * np.sqrt(variances))) > 3 or np.any(wrong > 0.02):
+        return 'wrong'
+    if np.isfinite(start.positions[:, 0]).all():
+        return 'oriented'
+    return 'in part, said' if solution.warnings else 'wrong'
+
+
+def panel_network(folder: Path) -> Network:
+    """Return what the package identifies in the photographs of the panel."""
+    rows, covariances, ids = [], [], []
+    paths = sorted(folder.glob('*.png'))
+    for photograph, path in enumerate(paths):
+        found = identify(read_image(path), detector='ring', family='aicon14')
+        rows += [(photograph, *centre) for centre in found.centres]
+        covariances += list(found.covariances)
+        ids += [str(one) for one in found.ids]
+    height, width = read_image(paths[0]).shape
+    targets = tuple(sorted(set(ids), key=int))
+    places = np.array(rows)
+    return Network(
+        tuple(path.name for path in paths),
+        np.zeros(len(paths), dtype=int),
+        (CameraView('camera', width, height),),
+        targets,
+        Observations(
+            places[:, 0].astype(int),
+            np.array([targets.index(one) for one in ids]),
+            places[:, 1:],
+            np.array(covariances),
+        ),
+    )
+
+
+def panel_table(network: Network, folder: Path) -> list[str]:
+    """Return figures of the panel: as identified, with three wrong IDs, and with a target renamed."""
+    with (folder / 'points.csv').open() as file:
+        truth = {row['id']: [float(row[axis]) for axis in 'xyz'] for row in csv.DictReader(file)}
+    observed = network.observations
+    plain = orient(network)[0]
+    rows = [(*_against(plain, truth), '-', '-')]
+    mixed = observed.point.copy()
+    wrong = [40, 250, 500]
+    for row in wrong:
+        own = observed.point[observed.photograph == observed.photograph[row]]
+        mixed[row] = np.setdiff1d(np.arange(len(network.targets)), own)[0]
+    of_target = observed.point == observed.point[0]
+    renamed = np.where(of_target, observed.point[10], observed.point)
+    cases: tuple[tuple[IntArray, IntArray], ...] = (
+        (mixed, np.array(wrong)),
+        (renamed, np.flatnonzero(of_target)),
+    )
+    for points, changed in cases:
+        solution = orient(replace(network, observations=replace(observed, point=points)))[0]
+        named = {(one.photograph, one.target) for one in solution.rejected}
+        asked = {
+            (network.photographs[observed.photograph[row]], network.targets[points[row]])
+            for row in changed
+        }
+        both = np.isfinite(solution.start.points[:, 0]) & np.isfinite(plain.start.points[:, 0])
+        reference = np.array([truth[name] for name in np.array(network.targets)[both]])
+        first, second = (
+            deviations(one.start.points[both], reference) for one in (plain, solution)
+        )
+        moved = float(np.linalg.norm(first - second, axis=1).max())
+        rows.append((*_against(solution, truth), f'{len(asked & named)} of {len(asked)}', moved))
+    names = ('as identified', 'three wrong IDs', "a target with another's ID")
+    lines = [
+        (
+            name,
+            number(rms, 4),
+            number(residual, 4),
+            number(sigma0, 2),
+            rejected,
+            named,
+            moved if moved == '-' else number(moved, 5),
+        )
+        for name, (rms, residual, sigma0, rejected, named, moved) in zip(names, rows, strict=True)
+    ]
+    head = (
+        'panel',
+        '3-D RMS, mm',
+        'residual, px',
+        'sigma0',
+        'rejected',
+        'changed IDs named',
+        'coordinates moved by at most, mm',
+    )
+    return table(head, lines)
+
+
+def _against(solution: Solution, truth: dict[str, list[float]]) -> tuple[float, float, float, int]:
+    """Return the RMS distance from measured points in mm, and residuals."""
+    start, names = solution.start, solution.network.targets
+    known = [index for index in np.flatnonzero(np.isfinite(start.points[:, 0]))]
+    known = [index for index in known if names[index] in truth]
+    apart = deviations(start.points[known], np.array([truth[names[index]] for index in known]))
+    residuals = solution.residuals[start.used]
+    return (
+        float(np.sqrt(np.mean(np.sum(apart**2, axis=1)))),
+        float(np.sqrt(np.mean(residuals**2))),
+        solution.sigma0,
+        len(solution.rejected),
+    )
+
+
+def panel() -> list[str]:
+    """Return the table of the panel; `AHF_PHOTOS` is the folder of photographs."""
+    if 'AHF_PHOTOS' not in os.environ:
+        raise SystemExit('AHF_PHOTOS is not set, expected the folder of photographs')
+    folder = Path(os.environ['AHF_PHOTOS']) / 'panel'
+    return panel_table(panel_network(folder), folder)
