@@ -1,4 +1,4 @@
-"""The calibration sheet `camcal`, beside the solution of DBAT, the Damped Bundle Adjustment Toolbox.
+"""The calibration sheet `camcal` beside the solution of the Damped Bundle Adjustment Toolbox.
 
 Its 21 photographs of 100 points, 4 of them fixed, come with DBAT's parameters and standard
 deviations, in the model of Brown backward, with affinity and without shear. They start here from

@@ -243,9 +243,10 @@ def _in_px(length: tuple[float, str] | None) -> Callable[[int, int], float] | No
 
 def _oriented(network: Network, options: argparse.Namespace) -> list[Solution]:
     from ahf_ros.orientation.datum import Datum
+    from ahf_ros.orientation.groups import separated
     from ahf_ros.orientation.orient import orient
 
-    return orient(network, datum=Datum(*options.datum) if options.datum else Datum())
+    return separated(orient(network, datum=Datum(*options.datum) if options.datum else Datum()))
 
 
 def _of_groups(solutions: Sequence[Solution], number: int) -> tuple[str, ...]:

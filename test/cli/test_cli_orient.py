@@ -93,6 +93,28 @@ def test_control_points_give_their_frame(results: Path, tmp_path: Path) -> None:
     assert (tmp_path / 'control.csv').exists()
 
 
+def test_groups_are_written_each_by_itself(
+    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Photographs of other targets are another network."""
+    lines = [json.loads(line) for line in results.read_text().splitlines()[:8]]
+    others = json.loads(json.dumps(lines[:6]))
+    for record in others:
+        record['image'] = f'other_{record["image"]}'
+        for target in record['targets']:
+            target['id'] += 100
+    path = tmp_path / 'results.jsonl'
+    path.write_text('\n'.join(json.dumps(it) for it in lines + others))
+    camera = '--calibration', results.parent / 'camera.yaml'
+    assert status('orient', path, '-o', tmp_path / 'out', *camera) == 0
+    large, small = (read_network(tmp_path / name) for name in ('out', 'out/group_2'))
+    assert [len(it.photographs) for it in (large, small)] == [8, 6]
+    assert small.points.names == tuple(str(100 + int(name)) for name in large.points.names)
+    assert small.photographs[0] == 'other_view_0.jpg'
+    told = ' '.join(capsys.readouterr().err.split())
+    assert 'group 2 of 2' in told and 'no pose' not in told
+
+
 @pytest.mark.parametrize(
     ('options', 'message'),
     [

@@ -1,0 +1,73 @@
+"""Groups of photographs that do not hang together, each as a network of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ahf_ros.orientation.solution import Solution
+from ahf_ros.orientation.strength import determined, oriented
+
+Mask = NDArray[np.bool_]
+
+
+def separated(solutions: Sequence[Solution]) -> list[Solution]:
+    """Return the solutions of one network without what only other groups determine.
+
+    What no group determines stays in the first one.
+    """
+    posed = np.array([oriented(it) for it in solutions])
+    placed = np.array([determined(it) for it in solutions])
+    parts = []
+    for number, solution in enumerate(solutions):
+        masks = []
+        for known in (posed, placed):
+            nowhere = ~known.any(axis=0) if number == 0 else False
+            masks.append(np.asarray(known[number] | nowhere))
+        parts.append(part(solution, *masks))
+    return parts
+
+
+def part(solution: Solution, photographs: Mask, targets: Mask) -> Solution:
+    """Return a solution with some of its photographs and targets; cameras stay as they are."""
+    network, start, seen = solution.network, solution.start, solution.network.observations
+    rows = photographs[seen.photograph] & targets[seen.point]
+    images = tuple(np.array(network.photographs, object)[photographs])
+    names = tuple(np.array(network.targets, object)[targets])
+    observations = replace(
+        seen,
+        photograph=(np.cumsum(photographs) - 1)[seen.photograph[rows]],
+        point=(np.cumsum(targets) - 1)[seen.point[rows]],
+        xy=seen.xy[rows],
+        covariance=seen.covariance[rows],
+    )
+    kept = set(names)
+    entries = np.repeat(targets, 3)
+    return replace(
+        solution,
+        network=replace(
+            network,
+            photographs=images,
+            camera_of=network.camera_of[photographs],
+            targets=names,
+            observations=observations,
+            bars=tuple(it for it in network.bars if kept.issuperset(it.ends)),
+            control=tuple(it for it in network.control if it.name in kept),
+            set_aside=tuple(it for it in network.set_aside if it.photograph in images),
+        ),
+        start=replace(
+            start,
+            rotations=start.rotations[photographs],
+            positions=start.positions[photographs],
+            points=start.points[targets],
+            used=start.used[rows],
+        ),
+        residuals=solution.residuals[rows],
+        normalised=solution.normalised[rows],
+        pose_covariances=solution.pose_covariances[photographs],
+        covariance_of_points=solution.covariance_of_points[np.ix_(entries, entries)],
+        rejected=tuple(it for it in solution.rejected if it.photograph in images),
+    )

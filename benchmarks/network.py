@@ -1,0 +1,42 @@
+"""Figures of networks: adjustment, covariances, wrong IDs, and other programs beside it.
+
+    python -m benchmarks.network --table camcal|ellipsoids|outliers|scale|colmap [--seed 301]
+        [--runs N]
+
+`camcal` needs `AHF_NETWORKS`, the folder of published networks, and `colmap` needs pycolmap.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+
+from benchmarks import (
+    network_camcal,
+    network_colmap,
+    network_ellipsoids,
+    network_outliers,
+    network_scale,
+)
+
+TABLES: dict[str, Callable[[int, int | None], list[str]]] = {
+    'camcal': lambda seed, runs: network_camcal.table(),
+    'ellipsoids': lambda seed, runs: network_ellipsoids.table([seed], runs or 125),
+    'outliers': lambda seed, runs: network_outliers.table([seed], runs or 25),
+    'scale': lambda seed, runs: network_scale.table([seed]),
+    'colmap': lambda seed, runs: network_colmap.table([seed]),
+}
+
+
+def main() -> None:
+    """Print the chosen table."""
+    parser = argparse.ArgumentParser(description=__doc__.split('\n\n', maxsplit=1)[0])
+    parser.add_argument('--table', choices=sorted(TABLES), required=True)
+    parser.add_argument('--seed', type=int, default=301)
+    parser.add_argument('--runs', type=int, help='runs of each row, where a table has runs')
+    options = parser.parse_args()
+    print('\n'.join(TABLES[options.table](options.seed, options.runs)))
+
+
+if __name__ == '__main__':
+    main()

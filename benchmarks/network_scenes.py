@@ -1,0 +1,87 @@
+"""Networks without images: exact projections of targets in many photographs, with noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ahf_ros.orientation.camera import pinhole, project, rotation_matrices
+from ahf_ros.orientation.network import CameraView, Network, Observations
+from ahf_ros.orientation.solution import Start
+
+WIDTH, HEIGHT = 4000, 3000
+
+
+@dataclass(frozen=True)
+class Field:
+    """A field of targets in a cube or a square of 2 units, and photographs around it.
+
+    Every fourth is rolled by a quarter turn more. `each` limits the targets of a photograph.
+    """
+
+    photographs: int = 12
+    targets: int = 40
+    planar: bool = False
+    sigma: float = 0.05
+    each: int | None = None
+
+
+def simulate(field: Field, random: np.random.Generator) -> tuple[Network, Start]:
+    """Return a network with noise in its image points, and the true values.
+
+    Standard deviations of centres vary by a factor of two, and are those of the noise.
+    """
+    calibration = pinhole(3200, WIDTH, HEIGHT)
+    calibration[1:8] += [15, -10, -0.1, 0.03, 0, 4e-4, -3e-4]
+    points = random.uniform(-1, 1, (field.targets, 3)) * [1, 1, 0 if field.planar else 0.5]
+    directions = random.normal(size=(field.photographs, 3))
+    directions[:, 2] = np.abs(directions[:, 2]) + 0.7
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    positions = directions * random.uniform(3.6, 4.4, (field.photographs, 1))
+    aims = random.normal(0, 0.1, (field.photographs, 3))
+    rolls = np.arange(field.photographs) % 4 * np.pi / 2
+    rotations = np.stack([_towards(*view) for view in zip(positions, aims, rolls, strict=True)])
+    photograph, point = np.divmod(np.arange(field.photographs * field.targets), field.targets)
+    xy = project(calibration, rotations[photograph], positions[photograph], points[point])
+    inside = ((xy > 0) & (xy < [WIDTH, HEIGHT])).all(axis=1)
+    order = np.where(inside, random.random(len(xy)), 2).reshape(field.photographs, -1)
+    rank = order.argsort(axis=1).argsort(axis=1).reshape(-1)
+    inside &= rank < (field.each or field.targets)
+    photograph, point, xy = photograph[inside], point[inside], xy[inside]
+    sigma = field.sigma * random.uniform(0.7, 1.4, len(xy))
+    network = Network(
+        tuple(f'{number}.jpg' for number in range(field.photographs)),
+        np.zeros(field.photographs, dtype=int),
+        (CameraView('camera', WIDTH, HEIGHT),),
+        tuple(str(number) for number in range(field.targets)),
+        Observations(
+            photograph,
+            point,
+            xy + sigma[:, None] * random.normal(size=xy.shape),
+            sigma[:, None, None] ** 2 * np.eye(2),
+        ),
+    )
+    used = np.ones(len(xy), dtype=bool)
+    return network, Start(calibration[None], rotations, positions, points, used)
+
+
+def approximate(truth: Start, random: np.random.Generator, size: float = 0.02) -> Start:
+    """Return true values with errors of a size in units and rad, of a camera without distortion."""
+    count = len(truth.positions)
+    turns = rotation_matrices(random.normal(0, size, (count, 3)))
+    return replace(
+        truth,
+        calibrations=pinhole(3200 * (1 + 2 * size), WIDTH, HEIGHT)[None],
+        rotations=turns @ truth.rotations,
+        positions=truth.positions + random.normal(0, size, (count, 3)),
+        points=truth.points + random.normal(0, size, truth.points.shape),
+    )
+
+
+def _towards(position: np.ndarray, aim: np.ndarray, roll: float) -> np.ndarray:
+    """Return the rotation of a camera that looks from a position to an aim."""
+    z = (aim - position) / np.linalg.norm(aim - position)
+    x = np.cross(z, [0.1, 0.2, 1])
+    x /= np.linalg.norm(x)
+    return rotation_matrices(np.array([[0, 0, roll]]))[0] @ np.stack([x, np.cross(z, x), z])
