@@ -1,7 +1,6 @@
 """Figures of networks: adjustment, covariances, wrong IDs, and other programs beside it.
 
-    python -m benchmarks.network --table camcal|colmap|ellipsoids|outliers|panel|scale|starts [--seed 301]
-        [--runs N]
+    python -m benchmarks.network --table TABLE [--seed 301] [--runs N]
 
 `camcal` needs `AHF_NETWORKS`, the folder of published networks, `panel` needs `AHF_PHOTOS`, that
 of photographs, and `colmap` needs pycolmap.
@@ -16,6 +15,7 @@ from benchmarks import (
     network_camcal,
     network_colmap,
     network_ellipsoids,
+    network_epochs,
     network_outliers,
     network_scale,
     network_starts,
@@ -24,6 +24,7 @@ from benchmarks import (
 TABLES: dict[str, Callable[[int, int | None], list[str]]] = {
     'camcal': lambda seed, runs: network_camcal.table(),
     'ellipsoids': lambda seed, runs: network_ellipsoids.table([seed], runs or 125),
+    'epochs': lambda seed, runs: network_epochs.table([seed], runs or network_epochs.RUNS),
     'outliers': lambda seed, runs: network_outliers.table([seed], runs or 25),
     'scale': lambda seed, runs: network_scale.table([seed]),
     'panel': lambda seed, runs: network_starts.panel(),

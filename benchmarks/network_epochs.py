@@ -1,6 +1,6 @@
 """How often the congruence test of two epochs raises a false alarm, and what it finds.
 
-    python -m benchmarks.network_epochs [--runs 2000] [--seeds 301]
+    python -m benchmarks.network --table epochs [--seed 301] [--runs 2000]
 
 Each epoch is a bundle of its own photographs: image points with normal errors, poses, focal length
 and radial distortion unknown, inner constraints, and a scale bar where the scale is fixed. Its
@@ -19,9 +19,9 @@ sigmas, and counts where these and no others are named.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -30,9 +30,9 @@ from ahf_ros.orientation.congruence import LEVEL, compare
 from ahf_ros.orientation.datum import movements, s_transform
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.points import MeasuredPoints
-from benchmarks.report import Report, about, about_text, parsed, parser, progress, publish, table
+from benchmarks.report import progress
+from benchmarks.report import table as markdown
 
-FIRST_SEED = 301
 RUNS = 2000
 SIGMAS = 5.0
 WIDTH, HEIGHT, FOCAL_LENGTH = 4000, 3000, 4200.0
@@ -141,14 +141,14 @@ def _design(xyz: FloatArray, photographs: int, rng: np.random.Generator) -> Floa
     return np.vstack(rows) / NOISE
 
 
-def cases(runs: int, seed: int) -> Iterator[dict[str, object]]:
+def cases(runs: int, seed: int) -> Iterator[dict[str, Any]]:
     """Yield the figures of each field, with its scale fixed and free."""
     for field in progress(FIELDS, 'networks'):
         for bar in (True, False):
             yield figures(field, bar, runs, np.random.default_rng(seed))
 
 
-def figures(field: Field, bar: bool, runs: int, rng: np.random.Generator) -> dict[str, object]:
+def figures(field: Field, bar: bool, runs: int, rng: np.random.Generator) -> dict[str, Any]:
     """Return how often the test is right, for one field; movements in a quarter of the runs."""
     from scipy.stats import f, ncf
 
@@ -227,31 +227,16 @@ def _movement(covariance: FloatArray, sigmas: float, rng: np.random.Generator) -
     return sigmas * np.sqrt(direction @ covariance @ direction) * direction
 
 
-def page(report: Report) -> str:
-    """Return the table in Markdown."""
+def table(seeds: Sequence[int], runs: int = RUNS) -> list[str]:
+    """Return the lines of the table, with `runs` pairs of epochs without movement a row."""
     kinds = [f'{kind}{name}' for kind in ('', 'conditional_') for name in _OUTCOMES]
     shares = ['false_alarms', 'false_alarms_of_sum', *kinds, 'quarter']
     head = 'field', 'targets', 'photographs', 'scale', 'redundancy'
     rows = [
         [*(row[name] for name in head), *(f'{100 * row[name]:.1f}' for name in shares)]
-        for row in report['rows']
+        for seed in seeds
+        for row in cases(runs, seed)
     ]
     titles = [f'{name.replace("_", " ")} %' for name in shares]
-    lines = table([*head, *titles], rows)
-    return '\n'.join([*lines, '', f'{report["runs"]} runs a row. {about_text(report)}'])
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Print the table."""
-    made = parser(__doc__)
-    made.set_defaults(seeds=[FIRST_SEED])
-    made.add_argument('--runs', type=int, default=RUNS, help='pairs of epochs without movement')
-    options = parsed(made, arguments)
-    rows = [row for seed in options.seeds for row in cases(options.runs, seed)]
-    report = about(options.seeds, runs=options.runs, rows=rows)
-    publish(report, page(report), options)
-    return 0
-
-
-if __name__ == '__main__':
-    sys.exit(main())
+    lines = markdown([*head, *titles], rows)
+    return [*lines, '', f'{runs} runs a row, seeds {", ".join(map(str, seeds))}.']
