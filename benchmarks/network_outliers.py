@@ -44,8 +44,12 @@ def counted(field: Field, random: np.random.Generator) -> tuple[int, int, int, i
     network, truth = simulate(field, random)
     network, second, late = moved(network, truth, random)
     network, wrong = disturbed(network, random)
-    observations = network.observations
-    if 2 * (late & ~wrong).sum() > ((observations.point == 0) & ~wrong).sum():
+    start = refine(network, approximate(truth, random), ('f', 'k1'))
+    solution = adjust(network, start)
+    observations, used = network.observations, solution.start.used
+    right = (observations.point == 0) & ~wrong
+    balance = 2 * (late & right).sum() - right.sum()
+    if balance > 0 or (balance == 0 and (used & late & right).any()):
         truth.points[0] = second  # where it is more often is where it is
     computed = project(
         truth.calibrations[0],
@@ -55,9 +59,6 @@ def counted(field: Field, random: np.random.Generator) -> tuple[int, int, int, i
     )
     sigma = np.sqrt(observations.covariance[:, 0, 0])
     large = np.linalg.norm(observations.xy - computed, axis=1) > LARGE * sigma
-    start = refine(network, approximate(truth, random), ('f', 'k1'))
-    solution = adjust(network, start)
-    used = solution.start.used
     bad = large | wrong
     named = any(text.startswith('target 0 is at two places') for text in solution.warnings)
     return bad.sum(), (used & large).sum(), (~bad).sum(), (used & ~bad).sum(), named

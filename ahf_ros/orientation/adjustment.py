@@ -168,6 +168,25 @@ def adjust(
     """
     check_network(network)
     start, datum, warnings = placed(network, start, datum or Datum())
+    try:
+        return _adjusted(network, start, datum, release, test, backward, warnings)
+    except np.linalg.LinAlgError as error:
+        raise ValueError(
+            'the network is singular: the targets of a photograph, or all, lie on a line, or bars '
+            'and control points without variance repeat each other'
+        ) from error
+
+
+def _adjusted(
+    network: Network,
+    start: Start,
+    datum: Datum,
+    release: tuple[str, ...] | None,
+    test: bool,
+    backward: bool,
+    warnings: tuple[str, ...],
+) -> Solution:
+    """Return the solution from approximate values in the frame of what is known."""
     has_control = kind(network, datum) == 'control'
     known_points = np.isin(
         network.targets, [point.name for point in network.control if not point.check]
@@ -308,8 +327,8 @@ def doubtful(network: Network, result: Adjusted, datum: Datum, sigma0: float) ->
 def zoomed(network: Network, layout: Layout, state: Start) -> tuple[str, ...]:
     """Return warnings of photographs whose focal length is not that of their camera.
 
-    Photographs of which a fifth disagrees, or all where residuals are large throughout, get a focal
-    length of their own each.
+    Photographs of which a fifth disagrees, or all where residuals are large throughout, get a
+    focal length of their own each.
     """
     observations = network.observations
     everything = np.bincount(observations.photograph, minlength=len(network.photographs))

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ahf_ros.orientation import normals
 from ahf_ros.orientation.adjustment import adjust, refine
-from ahf_ros.orientation.camera import PARAMETERS
+from ahf_ros.orientation.camera import PARAMETERS, project
 from ahf_ros.orientation.datum import Datum, movements
 from ahf_ros.orientation.knowledge import similarity
 from ahf_ros.orientation.network import CameraView, ControlPoint, ScaleBar
@@ -65,8 +66,6 @@ def test_covariances_are_those_of_the_whole_inverse(scene):
     network, _, start = scene
     solution = adjust(network, start, release=('f',), test=False)
     numbers, poses = 3 * len(network.targets), len(network.photographs)
-    from ahf_ros.orientation import normals
-
     free = np.isin(PARAMETERS, ['f'])[None]
     layout = normals.lay_out(network, solution.start, solution.start.used, free)
     design = normals.linearise(layout, solution.start)
@@ -304,6 +303,29 @@ def test_datum_needs_three_seen_targets(scene):
         adjust(network, start, Datum('inner', ('0', '1', 'nowhere')))
 
 
+def test_knowledge_without_variance_must_not_repeat_itself(scene):
+    network, truth, start = scene
+    bar = ScaleBar(('0', '3'), distance(truth.points, 0, 3), 0.0)
+    network = replace(network, bars=(bar,), control=named(scene, '0369'))
+    with pytest.raises(ValueError, match='control points without variance repeat each other'):
+        adjust(network, start, release=('f',), test=False)
+
+
+def test_targets_on_a_line_are_refused(scene):
+    network, truth, _ = scene
+    observations = network.observations
+    points = np.linspace(-1, 1, 20)[:, None] * [1, 0.5, 0.2]
+    xy = project(
+        truth.calibrations[0],
+        truth.rotations[observations.photograph],
+        truth.positions[observations.photograph],
+        points[observations.point],
+    )
+    network = replace(network, observations=replace(observations, xy=xy))
+    with pytest.raises(ValueError, match='on a line'):
+        adjust(network, replace(truth, points=points))
+
+
 def test_mixed_zoom_is_a_warning(scene):
     network, truth, start = scene
     observations = network.observations
@@ -318,8 +340,6 @@ def test_mixed_zoom_is_a_warning(scene):
 def test_photographs_of_a_plane_straight_on_do_not_determine_the_focal_length():
     random = np.random.default_rng(6)
     network, truth = simulate(replace(FIELD, planar=True), random)
-    from ahf_ros.orientation.camera import project
-
     observations = network.observations
     rotations = np.tile(np.diag([1.0, -1.0, -1.0]), (10, 1, 1))
     positions = np.column_stack([random.uniform(-0.3, 0.3, (10, 2)), np.full(10, 4.0)])
