@@ -1,7 +1,7 @@
 """Figures of networks: adjustment, covariances, wrong IDs, and other programs beside it.
 
-    python -m benchmarks.network --table camcal|colmap|ellipsoids|outliers|panel|scale|starts [--seed 301]
-        [--runs N]
+    python -m benchmarks.network --table camcal|colmap|ellipsoids|outliers|panel|scale|starts
+        [--seed 301] [--runs N]
 
 `camcal` needs `AHF_NETWORKS`, the folder of published networks, `panel` needs `AHF_PHOTOS`, that
 of photographs, and `colmap` needs pycolmap.

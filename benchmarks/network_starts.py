@@ -207,7 +207,7 @@ def panel_network(folder: Path) -> Network:
 
 
 def panel_table(network: Network, folder: Path) -> list[str]:
-    """Return figures of the panel: as identified, with three wrong IDs, and with a target renamed."""
+    """Return figures of the panel: as identified, with wrong IDs, and with a target renamed."""
     with (folder / 'points.csv').open() as file:
         truth = {row['id']: [float(row[axis]) for axis in 'xyz'] for row in csv.DictReader(file)}
     observed = network.observations
