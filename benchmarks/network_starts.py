@@ -207,7 +207,10 @@ def panel_network(folder: Path) -> Network:
 
 
 def panel_table(network: Network, folder: Path) -> list[str]:
-    """Return figures of the panel: as identified, with three wrong IDs, and with a target renamed."""
+    """Return figures of the panel: as identified, with wrong IDs, and with a target renamed.
+
+    Coordinates are compared with those without the observations whose IDs were changed.
+    """
     with (folder / 'points.csv').open() as file:
         truth = {row['id']: [float(row[axis]) for axis in 'xyz'] for row in csv.DictReader(file)}
     observed = network.observations
@@ -231,10 +234,11 @@ def panel_table(network: Network, folder: Path) -> list[str]:
             (network.photographs[observed.photograph[row]], network.targets[points[row]])
             for row in changed
         }
-        both = np.isfinite(solution.start.points[:, 0]) & np.isfinite(plain.start.points[:, 0])
+        clean = orient(_without(network, changed))[0]
+        both = np.isfinite(solution.start.points[:, 0]) & np.isfinite(clean.start.points[:, 0])
         reference = np.array([truth[name] for name in np.array(network.targets)[both]])
         first, second = (
-            deviations(one.start.points[both], reference) for one in (plain, solution)
+            deviations(one.start.points[both], reference) for one in (clean, solution)
         )
         moved = float(np.linalg.norm(first - second, axis=1).max())
         rows.append((*_against(solution, truth), f'{len(asked & named)} of {len(asked)}', moved))
@@ -258,9 +262,24 @@ def panel_table(network: Network, folder: Path) -> list[str]:
         'sigma0',
         'rejected',
         'changed IDs named',
-        'coordinates moved by at most, mm',
+        'moved by these at most, mm',
     )
     return table(head, lines)
+
+
+def _without(network: Network, rows: IntArray) -> Network:
+    """Return the network without some observations."""
+    observed = network.observations
+    keep = np.setdiff1d(np.arange(len(observed.xy)), rows)
+    return replace(
+        network,
+        observations=Observations(
+            observed.photograph[keep],
+            observed.point[keep],
+            observed.xy[keep],
+            observed.covariance[keep],
+        ),
+    )
 
 
 def _against(solution: Solution, truth: dict[str, list[float]]) -> tuple[float, float, float, int]:

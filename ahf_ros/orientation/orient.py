@@ -259,7 +259,7 @@ def _left_out(network: Network, solutions: Sequence[Solution]) -> tuple[str, ...
     views = views_of(network)
     few, alike, zoomed = [], [], []
     start = solutions[0].start
-    for index in np.flatnonzero(~posed):
+    for index in np.flatnonzero(~posed).tolist():
         seen = np.isfinite(start.points[views[index].points, 0])
         if seen.sum() < FEWEST_POINTS:
             few.append(index)

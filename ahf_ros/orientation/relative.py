@@ -7,6 +7,7 @@ geometric robust information criterion (1998, GRIC) orders what comes out of the
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -85,18 +86,16 @@ def _essential(
     first: FloatArray, second: FloatArray, sigma: float
 ) -> tuple[list[tuple[FloatArray, FloatArray, FloatArray]], float]:
     """Return (rotation, shift, errors) of essential matrices, and the scale of the errors."""
-    matrix, _ = cv2.findEssentialMat(first, second, np.eye(3), cv2.LMEDS, 0.9)
-    if matrix is None:
-        return [], sigma
-    found, scales = [], [sigma]
-    for essential in matrix.reshape(-1, 3, 3):
+    matrix: Any = cv2.findEssentialMat(first, second, np.eye(3), cv2.LMEDS, 0.9)[0]
+    found, scales = [], []
+    for essential in () if matrix is None else np.reshape(matrix, (-1, 3, 3)):
         pose = _in_front(essential, first, second, sigma)
         if pose is None:
             continue
         rotation, shift, residuals = _improved(*pose, first, second, sigma)
         found.append((rotation, shift, residuals))
         scales.append(_least_median_scale(residuals, 5, sigma))
-    return found, min(scales[1:], default=sigma)
+    return found, min(scales, default=sigma)
 
 
 def _in_front(
@@ -108,7 +107,11 @@ def _in_front(
     one, other, shift = cv2.decomposeEssentialMat(essential)
     residuals = np.abs(sampson_errors(essential, first, second))
     good = residuals <= BOUND * _least_median_scale(residuals, 5, sigma)
-    poses = [(turn, sign * shift.ravel()) for turn in (one, other) for sign in (1, -1)]
+    poses: list[tuple[FloatArray, FloatArray]] = [
+        (np.asarray(turn, float), sign * np.asarray(shift, float).ravel())
+        for turn in (one, other)
+        for sign in (1, -1)
+    ]
     counts = [np.sum(_before_both(*pose, first, second) & good) for pose in poses]
     return poses[int(np.argmax(counts))]
 
@@ -143,7 +146,7 @@ def _improved(
     differences, because the errors are cheap.
     """
 
-    def moved(step: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def moved(step: Any) -> tuple[FloatArray, FloatArray]:
         across = np.linalg.svd(shift[None])[2][1:]
         base = shift + step[3:] @ across
         return cv2.Rodrigues(step[:3])[0] @ rotation, base / np.linalg.norm(base)
@@ -191,7 +194,7 @@ def _homography(
         length = float(np.linalg.norm(shift))
         before = np.mean(rays @ normal.ravel() > 0) if np.isfinite(length) else 0
         if length > 1e-3 and before > 0.95 and abs(np.linalg.det(rotation) - 1) < 1e-3:
-            found.append((rotation, shift.ravel() / length))
+            found.append((np.asarray(rotation, float), np.asarray(shift, float).ravel() / length))
     return found, transfer
 
 

@@ -90,7 +90,7 @@ def _sampled(points: FloatArray, xy: FloatArray) -> Iterable[Pose]:
         flags = cv2.SOLVEPNP_P3P
         count, turns, shifts = cv2.solveP3P(points[three], xy[three], np.eye(3), None, flags)
         for turn, shift in zip(turns[:count], shifts[:count], strict=True):
-            rotation = cv2.Rodrigues(turn)[0]
+            rotation = np.asarray(cv2.Rodrigues(turn)[0], float)
             position = -rotation.T @ shift.ravel()
             if np.isfinite(rotation).all() and np.isfinite(position).all():
                 yield rotation, position

@@ -16,7 +16,7 @@ from ahf_ros.orientation.adjustment import free_parameters, refine
 from ahf_ros.orientation.camera import PARAMETERS, pinhole
 from ahf_ros.orientation.datum import movements
 from ahf_ros.orientation.least_squares import Conditions, normal_equations
-from ahf_ros.orientation.network import FloatArray, Network
+from ahf_ros.orientation.network import FloatArray, IntArray, Network
 from ahf_ros.orientation.planar import mirrored
 from ahf_ros.orientation.precision import precision
 from ahf_ros.orientation.relative import relative_orientations
@@ -104,7 +104,8 @@ def _triples(
     rated: dict[tuple[int, int, int], float] = {}
     for a, b in pairs:
         for c in most:
-            triple = tuple(sorted((a, b, c)))
+            low, middle, high = sorted((a, b, c))
+            triple = low, middle, high
             if c in (a, b) or triple in rated:
                 continue
             unknown = {views[index].camera for index in triple}
@@ -323,7 +324,7 @@ def median_angle(network: Network, start: Start) -> float:
     return float(np.median(angles)) if angles else 0.0
 
 
-def _whole(network: Network, seed: Seed, rows: FloatArray) -> Seed:
+def _whole(network: Network, seed: Seed, rows: IntArray) -> Seed:
     """Return a seed whose arrays are those of the whole network."""
     count = len(network.photographs)
     rotations, positions = np.full((count, 3, 3), np.nan), np.full((count, 3), np.nan)

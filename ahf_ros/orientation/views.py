@@ -12,6 +12,9 @@ from ahf_ros.orientation.camera import undistort
 from ahf_ros.orientation.network import FloatArray, IntArray, Network
 from ahf_ros.orientation.solution import Start
 
+NOWHERE = 1e3
+"""Coordinate in focal lengths, far outside every image."""
+
 
 @dataclass(frozen=True)
 class View:
@@ -27,13 +30,13 @@ class View:
     rows: IntArray
 
     def normalised(self, calibrations: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return places (n, 2) in the plane z = 1, zero where there is none, and their sigma."""
+        """Return places (n, 2) in the plane z = 1, and their standard deviations (n,).
+
+        Where the lens has no place, that is one that agrees with nothing.
+        """
         calibration = calibrations[self.camera]
-        places = undistort(calibration, self.xy)
-        lost = ~np.isfinite(places).all(axis=1)
-        sigma = self.sigma / calibration[0]
-        sigma[lost] = np.inf
-        return np.nan_to_num(places), sigma
+        places = np.nan_to_num(undistort(calibration, self.xy), nan=NOWHERE)
+        return places, self.sigma / calibration[0]
 
 
 def views_of(network: Network) -> list[View]:
