@@ -21,7 +21,7 @@ against the datum that remains comes back.
 References
 ----------
 .. [1] Pelzer, Zur Analyse geodätischer Deformationsmessungen, DGK C 164, 1971.
-.. [2] Niemeier, Ausgleichungsrechnung, 2nd ed., De Gruyter 2008, chapter 15.
+.. [2] Niemeier, Ausgleichungsrechnung, 2nd ed., De Gruyter 2008.
 """
 
 from __future__ import annotations
