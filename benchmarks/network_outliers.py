@@ -66,7 +66,7 @@ def counted(field: Field, random: np.random.Generator) -> tuple[int, int, int, i
 def moved(
     network: Network, truth: Start, random: np.random.Generator
 ) -> tuple[Network, np.ndarray, np.ndarray]:
-    """Return a network whose target 0 moves halfway by 0.1, its second place, and the rows there."""
+    """Return a network whose target 0 moves halfway, its second place, and the rows there."""
     observations = network.observations
     rows = np.flatnonzero(observations.point == 0)
     late = rows[len(rows) // 2 :]
@@ -89,7 +89,7 @@ def moved(
 
 
 def disturbed(network: Network, random: np.random.Generator) -> tuple[Network, np.ndarray]:
-    """Return a network with 5 % wrong IDs, of targets not in the photograph, and which they are."""
+    """Return a network with 5 % wrong IDs, of targets not in their photograph, and which."""
     observations = network.observations
     point = observations.point.copy()
     wrong = random.random(len(point)) < WRONG

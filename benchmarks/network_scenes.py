@@ -67,7 +67,7 @@ def simulate(field: Field, random: np.random.Generator) -> tuple[Network, Start]
 
 
 def approximate(truth: Start, random: np.random.Generator, size: float = 0.02) -> Start:
-    """Return true values with errors of a size in units and rad, of a camera without distortion."""
+    """Return true values with errors of a size in units and rad, and no distortion."""
     count = len(truth.positions)
     turns = rotation_matrices(random.normal(0, size, (count, 3)))
     return replace(

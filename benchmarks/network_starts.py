@@ -6,12 +6,13 @@ warns, and as silently wrong where it does neither and its points are off the tr
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ahf_ros.orientation.camera import pinhole, project
-from ahf_ros.orientation.network import CameraView, FloatArray, Network, Observations
+from ahf_ros.orientation.network import CameraView, FloatArray, IntArray, Network, Observations
 
 WIDTH, HEIGHT = 3000, 2000
 NOISE = 0.05
@@ -38,8 +39,7 @@ def rendered(
     points = random.uniform(-1, 1, (number, 3)) * [1, random.uniform(0.5, 1), 0.5]
     if flat:
         points[:, 2] = 0
-    calibration = pinhole(focal, WIDTH, HEIGHT)
-    rows, rotations, positions = [], [], []
+    rotations, positions = [], []
     tilt = np.radians(random.uniform(15, 50))
     for _ in range(count):
         around = random.uniform(0, 2 * np.pi)
@@ -50,28 +50,55 @@ def rendered(
         distance = random.uniform(0.7, 1.3) * 2 * focal / WIDTH
         rotations.append(looking(-away, random.uniform(0, 2 * np.pi)))
         positions.append(random.uniform(-0.4, 0.4, 3) * [1, 1, 0] + distance * away)
-    for photograph in range(count):
-        xy = project(calibration, rotations[photograph], positions[photograph], points)
-        inside = np.all((xy > 10) & (xy < [WIDTH - 10, HEIGHT - 10]), axis=1)
-        inside &= random.random(number) < 0.9
+    view = CameraView('camera', WIDTH, HEIGHT, focal if known else None)
+    calibration = pinhole(focal, WIDTH, HEIGHT)
+    cameras, of = (view,), np.zeros(count, dtype=int)
+    return photographed(
+        points, rotations, positions, cameras, of, calibration[None], random, wrong
+    )
+
+
+def photographed(
+    points: FloatArray,
+    rotations: Sequence[FloatArray],
+    positions: Sequence[FloatArray],
+    cameras: tuple[CameraView, ...],
+    camera_of: IntArray,
+    calibrations: FloatArray,
+    random: np.random.Generator,
+    wrong: float = 0.0,
+) -> Rendered:
+    """Return the network of poses: nine of ten targets in the image, a share with wrong IDs.
+
+    `calibrations` (cameras or photographs, parameters) are the true ones.
+    """
+    rows = []
+    for photograph, (rotation, position) in enumerate(zip(rotations, positions, strict=True)):
+        camera = camera_of[photograph]
+        own = photograph if len(calibrations) == len(rotations) else camera
+        xy = project(calibrations[own], rotation, position, points)
+        size = np.array([cameras[camera].width, cameras[camera].height])
+        inside = np.all((xy > 10) & (xy < size - 10), axis=1)
+        inside &= random.random(len(points)) < 0.9
         rows += [(photograph, point, *xy[point]) for point in np.flatnonzero(inside)]
     table = np.array(rows)
     xy = table[:, 2:] + random.normal(0, NOISE, (len(table), 2))
-    ids = table[:, 1].astype(int)
-    photograph = table[:, 0].astype(int)
+    photograph, ids = table[:, 0].astype(int), table[:, 1].astype(int)
     false = random.random(len(table)) < wrong
     for row in np.flatnonzero(false):
-        free = np.setdiff1d(np.arange(number), ids[photograph == photograph[row]])
+        free = np.setdiff1d(np.arange(len(points)), ids[photograph == photograph[row]])
         if len(free):
             ids[row] = random.choice(free)
-    view = CameraView('camera', WIDTH, HEIGHT, focal if known else None)
-    covariance = np.broadcast_to(NOISE**2 * np.eye(2), (len(table), 2, 2))
+        else:
+            false[row] = False
     network = Network(
-        tuple(f'{index}.png' for index in range(count)),
-        np.zeros(count, dtype=int),
-        (view,),
-        tuple(str(index) for index in range(number)),
-        Observations(photograph, ids, xy, covariance),
+        tuple(f'{index}.png' for index in range(len(rotations))),
+        np.asarray(camera_of),
+        cameras,
+        tuple(str(index) for index in range(len(points))),
+        Observations(
+            photograph, ids, xy, np.broadcast_to(NOISE**2 * np.eye(2), (len(table), 2, 2))
+        ),
     )
     return Rendered(network, points, false)
 

@@ -33,6 +33,8 @@ from ahf_ros.orientation.testing import CRITICAL, UnitWeight, unit_weight
 
 _AGREES = 5.0  # standard deviations, or robust ones, of an observation that agrees
 _ZOOMED = 0.01  # change of a photograph's focal length that is another zoom
+_SUSPECT = 0.8  # share of a photograph's observations that agree, below which its zoom is tested
+_LARGE_SPREAD = 3.0  # of residuals, in standard deviations, from which on all zooms are tested
 _CHECKED = 1e-6  # share of a variance that others must leave for a condition to be tested
 _NEEDED = (
     'no used observation has a pose and a point in front of it, expected photographs with three '
@@ -306,32 +308,44 @@ def doubtful(network: Network, result: Adjusted, datum: Datum, sigma0: float) ->
 def zoomed(network: Network, layout: Layout, state: Start) -> tuple[str, ...]:
     """Return warnings of photographs whose focal length is not that of their camera.
 
-    A change of the focal length of each photograph alone is estimated with its pose, all else
-    kept: the score test of one more parameter.
+    Photographs of which a fifth disagrees, or all where residuals are large throughout, get a focal
+    length of their own each.
     """
-    design = normals.linearise(replace(layout, free=np.ones_like(layout.free)), state)
-    spread = max(1.0, normals.robust_spread(normals.whitened_lengths(layout, state)))
-    images = normals.Groups.by(layout.photograph)
-    pose, focal = design.by_pose, design.by_calibration[:, :, :1]
-    right = design.misclosure[:, :, None]
-    mixed = images.sum(normals.products(pose, focal))
-    half = np.linalg.solve(images.sum(normals.products(pose, pose)), mixed)
-    transposed = half.transpose(0, 2, 1)
-    matrix = images.sum(normals.products(focal, focal)) - transposed @ mixed
-    change = images.sum(normals.products(focal, right))
-    change = (change - transposed @ images.sum(normals.products(pose, right))) / matrix
-    change, sigma = change[:, 0, 0], spread / np.sqrt(matrix[:, 0, 0])
-    cameras = network.camera_of[layout.photographs]
-    relative = change / state.calibrations[cameras, 0]
-    other = (np.abs(relative) > _ZOOMED) & (np.abs(change) > 2 * CRITICAL * sigma)
+    observations = network.observations
+    everything = np.bincount(observations.photograph, minlength=len(network.photographs))
+    agrees = np.bincount(observations.photograph[state.used], minlength=len(everything))
+    suspect = agrees < _SUSPECT * everything
+    if normals.robust_spread(normals.whitened_lengths(layout, state)) > _LARGE_SPREAD:
+        suspect[:] = True
+    own = np.intersect1d(np.flatnonzero(suspect), layout.photographs)
+    camera_of, usual = network.camera_of.copy(), network.camera_of[own]
+    camera_of[own] = len(network.cameras) + np.arange(len(own))
+    views = network.cameras + tuple(
+        replace(network.cameras[place], fixed=False) for place in usual
+    )
+    freed = refine(
+        replace(network, cameras=views, camera_of=camera_of),
+        replace(
+            state,
+            calibrations=np.concatenate([state.calibrations, state.calibrations[usual]]),
+            used=state.used | np.isin(observations.photograph, own),
+        ),
+        ('f',),
+    )
+    better = np.bincount(observations.photograph[freed.used], minlength=len(everything))[own]
+    focal = freed.calibrations[camera_of[layout.photographs], 0]
     warnings = []
-    for camera in np.unique(cameras[other]):
-        photographs = layout.photographs[other & (cameras == camera)]
-        warnings.append(
-            f'camera {network.cameras[camera].name}: {len(photographs)} photographs, such as '
-            f'{network.photographs[photographs[0]]}, have another focal length than the rest; '
-            'expected one zoom for a camera: give them a camera of their own'
-        )
+    for camera in np.unique(usual):
+        middle = np.median(focal[network.camera_of[layout.photographs] == camera])
+        relative = freed.calibrations[len(network.cameras) :, 0] / middle - 1
+        other = (usual == camera) & (np.abs(relative) > _ZOOMED)
+        other &= better >= _SUSPECT * everything[own]
+        if other.any():
+            warnings.append(
+                f'camera {network.cameras[camera].name}: {other.sum()} photographs, such as '
+                f'{network.photographs[own[other][0]]}, have another focal length than the rest; '
+                'expected one zoom for a camera: give them a camera of their own'
+            )
     return tuple(warnings)
 
 

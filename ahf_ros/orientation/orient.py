@@ -15,7 +15,7 @@ from ahf_ros.orientation.network import FloatArray, IntArray, Network, Rejection
 from ahf_ros.orientation.planar import principal_axes
 from ahf_ros.orientation.resection import FEWEST_POINTS, Resection, resections
 from ahf_ros.orientation.solution import Solution, Start
-from ahf_ros.orientation.start import WORST, oriented, reversal, starts
+from ahf_ros.orientation.start import oriented, reversal, starts
 from ahf_ros.orientation.triples import FEWEST_COMMON, STEPS, known_calibrations
 from ahf_ros.orientation.views import View, lengths_of, spread_of, views_of
 from ahf_ros.text import counted
@@ -28,6 +28,9 @@ CONTRADICTING = 0.6
 
 ZOOMED = 0.03
 """Relative difference of a photograph's focal length that is no error of its camera's."""
+
+FITS = 6.0
+"""Robust spread of a photograph, in those of the network, that another zoom must reach."""
 
 NAMED = 8
 """Photographs or targets that a message names."""
@@ -314,7 +317,7 @@ def _zoom(network: Network, view: View, start: Start) -> float | None:
         step = np.sqrt(step)
         best = min((best / step, best, best * step), key=lambda factor: fit(factor)[0])
     alone, own = fit(best)[0], fit(1.0)[0]
-    return best if abs(best - 1) > ZOOMED and alone < WORST and alone < own / 3 else None
+    return best if abs(best - 1) > ZOOMED and alone < FITS and alone < own / 3 else None
 
 
 def _zooms(solutions: Sequence[Solution]) -> tuple[str, ...]:

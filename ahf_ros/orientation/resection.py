@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -36,7 +36,10 @@ Pose = tuple[FloatArray, FloatArray]
 
 @dataclass(frozen=True)
 class Resection:
-    """A pose, the points that agree with it, its robust chi-square and its errors' scale."""
+    """A pose, the points that agree with it, its robust chi-square, and its errors' scale.
+
+    The scale is the robust standard deviation of the errors in units of the given ones.
+    """
 
     rotation: FloatArray
     position: FloatArray
@@ -69,7 +72,8 @@ def resections(points: FloatArray, xy: FloatArray, sigma: FloatArray) -> list[Re
     if not found:
         return []
     scale = max(min(one.scale for one in found), 1.0)
-    found = [_rated(one.rotation, one.position, points, xy, sigma * scale) for one in found]
+    rated = (_rated(one.rotation, one.position, points, xy, sigma * scale) for one in found)
+    found = [replace(one, scale=one.scale * scale) for one in rated]
     return sorted(found, key=lambda one: one.chi_square)
 
 

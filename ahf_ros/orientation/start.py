@@ -35,9 +35,6 @@ LARGEST_FOCAL_SIGMA = 0.03
 ONE_MINIMUM = np.radians(0.5)
 """Networks whose photographs are turned against each other by less are the same."""
 
-WORST = 6.0
-"""Robust spread of a photograph, in those of the network, up to which its pose is accepted."""
-
 LENS = (('k1', 4), ('k2', 8), ('cx', 10), ('cy', 10))
 """What is released of a lens while residuals exceed their standard deviations, and from how many
 photographs on."""
@@ -131,10 +128,24 @@ def _grown(
                 start = _with_pose(start, views[photograph], photograph, pose, calibration)
                 added += 1
             if added:
-                start = _adjusted(network, start)
-        return _intersected(network, views, _adjusted(network, start, rounds=30))
+                start = _pruned(views, _adjusted(network, start), postponed)
+        start = _pruned(views, _adjusted(network, start, rounds=30), postponed)
+        return _intersected(network, views, start)
     except (ValueError, np.linalg.LinAlgError):
         return None
+
+
+def _pruned(views: Sequence[View], start: Start, postponed: dict[int, int]) -> Start:
+    """Return the values without photographs most of whose points do not agree."""
+    rotations, positions, used = start.rotations.copy(), start.positions.copy(), start.used.copy()
+    for photograph in oriented(start):
+        view = views[photograph]
+        known = _known(view, start)
+        if start.used[view.rows].sum() < max(FEWEST_POINTS, known / 2):
+            rotations[photograph], positions[photograph] = np.nan, np.nan
+            used[view.rows] = False
+            postponed[photograph] = known
+    return replace(start, rotations=rotations, positions=positions, used=used)
 
 
 def _known(view: View, start: Start) -> int:
@@ -186,8 +197,7 @@ def _pose(
     if not poses or poses[0].agrees.sum() < max(FEWEST_POINTS, seen.sum() / 2):
         return None, calibration
     doubtful = len(poses) > 1 and poses[1].chi_square < poses[0].chi_square + ALIKE
-    bad = poses[0].scale > WORST and np.isfinite(start.calibrations[view.camera, 0])
-    return (None if doubtful or bad else poses[0]), calibration
+    return (None if doubtful else poses[0]), calibration
 
 
 def _poses(

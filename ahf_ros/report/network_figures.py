@@ -160,6 +160,7 @@ def _view(solution: Solution, axes: FloatArray, with_cameras: bool) -> tuple[str
         forward = solution.start.rotations[index][2] @ axes.T
         parts.append(_camera(place, forward, solution.network.photographs[index]))
     names = [solution.network.targets[index] for index in np.flatnonzero(known)]
+    parts += _knowledge(solution, dict(zip(names, placed(points), strict=True)))
     written: list[tuple[float, float]] = []
     for name, (x, y), ellipse in zip(names, placed(points), ellipses, strict=True):
         major, minor, angle = ellipse
@@ -174,6 +175,22 @@ def _view(solution: Solution, axes: FloatArray, with_cameras: bool) -> tuple[str
             parts.append(f'<text x="{x + 4:.1f}" y="{y - 4:.1f}">{escape(name)}</text>')
         parts.append('</g>')
     return _svg(*VIEW, parts, 'view'), step, enlarged
+
+
+def _knowledge(solution: Solution, places: dict[str, FloatArray]) -> Iterator[str]:
+    """Return scale bars as lines and control points as squares; those of checks are dashed."""
+    for bar in solution.network.bars:
+        if all(end in places for end in bar.ends):
+            (x, y), (u, v) = (places[end] for end in bar.ends)
+            yield _known(f'M{x:.1f} {y:.1f}L{u:.1f} {v:.1f}', bar.check)
+    for point in solution.network.control:
+        if point.name in places:
+            x, y = places[point.name]
+            yield _known(f'M{x - 6:.1f} {y - 6:.1f}h12v12h-12Z', point.check)
+
+
+def _known(path: str, check: bool) -> str:
+    return f'<path class="known{" check" * check}" d="{path}"/>'
 
 
 def _apart(across: float, down: float) -> bool:

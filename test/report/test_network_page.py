@@ -92,6 +92,15 @@ def test_a_view_shows_places_in_proportion() -> None:
     assert len(figure.findall("path[@class='camera']")) == 6
 
 
+def test_a_view_shows_bars_and_control_points() -> None:
+    """Along the axes of the coordinates, where control points give these a meaning."""
+    caption, text = views(network())[1]
+    assert 'x to the right, z up' in caption
+    (figure,) = figures(text)
+    kinds = [it.attrib['class'] for it in figure.findall('path') if 'known' in it.attrib['class']]
+    assert kinds == ['known', 'known check'] * 2
+
+
 def test_residuals_are_drawn_where_they_are() -> None:
     whole = network()
     (figure,) = figures(image_figure(whole, 1, 1000.0))

@@ -1,0 +1,195 @@
+"""Networks that nobody gave approximate values for: exact projections with noise, and refusals."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ahf_ros.orientation.camera import pinhole
+from ahf_ros.orientation.network import CameraView, Network, Observations
+from ahf_ros.orientation.orient import once_a_photograph, orient
+from benchmarks.network_starts import Rendered, deviations, looking, photographed
+
+pytest.importorskip('scipy', reason='the adjustment needs scipy')
+
+FOCAL = 2600.0
+
+
+def ring(count: int, tilt: float, rolled: bool = True) -> tuple[list, list]:
+    """Return poses that look at the origin from a circle of directions, at a distance of 3."""
+    rotations, positions = [], []
+    for index in range(count):
+        around, lean = 2.4 * index, np.radians(tilt)
+        away = np.array(
+            [np.sin(lean) * np.cos(around), np.sin(lean) * np.sin(around), np.cos(lean)]
+        )
+        rotations.append(looking(-away, np.pi / 2 * (index % 4) * rolled))
+        positions.append((2.5 + 0.3 * (index % 3)) * away)
+    return rotations, positions
+
+
+def field(number: int, depth: float) -> np.ndarray:
+    random = np.random.default_rng(5)
+    return random.uniform(-1, 1, (number, 3)) * [1, 0.7, depth]
+
+
+def taken(
+    count: int = 6,
+    tilt: float = 35,
+    focal: float | None = None,
+    depth: float = 0.3,
+    number: int = 30,
+    wrong: float = 0,
+) -> Rendered:
+    rotations, positions = ring(count, tilt)
+    camera = CameraView('camera', 3000, 2000, focal)
+    calibration = pinhole(FOCAL, 3000, 2000)[None]
+    random = np.random.default_rng(7)
+    of = np.zeros(count, dtype=int)
+    points = field(number, depth)
+    return photographed(points, rotations, positions, (camera,), of, calibration, random, wrong)
+
+
+def error(solution, truth: np.ndarray) -> float:
+    known = np.isfinite(solution.start.points[:, 0])
+    assert known.mean() > 0.95
+    return float(np.abs(deviations(solution.start.points[known], truth[known])).max())
+
+
+@pytest.mark.parametrize('depth', [0.0, 0.3])
+@pytest.mark.parametrize('focal', [None, FOCAL])
+def test_nothing_but_ids_orients_a_network(depth: float, focal: float | None):
+    seen = taken(depth=depth, focal=focal)
+    (solution,) = orient(seen.network)
+    assert error(solution, seen.points) < 1e-3
+    assert np.isfinite(solution.start.positions).all()
+    assert solution.start.calibrations[0, 0] == pytest.approx(FOCAL, rel=5e-3)
+    assert 0.8 < solution.sigma0 < 1.2
+
+
+def test_wrong_ids_are_named():
+    seen = taken(focal=FOCAL, wrong=0.05)
+    (solution,) = orient(seen.network)
+    assert error(solution, seen.points) < 1e-3
+    rejected = {(one.photograph, one.target) for one in solution.rejected}
+    observed = seen.network.observations
+    wrong = {
+        (seen.network.photographs[observed.photograph[row]], str(observed.point[row]))
+        for row in np.flatnonzero(seen.wrong)
+    }
+    assert wrong and wrong <= rejected
+
+
+def test_the_same_network_gives_the_same_bits():
+    network = taken(count=4, focal=FOCAL).network
+    first, second = orient(network), orient(network)
+    assert np.array_equal(first[0].start.points, second[0].start.points, equal_nan=True)
+
+
+def test_a_target_twice_in_a_photograph_is_set_aside():
+    seen = taken(focal=FOCAL)
+    observed = seen.network.observations
+    rows = np.append(np.arange(len(observed.xy)), 3)
+    double = Observations(
+        observed.photograph[rows],
+        observed.point[rows],
+        observed.xy[rows],
+        observed.covariance[rows],
+    )
+    double.xy[-1] += 100
+    once = once_a_photograph(replace(seen.network, observations=double))
+    assert len(once.observations.xy) == len(observed.xy) - 1
+    assert {one.target for one in once.set_aside} == {str(observed.point[3])}
+    (solution,) = orient(replace(seen.network, observations=double))
+    assert [one.reason for one in solution.rejected].count(
+        'its ID is more than once in the photograph'
+    ) == 2
+
+
+def test_groups_that_do_not_hang_together_are_oriented_each_by_itself():
+    seen = taken(count=8, focal=FOCAL)
+    observed = seen.network.observations
+    names = tuple(str(index) for index in range(60))
+    point = observed.point + 30 * (observed.photograph % 2)
+    network = replace(seen.network, targets=names, observations=replace(observed, point=point))
+    solutions = orient(network)
+    posed = [np.isfinite(one.start.positions[:, 0]) for one in solutions]
+    assert len(solutions) == 2
+    assert np.array_equal(posed[0], ~posed[1])
+
+
+def test_portrait_and_landscape_are_two_cameras():
+    rotations, positions = ring(8, 35)
+    cameras = CameraView('landscape', 3000, 2000), CameraView('portrait', 2000, 3000)
+    calibrations = np.stack([pinhole(FOCAL, 3000, 2000), pinhole(FOCAL, 2000, 3000)])
+    of = np.arange(8) // 4
+    points = field(30, 0.3)
+    random = np.random.default_rng(1)
+    seen = photographed(points, rotations, positions, cameras, of, calibrations, random)
+    (solution,) = orient(seen.network)
+    assert error(solution, points) < 1e-3
+    assert solution.start.calibrations[:, 0] == pytest.approx(FOCAL, rel=5e-3)
+
+
+def test_another_zoom_in_one_camera_is_said():
+    rotations, positions = ring(8, 35)
+    calibrations = np.stack(
+        [pinhole(FOCAL * (1.2 if index == 7 else 1), 3000, 2000) for index in range(8)]
+    )
+    camera, of = CameraView('camera', 3000, 2000), np.zeros(8, dtype=int)
+    points, random = field(30, 0.3), np.random.default_rng(1)
+    seen = photographed(points, rotations, positions, (camera,), of, calibrations, random)
+    (solution,) = orient(seen.network)
+    assert any('7.png' in it and 'camera of their own' in it for it in solution.warnings)
+    assert error(solution, points) < 1e-3
+
+
+@pytest.mark.parametrize('depth', [0.0, 0.3])
+def test_parallel_photographs_do_not_tell_the_focal_length(depth: float):
+    rotations = [looking(np.array([0, 0, -1.0]), 0)] * 6
+    positions = [np.array([x, y, 2.5]) for x in (-0.4, 0, 0.4) for y in (-0.3, 0.3)]
+    camera, of = CameraView('camera', 3000, 2000), np.zeros(6, dtype=int)
+    calibration = pinhole(FOCAL, 3000, 2000)[None]
+    points, random = field(30, depth), np.random.default_rng(1)
+    seen = photographed(points, rotations, positions, (camera,), of, calibration, random)
+    with pytest.raises(ValueError, match=r'focal length.*tilted'):
+        orient(seen.network)
+
+
+def without(network: Network, keep: np.ndarray) -> Network:
+    observed = network.observations
+    return replace(
+        network,
+        observations=Observations(
+            observed.photograph[keep],
+            observed.point[keep],
+            observed.xy[keep],
+            observed.covariance[keep],
+        ),
+    )
+
+
+def test_too_little_is_refused_in_words():
+    network = taken(focal=FOCAL).network
+    observed = network.observations
+    with pytest.raises(ValueError, match='photographs: 2 with targets, expected three'):
+        orient(without(network, observed.photograph < 2))
+    with pytest.raises(ValueError, match='targets: 3 in two or more photographs, expected 6'):
+        orient(without(network, observed.point < 3))
+    with pytest.raises(ValueError, match='no ID is seen in two photographs'):
+        orient(without(network, observed.point // 5 == observed.photograph))
+    few = (observed.point - 3 * observed.photograph) % 30 < 6
+    with pytest.raises(ValueError, match=r'no two have more than 3 targets in common'):
+        orient(without(network, few))
+
+
+def test_targets_on_a_line_are_refused():
+    rotations, positions = ring(6, 35)
+    camera, of = CameraView('camera', 3000, 2000, FOCAL), np.zeros(6, dtype=int)
+    calibration = pinhole(FOCAL, 3000, 2000)[None]
+    points, random = field(30, 0) * [1, 0, 0], np.random.default_rng(1)
+    seen = photographed(points, rotations, positions, (camera,), of, calibration, random)
+    with pytest.raises(ValueError, match='lie on a line'):
+        orient(seen.network)
