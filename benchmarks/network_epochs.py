@@ -137,7 +137,7 @@ class Adjusted:
         noise = np.sqrt(seen.covariance[:, :1, 0]) * rng.standard_normal(exact.shape)
         network = replace(self.network, observations=replace(seen, xy=exact + noise))
         if self.bar:
-            length = float(np.linalg.norm(self.xyz[1] - self.xyz[0]))
+            length = float(np.linalg.norm(start.points[1] - start.points[0]))  # at its epoch
             given = length * (1 + BAR_SIGMA * rng.standard_normal())
             bar = ScaleBar(self.network.targets[:2], given, BAR_SIGMA * length)
             network = replace(network, bars=(bar,), unit='m')
