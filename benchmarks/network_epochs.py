@@ -5,7 +5,8 @@
 Each epoch is a bundle of its own photographs: image points with normal errors, poses, focal length
 and radial distortion unknown, inner constraints, and a scale bar where the scale is fixed. Its
 coordinates are those of the linearised adjustment, with all correlations and with the variance of
-unit weight of its own residuals, in a frame of its own.
+unit weight of its own residuals, in a frame of its own. In the field *adjusted* all of them are
+adjusted by `adjust`, with Brown's distortion.
 
 A movement of 5 sigma is that of one target, any, in any direction e, by 5 sqrt(e' C e). C is the
 covariance of its difference x2 - x1 in the datum of all others, or, *conditional*, of the best
@@ -20,16 +21,28 @@ sigmas, and counts where these and no others are named.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from ahf_ros.orientation.camera import PARAMETERS, linearise, pinhole, rotation_matrices
+from ahf_ros.interchange.network_results import measured_points
+from ahf_ros.orientation.adjustment import adjust
+from ahf_ros.orientation.alignment import Similarity
+from ahf_ros.orientation.camera import (
+    PARAMETERS,
+    linearise,
+    pinhole,
+    project,
+    rotation_matrices,
+)
 from ahf_ros.orientation.congruence import LEVEL, compare
 from ahf_ros.orientation.datum import movements, s_transform
-from ahf_ros.orientation.network import FloatArray
+from ahf_ros.orientation.network import FloatArray, ScaleBar
 from ahf_ros.orientation.points import MeasuredPoints
+from ahf_ros.orientation.solution import Solution
+from benchmarks.network_scenes import Field as Scene
+from benchmarks.network_scenes import simulate
 from benchmarks.report import progress
 from benchmarks.report import table as markdown
 
@@ -41,6 +54,7 @@ NOISE = 0.05
 BAR_SIGMA = 2e-5
 """Standard deviation of a scale bar, as a share of its length."""
 _OUTCOMES = 'found', 'located', 'alone', 'bound'
+_RELEASED = 'f', 'cx', 'cy', 'k1', 'k2', 'p1', 'p2'
 _FREE = [PARAMETERS.index(name) for name in ('f', 'k1')]
 
 
@@ -52,6 +66,8 @@ class Field:
     extent: tuple[float, float, float]
     targets: int
     photographs: int
+    adjusted: bool = False
+    """Whether every epoch is adjusted, by `adjust`, from image points with errors."""
 
 
 FIELDS = (
@@ -60,6 +76,7 @@ FIELDS = (
     Field('machine', (1.0, 0.8, 0.6), 24, 16),
     Field('beam', (3.0, 0.2, 0.1), 14, 12),
     Field('hall', (1.0, 1.0, 0.4), 60, 40),
+    Field('adjusted', (2.0, 2.0, 1.0), 16, 10, adjusted=True),
 )
 
 
@@ -95,17 +112,53 @@ class Epoch:
         change = self.gain @ errors
         variance = errors @ (errors - self.design @ change) / self.redundancy
         xyz = self.xyz + moved + change[: self.xyz.size].reshape(-1, 3)
-        turn = rotation_matrices(rng.normal(0, 1, (1, 3)))[0]
-        scale = 1.0 if self.bar else float(rng.uniform(0.5, 2))
-        blocks = np.kron(np.eye(len(xyz)), scale * turn)
-        return MeasuredPoints(
-            tuple(f'{index}' for index in range(len(xyz))),
-            scale * xyz @ turn.T + rng.normal(0, 1, 3),
-            blocks @ self.covariance @ blocks.T,
-            float(np.sqrt(variance)),
-            self.redundancy,
-            'm' if self.bar else '',
-        )
+        points = _points(self.xyz, self.covariance, self.redundancy, self.bar, variance)
+        return _turned(replace(points, xyz=xyz), rng)
+
+
+class Adjusted:
+    """The same by `adjust`: errors of image points in, coordinates out."""
+
+    def __init__(self, xyz: FloatArray, photographs: int, bar: bool, rng: np.random.Generator):
+        network, start = simulate(Scene(photographs, len(xyz)), rng)
+        self.xyz, self.bar, self.network = xyz, bar, network
+        self.start = replace(start, points=xyz)
+        exact = measured_points(self._adjusted(np.zeros_like(xyz), rng))
+        self.covariance, self.redundancy = exact.cofactors, exact.redundancy
+
+    def measured(self, moved: FloatArray, rng: np.random.Generator) -> MeasuredPoints:
+        """Return coordinates of targets that have moved by (n, 3), in a frame of the epoch."""
+        return _turned(measured_points(self._adjusted(moved, rng)), rng)
+
+    def _adjusted(self, moved: FloatArray, rng: np.random.Generator) -> Solution:
+        seen, start = self.network.observations, replace(self.start, points=self.xyz + moved)
+        poses = start.rotations[seen.photograph], start.positions[seen.photograph]
+        exact = project(start.calibrations[0], *poses, start.points[seen.point])
+        noise = np.sqrt(seen.covariance[:, :1, 0]) * rng.standard_normal(exact.shape)
+        network = replace(self.network, observations=replace(seen, xy=exact + noise))
+        if self.bar:
+            length = float(np.linalg.norm(start.points[1] - start.points[0]))  # at its epoch
+            given = length * (1 + BAR_SIGMA * rng.standard_normal())
+            bar = ScaleBar(self.network.targets[:2], given, BAR_SIGMA * length)
+            network = replace(network, bars=(bar,), unit='m')
+        return adjust(network, start, release=_RELEASED, test=False)
+
+
+def _points(
+    xyz: FloatArray, covariance: FloatArray, redundancy: int, bar: bool, variance: float = 1.0
+) -> MeasuredPoints:
+    names = tuple(f'{index}' for index in range(len(xyz)))
+    unit = 'm' if bar else ''
+    return MeasuredPoints(names, xyz, covariance, float(np.sqrt(variance)), redundancy, unit)
+
+
+def _turned(points: MeasuredPoints, rng: np.random.Generator) -> MeasuredPoints:
+    """Return points in another frame, and in another scale where they have none."""
+    turn = rotation_matrices(rng.normal(0, 1, (1, 3)))[0]
+    scale = 1.0 if points.unit else float(rng.uniform(0.5, 2))
+    movement = Similarity(turn, rng.normal(0, 1, 3), scale)
+    moved, covariance = movement.moved(points.xyz), movement.turned(points.covariance)
+    return replace(points, xyz=moved, covariance=covariance)
 
 
 def _design(xyz: FloatArray, photographs: int, rng: np.random.Generator) -> FloatArray:
@@ -153,7 +206,8 @@ def figures(field: Field, bar: bool, runs: int, rng: np.random.Generator) -> dic
     from scipy.stats import f, ncf
 
     xyz = rng.uniform(-0.5, 0.5, (field.targets, 3)) * field.extent
-    epochs = [Epoch(xyz, field.photographs, bar, rng) for _ in range(2)]
+    make = Adjusted if field.adjusted else Epoch
+    epochs = [make(xyz, field.photographs, bar, rng) for _ in range(2)]
     still = np.zeros_like(xyz)
     alarms, by_sum = [], []
     for _ in range(runs):
@@ -161,10 +215,7 @@ def figures(field: Field, bar: bool, runs: int, rng: np.random.Generator) -> dic
         alarms.append(not found.congruent)
         by_sum.append(found.tests[0].probability < LEVEL)
 
-    exact = [
-        MeasuredPoints(names(field), xyz, it.covariance, 1.0, it.redundancy, 'm' if bar else '')
-        for it in epochs
-    ]
+    exact = [_points(xyz, it.covariance, it.redundancy, bar) for it in epochs]
     covariances = np.array([it.covariance for it in compare(*exact).movements])
     differences = _differences(xyz, epochs[0].covariance + epochs[1].covariance, bar)
     degrees = sum(it.redundancy for it in epochs)
@@ -213,11 +264,6 @@ def _differences(xyz: FloatArray, covariance: FloatArray, bar: bool) -> FloatArr
         moved = s_transform(xyz, covariance, others.astype(float), scale=not bar)[1]
         differences.append(moved[3 * index : 3 * index + 3, 3 * index : 3 * index + 3])
     return np.array(differences)
-
-
-def names(field: Field) -> tuple[str, ...]:
-    """Return the names of the targets of a field."""
-    return tuple(f'{index}' for index in range(field.targets))
 
 
 def _movement(covariance: FloatArray, sigmas: float, rng: np.random.Generator) -> FloatArray:

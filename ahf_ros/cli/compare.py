@@ -97,7 +97,7 @@ def _output(text: str) -> Path:
 
 
 def _show(found: Comparison) -> None:
-    """Print tests and movements for people, those that moved first."""
+    """Print the first and the last test, and movements, those that are named first."""
     unit = found.unit or 'units of the first epoch'
     tests = [
         (
@@ -108,7 +108,7 @@ def _show(found: Comparison) -> None:
             f'{it.probability:.2g}',
             f'{it.level:.3g}',
         )
-        for it in found.tests
+        for it in (found.tests if len(found.tests) < 2 else (found.tests[0], found.tests[-1]))
     ]
     print_table(
         'Congruence test, ' + ('shape only' if found.free_scale else 'with scale'),

@@ -21,7 +21,7 @@ against the datum that remains comes back.
 References
 ----------
 .. [1] Pelzer, Zur Analyse geodätischer Deformationsmessungen, DGK C 164, 1971.
-.. [2] Niemeier, Ausgleichungsrechnung, 2nd ed., De Gruyter 2008, chapter 15.
+.. [2] Niemeier, Ausgleichungsrechnung, 2nd ed., De Gruyter 2008.
 """
 
 from __future__ import annotations
@@ -212,8 +212,9 @@ def compare(
     candidates = np.array([not stable or name in stable for name in names])
     states = _localised(epochs, candidates)
     last = states[-1]
-    moved = last.probabilities < level
-    warnings = _warnings(variances, states, names, moved, level)
+    found = _passes(last, last.datum, level)
+    moved = (last.probabilities < level) & found  # without a datum, nothing can be named
+    warnings = _warnings(variances, states, names, moved, found)
     return Comparison(
         movements=tuple(
             Movement(
@@ -482,7 +483,7 @@ def _warnings(
     states: Sequence[_State],
     names: Sequence[str],
     moved: NDArray[np.bool_],
-    level: float,
+    found: bool,
 ) -> list[str]:
     """Return what whoever reads the results must know, as sentences."""
     warnings = []
@@ -492,11 +493,12 @@ def _warnings(
             f'The variances of unit weight differ by a factor of {variances.ratio:.2f}: one epoch '
             'is better or worse than its covariances say. Each is weighted by its own variance.'
         )
-    if not _passes(last, last.datum, level):
+    if not found:
         warnings.append(
             'No datum is left that stood still: more than half of its targets moved, or there are '
-            'too few to tell which.'
+            'too few to tell which. No target is named.'
         )
+        return warnings
     left = states[0].datum & ~last.datum & ~moved
     if left.any():
         listed = ', '.join(name for name, out in zip(names, left, strict=True) if out)
