@@ -65,6 +65,13 @@ class Family(CyclicFamily):
         """Radius of the circle that holds all ink."""
         return max(self.band_outer, *(outer for _, outer in self.circles), 0.0)
 
+    @property
+    def has_all_words(self) -> bool:
+        """Whether the family has all words of its bits, but that of none and that of all marks."""
+        # Burnside's lemma: as many as the mean number of words that a turn leaves as they are.
+        every = sum(2 ** gcd(turn, self.bits) for turn in range(self.bits)) // self.bits
+        return len(self.words) >= every - 2
+
 
 @cache
 def family(name: str) -> Family:

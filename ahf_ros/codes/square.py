@@ -23,14 +23,23 @@ def dictionary(name: str) -> Any:
             f'family is {name!r}, accepted with opencv-python-headless of at least 4.7, which has '
             f'square markers; this is OpenCV {cv2.__version__}'
         )
-    known = {member.lower(): member for member in dir(cv2.aruco)}
-    members = (f'dict_{name}', f'dict_{name.removeprefix("aruco_")}')
-    found = next((known[member] for member in members if member in known), None)
-    if found is None:
+    if not has_dictionary(name):
         raise ValueError(
             f'family is {name!r}, accepted with a newer OpenCV; this is {cv2.__version__}'
         )
-    return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, found))
+    return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, _member(name)))
+
+
+def has_dictionary(name: str) -> bool:
+    """Return whether this OpenCV has the dictionary of a family, one of `SQUARE_NAMES`."""
+    return hasattr(cv2, 'aruco') and hasattr(cv2.aruco, 'ArucoDetector') and bool(_member(name))
+
+
+def _member(name: str) -> str:
+    """Return what cv2.aruco calls a dictionary, '' if it has none."""
+    known = {member.lower(): member for member in dir(cv2.aruco)}
+    members = (f'dict_{name}', f'dict_{name.removeprefix("aruco_")}')
+    return next((known[member] for member in members if member in known), '')
 
 
 def marker(name: str, number: int, cell: int) -> Any:

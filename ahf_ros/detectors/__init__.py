@@ -13,6 +13,7 @@ from importlib.metadata import EntryPoint, entry_points
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, NamedTuple
 
+from ahf_ros.codes import SQUARE_NAMES
 from ahf_ros.codes.families import (
     AUTO,
     FAMILY_NAMES,
@@ -192,17 +193,17 @@ def _families(name: str, family: str, files: str) -> tuple[str, ...]:
 
 
 def _several(settings: DetectorSettings) -> Detector:
-    """Return a detector for each family, or for all that one reads at once, as one detector."""
+    """Return a detector for each family, or for all that one reads at once, as one detector.
+
+    Of all families, those of square markers are left out that an old OpenCV does not have.
+    """
+    from ahf_ros.codes.square import has_dictionary
     from ahf_ros.detectors.several import SeveralDetector
 
     groups: dict[str, list[str]] = {}
     for family in settings.families:
-        try:
-            create_detector(settings=settings.narrowed([family]))
-        except ValueError:
-            if settings.family != AUTO:
-                raise
-            continue  # square markers, which an old OpenCV does not have
+        if settings.family == AUTO and family in SQUARE_NAMES and not has_dictionary(family):
+            continue
         entry = _ENTRIES[detector_name(_AUTO, family, settings.family_file)]
         groups.setdefault(entry.detector if entry.several else family, []).append(family)
     parts = tuple(create_detector(settings=settings.narrowed(of)) for of in groups.values())

@@ -178,6 +178,27 @@ def test_targets_of_a_small_family_are_not_those_of_a_larger_one_with_the_same_p
     assert matches(identified(shown.image, family='cct12,aicon12'), truth)
 
 
+@pytest.mark.parametrize(('rule', 'free'), [('aicon12', 'cct12'), ('aicon14', 'cct14')])
+def test_three_words_that_obey_a_rule_are_of_its_family_unless_another_one_breaks_it(rule, free):
+    obeying = [int(word) for word in family(rule).words[[20, 50, 80]]]
+    breaking = [int(word) for word in family(free).words if word not in family(rule).words][40:42]
+    every = ','.join(RING_NAMES)
+    for words, of in ((obeying, rule), ([*obeying[:2], *breaking], free)):
+        targets = identified(sheet(*((free, word) for word in words)), family=every)
+        assert sorted((it.family, it.code) for it in targets) == sorted((of, it) for it in words)
+    assert identified(sheet((free, obeying[0])), family=every) == []
+
+
+@pytest.mark.parametrize(('name', 'radius', 'seed'), [('cct11', 7, 18), ('cct16', 16, 11)])
+def test_no_word_stands_that_a_family_found_later_explains_better(name, radius, seed):
+    """In the one, cct13 has words of the clearest bands, and in the other cct8."""
+    wide = {'width': 1000 + 40 * radius, 'height': 700 + 30 * radius, 'targets': 12}
+    light = {'light': 'stripe', 'ambient': 0.3} if name == 'cct11' else {}
+    shown = rendered(SceneSettings(family=name, dot_radius=radius, seed=seed, **wide, **light))
+    truth = [(it.family, it.id, it.x, it.y) for it in shown.targets]
+    assert matches(identified(shown.image, family=','.join(RING_NAMES)), truth)
+
+
 def test_rings_of_a_data_file_are_rendered_and_identified(tmp_path):
     file = tmp_path / 'mine.yaml'
     file.write_text('family: mine\nbits: 10\nband: [1.42, 1.87]\nwords: {changes: 6}\n')

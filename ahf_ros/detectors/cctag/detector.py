@@ -23,7 +23,7 @@ from ahf_ros.detectors.contract import FamilyDetector, moved_targets
 from ahf_ros.features import frame
 from ahf_ros.features.candidates import find_peaks
 from ahf_ros.features.dot_search import voted_dots, whole_dots
-from ahf_ros.features.dots import Dots
+from ahf_ros.features.dots import NO_DOTS, Dots
 from ahf_ros.features.ellipse_targets import ellipse_fields, targets_from_frames
 from ahf_ros.features.large_targets import targets_of_octaves
 from ahf_ros.features.log_edges import find_edges
@@ -59,7 +59,7 @@ class CctagDetector(FamilyDetector):
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image; see `Detector`."""
         check_image(image)
-        pyramid = image_pyramid(as_gray(image), self.settings.max_radius)
+        pyramid = _doubled(image_pyramid(as_gray(image), self.settings.max_radius))
         found = targets_of_octaves(pyramid, self.settings.radii, self._identify, self.refine)
         return sorted_targets(best_targets(found, 1.0))
 
@@ -92,8 +92,9 @@ class CctagDetector(FamilyDetector):
         """Return the targets of an octave, in its pixels."""
         gray = octave.pyramid.gray
         found = []
+        every, centres = _circles(octave), _common_centres(octave)
         for polarity in self.settings.polarities:
-            circles = _circles(octave, polarity)
+            circles = Dots.joined([every, replace(centres, polarity=centres.polarity + polarity)])
             for family in self.design:
                 frames = likely_rings(gray, circles, octave.radii, polarity, family)
                 rings = _identified(gray, frames, polarity, family)
@@ -139,31 +140,30 @@ def _owning(gray: np.ndarray, rings: Aligned, polarity: int, family: CircleFamil
     return rings.select(~beaten)
 
 
-def _circles(octave: Octave, polarity: int) -> Dots:
-    """Return dots that may be circles of targets of one colour, in px of an octave."""
+def _circles(octave: Octave) -> Dots:
+    """Return dots that may be circles of targets of any colour, in px of an octave."""
     low, high = octave.radii
-    pyramid = _doubled(octave.pyramid)
-    found = [
-        search(pyramid, max(low * least, 2.0), high, (sign,))
-        for sign, least in ((polarity, 1.0), (-polarity, _INNERMOST))
-        for search in (whole_dots, voted_dots)
-    ]
+    pyramid, colours = octave.pyramid, (1, -1)
+    least = max(low * _INNERMOST, 2.0)
+    found = [search(pyramid, least, high, colours) for search in (whole_dots, voted_dots)]
     if len(pyramid.halves) > 1:
         gray, *halves = pyramid.halves
         half = ImagePyramid(gray, tuple(halves), pyramid.logs[1:], pyramid.edges[1:])
-        dots = voted_dots(half, max(low / 2, 2.0), high / 2, (polarity,))
+        dots = voted_dots(half, max(low / 2, 2.0), high / 2, colours)
         found.append(replace(dots, frames=frame.enlarged(dots.frames, 1)))
-    if low < _COMMON_CENTRE[1] and octave.level == 0:
-        found.append(_common_centres(pyramid.logs[0], max(low, _COMMON_CENTRE[0]), polarity))
     return Dots.joined(found)
 
 
-def _common_centres(log: np.ndarray, low: float, polarity: int) -> Dots:
+def _common_centres(octave: Octave) -> Dots:
     """Return circles of several radii, about the points that the edges of many circles face.
 
     Narrow rings are too close for a dot to be told from the next. What they share is the centre.
+    The colour is unknown.
     """
-    high = _COMMON_CENTRE[1]
+    low, high = max(octave.radii[0], _COMMON_CENTRE[0]), _COMMON_CENTRE[1]
+    if octave.level or low >= high:
+        return NO_DOTS
+    log = octave.pyramid.logs[0]
     edges = find_edges(log).curved(2 * high)
     steps = np.arange(_COMMON_CENTRE_STEP, high, _COMMON_CENTRE_STEP, dtype=np.float32)
     steps = np.concatenate([-steps, steps])[:, None]
@@ -177,7 +177,7 @@ def _common_centres(log: np.ndarray, low: float, polarity: int) -> Dots:
     x, y = (np.repeat(of - margin, len(radii)) for of in (peaks.x, peaks.y))
     size = np.tile(radii, len(peaks.x))
     frames = frame.affine_frames(x, y, size, size, np.zeros(len(x)))
-    return Dots(frames, np.full(len(x), polarity), np.ones(len(x)))
+    return Dots(frames, np.zeros(len(x), int), np.ones(len(x)))
 
 
 def _doubled(pyramid: ImagePyramid) -> ImagePyramid:

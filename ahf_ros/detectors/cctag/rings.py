@@ -33,6 +33,7 @@ _SHIFTS, _BLURS = (-0.6, -0.3, 0.0, 0.3, 0.6), (0.6, 0.9, 1.4)  # of edges, that
 _GROWN = (0.85, 0.9, 0.95, 1.0, 1.05)  # radii of the outermost circle, where that was found
 _NARROWEST = 0.7  # ring that is read, px; blur hides others
 _PROMISING = 0.6  # share of a profile that rings explain, from which they are looked at
+_LOOKED_AT = 4  # frames for an ID, at the most
 _APART = 0.5  # distance of the centres of different targets, radii
 _PART = 2048, 48  # hypotheses and targets at a time, which bounds the memory
 _ENOUGH = 4  # certain targets, that tell of the edges of an image
@@ -54,7 +55,7 @@ _CLEAREST = 0.2  # share of rays
 _AGREEING = 0.5  # share of what a ray shows, that the rings explain
 _OF_TARGET = np.array([-15.5, -4.0, 1.2])  # of one, `clear`, `plain`
 _PLAIN = -5.0, 3.0  # beyond which it says no more
-_HOPELESS = -2.0  # plain, from which on other IDs are not tried
+_HOPELESS = 5e-4  # probability of a target, up to which other IDs are not tried
 _OF_ID = np.array([-0.9, 2.2])  # of one, margin
 
 
@@ -133,6 +134,7 @@ def likely_rings(
     """Return the frames of outermost circles whose mean profile looks like rings, (k, 3, 3).
 
     Any circle of a target may be among the circles. The bounds are those of the semi-major axis.
+    An ID is there once, so that some times as many frames are enough, those most like rings.
     """
     table = family.radii(family.numbers)
     outer = circles.frames[circles.polarity == polarity]
@@ -153,7 +155,7 @@ def likely_rings(
     size, centres = frame.mean_radii(frames), frames[:, :2, 2]
     kept: list[int] = []
     for index in np.argsort(-share, kind='stable').tolist():
-        if share[index] < _PROMISING:
+        if share[index] < _PROMISING or len(kept) == _LOOKED_AT * len(table):
             break
         away = np.hypot(*(centres[kept] - centres[index]).T)
         if not (away < _APART * np.maximum(size[kept], size[index])).any():
@@ -251,7 +253,7 @@ def identify(
     starts, ids, shift = _likely_ids(gray, frames, polarity, family)
     # The likeliest ID often brings the frame to its place even if it is the wrong one.
     first = align(gray, starts[:, 0], ids[:, 0], shift[:, 0], family, prior)
-    likely = first.plain > _HOPELESS
+    likely = first.of_target > _HOPELESS
     if not likely.any():
         return NOTHING
     again = _likely_ids(gray, first.frames[likely], polarity, family)

@@ -13,7 +13,8 @@ import numpy as np
 
 from ahf_ros.codes.ring import Family, words_of_print
 from ahf_ros.detectors.ring.decoding import DOUBT
-from ahf_ros.detectors.ring.families import decoded, present_families
+from ahf_ros.detectors.ring.families import contested, decoded, present_families
+from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.proposals import HOPEFUL, bounds, measure_likely
 from ahf_ros.detectors.ring.reading import read_bands
 from ahf_ros.features.circle_fit import ENOUGH, Fit
@@ -72,7 +73,6 @@ def _words_shown(
         band, bits = prints[best]
         # Whatever has a number of sectors has its multiples as well.
         same = [code for code in families if code.band == band and bits % code.bits == 0]
-        same.sort(key=lambda code: len(code.words))
         words: list[tuple[Family, int]] = []
         for some in _growing(np.flatnonzero(likely[best]), _SAMPLE):
             words += _read(gray, dots.select(some), same)
@@ -82,14 +82,8 @@ def _words_shown(
 
 
 def _read(gray: np.ndarray, dots: Fit, families: Sequence[Family]) -> list[tuple[Family, int]]:
-    """Return the words of dots, by the first of some families that explains their bands."""
-    words: list[tuple[Family, int]] = []
+    """Return the words of dots, by those of some families that explain their bands best."""
     dots, _ = measure_likely(gray, dots, None)
-    for code in families:
-        if not len(dots.frames):
-            break
-        read = read_bands(gray, dots, code)
-        shown = read.certain & (read.coded > -DOUBT)
-        words += [(code, word) for word in decoded(read)[1][shown].tolist()]
-        dots = dots.select(~shown)
-    return words
+    read = contested(Hypotheses.joined([read_bands(gray, dots, code) for code in families]))
+    read = read.select(read.certain & (read.coded > -DOUBT))
+    return list(zip(read.families.tolist(), decoded(read)[1].tolist(), strict=True))

@@ -16,7 +16,12 @@ from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes.ring import Family
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.ring.choice import choose_families, further_families
-from ahf_ros.detectors.ring.families import decoded, read_families, settle_same_prints
+from ahf_ros.detectors.ring.families import (
+    contested,
+    decoded,
+    read_families,
+    settle_same_prints,
+)
 from ahf_ros.detectors.ring.full_size import at_full_size
 from ahf_ros.detectors.ring.hypotheses import Hypotheses, among_others, resolve
 from ahf_ros.detectors.ring.known import WHOLE, Explained, Prior
@@ -156,14 +161,19 @@ def read_image(
     for octave, dots in measured:
         part = octave.pyramid.gray
         while shown:
-            dots = dots.select(~explained.on_targets(dots.frames, octave.level))
+            targets = explained.select(explained.certain)
+            rest = dots.select(~targets.on_them(dots.frames, octave.level))
             left = [code for code in families if code not in shown]
-            codes = further_families(part, dots, left)
+            codes = further_families(part, rest, left)
             if not codes:
                 break
+            clear = explained.select(explained.clear)
+            dots = dots.select(~clear.on_them(dots.frames, octave.level))
             explained = read_dots(octave, measure_likely(part, dots, codes)[0], codes)
             shown = shown + codes
     every = Hypotheses.joined(found)
+    if len(shown) > 1:
+        every = contested(every)
     named = {code.name: code for code in described}
     as_described = [named[code.name] for code in every.families]
     return replace(every, families=np.array(as_described, object))

@@ -2,7 +2,7 @@
 
 Every family reads a band by the same likelihood, so that their words compare by their evidence. To
 save time, the family that most of the clearest dots have reads all dots, and the others those that
-are not certain yet.
+are not clear yet.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from ahf_ros.features.circle_fit import Fit
 
 _FIRST = 8  # doubtful words that rivals read first
 _DOUBT = 0.05  # odds of another family that has all prints, up to which one is sure
+_ALL_WORDS = 0.5  # odds of a family of all words against one of a rule, before any print is seen
 
 
 def read_families(
@@ -32,19 +33,19 @@ def read_families(
 ) -> Hypotheses:
     """Return what the bands about dots are read as, at least one hypothesis of each dot.
 
-    The first family reads all dots, the others those that are not certain yet.
+    The first family reads all dots, the others those that are not clear yet.
     """
     first, *others = families
     found = read_bands(gray, dots, first, prior)
     found = _against_rivals(gray, dots, found, families, prior)
     if not others:
         return found
-    rest = dots.select(~found.certain)
+    rest = dots.select(~found.clear)
     parts = [found]
     for code in others:
         read = read_bands(gray, rest, code, prior)
         parts.append(read.select(read.words > 0))
-    return _contested(Hypotheses.joined(parts))
+    return contested(Hypotheses.joined(parts))
 
 
 def _against_rivals(
@@ -67,9 +68,9 @@ def _against_rivals(
         word = found.select(some)
         others = [read_bands(gray, dots.select(some), code, prior) for code in rivals]
         better = [_odds(other) > _odds(word) for other in others]
-        contested = np.any(better, axis=0)
-        confidence[some[contested]] = 0.0
-        if contested.mean() < 0.5:
+        beaten = np.any(better, axis=0)
+        confidence[some[beaten]] = 0.0
+        if beaten.mean() < 0.5:
             break
     return replace(found, confidence=confidence)
 
@@ -95,7 +96,7 @@ def _odds(read: Hypotheses) -> np.ndarray:
     return np.where(read.certain, read.coded - np.log(np.maximum(choices, 1)), -np.inf)
 
 
-def _contested(read: Hypotheses) -> Hypotheses:
+def contested(read: Hypotheses) -> Hypotheses:
     """Return hypotheses of which none is certain where another family has more evidence."""
     _, minor, _ = frame.ellipse_axes(read.frames)
     centres, names = read.frames[:, :2, 2], np.array([code.name for code in read.families], str)
@@ -159,7 +160,8 @@ def present_families(prints: Sequence[dict[Family, int]]) -> tuple[list[Family],
     """Return the families that say all prints in the fewest nats, and those that are sure.
 
     No other may stand for these. A print costs the logarithm of the number of words of its family,
-    and what it takes to say which of the families of the image it is of. One family is likelier.
+    and what it takes to say which of the families of the image it is of. One family is likelier,
+    and one whose words follow a rule. A family of more words would hardly show only these.
     """
     left, present, sure = list(prints), [], set()
     while left:
@@ -168,20 +170,28 @@ def present_families(prints: Sequence[dict[Family, int]]) -> tuple[list[Family],
         best = min(
             count,
             key=lambda code: (
-                _nats(count[code], len(code.words), len(left) - count[code], most),
+                _nats(count[code], len(code.words), len(left) - count[code], most)
+                - np.log(_before(code)),
                 len(code.words),
             ),
         )
         covered = [of for of in left if best in of]
         different = len({of[best] for of in covered})
         rivals = set.intersection(*(set(of) for of in covered)) - {best}
-        # A larger family would hardly show only words of a smaller one.
-        doubt = sum((len(best.words) / len(code.words)) ** different for code in rivals)
+        odds = (
+            (len(best.words) / len(code.words)) ** different * _before(code) / _before(best)
+            for code in rivals
+        )
         present.append(best)
-        if doubt < _DOUBT:
+        if sum(odds) < _DOUBT:
             sure.add(best)
         left = [of for of in left if best not in of]
     return present, sure
+
+
+def _before(code: Family) -> float:
+    """Return the odds of a family before any print is seen."""
+    return _ALL_WORDS if code.has_all_words else 1.0
 
 
 def _nats(own: int, words: int, others: int, most: int) -> float:

@@ -15,6 +15,7 @@ from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.circle_fit import Fit
 
 _CLEARLY = 2.0  # times the evidence of another claim to the same ID or dot
+_CLEAR = 5.0  # log odds of a word against arcs of any length, up to which others may be right
 _FOREIGN = 10.0  # log odds of arcs of any length against a word, which is none then
 _ROUND = 0.6  # share of the edges of a word that are in their place, where there is a band
 _OVERLAP = 0.92  # of the radii of two targets, at which the paper of one hides marks of the other
@@ -78,6 +79,12 @@ class Hypotheses(ArrayRecord):
         """Whether words are certain enough to be reported, ndarray of bool, shape (k,)."""
         certain: np.ndarray = self.confidence >= CERTAIN
         return certain
+
+    @property
+    def clear(self) -> np.ndarray:
+        """Whether no other family may explain the bands of certain words better, shape (k,)."""
+        clear: np.ndarray = self.certain & (self.coded > _CLEAR)
+        return clear
 
     @property
     def shift(self) -> np.ndarray:

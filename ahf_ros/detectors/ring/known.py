@@ -36,8 +36,8 @@ class Explained(ArrayRecord):
         Polygons around them and their margins, px of the image.
     sizes : ndarray of float64, shape (k,)
         Smaller radii of these, px.
-    certain : ndarray of bool, shape (k,)
-        Whether they are targets.
+    certain, clear : ndarray of bool, shape (k,)
+        Whether they are targets, and of no other family than the one read.
     shifts : ndarray of float64, shape (k,)
         Of their edges, px of the image; see `Hypotheses.edge_shift`.
     """
@@ -46,6 +46,7 @@ class Explained(ArrayRecord):
     outlines: np.ndarray
     sizes: np.ndarray
     certain: np.ndarray
+    clear: np.ndarray
     shifts: np.ndarray
 
     @staticmethod
@@ -57,13 +58,15 @@ class Explained(ArrayRecord):
         _, minor, _ = frame.ellipse_axes(read.frames)
         radii = np.where(certain, read.reach / minor, 1.0) + REACH
         outlines = frame.circle_outlines(read.frames, radii)
-        return Explained(read.frames, outlines, radii * minor, certain, read.edge_shift)
+        return Explained(
+            *(read.frames, outlines, radii * minor, certain, read.clear, read.edge_shift)
+        )
 
-    def on_targets(self, frames: np.ndarray, level: int) -> np.ndarray:
-        """Return whether dots lie on certain targets, (k,), in the image halved `level` times."""
+    def on_them(self, frames: np.ndarray, level: int) -> np.ndarray:
+        """Return whether dots lie on these, (n,), in the image halved `level` times."""
         centres = frame.enlarged(frames, level)[:, None, :2, 2]
-        away = centres - self.frames[self.certain][:, :2, 2]
-        near = np.hypot(away[..., 0], away[..., 1]) < self.sizes[self.certain]
+        away = centres - self.frames[:, :2, 2]
+        near = np.hypot(away[..., 0], away[..., 1]) < self.sizes
         return np.asarray(near.any(axis=1))
 
     def outlines_in(self, level: int) -> np.ndarray:

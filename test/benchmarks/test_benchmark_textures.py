@@ -1,0 +1,19 @@
+"""The benchmark of images without targets."""
+
+import json
+
+from benchmarks.textures import lookalikes, main, textured_image
+
+
+def test_textures_show_no_rings(capsys, tmp_path):
+    file = tmp_path / 'figures.json'
+    options = ['--seed', '7', '--count', '2', '--family', 'metashape12', '--only', 'textures']
+    assert main([*options, '--json', str(file)]) == 0
+    assert '0 reports in 2 images' in capsys.readouterr().out
+    assert list(json.loads(file.read_text())['reports']) == ['texture 7', 'texture 8']
+
+
+def test_textures_are_the_same_for_a_seed():
+    for make in (textured_image, lookalikes):
+        assert (make(3) == make(3)).all()
+        assert (make(3) != make(4)).any()
