@@ -27,6 +27,7 @@ _BORDER = 4.8  # price of a border of an arc of any length, at one of about 120 
 _RANKED = 1.2  # evidence of a reading that ranks words, which one cover must not settle
 _DRAW = 5.0  # lead of a word that is not expected, which is as good as none
 _NEAR = 3  # angles on either side of the clearest one
+_PHASE = 0.6  # error of the phase of sectors, and more, angles
 _NEVER = np.float32(-np.inf)
 
 CLEAR = 15.0
@@ -120,15 +121,18 @@ def decode(
     if not read.size:
         return decoded
     words, phases, some = words[read], phases[read], of_bands.select(read)
-    bits = lengthened(bits_at(words, phases, per_sector, family), overhang[read])
+    printed = bits_at(words, phases, per_sector, family)
+    bits, mixed = lengthened(printed, overhang[read]), _mixed(printed, overhang[read], some.mixed)
     order = _clearest(some)
     turned = replace(
         some,
         paper=np.take_along_axis(some.paper, order, 1),
         ink=np.take_along_axis(some.ink, order, 1),
     )
-    along = np.take_along_axis(bits, order[:, None], axis=2).transpose(2, 0, 1)
-    evidence_of = _along_words(turned, along)
+    along, on_ends = (
+        np.take_along_axis(of, order[:, None], axis=2).transpose(2, 0, 1) for of in (bits, mixed)
+    )
+    evidence_of = _along_words(turned, along, on_ends)
     like_paper = np.take_along_axis(
         np.maximum(some.paper, _half_paper(evidence.select(read))), order, axis=1
     )
@@ -234,16 +238,24 @@ def _clearest(evidence: Evidence) -> np.ndarray:
     return (window.argmax(axis=1)[:, None] + np.arange(best.shape[1])) % best.shape[1]
 
 
-def _along_words(evidence: Evidence, along: np.ndarray) -> np.ndarray:
+def _mixed(bits: np.ndarray, overhang: np.ndarray, blurred: np.ndarray) -> np.ndarray:
+    """Return at which angles bits (k, ..., m) as printed may show paper and ink, of their shape.
+
+    There arcs of ink end that are longer by angles, shape (k,), of a phase that is known to about
+    half an angle; `blurred` is `Evidence.mixed`.
+    """
+    beyond, within = blurred.T + _PHASE
+    possible, sure = lengthened(bits, overhang + beyond), lengthened(bits, overhang - within)
+    return possible & ~sure
+
+
+def _along_words(evidence: Evidence, along: np.ndarray, mixed: np.ndarray) -> np.ndarray:
     """Return the evidence for words at each angle, bits and result of shape (m, k, w).
 
-    A border between two sectors may lie to either side of the angles next to it, or in a reading,
-    which is then neither.
+    Readings at ends of arcs, which are of both, may be of either, or of neither.
     """
     paper, ink = evidence.paper.T[..., None], evidence.ink.T[..., None]
-    seen = np.where(along, ink, paper)
-    border = (along != np.roll(along, 1, axis=0)) | (along != np.roll(along, -1, axis=0))
-    return np.where(border, np.maximum(np.maximum(paper, ink), 0), seen)
+    return np.where(mixed, np.maximum(np.maximum(paper, ink), 0), np.where(along, ink, paper))
 
 
 def _sectors_as_they_look(

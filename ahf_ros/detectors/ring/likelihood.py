@@ -37,6 +37,7 @@ _ACROSS = (0.3, 0.75)  # shares of the gap, between which edges of light show
 _ANGLES = 120  # at which large targets have all the evidence that readings can give
 _MAXIMUM_GROWTH = 0.3  # dot radii
 _RADIUS, _DEPTH = 2.25, 0.2  # of readings, and distance of their depths, dot radii
+_MIXED = (1.2, 0.5)  # deviations of blur, to the dark and the bright side of edges, as ln shows them
 
 SURPRISES = (0.05, 0.5)
 """Least and largest probability of light that nothing predicts."""
@@ -67,6 +68,9 @@ class Evidence(ArrayRecord):
         Probability that an edge of light lies between two neighbouring readings.
     covered : ndarray of bool, shape (k, 2, m)
         Where something covers the ground beside the band.
+    mixed : ndarray of float32, shape (k, 2)
+        Angles on the paper's and on the ink's side of the end of an arc, whose readings blur makes
+        neither of both.
     """
 
     paper: np.ndarray
@@ -75,6 +79,7 @@ class Evidence(ArrayRecord):
     dot: np.ndarray
     lit: np.ndarray
     covered: np.ndarray
+    mixed: np.ndarray
 
     def plus(self, levels: Evidence) -> Evidence:
         """Return the sum of the evidence of edges and of levels, where nothing covers the ground.
@@ -92,6 +97,7 @@ class Evidence(ArrayRecord):
             dot=self.dot + levels.dot,
             lit=np.maximum(self.lit, levels.lit),
             covered=self.covered,
+            mixed=self.mixed,
         )
 
 
@@ -150,7 +156,17 @@ def edge_evidence(
         dot=np.zeros_like(weight),
         lit=edges.astype(np.float32),
         covered=_covered(polar, inside, ground / (1 - tail[..., None]), ink > paper, visible),
+        mixed=_mixed(polar, band),
     )
+
+
+def _mixed(polar: PolarImages, band: tuple[float, float]) -> np.ndarray:
+    """Return the angles that blur mixes at ends of arcs, see `Evidence`, shape (k, 2)."""
+    along = np.pi * sum(band) * polar.size / polar.gray.shape[1]
+    dark, bright = np.multiply.outer(_MIXED, polar.blur / along)
+    ink_is_dark = polar.polarity > 0
+    sides = np.where(ink_is_dark, bright, dark), np.where(ink_is_dark, dark, bright)
+    return np.stack(sides, axis=1).astype(np.float32)
 
 
 def _covered(
@@ -282,6 +298,7 @@ def level_evidence(
         dot=(ink - paper)[..., in_dot].sum(axis=(1, 2)),
         lit=surprise[:, 0, 0].astype(np.float32),
         covered=np.stack([dark[..., half & on_ground].any(axis=2) for half in halves], axis=1),
+        mixed=_mixed(polar, band),
     )
 
 
