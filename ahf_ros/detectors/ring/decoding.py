@@ -27,6 +27,7 @@ _BORDER = 4.8  # price of a border of an arc of any length, at one of about 120 
 _RANKED = 1.2  # evidence of a reading that ranks words, which one cover must not settle
 _DRAW = 5.0  # lead of a word that is not expected, which is as good as none
 _NEAR = 3  # angles on either side of the clearest one
+_REFINED = 2  # best words, that compete at the phases beside theirs as well
 _PHASE = 0.6  # error of the phase of sectors, and more, angles
 _NEVER = np.float32(-np.inf)
 
@@ -120,7 +121,8 @@ def decode(
     decoded = Words.none(count, angles)
     if not read.size:
         return decoded
-    words, phases, some = words[read], phases[read], of_bands.select(read)
+    words, phases = _at_near_phases(words[read], phases[read])
+    some = of_bands.select(read)
     printed = bits_at(words, phases, per_sector, family)
     bits, mixed = lengthened(printed, overhang[read]), _mixed(printed, overhang[read], some.mixed)
     order = _clearest(some)
@@ -236,6 +238,12 @@ def _clearest(evidence: Evidence) -> np.ndarray:
     best = np.maximum(evidence.paper, evidence.ink)
     window = np.sum([np.roll(best, shift, axis=1) for shift in range(-_NEAR, _NEAR + 1)], axis=0)
     return (window.argmax(axis=1)[:, None] + np.arange(best.shape[1])) % best.shape[1]
+
+
+def _at_near_phases(words: np.ndarray, phases: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return words and phases (k, w), and the best words at both phases beside theirs."""
+    best, phase = words[:, :_REFINED], phases[:, :_REFINED]
+    return np.hstack([words, best, best]), np.hstack([phases, phase - 1, phase + 1])
 
 
 def _mixed(bits: np.ndarray, overhang: np.ndarray, blurred: np.ndarray) -> np.ndarray:

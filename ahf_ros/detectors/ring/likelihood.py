@@ -13,6 +13,7 @@ edges of any height. Their sum over a target is the log odds of a word against n
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -140,12 +141,16 @@ def edge_evidence(
     beside = np.minimum(beside, 0.45 * (outer - inner))
     before = np.minimum(beside, 0.5 * (inner - radius - growth))
     edges = light_edges(polar, radius, growth, inner)
-    ground = np.stack([polar.at(inner - before), polar.at(outer + beside)], axis=1)
-    inside = np.stack([polar.at(inner + beside), polar.at(outer - beside)], axis=1)
-    paper, ink = _step_evidence(polar, inside, ground, edges)
-    # A soft mark makes the ground beside it darker.
-    away = np.stack([before, beside], axis=1) * (polar.size / polar.blur)[:, None]
-    tail = (0.5 * np.exp(-0.5 * away**2)).astype(np.float32)
+    ground_at, band_at = np.array([[inner - before, outer + beside], [inner + beside, outer - beside]])
+    ground, inside = (np.stack([polar.at(of) for of in at], axis=1) for at in (ground_at, band_at))
+    dot, ink_band = (-np.inf, radius + growth), (inner, outer)
+    of_dot, of_band = (
+        [_blurred(polar, at, *ring) for at in (ground_at, band_at)] for ring in (dot, ink_band)
+    )
+    without = [of_ground[..., None] for of_ground in of_dot]
+    with_ink = [(dot + of)[..., None] for dot, of in zip(of_dot, of_band, strict=True)]
+    lit_ground = np.maximum(ground, polar.paper(ground, with_ink[0]))
+    paper, ink = _step_evidence(polar, inside, ground, edges, without, with_ink)
     weight = weights(polar)
     visible = polar.reach[:, None] >= np.stack([inner + beside, outer + beside], axis=1)[..., None]
     share = weight[:, None, None] * visible
@@ -155,9 +160,18 @@ def edge_evidence(
         weight=weight,
         dot=np.zeros_like(weight),
         lit=edges.astype(np.float32),
-        covered=_covered(polar, inside, ground / (1 - tail[..., None]), ink > paper, visible),
+        covered=_covered(polar, inside, lit_ground, ink > paper, visible),
         mixed=_mixed(polar, band),
     )
+
+
+def _blurred(
+    polar: PolarImages, at: np.ndarray, inner: np.ndarray | float, outer: np.ndarray
+) -> np.ndarray:
+    """Return the shares of ink of a ring that blur leaves or brings at radii (n, k), (k, n)."""
+    deviation = polar.blur / polar.size
+    below, above = (normal_integral((of - at) / deviation) for of in (inner, outer))
+    return np.asarray(above - below).T.astype(np.float32)
 
 
 def _mixed(polar: PolarImages, band: tuple[float, float]) -> np.ndarray:
@@ -207,20 +221,30 @@ def light_edges(
 
 
 def _step_evidence(
-    polar: PolarImages, band: np.ndarray, ground: np.ndarray, edges: np.ndarray
+    polar: PolarImages,
+    band: np.ndarray,
+    ground: np.ndarray,
+    edges: np.ndarray,
+    without: Sequence[np.ndarray],
+    with_ink: Sequence[np.ndarray],
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the evidence of steps from ground into bands, (k, 2, m), for paper and for ink.
 
-    Glare makes the step of a mark smaller. Where it makes ground white, paper between is white.
+    Shares of ink that blur leaves on ground and band, shape (k, 2, 1), are those of bands without
+    ink and with it. Glare makes the step of a mark smaller. Where it makes ground white, paper
+    between is white.
     """
     (level, noise), (beside, of_ground) = polar.logs(band), polar.logs(ground)
-    ink = polar.inked(ground, band)
+    bare, ink = (
+        polar.printed(polar.paper(ground, on_ground), on_band, band)
+        for on_ground, on_band in (without, with_ink)
+    )
     mark = polar.logs(ink)[0] - beside
     step = level - beside
     limit = polar.glare[:, None, None]
     glare, white = ground >= limit, np.minimum(*ground.swapaxes(0, 1))[:, None] >= SATURATED
     flat = np.where(white & (limit <= SATURATED), np.float32(_WHITE), np.float32(_FLAT))
-    flat = normal(step, np.sqrt(flat**2 + noise**2 + of_ground**2))
+    flat = normal(level - polar.logs(bare)[0], np.sqrt(flat**2 + noise**2 + of_ground**2))
     more = (step - mark) * np.sign(mark)
     expected = of_ground * _gain(ground, ink)
     low, high = (np.sqrt(spread**2 + noise**2 + expected**2) for spread in (_MARK, _MARK_TAIL))
@@ -313,3 +337,9 @@ def normal(values: np.ndarray, spread: np.ndarray) -> np.ndarray:
     """Return the densities of values under normal distributions about 0."""
     density: np.ndarray = np.exp(-0.5 * (values / spread) ** 2) / (spread * np.sqrt(2 * np.pi))
     return density
+
+
+def normal_integral(values: np.ndarray) -> np.ndarray:
+    """Return the integral of the normal distribution up to values (Page 1977), to 0.0002."""
+    scaled = np.clip(values, -5, 5)
+    return np.asarray(1 / (1 + np.exp(-2 * np.sqrt(2 / np.pi) * (scaled + 0.044715 * scaled**3))))
