@@ -55,7 +55,7 @@ def random_family(file: Path, generator: np.random.Generator) -> dict[str, objec
 
 
 def rules_right(found: LearntFamily, rule: dict[str, object]) -> tuple[bool, bool]:
-    """Return whether the rules taken are right, and whether these with undecided ones are.
+    """Return whether the most probable rules are right, and whether any that may hold are.
 
     Rules are the same if the same words follow them.
     """
@@ -65,10 +65,7 @@ def rules_right(found: LearntFamily, rule: dict[str, object]) -> tuple[bool, boo
         either = [conforming(every, found.bits, **of) for of in (rules, rule)]
         return rules == rule or (found.bits <= 16 and np.array_equal(*either))
 
-    options = [found.rules]
-    for name, (value, _) in found.undecided.items():
-        options += [of | {name: value} for of in options]
-    return same(found.rules), any(map(same, options))
+    return same(found.rules), any(same(rules) for rules, _ in found.likely)
 
 
 def measured(seed: int, file: Path) -> tuple[list[tuple[bool, ...]], dict[str, Score]]:
