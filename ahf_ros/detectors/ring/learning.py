@@ -405,7 +405,9 @@ def likely_rules(words: np.ndarray, sure: np.ndarray, bits: int) -> list[tuple[R
     share = np.exp(np.array(odds) - np.max(odds))
     share /= share.sum()
     order = np.argsort(-share, kind='stable').tolist()
-    return [(rules[at], float(share[at])) for at in order if at == order[0] or share[at] > _POSSIBLE]
+    return [
+        (rules[at], float(share[at])) for at in order if at == order[0] or share[at] > _POSSIBLE
+    ]
 
 
 def _possible_rules(bits: int) -> Iterator[tuple[Rules, float]]:

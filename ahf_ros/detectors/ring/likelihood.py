@@ -38,7 +38,10 @@ _ACROSS = (0.3, 0.75)  # shares of the gap, between which edges of light show
 _ANGLES = 120  # at which large targets have all the evidence that readings can give
 _MAXIMUM_GROWTH = 0.3  # dot radii
 _RADIUS, _DEPTH = 2.25, 0.2  # of readings, and distance of their depths, dot radii
-_MIXED = (1.2, 0.5)  # deviations of blur, to the dark and the bright side of edges, as ln shows them
+_MIXED = (
+    1.2,
+    0.5,
+)  # deviations of blur, to the dark and the bright side of edges, as ln shows them
 
 SURPRISES = (0.05, 0.5)
 """Least and largest probability of light that nothing predicts."""
@@ -141,7 +144,9 @@ def edge_evidence(
     beside = np.minimum(beside, 0.45 * (outer - inner))
     before = np.minimum(beside, 0.5 * (inner - radius - growth))
     edges = light_edges(polar, radius, growth, inner)
-    ground_at, band_at = np.array([[inner - before, outer + beside], [inner + beside, outer - beside]])
+    ground_at, band_at = np.array(
+        [[inner - before, outer + beside], [inner + beside, outer - beside]]
+    )
     ground, inside = (np.stack([polar.at(of) for of in at], axis=1) for at in (ground_at, band_at))
     dot, ink_band = (-np.inf, radius + growth), (inner, outer)
     of_dot, of_band = (
