@@ -109,8 +109,10 @@ def learnt_rightly(image: np.ndarray, code: Family, rule: dict[str, object]) -> 
 
 
 def measured(seed: int, file: Path) -> tuple[dict[int, list[tuple[bool, ...]]], dict[str, Score]]:
-    """Return what was learnt rightly of each family, by the number of targets in the image, and
-    what was identified by light."""
+    """Return what was learnt rightly of each family, and what was identified by light.
+
+    The first is by the number of targets in the image that it is learnt from.
+    """
     learnt: dict[int, list[tuple[bool, ...]]] = {count: [] for count in LEARNT_FROM}
     scores: dict[str, list[Score]] = {light: [] for light in LIGHTS}
     for index in report.progress(range(FAMILIES), f'families of seed {seed}'):

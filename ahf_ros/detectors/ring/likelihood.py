@@ -38,10 +38,7 @@ _ACROSS = (0.3, 0.75)  # shares of the gap, between which edges of light show
 _ANGLES = 120  # at which large targets have all the evidence that readings can give
 _MAXIMUM_GROWTH = 0.3  # dot radii
 _RADIUS, _DEPTH = 2.25, 0.2  # of readings, and distance of their depths, dot radii
-_MIXED = (
-    1.2,
-    0.5,
-)  # deviations of blur, to the dark and the bright side of edges, as ln shows them
+_MIXED = (1.2, 0.5)  # deviations of blur that mix ln, to the dark and the bright side of edges
 
 SURPRISES = (0.05, 0.5)
 """Least and largest probability of light that nothing predicts."""
@@ -144,18 +141,17 @@ def edge_evidence(
     beside = np.minimum(beside, 0.45 * (outer - inner))
     before = np.minimum(beside, 0.5 * (inner - radius - growth))
     edges = light_edges(polar, radius, growth, inner)
-    ground_at, band_at = np.array(
-        [[inner - before, outer + beside], [inner + beside, outer - beside]]
-    )
+    ground_at = np.stack([inner - before, outer + beside])
+    band_at = np.stack([inner + beside, outer - beside])
     ground, inside = (np.stack([polar.at(of) for of in at], axis=1) for at in (ground_at, band_at))
-    dot, ink_band = (-np.inf, radius + growth), (inner, outer)
-    of_dot, of_band = (
-        [_blurred(polar, at, *ring) for at in (ground_at, band_at)] for ring in (dot, ink_band)
-    )
-    without = [of_ground[..., None] for of_ground in of_dot]
-    with_ink = [(dot + of)[..., None] for dot, of in zip(of_dot, of_band, strict=True)]
-    lit_ground = np.maximum(ground, polar.paper(ground, with_ink[0]))
-    paper, ink = _step_evidence(polar, inside, ground, edges, without, with_ink)
+    # Shares of ink on ground and band, without marks and with them.
+    bare = [_blurred(polar, at, -np.inf, radius + growth) for at in (ground_at, band_at)]
+    marked = [
+        of_dot + _blurred(polar, at, inner, outer)
+        for of_dot, at in zip(bare, (ground_at, band_at), strict=True)
+    ]
+    lit_ground = np.maximum(ground, polar.paper(ground, marked[0]))
+    paper, ink = _step_evidence(polar, inside, ground, edges, bare, marked)
     weight = weights(polar)
     visible = polar.reach[:, None] >= np.stack([inner + beside, outer + beside], axis=1)[..., None]
     share = weight[:, None, None] * visible
@@ -173,10 +169,10 @@ def edge_evidence(
 def _blurred(
     polar: PolarImages, at: np.ndarray, inner: np.ndarray | float, outer: np.ndarray
 ) -> np.ndarray:
-    """Return the shares of ink of a ring that blur leaves or brings at radii (n, k), (k, n)."""
+    """Return the shares of ink that blur leaves or brings at radii (n, k) of a ring, (k, n, 1)."""
     deviation = polar.blur / polar.size
     below, above = (normal_integral((of - at) / deviation) for of in (inner, outer))
-    return np.asarray(above - below).T.astype(np.float32)
+    return np.asarray(above - below).T[..., None].astype(np.float32)
 
 
 def _mixed(polar: PolarImages, band: tuple[float, float]) -> np.ndarray:
@@ -230,26 +226,26 @@ def _step_evidence(
     band: np.ndarray,
     ground: np.ndarray,
     edges: np.ndarray,
-    without: Sequence[np.ndarray],
-    with_ink: Sequence[np.ndarray],
+    bare: Sequence[np.ndarray],
+    marked: Sequence[np.ndarray],
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the evidence of steps from ground into bands, (k, 2, m), for paper and for ink.
 
-    Shares of ink that blur leaves on ground and band, shape (k, 2, 1), are those of bands without
-    ink and with it. Glare makes the step of a mark smaller. Where it makes ground white, paper
-    between is white.
+    The shares of ink that blur leaves on ground and band, shape (k, 2, 1) each, are those of bare
+    bands and of marked ones. Glare makes the step of a mark smaller. Where it makes ground white,
+    paper between is white.
     """
     (level, noise), (beside, of_ground) = polar.logs(band), polar.logs(ground)
-    bare, ink = (
+    blank, ink = (
         polar.printed(polar.paper(ground, on_ground), on_band, band)
-        for on_ground, on_band in (without, with_ink)
+        for on_ground, on_band in (bare, marked)
     )
     mark = polar.logs(ink)[0] - beside
     step = level - beside
     limit = polar.glare[:, None, None]
     glare, white = ground >= limit, np.minimum(*ground.swapaxes(0, 1))[:, None] >= SATURATED
     flat = np.where(white & (limit <= SATURATED), np.float32(_WHITE), np.float32(_FLAT))
-    flat = normal(level - polar.logs(bare)[0], np.sqrt(flat**2 + noise**2 + of_ground**2))
+    flat = normal(level - polar.logs(blank)[0], np.sqrt(flat**2 + noise**2 + of_ground**2))
     more = (step - mark) * np.sign(mark)
     expected = of_ground * _gain(ground, ink)
     low, high = (np.sqrt(spread**2 + noise**2 + expected**2) for spread in (_MARK, _MARK_TAIL))

@@ -112,7 +112,7 @@ class PolarImages(ArrayRecord):
         return np.where(polarity > 0, contrast * paper, bright)
 
     def printed(self, paper: np.ndarray, share: np.ndarray, seen: np.ndarray) -> np.ndarray:
-        """Return the gray values of paper of which a share is ink of the dot's colour, (k, ...)."""
+        """Return the gray values of paper of which a share is ink."""
         return paper + share * (self.inked(paper, seen) - paper)
 
     def paper(self, seen: np.ndarray, share: np.ndarray) -> np.ndarray:
