@@ -23,7 +23,6 @@ _LIKE_PAPER = 8.5  # the same of something that looks like paper
 _IN_LIGHT = 15.0  # times the probability of edges of light beyond the least, by which that grows
 _MORE = 0.6  # of each further reading of that
 _COVERED = 0.1  # price of each further reading that something else covers
-_BORDER = 4.8  # price of a border of an arc of any length, at one of about 120 angles
 _RANKED = 1.2  # evidence of a reading that ranks words, which one cover must not settle
 _DRAW = 5.0  # lead of a word that is not expected, which is as good as none
 _NEAR = 3  # angles on either side of the clearest one
@@ -158,7 +157,7 @@ def decode(
         starts=2 * np.pi * phases[rows, best] / angles,
         margin=margin.astype(np.float64),
         marked=score - bare + some.dot,
-        coded=score - _free_paths(turned) - _BORDER * _borders(bits[rows, best], hidden),
+        coded=score - _free_paths(turned) - _border(turned) * _borders(bits[rows, best], hidden),
         ends=np.zeros(len(read)),
         other=other,
         ahead=of_other - score,
@@ -348,10 +347,15 @@ def _borders(bits: np.ndarray, unknown: np.ndarray) -> np.ndarray:
     return np.count_nonzero(border, axis=1)
 
 
+def _border(evidence: Evidence) -> np.ndarray:
+    """Return the prices of a border of an arc of any length, at one of all readings, (k,)."""
+    return np.asarray(np.log(evidence.weight * evidence.paper.shape[1]))
+
+
 def _free_paths(evidence: Evidence) -> np.ndarray:
     """Return the evidence for arcs of ink of any length, with their best covers, shape (k,)."""
     cost = np.float32(_COVERED) * evidence.weight
-    border, cover = np.float32(_BORDER), np.float32(_COVER)
+    border, cover = _border(evidence), np.float32(_COVER)
     paper, ink = evidence.paper.T, evidence.ink.T
     white, dark = paper[0], ink[0]
     covered = np.full_like(white, _NEVER)
