@@ -12,15 +12,16 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 
 from ahf_ros.codes.cyclic import smallest_rotation
-from ahf_ros.codes.ring import conforming, ring_family
+from ahf_ros.codes.ring import Family, conforming, ring_family
 from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.detectors.ring.learning import LearntFamily, find_bands, learn_families
 from ahf_ros.evaluation import Score, score, total
-from ahf_ros.synthetic.scene import SceneSettings, render
+from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 from benchmarks import report
 from benchmarks.report import table
 
@@ -34,6 +35,13 @@ RULES = ({}, {'parity': 'even'}, {'parity': 'even', 'opposite_pairs': 1}, {'chan
 """Rules of words, one of which is drawn."""
 
 TARGETS = 20
+"""In an image that is identified."""
+
+LEARNT_FROM = (20, 54)
+"""Targets in an image that a family is learnt from."""
+
+RADII = (5.0, 30.0)
+"""Smallest and largest radius of dots, px."""
 
 
 def random_family(file: Path, generator: np.random.Generator) -> dict[str, object]:
@@ -55,7 +63,7 @@ def random_family(file: Path, generator: np.random.Generator) -> dict[str, objec
 
 
 def rules_right(found: LearntFamily, rule: dict[str, object]) -> tuple[bool, bool]:
-    """Return whether the rules taken are right, and whether these with undecided ones are.
+    """Return whether the most probable rules are right, and whether any that may hold are.
 
     Rules are the same if the same words follow them.
     """
@@ -65,73 +73,97 @@ def rules_right(found: LearntFamily, rule: dict[str, object]) -> tuple[bool, boo
         either = [conforming(every, found.bits, **of) for of in (rules, rule)]
         return rules == rule or (found.bits <= 16 and np.array_equal(*either))
 
-    options = [found.rules]
-    for name, (value, _) in found.undecided.items():
-        options += [of | {name: value} for of in options]
-    return same(found.rules), any(map(same, options))
+    return same(found.rules), any(same(rules) for rules, _ in found.likely)
 
 
-def measured(seed: int, file: Path) -> tuple[list[tuple[bool, ...]], dict[str, Score]]:
-    """Return what was learnt rightly of each family, and what was identified by light."""
-    learnt: list[tuple[bool, ...]] = []
+def sheet(file: Path, targets: int, light: str, seed: int, values: dict[str, Any]) -> Rendering:
+    """Return the rendering of a sheet that is as large as its targets need."""
+    for growth in range(12):
+        try:
+            return render(
+                SceneSettings(
+                    width=round(1600 * 1.15**growth),
+                    height=round(1200 * 1.15**growth),
+                    targets=min(targets, len(ring_family(str(file)).words)),
+                    light=light,
+                    family='mine',
+                    family_file=str(file),
+                    seed=seed,
+                    **values,
+                )
+            )
+        except ValueError as error:
+            if not str(error).startswith('targets is'):
+                raise
+    raise ValueError(f'targets is {targets!r}, accepted are fewer for dots of this size')
+
+
+def learnt_rightly(image: np.ndarray, code: Family, rule: dict[str, object]) -> tuple[bool, ...]:
+    """Return whether bits, radii, words, rule, or one that is named, were learnt from an image."""
+    found = learn_families(find_bands([image], DetectorSettings()))
+    if not found or found[0].bits != code.bits:
+        return (False,) * 5
+    radii = np.abs(np.subtract(found[0].band, code.band)).max() < 0.03
+    words = set(found[0].words.tolist()) <= set(code.words.tolist())
+    return True, bool(radii), words, *rules_right(found[0], rule)
+
+
+def measured(seed: int, file: Path) -> tuple[dict[int, list[tuple[bool, ...]]], dict[str, Score]]:
+    """Return what was learnt rightly of each family, and what was identified by light.
+
+    The first is by the number of targets in the image that it is learnt from.
+    """
+    learnt: dict[int, list[tuple[bool, ...]]] = {count: [] for count in LEARNT_FROM}
     scores: dict[str, list[Score]] = {light: [] for light in LIGHTS}
     for index in report.progress(range(FAMILIES), f'families of seed {seed}'):
         generator = np.random.default_rng([seed, index])
         rule = random_family(file, generator)
         code = ring_family(str(file))
         values = {
-            'dot_radius': float(generator.uniform(7, 16)),
+            'dot_radius': float(np.exp(generator.uniform(*np.log(RADII)))),
             'edge_shift': float(generator.choice([-0.5, 0.0, 0.5])),
             'polarity': str(generator.choice(['dark', 'bright'])),
         }
         detector = create_detector(family='mine', family_file=str(file))
         for light in LIGHTS:
-            scene = SceneSettings(
-                width=1600,
-                height=1200,
-                targets=min(TARGETS, len(code.words)),
-                light=light,
-                family='mine',
-                family_file=str(file),
-                seed=index,
-                **values,
-            )
-            shown = render(scene)
+            shown = sheet(file, TARGETS, light, index, values)
             scores[light].append(score(shown, detector(shown.image)))
-            if light != LIGHTS[0]:
-                continue
-            found = learn_families(find_bands([shown.image], DetectorSettings()))
-            bits = bool(found) and found[0].bits == code.bits
-            radii = bits and np.abs(np.subtract(found[0].band, code.band)).max() < 0.03
-            words = bits and set(found[0].words.tolist()) <= set(code.words.tolist())
-            strict, told = rules_right(found[0], rule) if bits else (False, False)
-            learnt.append((bits, bool(radii), words, strict, told))
+        for count in LEARNT_FROM:
+            shown = sheet(file, count, LIGHTS[0], index, values)
+            learnt[count].append(learnt_rightly(shown.image, code, rule))
     return learnt, {light: total(of) for light, of in scores.items()}
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print both tables as Markdown."""
     options = report.parsed(report.parser(__doc__), arguments)
-    learnt: list[tuple[bool, ...]] = []
+    learnt: dict[int, list[tuple[bool, ...]]] = {count: [] for count in LEARNT_FROM}
     scores: dict[str, list[Score]] = {light: [] for light in LIGHTS}
     with TemporaryDirectory() as folder:
         for seed in options.seeds:
             of_seed, by_light = measured(seed, Path(folder, 'mine.json'))
-            learnt += of_seed
+            for count, rows in of_seed.items():
+                learnt[count] += rows
             for light, of in by_light.items():
                 scores[light].append(of)
-    right = [sum(of) for of in zip(*learnt, strict=True)]
     names = (
+        'targets',
         'families',
         'bits right',
         'radii within 0.03',
         'all words right',
         'rule right',
-        'or undecided',
+        'or named',
     )
     figures = report.about(
         options.seeds,
-        learnt=table(names, [(len(learnt), *right)]),
+        learnt=table(
+            names,
+            [
+                (count, len(rows), *(sum(of) for of in zip(*rows, strict=True)))
+                for count, rows in learnt.items()
+            ],
+        ),
         identified=table(
             ('light', 'targets', 'right', 'wrong', 'false positives'),
             [

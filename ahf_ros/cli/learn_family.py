@@ -139,11 +139,11 @@ def _write_rings(
     inner, outer = (round(radius, 2) for radius in learnt.band)
     count = len(learnt.words)
     seen = f'{count} targets in {len(set(learnt.bands.image.tolist()))} of {images} images'
-    rules = json.dumps(learnt.rules) if learnt.rules else 'all'
+    rules, *others = [json.dumps(of) if of else 'all' for of, _ in learnt.likely]
     different = sorted(set(learnt.words.tolist()))
     maybe = [
-        f'{rule} {value} cannot be told from {len(different)} words (probability {share:.2f})'
-        for rule, (value, share) in learnt.undecided.items()
+        f'{len(different)} words may follow words: {of} as well (probability {share:.2f})'
+        for of, (_, share) in zip(others, learnt.likely[1:], strict=True)
     ]
     pinhole = round(learnt.pinhole, 2)
     text = (
@@ -163,11 +163,7 @@ def _write_rings(
         f'{f"pinhole {pinhole:g}, " if pinhole else ""}ink {learnt.growth:+.1f} px',
         file=sys.stderr,
     )
-    for rule, odds in learnt.odds.items():
-        print(
-            f'{file}: {rule} {learnt.rules[rule]} holds, log odds against chance {odds:.0f}',
-            file=sys.stderr,
-        )
+    print(f'{file}: words: {rules} (probability {learnt.likely[0][1]:.2f})', file=sys.stderr)
     for of in maybe:
         print(f'{file}: {of}', file=sys.stderr)
     for known in learnt.known():

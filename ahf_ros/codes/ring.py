@@ -228,16 +228,16 @@ def conforming(
     """Return whether words follow rules of a family, see docs/ring_targets.md, shape (k,)."""
     good = words > above
     if parity:
-        good &= _marks(words, bits) % 2 == (parity == 'odd')
+        good &= marks(words, bits) % 2 == (parity == 'odd')
     if opposite_pairs:
         half = bits // 2
-        good &= _marks(words & (words >> half) & ((1 << half) - 1), half) >= opposite_pairs
+        good &= marks(words & (words >> half) & ((1 << half) - 1), half) >= opposite_pairs
     if changes is not None:
-        good &= _borders(words, bits) <= changes
+        good &= borders(words, bits) <= changes
     return good
 
 
-def _marks(words: np.ndarray, bits: int) -> np.ndarray:
+def marks(words: np.ndarray, bits: int) -> np.ndarray:
     """Return the numbers of ones of words."""
     count = np.zeros_like(words)
     for bit in range(bits):
@@ -248,12 +248,12 @@ def _marks(words: np.ndarray, bits: int) -> np.ndarray:
 @cache
 def least_marked(code: Family) -> float:
     """Return the share of the band that has marks in the word with the fewest of these."""
-    return float(_marks(code.words, code.bits).min() / code.bits)
+    return float(marks(code.words, code.bits).min() / code.bits)
 
 
-def _borders(words: np.ndarray, bits: int) -> np.ndarray:
+def borders(words: np.ndarray, bits: int) -> np.ndarray:
     """Return the numbers of borders between ones and zeros of words, read in a circle."""
-    return _marks(words ^ (words >> 1 | (words & 1) << (bits - 1)), bits)
+    return marks(words ^ (words >> 1 | (words & 1) << (bits - 1)), bits)
 
 
 def _numbers(rule: Entry | None, words: np.ndarray, bits: int) -> np.ndarray:

@@ -28,6 +28,7 @@ def seen(marked: np.ndarray, weight: float = 1.0) -> Evidence:
         dot=np.zeros(count, np.float32),
         lit=np.full(count, SURPRISES[0], np.float32),
         covered=np.zeros(halves.shape, bool),
+        mixed=np.full((count, 2), 0.3, np.float32),
     )
 
 

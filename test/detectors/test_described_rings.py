@@ -75,10 +75,11 @@ def test_hypotheses_are_of_the_family_as_described(tmp_path: Path) -> None:
     assert {code.bounds for code in read.families} == {((1.8, 2.2), (2.8, 3.2))}
 
 
-def test_a_single_mark_of_many_sectors_is_read(tmp_path: Path) -> None:
+@pytest.mark.parametrize('radius', [8.0, 24.0])
+def test_a_single_mark_of_many_sectors_is_read(tmp_path: Path, radius: float) -> None:
     file = tmp_path / 'mine.yaml'
     file.write_text('family: mine\nbits: 24\nband: [2, 3]\nwords: [1, 11, 27]\n')
-    scene = shown(str(file), targets=3, dot_radius=24)
+    scene = shown(str(file), targets=3, dot_radius=radius)
     found = create_detector(family='mine', family_file=str(file))(scene.image)
     assert 1 in ring_family(str(file)).words
     assert sorted(it.id for it in found) == [1, 2, 3]

@@ -19,6 +19,12 @@ RAYS = 48
 _INNER_PART = 0.4  # of a sector, to either side; next to its ends the blur rounds an arc off
 
 
+def reach_of(family: Family) -> float:
+    """Return how far to look for the edges of a target, dot radii: not to the next edge."""
+    inner, outer = family.band
+    return min(REACH, (inner - 1) / 2, (outer - inner) / 2)
+
+
 def target_circles(
     words: np.ndarray,
     starts: np.ndarray,

@@ -10,7 +10,7 @@ from ahf_ros.codes.cyclic import rotated_words
 from ahf_ros.codes.ring import Family, canonical
 
 _EXHAUSTIVE = 50_000  # rotations of words, up to which all of them compete
-_MINIMUM_EVIDENCE = 2.0  # for ones, in units of ln
+_MINIMUM_EVIDENCE = 1.0  # for ones, in units of ln
 
 COMPETITORS = 24
 """Number of words of each band that are returned, more than there are rotations of one."""

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ahf_ros.codes.ring import borders, marks
 from ahf_ros.features.logistic import logistic, read_weights
 
 if TYPE_CHECKING:
@@ -32,12 +33,12 @@ _OF_MARGIN = np.array([-1.0, 1.0])  # one or two log odds leave a doubt
 
 
 def features(read: Hypotheses) -> np.ndarray:
-    """Return what speaks for readings, float64, shape (k, 5).
+    """Return what speaks for readings, float64, shape (k, 6).
 
     Logarithm of the log odds of words against the next ID; root of the log odds of arcs of ink of
     any length against them, negative; the share of the expected edges that are in their place, and
     that of the band that is seen; the log odds that arcs end where sectors do, where these are
-    negative.
+    negative; how easily spots of light show the word, negative.
     """
     return np.stack(
         [
@@ -46,9 +47,21 @@ def features(read: Hypotheses) -> np.ndarray:
             read.share,
             1 - read.hidden,
             np.minimum(read.ends, 0),
+            -np.exp(1 - _spots(read)),
         ],
         axis=1,
     )
+
+
+def _spots(read: Hypotheses) -> np.ndarray:
+    """Return how many spots of light as large as the dot it takes to show words, shape (k,)."""
+    spots = np.zeros(len(read.words))
+    for code in dict.fromkeys(read.families):
+        which = read.families == code
+        words = read.words[which]
+        length = marks(words, code.bits) / code.bits * np.pi * sum(code.band)  # dot radii
+        spots[which] = np.maximum(length / 2, borders(words, code.bits) / 2)
+    return spots
 
 
 def confidence(values: np.ndarray) -> np.ndarray:
@@ -57,5 +70,5 @@ def confidence(values: np.ndarray) -> np.ndarray:
 
 
 def target_probability(values: np.ndarray) -> np.ndarray:
-    """Return the probabilities that readings are of targets, shape (k,), values (k, 5)."""
+    """Return the probabilities that readings are of targets, shape (k,), values (k, 6)."""
     return logistic(values, _OF_TARGET)

@@ -23,10 +23,11 @@ _LIKE_PAPER = 8.5  # the same of something that looks like paper
 _IN_LIGHT = 15.0  # times the probability of edges of light beyond the least, by which that grows
 _MORE = 0.6  # of each further reading of that
 _COVERED = 0.1  # price of each further reading that something else covers
-_BORDER = 4.8  # price of a border of an arc of any length, at one of about 120 angles
 _RANKED = 1.2  # evidence of a reading that ranks words, which one cover must not settle
 _DRAW = 5.0  # lead of a word that is not expected, which is as good as none
 _NEAR = 3  # angles on either side of the clearest one
+_REFINED = 2  # best words, that compete at the phases beside theirs as well
+_PHASE = 0.6  # error of the phase of sectors, and more, angles
 _NEVER = np.float32(-np.inf)
 
 CLEAR = 15.0
@@ -119,16 +120,20 @@ def decode(
     decoded = Words.none(count, angles)
     if not read.size:
         return decoded
-    words, phases, some = words[read], phases[read], of_bands.select(read)
-    bits = lengthened(bits_at(words, phases, per_sector, family), overhang[read])
+    words, phases = _at_near_phases(words[read], phases[read])
+    some = of_bands.select(read)
+    printed = bits_at(words, phases, per_sector, family)
+    bits, mixed = lengthened(printed, overhang[read]), _mixed(printed, overhang[read], some.mixed)
     order = _clearest(some)
     turned = replace(
         some,
         paper=np.take_along_axis(some.paper, order, 1),
         ink=np.take_along_axis(some.ink, order, 1),
     )
-    along = np.take_along_axis(bits, order[:, None], axis=2).transpose(2, 0, 1)
-    evidence_of = _along_words(turned, along)
+    along, on_ends = (
+        np.take_along_axis(of, order[:, None], axis=2).transpose(2, 0, 1) for of in (bits, mixed)
+    )
+    evidence_of = _along_words(turned, along, on_ends)
     like_paper = np.take_along_axis(
         np.maximum(some.paper, _half_paper(evidence.select(read))), order, axis=1
     )
@@ -152,7 +157,7 @@ def decode(
         starts=2 * np.pi * phases[rows, best] / angles,
         margin=margin.astype(np.float64),
         marked=score - bare + some.dot,
-        coded=score - _free_paths(turned) - _BORDER * _borders(bits[rows, best], hidden),
+        coded=score - _free_paths(turned) - _border(turned) * _borders(bits[rows, best], hidden),
         ends=np.zeros(len(read)),
         other=other,
         ahead=of_other - score,
@@ -234,16 +239,30 @@ def _clearest(evidence: Evidence) -> np.ndarray:
     return (window.argmax(axis=1)[:, None] + np.arange(best.shape[1])) % best.shape[1]
 
 
-def _along_words(evidence: Evidence, along: np.ndarray) -> np.ndarray:
+def _at_near_phases(words: np.ndarray, phases: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return words and phases (k, w), and the best words at both phases beside theirs."""
+    best, phase = words[:, :_REFINED], phases[:, :_REFINED]
+    return np.hstack([words, best, best]), np.hstack([phases, phase - 1, phase + 1])
+
+
+def _mixed(bits: np.ndarray, overhang: np.ndarray, blurred: np.ndarray) -> np.ndarray:
+    """Return at which angles bits (k, ..., m) as printed may show paper and ink, of their shape.
+
+    There arcs of ink end that are longer by angles, shape (k,), of a phase that is known to about
+    half an angle; `blurred` is `Evidence.mixed`.
+    """
+    beyond, within = blurred.T + _PHASE
+    possible, sure = lengthened(bits, overhang + beyond), lengthened(bits, overhang - within)
+    return possible & ~sure
+
+
+def _along_words(evidence: Evidence, along: np.ndarray, mixed: np.ndarray) -> np.ndarray:
     """Return the evidence for words at each angle, bits and result of shape (m, k, w).
 
-    A border between two sectors may lie to either side of the angles next to it, or in a reading,
-    which is then neither.
+    Readings at ends of arcs, which are of both, may be of either, or of neither.
     """
     paper, ink = evidence.paper.T[..., None], evidence.ink.T[..., None]
-    seen = np.where(along, ink, paper)
-    border = (along != np.roll(along, 1, axis=0)) | (along != np.roll(along, -1, axis=0))
-    return np.where(border, np.maximum(np.maximum(paper, ink), 0), seen)
+    return np.where(mixed, np.maximum(np.maximum(paper, ink), 0), np.where(along, ink, paper))
 
 
 def _sectors_as_they_look(
@@ -328,10 +347,15 @@ def _borders(bits: np.ndarray, unknown: np.ndarray) -> np.ndarray:
     return np.count_nonzero(border, axis=1)
 
 
+def _border(evidence: Evidence) -> np.ndarray:
+    """Return the prices of a border of an arc of any length, at one of all readings, (k,)."""
+    return np.asarray(np.log(evidence.weight * evidence.paper.shape[1]))
+
+
 def _free_paths(evidence: Evidence) -> np.ndarray:
     """Return the evidence for arcs of ink of any length, with their best covers, shape (k,)."""
     cost = np.float32(_COVERED) * evidence.weight
-    border, cover = np.float32(_BORDER), np.float32(_COVER)
+    border, cover = _border(evidence), np.float32(_COVER)
     paper, ink = evidence.paper.T, evidence.ink.T
     white, dark = paper[0], ink[0]
     covered = np.full_like(white, _NEVER)

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ahf_ros.detectors.ring.circles import REACH, target_circles
+from ahf_ros.detectors.ring.circles import reach_of, target_circles
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.reading import PER_SECTOR
 from ahf_ros.features import frame
@@ -53,7 +53,9 @@ def _measured(image: np.ndarray, read: Hypotheses, which: np.ndarray) -> Hypothe
         of_code = selected[read.families[selected] == code]
         some = read.select(of_code)
         circles = target_circles(some.words, some.starts, some.polarity, PER_SECTOR, code)
-        fit = fit_circles_of_any_blur(gray, some.frames, circles, reach=REACH, projective=True)
+        fit = fit_circles_of_any_blur(
+            gray, some.frames, circles, reach=reach_of(code), projective=True
+        )
         fitted = replace(
             some,
             frames=fit.frames,

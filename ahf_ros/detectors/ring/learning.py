@@ -8,7 +8,7 @@ All targets of a family share bits, radii and rules, so that a few borders of ea
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -60,9 +60,16 @@ _UNCLEAR = 0.25  # mean difference of sectors from paper and ink
 _MISREAD = 0.02  # share of words
 _SAME_RADII = 0.08  # difference of radii that are the same, dot radii
 _OFTEN = 3  # targets with a word, which then is not misread
-_SAMPLED = 200_000  # words that tell how common a rule is
-_CERTAIN, _POSSIBLE = 3.0, 0.05  # log odds of a rule that is taken, probability of one that may be
-_SURE = {'parity': 5.0, 'opposite_pairs': 3.0, 'changes': 7.0}  # these, and odds against before
+_SAMPLED = 50_000  # words that tell how common a rule is
+_COUNTED = 15  # bits, up to which all words are counted
+_PARITIES = {'': 0.45, 'even': 0.5, 'odd': 0.05}  # probabilities before words are seen
+_PAIRS, _PAIRS_ALONE = 0.4, 0.05  # of opposite pairs in words of even parity, and in others
+_CHANGES = 0.1  # of a limit of changes
+_POSSIBLE = 0.05  # probability from which rules may hold
+
+
+Rules = dict[str, Any]
+"""Arguments of `conforming`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,9 +97,8 @@ class LearntFamily:
     words: np.ndarray  # (k,), canonical words of the targets
     bands: Bands  # the targets
     lead: float  # log odds of the number of bits against the next one
-    rules: dict[str, Any]  # arguments of `conforming` that all words follow
-    odds: dict[str, float]  # log odds of these, of chance
-    undecided: dict[str, tuple[Any, float]]  # rules that may hold as well, and their probabilities
+    rules: Rules  # the most probable ones of `likely`
+    likely: list[tuple[Rules, float]]  # rules that words may follow, and their probabilities
 
     @property
     def polarity(self) -> str:
@@ -292,7 +298,8 @@ def _learn(bands: Bands) -> tuple[np.ndarray, LearntFamily]:
     some = bands.select(own)
     words, clear = _words(some, bits, growth)
     different, count = np.unique(words[clear], return_counts=True)
-    rules, odds, undecided = _rules(different, count >= _OFTEN, bits)
+    likely = likely_rules(different, count >= _OFTEN, bits)
+    rules = likely[0][0]
     clear &= conforming(words, bits, **rules)
     found = LearntFamily(
         bits=bits,
@@ -302,8 +309,7 @@ def _learn(bands: Bands) -> tuple[np.ndarray, LearntFamily]:
         bands=some.select(clear),
         lead=float(total.max() - np.delete(total.max(axis=1), best).max()),
         rules=rules,
-        odds=odds,
-        undecided=undecided,
+        likely=likely,
     )
     return np.flatnonzero(own), found
 
@@ -371,41 +377,48 @@ def _words(bands: Bands, bits: int, growth: float) -> tuple[np.ndarray, np.ndarr
     return smallest_rotation(words, bits), np.abs(levels - marked).mean(axis=1) < _UNCLEAR
 
 
-def _rules(
-    words: np.ndarray, sure: np.ndarray, bits: int
-) -> tuple[dict[str, Any], dict[str, float], dict[str, tuple[Any, float]]]:
-    """Return the rules that nearly all of different words follow, and their odds of chance.
+def likely_rules(words: np.ndarray, sure: np.ndarray, bits: int) -> list[tuple[Rules, float]]:
+    """Return the rules that different words may follow, the most probable ones first.
 
-    Sure words follow them all; others may be misread. A rule is taken where it is as good as
-    certain, since one that does not hold makes targets unreadable; others that are likely enough
-    come last, with their probabilities.
+    The words are drawn from those of a family up to the largest one seen, since some print the
+    first words only. Each of n words has the probability 1 / n, so that the rules which leave the
+    fewest words are the likeliest that all follow. Sure words follow them; a few others may be
+    misread.
     """
-    rules: dict[str, Any] = {}
-    odds: dict[str, float] = {}
-    undecided: dict[str, tuple[Any, float]] = {}
-    sampled = np.random.default_rng(0).integers(1, (1 << bits) - 1, _SAMPLED)
-    tried: dict[str, list[Any]] = {'parity': ['even', 'odd']}
-    if bits % 2 == 0:
-        tried['opposite_pairs'] = [1]
-    tried['changes'] = list(range(2, bits, 2))
-    for name, values in tried.items():
-        likely = []
-        for value in values:
-            usual = conforming(sampled, bits, **{name: value}).mean()
-            usual = np.clip(usual, 1 / _SAMPLED, 1 - 1 / _SAMPLED)
-            good = conforming(words, bits, **{name: value})
-            of_chance = [np.log((1 - _MISREAD) / usual), np.log(_MISREAD / (1 - usual))]
-            either = np.dot([good.sum(), (~good).sum()], of_chance)
-            likely.append(float(either) if good[sure].all() else -np.inf)
-        best = int(np.argmax(likely))
-        if likely[best] > _SURE[name]:
-            rule = {name: values[best]}
-            rules, odds = rules | rule, odds | {name: likely[best]}
-            sampled = sampled[conforming(sampled, bits, **rule)]
-            good = conforming(words, bits, **rule)
-            words, sure = words[good], sure[good]
+    if bits <= _COUNTED:
+        every = np.arange(1, 1 << bits)
+        every, weight = every[every == smallest_rotation(every, bits)], 1.0
+    else:
+        drawn = np.random.default_rng(0).integers(1, (1 << bits) - 1, _SAMPLED)
+        every, weight = smallest_rotation(drawn, bits), (1 << bits) / bits / _SAMPLED
+    every = every[every <= words.max(initial=1)]
+    misread = np.log(_MISREAD / max(weight * len(every), 1))
+    rules, odds = [], []
+    for rule, before in _possible_rules(bits):
+        good = conforming(words, bits, **rule)
+        if not good[sure].all():
             continue
-        probability = float(1 / (1 + np.exp(_SURE[name] - _CERTAIN - likely[best])))
-        if probability > _POSSIBLE:
-            undecided[name] = values[best], probability
-    return rules, odds, undecided
+        count, left = good.sum(), max(weight * conforming(every, bits, **rule).sum(), 1)
+        drawn = np.log(np.maximum(left - np.arange(count), 1)).sum()  # none of them twice
+        rules.append(rule)
+        odds.append(np.log(before) - drawn + (~good).sum() * misread)
+    share = np.exp(np.array(odds) - np.max(odds))
+    share /= share.sum()
+    order = np.argsort(-share, kind='stable').tolist()
+    return [
+        (rules[at], float(share[at])) for at in order if at == order[0] or share[at] > _POSSIBLE
+    ]
+
+
+def _possible_rules(bits: int) -> Iterator[tuple[Rules, float]]:
+    """Yield the rules of words, with their probabilities before any word is seen."""
+    limits = range(2, bits - bits % 2, 2)
+    for parity, of_parity in _PARITIES.items():
+        of_pairs = _PAIRS if parity == 'even' else _PAIRS_ALONE
+        pairs = {0: 1 - of_pairs, 1: of_pairs} if bits % 2 == 0 else {0: 1.0}
+        for least, of_least in pairs.items():
+            rule: Rules = {'parity': parity} if parity else {}
+            rule |= {'opposite_pairs': least} if least else {}
+            yield rule, of_parity * of_least * (1 - _CHANGES)
+            for limit in limits:
+                yield rule | {'changes': limit}, of_parity * of_least * _CHANGES / len(limits)

@@ -13,6 +13,7 @@ edges of any height. Their sum over a target is the log odds of a word against n
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,6 +38,7 @@ _ACROSS = (0.3, 0.75)  # shares of the gap, between which edges of light show
 _ANGLES = 120  # at which large targets have all the evidence that readings can give
 _MAXIMUM_GROWTH = 0.3  # dot radii
 _RADIUS, _DEPTH = 2.25, 0.2  # of readings, and distance of their depths, dot radii
+_MIXED = (1.2, 0.5)  # deviations of blur that mix ln, to the dark and the bright side of edges
 
 SURPRISES = (0.05, 0.5)
 """Least and largest probability of light that nothing predicts."""
@@ -67,6 +69,9 @@ class Evidence(ArrayRecord):
         Probability that an edge of light lies between two neighbouring readings.
     covered : ndarray of bool, shape (k, 2, m)
         Where something covers the ground beside the band.
+    mixed : ndarray of float32, shape (k, 2)
+        Angles on the paper's and on the ink's side of the end of an arc, whose readings blur makes
+        neither of both.
     """
 
     paper: np.ndarray
@@ -75,6 +80,7 @@ class Evidence(ArrayRecord):
     dot: np.ndarray
     lit: np.ndarray
     covered: np.ndarray
+    mixed: np.ndarray
 
     def plus(self, levels: Evidence) -> Evidence:
         """Return the sum of the evidence of edges and of levels, where nothing covers the ground.
@@ -92,6 +98,7 @@ class Evidence(ArrayRecord):
             dot=self.dot + levels.dot,
             lit=np.maximum(self.lit, levels.lit),
             covered=self.covered,
+            mixed=self.mixed,
         )
 
 
@@ -134,12 +141,17 @@ def edge_evidence(
     beside = np.minimum(beside, 0.45 * (outer - inner))
     before = np.minimum(beside, 0.5 * (inner - radius - growth))
     edges = light_edges(polar, radius, growth, inner)
-    ground = np.stack([polar.at(inner - before), polar.at(outer + beside)], axis=1)
-    inside = np.stack([polar.at(inner + beside), polar.at(outer - beside)], axis=1)
-    paper, ink = _step_evidence(polar, inside, ground, edges)
-    # A soft mark makes the ground beside it darker.
-    away = np.stack([before, beside], axis=1) * (polar.size / polar.blur)[:, None]
-    tail = (0.5 * np.exp(-0.5 * away**2)).astype(np.float32)
+    ground_at = np.stack([inner - before, outer + beside])
+    band_at = np.stack([inner + beside, outer - beside])
+    ground, inside = (np.stack([polar.at(of) for of in at], axis=1) for at in (ground_at, band_at))
+    # Shares of ink on ground and band, without marks and with them.
+    bare = [_blurred(polar, at, -np.inf, radius + growth) for at in (ground_at, band_at)]
+    marked = [
+        of_dot + _blurred(polar, at, inner, outer)
+        for of_dot, at in zip(bare, (ground_at, band_at), strict=True)
+    ]
+    lit_ground = np.maximum(ground, polar.paper(ground, marked[0]))
+    paper, ink = _step_evidence(polar, inside, ground, edges, bare, marked)
     weight = weights(polar)
     visible = polar.reach[:, None] >= np.stack([inner + beside, outer + beside], axis=1)[..., None]
     share = weight[:, None, None] * visible
@@ -149,8 +161,27 @@ def edge_evidence(
         weight=weight,
         dot=np.zeros_like(weight),
         lit=edges.astype(np.float32),
-        covered=_covered(polar, inside, ground / (1 - tail[..., None]), ink > paper, visible),
+        covered=_covered(polar, inside, lit_ground, ink > paper, visible),
+        mixed=_mixed(polar, band),
     )
+
+
+def _blurred(
+    polar: PolarImages, at: np.ndarray, inner: np.ndarray | float, outer: np.ndarray
+) -> np.ndarray:
+    """Return the shares of ink that blur leaves or brings at radii (n, k) of a ring, (k, n, 1)."""
+    deviation = polar.blur / polar.size
+    below, above = (normal_integral((of - at) / deviation) for of in (inner, outer))
+    return np.asarray(above - below).T[..., None].astype(np.float32)
+
+
+def _mixed(polar: PolarImages, band: tuple[float, float]) -> np.ndarray:
+    """Return the angles that blur mixes at ends of arcs, see `Evidence`, shape (k, 2)."""
+    along = np.pi * sum(band) * polar.size / polar.gray.shape[1]
+    dark, bright = np.multiply.outer(_MIXED, polar.blur / along)
+    ink_is_dark = polar.polarity > 0
+    sides = np.where(ink_is_dark, bright, dark), np.where(ink_is_dark, dark, bright)
+    return np.stack(sides, axis=1).astype(np.float32)
 
 
 def _covered(
@@ -191,20 +222,30 @@ def light_edges(
 
 
 def _step_evidence(
-    polar: PolarImages, band: np.ndarray, ground: np.ndarray, edges: np.ndarray
+    polar: PolarImages,
+    band: np.ndarray,
+    ground: np.ndarray,
+    edges: np.ndarray,
+    bare: Sequence[np.ndarray],
+    marked: Sequence[np.ndarray],
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the evidence of steps from ground into bands, (k, 2, m), for paper and for ink.
 
-    Glare makes the step of a mark smaller. Where it makes ground white, paper between is white.
+    The shares of ink that blur leaves on ground and band, shape (k, 2, 1) each, are those of bare
+    bands and of marked ones. Glare makes the step of a mark smaller. Where it makes ground white,
+    paper between is white.
     """
     (level, noise), (beside, of_ground) = polar.logs(band), polar.logs(ground)
-    ink = polar.inked(ground, band)
+    blank, ink = (
+        polar.printed(polar.paper(ground, on_ground), on_band, band)
+        for on_ground, on_band in (bare, marked)
+    )
     mark = polar.logs(ink)[0] - beside
     step = level - beside
     limit = polar.glare[:, None, None]
     glare, white = ground >= limit, np.minimum(*ground.swapaxes(0, 1))[:, None] >= SATURATED
     flat = np.where(white & (limit <= SATURATED), np.float32(_WHITE), np.float32(_FLAT))
-    flat = normal(step, np.sqrt(flat**2 + noise**2 + of_ground**2))
+    flat = normal(level - polar.logs(blank)[0], np.sqrt(flat**2 + noise**2 + of_ground**2))
     more = (step - mark) * np.sign(mark)
     expected = of_ground * _gain(ground, ink)
     low, high = (np.sqrt(spread**2 + noise**2 + expected**2) for spread in (_MARK, _MARK_TAIL))
@@ -282,6 +323,7 @@ def level_evidence(
         dot=(ink - paper)[..., in_dot].sum(axis=(1, 2)),
         lit=surprise[:, 0, 0].astype(np.float32),
         covered=np.stack([dark[..., half & on_ground].any(axis=2) for half in halves], axis=1),
+        mixed=_mixed(polar, band),
     )
 
 
@@ -296,3 +338,9 @@ def normal(values: np.ndarray, spread: np.ndarray) -> np.ndarray:
     """Return the densities of values under normal distributions about 0."""
     density: np.ndarray = np.exp(-0.5 * (values / spread) ** 2) / (spread * np.sqrt(2 * np.pi))
     return density
+
+
+def normal_integral(values: np.ndarray) -> np.ndarray:
+    """Return the integral of the normal distribution up to values (Page 1977), to 0.0002."""
+    scaled = np.clip(values, -5, 5)
+    return np.asarray(1 / (1 + np.exp(-2 * np.sqrt(2 / np.pi) * (scaled + 0.044715 * scaled**3))))

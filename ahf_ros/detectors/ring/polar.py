@@ -111,6 +111,16 @@ class PolarImages(ArrayRecord):
         bright = np.where(seen >= SATURATED, np.minimum(bright, seen), bright)
         return np.where(polarity > 0, contrast * paper, bright)
 
+    def printed(self, paper: np.ndarray, share: np.ndarray, seen: np.ndarray) -> np.ndarray:
+        """Return the gray values of paper of which a share is ink."""
+        return paper + share * (self.inked(paper, seen) - paper)
+
+    def paper(self, seen: np.ndarray, share: np.ndarray) -> np.ndarray:
+        """Return the gray values of bare paper, of which a share is ink where it is `seen`."""
+        dark = self.polarity > 0
+        ink = _along(np.where(dark, self.contrast, 1 / self.contrast), seen).astype(np.float32)
+        return np.asarray(seen / (1 + share * (ink - 1)))
+
     def logs(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return ln(I + offset) of gray values (k, ...), and the deviation of its noise."""
         raised = np.maximum(values, 0) + np.float32(LOG_OFFSET)

@@ -14,7 +14,7 @@ import numpy as np
 
 from ahf_ros.codes.ring import Family, least_marked
 from ahf_ros.detectors.ring.borders import with_ends
-from ahf_ros.detectors.ring.circles import REACH, target_circles
+from ahf_ros.detectors.ring.circles import reach_of, target_circles
 from ahf_ros.detectors.ring.decoding import CLEAR, DOUBT, Words, decode
 from ahf_ros.detectors.ring.hypotheses import Hypotheses
 from ahf_ros.detectors.ring.known import NOTHING_KNOWN, Prior
@@ -176,7 +176,7 @@ def _joint_fit(
         gray,
         start.frames,
         circles,
-        reach=REACH,
+        reach=reach_of(family),
         projective=True,
         rounds=rounds,
         blur=start.blur,
