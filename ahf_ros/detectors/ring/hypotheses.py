@@ -140,15 +140,15 @@ def among_others(hypotheses: Hypotheses) -> Hypotheses:
     certain, confidence = hypotheses.certain, hypotheses.confidence
     arcs = (hypotheses.coded < -_FOREIGN) & (hypotheses.ends <= 0) & (hypotheses.share > _ROUND)
     foreign = (arcs | (hypotheses.unlike > COVERED)) & ~certain
-    doubt = (1 - confidence) / np.maximum(confidence, np.finfo(float).eps)
+    left = confidence.copy()
     for code in dict.fromkeys(hypotheses.families):
         own = hypotheses.families == code
-        alike = (certain * confidence)[own].sum() - (certain * confidence)[own] + 0.5
-        others = foreign[own].sum()
-        by_chance = doubt[own] * np.maximum((others + 0.5) / alike, 1)
+        sure, others = confidence[own], foreign[own].sum()
+        alike = (certain[own] * sure).sum() - certain[own] * sure + 0.5
+        by_chance = np.maximum((others + 0.5) / alike, 1)
         as_arcs = others / alike * np.exp(-np.maximum(hypotheses.coded[own], 0)) / _CODED
-        doubt[own] = by_chance + as_arcs
-    return replace(hypotheses, confidence=np.where(confidence > 0, 1 / (1 + doubt), 0.0))
+        left[own] = sure / (1 + (1 - sure) * (by_chance - 1) + sure * as_arcs)
+    return replace(hypotheses, confidence=left)
 
 
 def resolve(hypotheses: Hypotheses, ids: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
