@@ -22,6 +22,7 @@ _ASIDE = 0.25  # distance from further circles, dot radii
 _EVEN, _UNEVEN = 0.3, 0.03  # of the step of ink that even ground keeps within; share that may not
 _UNLIKE = 0.5  # of that step, from which paper is ink, and up to which ink is paper
 _READINGS = 2  # in one direction, which are no noise
+_OF_MARKS = 1 / 3  # of all directions, that are as unlike as all marks
 
 
 def unlike_print(
@@ -29,8 +30,9 @@ def unlike_print(
 ) -> np.ndarray:
     """Return the shares of directions in which targets are not what their words print, (k,).
 
-    They are 0 where light is uneven. `growth`, shape (k,), is that of ink in dot radii, and
-    `overhang` by how many angles this makes arcs longer at either end.
+    Where few are marked, a third of the share of these counts. All are 0 where light is uneven.
+    `growth`, shape (k,), is that of ink in dot radii, and `overhang` by how many angles this makes
+    arcs longer at either end.
     """
     count, (inner, outer) = words.hidden.shape[1], family.band
     radii, about = polar.radii, (growth, inner - growth, outer + growth)
@@ -52,14 +54,22 @@ def unlike_print(
     step = _step_shares(polar, ground)
     uneven = (np.abs(step) > _EVEN) & ground
     even = uneven.sum(axis=(1, 2)) < _UNEVEN * ground.sum(axis=(1, 2))
-    other = np.where(ink, step < _UNLIKE, (step > _UNLIKE) & paper)
-    return np.where(even, (other.sum(axis=2) >= _READINGS).mean(axis=1), 0.0)
+    lost, stray = (
+        np.count_nonzero(of, axis=2) >= _READINGS
+        for of in (ink & (step < _UNLIKE), paper & (step > _UNLIKE))
+    )
+    printed = np.maximum(np.count_nonzero(ink.any(axis=2), axis=1), 1)
+    of_marks = np.count_nonzero(lost, axis=1) / printed
+    unlike = np.maximum((lost | stray).mean(axis=1), _OF_MARKS * of_marks)
+    return np.where(even, unlike, 0.0)
 
 
 def _step_shares(polar: PolarImages, ground: np.ndarray) -> np.ndarray:
     """Return steps of ln from the usual gray value of ground, in those of ink, (k, m, n)."""
-    flat = len(ground), ground.shape[1] * ground.shape[2]
-    paper = median(polar.gray.reshape(flat), ground.reshape(flat))[:, None]
+    beyond = ground.any(axis=(0, 1))
+    flat = len(ground), ground.shape[1] * int(beyond.sum())
+    levels, known = (of[..., beyond].reshape(flat) for of in (polar.gray, ground))
+    paper = median(levels, known)[:, None]
     ink = polar.inked(paper, paper)
     of_paper, of_ink = (np.log(of + LOG_OFFSET)[..., None] for of in (paper, ink))
     values = np.log(polar.gray + np.float32(LOG_OFFSET))

@@ -17,7 +17,7 @@ from ahf_ros.features.circle_fit import Fit
 _CLEARLY = 2.0  # times the evidence of another claim to the same ID or dot
 _FOREIGN = 10.0  # log odds of arcs of any length against a word, which is none then
 _ROUND = 0.6  # share of the edges of a word that are in their place, where there is a band
-_CODED = 20.0  # odds of words against arcs of any length, before any is read
+_CODED = 5.0  # odds of words against arcs of any length, before any is read
 _OVERLAP = 0.92  # of the radii of two targets, at which the paper of one hides marks of the other
 _ON_TOP = 3.0  # times as sure of its word as of what lies below it
 
