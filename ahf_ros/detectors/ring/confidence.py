@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 CERTAIN = 0.75
 """Confidence from which words are reported."""
 
+COVERED = 0.25
+"""Share of directions that covers hide at the most where they leave even ground beyond a band."""
+
 WEIGHTS = Path(__file__).with_name('fitted_weights.json')
 """The data file, which says what made it."""
 
@@ -33,12 +36,13 @@ _OF_MARGIN = np.array([-1.0, 1.0])  # one or two log odds leave a doubt
 
 
 def features(read: Hypotheses) -> np.ndarray:
-    """Return what speaks for readings, float64, shape (k, 6).
+    """Return what speaks for readings, float64, shape (k, 7).
 
     Logarithm of the log odds of words against the next ID; root of the log odds of arcs of ink of
     any length against them, negative; the share of the expected edges that are in their place, and
     that of the band that is seen; the log odds that arcs end where sectors do, where these are
-    negative; how easily spots of light show the word, negative.
+    negative; how easily spots of light show the word, negative; the share of directions that look
+    like another print, beyond what covers explain, negative.
     """
     return np.stack(
         [
@@ -48,6 +52,7 @@ def features(read: Hypotheses) -> np.ndarray:
             1 - read.hidden,
             np.minimum(read.ends, 0),
             -np.exp(1 - _spots(read)),
+            np.minimum(COVERED - read.unlike, 0),
         ],
         axis=1,
     )
@@ -70,5 +75,5 @@ def confidence(values: np.ndarray) -> np.ndarray:
 
 
 def target_probability(values: np.ndarray) -> np.ndarray:
-    """Return the probabilities that readings are of targets, shape (k,), values (k, 6)."""
+    """Return the probabilities that readings are of targets, shape (k,), values (k, 7)."""
     return logistic(values, _OF_TARGET)

@@ -61,6 +61,8 @@ class Words(ArrayRecord):
         Log odds of these against the word and what covers it.
     seen : ndarray of float64, shape (k,)
         Log odds of the word, where it is not covered, against anything.
+    unlike : ndarray of float64, shape (k,)
+        Share of directions in which targets are not what their words print, see `appearance`.
     hidden : ndarray of bool, shape (k, m)
         Where something covers the band.
     """
@@ -74,6 +76,7 @@ class Words(ArrayRecord):
     other: np.ndarray
     ahead: np.ndarray
     seen: np.ndarray
+    unlike: np.ndarray
     hidden: np.ndarray
 
     def as_they_look(self) -> Words:
@@ -93,6 +96,7 @@ class Words(ArrayRecord):
             other=np.zeros(count, np.int64),
             ahead=np.zeros(count),
             seen=np.zeros(count),
+            unlike=np.zeros(count),
             hidden=np.zeros((count, angles), bool),
         )
 
@@ -162,6 +166,7 @@ def decode(
         other=other,
         ahead=of_other - score,
         seen=score,
+        unlike=np.zeros(len(read)),
         hidden=hidden,
     )
     return decoded.replaced(read, found)

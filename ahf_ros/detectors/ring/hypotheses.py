@@ -8,7 +8,7 @@ import numpy as np
 
 from ahf_ros.codes.ring import Family
 from ahf_ros.detectors.claims import Rivals, leading, owners
-from ahf_ros.detectors.ring.confidence import CERTAIN, confidence, features
+from ahf_ros.detectors.ring.confidence import CERTAIN, COVERED, confidence, features
 from ahf_ros.detectors.ring.decoding import Words
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
@@ -18,6 +18,7 @@ _CLEARLY = 2.0  # times the evidence of another claim to the same ID or dot
 _CLEAR = 5.0  # log odds of a word against arcs of any length, up to which others may be right
 _FOREIGN = 10.0  # log odds of arcs of any length against a word, which is none then
 _ROUND = 0.6  # share of the edges of a word that are in their place, where there is a band
+_CODED = 5.0  # odds of words against arcs of any length, before any is read
 _OVERLAP = 0.92  # of the radii of two targets, at which the paper of one hides marks of the other
 _ON_TOP = 3.0  # times as sure of its word as of what lies below it
 
@@ -46,8 +47,8 @@ class Hypotheses(ArrayRecord):
         In the rotation read; 0 where there is none.
     starts : ndarray of float64, shape (k,)
         Where in the frame the sector of the lowest bit starts, rad counter-clockwise from +x.
-    margin, marked, coded, ends, seen : ndarray of float64, shape (k,)
-        Log odds of the word, see `ahf_ros.detectors.ring.decoding.Words`.
+    margin, marked, coded, ends, seen, unlike : ndarray of float64, shape (k,)
+        Log odds of the word and looks of its print, see `ahf_ros.detectors.ring.decoding.Words`.
     hidden : ndarray of float64, shape (k,)
         Share of the band that something covers.
     families : ndarray of Family, shape (k,)
@@ -70,6 +71,7 @@ class Hypotheses(ArrayRecord):
     coded: np.ndarray
     ends: np.ndarray
     seen: np.ndarray
+    unlike: np.ndarray
     hidden: np.ndarray
     families: np.ndarray
     confidence: np.ndarray
@@ -121,6 +123,7 @@ class Hypotheses(ArrayRecord):
             coded=words.coded,
             ends=words.ends,
             seen=words.seen,
+            unlike=words.unlike,
             hidden=words.hidden.mean(axis=1),
             families=np.full(len(words.words), family, object),
             confidence=np.zeros(len(words.words)),
@@ -134,20 +137,25 @@ class Hypotheses(ArrayRecord):
 
 
 def among_others(hypotheses: Hypotheses) -> Hypotheses:
-    """Return hypotheses of an image, less certain where most bands are of no family that is read.
+    """Return hypotheses of an image, less certain where it shows bands of no family that is read.
 
-    Targets of one image share a family. Where arcs of any length explain most whole bands better
-    than words, a single word that is not quite clear is one by chance.
+    Targets of one image share a family. Whole bands that arcs of any length explain better than
+    words, with ends anywhere, and targets that do not look like their print are foreign. Among
+    these a word is one by chance, unless more targets share its family; and it is arcs of any
+    length, unless it explains its band better.
     """
     certain, confidence = hypotheses.certain, hypotheses.confidence
-    foreign = (hypotheses.coded < -_FOREIGN) & (hypotheses.share > _ROUND) & ~certain
-    others = np.zeros(len(certain))
+    arcs = (hypotheses.coded < -_FOREIGN) & (hypotheses.ends <= 0) & (hypotheses.share > _ROUND)
+    foreign = (arcs | (hypotheses.unlike > COVERED)) & ~certain
+    left = confidence.copy()
     for code in dict.fromkeys(hypotheses.families):
         own = hypotheses.families == code
-        alike = (certain * confidence)[own].sum() - certain * confidence
-        others[own] = ((alike + 0.5) / (foreign[own].sum() + 0.5))[own]
-    odds = np.minimum(others, 1)
-    return replace(hypotheses, confidence=confidence * odds / (1 - confidence * (1 - odds)))
+        sure, others = confidence[own], foreign[own].sum()
+        alike = (certain[own] * sure).sum() - certain[own] * sure + 0.5
+        by_chance = np.maximum((others + 0.5) / alike, 1)
+        as_arcs = others / alike * np.exp(-np.maximum(hypotheses.coded[own], 0)) / _CODED
+        left[own] = sure / (1 + (1 - sure) * (by_chance - 1) + sure * as_arcs)
+    return replace(hypotheses, confidence=left)
 
 
 def resolve(hypotheses: Hypotheses, ids: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

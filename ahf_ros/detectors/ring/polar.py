@@ -89,6 +89,11 @@ class PolarImages(ArrayRecord):
     shade: np.ndarray
     glare: np.ndarray
 
+    @property
+    def radii(self) -> np.ndarray:
+        """Radii of the circles, dot radii, shape (k, n)."""
+        return np.linspace(_INNERMOST, self.outermost, self.gray.shape[2], axis=1)
+
     def at(self, radii: np.ndarray) -> np.ndarray:
         """Return gray values on a circle of each dot, of radii (k,) in dot radii, shape (k, m)."""
         spacing = (self.outermost - _INNERMOST) / (self.gray.shape[2] - 1)

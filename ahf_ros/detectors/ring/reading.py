@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from ahf_ros.codes.ring import Family, least_marked
+from ahf_ros.detectors.ring.appearance import unlike_print
 from ahf_ros.detectors.ring.borders import with_ends
 from ahf_ros.detectors.ring.circles import reach_of, target_circles
 from ahf_ros.detectors.ring.decoding import CLEAR, DOUBT, Words, decode
@@ -86,6 +87,7 @@ def _read_part(gray: np.ndarray, dots: Fit, family: Family, prior: Prior) -> Hyp
     words = decode(edges, overhang, family, prior.expected)
     words = _settled(gray, fit, polar, edges, words, overhang, family, prior.expected)
     words = with_ends(polar, words, overhang, edges.lit, family)
+    words = replace(words, unlike=unlike_print(polar, words, growth, overhang, family))
     good = _mean_odds(words, edges.weight) > hopeful
     read, fit, words = read[good], fit.select(good), words.select(good)
     fit = _joint_fit(gray, fit, words, PER_SECTOR, 2, family)

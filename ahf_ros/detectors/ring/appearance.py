@@ -1,0 +1,77 @@
+"""Whether targets look like the print of their words, where light is even about them.
+
+Where the ground beyond a band is even, so is the light on the target, and all of it is paper or
+ink. What covers a target without reaching beyond it hides a small part of its directions. A
+print with other radii or with two bands is another one nearly all round.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ahf_ros.codes.ring import Family
+from ahf_ros.detectors.ring.decoding import Words, bits_at, lengthened
+from ahf_ros.detectors.ring.light import clear_of
+from ahf_ros.detectors.ring.polar import PolarImages
+from ahf_ros.features.robust import median
+from ahf_ros.imaging.logarithm import LOG_OFFSET
+
+_BLURRED, _MINIMUM_BLURRED = 1.6, 1.0  # distance from an edge at which it ends: blurs, and px
+_BEYOND = 0.2, 0.7  # the ground beyond a band, dot radii
+_ASIDE = 0.25  # distance from further circles, dot radii
+_EVEN, _UNEVEN = 0.3, 0.03  # of the step of ink that even ground keeps within; share that may not
+_UNLIKE = 0.5  # of that step, from which paper is ink, and up to which ink is paper
+_READINGS = 2  # in one direction, which are no noise
+_OF_MARKS = 1 / 3  # of all directions, that are as unlike as all marks
+
+
+def unlike_print(
+    polar: PolarImages, words: Words, growth: np.ndarray, overhang: np.ndarray, family: Family
+) -> np.ndarray:
+    """Return the shares of directions in which targets are not what their words print, (k,).
+
+    Where few are marked, a third of the share of these counts. All are 0 where light is uneven.
+    `growth`, shape (k,), is that of ink in dot radii, and `overhang` by how many angles this makes
+    arcs longer at either end.
+    """
+    count, (inner, outer) = words.hidden.shape[1], family.band
+    radii, about = polar.radii, (growth, inner - growth, outer + growth)
+    dot, inside, outside = (of[:, None] for of in about)
+    aside = (np.maximum(_BLURRED * polar.blur, _MINIMUM_BLURRED) / polar.size)[:, None]
+    clear = clear_of(radii, family.circles, _ASIDE)
+    beyond = (radii > outside + np.maximum(aside, _BEYOND[0])) & (radii < outside + _BEYOND[1])
+    gap = (radii > 1 + dot + aside) & (radii < inside - aside)
+    deep = (radii > inside + aside) & (radii < outside - aside)
+    near = (radii > inside - aside) & (radii < outside + aside)
+    visible = (radii[:, None] <= polar.reach[..., None]) & clear[:, None]
+    phases = np.rint(words.starts * count / (2 * np.pi)).astype(int)
+    marked = bits_at(words.words, phases, count // family.bits, family)
+    away = aside[:, 0] * count / (np.pi * (inner + outer)) + 1
+    ink = lengthened(marked, overhang - away)[..., None] & deep[:, None] & visible
+    unmarked = ~lengthened(marked, overhang + away)
+    paper = ((gap | beyond)[:, None] | (unmarked[..., None] & near[:, None])) & visible
+    ground = np.broadcast_to(beyond[:, None] & visible, polar.gray.shape)
+    step = _step_shares(polar, ground)
+    uneven = (np.abs(step) > _EVEN) & ground
+    even = uneven.sum(axis=(1, 2)) < _UNEVEN * ground.sum(axis=(1, 2))
+    lost, stray = (
+        np.count_nonzero(of, axis=2) >= _READINGS
+        for of in (ink & (step < _UNLIKE), paper & (step > _UNLIKE))
+    )
+    printed = np.maximum(np.count_nonzero(ink.any(axis=2), axis=1), 1)
+    of_marks = np.count_nonzero(lost, axis=1) / printed
+    unlike = np.maximum((lost | stray).mean(axis=1), _OF_MARKS * of_marks)
+    return np.where(even, unlike, 0.0)
+
+
+def _step_shares(polar: PolarImages, ground: np.ndarray) -> np.ndarray:
+    """Return steps of ln from the usual gray value of ground, in those of ink, (k, m, n)."""
+    beyond = ground.any(axis=(0, 1))
+    flat = len(ground), ground.shape[1] * int(beyond.sum())
+    levels, known = (of[..., beyond].reshape(flat) for of in (polar.gray, ground))
+    paper = median(levels, known)[:, None]
+    ink = polar.inked(paper, paper)
+    of_paper, of_ink = (np.log(of + LOG_OFFSET)[..., None] for of in (paper, ink))
+    values = np.log(polar.gray + np.float32(LOG_OFFSET))
+    shares: np.ndarray = (values - of_paper) / (of_ink - of_paper)
+    return shares

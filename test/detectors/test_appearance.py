@@ -1,0 +1,47 @@
+"""Targets look like the print of their words; other prints do not, nearly all round."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ahf_ros.codes.ring import family
+from ahf_ros.detectors import DetectorSettings
+from ahf_ros.detectors.ring.confidence import COVERED
+from ahf_ros.detectors.ring.detector import find_hypotheses
+from ahf_ros.synthetic.scene import SceneSettings, render
+from benchmarks import occluders
+from benchmarks.disturbed import Targets
+from benchmarks.exposure import Exposure
+from benchmarks.lookalikes import LOOKALIKES
+from benchmarks.sheets import mark_sheet
+
+
+def unlike(image: np.ndarray, name: str) -> np.ndarray:
+    """Return the shares of directions of the dots that were read."""
+    found = find_hypotheses(image, DetectorSettings(family=name))
+    return found.unlike[found.words > 0]
+
+
+@pytest.mark.parametrize('name', ['metashape12', 'aicon14'])
+def test_targets_look_like_their_words(name: str) -> None:
+    (sheet,) = Targets(name, 12, 3).sheets()
+    clear = unlike(sheet.photograph(Exposure()), name)
+    assert len(clear) == 12 and not clear.any()
+    spots = Exposure(occluder=occluders.disc(0.8, 150.0))
+    spotted = unlike(sheet.photograph(spots), name)
+    assert 0 < spotted.max() < COVERED  # measured: 0.1 in the median
+
+
+def test_other_prints_are_others_all_round() -> None:
+    generator = np.random.default_rng(5)
+    inks = [LOOKALIKES['two bands (RAD)'](family('aicon12'), generator) for _ in range(36)]
+    found = unlike(mark_sheet(inks, 5).photograph(Exposure()), 'aicon12')
+    assert len(found) > 12
+    assert np.median(found) > COVERED
+
+
+def test_light_that_is_uneven_tells_nothing() -> None:
+    scene = SceneSettings(width=800, height=600, targets=4, light='stripe', ambient=0.12, seed=2)
+    found = unlike(render(scene).image, scene.family)
+    assert len(found) >= 4 and not found.any()
