@@ -44,7 +44,8 @@ _QUIET = 0.35  # quantile of rays, whose errors are usual
 _LEAST = 0.003  # standard deviation of gray values, of their mean
 _OTHER_CONTRAST = 0.2  # difference of the contrast of a ray, that quarters its weight
 _MAXIMUM_CHANGE = 0.08  # of a frame in a round, radii
-_PRIOR_PERSPECTIVE = 5e-4  # change of scale in a radius, for a px of the radius
+_PERSPECTIVE = 5e-4  # change of scale along a px where tilted by 45 degrees: 1 / focal length, px
+_LEAST_TILT = 0.1  # tangent of the tilt that a circular target may have
 _OF_VARIANCE = 2.0  # of gray values, that their model adds
 _SHARPEST, _SOFTEST = 0.35, 1.5  # blur: px, and in narrow rings, which more of it would hide
 _MOST_SHIFT = 0.45  # of edges, in narrow rings
@@ -353,7 +354,9 @@ def _aligned(
         each = np.minimum(area, 1.0) / variance / _OF_VARIANCE  # pixels are independent
         normal, right = normal * each[:, None, None], right * each[:, None]
         normal[:, range(5), range(5)] += 1e-6
-        normal[:, [5, 6], [5, 6]] += ((_PRIOR_PERSPECTIVE * size) ** -2)[:, None]
+        usual = _usual_perspective(frames)
+        normal[:, 5:7, 5:7] += usual
+        right[:, 5:7] -= (usual @ frames[:, 2, :2, None])[..., 0]
         normal[:, [7, 8], [7, 8]] += np.array(prior.deviations) ** -2
         known = np.stack([shift - prior.shift, np.log(blur / prior.blur)], axis=1)
         right[:, 7:] -= known * np.array(prior.deviations) ** -2
@@ -391,6 +394,19 @@ def _aligned(
         plain=_plain(values, good, ink, blur / frame.mean_radii(frames)),
         margin=np.full(count, np.nan),
     )
+
+
+def _usual_perspective(frames: np.ndarray) -> np.ndarray:
+    """Return the inverse covariances of the perspective of frames, (k, 2, 2), that is expected.
+
+    Scale changes along the minor axis of a tilted target, the more the more it is foreshortened.
+    """
+    _, axes, directions = np.linalg.svd(frame.local_affine(frames))
+    tilt = np.sqrt(np.maximum((axes[:, 0] / axes[:, 1]) ** 2 - 1, 0))
+    most = np.stack([np.full(len(frames), _LEAST_TILT), tilt + _LEAST_TILT], axis=1)
+    weight = (most * _PERSPECTIVE * frame.mean_radii(frames)[:, None]) ** -2
+    usual: np.ndarray = directions.transpose(0, 2, 1) * weight[:, None] @ directions
+    return usual
 
 
 def _plain(values: np.ndarray, good: np.ndarray, ink: np.ndarray, blur: np.ndarray) -> np.ndarray:
