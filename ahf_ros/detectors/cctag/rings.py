@@ -23,12 +23,14 @@ from ahf_ros.features.sampling import sample_circles
 
 _FEW_ANGLES, _FEW_RADII = ANGLES[::2], slice(None, None, 2)  # of a glance
 _SIZES = 1.05  # ratio of radii that share templates, and of hypotheses of the radius
-_SHIFTS, _BLURS = (-0.6, -0.3, 0.0, 0.3, 0.6), (0.6, 0.9, 1.4)  # of edges, that are tried, px
+_TRIED_SHIFTS, _TRIED_BLURS = (-1.2, -0.6, 0.0, 0.6, 1.2), (-1.0, 0.0, 1.4)  # deviations
 _GROWN = (0.85, 0.9, 0.95, 1.0, 1.05)  # radii of the outermost circle, where that was found
-_NARROWEST = 0.7  # ring that is read, px; blur hides others
+_NARROWEST = 0.5  # ring that is read, px; blur hides others
 _PROMISING = 0.6  # share of a profile that rings explain, from which they are looked at
 _APART = 0.5  # distance of the centres of different targets, radii
 _PART = 2048, 48  # hypotheses and targets at a time, which bounds the memory
+_GAMMAS = (2.2,)  # of gray values, besides 1
+_TELLING_OF_GAMMA = 16  # targets
 _ENOUGH = 4  # certain targets, that tell of the edges of an image
 _SCALES = (0.93, 0.965, 1.0, 1.035, 1.07)  # of the radius, about a frame
 _READINGS = 5  # IDs that are brought onto the image from a frame
@@ -68,6 +70,13 @@ class Prior:
         return ((rings.shift - self.shift) / of_shift) ** 2 + (
             np.log(rings.blur / self.blur) / of_blur
         ) ** 2
+
+    @property
+    def tried(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Shifts and blurs of templates, px."""
+        of_shift, of_blur = self.deviations
+        shifts = tuple(round(self.shift + of * of_shift, 2) for of in _TRIED_SHIFTS)
+        return shifts, tuple(round(self.blur * np.exp(of * of_blur), 2) for of in _TRIED_BLURS)
 
     @staticmethod
     def after(rings: Aligned) -> Prior:
@@ -240,13 +249,13 @@ def identify(
     """Return the best reading of each target about outermost circles, known to about a tenth."""
     if not len(frames):
         return NOTHING
-    starts, ids, shift = _likely_ids(gray, frames, polarity, family)
+    starts, ids, shift = _likely_ids(gray, frames, polarity, family, prior)
     # The likeliest ID often brings the frame to its place even if it is the wrong one.
     first = align(gray, starts[:, 0], ids[:, 0], shift[:, 0], family, prior)
     likely = first.plain > _HOPELESS
     if not likely.any():
         return NOTHING
-    again = _likely_ids(gray, first.frames[likely], polarity, family)
+    again = _likely_ids(gray, first.frames[likely], polarity, family, prior)
     starts, ids, shift = (
         np.concatenate([of[likely], more], axis=1)
         for of, more in zip((starts, ids, shift), again, strict=True)
@@ -282,7 +291,7 @@ def _settled(gray: np.ndarray, rings: Aligned, family: CircleFamily, prior: Prio
 
 
 def _likely_ids(
-    gray: np.ndarray, frames: np.ndarray, polarity: int, family: CircleFamily
+    gray: np.ndarray, frames: np.ndarray, polarity: int, family: CircleFamily, prior: Prior
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return frames, (k, n, 3, 3), of IDs that profiles are like, (k, n), and shifts of edges."""
     weight = np.sqrt(PROFILE / PROFILE.sum())
@@ -292,7 +301,7 @@ def _likely_ids(
     for of_scale, share, shift in zip(scaled, shares, shifts, strict=True):
         profiles = _profiles(gray, of_scale, polarity, ANGLES, PROFILE) * weight
         for step, some in _by_size(of_scale):
-            templates, of_shift = _templates(family, step, _SHIFTS, _BLURS)
+            templates, of_shift = _templates(family, step, *prior.tried)
             found = _shares(profiles[some], templates, weight, PROFILE)
             found = found.reshape(len(some), -1, len(family.numbers))
             share[some], shift[some] = found.max(axis=1), of_shift[found.argmax(axis=1)]
@@ -302,6 +311,21 @@ def _likely_ids(
     rows = np.arange(len(frames))[:, None]
     scale = shares.argmax(axis=0)[rows, order]
     return scaled[scale, rows], order, shifts[scale, rows, order]
+
+
+def in_light(gray: np.ndarray, rings: Aligned, family: CircleFamily) -> np.ndarray:
+    """Return an image of light, where rings that are read tell the gamma of its gray values.
+
+    Blur mixes light, and not gray values, which matters where rings are narrow.
+    """
+    some = rings.select(np.argsort(rings.left, kind='stable')[:_TELLING_OF_GAMMA])
+    if not len(some.ids):
+        return gray
+    images = [gray] + [255 * (gray.clip(0) / 255) ** np.float32(gamma) for gamma in _GAMMAS]
+    left = [
+        float(np.mean(align(of, some.frames, some.ids, some.shift, family).left)) for of in images
+    ]
+    return images[int(np.argmin(left))]
 
 
 def align(
@@ -318,7 +342,8 @@ def align(
     """
     parts = [slice(start, start + _PART[1]) for start in range(0, len(frames), _PART[1])]
     return Aligned.joined(
-        [_aligned(gray, frames[part], ids[part], shift[part], family, prior) for part in parts]
+        [NOTHING]
+        + [_aligned(gray, frames[part], ids[part], shift[part], family, prior) for part in parts]
     )
 
 
