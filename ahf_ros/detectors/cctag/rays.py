@@ -30,7 +30,7 @@ _LIGHT_EDGES = PROFILE[2:-2:2]  # radii at which the light may change
 _EDGES_OF_RAY = 2
 _LEAST_STEP = 0.15  # of ln of the light
 _EXPLAINED, _OF_USUAL = 0.5, 3.0  # squares that an edge takes, of those of its ray and usual ones
-_BLUR = 0.9  # of edges of light, px
+_EDGE_WIDTH = 2.2  # of light, px
 _CLOSE, _CLOSE_WEIGHT = 1.0, 0.02  # px from an edge of light, and what is left there of a weight
 _DARKEST = 0.03  # ink, of the brightness of paper, in logarithms
 
@@ -42,25 +42,30 @@ def lit(gray: np.ndarray, frames: np.ndarray) -> np.ndarray:
     return lit
 
 
-def robust_rays(values: np.ndarray, ink: np.ndarray, size: np.ndarray, outlier: float) -> Rays:
+def robust_rays(values: np.ndarray, ink: np.ndarray, outlier: float) -> Rays:
     """Return rays, values (k, rays, n) and ink (k, n), whose weights are low where light disturbs.
 
-    The size (k,) is the radius of the targets, px. Edges of light are taken out.
+    An error of `outlier` usual deviations leaves a quarter of a weight.
     """
-    rays = _weighted(values, ink, np.broadcast_to(PROFILE, values.shape), outlier)
+    return _weighted(values, ink, np.broadcast_to(PROFILE, values.shape), outlier, 2)
+
+
+def evenly_lit_rays(values: np.ndarray, ink: np.ndarray, size: np.ndarray, outlier: float) -> Rays:
+    """Return what `robust_rays` does, edges of light taken out; sizes (k,) are radii, px."""
+    rays = _weighted(values, ink, np.broadcast_to(PROFILE, values.shape), outlier, 1)
     light, weight = _light_edges(values, ink, np.median(rays.contrast, axis=1), size)
-    return _weighted(values / light, ink, PROFILE * weight, outlier)
+    return _weighted(values / light, ink, PROFILE * weight, outlier, 1)
 
 
 def _weighted(
-    values: np.ndarray, ink: np.ndarray, usual_weight: np.ndarray, outlier: float
+    values: np.ndarray, ink: np.ndarray, usual_weight: np.ndarray, outlier: float, rounds: int
 ) -> Rays:
     """Return rays whose weights are low where values are unlike the ink.
 
     The contrast of ink is the same wherever the light falls.
     """
     rays = Rays.of(values, ink, usual_weight)
-    for _ in range(2):
+    for _ in range(rounds):
         usual = np.median(rays.contrast, axis=1, keepdims=True)
         unlike = (rays.contrast - usual) / (_OTHER_CONTRAST * np.maximum(np.abs(usual), 1e-9))
         alike = geman_mcclure(1.0, unlike)
@@ -83,7 +88,8 @@ def _light_edges(
     bright = np.maximum(paper + contrast * ink, _DARKEST)
     weight = PROFILE * bright  # noise is relative to the light
     weight = (weight / weight.sum(axis=1, keepdims=True))[:, None]
-    steps = normal_share((PROFILE - _LIGHT_EDGES[:, None]) * size[:, None, None] / _BLUR)
+    steps = (PROFILE - _LIGHT_EDGES[:, None]) * size[:, None, None] / _EDGE_WIDTH
+    steps = np.clip(0.5 + steps, 0, 1)
     away = steps - (steps * weight).sum(axis=2, keepdims=True)
     power = np.maximum((away**2 * weight).sum(axis=2), 1e-6)[:, None]
     rest = np.log(np.maximum(values, 0.01)) - np.log(bright)[:, None]

@@ -14,7 +14,15 @@ from itertools import product
 import numpy as np
 
 from ahf_ros.codes.cctag import CircleFamily
-from ahf_ros.detectors.cctag.rays import ANGLES, PROFILE, Rays, lit, normal_share, robust_rays
+from ahf_ros.detectors.cctag.rays import (
+    ANGLES,
+    PROFILE,
+    Rays,
+    evenly_lit_rays,
+    lit,
+    normal_share,
+    robust_rays,
+)
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.dots import Dots
@@ -36,6 +44,7 @@ _SCALES = (0.93, 0.965, 1.0, 1.035, 1.07)  # of the radius, about a frame
 _READINGS = 5  # IDs that are brought onto the image from a frame
 _REPEATS, _STAYING = 6, 0.1  # until the square of a move is a small part of the variance
 _OUTLIERS = 12.0, 8.0, 5.0, 3.0, 3.0  # deviations that quarter a weight, in rounds of Gauss-Newton
+_NEAR = 5.0  # deviations, from which on edges of light are told from rings
 _MAXIMUM_CHANGE = 0.08  # of a frame in a round, radii
 _PERSPECTIVE = 5e-4  # change of scale along a px where tilted by 45 degrees: 1 / focal length, px
 _LEAST_TILT = 0.1  # tangent of the tilt that a circular target may have
@@ -362,7 +371,12 @@ def _aligned(
         size = frame.mean_radii(frames)
         values = lit(gray, frames)
         ink, slope, by_shift, by_blur = _rings(family, ids, size, shift, blur)
-        rays = robust_rays(values, ink, size, outlier)
+        near = outlier <= _NEAR  # light is told from rings
+        rays = (
+            evenly_lit_rays(values, ink, size, outlier)
+            if near
+            else robust_rays(values, ink, outlier)
+        )
         by_radius = [slope, slope * PROFILE, slope * PROFILE**2]
         normal, right = rays.equations(np.stack([*by_radius, by_shift, by_blur], axis=1), ink)
         variance = (rays.weight * rays.errors**2).sum(axis=(1, 2)) / rays.weight.sum(axis=(1, 2))
