@@ -17,7 +17,7 @@ import numpy as np
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.codes import CCTAG_NAMES
 from ahf_ros.codes.cctag import CircleFamily, circle_family
-from ahf_ros.detectors.cctag.rings import Aligned, Prior, align, identify, likely_rings
+from ahf_ros.detectors.cctag.rings import Aligned, Prior, align, identify, in_light, likely_rings
 from ahf_ros.detectors.claims import best_targets
 from ahf_ros.detectors.contract import FamilyDetector, moved_targets
 from ahf_ros.features import frame
@@ -80,7 +80,9 @@ class CctagDetector(FamilyDetector):
             columns = [(it.x, it.y, it.semi_major, it.semi_minor, it.angle) for it in known]
             start = frame.affine_frames(*np.array(columns).T)
             shift = np.array([target.edge_shift or 0.0 for target in known])
-            of = align(gray, start, np.array([it.id for it in known]), shift, family)
+            ids = np.array([it.id for it in known])
+            light = in_light(gray, align(gray, start, ids, shift, family), family)
+            of = align(light, start, ids, shift, family)
             moved = np.hypot(*(of.frames[:, :2, 2] - start[:, :2, 2]).T)
             reach = np.maximum(_MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE * frame.mean_radii(start))
             places = ellipse_fields(of.frames, of.covariance, of.edge_shift)
@@ -97,8 +99,8 @@ class CctagDetector(FamilyDetector):
             circles = Dots.joined([every, replace(centres, polarity=centres.polarity + polarity)])
             for family in self.design:
                 frames = likely_rings(gray, circles, octave.radii, polarity, family)
-                rings = _identified(gray, frames, polarity, family)
-                found += self._shown(_owning(gray, rings, polarity, family), family.name)
+                rings, light = _identified(gray, frames, polarity, family)
+                found += self._shown(_owning(light, rings, polarity, family), family.name)
         return found
 
     def _shown(self, rings: Aligned, family: str) -> list[Target]:
@@ -116,13 +118,19 @@ class CctagDetector(FamilyDetector):
 
 def _identified(
     gray: np.ndarray, frames: np.ndarray, polarity: int, family: CircleFamily
-) -> Aligned:
-    """Return the readings of targets of one colour, doubtful ones with what certain ones show."""
+) -> tuple[Aligned, np.ndarray]:
+    """Return the readings of targets of one colour, and the image of light that they are of.
+
+    Doubtful targets are read with what certain ones show.
+    """
     rings = identify(gray, frames, polarity, family)
-    certain = rings.confidence >= _TELLING
-    doubtful = rings.select(~certain & (rings.of_target >= _POSSIBLE))
-    again = identify(gray, doubtful.frames, polarity, family, Prior.after(rings.select(certain)))
-    return Aligned.joined([rings.select(certain), again])
+    light = in_light(gray, rings.select(rings.of_target >= _SURE_OF_TARGET), family)
+    certain = rings.select(rings.confidence >= _TELLING)
+    seen = align(light, certain.frames, certain.ids, certain.shift, family)
+    certain = replace(seen, margin=certain.margin)
+    doubtful = rings.select((rings.confidence < _TELLING) & (rings.of_target >= _POSSIBLE))
+    again = identify(light, doubtful.frames, polarity, family, Prior.after(certain))
+    return Aligned.joined([certain, again]), light
 
 
 def _owning(gray: np.ndarray, rings: Aligned, polarity: int, family: CircleFamily) -> Aligned:

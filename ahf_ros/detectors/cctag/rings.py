@@ -14,38 +14,41 @@ from itertools import product
 import numpy as np
 
 from ahf_ros.codes.cctag import CircleFamily
+from ahf_ros.detectors.cctag.rays import (
+    ANGLES,
+    PROFILE,
+    Rays,
+    evenly_lit_rays,
+    lit,
+    normal_share,
+    robust_rays,
+)
 from ahf_ros.features import frame
 from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.dots import Dots
 from ahf_ros.features.logistic import logistic
-from ahf_ros.features.robust import NORMAL, geman_mcclure
 from ahf_ros.features.sampling import sample_circles
 
-_RAYS = 64
-_ANGLES = 2 * np.pi * np.arange(_RAYS) / _RAYS
-_PROFILE = np.linspace(0.06, 1.3, 72)  # radii at which rays are read
-_AROUND = np.zeros((_RAYS, 5, 9))  # what each change does to the ink on rays, by powers of radii
-_AROUND[:, [0, 0, 1, 1, 1, 2, 2], range(7)] = -frame.displacement_basis(_ANGLES, np.ones(_RAYS))
-_AROUND[:, [3, 4], [7, 8]] = 1.0
-_FEW_ANGLES, _FEW_RADII = _ANGLES[::2], slice(None, None, 2)  # of a glance
+_FEW_ANGLES, _FEW_RADII = ANGLES[::2], slice(None, None, 2)  # of a glance
 _SIZES = 1.05  # ratio of radii that share templates, and of hypotheses of the radius
-_SHIFTS, _BLURS = (-0.6, -0.3, 0.0, 0.3, 0.6), (0.6, 0.9, 1.4)  # of edges, that are tried, px
+_TRIED_SHIFTS, _TRIED_BLURS = (-1.2, -0.6, 0.0, 0.6, 1.2), (-1.0, 0.0, 1.4)  # deviations
 _GROWN = (0.85, 0.9, 0.95, 1.0, 1.05)  # radii of the outermost circle, where that was found
-_NARROWEST = 0.7  # ring that is read, px; blur hides others
+_NARROWEST = 0.5  # ring that is read, px; blur hides others
 _PROMISING = 0.6  # share of a profile that rings explain, from which they are looked at
 _LOOKED_AT = 4  # frames for an ID, at the most
 _APART = 0.5  # distance of the centres of different targets, radii
 _PART = 2048, 48  # hypotheses and targets at a time, which bounds the memory
+_GAMMAS = (2.2,)  # of gray values, besides 1
+_TELLING_OF_GAMMA = 16  # targets
 _ENOUGH = 4  # certain targets, that tell of the edges of an image
 _SCALES = (0.93, 0.965, 1.0, 1.035, 1.07)  # of the radius, about a frame
 _READINGS = 5  # IDs that are brought onto the image from a frame
 _REPEATS, _STAYING = 6, 0.1  # until the square of a move is a small part of the variance
 _OUTLIERS = 12.0, 8.0, 5.0, 3.0, 3.0  # deviations that quarter a weight, in rounds of Gauss-Newton
-_QUIET = 0.35  # quantile of rays, whose errors are usual
-_LEAST = 0.003  # standard deviation of gray values, of their mean
-_OTHER_CONTRAST = 0.2  # difference of the contrast of a ray, that quarters its weight
+_NEAR = 5.0  # deviations, from which on edges of light are told from rings
 _MAXIMUM_CHANGE = 0.08  # of a frame in a round, radii
-_PRIOR_PERSPECTIVE = 5e-4  # change of scale in a radius, for a px of the radius
+_PERSPECTIVE = 5e-4  # change of scale along a px where tilted by 45 degrees: 1 / focal length, px
+_LEAST_TILT = 0.1  # tangent of the tilt that a circular target may have
 _OF_VARIANCE = 2.0  # of gray values, that their model adds
 _SHARPEST, _SOFTEST = 0.35, 1.5  # blur: px, and in narrow rings, which more of it would hide
 _MOST_SHIFT = 0.45  # of edges, in narrow rings
@@ -77,6 +80,13 @@ class Prior:
         return ((rings.shift - self.shift) / of_shift) ** 2 + (
             np.log(rings.blur / self.blur) / of_blur
         ) ** 2
+
+    @property
+    def tried(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Shifts and blurs of templates, px."""
+        of_shift, of_blur = self.deviations
+        shifts = tuple(round(self.shift + of * of_shift, 2) for of in _TRIED_SHIFTS)
+        return shifts, tuple(round(self.blur * np.exp(of * of_blur), 2) for of in _TRIED_BLURS)
 
     @staticmethod
     def after(rings: Aligned) -> Prior:
@@ -167,7 +177,7 @@ def _glance(
     gray: np.ndarray, frames: np.ndarray, polarity: int, family: CircleFamily
 ) -> np.ndarray:
     """Return the share of the mean profiles of frames that the rings of some ID explain, (k,)."""
-    along = _PROFILE[_FEW_RADII]
+    along = PROFILE[_FEW_RADII]
     profiles = _profiles(gray, frames, polarity, _FEW_ANGLES, along)
     share = np.zeros(len(frames))
     for step, some in _by_size(frames):
@@ -227,8 +237,8 @@ def _templates(
     edges = [of for of in product(shifts, blurs) if abs(of[0]) <= most]
     inks = []
     for shift, blur in edges:
-        place = np.hypot(_PROFILE, blur / size)
-        circles = sign * _normal_share(((radii - place) * size + sign * shift) / blur)
+        place = np.hypot(PROFILE, blur / size)
+        circles = sign * normal_share(((radii - place) * size + sign * shift) / blur)
         inks.append(circles[inverse.reshape(table.shape)].sum(axis=1))
     return np.concatenate(inks), np.array([shift for shift, _ in edges])
 
@@ -236,8 +246,8 @@ def _templates(
 @lru_cache(maxsize=64)
 def _discs(step: int) -> np.ndarray:
     """Return the profiles of single discs of all radii, shape (t, n)."""
-    radii = np.linspace(_PROFILE[0], _PROFILE[-1], 100)[3:-3, None]
-    return _normal_share((radii - _PROFILE) * _SIZES**step / 0.9)
+    radii = np.linspace(PROFILE[0], PROFILE[-1], 100)[3:-3, None]
+    return normal_share((radii - PROFILE) * _SIZES**step / 0.9)
 
 
 def identify(
@@ -250,20 +260,20 @@ def identify(
     """Return the best reading of each target about outermost circles, known to about a tenth."""
     if not len(frames):
         return NOTHING
-    starts, ids, shift = _likely_ids(gray, frames, polarity, family)
+    starts, ids, shift = _likely_ids(gray, frames, polarity, family, prior)
     # The likeliest ID often brings the frame to its place even if it is the wrong one.
     first = align(gray, starts[:, 0], ids[:, 0], shift[:, 0], family, prior)
     likely = first.of_target > _HOPELESS
     if not likely.any():
         return NOTHING
-    again = _likely_ids(gray, first.frames[likely], polarity, family)
+    again = _likely_ids(gray, first.frames[likely], polarity, family, prior)
     starts, ids, shift = (
         np.concatenate([of[likely], more], axis=1)
         for of, more in zip((starts, ids, shift), again, strict=True)
     )
     count = ids.shape[1]
     every = align(gray, starts.reshape(-1, 3, 3), ids.ravel(), shift.ravel(), family, prior)
-    independent = frame.mean_radii(starts[:, 0]) * np.ptp(_PROFILE) / _INDEPENDENT
+    independent = frame.mean_radii(starts[:, 0]) * np.ptp(PROFILE) / _INDEPENDENT
     left = np.where(every.colour == polarity, every.left, 0.0).reshape(-1, count)
     cost = (independent[:, None] * left + prior.squares(every).reshape(-1, count)) / 2
     best = every.select(np.arange(len(ids)) * count + cost.argmin(axis=1))
@@ -292,18 +302,18 @@ def _settled(gray: np.ndarray, rings: Aligned, family: CircleFamily, prior: Prio
 
 
 def _likely_ids(
-    gray: np.ndarray, frames: np.ndarray, polarity: int, family: CircleFamily
+    gray: np.ndarray, frames: np.ndarray, polarity: int, family: CircleFamily, prior: Prior
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return frames, (k, n, 3, 3), of IDs that profiles are like, (k, n), and shifts of edges."""
-    weight = np.sqrt(_PROFILE / _PROFILE.sum())
+    weight = np.sqrt(PROFILE / PROFILE.sum())
     shape = len(_SCALES), len(frames), len(family.numbers)
     shares, shifts = np.empty(shape), np.empty(shape)
     scaled = np.stack([frame.scaled(frames, np.full(len(frames), of)) for of in _SCALES])
     for of_scale, share, shift in zip(scaled, shares, shifts, strict=True):
-        profiles = _profiles(gray, of_scale, polarity, _ANGLES, _PROFILE) * weight
+        profiles = _profiles(gray, of_scale, polarity, ANGLES, PROFILE) * weight
         for step, some in _by_size(of_scale):
-            templates, of_shift = _templates(family, step, _SHIFTS, _BLURS)
-            found = _shares(profiles[some], templates, weight, _PROFILE)
+            templates, of_shift = _templates(family, step, *prior.tried)
+            found = _shares(profiles[some], templates, weight, PROFILE)
             found = found.reshape(len(some), -1, len(family.numbers))
             share[some], shift[some] = found.max(axis=1), of_shift[found.argmax(axis=1)]
     order = np.argsort(-shares.max(axis=0), axis=1, kind='stable')[:, :_READINGS]
@@ -312,6 +322,21 @@ def _likely_ids(
     rows = np.arange(len(frames))[:, None]
     scale = shares.argmax(axis=0)[rows, order]
     return scaled[scale, rows], order, shifts[scale, rows, order]
+
+
+def in_light(gray: np.ndarray, rings: Aligned, family: CircleFamily) -> np.ndarray:
+    """Return an image of light, where rings that are read tell the gamma of its gray values.
+
+    Blur mixes light, and not gray values, which matters where rings are narrow.
+    """
+    some = rings.select(np.argsort(rings.left, kind='stable')[:_TELLING_OF_GAMMA])
+    if not len(some.ids):
+        return gray
+    images = [gray] + [255 * (gray.clip(0) / 255) ** np.float32(gamma) for gamma in _GAMMAS]
+    left = [
+        float(np.mean(align(of, some.frames, some.ids, some.shift, family).left)) for of in images
+    ]
+    return images[int(np.argmin(left))]
 
 
 def align(
@@ -328,7 +353,8 @@ def align(
     """
     parts = [slice(start, start + _PART[1]) for start in range(0, len(frames), _PART[1])]
     return Aligned.joined(
-        [_aligned(gray, frames[part], ids[part], shift[part], family, prior) for part in parts]
+        [NOTHING]
+        + [_aligned(gray, frames[part], ids[part], shift[part], family, prior) for part in parts]
     )
 
 
@@ -345,17 +371,24 @@ def _aligned(
     blur = np.full(count, prior.blur)
     for outlier in _OUTLIERS:
         size = frame.mean_radii(frames)
-        values = _lit(gray, frames)
+        values = lit(gray, frames)
         ink, slope, by_shift, by_blur = _rings(family, ids, size, shift, blur)
-        rays = _robust_rays(values, ink, outlier)
-        by_radius = [slope, slope * _PROFILE, slope * _PROFILE**2]
+        near = outlier <= _NEAR  # light is told from rings
+        rays = (
+            evenly_lit_rays(values, ink, size, outlier)
+            if near
+            else robust_rays(values, ink, outlier)
+        )
+        by_radius = [slope, slope * PROFILE, slope * PROFILE**2]
         normal, right = rays.equations(np.stack([*by_radius, by_shift, by_blur], axis=1), ink)
         variance = (rays.weight * rays.errors**2).sum(axis=(1, 2)) / rays.weight.sum(axis=(1, 2))
-        area = size**2 * (_PROFILE[1] - _PROFILE[0]) * (_ANGLES[1] - _ANGLES[0])
+        area = size**2 * (PROFILE[1] - PROFILE[0]) * (ANGLES[1] - ANGLES[0])
         each = np.minimum(area, 1.0) / variance / _OF_VARIANCE  # pixels are independent
         normal, right = normal * each[:, None, None], right * each[:, None]
         normal[:, range(5), range(5)] += 1e-6
-        normal[:, [5, 6], [5, 6]] += ((_PRIOR_PERSPECTIVE * size) ** -2)[:, None]
+        usual = _usual_perspective(frames)
+        normal[:, 5:7, 5:7] += usual
+        right[:, 5:7] -= (usual @ frames[:, 2, :2, None])[..., 0]
         normal[:, [7, 8], [7, 8]] += np.array(prior.deviations) ** -2
         known = np.stack([shift - prior.shift, np.log(blur / prior.blur)], axis=1)
         right[:, 7:] -= known * np.array(prior.deviations) ** -2
@@ -371,10 +404,10 @@ def _aligned(
     covariance = np.linalg.inv(normal)[:, :2, :2]
     affine = frame.local_affine(frames)
     covariance = affine @ covariance @ affine.transpose(0, 2, 1) + _SYSTEMATIC**2 * np.eye(2)
-    values = _lit(gray, frames)
+    values = lit(gray, frames)
     ink = _rings(family, ids, frame.mean_radii(frames), shift, blur)[0]
-    rays = _Rays.of(values, ink, np.broadcast_to(_PROFILE, values.shape))
-    left, shown = ((_PROFILE * of**2).sum(axis=2) for of in (rays.errors, rays.deviations(values)))
+    rays = Rays.of(values, ink, np.broadcast_to(PROFILE, values.shape))
+    left, shown = ((PROFILE * of**2).sum(axis=2) for of in (rays.errors, rays.deviations(values)))
     agreeing = (left < (1 - _AGREEING) * shown) & (
         np.sign(rays.step) == np.sign(np.median(rays.step, axis=1))[:, None]
     )
@@ -395,19 +428,32 @@ def _aligned(
     )
 
 
+def _usual_perspective(frames: np.ndarray) -> np.ndarray:
+    """Return the inverse covariances of the perspective of frames, (k, 2, 2), that is expected.
+
+    Scale changes along the minor axis of a tilted target, the more the more it is foreshortened.
+    """
+    _, axes, directions = np.linalg.svd(frame.local_affine(frames))
+    tilt = np.sqrt(np.maximum((axes[:, 0] / axes[:, 1]) ** 2 - 1, 0))
+    most = np.stack([np.full(len(frames), _LEAST_TILT), tilt + _LEAST_TILT], axis=1)
+    weight = (most * _PERSPECTIVE * frame.mean_radii(frames)[:, None]) ** -2
+    usual: np.ndarray = directions.transpose(0, 2, 1) * weight[:, None] @ directions
+    return usual
+
+
 def _plain(values: np.ndarray, good: np.ndarray, ink: np.ndarray, blur: np.ndarray) -> np.ndarray:
     """Return by how much better rings explain a profile than two edges of any height do, (k,).
 
     It is the difference of ln of what is left of the mean of the good rays, shape (k, rays). The
     blur is in radii.
     """
-    weight = np.sqrt(_PROFILE / _PROFILE.sum())
-    line, _ = np.linalg.qr(np.stack([weight, _PROFILE * weight], axis=1))
+    weight = np.sqrt(PROFILE / PROFILE.sum())
+    line, _ = np.linalg.qr(np.stack([weight, PROFILE * weight], axis=1))
     profiles = (good[..., None] * values).sum(axis=1) / good.sum(axis=1)[:, None] * weight
-    edges = np.linspace(_PROFILE[0], _PROFILE[-1], 66)[3:-3, None]
+    edges = np.linspace(PROFILE[0], PROFILE[-1], 66)[3:-3, None]
     found = np.empty(len(values))
     for index, (profile, rings) in enumerate(zip(profiles, ink * weight, strict=True)):
-        steps = _normal_share((edges - _PROFILE) / blur[index]) * weight
+        steps = normal_share((edges - PROFILE) / blur[index]) * weight
         profile, rings, steps = (of - (of @ line) @ line.T for of in (profile, rings, steps))
         total = profile @ profile
         steps = steps / np.linalg.norm(steps, axis=1, keepdims=True)
@@ -417,79 +463,6 @@ def _plain(values: np.ndarray, good: np.ndarray, ink: np.ndarray, blur: np.ndarr
         share = (rings @ profile) ** 2 / (rings @ rings) / total
         found[index] = np.log(max(1 - shares.max(), 1e-6) / max(1 - share, 1e-6))
     return found
-
-
-def _lit(gray: np.ndarray, frames: np.ndarray) -> np.ndarray:
-    """Return the gray values of rays, each in its own light, shape (k, rays, n)."""
-    values = np.maximum(sample_circles(gray, frames, _ANGLES, _PROFILE), 0).astype(np.float64)
-    lit: np.ndarray = values / np.maximum(values.mean(axis=2, keepdims=True), 1)
-    return lit
-
-
-def _robust_rays(values: np.ndarray, ink: np.ndarray, outlier: float) -> _Rays:
-    """Return rays whose weights are low where edges of light disturb them.
-
-    The contrast of ink is the same wherever the light falls.
-    """
-    rays = _Rays.of(values, ink, np.broadcast_to(_PROFILE, values.shape))
-    for _ in range(2):
-        usual = np.median(rays.contrast, axis=1, keepdims=True)
-        unlike = (rays.contrast - usual) / (_OTHER_CONTRAST * np.maximum(np.abs(usual), 1e-9))
-        alike = geman_mcclure(1.0, unlike)
-        of_rays = np.median(np.abs(rays.errors), axis=2)
-        spread = NORMAL * np.quantile(of_rays, _QUIET, axis=1)[:, None, None]
-        weight = geman_mcclure(_PROFILE, rays.errors / (outlier * np.maximum(spread, _LEAST)))
-        rays = _Rays.of(values, ink, weight * alike[..., None])
-    return rays
-
-
-@dataclass(frozen=True, slots=True)
-class _Rays:
-    """Rays as linear functions of ink: values = paper + step ink + errors."""
-
-    weight: np.ndarray  # (k, rays, n)
-    away: np.ndarray  # of the ink, from its mean on the ray, the same shape
-    step: np.ndarray  # (k, rays)
-    errors: np.ndarray
-    contrast: np.ndarray  # of ink, (k, rays), below 0 where it is darker
-
-    @staticmethod
-    def of(values: np.ndarray, ink: np.ndarray, weight: np.ndarray) -> _Rays:
-        """Fit rays to the ink of profiles, shape (k, n)."""
-        total = np.maximum(weight.sum(axis=2), 1e-9)
-        ink = np.broadcast_to(ink[:, None], values.shape)
-        away = ink - ((weight * ink).sum(axis=2) / total)[..., None]
-        mean = ((weight * values).sum(axis=2) / total)[..., None]
-        power = np.maximum((weight * away * away).sum(axis=2), 1e-9)
-        step = (weight * away * values).sum(axis=2) / power
-        paper = mean[..., 0] - step * (weight * ink).sum(axis=2) / total
-        contrast = step / np.maximum(np.maximum(paper, paper + step), 0.1)
-        return _Rays(weight, away, step, values - mean - step[..., None] * away, contrast)
-
-    def deviations(self, values: np.ndarray) -> np.ndarray:
-        """Return the differences of values from the weighted means of their rays."""
-        total = np.maximum(self.weight.sum(axis=2, keepdims=True), 1e-9)
-        away: np.ndarray = values - (self.weight * values).sum(axis=2, keepdims=True) / total
-        return away
-
-    def equations(self, changes: np.ndarray, ink: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the normal equations of the changes of a frame, of shift and of blur.
-
-        What another paper and ink of a ray would explain is left to these. The changes of the ink
-        (k, 5, n) are those by the radius, times its powers 0 to 2, by the shift and by the blur.
-        """
-        basis = np.concatenate([np.ones_like(ink)[:, None], ink[:, None], changes], axis=1)
-        products = (basis[:, :, None] * basis[:, None]).reshape(len(ink), -1, ink.shape[1])
-        moments = self.weight @ products.transpose(0, 2, 1)
-        moments = moments.reshape(*self.step.shape, 7, 7)
-        light = moments[..., :2, :2] + 1e-6 * np.eye(2)
-        mixed = moments[..., 2:, :2]
-        own = moments[..., 2:, 2:] - mixed @ np.linalg.inv(light) @ mixed.swapaxes(2, 3)
-        own *= self.step[..., None, None] ** 2
-        errors = (self.weight * self.errors) @ changes.transpose(0, 2, 1)
-        normal = (_AROUND.swapaxes(1, 2) @ own @ _AROUND).sum(axis=1)
-        right = (self.step[..., None, None] * errors[..., None, :] @ _AROUND).sum(axis=(1, 2))
-        return normal, right
 
 
 def _rings(
@@ -503,9 +476,9 @@ def _rings(
     sign = _signs(radii)[:, None]
     size, shift, blur = (of[:, None, None] for of in (size, shift, blur))
     # Blur moves what lies near to the centre outwards, on the mean (Rice).
-    place = np.sqrt(_PROFILE**2 + (blur / size) ** 2)
+    place = np.sqrt(PROFILE**2 + (blur / size) ** 2)
     away = (radii[..., None] * size + sign * shift - place * size) / blur
-    ink = (sign * _normal_share(away)).sum(axis=1)
+    ink = (sign * normal_share(away)).sum(axis=1)
     density = np.exp(-0.5 * away**2) / np.sqrt(2 * np.pi)
     slope = -(sign * density * size / blur).sum(axis=1)
     by_shift = (density / blur).sum(axis=1)
@@ -516,9 +489,3 @@ def _rings(
 def _signs(radii: np.ndarray) -> np.ndarray:
     """Return 1 for circles that ink fills, -1 for those that paper fills, from shape (k, n)."""
     return np.where(np.arange(radii.shape[1]) % 2 == 0, 1, -1)
-
-
-def _normal_share(x: np.ndarray) -> np.ndarray:
-    """Return the share of a normal distribution below x, to 0.0005 (Page, JRSS C 1977, 26, 75)."""
-    share: np.ndarray = 0.5 * (1 + np.tanh(np.sqrt(2 / np.pi) * (x + 0.044715 * x**3)))
-    return share

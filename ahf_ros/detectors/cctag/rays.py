@@ -1,0 +1,168 @@
+"""Rays from the centre of a CCTag: each has its own light, which edges of light may change.
+
+An edge of light is a step of the logarithm of the light along a ray. What the ink of the rings
+does not explain tells where it is. Values of both sides are brought to one light, and those close
+to the edge lose their weight.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ahf_ros.features import frame
+from ahf_ros.features.robust import NORMAL, geman_mcclure
+from ahf_ros.features.sampling import sample_circles
+
+_RAYS = 64
+ANGLES = 2 * np.pi * np.arange(_RAYS) / _RAYS
+PROFILE = np.linspace(0.06, 1.3, 72)
+"""Radii at which rays are read."""
+AROUND = np.zeros((_RAYS, 5, 9))
+"""What each change does to the ink on rays, by powers of radii."""
+AROUND[:, [0, 0, 1, 1, 1, 2, 2], range(7)] = -frame.displacement_basis(ANGLES, np.ones(_RAYS))
+AROUND[:, [3, 4], [7, 8]] = 1.0
+_QUIET = 0.35  # quantile of rays, whose errors are usual
+_LEAST = 0.003  # standard deviation of gray values, of their mean
+_OTHER_CONTRAST = 0.2  # difference of the contrast of a ray, that quarters its weight
+_LIGHT_EDGES = PROFILE[2:-2:2]  # radii at which the light may change
+_EDGES_OF_RAY = 2
+_LEAST_STEP = 0.15  # of ln of the light
+_EXPLAINED, _OF_USUAL = 0.5, 3.0  # squares that an edge takes, of those of its ray and usual ones
+_EDGE_WIDTH = 2.2  # of light, px
+_CLOSE, _CLOSE_WEIGHT = 1.0, 0.02  # px from an edge of light, and what is left there of a weight
+_DARKEST = 0.03  # ink, of the brightness of paper, in logarithms
+
+
+def lit(gray: np.ndarray, frames: np.ndarray) -> np.ndarray:
+    """Return the gray values of rays, each in its own light, shape (k, rays, n)."""
+    values = np.maximum(sample_circles(gray, frames, ANGLES, PROFILE), 0).astype(np.float64)
+    lit: np.ndarray = values / np.maximum(values.mean(axis=2, keepdims=True), 1)
+    return lit
+
+
+def robust_rays(values: np.ndarray, ink: np.ndarray, outlier: float) -> Rays:
+    """Return rays, values (k, rays, n) and ink (k, n), whose weights are low where light disturbs.
+
+    An error of `outlier` usual deviations leaves a quarter of a weight.
+    """
+    return _weighted(values, ink, np.broadcast_to(PROFILE, values.shape), outlier, 2)
+
+
+def evenly_lit_rays(values: np.ndarray, ink: np.ndarray, size: np.ndarray, outlier: float) -> Rays:
+    """Return what `robust_rays` does, edges of light taken out; sizes (k,) are radii, px."""
+    rays = _weighted(values, ink, np.broadcast_to(PROFILE, values.shape), outlier, 1)
+    light, weight = _light_edges(values, ink, np.median(rays.contrast, axis=1), size)
+    return _weighted(values / light, ink, PROFILE * weight, outlier, 1)
+
+
+def _weighted(
+    values: np.ndarray, ink: np.ndarray, usual_weight: np.ndarray, outlier: float, rounds: int
+) -> Rays:
+    """Return rays whose weights are low where values are unlike the ink.
+
+    The contrast of ink is the same wherever the light falls.
+    """
+    rays = Rays.of(values, ink, usual_weight)
+    for _ in range(rounds):
+        usual = np.median(rays.contrast, axis=1, keepdims=True)
+        unlike = (rays.contrast - usual) / (_OTHER_CONTRAST * np.maximum(np.abs(usual), 1e-9))
+        alike = geman_mcclure(1.0, unlike)
+        of_rays = np.median(np.abs(rays.errors), axis=2)
+        spread = NORMAL * np.quantile(of_rays, _QUIET, axis=1)[:, None, None]
+        weight = geman_mcclure(usual_weight, rays.errors / (outlier * np.maximum(spread, _LEAST)))
+        rays = Rays.of(values, ink, weight * alike[..., None])
+    return rays
+
+
+def _light_edges(
+    values: np.ndarray, ink: np.ndarray, contrast: np.ndarray, size: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the light along rays beyond a factor, and weights, both of the shape of the values.
+
+    The contrast of ink (k,) is that of `Rays`.
+    """
+    contrast = contrast[:, None]
+    paper = np.where(contrast < 0, 1.0, 1 - contrast)
+    bright = np.maximum(paper + contrast * ink, _DARKEST)
+    weight = PROFILE * bright  # noise is relative to the light
+    weight = (weight / weight.sum(axis=1, keepdims=True))[:, None]
+    steps = (PROFILE - _LIGHT_EDGES[:, None]) * size[:, None, None] / _EDGE_WIDTH
+    steps = np.clip(0.5 + steps, 0, 1)
+    away = steps - (steps * weight).sum(axis=2, keepdims=True)
+    power = np.maximum((away**2 * weight).sum(axis=2), 1e-6)[:, None]
+    rest = np.log(np.maximum(values, 0.01)) - np.log(bright)[:, None]
+    rest -= (rest * weight).sum(axis=2, keepdims=True)
+    light, trusted = np.zeros_like(rest), np.ones_like(rest)
+    rows = np.arange(len(values))[:, None]
+    for _ in range(_EDGES_OF_RAY):
+        along = (rest * weight) @ away.transpose(0, 2, 1)
+        gain = along**2 / power
+        best = gain.argmax(axis=2)
+        explained, total = gain.max(axis=2), (rest**2 * weight).sum(axis=2)
+        height = np.take_along_axis(along / power, best[..., None], axis=2)
+        usual = np.quantile(total - explained, _QUIET, axis=1)[:, None]
+        edge = (explained > np.maximum(_OF_USUAL * usual, _EXPLAINED * total))[..., None]
+        edge &= np.abs(height) > _LEAST_STEP
+        height = np.where(edge, height, 0.0)
+        rest -= height * away[rows, best]
+        light += height * steps[rows, best]
+        distance = np.abs(PROFILE - _LIGHT_EDGES[best][..., None]) * size[:, None, None]
+        trusted[edge & (distance < _CLOSE)] = _CLOSE_WEIGHT
+    return np.exp(light), trusted
+
+
+@dataclass(frozen=True, slots=True)
+class Rays:
+    """Rays as linear functions of ink: values = paper + step ink + errors."""
+
+    weight: np.ndarray  # (k, rays, n)
+    away: np.ndarray  # of the ink, from its mean on the ray, the same shape
+    step: np.ndarray  # (k, rays)
+    errors: np.ndarray
+    contrast: np.ndarray  # of ink, (k, rays), below 0 where it is darker
+
+    @staticmethod
+    def of(values: np.ndarray, ink: np.ndarray, weight: np.ndarray) -> Rays:
+        """Fit rays to the ink of profiles, shape (k, n)."""
+        total = np.maximum(weight.sum(axis=2), 1e-9)
+        ink = np.broadcast_to(ink[:, None], values.shape)
+        away = ink - ((weight * ink).sum(axis=2) / total)[..., None]
+        mean = ((weight * values).sum(axis=2) / total)[..., None]
+        power = np.maximum((weight * away * away).sum(axis=2), 1e-9)
+        step = (weight * away * values).sum(axis=2) / power
+        paper = mean[..., 0] - step * (weight * ink).sum(axis=2) / total
+        contrast = step / np.maximum(np.maximum(paper, paper + step), 0.1)
+        return Rays(weight, away, step, values - mean - step[..., None] * away, contrast)
+
+    def deviations(self, values: np.ndarray) -> np.ndarray:
+        """Return the differences of values from the weighted means of their rays."""
+        total = np.maximum(self.weight.sum(axis=2, keepdims=True), 1e-9)
+        away: np.ndarray = values - (self.weight * values).sum(axis=2, keepdims=True) / total
+        return away
+
+    def equations(self, changes: np.ndarray, ink: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the normal equations of the changes of a frame, of shift and of blur.
+
+        What another paper and ink of a ray would explain is left to these. The changes of the ink
+        (k, 5, n) are those by the radius, times its powers 0 to 2, by the shift and by the blur.
+        """
+        basis = np.concatenate([np.ones_like(ink)[:, None], ink[:, None], changes], axis=1)
+        products = (basis[:, :, None] * basis[:, None]).reshape(len(ink), -1, ink.shape[1])
+        moments = self.weight @ products.transpose(0, 2, 1)
+        moments = moments.reshape(*self.step.shape, 7, 7)
+        light = moments[..., :2, :2] + 1e-6 * np.eye(2)
+        mixed = moments[..., 2:, :2]
+        own = moments[..., 2:, 2:] - mixed @ np.linalg.inv(light) @ mixed.swapaxes(2, 3)
+        own *= self.step[..., None, None] ** 2
+        errors = (self.weight * self.errors) @ changes.transpose(0, 2, 1)
+        normal = (AROUND.swapaxes(1, 2) @ own @ AROUND).sum(axis=1)
+        right = (self.step[..., None, None] * errors[..., None, :] @ AROUND).sum(axis=(1, 2))
+        return normal, right
+
+
+def normal_share(x: np.ndarray) -> np.ndarray:
+    """Return the share of a normal distribution below x, to 0.0005 (Page, JRSS C 1977, 26, 75)."""
+    share: np.ndarray = 0.5 * (1 + np.tanh(np.sqrt(2 / np.pi) * (x + 0.044715 * x**3)))
+    return share
