@@ -20,7 +20,7 @@ from ahf_ros.orientation.planar import mirrored
 from ahf_ros.orientation.resection import ALIKE, BOUND, FEWEST_POINTS, Resection, resections
 from ahf_ros.orientation.solution import Start
 from ahf_ros.orientation.triangulation import intersect
-from ahf_ros.orientation.triples import STEPS, Seed, focal_sigma, known_calibrations, seeds
+from ahf_ros.orientation.triples import STEPS, WEAK, Seed, focal_sigma, known_calibrations, seeds
 from ahf_ros.orientation.views import View, lengths_of, spread_of, views_of
 
 MOST_SEEDS = 5
@@ -28,6 +28,9 @@ MOST_SEEDS = 5
 BATCH = 4
 """One photograph for so many oriented ones, at least one, is added between two adjustments: the
 values stay as good as after each single one, in a quarter of the time."""
+
+FEWEST_PHOTOGRAPHS = 3
+"""What two photographs say is checked by nothing."""
 
 LARGEST_FOCAL_SIGMA = 0.03
 """Relative standard deviation beyond which a free focal length is not accepted."""
@@ -49,7 +52,7 @@ def starts(network: Network) -> list[Start]:
     views = views_of(network)
     remaining = [index for index, view in enumerate(views) if len(view.points) >= FEWEST_POINTS]
     found: list[Start] = []
-    while len(remaining) > 2:
+    while len(remaining) >= FEWEST_PHOTOGRAPHS:
         start = _largest(network, views, remaining)
         if start is None:
             break
@@ -92,7 +95,7 @@ def _largest(network: Network, views: Sequence[View], among: Sequence[int]) -> S
     result: Start | None = None
     for seed in islice(seeds(network, views, among), MOST_SEEDS):
         start = _grown(network, views, seed, among)
-        if start is None:
+        if start is None or len(oriented(start)) < FEWEST_PHOTOGRAPHS:
             continue
         lengths = lengths_of(network, start)
         number = len(oriented(start))
@@ -111,13 +114,19 @@ def _grown(
     """Return the values of all photographs and points that a seed reaches."""
     start = seed.start
     postponed: dict[int, int] = {}
+    last = False
     try:
         start = _adjusted(network, start)
         while True:
             start = _intersected(network, views, start)
             chosen = _next(views, start, among, postponed)
-            if not chosen:
+            if not chosen and (last or not postponed):
                 break
+            if not chosen:  # all others are there: what was doubtful may be certain by now
+                start = _pruned(views, _adjusted(network, start, rounds=30), postponed)
+                postponed.clear()
+                last = True
+                continue
             spread = spread_of(lengths_of(network, start))
             added = 0
             for photograph in chosen:
@@ -275,7 +284,10 @@ def _adjusted(network: Network, start: Start, rounds: int = 8) -> Start:
     )
     if not given.all():
         free = ('f',)
-    start = refine(replace(network, cameras=held), start, free, rounds=rounds)
+    partly = replace(network, cameras=held)
+    if free and photographs < 10 and focal_sigma(partly, start, free) > WEAK:
+        free = ()
+    start = refine(partly, start, free, rounds=rounds)
     spread = spread_of(lengths_of(network, start))
     lens = tuple(name for name, least in LENS if photographs >= least)
     if spread < 2 or not lens or all(camera.fixed for camera in network.cameras):

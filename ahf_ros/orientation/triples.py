@@ -33,6 +33,9 @@ MOST_PHOTOGRAPHS = 40
 MOST_TRIPLES = 9
 AT_A_TIME = 3
 
+WEAK = 0.2
+"""Relative standard deviation of a focal length that is hardly determined."""
+
 BOUND = 4.0
 """Standard deviations to which a residual counts."""
 
@@ -76,15 +79,19 @@ def seeds(network: Network, views: Sequence[View], among: Sequence[int]) -> Iter
     """Yield approximate values of triples of the photographs `among`.
 
     Triples come in the order of what their image points promise, a few at a time, and of these
-    the best first.
+    the best first; those that hardly determine the focal length come last.
     """
     known = known_calibrations(network)
     triples = _triples(views, among, np.isfinite(known[:, 0]))
+    weak: list[Seed] = []
     for begin in range(0, len(triples), AT_A_TIME):
         found: list[Seed] = []
         for triple in triples[begin : begin + AT_A_TIME]:
             found += _seeds_of(network, views, triple, known)
-        yield from sorted(found, key=lambda seed: seed.rank)
+        found.sort(key=lambda seed: seed.rank)
+        weak += [seed for seed in found if seed.focal_sigma > WEAK]
+        yield from (seed for seed in found if seed.focal_sigma <= WEAK)
+    yield from sorted(weak, key=lambda seed: seed.rank)
 
 
 def _triples(
