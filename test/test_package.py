@@ -56,6 +56,7 @@ NOT_IN_ROSDEP = {
     'distributed',
     'fsspec',
     'pandas',
+    'pycolmap',
     'pypdfium2',
     'selenium',
     'typing_extensions',
