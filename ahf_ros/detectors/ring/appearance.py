@@ -66,7 +66,7 @@ def unlike_print(
 
 def _step_shares(polar: PolarImages, ground: np.ndarray) -> np.ndarray:
     """Return steps of ln from the usual gray value of ground, in those of ink, (k, m, n)."""
-    beyond = ground.any(axis=(0, 1))
+    beyond = np.asarray(ground.any(axis=(0, 1)))
     beyond[-1] = True  # blur may leave none
     flat = len(ground), ground.shape[1] * int(beyond.sum())
     levels, known = (of[..., beyond].reshape(flat) for of in (polar.gray, ground))
