@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from ahf_ros.codes.ring import family
 from ahf_ros.detectors import DetectorSettings
+from ahf_ros.detectors.ring.appearance import unlike_print
 from ahf_ros.detectors.ring.confidence import COVERED
+from ahf_ros.detectors.ring.decoding import Words
 from ahf_ros.detectors.ring.detector import find_hypotheses
+from ahf_ros.detectors.ring.polar import polar_images
 from ahf_ros.synthetic.scene import SceneSettings, render
 from benchmarks import occluders
 from benchmarks.disturbed import Targets
 from benchmarks.exposure import Exposure
 from benchmarks.lookalikes import LOOKALIKES
 from benchmarks.sheets import mark_sheet
+from support.ring import made_up
 
 
 def unlike(image: np.ndarray, name: str) -> np.ndarray:
@@ -39,6 +45,14 @@ def test_other_prints_are_others_all_round() -> None:
     found = unlike(mark_sheet(inks, 5).photograph(Exposure()), 'aicon12')
     assert len(found) > 12
     assert np.median(found) > COVERED
+
+
+def test_blur_that_leaves_no_ground_tells_nothing() -> None:
+    code, gray = family('metashape12'), np.full((60, 60), 200, np.float32)
+    polar = polar_images(gray, made_up([30.0], radius=2.0), code.band, 120)
+    words = replace(Words.none(1, 120), words=np.array([71]))
+    soft = replace(polar, blur=np.array([3.0]))
+    assert not unlike_print(soft, words, np.zeros(1), np.zeros(1), code).any()
 
 
 def test_light_that_is_uneven_tells_nothing() -> None:

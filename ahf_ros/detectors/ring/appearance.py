@@ -66,12 +66,14 @@ def unlike_print(
 
 def _step_shares(polar: PolarImages, ground: np.ndarray) -> np.ndarray:
     """Return steps of ln from the usual gray value of ground, in those of ink, (k, m, n)."""
-    beyond = ground.any(axis=(0, 1))
+    beyond = np.asarray(ground.any(axis=(0, 1)))
+    beyond[-1] = True  # blur may leave none
     flat = len(ground), ground.shape[1] * int(beyond.sum())
     levels, known = (of[..., beyond].reshape(flat) for of in (polar.gray, ground))
     paper = median(levels, known)[:, None]
     ink = polar.inked(paper, paper)
     of_paper, of_ink = (np.log(of + LOG_OFFSET)[..., None] for of in (paper, ink))
     values = np.log(polar.gray + np.float32(LOG_OFFSET))
-    shares: np.ndarray = (values - of_paper) / (of_ink - of_paper)
+    step = np.where(of_ink == of_paper, np.inf, of_ink - of_paper)
+    shares: np.ndarray = (values - of_paper) / step
     return shares
