@@ -55,6 +55,7 @@ NOT_IN_ROSDEP = {
     'distributed',
     'fsspec',
     'pandas',
+    'pycolmap',
     'pypdfium2',
     'selenium',
     'typing_extensions',
