@@ -117,7 +117,7 @@ class Aligned(ArrayRecord):
     clear: np.ndarray  # (k,), ln of the share of a ray that is not explained, of clear rays
     left: np.ndarray  # (k,), ln of the share of a ray that is not explained, on the mean
     plain: np.ndarray  # (k,), the same of any two edges, less that of the rings
-    unusual: np.ndarray  # (k,), half the squares of deviations from usual edges
+    unusual: np.ndarray  # (k,), half the squares of deviations of edges, where light hides rays
     margin: np.ndarray  # (k,), ln of the odds against the next ID; NaN before it is known
 
     @property
@@ -431,7 +431,7 @@ def _aligned(
         clear=np.quantile(rest, _CLEAREST, axis=1),
         left=rest.mean(axis=1),
         plain=_plain(values, good, ink, blur / frame.mean_radii(frames)),
-        unusual=_unusual(shift, blur, prior),
+        unusual=_unusual(shift, blur, prior) * np.minimum(3 * (1 - agreeing.mean(axis=1)), 1),
         margin=np.full(count, np.nan),
     )
 
