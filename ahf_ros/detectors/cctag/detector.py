@@ -36,6 +36,8 @@ _INNERMOST = 0.25  # of the radii of circles that are looked for
 _COMMON_CENTRE = 8.0, 20.0  # radii of targets whose rings vote together for their centre, px
 _COMMON_CENTRE_STEP, _COMMON_CENTRE_VOTES, _COMMON_CENTRE_SIZES = 1.0, 2.0, 1.25
 _TELLING = 0.98  # confidence of targets that tell of others
+_PROBABLE = 0.5  # confidence of targets that tell of edges together
+_ROUNDS = 2  # in which doubtful targets are read with what others tell
 _POSSIBLE = 0.01  # probability of a target, from which it is read again
 _CERTAIN = 0.75  # confidence from which a target is reported
 _SURE_OF_TARGET = 0.9  # probability of a target, from which it is reported without its ID
@@ -124,13 +126,29 @@ def _identified(
     Doubtful targets are read with what certain ones show.
     """
     rings = identify(gray, frames, polarity, family)
-    light = in_light(gray, rings.select(rings.of_target >= _SURE_OF_TARGET), family)
-    certain = rings.select(rings.confidence >= _TELLING)
-    seen = align(light, certain.frames, certain.ids, certain.shift, family)
-    certain = replace(seen, margin=certain.margin)
-    doubtful = rings.select((rings.confidence < _TELLING) & (rings.of_target >= _POSSIBLE))
-    again = identify(light, doubtful.frames, polarity, family, Prior.after(certain))
-    return Aligned.joined([certain, again]), light
+    likely = rings.select(rings.of_target >= _SURE_OF_TARGET)
+    light = in_light(gray, likely, family)
+    if not len(likely.ids):
+        return rings.select(rings.of_target >= _POSSIBLE), gray
+    likely = replace(
+        align(light, likely.frames, likely.ids, likely.shift, family), margin=likely.margin
+    )
+    for _ in range(_ROUNDS):
+        certain = likely.confidence >= _TELLING
+        unread = frames[~_near(frames, likely.frames).any(axis=1)]
+        doubtful = np.concatenate([likely.frames[~certain], unread])
+        prior = Prior.after(likely.select(likely.confidence >= _PROBABLE))
+        again = identify(light, doubtful, polarity, family, prior)
+        certain = likely.select(certain)
+        likely = Aligned.joined([certain, again.select(again.of_target >= _POSSIBLE)])
+    return likely, light
+
+
+def _near(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Return whether targets (k, 3, 3) are at the places of others (n, 3, 3), shape (k, n)."""
+    away = np.hypot(*(frames[:, None, :2, 2] - others[None, :, :2, 2]).transpose(2, 0, 1))
+    near: np.ndarray = away < _SAME_PLACE * frame.mean_radii(others)
+    return near
 
 
 def _owning(gray: np.ndarray, rings: Aligned, polarity: int, family: CircleFamily) -> Aligned:
@@ -142,8 +160,7 @@ def _owning(gray: np.ndarray, rings: Aligned, polarity: int, family: CircleFamil
             continue
         others = identify(gray, rings.frames[doubtful], polarity, circle_family(name))
         for index in doubtful.tolist():
-            away = np.hypot(*(others.frames[:, :2, 2] - rings.frames[index, :2, 2]).T)
-            near = away < _SAME_PLACE * frame.mean_radii(others.frames)
+            near = _near(rings.frames[[index]], others.frames)[0]
             beaten[index] |= (others.left[near] < rings.left[index]).any()
     return rings.select(~beaten)
 

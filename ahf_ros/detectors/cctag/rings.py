@@ -34,6 +34,10 @@ _SIZES = 1.05  # ratio of radii that share templates, and of hypotheses of the r
 _TRIED_SHIFTS, _TRIED_BLURS = (-1.2, -0.6, 0.0, 0.6, 1.2), (-1.0, 0.0, 1.4)  # deviations
 _GROWN = (0.85, 0.9, 0.95, 1.0, 1.05)  # radii of the outermost circle, where that was found
 _NARROWEST = 0.5  # ring that is read, px; blur hides others
+_NARROWEST_IN_LIGHT = (
+    0.7  # ring, px, below which all but a small part of each ray must be explained
+)
+_CLEAN = -5.4  # `left` of such rays
 _PROMISING = 0.6  # share of a profile that rings explain, from which they are looked at
 _LOOKED_AT = 4  # frames for an ID, at the most
 _APART = 0.5  # distance of the centres of different targets, radii
@@ -56,7 +60,8 @@ _INDEPENDENT = 1.5  # distance of independent readings along a profile, px
 _SYSTEMATIC = 0.004  # standard deviation of what pixels and interpolation do to a centre, px
 _CLEAREST = 0.2  # share of rays
 _AGREEING = 0.5  # share of what a ray shows, that the rings explain
-_OF_TARGET = np.array([-15.5, -4.0, 1.2])  # of one, `clear`, `plain`
+_OF_TARGET = np.array([-15.5, -4.0, 1.2, -1.0])  # of one, `clear`, `plain`, `unusual`
+_USUAL_EDGES = 0.13, 0.3  # deviations of growth, px, and of ln of the blur, of targets
 _PLAIN = -5.0, 3.0  # beyond which it says no more
 _HOPELESS = 5e-4  # probability of a target, up to which other IDs are not tried
 _OF_ID = np.array([-0.9, 2.2])  # of one, margin
@@ -113,6 +118,7 @@ class Aligned(ArrayRecord):
     clear: np.ndarray  # (k,), ln of the share of a ray that is not explained, of clear rays
     left: np.ndarray  # (k,), ln of the share of a ray that is not explained, on the mean
     plain: np.ndarray  # (k,), the same of any two edges, less that of the rings
+    unusual: np.ndarray  # (k,), half the squares of deviations of edges, where light hides rays
     margin: np.ndarray  # (k,), ln of the odds against the next ID; NaN before it is known
 
     @property
@@ -123,7 +129,8 @@ class Aligned(ArrayRecord):
     @property
     def of_target(self) -> np.ndarray:
         """Probability that there is a target, shape (k,)."""
-        return logistic(np.stack([self.clear, np.clip(self.plain, *_PLAIN)], axis=1), _OF_TARGET)
+        features = [self.clear, np.clip(self.plain, *_PLAIN), self.unusual]
+        return logistic(np.stack(features, axis=1), _OF_TARGET)
 
     @property
     def confidence(self) -> np.ndarray:
@@ -131,7 +138,7 @@ class Aligned(ArrayRecord):
         return self.of_target * logistic(self.margin[:, None], _OF_ID)
 
 
-NOTHING = Aligned(*(np.zeros((0, 3, 3)), np.zeros(0, int), np.zeros((0, 2, 2)), *np.zeros((8, 0))))
+NOTHING = Aligned(*(np.zeros((0, 3, 3)), np.zeros(0, int), np.zeros((0, 2, 2)), *np.zeros((9, 0))))
 
 
 def likely_rings(
@@ -279,7 +286,9 @@ def identify(
     best = every.select(np.arange(len(ids)) * count + cost.argmin(axis=1))
     others = np.where(ids == best.ids[:, None], np.inf, cost).min(axis=1)
     best = _settled(gray, best, family, prior)
-    return replace(best, margin=others - cost.min(axis=1)).select(best.colour == polarity)
+    best = replace(best, margin=others - cost.min(axis=1))
+    hidden = family.narrow * frame.mean_radii(best.frames) < _NARROWEST_IN_LIGHT
+    return best.select((best.colour == polarity) & ~(hidden & (best.left > _CLEAN)))
 
 
 def _settled(gray: np.ndarray, rings: Aligned, family: CircleFamily, prior: Prior) -> Aligned:
@@ -424,8 +433,16 @@ def _aligned(
         clear=np.quantile(rest, _CLEAREST, axis=1),
         left=rest.mean(axis=1),
         plain=_plain(values, good, ink, blur / frame.mean_radii(frames)),
+        unusual=_unusual(shift, blur, prior) * np.minimum(3 * (1 - agreeing.mean(axis=1)), 1),
         margin=np.full(count, np.nan),
     )
+
+
+def _unusual(shift: np.ndarray, blur: np.ndarray, prior: Prior) -> np.ndarray:
+    """Return half the squares of deviations of edges, (k,): chance finds rings of any growth."""
+    deviations = np.stack([shift - prior.shift, np.log(blur / prior.blur)], axis=1) / _USUAL_EDGES
+    squares: np.ndarray = (deviations**2).sum(axis=1) / 2
+    return squares
 
 
 def _usual_perspective(frames: np.ndarray) -> np.ndarray:
