@@ -134,12 +134,12 @@ def _identified(
         align(light, likely.frames, likely.ids, likely.shift, family), margin=likely.margin
     )
     for _ in range(_ROUNDS):
-        certain = likely.confidence >= _TELLING
+        told = likely.confidence >= _TELLING
         unread = frames[~_near(frames, likely.frames).any(axis=1)]
-        doubtful = np.concatenate([likely.frames[~certain], unread])
+        doubtful = np.concatenate([likely.frames[~told], unread])
         prior = Prior.after(likely.select(likely.confidence >= _PROBABLE))
         again = identify(light, doubtful, polarity, family, prior)
-        certain = likely.select(certain)
+        certain = likely.select(told)
         likely = Aligned.joined([certain, again.select(again.of_target >= _POSSIBLE)])
     return likely, light
 
