@@ -1,7 +1,9 @@
 """Square markers read by this package, by OpenCV and by AprilTag's own detector.
 
 Centres of the others are the intersections of the diagonals between their corners, OpenCV's after
-its sub-pixel refinement. Photographs have no truth: a row says how many markers each finds.
+its sub-pixel refinement. Photographs have no truth: a row says how many markers each finds, and,
+where a photograph shows an AprilGrid of 6 x 6 markers as Kalibr prints it, the RMS distance of the
+centres that all such readers find from the grid, under a homography and radial distortion.
 pupil-apriltags is left out where it is not installed. Seeds from 101 on are for tests.
 
     python -m benchmarks.squares [--seeds 301 302] [--photographs FOLDER] [--output FILE]
@@ -16,18 +18,19 @@ from typing import Any
 
 import cv2
 import numpy as np
+from scipy.optimize import least_squares
 
 from ahf_ros.codes.square import dictionary
 from ahf_ros.detectors import create_detector
 from ahf_ros.detectors.square.sides import centres
 from ahf_ros.evaluation import score
-from ahf_ros.interchange.image_files import read_image
 from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import Target
 from benchmarks import report
 from benchmarks.report import number
 
 FAMILY = 'apriltag_36h11'
+GRID = frozenset(range(36))
 SCENES: dict[str, dict[str, Any]] = {
     'even light': {},
     'tilt 45 deg': {'tilt': 45.0},
@@ -102,11 +105,39 @@ def measure(seeds: Sequence[int]) -> Iterator[dict[str, Any]]:
 
 
 def photographed(folder: Path) -> Iterator[dict[str, Any]]:
-    """Yield how many markers each reader finds in the photographs of a folder."""
+    """Yield how many markers each reader finds in the photographs of a folder, and its RMS, px."""
     found = readers()
     for path in sorted(path for path in folder.iterdir() if path.suffix in ('.jpg', '.png')):
-        image = read_image(path)
-        yield {'scene': path.name} | {name: len(read(image)) for name, read in found.items()}
+        image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+        read = {name: {it.id: (it.x, it.y) for it in of(image)} for name, of in found.items()}
+        grids = {name: of for name, of in read.items() if GRID.issuperset(of) and len(of) > 12}
+        common = sorted(set.intersection(*map(set, grids.values()))) if grids else []
+        row: dict[str, Any] = {'scene': path.name}
+        for name, places in read.items():
+            seen = np.array([places[number] for number in common]) if name in grids else None
+            rms = None if seen is None else grid_rms(np.array(common), seen, image.shape[:2])
+            row |= {name: len(places), f'{name}, RMS, px': number(rms, 3)}
+        yield row
+
+
+def grid_rms(ids: np.ndarray, places: np.ndarray, shape: tuple[int, int]) -> float:
+    """Return the RMS distance per coordinate, px, of centres (n, 2) from an AprilGrid."""
+    rows, columns = np.divmod(ids, 6)
+    grid = np.stack([columns, rows], axis=1) - 2.5
+    middle, size = (np.array(shape[::-1]) - 1) / 2, shape[1] / 2
+    aim = (places - middle) / size
+    first, _ = cv2.findHomography(grid, aim)
+
+    def errors(unknowns: np.ndarray) -> np.ndarray:
+        plane = np.append(unknowns[:8], 1).reshape(3, 3)
+        seen = np.column_stack([grid, np.ones(len(grid))]) @ plane.T
+        seen = seen[:, :2] / seen[:, 2:] - unknowns[10:]
+        squares = (seen**2).sum(axis=1, keepdims=True)
+        seen *= 1 + squares * (unknowns[8] + squares * unknowns[9])
+        return ((seen + unknowns[10:] - aim) * size).ravel()
+
+    fitted = least_squares(errors, np.r_[(first / first[2, 2]).ravel()[:8], 0, 0, 0, 0])
+    return float(np.sqrt((fitted.fun**2).mean()))
 
 
 def markdown(figures: report.Report) -> str:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 
 from ahf_ros.codes import SQUARE_NAMES
+from ahf_ros.codes.square import words
 from ahf_ros.detectors import Detector, create_detector
 from ahf_ros.evaluation import score
 from ahf_ros.session import identify
@@ -83,6 +85,28 @@ def test_hardly_any_texture_is_a_marker():
 @pytest.mark.parametrize(('family', 'seed'), [('aruco_4x4_1000', 4), ('aruco_4x4_50', 39)])
 def test_letters_are_no_markers_with_few_edges(family, seed):
     assert create_detector(family=family)(textured_image(seed)) == []
+
+
+def test_markers_of_an_aprilgrid_touch_squares_and_have_wide_borders():
+    family = 'apriltag_36h11'
+    cells, gap, count = 10, 3, 3
+    period = cells + gap
+    grid = np.full((count * period + gap,) * 2, 225, np.uint8)
+    for row, column in np.ndindex(count + 1, count + 1):
+        top, left = row * period, column * period
+        grid[top : top + gap, left : left + gap] = 30
+        if row < count and column < count:
+            white = words(family)[row * count + column]
+            top, left = top + gap, left + gap
+            grid[top : top + cells, left : left + cells] = 30
+            grid[top + 2 : top + cells - 2, left + 2 : left + cells - 2][white] = 225
+    image = cv2.resize(np.pad(grid, 3, constant_values=225), None, fx=7, fy=7, interpolation=0)
+    found = create_detector(family=family)(cv2.GaussianBlur(image, (0, 0), 1.0))
+    assert [it.id for it in found] == list(range(9))
+    middle = 7 * (3 + gap + cells / 2) - 0.5
+    rows, columns = np.divmod(np.arange(9), count)
+    expected = middle + 7 * period * np.stack([columns, rows], axis=1)
+    assert np.abs(np.array([(it.x, it.y) for it in found]) - expected).max() < 0.02
 
 
 @pytest.mark.parametrize('gray', [0, 90, 255])

@@ -20,6 +20,7 @@ from ahf_ros.imaging.logarithm import LOG_OFFSET
 _WINDOW = 13  # in which a pixel is compared, px
 _MINIMUM_STEP = 24  # from the darkest to the brightest pixel of a window, of 255
 _SMALLEST = 8.0  # side of a quadrilateral, px
+_SHORTEST = 2.8  # outline, in such sides
 _SOLID = 0.3  # minimum area of a region with its holes, as a share of a square's of its perimeter
 _TATTERED, _FILLED = 4.0, 0.15  # bounds of outline and area of a region whose hull is taken
 _TOLERANCE = 0.025  # of the corners of an outline, as a share of its length
@@ -61,14 +62,15 @@ def find_quadrilaterals(gray: np.ndarray) -> np.ndarray:
         height = cv2.subtract(high, low)
         dark = cv2.compare(values, middle, cv2.CMP_LT)
         dark *= height > _MINIMUM_STEP
-        outlines, _ = cv2.findContours(dark, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
-        regions = [region for outline in outlines if (region := _region(outline))]
-        sides, four = _four_sides(regions)
-        areas = np.array([regions[index].area for index in four])
-        for index in _bordered(values, sides, areas):
-            fitted = _fitted(regions[four[index]], sides[index], growth)
-            if fitted is not None:
-                found.append(fitted)
+        outlines = _outlines(dark)
+        for some, lost in ((outlines, 0.0), (_parted(dark, outlines), 1.0)):
+            regions = [region for outline in some if (region := _region(outline))]
+            sides, four = _four_sides(regions)
+            areas = np.array([regions[index].area for index in four])
+            for index in _bordered(values, sides, areas):
+                fitted = _fitted(regions[four[index]], sides[index], growth + lost)
+                if fitted is not None:
+                    found.append(fitted)
     lines = np.array(found, np.float64).reshape(-1, 4, 2, 2)
     before = np.roll(lines, 1, axis=1)
     corners = meet(before[:, :, 0], before[:, :, 1], lines[:, :, 0], lines[:, :, 1])
@@ -76,13 +78,33 @@ def find_quadrilaterals(gray: np.ndarray) -> np.ndarray:
     return corners[np.array(convex, bool)]
 
 
+def _outlines(dark: np.ndarray) -> list[np.ndarray]:
+    """Return the outlines of regions that are large enough, without those of holes, (n, 1, 2)."""
+    outlines, _ = cv2.findContours(dark, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
+    large = [of for of in outlines if len(of) >= _SHORTEST * _SMALLEST]
+    return [of for of in large if cv2.contourArea(of, oriented=True) <= 0]
+
+
+def _parted(dark: np.ndarray, outlines: list[np.ndarray]) -> list[np.ndarray]:
+    """Return the outlines of parts of regions that hang together by a few pixels.
+
+    Squares that touch at their corners do, such as those of an AprilGrid. The parts have lost
+    their outermost pixels.
+    """
+    labels = np.zeros(dark.shape, np.int32)
+    regions = (of for of in outlines if len(of) >= 2 * _SHORTEST * _SMALLEST)
+    for label, outline in enumerate(regions, start=1):
+        cv2.drawContours(labels, [outline], 0, label, cv2.FILLED)
+    eroded = cv2.erode(dark * (labels > 0), np.ones((3, 3), np.uint8))
+    parts = _outlines(eroded)
+    whole = [labels[of[0, 0, 1], of[0, 0, 0]] for of in parts]
+    count = np.bincount(whole, minlength=1)
+    return [of for of, label in zip(parts, whole, strict=True) if count[label] > 1]
+
+
 def _region(outline: np.ndarray) -> _Region | None:
     """Return the region in an outline if it may have four straight sides."""
-    if len(outline) < 4 * _SMALLEST * 0.7:
-        return None
-    area = -cv2.contourArea(outline, oriented=True)
-    if area < 0:
-        return None  # of a hole
+    area = cv2.contourArea(outline)
     length = cv2.arcLength(outline, closed=True)
     around = outline
     if area < _SOLID * length**2 / 16:

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import product
 from math import erf, log, sqrt
 
 import cv2
@@ -22,6 +23,7 @@ from ahf_ros.features.frame import project
 from ahf_ros.features.sampling import sample
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
+_BORDERS = (1, 2)  # cells; the markers of AprilGrids have two
 _IN_CELL = (-0.2, 0.2)  # where a cell is sampled, from its centre, in cells
 _BLUR = 0.7  # of the image, standard deviation in px
 _MOST_MIXED = 0.2  # share that a cell takes from each neighbour, at most
@@ -64,8 +66,8 @@ def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]])
     sizes = {words(group[0]).shape[1] for group in groups}
     bordered = _bordered(gray, frames)
     frames, corners = frames[bordered], corners[bordered]
-    for cells in sorted(sizes) if len(corners) else ():
-        evidence, against, which = _evidence(gray, frames, corners, cells)
+    for cells, border in product(sorted(sizes), _BORDERS) if len(corners) else ():
+        evidence, against, which = _evidence(gray, frames, corners, cells, border)
         for index, group in enumerate(groups):
             if words(group[0]).shape[1] != cells or not len(which):
                 continue
@@ -144,14 +146,14 @@ def _bordered(gray: np.ndarray, frames: np.ndarray) -> np.ndarray:
 
 
 def _evidence(
-    gray: np.ndarray, frames: np.ndarray, corners: np.ndarray, cells: int
+    gray: np.ndarray, frames: np.ndarray, corners: np.ndarray, cells: int, border: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return what the cells of quadrilaterals with a border say, and indices of these.
+    """Return what the cells of quadrilaterals within a border say, and indices of these.
 
     It is by how much the logarithmic odds of a marker grow where a cell is paper, shape
     (k, cells^2), and what they are where all cells are ink, (k,).
     """
-    side = cells + 2
+    side = cells + 2 * border
     places = (np.arange(side + 2) - (side + 1) / 2) / side
     grid = np.stack(np.meshgrid(places, places), axis=-1)
     size = side + 2
@@ -168,7 +170,7 @@ def _evidence(
     whole = _unmixed(parts.mean(axis=0), corners, side)
     logs = np.log(parts + LOG_OFFSET).reshape(len(parts), len(frames), -1)
     values = np.log(np.maximum(whole, 0) + LOG_OFFSET)
-    rings = _rings(cells)
+    rings = _rings(cells, border)
     flat = values.reshape(len(values), -1)
     ink, paper = flat[:, rings.ink], flat[:, rings.paper]
     steps = paper - ink
@@ -185,15 +187,15 @@ def _evidence(
     weights = np.array([1.0, *[_PART_WEIGHT] * len(parts)])
     against = np.einsum('p,pkc->kc', weights, log(2) - np.logaddexp(0, odds))
     against -= _UNCLEAR * (1 - np.abs(odds[0]) / _COVERED)
-    border = _BORDER_WEIGHT * against[:, rings.border].sum(axis=1)
-    border += _CORNER_WEIGHT * against[:, rings.corners].sum(axis=1)
+    around = _BORDER_WEIGHT * against[:, rings.border].sum(axis=1)
+    around += _CORNER_WEIGHT * against[:, rings.corners].sum(axis=1)
     paper = np.einsum('p,pkc->kc', weights, odds)[:, rings.inside]
-    return paper.astype(np.float32), against[:, rings.inside].sum(axis=1) + border, which
+    return paper.astype(np.float32), against[:, rings.inside].sum(axis=1) + around, which
 
 
 @dataclass(frozen=True, slots=True)
 class _Rings:
-    ink: np.ndarray  # (4 m,), cells of the border, side by side
+    ink: np.ndarray  # (4 m,), outermost cells of the border, side by side
     paper: np.ndarray  # (4 m,), the cells beside them
     border: np.ndarray  # the cells of the border, each once
     corners: np.ndarray  # those at the corners, which round and tattered regions do not have
@@ -202,9 +204,9 @@ class _Rings:
 
 
 @lru_cache
-def _rings(cells: int) -> _Rings:
+def _rings(cells: int, border: int) -> _Rings:
     """Return the indices of cells in the grid of a marker, border and one more ring included."""
-    size = cells + 4
+    size = cells + 2 * border + 2
     index = np.arange(size**2).reshape(size, size)
     turned = [np.rot90(index, turn) for turn in range(4)]
     ink = np.concatenate([of[1, 1:-1] for of in turned])
@@ -214,7 +216,9 @@ def _rings(cells: int) -> _Rings:
     squares += np.subtract.outer(columns[ink], columns) ** 2.0
     weights = np.exp(-squares / (2 * (_REACH * size) ** 2)) + 1e-6
     corners = index[[1, 1, -2, -2], [1, -2, 1, -2]]
-    return _Rings(ink, paper, np.unique(ink), corners, index[2:-2, 2:-2].ravel(), weights)
+    inside = index[border + 1 : -border - 1, border + 1 : -border - 1].ravel()
+    around = np.setdiff1d(index[1:-1, 1:-1], inside)
+    return _Rings(ink, paper, around, corners, inside, weights)
 
 
 def _unmixed(values: np.ndarray, corners: np.ndarray, side: int) -> np.ndarray:
