@@ -21,6 +21,7 @@ from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import Fit
 
 _FIRST = 8  # doubtful words that rivals read first
+_MORE_SEEN = 3.0  # log odds against anything, by which a family that is not read beats one that is
 _DOUBT = 0.05  # odds of another family that has all prints, up to which one is sure
 _ALL_WORDS = 0.5  # odds of a family of all words against one of a rule, before any print is seen
 
@@ -53,12 +54,13 @@ def _against_rivals(
 ) -> Hypotheses:
     """Return hypotheses of dots, none certain where a family that is not read has more evidence.
 
-    Where arcs of any length explain a band better than its word, it may be one of theirs. Where
-    rivals contest most of the most doubtful words, they read all.
+    Where arcs of any length explain a band nearly as well as its word, it may be one of theirs. It
+    is if its arcs and its radii are. Where rivals contest most of the most doubtful words, they
+    read all.
     """
     certain = np.flatnonzero(found.certain)
     order = certain[np.argsort(found.coded[certain], kind='stable')]
-    first = order[: min(_FIRST, (found.coded[certain] < 0).sum())]
+    first = order[: min(_FIRST, (~found.clear[certain]).sum())]
     known = [family(name) for name in FAMILY_NAMES]
     rivals = [rival for rival in known if not any(_has_all(code, rival) for code in families)]
     confidence = found.confidence.copy()
@@ -67,7 +69,10 @@ def _against_rivals(
             break
         word = found.select(some)
         others = [read_bands(gray, dots.select(some), code, prior) for code in rivals]
-        better = [_odds(other) > _odds(word) for other in others]
+        better = [
+            (_odds(other) > _odds(word)) & (other.seen > word.seen + _MORE_SEEN)
+            for other in others
+        ]
         beaten = np.any(better, axis=0)
         confidence[some[beaten]] = 0.0
         if beaten.mean() < 0.5:
