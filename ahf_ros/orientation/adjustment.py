@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ahf_ros.blas import one_blas_thread
 from ahf_ros.orientation import normals
 from ahf_ros.orientation.calibration import released
 from ahf_ros.orientation.camera import PARAMETERS
@@ -89,6 +90,7 @@ def agreeing(network: Network, state: Start, adjusted: Layout) -> NDArray[np.boo
     return used
 
 
+@one_blas_thread()
 def adjust(
     network: Network,
     start: Start,

@@ -8,6 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
+from ahf_ros.blas import one_blas_thread
 from ahf_ros.orientation.adjustment import adjust
 from ahf_ros.orientation.datum import Datum
 from ahf_ros.orientation.network import FloatArray, IntArray, Network, Rejection
@@ -40,6 +41,7 @@ TILT = (
 )
 
 
+@one_blas_thread()
 def orient(
     network: Network,
     datum: Datum | None = None,
