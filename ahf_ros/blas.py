@@ -1,7 +1,8 @@
-"""One BLAS thread while targets are identified.
+"""One BLAS thread while targets are identified and networks adjusted.
 
 An identification uses the cores for filters and pixels. Beside that, the threads of OpenBLAS spin
-between short products and take two to three times the processor time.
+between short products and take two to three times the processor time. The last bits of a product
+depend on their number, and so would coordinates.
 """
 
 from __future__ import annotations

@@ -10,14 +10,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ahf_ros.blas import one_blas_thread
 from ahf_ros.orientation import normals
 from ahf_ros.orientation.calibration import released
 from ahf_ros.orientation.camera import PARAMETERS
 from ahf_ros.orientation.checks import check_network
-from ahf_ros.orientation.datum import Datum, movements
+from ahf_ros.orientation.datum import Datum
 from ahf_ros.orientation.knowledge import gathered, kind, knowledge
 from ahf_ros.orientation.least_squares import (
-    Conditions,
     Knowledge,
     Loss,
     minimise,
@@ -30,6 +30,7 @@ from ahf_ros.orientation.precision import precision
 from ahf_ros.orientation.rejection import Adjusted, adjusted, rejections, relocated, tested
 from ahf_ros.orientation.solution import Solution, Start
 from ahf_ros.orientation.testing import CRITICAL, UnitWeight, unit_weight
+from ahf_ros.orientation.usual_lens import usual_lens
 
 _AGREES = 5.0  # standard deviations, or robust ones, of an observation that agrees
 _ZOOMED = 0.01  # change of a photograph's focal length that is another zoom
@@ -53,7 +54,8 @@ def refine(
     """Return approximate values bettered by a robust adjustment of the used observations.
 
     Bars and control points are not used, and the frame stays about where it was. The parameters
-    in `free` are estimated for every camera that is not fixed. Photographs with fewer than three
+    in `free` are estimated for every camera that is not fixed, those of lenses about as usual.
+    Photographs with fewer than three
     and points with fewer than two used observations keep their values. Afterwards those
     observations are used, of all with a pose and a point, that agree with the values to five
     standard deviations, or five robust ones where the residuals are larger.
@@ -63,13 +65,7 @@ def refine(
     layout = normals.lay_out(network, start, start.used, free_parameters(network, free))
     if not len(layout.xy):
         raise ValueError('start: nothing to refine; ' + _NEEDED)
-
-    def datum(state: Start) -> Conditions:
-        rows = np.zeros((7, layout.unknowns))
-        rows[:, : 3 * len(layout.points)] = movements(state.points[layout.points]).T
-        return Conditions(rows, np.zeros(7), np.zeros(7))
-
-    refined, _ = minimise(layout, start, datum, loss, rounds)
+    refined, _ = minimise(layout, start, usual_lens(network, layout), loss, rounds)
     return replace(refined, used=agreeing(network, refined, layout))
 
 
@@ -94,6 +90,7 @@ def agreeing(network: Network, state: Start, adjusted: Layout) -> NDArray[np.boo
     return used
 
 
+@one_blas_thread()
 def adjust(
     network: Network,
     start: Start,

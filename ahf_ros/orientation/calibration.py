@@ -18,7 +18,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ahf_ros.orientation.camera import PARAMETERS
+from ahf_ros.orientation.camera import PARAMETERS, pinhole
 from ahf_ros.orientation.network import FloatArray, Network
 from ahf_ros.orientation.solution import Start
 
@@ -51,6 +51,7 @@ def released(network: Network, start: Start, fit: Fit) -> tuple[Mask, Start, tup
     """
     free = np.zeros((len(network.cameras), len(PARAMETERS)), dtype=bool)
     state, warnings = start, []
+    before = _known(network, start)
     open_cameras = [place for place, view in enumerate(network.cameras) if not view.fixed]
     for stage in (*STAGES, ()):
         trial = free.copy()
@@ -62,7 +63,7 @@ def released(network: Network, start: Start, fit: Fit) -> tuple[Mask, Start, tup
         fitted, covariances = fit(trial, state)
         free = trial.copy()
         for place in open_cameras:
-            change = fitted.calibrations[place] - start.calibrations[place]
+            change = fitted.calibrations[place] - before[place]
             if stage == ('f',):
                 sigma = np.sqrt(covariances[place][0, 0])
                 free[place, 0] = sigma < _FOCAL_LENGTH * fitted.calibrations[place, 0]
@@ -71,8 +72,20 @@ def released(network: Network, start: Start, fit: Fit) -> tuple[Mask, Start, tup
             free[place] = _apart(change, covariances[place], free[place], significant=not stage)
         if (free == trial).all():
             state = fitted
-    kept = np.where(free, state.calibrations, start.calibrations)
+    kept = np.where(free, state.calibrations, before)
     return free, replace(state, calibrations=kept), tuple(warnings)
+
+
+def _known(network: Network, start: Start) -> FloatArray:
+    """Return calibrations as they were known; approximate values of a lens are not knowledge."""
+    return np.array(
+        [
+            pinhole(found[0], view.width, view.height)
+            if view.calibration is None
+            else view.calibration
+            for view, found in zip(network.cameras, start.calibrations, strict=True)
+        ]
+    )
 
 
 def rolled(rotations: FloatArray) -> bool:

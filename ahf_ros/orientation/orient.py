@@ -8,8 +8,8 @@ from itertools import combinations
 
 import numpy as np
 
+from ahf_ros.blas import one_blas_thread
 from ahf_ros.orientation.adjustment import adjust
-from ahf_ros.orientation.camera import pinhole
 from ahf_ros.orientation.datum import Datum
 from ahf_ros.orientation.network import FloatArray, IntArray, Network, Rejection
 from ahf_ros.orientation.planar import principal_axes
@@ -41,6 +41,7 @@ TILT = (
 )
 
 
+@one_blas_thread()
 def orient(
     network: Network,
     datum: Datum | None = None,
@@ -98,7 +99,7 @@ def orient(
     for start in starts(network):
         reason = _ambiguous(network, start)
         if reason is None:
-            solution = adjust(network, _without_lens(network, start), datum, release, test)
+            solution = adjust(network, start, datum, release, test)
             reason = _doubtful(solution)
         if reason is None:
             solutions.append(solution)
@@ -112,19 +113,6 @@ def orient(
         replace(first, warnings=first.warnings + tuple(refused) + left + _zooms(solutions)),
         *solutions[1:],
     ]
-
-
-def _without_lens(network: Network, start: Start) -> Start:
-    """Return the values with what is known of the lenses, and nothing where nothing is.
-
-    The adjustment releases a parameter where it differs from what it was. Found values are none.
-    """
-    calibrations = start.calibrations.copy()
-    for camera, view in enumerate(network.cameras):
-        given = view.calibration
-        size = view.width, view.height
-        calibrations[camera] = pinhole(calibrations[camera, 0], *size) if given is None else given
-    return replace(start, calibrations=calibrations)
 
 
 def once_a_photograph(network: Network) -> Network:

@@ -20,7 +20,15 @@ from ahf_ros.orientation.planar import mirrored
 from ahf_ros.orientation.resection import ALIKE, BOUND, FEWEST_POINTS, Resection, resections
 from ahf_ros.orientation.solution import Start
 from ahf_ros.orientation.triangulation import intersect
-from ahf_ros.orientation.triples import STEPS, WEAK, Seed, focal_sigma, known_calibrations, seeds
+from ahf_ros.orientation.triples import (
+    STEPS,
+    WEAK,
+    Seed,
+    focal_sigma,
+    known_calibrations,
+    seeds,
+    with_lens,
+)
 from ahf_ros.orientation.views import View, lengths_of, spread_of, views_of
 
 MOST_SEEDS = 5
@@ -32,15 +40,8 @@ values stay as good as after each single one, in a quarter of the time."""
 FEWEST_PHOTOGRAPHS = 3
 """What two photographs say is checked by nothing."""
 
-LARGEST_FOCAL_SIGMA = 0.03
-"""Relative standard deviation beyond which a free focal length is not accepted."""
-
 ONE_MINIMUM = np.radians(0.5)
 """Networks whose photographs are turned against each other by less are the same."""
-
-LENS = (('k1', 4), ('k2', 8), ('cx', 10), ('cy', 10))
-"""What is released of a lens while residuals exceed their standard deviations, and from how many
-photographs on."""
 
 
 def starts(network: Network) -> list[Start]:
@@ -288,13 +289,4 @@ def _adjusted(network: Network, start: Start, rounds: int = 8) -> Start:
     if free and photographs < 10 and focal_sigma(partly, start, free) > WEAK:
         free = ()
     start = refine(partly, start, free, rounds=rounds)
-    spread = spread_of(lengths_of(network, start))
-    lens = tuple(name for name, least in LENS if photographs >= least)
-    if spread < 2 or not lens or all(camera.fixed for camera in network.cameras):
-        return start
-    free = ('f', *lens)
-    tried = refine(network, start, free, rounds=rounds)
-    if focal_sigma(network, tried, free) * spread > LARGEST_FOCAL_SIGMA:
-        return start
-    better = spread_of(lengths_of(network, tried)) < 0.9 * spread
-    return tried if better else start
+    return with_lens(network, start, rounds)[0]

@@ -14,8 +14,7 @@ import numpy as np
 from ahf_ros.orientation import normals
 from ahf_ros.orientation.adjustment import free_parameters, refine
 from ahf_ros.orientation.camera import PARAMETERS, pinhole
-from ahf_ros.orientation.datum import movements
-from ahf_ros.orientation.least_squares import Conditions, normal_equations
+from ahf_ros.orientation.least_squares import normal_equations
 from ahf_ros.orientation.network import FloatArray, IntArray, Network
 from ahf_ros.orientation.planar import mirrored
 from ahf_ros.orientation.precision import precision
@@ -23,6 +22,7 @@ from ahf_ros.orientation.relative import relative_orientations
 from ahf_ros.orientation.resection import resections
 from ahf_ros.orientation.solution import Start
 from ahf_ros.orientation.triangulation import SMALLEST_ANGLE, directions, midpoints
+from ahf_ros.orientation.usual_lens import usual_lens
 from ahf_ros.orientation.views import View, lengths_of, part_of, spread_of
 
 STEPS = np.geomspace(0.5, 4.0, 14)
@@ -32,6 +32,12 @@ FEWEST_COMMON = 6
 MOST_PHOTOGRAPHS = 40
 MOST_TRIPLES = 9
 AT_A_TIME = 3
+
+LENS = (('f', 'k1'), ('f', 'k1', 'k2', 'cx', 'cy'))
+"""What is released of lenses while residuals exceed their standard deviations."""
+
+UNEXPLAINED = 2.0
+"""Robust spread of residuals in standard deviations that a lens may explain."""
 
 WEAK = 0.2
 """Relative standard deviation of a focal length that is hardly determined."""
@@ -176,23 +182,19 @@ def _seeds_of(
     cameras = sorted({views[index].camera for index in triple})
     unknown = [camera for camera in cameras if not np.isfinite(known[camera, 0])]
     own = [views[index] for index in triple]
-    if not unknown:
-        hypotheses = sorted(_hypotheses(part, own, known), key=lambda one: one.score)[:4]
-        free: tuple[str, ...] = ()
-    else:
-        free = ('f',)
+    if unknown:
         hypotheses = _scanned(part, own, known, unknown[0])
-        held = (replace(one, fixed=index != unknown[0]) for index, one in enumerate(part.cameras))
-        part = replace(part, cameras=tuple(held))
+    else:
+        hypotheses = sorted(_hypotheses(part, own, known), key=lambda one: one.score)[:4]
     found: list[Seed] = []
     for hypothesis in hypotheses:
-        seed = _refined(part, hypothesis.start, triple, free, unknown)
+        seed = _refined(part, hypothesis.start, triple, unknown)
         if seed is None:
             continue
         found.append(seed)
     if found:
         best = min(found, key=lambda one: one.cost)
-        seed = _refined(part, mirrored(best.start), triple, free, unknown)
+        seed = _refined(part, mirrored(best.start), triple, unknown)
         found += [seed] if seed is not None else []
     return [_whole(network, seed, rows) for seed in _different(found)]
 
@@ -268,13 +270,17 @@ def _refined(
     part: Network,
     start: Start,
     triple: tuple[int, int, int],
-    free: tuple[str, ...],
     unknown: list[int],
 ) -> Seed | None:
     """Return the seed after a robust adjustment, None where it fails."""
+    views = (
+        view if index in unknown else replace(view, fixed=True)
+        for index, view in enumerate(part.cameras)
+    )
+    held = replace(part, cameras=tuple(views))
     try:
         start = refine(part, start, (), rounds=6)
-        start = refine(part, start, free, rounds=15)
+        start, free = with_lens(part, refine(held, start, ('f',), rounds=15), rounds=15)
     except (ValueError, np.linalg.LinAlgError):
         return None
     focal = start.calibrations[unknown, 0]
@@ -295,6 +301,27 @@ def _refined(
     return Seed(triple, start, spread, cost, angle, sigma)
 
 
+def with_lens(network: Network, start: Start, rounds: int) -> tuple[Start, tuple[str, ...]]:
+    """Return the values with as much of the lenses as residuals ask for, and what was released.
+
+    A lens that is not known makes residuals of many standard deviations, which would cost good
+    observations, or photographs.
+    """
+    released: tuple[str, ...] = ('f',)
+    for free in LENS:
+        spread = spread_of(lengths_of(network, start))
+        if spread < UNEXPLAINED or all(camera.fixed for camera in network.cameras):
+            break
+        try:
+            tried = refine(network, start, free, rounds=rounds)
+        except (ValueError, np.linalg.LinAlgError):
+            break
+        now = spread_of(lengths_of(network, tried))
+        if now < 0.9 * spread and now * focal_sigma(network, tried, free) < WEAK:
+            start, released = tried, free
+    return start, released
+
+
 def focal_sigma(network: Network, start: Start, free: tuple[str, ...]) -> float:
     """Return the largest relative standard deviation of a free focal length, for unit weights."""
     mask = free_parameters(network, free)
@@ -303,13 +330,8 @@ def focal_sigma(network: Network, start: Start, free: tuple[str, ...]) -> float:
     if not len(focal):
         return 0.0 if len(layout.xy) else np.inf
 
-    def datum(state: Start) -> Conditions:
-        rows = np.zeros((7, layout.unknowns))
-        rows[:, : 3 * len(layout.points)] = movements(state.points[layout.points]).T
-        return Conditions(rows, np.zeros(7), np.zeros(7))
-
     try:
-        covariance = precision(*normal_equations(layout, start, datum)).rest
+        covariance = precision(*normal_equations(layout, start, usual_lens(network, layout))).rest
     except np.linalg.LinAlgError:
         return np.inf
     variance = covariance[focal, focal]

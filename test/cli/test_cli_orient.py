@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import csv
 import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +14,7 @@ import pytest
 
 from ahf_ros.interchange.camera_files import ros_yaml
 from ahf_ros.interchange.network_results import read_network
+from support import ROOT
 from support.command_line import status
 from support.networks import CALIBRATION, SIZE, records, solution
 
@@ -162,3 +166,15 @@ def test_files_that_cannot_be_used(
         told = capsys.readouterr().err
         assert told.startswith('ahf orient: ') and message in told
         assert not (tmp_path / 'out').exists()
+
+
+def test_coordinates_do_not_depend_on_the_threads_of_blas(tmp_path: Path) -> None:
+    panel = str(ROOT / 'docs' / 'examples' / 'panel.csv')
+    command = [sys.executable, '-m', 'ahf_ros.cli', 'orient', panel, '--focal-length', '2100px']
+    command += ['--quiet', '-o']
+    tables = []
+    for threads in '12':
+        variables = os.environ | {'PYTHONPATH': str(ROOT), 'OPENBLAS_NUM_THREADS': threads}
+        subprocess.run([*command, str(tmp_path / threads)], env=variables, cwd=ROOT, check=True)
+        tables.append((tmp_path / threads / 'points.csv').read_bytes())
+    assert tables[0] == tables[1]
