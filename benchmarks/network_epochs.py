@@ -28,7 +28,6 @@ import numpy as np
 
 from ahf_ros.interchange.network_results import measured_points
 from ahf_ros.orientation.adjustment import adjust
-from ahf_ros.orientation.alignment import Similarity
 from ahf_ros.orientation.camera import (
     PARAMETERS,
     linearise,
@@ -40,6 +39,7 @@ from ahf_ros.orientation.congruence import LEVEL, compare
 from ahf_ros.orientation.datum import movements, s_transform
 from ahf_ros.orientation.network import FloatArray, ScaleBar
 from ahf_ros.orientation.points import MeasuredPoints
+from ahf_ros.orientation.similarity import Similarity
 from ahf_ros.orientation.solution import Solution
 from benchmarks.network_scenes import Field as Scene
 from benchmarks.network_scenes import simulate

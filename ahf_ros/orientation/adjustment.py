@@ -19,7 +19,6 @@ from ahf_ros.orientation.knowledge import gathered, kind, knowledge
 from ahf_ros.orientation.least_squares import (
     Conditions,
     Knowledge,
-    Loss,
     minimise,
     normal_equations,
 )
@@ -46,7 +45,6 @@ def refine(
     network: Network,
     start: Start,
     free: tuple[str, ...] = (),
-    loss: Loss = 'cauchy',
     *,
     rounds: int = 30,
 ) -> Start:
@@ -69,7 +67,7 @@ def refine(
         rows[:, : 3 * len(layout.points)] = movements(state.points[layout.points]).T
         return Conditions(rows, np.zeros(7), np.zeros(7))
 
-    refined, _ = minimise(layout, start, datum, loss, rounds)
+    refined, _ = minimise(layout, start, datum, 'cauchy', rounds)
     return replace(refined, used=agreeing(network, refined, layout))
 
 

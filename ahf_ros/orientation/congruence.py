@@ -32,10 +32,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ahf_ros.orientation.alignment import on_a_line, similarity_between
 from ahf_ros.orientation.datum import movements, s_transform
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.points import MeasuredPoints
+from ahf_ros.orientation.similarity import on_a_line, similarity_between
 from ahf_ros.text import counted
 
 LEVEL = 0.05

@@ -12,12 +12,14 @@ from itertools import combinations
 import numpy as np
 
 from ahf_ros.orientation.datum import Datum
-from ahf_ros.orientation.knowledge import kind, moved, similarity
+from ahf_ros.orientation.knowledge import kind
 from ahf_ros.orientation.network import FloatArray, Network
+from ahf_ros.orientation.similarity import Similarity, on_a_line, similarity_between
 from ahf_ros.orientation.solution import Start
 
 _MISFIT = 0.15  # of control points, relative to their extent, that no approximate value explains
 _STRETCH = 1.2  # ratio of lengths that none explains
+_NARROW = 1e-3  # extent across a line of targets that hold no frame, relative to that along it
 _UNITS = (10, 100, 1000, 25.4, 304.8)
 
 
@@ -40,7 +42,7 @@ def placed(network: Network, start: Start, datum: Datum) -> tuple[Start, Datum, 
     here = np.array([_at(start, index, point.name) for point in seen]).reshape(-1, 3)
     if len(seen) >= 3:
         _check_control(tuple(point.name for point in seen), here, known)
-        start = moved(start, *similarity(here, known))
+        start = similarity_between(here, known).in_frame(start)
     elif seen and datum.kind == 'control':
         warnings.append(
             f'control: {len(seen)} points hold no frame, inner constraints hold the rest of it'
@@ -48,7 +50,7 @@ def placed(network: Network, start: Start, datum: Datum) -> tuple[Start, Datum, 
     start, of_bars = _scaled(network, start, index, len(seen) >= 2)
     if len(seen) in (1, 2):
         here = np.array([_at(start, index, point.name) for point in seen])
-        start = moved(start, 1.0, np.eye(3), known[0] - here[0])
+        start = Similarity(translation=known[0] - here[0]).in_frame(start)
         start = _turned(start, known, here) if len(seen) == 2 else start
     if kind(network, datum) == 'fixed':
         datum = Datum('fixed', datum.targets or _large_triangle(network, start))
@@ -98,7 +100,7 @@ def _scaled(
             f'scale bars contradict: {each}{_unit([ratios[p] / usual for p in wrong])}'
         )
     if not scaled:
-        start = moved(start, usual, np.eye(3), np.zeros(3))
+        start = Similarity(scale=usual).in_frame(start)
     return start, tuple(warnings)
 
 
@@ -160,8 +162,8 @@ def _explanations(
 
 def _misfit(here: FloatArray, known: FloatArray) -> float:
     """Return the largest deviation after a similarity, relative to the known points' extent."""
-    factor, rotation, shift = similarity(here, known)
-    deviations = np.linalg.norm(factor * here @ rotation.T + shift - known, axis=1)
+    moved = similarity_between(here, known).moved(here)
+    deviations = np.linalg.norm(moved - known, axis=1)
     extent = np.sqrt(((known - known.mean(axis=0)) ** 2).sum(axis=1).mean())
     return float(deviations.max() / extent) if extent > 0 else np.inf
 
@@ -175,7 +177,8 @@ def _turned(start: Start, known: FloatArray, here: FloatArray) -> Start:
     middle = middle / np.linalg.norm(middle)
     rotation = 2 * np.outer(middle, middle) - np.eye(3)
     factor = float(np.linalg.norm(new) / np.linalg.norm(old))
-    return moved(start, factor, rotation, known[0] - factor * rotation @ known[0])
+    shift = known[0] - factor * rotation @ known[0]
+    return Similarity(rotation, shift, factor).in_frame(start)
 
 
 def _large_triangle(network: Network, start: Start) -> tuple[str, ...]:
@@ -201,8 +204,7 @@ def _check_datum(start: Start, index: dict[str, int], datum: Datum) -> None:
         )
     if datum.kind == 'fixed' and len(points) != 3:
         raise ValueError(f'datum: {len(points)} fixed targets, expected 3')
-    sizes = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    if len(points) < 3 or sizes[1] < 1e-3 * sizes[0]:
+    if on_a_line(points, _NARROW):
         raise ValueError(
             f'datum: {_listed(list(datum.targets))} hold no frame, expected three or more targets '
             'that are not on a line'
@@ -215,7 +217,7 @@ def _axes(start: Start, points: FloatArray) -> Start:
     z = np.cross(x, points[2] - points[0])
     x, z = x / np.linalg.norm(x), z / np.linalg.norm(z)
     rotation = np.stack([x, np.cross(z, x), z])
-    return moved(start, 1.0, rotation, -rotation @ points[0])
+    return Similarity(rotation, -rotation @ points[0]).in_frame(start)
 
 
 def _listed(names: list[str]) -> str:

@@ -9,8 +9,8 @@ from ahf_ros.orientation import normals
 from ahf_ros.orientation.adjustment import adjust, refine
 from ahf_ros.orientation.camera import PARAMETERS, project
 from ahf_ros.orientation.datum import Datum, movements
-from ahf_ros.orientation.knowledge import similarity
 from ahf_ros.orientation.network import CameraView, ControlPoint, ScaleBar
+from ahf_ros.orientation.similarity import similarity_between
 from benchmarks.network_camcal import dbat, folder, in_dbat_units, solve
 from benchmarks.network_ellipsoids import RELEASED, coverage
 from benchmarks.network_outliers import counted
@@ -43,8 +43,8 @@ def distance(points, first, second):
 def test_refine_brings_values_near_the_truth(scene):
     network, truth, start = scene
     refined = refine(network, start, ('f', 'k1', 'k2', 'cx', 'cy'))
-    factor, rotation, shift = similarity(refined.points, truth.points)
-    error = factor * refined.points @ rotation.T + shift - truth.points
+    movement = similarity_between(refined.points, truth.points)
+    error = movement.moved(refined.points) - truth.points
     assert np.abs(error).max() < 3e-4
     assert refined.used.mean() > 0.99
 
