@@ -54,8 +54,6 @@ def coverage(solution: Solution, truth: Start) -> float:
     found = np.isfinite(points[:, 0])
     movement = similarity_between(truth.points[found], points[found])
     error = points[found] - movement.moved(truth.points[found])
-    count = len(points)
-    covariances = solution.covariance_of_points.reshape(count, 3, count, 3)
-    own = covariances[np.arange(count), :, np.arange(count)][found]
+    own = solution.point_covariances[found]
     squares = np.einsum('ni,ni->n', error, np.linalg.solve(own, error[:, :, None])[:, :, 0])
     return float((squares < CHI_SQUARE).mean())

@@ -26,7 +26,6 @@ from typing import Any
 
 import numpy as np
 
-from ahf_ros.interchange.network_results import measured_points
 from ahf_ros.orientation.adjustment import adjust
 from ahf_ros.orientation.camera import (
     PARAMETERS,
@@ -123,12 +122,12 @@ class Adjusted:
         network, start = simulate(Scene(photographs, len(xyz)), rng)
         self.xyz, self.bar, self.network = xyz, bar, network
         self.start = replace(start, points=xyz)
-        exact = measured_points(self._adjusted(np.zeros_like(xyz), rng))
+        exact = self._adjusted(np.zeros_like(xyz), rng).measured_points
         self.covariance, self.redundancy = exact.cofactors, exact.redundancy
 
     def measured(self, moved: FloatArray, rng: np.random.Generator) -> MeasuredPoints:
         """Return coordinates of targets that have moved by (n, 3), in a frame of the epoch."""
-        return _turned(measured_points(self._adjusted(moved, rng)), rng)
+        return _turned(self._adjusted(moved, rng).measured_points, rng)
 
     def _adjusted(self, moved: FloatArray, rng: np.random.Generator) -> Solution:
         seen, start = self.network.observations, replace(self.start, points=self.xyz + moved)

@@ -14,9 +14,7 @@ from ahf_ros.orientation.camera import PARAMETERS
 from ahf_ros.orientation.deviations import bar_deviations, control_deviations
 from ahf_ros.orientation.solution import Solution
 from ahf_ros.orientation.strength import (
-    determined,
     largest_angles,
-    oriented,
     rays_of,
     semi_axes,
     what_to_photograph,
@@ -47,13 +45,13 @@ def _table(title: str, *columns: str) -> Table:
 
 
 def _summary(solution: Solution, folder: str) -> Table:
-    known, rays = determined(solution), rays_of(solution)
+    known, rays = solution.determined, rays_of(solution)
     angles = np.degrees(largest_angles(solution)[known])
     deviations = np.sqrt(np.diag(solution.covariance_of_points)).reshape(-1, 3)[known]
     unit = f' {solution.network.unit}' if solution.network.unit else ', without scale'
     table = _table(folder, '', '')
     table.show_header = False
-    posed = oriented(solution)
+    posed = solution.oriented
     table.add_row('photographs', _of(int(posed.sum()), len(posed)))
     table.add_row('targets', _of(int(known.sum()), len(known)))
     if known.any():

@@ -25,7 +25,7 @@ import numpy as np
 
 from ahf_ros.orientation.datum import movements
 from ahf_ros.orientation.network import FloatArray
-from ahf_ros.orientation.points import MeasuredPoints
+from ahf_ros.orientation.points import MeasuredPoints, entries
 from ahf_ros.orientation.similarity import Similarity, on_a_line, similarity_between
 
 Weights = Literal['covariance', 'equal']
@@ -125,15 +125,15 @@ def _aligned(
 ) -> Alignment:
     """Return the alignment for which a condition holds, B of a movement and G of its targets."""
     rows = points.indices(used)
-    entries = (3 * np.array(rows)[:, None] + np.arange(3)).ravel()
+    some = entries(rows)
     aim = np.array([nominal[name] for name in used], float)
     movement = similarity_between(points.xyz[rows], aim, scale)
     size = float(np.ptp(aim, axis=0).max())
     for _ in range(_ROUNDS):
         moved = movement.moved(points.xyz)
         free = movements(moved, scale)
-        needed = condition(movement, free[entries])
-        normal = needed @ free[entries]
+        needed = condition(movement, free[some])
+        normal = needed @ free[some]
         if np.linalg.cond(normal) > 1 / np.finfo(float).eps:
             raise ValueError(f'targets {", ".join(used)} do not hold all movements')
         step = free @ np.linalg.solve(normal, needed @ (aim - moved[rows]).ravel())
@@ -143,7 +143,7 @@ def _aligned(
     else:
         raise ValueError(f'the alignment on {", ".join(used)} does not converge')
     projection = np.eye(len(free))
-    projection[:, entries] -= free @ np.linalg.solve(normal, needed)
+    projection[:, some] -= free @ np.linalg.solve(normal, needed)
     return Alignment(
         movement,
         replace(

@@ -15,9 +15,7 @@ from ahf_ros.orientation.solution import Solution
 from ahf_ros.orientation.strength import (
     FEW_RAYS,
     SMALL_ANGLE,
-    determined,
     largest_angles,
-    oriented,
     rays_of,
     semi_axes,
     what_to_photograph,
@@ -67,7 +65,7 @@ def _content(solution: Solution) -> dict[str, Any]:
 
 
 def _summary(solution: Solution) -> list[tuple[str, str]]:
-    known, posed, used = determined(solution), oriented(solution), solution.start.used
+    known, posed, used = solution.determined, solution.oriented, solution.start.used
     axes = semi_axes(solution)[known]
     rms = np.sqrt((solution.residuals[used] ** 2).mean()) if used.any() else np.nan
     unit = solution.network.unit or 'in units of the network, which has no scale'
@@ -86,7 +84,7 @@ def _summary(solution: Solution) -> list[tuple[str, str]]:
 
 
 def _targets(solution: Solution) -> list[dict[str, Any]]:
-    known, rays = determined(solution), rays_of(solution)
+    known, rays = solution.determined, rays_of(solution)
     angles, axes = largest_angles(solution), semi_axes(solution)
     sigmas = np.sqrt(np.maximum(np.diag(solution.covariance_of_points), 0)).reshape(-1, 3)
     longest = np.nanmax(axes[:, 0], initial=0) or 1.0
@@ -109,7 +107,7 @@ def _targets(solution: Solution) -> list[dict[str, Any]]:
 def _photographs(solution: Solution) -> list[dict[str, Any]]:
     network, seen = solution.network, solution.network.observations
     rows = []
-    posed = oriented(solution)
+    posed = solution.oriented
     for index, name in enumerate(network.photographs):
         here = seen.photograph == index
         residuals = solution.residuals[here & solution.start.used]

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ahf_ros.interchange.network_results import measured_points, read_network, write_network
+from ahf_ros.interchange.network_results import read_network, write_network
 from ahf_ros.orientation.network import Rejection
 from ahf_ros.orientation.solution import Solution
 from support.networks import solution
@@ -51,7 +51,7 @@ def test_a_network_is_read_back_as_it_was_written(tmp_path: Path) -> None:
     write_network(tmp_path, wanted)
     for place in (tmp_path, tmp_path / 'network.json'):
         found = read_network(place)
-        points, ours = found.points, measured_points(wanted)
+        points, ours = found.points, wanted.measured_points
         assert points.names == ours.names and len(ours.names) == 11 and '3' not in ours.names
         np.testing.assert_array_equal(points.xyz, ours.xyz)
         np.testing.assert_array_equal(points.covariance, ours.covariance)
