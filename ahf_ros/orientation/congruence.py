@@ -69,7 +69,7 @@ class GlobalTest:
     targets: int
     statistic: float
     rank: int
-    degrees: int
+    redundancy: int
     probability: float
     """Of a statistic at least as large if none of these targets moved."""
     level: float

@@ -16,6 +16,7 @@ from ahf_ros.orientation.knowledge import kind
 from ahf_ros.orientation.network import FloatArray, Network
 from ahf_ros.orientation.similarity import Similarity, on_a_line, similarity_between
 from ahf_ros.orientation.solution import Start
+from ahf_ros.text import listed
 
 _MISFIT = 0.15  # of control points, relative to their extent, that no approximate value explains
 _STRETCH = 1.2  # ratio of lengths that none explains
@@ -35,7 +36,7 @@ def placed(network: Network, start: Start, datum: Datum) -> tuple[Start, Datum, 
     seen = [point for point in control if np.isfinite(_at(start, index, point.name)).all()]
     unseen = sorted({point.name for point in control} - {point.name for point in seen})
     if unseen:
-        warnings.append(f'control: {_listed(unseen)} is in no two photographs and not used')
+        warnings.append(f'control: {listed(unseen)} is in no two photographs and not used')
     if datum.kind == 'control' and not seen:
         raise ValueError('datum: control without a control point that is seen, expected some')
     known = np.array([point.xyz for point in seen]).reshape(-1, 3)
@@ -79,7 +80,7 @@ def _scaled(
         if not np.isfinite(distance):
             ends = [end for end in bar.ends if not np.isfinite(_at(start, index, end)).all()]
             warnings.append(
-                f'scale bar {name}: {_listed(ends)} is in no two photographs, the bar is not used'
+                f'scale bar {name}: {listed(ends)} is in no two photographs, the bar is not used'
             )
         elif distance == 0:
             raise ValueError(f'scale bar {name}: both ends have the same place')
@@ -130,7 +131,7 @@ def _check_control(names: tuple[str, ...], here: FloatArray, known: FloatArray) 
         if _misfit(changed_here, changed) < _MISFIT:
             raise ValueError(f'control points contradict the photographs: {explanation}')
     raise ValueError(
-        f'control points contradict the photographs: {_listed(list(names))} do not have the shape '
+        f'control points contradict the photographs: {listed(names)} do not have the shape '
         'of the network, whatever pair is exchanged or point left out; expected the coordinates '
         'of these IDs'
     )
@@ -200,13 +201,13 @@ def _check_datum(start: Start, index: dict[str, int], datum: Datum) -> None:
     unseen = [name for name, found in zip(datum.targets, finite, strict=True) if not found]
     if unseen:
         raise ValueError(
-            f'datum: {_listed(unseen)} is in no two photographs, expected seen targets'
+            f'datum: {listed(unseen)} is in no two photographs, expected seen targets'
         )
     if datum.kind == 'fixed' and len(points) != 3:
         raise ValueError(f'datum: {len(points)} fixed targets, expected 3')
     if on_a_line(points, _NARROW):
         raise ValueError(
-            f'datum: {_listed(list(datum.targets))} hold no frame, expected three or more targets '
+            f'datum: {listed(datum.targets)} hold no frame, expected three or more targets '
             'that are not on a line'
         )
 
@@ -218,8 +219,3 @@ def _axes(start: Start, points: FloatArray) -> Start:
     x, z = x / np.linalg.norm(x), z / np.linalg.norm(z)
     rotation = np.stack([x, np.cross(z, x), z])
     return Similarity(rotation, -rotation @ points[0]).in_frame(start)
-
-
-def _listed(names: list[str]) -> str:
-    """Return up to six names as text."""
-    return ', '.join(names[:6]) + (f' and {len(names) - 6} more' if len(names) > 6 else '')

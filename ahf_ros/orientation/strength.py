@@ -10,6 +10,8 @@ import numpy as np
 from ahf_ros.orientation.calibration import rolled
 from ahf_ros.orientation.network import FloatArray, IntArray
 from ahf_ros.orientation.solution import Solution
+from ahf_ros.orientation.triangulation import largest_angle
+from ahf_ros.text import listed
 
 FEW_RAYS = 3
 """Number of rays with which a wrong one is noticed but cannot be named."""
@@ -19,7 +21,6 @@ SMALL_ANGLE = math.radians(30)
 
 _FEW_POINTS = 6  # observations, with which a pose has hardly a check
 _COVERED = 0.7  # of the half diagonal, that observations should reach
-_NAMED = 12  # targets or photographs in a line of advice
 _WEAK = 3.0  # times the median, of the largest standard deviation of a target
 
 
@@ -40,7 +41,7 @@ def largest_angles(solution: Solution) -> FloatArray:
         directions = directions[np.isfinite(directions).all(axis=1)]
         if len(directions) > 1:
             directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-            angles[target] = math.acos(np.clip((directions @ directions.T).min(), -1, 1))
+            angles[target] = largest_angle(directions)
     return angles
 
 
@@ -141,7 +142,4 @@ def _of_scale(solution: Solution) -> list[str]:
 
 
 def _named(names: Sequence[str], chosen: np.ndarray) -> str:
-    """Return the first of the chosen names, and the number of the others."""
-    some = [name for name, one in zip(names, chosen, strict=True) if one]
-    more = f' and {len(some) - _NAMED} more' if len(some) > _NAMED else ''
-    return ', '.join(some[:_NAMED]) + more
+    return listed([name for name, one in zip(names, chosen, strict=True) if one])
