@@ -231,10 +231,18 @@ def _cell(value: object, digits: str) -> str:
 
 def _show(points: MeasuredPoints, *found: Any) -> None:
     """Print what was measured for people."""
+    import numpy as np
+
     for name, (head, *rows), digits in _tables(*found):
         title = f'{_TITLES[name]}, {points.unit or "no scale"}'
         shown = [[_cell(value, f'.{digits}f') for value in row] for row in rows]
         print_table(title, [str(it) for it in head], shown)
+    off: list[Deviation] = found[1]
+    if off:
+        squares = np.mean([it.xyz**2 for it in off], axis=0)
+        each = ', '.join(f'{value:.4g}' for value in np.sqrt(squares))
+        text = f'RMS deviation x, y, z: {each}; of the distance: {np.sqrt(squares.sum()):.4g}'
+        print(f'{text} {points.unit}'.rstrip(), file=sys.stderr)
     test: LengthTest | None = found[2]
     if test:
         text = f'largest length error: {test.largest.error:+.4g} {points.unit}'

@@ -66,7 +66,9 @@ def network_files(solution: Solution) -> dict[str, bytes]:
     """Return network.json, points.csv and the covariance of all points, by the names of the files.
 
     Photographs and targets that could not be determined are left out, and named in the warnings.
+    A ValueError is raised for a solution with backward distortion.
     """
+    solution.check_forward()
     network, values = solution.network, solution.start
     points, rays = solution.measured_points, rays_of(solution)[solution.determined]
     record = {

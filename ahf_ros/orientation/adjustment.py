@@ -35,9 +35,15 @@ _ZOOMED = 0.01  # change of a photograph's focal length that is another zoom
 _SUSPECT = 0.8  # share of a photograph's observations that agree, below which its zoom is tested
 _LARGE_SPREAD = 3.0  # of residuals, in standard deviations, from which on all zooms are tested
 _CHECKED = 1e-6  # share of a variance that others must leave for a condition to be tested
+_MISFIT = 3.0  # sigma0 that is no matter of weights
 _NEEDED = (
     'no used observation has a pose and a point in front of it, expected photographs with three '
     'points and points with two rays'
+)
+_MISFITS = (
+    'sigma0 is {:.1f}: image points fit so many times worse than their covariances say. Do not '
+    'trust the coordinates before the reason is found: a wrong focal length or calibration, '
+    'wrong IDs, targets that moved, or covariances that are too small'
 )
 
 
@@ -269,6 +275,8 @@ def _solution(
     if test:
         rejected, of_targets = rejections(network, result)
         warnings += of_targets + doubtful(network, result, datum, np.sqrt(factor))
+    if unit.sigma0 > _MISFIT:
+        warnings += (_MISFITS.format(unit.sigma0),)
     if not result.converged:
         warnings += ('the adjustment did not converge: its coordinates are not final',)
     used = np.zeros(len(residuals), dtype=bool)

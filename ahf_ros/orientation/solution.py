@@ -62,6 +62,14 @@ class Solution:
     """Whether distortion is a correction at the measured place; see `camera`."""
     converged: bool = True
 
+    def check_forward(self) -> None:
+        """Raise a ValueError if its distortion is backward, which files do not tell apart."""
+        if self.backward:
+            raise ValueError(
+                'backward is True, accepted is a solution with the forward distortion of '
+                'OpenCV: adjust without backward to write it'
+            )
+
     @property
     def oriented(self) -> NDArray[np.bool_]:
         """Which photographs have a pose, (photographs,)."""

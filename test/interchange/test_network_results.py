@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from ahf_ros.interchange.export.networks import write_network_export
 from ahf_ros.interchange.network_results import read_network, write_network
 from ahf_ros.orientation.network import Rejection
 from ahf_ros.orientation.solution import Solution
@@ -71,6 +72,16 @@ def test_a_network_is_read_back_as_it_was_written(tmp_path: Path) -> None:
             'photographs without a pose: view_4.jpg',
             'targets without coordinates: 3',
         )
+
+
+def test_backward_distortion_is_not_written(tmp_path: Path) -> None:
+    """Whoever reads the files takes k1 to p2 for those of OpenCV."""
+    backward = replace(solution(), backward=True)
+    with pytest.raises(ValueError, match='backward is True, accepted is'):
+        write_network(tmp_path, backward)
+    with pytest.raises(ValueError, match='backward is True, accepted is'):
+        write_network_export('colmap', tmp_path, backward)
+    assert not list(tmp_path.iterdir())
 
 
 def test_the_json_has_the_documented_keys_and_no_others(tmp_path: Path) -> None:

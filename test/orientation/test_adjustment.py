@@ -1,5 +1,6 @@
 """The adjustment of simulated networks: values, covariances, datum, wrong IDs, bad input."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -170,6 +171,15 @@ def test_fixed_control_points_stay(scene):
         np.testing.assert_allclose(block, 0, atol=1e-12)
     error = solution.start.points - (1000 * truth.points + 5)
     assert np.abs(error).max() < 1
+
+
+def test_image_points_that_fit_badly_are_a_warning(scene):
+    network, _, start = scene
+    seen = network.observations
+    small = replace(network, observations=replace(seen, covariance=seen.covariance / 100))
+    (warning,) = adjust(small, start, release=RELEASED, test=False).warnings
+    assert re.match('sigma0 is (9|10)[.].*: image points fit so many times worse', warning)
+    assert adjust(network, start, release=RELEASED, test=False).warnings == ()
 
 
 def test_three_fixed_targets_are_the_axes(scene):
