@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable, Sequence
+
 MAXIMUM_LENGTH = 300
 """Number of characters of a foreign text that are passed on."""
+
+_HELD = 1e-6  # of the largest standard deviation: of what a datum holds, and rounding
 
 
 def printable(text: str, longest: int = MAXIMUM_LENGTH) -> str:
@@ -51,3 +56,28 @@ def counted(number: int, noun: str) -> str:
     ('1 page', '2 pages')
     """
     return f'{number} {noun}' + 's' * (number != 1)
+
+
+def listed(names: Sequence[str], most: int = 8) -> str:
+    """Return names with commas, and of long lists the number of the others.
+
+    Examples
+    --------
+    >>> listed(['A', 'B'], 2), listed(['A', 'B', 'C', 'D'], 2)
+    ('A, B', 'A, B and 2 more')
+    """
+    more = f' and {len(names) - most} more' if len(names) > most else ''
+    return ', '.join(names[:most]) + more
+
+
+def decimals(sigmas: Iterable[float]) -> int:
+    """Return how many decimals show the smallest standard deviation with two digits.
+
+    Examples
+    --------
+    >>> decimals([0.12, 3.4]), decimals([200.0])
+    (2, 0)
+    """
+    every = list(sigmas)
+    above = [it for it in every if it > _HELD * max(every)]
+    return min(max(1 - math.floor(math.log10(min(above))), 0), 12) if above else 6

@@ -12,8 +12,8 @@ import numpy as np
 from ahf_ros.orientation import normals
 from ahf_ros.orientation.adjustment import adjust
 from ahf_ros.orientation.camera import PARAMETERS
-from ahf_ros.orientation.knowledge import similarity
 from ahf_ros.orientation.network import Network
+from ahf_ros.orientation.similarity import similarity_between
 from ahf_ros.orientation.solution import Start
 from benchmarks.network_scenes import Field, approximate, simulate
 
@@ -49,12 +49,12 @@ def table(seeds: Sequence[int]) -> list[str]:
         begin = time.perf_counter()
         theirs, covariances = colmap(pycolmap, network, start)
         their_seconds = time.perf_counter() - begin
-        factor, rotation, shift = similarity(theirs, solution.start.points)
-        difference = factor * theirs @ rotation.T + shift - solution.start.points
+        movement = similarity_between(theirs, solution.start.points)
+        difference = movement.moved(theirs) - solution.start.points
         scale = solution.sigma0 if solution.scaled else 1.0
         sigma = np.sqrt(np.diag(solution.covariance_of_points)) / scale
         whole = np.sqrt((sigma.reshape(-1, 3) ** 2).mean(axis=1)).mean()
-        theirs_mean = SIGMA * factor * _mean(covariances)
+        theirs_mean = SIGMA * movement.scale * _mean(covariances)
         lines.append(
             f'| {photographs} | {np.sqrt(((difference.ravel() / sigma) ** 2).mean()):.1e} '
             f'| {seconds:.2f} | {their_seconds:.2f} | {whole:.3g} '

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ahf_ros.orientation.adjustment import adjust
-from ahf_ros.orientation.knowledge import similarity
+from ahf_ros.orientation.similarity import similarity_between
 from ahf_ros.orientation.solution import Solution, Start
 from benchmarks.network_scenes import Field, approximate, simulate
 
@@ -52,10 +52,8 @@ def coverage(solution: Solution, truth: Start) -> float:
     """Return the share of points whose 95 % ellipsoid holds the truth."""
     points = solution.start.points
     found = np.isfinite(points[:, 0])
-    factor, rotation, shift = similarity(truth.points[found], points[found])
-    error = points[found] - (factor * truth.points[found] @ rotation.T + shift)
-    count = len(points)
-    covariances = solution.covariance_of_points.reshape(count, 3, count, 3)
-    own = covariances[np.arange(count), :, np.arange(count)][found]
+    movement = similarity_between(truth.points[found], points[found])
+    error = points[found] - movement.moved(truth.points[found])
+    own = solution.point_covariances[found]
     squares = np.einsum('ni,ni->n', error, np.linalg.solve(own, error[:, :, None])[:, :, 0])
     return float((squares < CHI_SQUARE).mean())

@@ -26,9 +26,7 @@ from typing import Any
 
 import numpy as np
 
-from ahf_ros.interchange.network_results import measured_points
 from ahf_ros.orientation.adjustment import adjust
-from ahf_ros.orientation.alignment import Similarity
 from ahf_ros.orientation.camera import (
     PARAMETERS,
     linearise,
@@ -40,6 +38,7 @@ from ahf_ros.orientation.congruence import LEVEL, compare
 from ahf_ros.orientation.datum import movements, s_transform
 from ahf_ros.orientation.network import FloatArray, ScaleBar
 from ahf_ros.orientation.points import MeasuredPoints
+from ahf_ros.orientation.similarity import Similarity
 from ahf_ros.orientation.solution import Solution
 from benchmarks.network_scenes import Field as Scene
 from benchmarks.network_scenes import simulate
@@ -123,12 +122,12 @@ class Adjusted:
         network, start = simulate(Scene(photographs, len(xyz)), rng)
         self.xyz, self.bar, self.network = xyz, bar, network
         self.start = replace(start, points=xyz)
-        exact = measured_points(self._adjusted(np.zeros_like(xyz), rng))
+        exact = self._adjusted(np.zeros_like(xyz), rng).measured_points
         self.covariance, self.redundancy = exact.cofactors, exact.redundancy
 
     def measured(self, moved: FloatArray, rng: np.random.Generator) -> MeasuredPoints:
         """Return coordinates of targets that have moved by (n, 3), in a frame of the epoch."""
-        return _turned(measured_points(self._adjusted(moved, rng)), rng)
+        return _turned(self._adjusted(moved, rng).measured_points, rng)
 
     def _adjusted(self, moved: FloatArray, rng: np.random.Generator) -> Solution:
         seen, start = self.network.observations, replace(self.start, points=self.xyz + moved)

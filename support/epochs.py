@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from ahf_ros.interchange.network_results import measured_points
 from ahf_ros.orientation.adjustment import adjust
 from ahf_ros.orientation.camera import project
 from ahf_ros.orientation.network import ScaleBar
@@ -54,4 +53,4 @@ def measured(
     seed: int, moved: Mapping[str, Sequence[float]] | None = None, unit: str = 'mm'
 ) -> MeasuredPoints:
     """Return the coordinates of an epoch."""
-    return measured_points(epoch(seed, moved, unit))
+    return epoch(seed, moved, unit).measured_points

@@ -6,13 +6,15 @@ import argparse
 import json
 import sys
 from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ahf_ros.cli import tell
 from ahf_ros.cli.options import add_option, add_quiet, parsed_by
-from ahf_ros.cli.tables import decimals, identifiers, print_table
+from ahf_ros.cli.tables import identifiers, print_table
 from ahf_ros.settings.parameter import Parameter
+from ahf_ros.text import decimals
 
 if TYPE_CHECKING:
     from ahf_ros.orientation.congruence import Comparison
@@ -104,7 +106,7 @@ def _show(found: Comparison) -> None:
             str(it.targets),
             f'{it.statistic:.3f}',
             str(it.rank),
-            str(it.degrees),
+            str(it.redundancy),
             f'{it.probability:.2g}',
             f'{it.level:.3g}',
         )
@@ -157,29 +159,14 @@ def _rows(found: Comparison) -> Iterator[list[object]]:
 
 def _record(found: Comparison) -> dict[str, Any]:
     """Return what was found as a JSON object."""
-    variances = found.variances
     return {
         'congruent': found.congruent,
         'moved': list(found.moved),
         'level': found.level,
         'free_scale': found.free_scale,
         'unit': found.unit,
-        'variances': {
-            'ratio': variances.ratio,
-            'probability': variances.probability,
-            'equal': variances.equal,
-        },
-        'tests': [
-            {
-                'targets': it.targets,
-                'statistic': it.statistic,
-                'rank': it.rank,
-                'redundancy': it.degrees,
-                'probability': it.probability,
-                'level': it.level,
-            }
-            for it in found.tests
-        ],
+        'variances': asdict(found.variances),
+        'tests': [asdict(it) for it in found.tests],
         'movements': [
             {
                 'id': it.name,

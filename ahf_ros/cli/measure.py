@@ -5,26 +5,31 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ahf_ros.cli import tell
 from ahf_ros.cli.options import add_quiet, parsed_by
-from ahf_ros.cli.tables import decimals, identifiers, print_table
+from ahf_ros.cli.tables import identifiers, print_table
+from ahf_ros.text import decimals
 
 if TYPE_CHECKING:
     from ahf_ros.orientation.alignment import Alignment
     from ahf_ros.orientation.measurement import (
         Deviation,
         Distance,
-        LengthError,
         LengthTest,
         PermissibleError,
     )
     from ahf_ros.orientation.network import FloatArray
     from ahf_ros.orientation.points import MeasuredPoints
 
+_TITLES = {
+    'distances': 'Distances',
+    'deviations': 'Measured minus nominal',
+    'lengths': 'Length errors',
+}
 _ALIGNMENTS = 'best-fit', 'similarity', '3-2-1', 'none'
 
 _Measured = tuple[list['Distance'], list['Deviation'], 'LengthTest | None']
@@ -192,88 +197,67 @@ def _permissible(text: str) -> PermissibleError:
     return PermissibleError(*numbers)
 
 
-def _show(
-    points: MeasuredPoints,
-    far: Sequence[Distance],
-    off: Sequence[Deviation],
-    test: LengthTest | None,
-) -> None:
-    """Print what was measured for people."""
-    unit = f', {points.unit}' if points.unit else ', no scale'
+def _tables(
+    far: Sequence[Distance], off: Sequence[Deviation], test: LengthTest | None
+) -> Iterator[tuple[str, list[list[object]], int]]:
+    """Yield name, head and rows of the tables that are not empty, and decimals to be shown."""
     if far:
-        digits = decimals(it.sigma for it in far)
-        rows = [
-            (' to '.join(it.ends), f'{it.length:.{digits}f}', f'{it.sigma:.{digits}f}')
-            for it in far
-        ]
-        print_table('Distances', ('targets', f'distance{unit}', 'sigma'), rows)
+        head: list[object] = ['id_1', 'id_2', 'distance', 'sigma']
+        rows: list[list[object]] = [[*it.ends, it.length, it.sigma] for it in far]
+        yield 'distances', [head, *rows], decimals(it.sigma for it in far)
     if off:
-        digits = decimals(value for it in off for value in it.sigmas)
-        axes = f'dx{unit}', 'dy', 'dz'
-        print_table(
-            'Measured minus nominal',
-            ('target', *axes, 'distance', 'sigma x', 'y', 'z', ''),
-            [
-                (
-                    it.name,
-                    *(f'{value:+.{digits}f}' for value in it.xyz),
-                    f'{it.distance:.{digits}f}',
-                    *(f'{value:.{digits}f}' for value in it.sigmas),
-                    'aligned' if it.used else '',
-                )
-                for it in off
-            ],
-        )
+        head = ['id', 'dx', 'dy', 'dz', 'distance', 'sigma_x', 'sigma_y', 'sigma_z', 'aligned']
+        rows = [[it.name, *it.xyz, it.distance, *it.sigmas, it.used] for it in off]
+        yield 'deviations', [head, *rows], decimals(value for it in off for value in it.sigmas)
     if test:
-        digits = decimals(it.sigma for it in test.errors)
-        head = 'targets', 'line', f'calibrated{unit}', 'error', 'sigma', 'permissible', ''
-        print_table('Length errors', head, [_length_row(it, digits) for it in test.errors])
-        largest, passed = test.largest, test.passed
-        text = f'largest length error: {largest.error:+.4g} {points.unit}'
-        if passed is not None:
-            text += ', all are permissible' if passed else ', NOT all are permissible'
+        head = ['id_1', 'id_2', 'line', 'calibrated', 'measured', 'error', 'sigma']
+        rows = [
+            [
+                *(*it.ends, it.line, it.calibrated, it.measured, it.error, it.sigma),
+                *(it.permissible, it.within),
+            ]
+            for it in test.errors
+        ]
+        table = [[*head, 'permissible', 'within'], *rows]
+        yield 'lengths', table, decimals(it.sigma for it in test.errors)
+
+
+def _cell(value: object, digits: str) -> str:
+    """Return a number with these digits, a verdict as 1 or 0, nothing where there is none."""
+    if isinstance(value, bool):
+        return str(int(value))
+    return f'{value:{digits}}' if isinstance(value, float) else str(value or '')
+
+
+def _show(points: MeasuredPoints, *found: Any) -> None:
+    """Print what was measured for people."""
+    import numpy as np
+
+    for name, (head, *rows), digits in _tables(*found):
+        title = f'{_TITLES[name]}, {points.unit or "no scale"}'
+        shown = [[_cell(value, f'.{digits}f') for value in row] for row in rows]
+        print_table(title, [str(it) for it in head], shown)
+    off: list[Deviation] = found[1]
+    if off:
+        squares = np.mean([it.xyz**2 for it in off], axis=0)
+        each = ', '.join(f'{value:.4g}' for value in np.sqrt(squares))
+        text = f'RMS deviation x, y, z: {each}; of the distance: {np.sqrt(squares.sum()):.4g}'
+        print(f'{text} {points.unit}'.rstrip(), file=sys.stderr)
+    test: LengthTest | None = found[2]
+    if test:
+        text = f'largest length error: {test.largest.error:+.4g} {points.unit}'
+        if test.passed is not None:
+            text += ', all are permissible' if test.passed else ', NOT all are permissible'
         print(text, file=sys.stderr)
 
 
-def _length_row(it: LengthError, digits: int) -> tuple[str, ...]:
-    return (
-        ' to '.join(it.ends),
-        it.line,
-        f'{it.calibrated:.{digits}f}',
-        f'{it.error:+.{digits}f}',
-        f'{it.sigma:.{digits}f}',
-        '' if it.permissible is None else f'{it.permissible:.{digits}f}',
-        'too large' if it.within is False else '',
-    )
-
-
-def _write(
-    folder: Path, far: Sequence[Distance], off: Sequence[Deviation], test: LengthTest | None
-) -> None:
+def _write(folder: Path, *found: Any) -> None:
     """Write the tables of what was measured."""
     from ahf_ros.interchange.files import csv_table, write_whole
 
-    tables: dict[str, list[list[object]]] = {}
-    if far:
-        tables['distances'] = [['id_1', 'id_2', 'distance', 'sigma']]
-        tables['distances'] += [[*it.ends, f'{it.length:.9g}', f'{it.sigma:.6g}'] for it in far]
-    if off:
-        sigmas = ['sigma_x', 'sigma_y', 'sigma_z']
-        tables['deviations'] = [['id', 'dx', 'dy', 'dz', 'distance', *sigmas, 'aligned']]
-        for item in off:
-            numbers = [*item.xyz, item.distance, *item.sigmas]
-            cells = [f'{value:.9g}' for value in numbers]
-            tables['deviations'].append([item.name, *cells, int(item.used)])
-    if test:
-        head = ['id_1', 'id_2', 'line', 'calibrated', 'measured', 'error', 'sigma', 'permissible']
-        tables['lengths'] = [[*head]]
-        for it in test.errors:
-            numbers = [it.calibrated, it.measured, it.error, it.sigma]
-            limit = '' if it.permissible is None else f'{it.permissible:.9g}'
-            cells = [f'{value:.9g}' for value in numbers]
-            tables['lengths'].append([*it.ends, it.line, *cells, limit])
-    for name, rows in tables.items():
-        write_whole(folder / f'{name}.csv', csv_table(rows))
+    for name, rows, _ in _tables(*found):
+        cells = [[_cell(value, '.9g') for value in row] for row in rows]
+        write_whole(folder / f'{name}.csv', csv_table(cells))
 
 
 def _record(
@@ -300,17 +284,9 @@ def _record(
             for it in off
         ]
     if test:
+        names = 'line', 'calibrated', 'measured', 'error', 'sigma', 'permissible', 'within'
         record['lengths'] = [
-            {
-                'ids': list(it.ends),
-                'line': it.line,
-                'calibrated': it.calibrated,
-                'measured': it.measured,
-                'error': it.error,
-                'sigma': it.sigma,
-                'permissible': it.permissible,
-                'within': it.within,
-            }
+            {'ids': list(it.ends), **{name: getattr(it, name) for name in names}}
             for it in test.errors
         ]
         record['remarks'] = list(test.remarks)

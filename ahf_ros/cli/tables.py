@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 _ROWS = 30
 """Rows that are shown; files and JSON have all."""
 
-_WIDTH = 120  # characters
-_HELD = 1e-6  # of the largest standard deviation: what is held by an alignment, and rounding
+_WIDTH = 120  # characters, of a pipe
 
 
 def identifiers(text: str) -> tuple[str, ...]:
@@ -21,26 +23,33 @@ def identifiers(text: str) -> tuple[str, ...]:
     return names
 
 
-def print_table(title: str, head: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """Print a table, numbers to the right; of long ones the first rows."""
+def terminal() -> Console:
+    """Return where tables are shown: standard error, wide enough where it is a pipe."""
     from rich.console import Console
+
+    return Console(stderr=True, width=None if sys.stderr.isatty() else _WIDTH)
+
+
+def print_table(
+    title: str,
+    head: Sequence[str],
+    rows: Iterable[Sequence[str]],
+    console: Console | None = None,
+) -> None:
+    """Print a table, numbers to the right; of long ones the first rows.
+
+    Without names of columns there is no head.
+    """
     from rich.markup import escape
     from rich.table import Table
 
     rows = list(rows)
     table = Table(title=escape(title), title_justify='left', title_style='bold')
+    table.show_header = any(head)
     for number, name in enumerate(head):
-        table.add_column(escape(name), justify='right' if number else 'left')
+        table.add_column(escape(name), justify='right' if number and name != 'why' else 'left')
     for row in rows[:_ROWS]:
         table.add_row(*map(escape, row))
     if len(rows) > _ROWS:
         table.add_row(f'and {len(rows) - _ROWS} more', *[''] * (len(head) - 1))
-    # A pipe has no width; cells are not broken there.
-    Console(stderr=True, width=None if sys.stderr.isatty() else _WIDTH).print(table)
-
-
-def decimals(sigmas: Iterable[float]) -> int:
-    """Return how many decimals show the smallest standard deviation with two digits."""
-    listed = list(sigmas)
-    above = [it for it in listed if it > _HELD * max(listed)]
-    return min(max(1 - math.floor(math.log10(min(above))), 0), 12) if above else 6
+    (console or terminal()).print(table)

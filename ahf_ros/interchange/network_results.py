@@ -19,9 +19,9 @@ from ahf_ros.interchange.network_tables import calibration_files, tables
 from ahf_ros.interchange.target_json import parsed_json
 from ahf_ros.orientation.camera import PARAMETERS
 from ahf_ros.orientation.network import FloatArray, IntArray, Rejection
-from ahf_ros.orientation.points import MeasuredPoints
+from ahf_ros.orientation.points import MeasuredPoints, blocks
 from ahf_ros.orientation.solution import Solution
-from ahf_ros.orientation.strength import oriented, rays_of
+from ahf_ros.orientation.strength import rays_of
 from ahf_ros.text import shown
 
 NETWORK_FILE = 'network.json'
@@ -62,29 +62,15 @@ class OrientedNetwork:
     warnings: tuple[str, ...]
 
 
-def measured_points(solution: Solution) -> MeasuredPoints:
-    """Return the targets that an adjusted network determines, with their covariance."""
-    known = np.flatnonzero(np.isfinite(solution.start.points).all(axis=1))
-    rows = (3 * known[:, None] + np.arange(3)).ravel()
-    return MeasuredPoints(
-        names=tuple(solution.network.targets[index] for index in known),
-        xyz=solution.start.points[known],
-        covariance=solution.covariance_of_points[np.ix_(rows, rows)],
-        sigma0=float(solution.sigma0),
-        redundancy=int(solution.redundancy),
-        unit=solution.network.unit,
-        scaled=solution.scaled,
-    )
-
-
 def network_files(solution: Solution) -> dict[str, bytes]:
     """Return network.json, points.csv and the covariance of all points, by the names of the files.
 
     Photographs and targets that could not be determined are left out, and named in the warnings.
+    A ValueError is raised for a solution with backward distortion.
     """
+    solution.check_forward()
     network, values = solution.network, solution.start
-    known = np.isfinite(values.points).all(axis=1)
-    points, rays = measured_points(solution), rays_of(solution)[known]
+    points, rays = solution.measured_points, rays_of(solution)[solution.determined]
     record = {
         'sigma0': points.sigma0,
         'redundancy': points.redundancy,
@@ -98,7 +84,7 @@ def network_files(solution: Solution) -> dict[str, bytes]:
                 'position': values.positions[index].tolist(),
                 'covariance': solution.pose_covariances[index].tolist(),
             }
-            for index in np.flatnonzero(oriented(solution))
+            for index in np.flatnonzero(solution.oriented)
         ],
         'points': [
             {'id': name, **dict(zip('xyz', point, strict=True)), 'rays': int(number)}
@@ -170,8 +156,8 @@ def _cameras(solution: Solution) -> list[dict[str, Any]]:
 def _left_out(solution: Solution) -> list[str]:
     """Return which photographs and targets the solution has no values for."""
     network = solution.network
-    without = np.flatnonzero(~oriented(solution))
-    unknown = np.flatnonzero(~np.isfinite(solution.start.points).all(axis=1))
+    without = np.flatnonzero(~solution.oriented)
+    unknown = np.flatnonzero(~solution.determined)
     return [
         f'{what} without {lacking}: {", ".join(names[index] for index in indices)}'
         for what, lacking, names, indices in (
@@ -187,8 +173,8 @@ def _points_table(points: MeasuredPoints, rays: IntArray) -> bytes:
     sides = [('x', 'y'), ('x', 'z'), ('y', 'z')]
     header = ['id', 'x', 'y', 'z', 'sigma_x', 'sigma_y', 'sigma_z', 'rays']
     table: list[Sequence[object]] = [[*header, *(f'covariance_{a}{b}' for a, b in sides)]]
-    for index, name in enumerate(points.names):
-        block = points.covariance[3 * index : 3 * index + 3, 3 * index : 3 * index + 3]
+    own = blocks(points.covariance)
+    for index, (name, block) in enumerate(zip(points.names, own, strict=True)):
         sigma = np.sqrt(np.maximum(np.diag(block), 0))
         mixed = [f'{block["xyz".index(a), "xyz".index(b)]:.9g}' for a, b in sides]
         place = [f'{value:.12g}' for value in points.xyz[index]]

@@ -11,7 +11,6 @@ from ahf_ros.interchange.files import csv_table
 from ahf_ros.orientation.deviations import bar_deviations, control_deviations
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.solution import Solution
-from ahf_ros.orientation.strength import oriented
 
 Table = list[Sequence[object]]
 
@@ -68,7 +67,7 @@ def _poses(solution: Solution) -> Table:
     network, values = solution.network, solution.start
     sigmas = [f'sigma_{it}' for it in ('x', 'y', 'z', 'rx', 'ry', 'rz')]
     rows: Table = [['image', 'camera', 'x', 'y', 'z', 'qx', 'qy', 'qz', 'qw', *sigmas]]
-    for index in np.flatnonzero(oriented(solution)):
+    for index in np.flatnonzero(solution.oriented):
         variances = np.diag(solution.pose_covariances[index])
         numbers = [*values.positions[index], *quaternion(values.rotations[index].T)]
         numbers += list(np.sqrt(np.maximum(variances, 0)))

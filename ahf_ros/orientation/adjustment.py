@@ -19,7 +19,6 @@ from ahf_ros.orientation.datum import Datum
 from ahf_ros.orientation.knowledge import gathered, kind, knowledge
 from ahf_ros.orientation.least_squares import (
     Knowledge,
-    Loss,
     minimise,
     normal_equations,
 )
@@ -37,9 +36,15 @@ _ZOOMED = 0.01  # change of a photograph's focal length that is another zoom
 _SUSPECT = 0.8  # share of a photograph's observations that agree, below which its zoom is tested
 _LARGE_SPREAD = 3.0  # of residuals, in standard deviations, from which on all zooms are tested
 _CHECKED = 1e-6  # share of a variance that others must leave for a condition to be tested
+_MISFIT = 3.0  # sigma0 that is no matter of weights
 _NEEDED = (
     'no used observation has a pose and a point in front of it, expected photographs with three '
     'points and points with two rays'
+)
+_MISFITS = (
+    'sigma0 is {:.1f}: image points fit so many times worse than their covariances say. Do not '
+    'trust the coordinates before the reason is found: a wrong focal length or calibration, '
+    'wrong IDs, targets that moved, or covariances that are too small'
 )
 
 
@@ -47,7 +52,6 @@ def refine(
     network: Network,
     start: Start,
     free: tuple[str, ...] = (),
-    loss: Loss = 'cauchy',
     *,
     rounds: int = 30,
 ) -> Start:
@@ -65,7 +69,7 @@ def refine(
     layout = normals.lay_out(network, start, start.used, free_parameters(network, free))
     if not len(layout.xy):
         raise ValueError('start: nothing to refine; ' + _NEEDED)
-    refined, _ = minimise(layout, start, usual_lens(network, layout), loss, rounds)
+    refined, _ = minimise(layout, start, usual_lens(network, layout), 'cauchy', rounds)
     return replace(refined, used=agreeing(network, refined, layout))
 
 
@@ -268,6 +272,8 @@ def _solution(
     if test:
         rejected, of_targets = rejections(network, result)
         warnings += of_targets + doubtful(network, result, datum, np.sqrt(factor))
+    if unit.sigma0 > _MISFIT:
+        warnings += (_MISFITS.format(unit.sigma0),)
     if not result.converged:
         warnings += ('the adjustment did not converge: its coordinates are not final',)
     used = np.zeros(len(residuals), dtype=bool)

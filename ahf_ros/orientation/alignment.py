@@ -25,34 +25,13 @@ import numpy as np
 
 from ahf_ros.orientation.datum import movements
 from ahf_ros.orientation.network import FloatArray
-from ahf_ros.orientation.points import MeasuredPoints
+from ahf_ros.orientation.points import MeasuredPoints, entries
+from ahf_ros.orientation.similarity import Similarity, on_a_line, similarity_between
 
 Weights = Literal['covariance', 'equal']
 
 _ROUNDS = 50
 _CONVERGED = 1e-12  # of the size of the points
-_FLAT = 1e-5  # of the size: what is thinner is on a line
-
-
-@dataclass(frozen=True)
-class Similarity:
-    """The movement x' = scale R x + translation, with R (3, 3) and translation (3,)."""
-
-    rotation: FloatArray
-    translation: FloatArray
-    scale: float = 1.0
-
-    def moved(self, xyz: FloatArray) -> FloatArray:
-        """Return points (n, 3) after the movement."""
-        return self.scale * xyz @ self.rotation.T + self.translation
-
-    def turned(self, covariance: FloatArray) -> FloatArray:
-        """Return the covariance (3n, 3n) of points after the movement, which is without error."""
-        count = len(covariance) // 3
-        blocks = covariance.reshape(count, 3, count, 3)
-        turned = np.einsum('ai,minj,bj->manb', self.rotation, blocks, self.rotation, optimize=True)
-        result: FloatArray = self.scale**2 * turned.reshape(covariance.shape)
-        return result
 
 
 @dataclass(frozen=True)
@@ -66,22 +45,9 @@ class Alignment:
     """Names of the targets that the alignment rests on."""
 
 
-def similarity_between(source: FloatArray, target: FloatArray, scale: bool) -> Similarity:
-    """Return the movement of points (n, 3) to others with the least sum of squared distances.
-
-    Umeyama, IEEE Trans. PAMI 1991, 13, 376.
-    """
-    centre, aim = source.mean(axis=0), target.mean(axis=0)
-    left, values, right = np.linalg.svd((target - aim).T @ (source - centre))
-    signs = np.array([1.0, 1.0, np.sign(np.linalg.det(left) * np.linalg.det(right))])
-    rotation = (left * signs) @ right
-    factor = float(values @ signs / ((source - centre) ** 2).sum()) if scale else 1.0
-    return Similarity(rotation, aim - factor * rotation @ centre, factor)
-
-
 def unaligned(points: MeasuredPoints) -> Alignment:
     """Return points as they are, in the frame of nominal ones already."""
-    return Alignment(Similarity(np.eye(3), np.zeros(3)), points, ())
+    return Alignment(Similarity(), points, ())
 
 
 def best_fit(
@@ -159,15 +125,15 @@ def _aligned(
 ) -> Alignment:
     """Return the alignment for which a condition holds, B of a movement and G of its targets."""
     rows = points.indices(used)
-    entries = (3 * np.array(rows)[:, None] + np.arange(3)).ravel()
+    some = entries(rows)
     aim = np.array([nominal[name] for name in used], float)
     movement = similarity_between(points.xyz[rows], aim, scale)
     size = float(np.ptp(aim, axis=0).max())
     for _ in range(_ROUNDS):
         moved = movement.moved(points.xyz)
         free = movements(moved, scale)
-        needed = condition(movement, free[entries])
-        normal = needed @ free[entries]
+        needed = condition(movement, free[some])
+        normal = needed @ free[some]
         if np.linalg.cond(normal) > 1 / np.finfo(float).eps:
             raise ValueError(f'targets {", ".join(used)} do not hold all movements')
         step = free @ np.linalg.solve(normal, needed @ (aim - moved[rows]).ravel())
@@ -177,7 +143,7 @@ def _aligned(
     else:
         raise ValueError(f'the alignment on {", ".join(used)} does not converge')
     projection = np.eye(len(free))
-    projection[:, entries] -= free @ np.linalg.solve(normal, needed)
+    projection[:, some] -= free @ np.linalg.solve(normal, needed)
     return Alignment(
         movement,
         replace(
@@ -216,9 +182,3 @@ def _checked_names(
         if on_a_line(xyz):
             raise ValueError(f'targets {", ".join(used)} are on a line, accepted are others, too')
     return used
-
-
-def on_a_line(xyz: FloatArray) -> bool:
-    """Return whether points (n, 3) are on a line, or in one place."""
-    values = np.linalg.svd(xyz - xyz.mean(axis=0), compute_uv=False)
-    return bool(values[1] <= _FLAT * values[0])

@@ -32,10 +32,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ahf_ros.orientation.alignment import on_a_line, similarity_between
 from ahf_ros.orientation.datum import movements, s_transform
 from ahf_ros.orientation.network import FloatArray
-from ahf_ros.orientation.points import MeasuredPoints
+from ahf_ros.orientation.points import MeasuredPoints, blocks
+from ahf_ros.orientation.similarity import on_a_line, similarity_between
 from ahf_ros.text import counted
 
 LEVEL = 0.05
@@ -69,7 +69,7 @@ class GlobalTest:
     targets: int
     statistic: float
     rank: int
-    degrees: int
+    redundancy: int
     probability: float
     """Of a statistic at least as large if none of these targets moved."""
     level: float
@@ -409,12 +409,12 @@ def _tested(epochs: _Epochs, datum: NDArray[np.bool_]) -> _State:
     )
     pulls = (weights @ difference[datum].ravel()).reshape(-1, 3)
     inverse = np.empty((len(first), 3, 3))
-    inverse[datum] = _blocks(weights)
+    inverse[datum] = blocks(weights)
     # What the movements of the datum, which are errors, say of those of the other targets.
     gain = covariance[np.ix_(~rows, rows)] @ weights
     difference[~datum] -= (gain @ difference[datum].ravel()).reshape(-1, 3)
     covariances = np.empty_like(inverse)
-    covariances[~datum] = _blocks(
+    covariances[~datum] = blocks(
         covariance[np.ix_(~rows, ~rows)] - gain @ covariance[np.ix_(rows, ~rows)]
     )
     covariances[datum] = np.linalg.pinv(inverse[datum], _SINGULAR, hermitian=True)
@@ -459,14 +459,6 @@ def _pseudoinverse(covariance: FloatArray, free: FloatArray) -> FloatArray:
         )
     inverse: FloatArray = ((vectors / values) @ vectors.T - added) / size
     return inverse
-
-
-def _blocks(matrix: FloatArray) -> FloatArray:
-    """Return the 3x3 blocks on the diagonal, (n, 3, 3)."""
-    count = len(matrix) // 3
-    each = np.arange(count)
-    blocks: FloatArray = matrix.reshape(count, 3, count, 3)[each, :, each]
-    return blocks
 
 
 def _f_probability(above: ArrayLike, below: ArrayLike, statistic: ArrayLike) -> FloatArray:

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ahf_ros.orientation.measurement import distances
 from ahf_ros.orientation.network import ControlPoint, FloatArray, ScaleBar
+from ahf_ros.orientation.points import blocks
 from ahf_ros.orientation.solution import Solution
 
 
@@ -40,38 +42,26 @@ class ControlDeviation:
 
 def bar_deviations(solution: Solution) -> list[BarDeviation]:
     """Return the scale bars whose ends the network determines, if it has a scale."""
-    index = _determined(solution)
-    found = []
-    for bar in solution.network.bars if solution.network.unit else ():
-        if not all(end in index for end in bar.ends):
-            continue
-        first, second = (index[end] for end in bar.ends)
-        points = solution.start.points
-        along = points[second] - points[first]
-        length = float(np.linalg.norm(along))
-        rows = [*range(3 * first, 3 * first + 3), *range(3 * second, 3 * second + 3)]
-        slopes = np.concatenate((-along, along)) / length
-        variance = float(slopes @ solution.covariance_of_points[np.ix_(rows, rows)] @ slopes)
-        own = bar.sigma if bar.check else 0.0
-        found.append(BarDeviation(bar, length, math.sqrt(max(variance, 0.0) + own**2)))
-    return found
+    points = solution.measured_points
+    names = set(points.names if points.unit else ())
+    bars = [bar for bar in solution.network.bars if names.issuperset(bar.ends)]
+    return [
+        BarDeviation(bar, it.length, math.hypot(it.sigma, bar.sigma if bar.check else 0.0))
+        for bar, it in zip(bars, distances(points, [bar.ends for bar in bars]), strict=True)
+    ]
 
 
 def control_deviations(solution: Solution) -> list[ControlDeviation]:
     """Return the control and check points that the network determines, if it has a scale."""
-    index = _determined(solution)
-    found = []
-    for point in solution.network.control if solution.network.unit else ():
-        if point.name in index:
-            row = index[point.name]
-            block = solution.covariance_of_points[3 * row : 3 * row + 3, 3 * row : 3 * row + 3]
-            own = np.diag(point.covariance) if point.check else np.zeros(3)
-            sigma = np.sqrt(np.maximum(np.diag(block), 0) + own)
-            found.append(ControlDeviation(point, solution.start.points[row] - point.xyz, sigma))
-    return found
-
-
-def _determined(solution: Solution) -> dict[str, int]:
-    """Return the rows of the targets that have coordinates."""
-    known = np.isfinite(solution.start.points).all(axis=1)
-    return {solution.network.targets[row]: int(row) for row in np.flatnonzero(known)}
+    points = solution.measured_points
+    known = [it for it in solution.network.control if points.unit and it.name in points.names]
+    rows = points.indices([it.name for it in known])
+    variances = np.diagonal(blocks(points.covariance)[rows], axis1=1, axis2=2)
+    return [
+        ControlDeviation(
+            point,
+            points.xyz[row] - point.xyz,
+            np.sqrt(np.maximum(own, 0) + point.check * np.diag(point.covariance)),
+        )
+        for point, row, own in zip(known, rows, variances, strict=True)
+    ]

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ahf_ros.orientation.solution import Solution
-from ahf_ros.orientation.strength import determined, oriented
 
 Mask = NDArray[np.bool_]
 
@@ -19,8 +18,8 @@ def separated(solutions: Sequence[Solution]) -> list[Solution]:
 
     What no group determines stays in the first one.
     """
-    posed = np.array([oriented(it) for it in solutions])
-    placed = np.array([determined(it) for it in solutions])
+    posed = np.array([it.oriented for it in solutions])
+    placed = np.array([it.determined for it in solutions])
     parts = []
     for number, solution in enumerate(solutions):
         masks = []

@@ -11,7 +11,7 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -141,28 +141,3 @@ def _fixed(targets: IntArray, points: FloatArray, count: int) -> tuple[FloatArra
         rows[row, target, axis] = 1
         gaps[row] = -points[target, axis] if row < 6 else 0
     return rows.reshape(count, points.size), gaps
-
-
-def similarity(
-    source: FloatArray, target: FloatArray, scale: bool = True
-) -> tuple[float, FloatArray, FloatArray]:
-    """Return scale s, rotation R and shift t of least squares for target = s R source + t.
-
-    After Umeyama, Least-squares estimation of transformation parameters, PAMI 13 (4), 1991.
-    """
-    middle, aim = source.mean(axis=0), target.mean(axis=0)
-    left, sizes, right = np.linalg.svd((target - aim).T @ (source - middle))
-    signs = np.array([1, 1, np.sign(np.linalg.det(left @ right))])
-    rotation = left * signs @ right
-    factor = float(sizes @ signs / ((source - middle) ** 2).sum()) if scale else 1.0
-    return factor, rotation, aim - factor * rotation @ middle
-
-
-def moved(state: Start, factor: float, rotation: FloatArray, shift: FloatArray) -> Start:
-    """Return approximate values in another frame: X' = factor rotation X + shift."""
-    return replace(
-        state,
-        rotations=state.rotations @ rotation.T,
-        positions=factor * state.positions @ rotation.T + shift,
-        points=factor * state.points @ rotation.T + shift,
-    )

@@ -19,7 +19,7 @@ from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.normals import Layout, Normals, Reduced
 from ahf_ros.orientation.solution import Start
 
-Loss = Literal['squares', 'cauchy', 'geman_mcclure']
+Loss = Literal['squares', 'cauchy']
 
 _FIRST_DAMPING = 1e-3
 _LARGEST_DAMPING = 1e10
@@ -126,6 +126,4 @@ def _losses(lengths: FloatArray, spread: float, loss: Loss) -> tuple[float, Floa
         return float(squares.sum()), np.ones(len(lengths))
     unit = (_TUNING * spread) ** 2
     relative = squares / unit
-    if loss == 'cauchy':
-        return float(unit * np.log1p(relative).sum()), 1 / (1 + relative)
-    return float((unit * relative / (1 + relative)).sum()), 1 / (1 + relative) ** 2
+    return float(unit * np.log1p(relative).sum()), 1 / (1 + relative)

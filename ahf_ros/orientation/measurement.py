@@ -15,7 +15,7 @@ import numpy as np
 
 from ahf_ros.orientation.alignment import Alignment
 from ahf_ros.orientation.network import FloatArray
-from ahf_ros.orientation.points import MeasuredPoints
+from ahf_ros.orientation.points import MeasuredPoints, blocks, entries
 from ahf_ros.text import counted
 
 LINES, LENGTHS_A_LINE, SHARE_OF_DIAGONAL = 7, 5, 2 / 3
@@ -133,7 +133,6 @@ def distances(
 ) -> list[Distance]:
     """Return the distances of pairs of targets, by default of all."""
     pairs = list(combinations(points.names, 2)) if pairs is None else pairs
-    blocks = points.covariance.reshape(len(points.names), 3, len(points.names), 3)
     measured = []
     for pair in pairs:
         first, second = points.indices(pair)
@@ -141,10 +140,9 @@ def distances(
         length = float(np.linalg.norm(difference))
         if not length > 0:
             raise ValueError(f'targets {pair[0]} and {pair[1]} are in one place, accepted are two')
-        covariance = blocks[first, :, first] + blocks[second, :, second]
-        covariance = covariance - blocks[first, :, second] - blocks[second, :, first]
-        direction = difference / length
-        variance = max(float(direction @ covariance @ direction), 0.0)
+        some = entries([first, second])
+        slopes = np.concatenate((-difference, difference)) / length
+        variance = max(float(slopes @ points.covariance[np.ix_(some, some)] @ slopes), 0.0)
         measured.append(Distance((pair[0], pair[1]), length, float(np.sqrt(variance))))
     return measured
 
@@ -152,12 +150,11 @@ def distances(
 def deviations(alignment: Alignment, nominal: Mapping[str, FloatArray]) -> list[Deviation]:
     """Return measured minus nominal coordinates of all targets that have both."""
     points, found = alignment.points, []
+    own = blocks(points.covariance)
     for index, name in enumerate(points.names):
         if name in nominal:
-            rows = slice(3 * index, 3 * index + 3)
             difference = points.xyz[index] - nominal[name]
-            covariance = points.covariance[rows, rows]
-            found.append(Deviation(name, difference, covariance, name in alignment.used))
+            found.append(Deviation(name, difference, own[index], name in alignment.used))
     return found
 
 

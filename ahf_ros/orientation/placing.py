@@ -12,12 +12,15 @@ from itertools import combinations
 import numpy as np
 
 from ahf_ros.orientation.datum import Datum
-from ahf_ros.orientation.knowledge import kind, moved, similarity
+from ahf_ros.orientation.knowledge import kind
 from ahf_ros.orientation.network import FloatArray, Network
+from ahf_ros.orientation.similarity import Similarity, on_a_line, similarity_between
 from ahf_ros.orientation.solution import Start
+from ahf_ros.text import listed
 
 _MISFIT = 0.15  # of control points, relative to their extent, that no approximate value explains
 _STRETCH = 1.2  # ratio of lengths that none explains
+_NARROW = 1e-3  # extent across a line of targets that hold no frame, relative to that along it
 _UNITS = (10, 100, 1000, 25.4, 304.8)
 
 
@@ -33,14 +36,14 @@ def placed(network: Network, start: Start, datum: Datum) -> tuple[Start, Datum, 
     seen = [point for point in control if np.isfinite(_at(start, index, point.name)).all()]
     unseen = sorted({point.name for point in control} - {point.name for point in seen})
     if unseen:
-        warnings.append(f'control: {_listed(unseen)} is in no two photographs and not used')
+        warnings.append(f'control: {listed(unseen)} is in no two photographs and not used')
     if datum.kind == 'control' and not seen:
         raise ValueError('datum: control without a control point that is seen, expected some')
     known = np.array([point.xyz for point in seen]).reshape(-1, 3)
     here = np.array([_at(start, index, point.name) for point in seen]).reshape(-1, 3)
     if len(seen) >= 3:
         _check_control(tuple(point.name for point in seen), here, known)
-        start = moved(start, *similarity(here, known))
+        start = similarity_between(here, known).in_frame(start)
     elif seen and datum.kind == 'control':
         warnings.append(
             f'control: {len(seen)} points hold no frame, inner constraints hold the rest of it'
@@ -48,7 +51,7 @@ def placed(network: Network, start: Start, datum: Datum) -> tuple[Start, Datum, 
     start, of_bars = _scaled(network, start, index, len(seen) >= 2)
     if len(seen) in (1, 2):
         here = np.array([_at(start, index, point.name) for point in seen])
-        start = moved(start, 1.0, np.eye(3), known[0] - here[0])
+        start = Similarity(translation=known[0] - here[0]).in_frame(start)
         start = _turned(start, known, here) if len(seen) == 2 else start
     if kind(network, datum) == 'fixed':
         datum = Datum('fixed', datum.targets or _large_triangle(network, start))
@@ -77,7 +80,7 @@ def _scaled(
         if not np.isfinite(distance):
             ends = [end for end in bar.ends if not np.isfinite(_at(start, index, end)).all()]
             warnings.append(
-                f'scale bar {name}: {_listed(ends)} is in no two photographs, the bar is not used'
+                f'scale bar {name}: {listed(ends)} is in no two photographs, the bar is not used'
             )
         elif distance == 0:
             raise ValueError(f'scale bar {name}: both ends have the same place')
@@ -98,7 +101,7 @@ def _scaled(
             f'scale bars contradict: {each}{_unit([ratios[p] / usual for p in wrong])}'
         )
     if not scaled:
-        start = moved(start, usual, np.eye(3), np.zeros(3))
+        start = Similarity(scale=usual).in_frame(start)
     return start, tuple(warnings)
 
 
@@ -128,7 +131,7 @@ def _check_control(names: tuple[str, ...], here: FloatArray, known: FloatArray) 
         if _misfit(changed_here, changed) < _MISFIT:
             raise ValueError(f'control points contradict the photographs: {explanation}')
     raise ValueError(
-        f'control points contradict the photographs: {_listed(list(names))} do not have the shape '
+        f'control points contradict the photographs: {listed(names)} do not have the shape '
         'of the network, whatever pair is exchanged or point left out; expected the coordinates '
         'of these IDs'
     )
@@ -160,8 +163,8 @@ def _explanations(
 
 def _misfit(here: FloatArray, known: FloatArray) -> float:
     """Return the largest deviation after a similarity, relative to the known points' extent."""
-    factor, rotation, shift = similarity(here, known)
-    deviations = np.linalg.norm(factor * here @ rotation.T + shift - known, axis=1)
+    moved = similarity_between(here, known).moved(here)
+    deviations = np.linalg.norm(moved - known, axis=1)
     extent = np.sqrt(((known - known.mean(axis=0)) ** 2).sum(axis=1).mean())
     return float(deviations.max() / extent) if extent > 0 else np.inf
 
@@ -175,7 +178,8 @@ def _turned(start: Start, known: FloatArray, here: FloatArray) -> Start:
     middle = middle / np.linalg.norm(middle)
     rotation = 2 * np.outer(middle, middle) - np.eye(3)
     factor = float(np.linalg.norm(new) / np.linalg.norm(old))
-    return moved(start, factor, rotation, known[0] - factor * rotation @ known[0])
+    shift = known[0] - factor * rotation @ known[0]
+    return Similarity(rotation, shift, factor).in_frame(start)
 
 
 def _large_triangle(network: Network, start: Start) -> tuple[str, ...]:
@@ -197,14 +201,13 @@ def _check_datum(start: Start, index: dict[str, int], datum: Datum) -> None:
     unseen = [name for name, found in zip(datum.targets, finite, strict=True) if not found]
     if unseen:
         raise ValueError(
-            f'datum: {_listed(unseen)} is in no two photographs, expected seen targets'
+            f'datum: {listed(unseen)} is in no two photographs, expected seen targets'
         )
     if datum.kind == 'fixed' and len(points) != 3:
         raise ValueError(f'datum: {len(points)} fixed targets, expected 3')
-    sizes = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    if len(points) < 3 or sizes[1] < 1e-3 * sizes[0]:
+    if on_a_line(points, _NARROW):
         raise ValueError(
-            f'datum: {_listed(list(datum.targets))} hold no frame, expected three or more targets '
+            f'datum: {listed(datum.targets)} hold no frame, expected three or more targets '
             'that are not on a line'
         )
 
@@ -215,9 +218,4 @@ def _axes(start: Start, points: FloatArray) -> Start:
     z = np.cross(x, points[2] - points[0])
     x, z = x / np.linalg.norm(x), z / np.linalg.norm(z)
     rotation = np.stack([x, np.cross(z, x), z])
-    return moved(start, 1.0, rotation, -rotation @ points[0])
-
-
-def _listed(names: list[str]) -> str:
-    """Return up to six names as text."""
-    return ', '.join(names[:6]) + (f' and {len(names) - 6} more' if len(names) > 6 else '')
+    return Similarity(rotation, -rotation @ points[0]).in_frame(start)

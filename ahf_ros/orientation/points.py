@@ -3,14 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ahf_ros.orientation.network import FloatArray
+from ahf_ros.orientation.network import FloatArray, IntArray
 
 _ASYMMETRY = 1e-6  # of the largest entry, that rounding in a file may leave
 _NEGATIVE = 1e-6  # of the largest eigenvalue, the same
+
+
+def blocks(covariance: FloatArray) -> FloatArray:
+    """Return the covariance (n, 3, 3) of each point from that of all, (3n, 3n)."""
+    count = len(covariance) // 3
+    each = np.arange(count)
+    own: FloatArray = covariance.reshape(count, 3, count, 3)[each, :, each]
+    return own
+
+
+def entries(rows: Sequence[int] | IntArray) -> IntArray:
+    """Return the rows of coordinates, (3n,), of the rows of points."""
+    return np.ravel(3 * np.asarray(rows, np.int64)[:, None] + np.arange(3))
 
 
 @dataclass(frozen=True)
@@ -70,16 +83,9 @@ class MeasuredPoints:
     def chosen(self, names: Sequence[str]) -> MeasuredPoints:
         """Return some of the points, in the order of their names."""
         rows = self.indices(names)
-        entries = (3 * np.array(rows, np.int64)[:, None] + np.arange(3)).ravel()
-        return MeasuredPoints(
-            tuple(names),
-            self.xyz[rows],
-            self.covariance[np.ix_(entries, entries)],
-            self.sigma0,
-            self.redundancy,
-            self.unit,
-            self.scaled,
-        )
+        some = entries(rows)
+        covariance = self.covariance[np.ix_(some, some)]
+        return replace(self, names=tuple(names), xyz=self.xyz[rows], covariance=covariance)
 
 
 def _check_array(name: str, array: FloatArray, shape: tuple[int, ...]) -> None:

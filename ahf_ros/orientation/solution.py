@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ahf_ros.orientation.network import FloatArray, Network, Rejection
+from ahf_ros.orientation.points import MeasuredPoints, blocks, entries
 
 
 @dataclass(frozen=True)
@@ -59,3 +61,46 @@ class Solution:
     backward: bool = False
     """Whether distortion is a correction at the measured place; see `camera`."""
     converged: bool = True
+
+    def check_forward(self) -> None:
+        """Raise a ValueError if its distortion is backward, which files do not tell apart."""
+        if self.backward:
+            raise ValueError(
+                'backward is True, accepted is a solution with the forward distortion of '
+                'OpenCV: adjust without backward to write it'
+            )
+
+    @property
+    def oriented(self) -> NDArray[np.bool_]:
+        """Which photographs have a pose, (photographs,)."""
+        return np.asarray(np.isfinite(self.start.positions).all(axis=1))
+
+    @property
+    def determined(self) -> NDArray[np.bool_]:
+        """Which targets have coordinates, (points,)."""
+        return np.asarray(np.isfinite(self.start.points).all(axis=1))
+
+    @property
+    def calibrated(self) -> NDArray[np.bool_]:
+        """Which cameras have a calibration, (cameras,): those that took oriented photographs."""
+        return np.asarray(np.isfinite(self.start.calibrations).all(axis=1))
+
+    @property
+    def point_covariances(self) -> FloatArray:
+        """(points, 3, 3), of each point by itself."""
+        return blocks(self.covariance_of_points)
+
+    @cached_property
+    def measured_points(self) -> MeasuredPoints:
+        """The targets that have coordinates, with their covariance."""
+        rows = np.flatnonzero(self.determined)
+        some = entries(rows)
+        return MeasuredPoints(
+            names=tuple(self.network.targets[row] for row in rows),
+            xyz=self.start.points[rows],
+            covariance=self.covariance_of_points[np.ix_(some, some)],
+            sigma0=float(self.sigma0),
+            redundancy=int(self.redundancy),
+            unit=self.network.unit,
+            scaled=self.scaled,
+        )

@@ -6,11 +6,12 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ahf_ros.orientation.calibration import rolled
 from ahf_ros.orientation.network import FloatArray, IntArray
 from ahf_ros.orientation.solution import Solution
+from ahf_ros.orientation.triangulation import largest_angle
+from ahf_ros.text import listed
 
 FEW_RAYS = 3
 """Number of rays with which a wrong one is noticed but cannot be named."""
@@ -20,18 +21,7 @@ SMALL_ANGLE = math.radians(30)
 
 _FEW_POINTS = 6  # observations, with which a pose has hardly a check
 _COVERED = 0.7  # of the half diagonal, that observations should reach
-_NAMED = 12  # targets or photographs in a line of advice
 _WEAK = 3.0  # times the median, of the largest standard deviation of a target
-
-
-def oriented(solution: Solution) -> NDArray[np.bool_]:
-    """Return which photographs have a pose, (photographs,)."""
-    return np.asarray(np.isfinite(solution.start.positions).all(axis=1))
-
-
-def determined(solution: Solution) -> NDArray[np.bool_]:
-    """Return which targets have coordinates, (points,)."""
-    return np.asarray(np.isfinite(solution.start.points).all(axis=1))
 
 
 def rays_of(solution: Solution) -> IntArray:
@@ -51,16 +41,14 @@ def largest_angles(solution: Solution) -> FloatArray:
         directions = directions[np.isfinite(directions).all(axis=1)]
         if len(directions) > 1:
             directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-            angles[target] = math.acos(np.clip((directions @ directions.T).min(), -1, 1))
+            angles[target] = largest_angle(directions)
     return angles
 
 
 def semi_axes(solution: Solution) -> FloatArray:
     """Return the standard deviations along the axes of each target's ellipsoid, largest first."""
-    count = len(solution.network.targets)
-    blocks = solution.covariance_of_points.reshape(count, 3, count, 3)
-    own = blocks[np.arange(count), :, np.arange(count)]
-    axes = np.full((count, 3), np.nan)
+    own = solution.point_covariances
+    axes = np.full((len(own), 3), np.nan)
     known = np.isfinite(own).all(axis=(1, 2))
     axes[known] = np.sqrt(np.maximum(np.linalg.eigvalsh(own[known]), 0))[:, ::-1]
     return axes
@@ -69,7 +57,7 @@ def semi_axes(solution: Solution) -> FloatArray:
 def what_to_photograph(solution: Solution) -> list[str]:
     """Return what would make a weak network stronger, one sentence a weakness."""
     network = solution.network
-    known = determined(solution)
+    known = solution.determined
     rays, angles, largest = rays_of(solution), largest_angles(solution), semi_axes(solution)[:, 0]
     advice = []
     if np.any(few := known & (rays < FEW_RAYS)):
@@ -98,7 +86,7 @@ def what_to_photograph(solution: Solution) -> list[str]:
 
 def _of_photographs(solution: Solution) -> list[str]:
     network, values = solution.network, solution.start
-    posed = oriented(solution)
+    posed = solution.oriented
     number = np.bincount(
         network.observations.photograph[values.used], minlength=len(network.photographs)
     )
@@ -121,7 +109,7 @@ def _of_cameras(solution: Solution) -> list[str]:
     network, values = solution.network, solution.start
     advice = []
     for place, view in enumerate(network.cameras):
-        taken = (network.camera_of == place) & oriented(solution)
+        taken = (network.camera_of == place) & solution.oriented
         if view.fixed or not taken.any():
             continue
         if not rolled(values.rotations[taken]):
@@ -154,7 +142,4 @@ def _of_scale(solution: Solution) -> list[str]:
 
 
 def _named(names: Sequence[str], chosen: np.ndarray) -> str:
-    """Return the first of the chosen names, and the number of the others."""
-    some = [name for name, one in zip(names, chosen, strict=True) if one]
-    more = f' and {len(some) - _NAMED} more' if len(some) > _NAMED else ''
-    return ', '.join(some[:_NAMED]) + more
+    return listed([name for name, one in zip(names, chosen, strict=True) if one])

@@ -10,7 +10,6 @@ import numpy as np
 
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.solution import Solution
-from ahf_ros.orientation.strength import determined, oriented
 
 VIEW = 620, 460  # px, of a view of the network
 PICTURE = 300  # px, width of a figure of an image
@@ -32,8 +31,8 @@ def views(solution: Solution) -> list[tuple[str, str]]:
     small beside the network, they are shown alone, too.
     """
     axes, names = _axes(solution)
-    points = solution.start.points[determined(solution)]
-    cameras = solution.start.positions[oriented(solution)]
+    points = solution.start.points[solution.determined]
+    cameras = solution.start.positions[solution.oriented]
     whole, alone = _extent(np.concatenate((points, cameras)), axes), _extent(points, axes)
     shown = [('From above', (0, 1), True), ('From the side', (0, 2), True)]
     if alone < _ALONE * whole:
@@ -125,11 +124,11 @@ def sensor_map(solution: Solution, camera: int, enlarged: float) -> str:
 
 def _axes(solution: Solution) -> tuple[FloatArray, tuple[str, str, str]]:
     """Return the directions (3, 3) that figures have to the right, up, and towards the viewer."""
-    points = solution.start.points[determined(solution)]
+    points = solution.start.points[solution.determined]
     if solution.network.control or len(points) < 3:
         return np.eye(3), ('x', 'y', 'z')
     axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=True)[2].copy()
-    cameras = solution.start.positions[oriented(solution)]
+    cameras = solution.start.positions[solution.oriented]
     if len(cameras) and (cameras.mean(axis=0) - points.mean(axis=0)) @ axes[2] < 0:
         axes[2] *= -1
     if np.linalg.det(axes) < 0:
@@ -139,8 +138,8 @@ def _axes(solution: Solution) -> tuple[FloatArray, tuple[str, str, str]]:
 
 def _view(solution: Solution, axes: FloatArray, with_cameras: bool) -> tuple[str, float, float]:
     """Return a view along two directions, the step of its grid, and how it enlarges ellipses."""
-    known = determined(solution)
-    posed = oriented(solution) & with_cameras
+    known = solution.determined
+    posed = solution.oriented & with_cameras
     points = solution.start.points[known] @ axes.T
     cameras = solution.start.positions[posed] @ axes.T
     low, high = _bounds(np.concatenate((points, cameras)))
@@ -151,7 +150,7 @@ def _view(solution: Solution, axes: FloatArray, with_cameras: bool) -> tuple[str
         moved = (places - middle) * (scale, -scale)
         return np.asarray(moved + np.array(VIEW) / 2)
 
-    ellipses = [_ellipse(block, axes) for block in _blocks(solution, known)]
+    ellipses = [_ellipse(block, axes) for block in solution.point_covariances[known]]
     sizes = [major for major, _, _ in ellipses if major > 0]
     wanted = _ELLIPSE * VIEW[0] / scale
     enlarged = _round(wanted / float(np.median(sizes))) if sizes else 1.0
@@ -196,11 +195,6 @@ def _known(path: str, check: bool) -> str:
 def _apart(across: float, down: float) -> bool:
     """Return whether two names at this distance, px, can be read."""
     return abs(across) > _NAME[0] or abs(down) > _NAME[1]
-
-
-def _blocks(solution: Solution, known: np.ndarray) -> Iterator[FloatArray]:
-    for index in np.flatnonzero(known):
-        yield solution.covariance_of_points[3 * index : 3 * index + 3, 3 * index : 3 * index + 3]
 
 
 def _ellipse(covariance: FloatArray, axes: FloatArray) -> tuple[float, float, float]:

@@ -8,22 +8,26 @@ from typing import Any
 import numpy as np
 
 from ahf_ros.interchange.files import write_whole
-from ahf_ros.interchange.network_results import rejections
 from ahf_ros.orientation.camera import PARAMETERS
-from ahf_ros.orientation.deviations import bar_deviations, control_deviations
 from ahf_ros.orientation.solution import Solution
 from ahf_ros.orientation.strength import (
     FEW_RAYS,
     SMALL_ANGLE,
-    determined,
     largest_angles,
-    oriented,
     rays_of,
     semi_axes,
     what_to_photograph,
 )
 from ahf_ros.report.network_figures import enlargement, image_figure, sensor_map, views
+from ahf_ros.report.network_summary import (
+    bar_rows,
+    camera_rows,
+    control_rows,
+    rejected_rows,
+    summary,
+)
 from ahf_ros.report.page import page_style, page_template
+from ahf_ros.text import decimals
 
 _PICTURES = 60  # photographs whose residuals are drawn: those with the largest ones
 _CORRELATED = 0.7  # correlation of two parameters of a camera that is listed
@@ -42,16 +46,18 @@ def write_network_page(path: Path, solution: Solution, title: str) -> None:
 
 def _content(solution: Solution) -> dict[str, Any]:
     enlarged = enlargement(solution)
+    variances = np.diagonal(solution.point_covariances, axis1=1, axis2=2)
     photographs = _photographs(solution)
     drawn = sorted(photographs, key=lambda it: -it['largest'])[:_PICTURES]
     shown = {it['index'] for it in drawn}
     return {
         'unit': solution.network.unit,
-        'summary': _summary(solution),
+        'summary': summary(solution),
         'warnings': solution.warnings,
         'advice': what_to_photograph(solution),
         'views': views(solution),
         'targets': _targets(solution),
+        'digits': decimals(np.sqrt(variances[solution.determined]).ravel()),
         'photographs': photographs,
         'pictures': [
             (it['name'], image_figure(solution, it['index'], enlarged))
@@ -60,46 +66,25 @@ def _content(solution: Solution) -> dict[str, Any]:
         ],
         'enlarged': enlarged,
         'cameras': _cameras(solution, enlarged),
-        'bars': bar_deviations(solution),
-        'control': control_deviations(solution),
-        'rejected': rejections(solution),
+        'bars': bar_rows(solution),
+        'control': control_rows(solution),
+        'rejected': rejected_rows(solution),
     }
 
 
-def _summary(solution: Solution) -> list[tuple[str, str]]:
-    known, posed, used = determined(solution), oriented(solution), solution.start.used
-    axes = semi_axes(solution)[known]
-    rms = np.sqrt((solution.residuals[used] ** 2).mean()) if used.any() else np.nan
-    unit = solution.network.unit or 'in units of the network, which has no scale'
-    rows = [
-        ('photographs', f'{posed.sum()} of {len(posed)}'),
-        ('targets', f'{known.sum()} of {len(known)}'),
-        ('image points used', f'{used.sum()} of {len(used)}'),
-        ('RMS residual', f'{rms:.4f} px'),
-        ('sigma0', f'{solution.sigma0:.3f}, redundancy {solution.redundancy}'),
-    ]
-    if len(axes):
-        middle, largest = np.median(axes[:, 0]), axes[:, 0].max()
-        rows.append(('largest standard deviation', f'median {middle:.3g}, at most {largest:.3g}'))
-        rows.append(('unit', unit))
-    return rows
-
-
 def _targets(solution: Solution) -> list[dict[str, Any]]:
-    known, rays = determined(solution), rays_of(solution)
+    known, rays = solution.determined, rays_of(solution)
     angles, axes = largest_angles(solution), semi_axes(solution)
     sigmas = np.sqrt(np.maximum(np.diag(solution.covariance_of_points), 0)).reshape(-1, 3)
     longest = np.nanmax(axes[:, 0], initial=0) or 1.0
     return [
         {
             'name': solution.network.targets[index],
-            'xyz': solution.start.points[index],
-            'sigmas': sigmas[index],
+            'numbers': (*solution.start.points[index], *sigmas[index], axes[index, 0]),
             'rays': int(rays[index]),
             'few': rays[index] < FEW_RAYS,
             'angle': float(np.degrees(angles[index])),
             'small': not angles[index] >= SMALL_ANGLE,
-            'largest': axes[index, 0],
             'share': float(axes[index, 0] / longest),
         }
         for index in np.flatnonzero(known)
@@ -109,7 +94,7 @@ def _targets(solution: Solution) -> list[dict[str, Any]]:
 def _photographs(solution: Solution) -> list[dict[str, Any]]:
     network, seen = solution.network, solution.network.observations
     rows = []
-    posed = oriented(solution)
+    posed = solution.oriented
     for index, name in enumerate(network.photographs):
         here = seen.photograph == index
         residuals = solution.residuals[here & solution.start.used]
@@ -131,10 +116,8 @@ def _photographs(solution: Solution) -> list[dict[str, Any]]:
 
 def _cameras(solution: Solution, enlarged: float) -> list[dict[str, Any]]:
     cameras = []
-    for index, view in enumerate(solution.network.cameras):
-        values = solution.start.calibrations[index]
-        if not np.isfinite(values).all():
-            continue
+    for index in np.flatnonzero(solution.calibrated).tolist():
+        view = solution.network.cameras[index]
         sigma = np.sqrt(np.maximum(np.diag(solution.camera_covariances[index]), 0))
         free = [PARAMETERS.index(name) for name in solution.released[index]]
         correlated = [
@@ -152,15 +135,9 @@ def _cameras(solution: Solution, enlarged: float) -> list[dict[str, Any]]:
         cameras.append(
             {
                 'name': view.name,
-                'size': f'{view.width} x {view.height} px',
-                'rows': [
-                    (name, values[place], sigma[place] if place in free else None)
-                    for place, name in enumerate(PARAMETERS)
-                    if place in free or values[place]
-                ],
+                'rows': camera_rows(solution, index),
                 'correlated': correlated,
                 'map': sensor_map(solution, index, 3 * enlarged),
-                'map_enlarged': 3 * enlarged,
             }
         )
     return cameras

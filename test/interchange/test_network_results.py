@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ahf_ros.interchange.network_results import measured_points, read_network, write_network
+from ahf_ros.interchange.export.networks import write_network_export
+from ahf_ros.interchange.network_results import read_network, write_network
 from ahf_ros.orientation.network import Rejection
 from ahf_ros.orientation.solution import Solution
 from support.networks import solution
@@ -51,7 +52,7 @@ def test_a_network_is_read_back_as_it_was_written(tmp_path: Path) -> None:
     write_network(tmp_path, wanted)
     for place in (tmp_path, tmp_path / 'network.json'):
         found = read_network(place)
-        points, ours = found.points, measured_points(wanted)
+        points, ours = found.points, wanted.measured_points
         assert points.names == ours.names and len(ours.names) == 11 and '3' not in ours.names
         np.testing.assert_array_equal(points.xyz, ours.xyz)
         np.testing.assert_array_equal(points.covariance, ours.covariance)
@@ -71,6 +72,16 @@ def test_a_network_is_read_back_as_it_was_written(tmp_path: Path) -> None:
             'photographs without a pose: view_4.jpg',
             'targets without coordinates: 3',
         )
+
+
+def test_backward_distortion_is_not_written(tmp_path: Path) -> None:
+    """Whoever reads the files takes k1 to p2 for those of OpenCV."""
+    backward = replace(solution(), backward=True)
+    with pytest.raises(ValueError, match='backward is True, accepted is'):
+        write_network(tmp_path, backward)
+    with pytest.raises(ValueError, match='backward is True, accepted is'):
+        write_network_export('colmap', tmp_path, backward)
+    assert not list(tmp_path.iterdir())
 
 
 def test_the_json_has_the_documented_keys_and_no_others(tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """The adjustment of simulated networks: values, covariances, datum, wrong IDs, bad input."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -9,8 +10,8 @@ from ahf_ros.orientation import normals
 from ahf_ros.orientation.adjustment import adjust, refine
 from ahf_ros.orientation.camera import PARAMETERS, project
 from ahf_ros.orientation.datum import Datum, movements
-from ahf_ros.orientation.knowledge import similarity
 from ahf_ros.orientation.network import CameraView, ControlPoint, ScaleBar
+from ahf_ros.orientation.similarity import similarity_between
 from benchmarks.network_camcal import dbat, folder, in_dbat_units, solve
 from benchmarks.network_ellipsoids import RELEASED, coverage
 from benchmarks.network_outliers import counted
@@ -43,8 +44,8 @@ def distance(points, first, second):
 def test_refine_brings_values_near_the_truth(scene):
     network, truth, start = scene
     refined = refine(network, start, ('f', 'k1', 'k2', 'cx', 'cy'))
-    factor, rotation, shift = similarity(refined.points, truth.points)
-    error = factor * refined.points @ rotation.T + shift - truth.points
+    movement = similarity_between(refined.points, truth.points)
+    error = movement.moved(refined.points) - truth.points
     assert np.abs(error).max() < 3e-4
     assert refined.used.mean() > 0.99
 
@@ -170,6 +171,15 @@ def test_fixed_control_points_stay(scene):
         np.testing.assert_allclose(block, 0, atol=1e-12)
     error = solution.start.points - (1000 * truth.points + 5)
     assert np.abs(error).max() < 1
+
+
+def test_image_points_that_fit_badly_are_a_warning(scene):
+    network, _, start = scene
+    seen = network.observations
+    small = replace(network, observations=replace(seen, covariance=seen.covariance / 100))
+    (warning,) = adjust(small, start, release=RELEASED, test=False).warnings
+    assert re.match('sigma0 is (9|10)[.].*: image points fit so many times worse', warning)
+    assert adjust(network, start, release=RELEASED, test=False).warnings == ()
 
 
 def test_three_fixed_targets_are_the_axes(scene):

@@ -10,15 +10,14 @@ import pytest
 
 from ahf_ros.orientation.alignment import (
     Alignment,
-    Similarity,
     best_fit,
-    similarity_between,
     three_two_one,
     unaligned,
 )
 from ahf_ros.orientation.camera import rotation_matrices
 from ahf_ros.orientation.datum import movements, s_transform
 from ahf_ros.orientation.points import MeasuredPoints
+from ahf_ros.orientation.similarity import Similarity, similarity_between
 
 TURN = rotation_matrices(np.array([[0.7, -1.1, 2.0]]))[0]
 

@@ -32,7 +32,7 @@ def test_nothing_moves_between_two_adjustments_of_one_object() -> None:
     assert found.congruent
     assert (found.moved, found.warnings, found.free_scale) == ((), (), False)
     (test,) = found.tests
-    assert (test.targets, test.rank, test.degrees) == (12, 30, 158)
+    assert (test.targets, test.rank, test.redundancy) == (12, 30, 158)
     assert test.passed and 0.3 < test.statistic < 1.5
 
 
@@ -132,7 +132,7 @@ def test_variances_that_differ_are_said_and_kept_apart() -> None:
     assert not found.variances.equal
     assert found.variances.ratio == pytest.approx((worse.sigma0 / first.sigma0) ** 2)
     assert 'variances of unit weight differ' in found.warnings[0]
-    assert found.tests[0].degrees == 79
+    assert found.tests[0].redundancy == 79
     assert found.movements[5].sigma > compare(first, second).movements[5].sigma
 
 

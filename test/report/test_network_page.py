@@ -50,7 +50,7 @@ def test_the_page_shows_what_was_found(tmp_path: Path) -> None:
     assert '<script' not in text and 'nan' not in text.lower().replace('nance', '')
     for section in ('next', 'network', 'known', 'targets', 'left-out', 'cameras', 'photographs'):
         assert f'<section id="{section}"' in text
-    assert '1 to 2</td><td class="text">control</td>' in text and '-0.0200' in text
+    assert '1 to 2</td><td class="text">control</td>' in text and '-0.020</td><td>0.012' in text
     drawn = figures(text)
     assert [it.attrib['class'] for it in drawn] == ['view'] * 3 + ['image'] * 7
 

@@ -12,7 +12,6 @@ from ahf_ros.interchange.files import csv_table
 from ahf_ros.interchange.network_tables import quaternion
 from ahf_ros.orientation.camera import PARAMETERS
 from ahf_ros.orientation.solution import Solution
-from ahf_ros.orientation.strength import determined, oriented
 
 _SHIFT = 0.5
 _GRAY = '128 128 128'
@@ -27,7 +26,7 @@ def colmap_model_files(solution: Solution) -> dict[str, bytes]:
     labels = [
         (index + 1, name)
         for index, name in enumerate(solution.network.targets)
-        if determined(solution)[index]
+        if solution.determined[index]
     ]
     return {
         'cameras.txt': _text(_cameras(solution)),
@@ -45,7 +44,7 @@ def _points_of_images(solution: Solution) -> list[list[int]]:
     """Return the used observations of each photograph with a pose, in their order."""
     network, values = solution.network, solution.start
     lists: list[list[int]] = [[] for _ in network.photographs]
-    known = values.used & determined(solution)[network.observations.point]
+    known = values.used & solution.determined[network.observations.point]
     for row in np.flatnonzero(known):
         lists[network.observations.photograph[row]].append(int(row))
     return lists
@@ -55,7 +54,7 @@ def _cameras(solution: Solution) -> list[str]:
     """Return cameras of the model FULL_OPENCV, without its denominator."""
     lines = ['# CAMERA_ID, MODEL, WIDTH, HEIGHT, fx fy cx cy k1 k2 p1 p2 k3 k4 k5 k6']
     for index, view in enumerate(solution.network.cameras):
-        if not np.isfinite(solution.start.calibrations[index]).all():
+        if not solution.calibrated[index]:
             continue
         value = dict(zip(PARAMETERS, solution.start.calibrations[index].tolist(), strict=True))
         fx = value['f'] * (1 + value['affinity'])
@@ -70,7 +69,7 @@ def _images(solution: Solution, points_of: list[list[int]]) -> list[str]:
     """Return poses from world to camera, and the image points below each of them."""
     network, values = solution.network, solution.start
     lines = ['# IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME, then X, Y, POINT3D_ID']
-    for index in np.flatnonzero(oriented(solution)):
+    for index in np.flatnonzero(solution.oriented):
         name = network.photographs[index]
         if not name.isprintable():
             raise ValueError(f'image is {name!r}, accepted is a name that prints')
@@ -92,13 +91,13 @@ def _points(solution: Solution, points_of: list[list[int]]) -> list[str]:
     """Return targets with their mean residual in px and the image points that show them."""
     network, values = solution.network, solution.start
     tracks: list[list[tuple[int, int, float]]] = [[] for _ in network.targets]
-    for image in np.flatnonzero(oriented(solution)):
+    for image in np.flatnonzero(solution.oriented):
         for place, row in enumerate(points_of[image]):
             error = float(np.hypot(*solution.residuals[row]))
             tracks[network.observations.point[row]].append((int(image) + 1, place, error))
     lines = ['# POINT3D_ID, X, Y, Z, R, G, B, ERROR, then IMAGE_ID, POINT2D_IDX']
     for index, track in enumerate(tracks):
-        if track and determined(solution)[index]:
+        if track and solution.determined[index]:
             xyz = ' '.join(f'{value:.15g}' for value in values.points[index])
             mean = np.mean([it[2] for it in track])
             pairs = ' '.join(f'{image} {place}' for image, place, _ in track)

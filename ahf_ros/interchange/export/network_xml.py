@@ -16,7 +16,6 @@ from ahf_ros.interchange.export.xml_files import NAME, mmvii_file, serialised
 from ahf_ros.orientation.camera import PARAMETERS
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.solution import Solution
-from ahf_ros.orientation.strength import determined, oriented
 
 _SHIFT = 0.5  # of Metashape
 _PROJECT = 'MMVII-PhgrProj'
@@ -34,7 +33,7 @@ def metashape_network_files(solution: Solution) -> dict[str, bytes]:
     files = {'cameras.xml': serialised(document)}
     network = solution.network
     for index, view in enumerate(network.cameras):
-        if np.isfinite(solution.start.calibrations[index]).all():
+        if solution.calibrated[index]:
             root = Element('calibration')
             SubElement(root, 'projection').text = 'frame'
             SubElement(root, 'width').text = str(view.width)
@@ -69,7 +68,7 @@ def _metashape_cameras(chunk: Element, solution: Solution) -> None:
     network, values = solution.network, solution.start
     sensors, cameras = SubElement(chunk, 'sensors'), SubElement(chunk, 'cameras')
     for index, view in enumerate(network.cameras):
-        if not np.isfinite(values.calibrations[index]).all():
+        if not solution.calibrated[index]:
             continue
         about = {'id': str(index), 'label': view.name, 'type': 'frame'}
         sensor = SubElement(sensors, 'sensor', about)
@@ -79,7 +78,7 @@ def _metashape_cameras(chunk: Element, solution: Solution) -> None:
         SubElement(lens, 'resolution', size)
         for name, value in _metashape_lens(solution, index).items():
             SubElement(lens, name).text = f'{value:.15g}'
-    for index in np.flatnonzero(oriented(solution)).tolist():
+    for index in np.flatnonzero(solution.oriented).tolist():
         about = {
             'id': str(index),
             'label': PurePath(network.photographs[index]).name,
@@ -97,7 +96,7 @@ def _metashape_markers(chunk: Element, solution: Solution) -> None:
     frame = SubElement(SubElement(chunk, 'frames'), 'frame', id='0')
     measured = SubElement(frame, 'markers')
     elements = {}
-    for index in np.flatnonzero(determined(solution)).tolist():
+    for index in np.flatnonzero(solution.determined).tolist():
         marker = SubElement(points, 'marker', id=str(index), label=network.targets[index])
         x, y, z = (f'{value:.15g}' for value in values.points[index])
         SubElement(marker, 'reference', x=x, y=y, z=z, enabled='true')
@@ -122,10 +121,10 @@ def mmvii_network_files(solution: Solution) -> dict[str, bytes]:
             raise ValueError(f'{text!r} has a quotation mark, accepted is a name without')
     files = {}
     for index in range(len(network.cameras)):
-        if np.isfinite(values.calibrations[index]).all():
+        if solution.calibrated[index]:
             name = _calibration_name(index)
             files[f'{_PROJECT}/Ori/{NAME}/{name}.xml'] = _mmvii_lens(solution, index)
-    for index in np.flatnonzero(oriented(solution)).tolist():
+    for index in np.flatnonzero(solution.oriented).tolist():
         image = PurePath(network.photographs[index]).name
         rows = np.flatnonzero(values.used & (network.observations.photograph == index))
         path = f'{_PROJECT}/Ori/{NAME}/Ori-PerspCentral-{image}.xml'
@@ -200,9 +199,8 @@ def _mmvii_points(solution: Solution) -> bytes:
     content = Element('SetGCP')
     SubElement(content, 'NameSet').text = f'"{NAME}"'
     measures = SubElement(content, 'Measures')
-    for index in np.flatnonzero(determined(solution)).tolist():
-        block = slice(3 * index, 3 * index + 3)
-        covariance = solution.covariance_of_points[block, block]
+    for index in np.flatnonzero(solution.determined).tolist():
+        covariance = solution.point_covariances[index]
         item = SubElement(measures, 'el')
         SubElement(item, 'Name').text = f'"{solution.network.targets[index]}"'
         SubElement(item, 'Pt').text = _numbers(solution.start.points[index])

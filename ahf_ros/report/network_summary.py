@@ -1,0 +1,117 @@
+"""What the page of a network and the terminal say of it, as rows of texts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ahf_ros.interchange.network_results import rejections
+from ahf_ros.orientation.camera import PARAMETERS
+from ahf_ros.orientation.deviations import bar_deviations, control_deviations
+from ahf_ros.orientation.solution import Solution
+from ahf_ros.orientation.strength import largest_angles, rays_of, semi_axes
+from ahf_ros.text import decimals
+
+Rows = Sequence[tuple[str, ...]]
+
+_IN_PX = ('f', 'cx', 'cy')
+
+
+def summary(solution: Solution) -> Rows:
+    """Return names and values of what describes a whole network."""
+    known, posed, used = solution.determined, solution.oriented, solution.start.used
+    unit = f' {solution.network.unit}' if solution.network.unit else ', without scale'
+    scaled = ', covariances are scaled by its square' if solution.scaled else ''
+    rows = [
+        ('photographs', _of(posed)),
+        ('targets', _of(known)),
+        ('image points used', _of(used)),
+        ('sigma0', f'{solution.sigma0:.3f}{scaled}'),
+        ('redundancy', str(solution.redundancy)),
+    ]
+    if used.any():
+        rms = np.sqrt((solution.residuals[used] ** 2).mean(axis=0))
+        rows.append(('RMS residual x, y', f'{rms[0]:.4f}, {rms[1]:.4f} px'))
+    if known.any():
+        rays, angles = rays_of(solution)[known], np.degrees(largest_angles(solution)[known])
+        middle = np.median(rays)
+        rows.append(('rays a target', f'{rays.min()} to {rays.max()}, median {middle:g}'))
+        between = f'{np.nanmin(angles):.0f} to {np.nanmax(angles):.0f} degrees'
+        rows.append(('angles of rays', between))
+        variances = np.diagonal(solution.point_covariances[known], axis1=1, axis2=2)
+        mean = ', '.join(f'{value:.3g}' for value in np.sqrt(variances.mean(axis=0)))
+        rows.append(('standard deviation x, y, z', f'{mean}{unit}'))
+        rows.append(('largest semi-axis', f'{semi_axes(solution)[known].max():.3g}{unit}'))
+    return rows
+
+
+def _of(chosen: np.ndarray) -> str:
+    """Return how many there are, and of how many if these are more."""
+    number = int(chosen.sum())
+    return f'{number}' if number == len(chosen) else f'{number} of {len(chosen)}'
+
+
+def camera_rows(solution: Solution, camera: int) -> Rows:
+    """Return parameters, their values and standard deviations, of a calibrated camera."""
+    rows = []
+    sigmas = np.sqrt(np.maximum(np.diag(solution.camera_covariances[camera]), 0))
+    values = solution.start.calibrations[camera]
+    for name, value, sigma in zip(PARAMETERS, values, sigmas, strict=True):
+        called = f'{name}, px' if name in _IN_PX else name
+        if name in solution.released[camera]:
+            digits = decimals([sigma])
+            rows.append((called, f'{value:.{digits}f}', f'{sigma:.{digits}f}'))
+        elif value:
+            rows.append((called, f'{value:.7g}', 'kept'))
+    return rows
+
+
+def bar_rows(solution: Solution) -> Rows:
+    """Return scale bars: ends, role, length, deviation, its standard deviation, their ratio."""
+    bars = bar_deviations(solution)
+    digits = decimals(it.sigma for it in bars)
+    return [
+        (
+            ' to '.join(it.bar.ends),
+            _role(it.bar.check),
+            f'{it.bar.length:.{digits}f}',
+            f'{it.deviation:+.{digits}f}',
+            f'{it.sigma:.{digits}f}',
+            f'{abs(it.deviation) / it.sigma:.1f}' if it.sigma else '',
+        )
+        for it in bars
+    ]
+
+
+def control_rows(solution: Solution) -> Rows:
+    """Return control points: name, role, deviations in x, y, z, their standard deviations."""
+    points = control_deviations(solution)
+    digits = decimals(value for it in points for value in it.sigma)
+    return [
+        (
+            it.point.name,
+            _role(it.point.check),
+            *(f'{value:+.{digits}f}' for value in it.deviation),
+            ', '.join(f'{value:.{digits}f}' for value in it.sigma),
+        )
+        for it in points
+    ]
+
+
+def _role(check: bool) -> str:
+    return 'check' if check else 'control'
+
+
+def rejected_rows(solution: Solution) -> Rows:
+    """Return what was left out: photograph, target, x and y, normalised residual, reason."""
+    return [
+        (
+            it.photograph,
+            it.target,
+            *(f'{value:.1f}' for value in it.xy),
+            '' if it.normalised_residual is None else f'{abs(it.normalised_residual):.1f}',
+            it.reason,
+        )
+        for it in rejections(solution)
+    ]
