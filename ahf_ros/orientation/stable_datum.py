@@ -19,6 +19,7 @@ from ahf_ros.orientation.datum import movements, s_transform
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.points import blocks
 from ahf_ros.orientation.similarity import on_a_line, similarity_between
+from ahf_ros.orientation.testing import special
 
 FEWEST = 3
 """Targets of a datum."""
@@ -219,8 +220,4 @@ def _pseudoinverse(covariance: FloatArray, free: FloatArray) -> FloatArray:
 
 def f_probability(above: ArrayLike, below: ArrayLike, statistic: ArrayLike) -> FloatArray:
     """Return the probability of a value of F at least as large, by its degrees of freedom."""
-    try:
-        from scipy.special import fdtrc
-    except ModuleNotFoundError as error:
-        raise ModuleNotFoundError("scipy: pip install 'ahf_ros[orient]'") from error
-    return np.asarray(fdtrc(above, below, np.maximum(statistic, 0.0)))
+    return np.asarray(special().fdtrc(above, below, np.maximum(statistic, 0.0)))
