@@ -8,7 +8,7 @@ from html import escape
 
 import numpy as np
 
-from ahf_ros.drawing.ellipses import CONFIDENCE, ellipse, round_number
+from ahf_ros.drawing.coordinates import CONFIDENCE, apart, ellipse, round_number
 from ahf_ros.orientation.congruence import Comparison, Movement
 from ahf_ros.orientation.network import FloatArray
 
@@ -54,9 +54,16 @@ def movements_figure(comparison: Comparison) -> str:
         parts.append(f'<text x="10" y="{top + _LINE:.0f}">{title}</text>')
         origin = np.array([_VIEW / 2, top + height / 2])
         middle = (flat.max(axis=0) + flat.min(axis=0))[[0, second]] / 2
-        for item, place in zip(comparison.movements, flat[:, [0, second]], strict=True):
-            centre = origin + scale * (place - middle) * (1, -1)
-            parts.extend(_target(item, axes[[0, second]], centre, scale * enlarged))
+        centres = origin + scale * (flat[:, [0, second]] - middle) * (1, -1)
+        named: list[tuple[float, float]] = []
+        pairs = zip(comparison.movements, centres.tolist(), strict=True)
+        for item, (x, y) in sorted(pairs, key=lambda it: -it[0].moved):
+            parts.append(_target(item, axes[[0, second]], (x, y), scale * enlarged))
+            if apart((x, y), named):
+                named.append((x, y))
+                shown = 'class="moved" ' if item.moved else ''
+                name = escape(item.name)
+                parts.append(f'<text {shown}x="{x + 5:.1f}" y="{y - 5:.1f}">{name}</text>')
         top += height
     parts.extend(_scale_bar(top, scale, enlarged, comparison.unit))
     height = top + 3 * _LINE
@@ -73,20 +80,17 @@ def _size(item: Movement) -> float:
     return max(item.length, CONFIDENCE * math.sqrt(max(largest, 0.0)))
 
 
-def _target(item: Movement, axes: FloatArray, centre: FloatArray, scale: float) -> Iterator[str]:
-    """Yield place, movement, ellipse and name of a target in a view along two axes."""
+def _target(item: Movement, axes: FloatArray, place: tuple[float, float], scale: float) -> str:
+    """Return place, movement and ellipse of a target in a view along two axes."""
     kind = 'moved' if item.moved else 'still'
-    step = scale * (axes @ item.xyz) * (1, -1)
     major, minor, angle = ellipse(item.covariance, axes)
-    (x, y), (across, down) = centre, centre + step
-    yield (
+    (x, y), (across, down) = place, np.add(place, scale * (axes @ item.xyz) * (1, -1))
+    return (
         f'<g class="{kind}"><title>{escape(item.name)}</title>'
         f'<circle cx="{x:.1f}" cy="{y:.1f}" r="2"/><path d="M{x:.1f} {y:.1f}L{across:.1f} '
         f'{down:.1f}"/><ellipse rx="{scale * major:.2f}" ry="{scale * minor:.2f}" '
         f'transform="translate({across:.1f} {down:.1f}) rotate({angle:.1f})"/></g>'
     )
-    shown = 'class="moved" ' if item.moved else ''
-    yield f'<text {shown}x="{x + 5:.1f}" y="{y - 5:.1f}">{escape(item.name)}</text>'
 
 
 def _scale_bar(top: float, scale: float, enlarged: float, unit: str) -> Iterator[str]:

@@ -8,7 +8,7 @@ from html import escape
 
 import numpy as np
 
-from ahf_ros.drawing.ellipses import ellipse, round_number
+from ahf_ros.drawing.coordinates import apart, ellipse, round_number
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.solution import Solution
 
@@ -17,7 +17,6 @@ PICTURE = 300  # px, width of a figure of an image
 CELLS = 12  # columns of the map of a sensor
 NAMED = 150  # targets, above which they have no names in the figures
 _MARGIN = 28
-_NAME = 16, 9  # px, that a name takes
 _ALONE = 0.6  # of the extent of the network, below which targets are shown alone, too
 _ELLIPSE = 0.025  # of the width of a view: size that the median ellipse is enlarged to
 _ARROW = 0.03  # of the width of an image: size that the median residual is enlarged to
@@ -168,7 +167,7 @@ def _view(solution: Solution, axes: FloatArray, with_cameras: bool) -> tuple[str
             f'transform="translate({x:.1f} {y:.1f}) rotate({angle:.1f})"/>'
             f'<circle cx="{x:.1f}" cy="{y:.1f}" r="1.4"/>'
         )
-        if len(names) <= NAMED and all(_apart(x - u, y - v) for u, v in written):
+        if len(names) <= NAMED and apart((x, y), written):
             written.append((x, y))
             parts.append(f'<text x="{x + 4:.1f}" y="{y - 4:.1f}">{escape(name)}</text>')
         parts.append('</g>')
@@ -189,11 +188,6 @@ def _knowledge(solution: Solution, places: dict[str, FloatArray]) -> Iterator[st
 
 def _known(path: str, check: bool) -> str:
     return f'<path class="known{" check" * check}" d="{path}"/>'
-
-
-def _apart(across: float, down: float) -> bool:
-    """Return whether two names at this distance, px, can be read."""
-    return abs(across) > _NAME[0] or abs(down) > _NAME[1]
 
 
 def _bounds(places: FloatArray) -> tuple[FloatArray, FloatArray]:

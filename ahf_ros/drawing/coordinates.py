@@ -1,8 +1,9 @@
-"""Error ellipses and round numbers for figures of coordinates."""
+"""Error ellipses, names and round numbers in figures of coordinates."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -10,6 +11,8 @@ from ahf_ros.orientation.network import FloatArray
 
 CONFIDENCE = math.sqrt(5.991)
 """Semi-axes of the ellipse that holds 95 %, in standard deviations."""
+
+_NAME = 16, 9  # px, that a name takes
 
 
 def ellipse(covariance: FloatArray, axes: FloatArray) -> tuple[float, float, float]:
@@ -20,6 +23,12 @@ def ellipse(covariance: FloatArray, axes: FloatArray) -> tuple[float, float, flo
     values, vectors = np.linalg.eigh(axes @ covariance @ axes.T)
     minor, major = CONFIDENCE * np.sqrt(np.maximum(values, 0))
     return float(major), float(minor), -math.degrees(math.atan2(vectors[1, 1], vectors[0, 1]))
+
+
+def apart(place: tuple[float, float], others: Iterable[tuple[float, float]]) -> bool:
+    """Return whether a name at a place, px, can be read beside those at others."""
+    x, y = place
+    return all(abs(x - u) > _NAME[0] or abs(y - v) > _NAME[1] for u, v in others)
 
 
 def round_number(number: float) -> float:
