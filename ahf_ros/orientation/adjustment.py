@@ -19,6 +19,7 @@ from ahf_ros.orientation.knowledge import gathered, kind, knowledge
 from ahf_ros.orientation.least_squares import (
     Conditions,
     Knowledge,
+    Loss,
     minimise,
     normal_equations,
 )
@@ -51,6 +52,7 @@ def refine(
     network: Network,
     start: Start,
     free: tuple[str, ...] = (),
+    loss: Loss = 'cauchy',
     *,
     rounds: int = 30,
 ) -> Start:
@@ -73,7 +75,7 @@ def refine(
         rows[:, : 3 * len(layout.points)] = movements(state.points[layout.points]).T
         return Conditions(rows, np.zeros(7), np.zeros(7))
 
-    refined, _ = minimise(layout, start, datum, 'cauchy', rounds)
+    refined, _ = minimise(layout, start, datum, loss, rounds)
     return replace(refined, used=agreeing(network, refined, layout))
 
 
