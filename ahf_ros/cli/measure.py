@@ -139,7 +139,7 @@ def _check(options: argparse.Namespace) -> None:
 
 def _measured(options: argparse.Namespace, points: MeasuredPoints) -> _Measured:
     """Return distances, deviations and the test of lengths, as far as they are asked for."""
-    from ahf_ros.interchange.length_files import read_lengths
+    from ahf_ros.interchange.control_files import read_lengths
     from ahf_ros.interchange.point_lists import read_point_list
     from ahf_ros.orientation.measurement import deviations, distances, length_errors
 

@@ -8,6 +8,7 @@ from html import escape
 
 import numpy as np
 
+from ahf_ros.drawing.coordinates import CONFIDENCE, apart, ellipse, round_number
 from ahf_ros.orientation.congruence import Comparison, Movement
 from ahf_ros.orientation.network import FloatArray
 
@@ -16,7 +17,6 @@ _MARGIN = 60.0
 _LINE = 18.0  # px, height of a line of text
 _ARROW = 0.12  # of the width: the longest movement or ellipse
 _SLIM = 0.25  # of the width: least height of a view
-_CONFIDENCE = math.sqrt(5.991)  # semi-axes of the ellipse that holds 95 %, standard deviations
 
 _STYLE = """
 text { font: 12px sans-serif; fill: #222; }
@@ -46,7 +46,7 @@ def movements_figure(comparison: Comparison) -> str:
     flat = centred @ axes.T
     scale = (_VIEW - 2 * _MARGIN) / float(np.ptp(flat[:, 0]))
     longest = max(_size(it) for it in comparison.movements)
-    enlarged = _round(_ARROW * _VIEW / scale / longest) if longest > 0 else 1.0
+    enlarged = round_number(_ARROW * _VIEW / scale / longest) if longest > 0 else 1.0
     parts: list[str] = []
     top = 0.0
     for title, second in (('From above', 1), ('From the side', 2)):
@@ -54,9 +54,16 @@ def movements_figure(comparison: Comparison) -> str:
         parts.append(f'<text x="10" y="{top + _LINE:.0f}">{title}</text>')
         origin = np.array([_VIEW / 2, top + height / 2])
         middle = (flat.max(axis=0) + flat.min(axis=0))[[0, second]] / 2
-        for item, place in zip(comparison.movements, flat[:, [0, second]], strict=True):
-            centre = origin + scale * (place - middle) * (1, -1)
-            parts.extend(_target(item, axes[[0, second]], centre, scale * enlarged))
+        centres = origin + scale * (flat[:, [0, second]] - middle) * (1, -1)
+        named: list[tuple[float, float]] = []
+        pairs = zip(comparison.movements, centres.tolist(), strict=True)
+        for item, (x, y) in sorted(pairs, key=lambda it: -it[0].moved):
+            parts.append(_target(item, axes[[0, second]], (x, y), scale * enlarged))
+            if apart((x, y), named):
+                named.append((x, y))
+                shown = 'class="moved" ' if item.moved else ''
+                name = escape(item.name)
+                parts.append(f'<text {shown}x="{x + 5:.1f}" y="{y - 5:.1f}">{name}</text>')
         top += height
     parts.extend(_scale_bar(top, scale, enlarged, comparison.unit))
     height = top + 3 * _LINE
@@ -70,25 +77,20 @@ def movements_figure(comparison: Comparison) -> str:
 def _size(item: Movement) -> float:
     """Return the length of a movement, or the major semi-axis of its ellipse if that is longer."""
     largest = float(np.linalg.eigvalsh(item.covariance)[-1])
-    return max(item.length, _CONFIDENCE * math.sqrt(max(largest, 0.0)))
+    return max(item.length, CONFIDENCE * math.sqrt(max(largest, 0.0)))
 
 
-def _target(item: Movement, axes: FloatArray, centre: FloatArray, scale: float) -> Iterator[str]:
-    """Yield place, movement, ellipse and name of a target in a view along two axes."""
+def _target(item: Movement, axes: FloatArray, place: tuple[float, float], scale: float) -> str:
+    """Return place, movement and ellipse of a target in a view along two axes."""
     kind = 'moved' if item.moved else 'still'
-    step = scale * (axes @ item.xyz) * (1, -1)
-    values, vectors = np.linalg.eigh(axes @ item.covariance @ axes.T)
-    minor, major = scale * _CONFIDENCE * np.sqrt(np.maximum(values, 0))
-    angle = -math.degrees(math.atan2(vectors[1, 1], vectors[0, 1]))
-    (x, y), (across, down) = centre, centre + step
-    yield (
+    major, minor, angle = ellipse(item.covariance, axes)
+    (x, y), (across, down) = place, np.add(place, scale * (axes @ item.xyz) * (1, -1))
+    return (
         f'<g class="{kind}"><title>{escape(item.name)}</title>'
         f'<circle cx="{x:.1f}" cy="{y:.1f}" r="2"/><path d="M{x:.1f} {y:.1f}L{across:.1f} '
-        f'{down:.1f}"/><ellipse rx="{major:.2f}" ry="{minor:.2f}" '
+        f'{down:.1f}"/><ellipse rx="{scale * major:.2f}" ry="{scale * minor:.2f}" '
         f'transform="translate({across:.1f} {down:.1f}) rotate({angle:.1f})"/></g>'
     )
-    shown = 'class="moved" ' if item.moved else ''
-    yield f'<text {shown}x="{x + 5:.1f}" y="{y - 5:.1f}">{escape(item.name)}</text>'
 
 
 def _scale_bar(top: float, scale: float, enlarged: float, unit: str) -> Iterator[str]:
@@ -96,7 +98,7 @@ def _scale_bar(top: float, scale: float, enlarged: float, unit: str) -> Iterator
     unit = f' {unit}' if unit else ''
     wanted = _VIEW / 6
     for row, (name, factor) in enumerate((('targets', scale), ('movements', scale * enlarged))):
-        length = _round(wanted / factor)
+        length = round_number(wanted / factor)
         y = top + (row + 0.7) * _LINE
         width = factor * length
         yield f'<path class="scale" d="M10 {y:.1f}h{width:.1f}"/>'
@@ -104,9 +106,3 @@ def _scale_bar(top: float, scale: float, enlarged: float, unit: str) -> Iterator
         if name == 'movements':
             text += f', enlarged {enlarged:,.0f} times; ellipses hold 95 %'
         yield f'<text x="{width + 18:.1f}" y="{y + 4:.1f}">{text}</text>'
-
-
-def _round(number: float) -> float:
-    """Return 1, 2 or 5 times a power of ten, the largest up to a number."""
-    power = 10.0 ** math.floor(math.log10(number))
-    return max(step * power for step in (1, 2, 5) if step * power <= number * (1 + 1e-9))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -96,19 +96,12 @@ def ros_yaml(
     Standard deviations and correlations of the parameters follow, which those leave alone. ROS
     has no shear: it is dropped.
     """
-    matrix, distortion = _opencv(calibration)
+    matrix, _ = _opencv(calibration)
     rows = [
-        f'image_width: {width}',
-        f'image_height: {height}',
-        f'camera_name: {_quoted(name)}',
-        _ros_matrix('camera_matrix', matrix),
+        *_rows(name, width, height, calibration, covariance, _ros_matrix),
         'distortion_model: plumb_bob',
-        _ros_matrix('distortion_coefficients', distortion[None]),
         _ros_matrix('rectification_matrix', np.eye(3)),
         _ros_matrix('projection_matrix', np.column_stack((matrix, np.zeros(3)))),
-        f'parameters: [{", ".join(PARAMETERS)}]',
-        _ros_matrix('standard_deviations', _deviations(covariance)[None]),
-        _ros_matrix('correlations', _correlations(covariance)),
     ]
     return ('\n'.join(rows) + '\n').encode()
 
@@ -117,20 +110,30 @@ def opencv_yaml(
     name: str, width: int, height: int, calibration: FloatArray, covariance: FloatArray
 ) -> bytes:
     """Return a calibration as cv2.FileStorage reads it, with the same fields as `ros_yaml`."""
+    rows = _rows(name, width, height, calibration, covariance, _opencv_matrix)
+    return ('\n'.join(('%YAML:1.0', '---', *rows)) + '\n').encode()
+
+
+def _rows(
+    name: str,
+    width: int,
+    height: int,
+    calibration: FloatArray,
+    covariance: FloatArray,
+    written: Callable[[str, FloatArray], str],
+) -> list[str]:
+    """Return the fields that both formats have, matrices as one of them writes them."""
     matrix, distortion = _opencv(calibration)
-    rows = [
-        '%YAML:1.0',
-        '---',
+    return [
         f'image_width: {width}',
         f'image_height: {height}',
         f'camera_name: {_quoted(name)}',
-        _opencv_matrix('camera_matrix', matrix),
-        _opencv_matrix('distortion_coefficients', distortion[None]),
-        f'parameters: [ {", ".join(PARAMETERS)} ]',
-        _opencv_matrix('standard_deviations', _deviations(covariance)[None]),
-        _opencv_matrix('correlations', _correlations(covariance)),
+        written('camera_matrix', matrix),
+        written('distortion_coefficients', distortion[None]),
+        f'parameters: [{", ".join(PARAMETERS)}]',
+        written('standard_deviations', _deviations(covariance)[None]),
+        written('correlations', _correlations(covariance)),
     ]
-    return ('\n'.join(rows) + '\n').encode()
 
 
 def _opencv(calibration: FloatArray) -> tuple[FloatArray, FloatArray]:

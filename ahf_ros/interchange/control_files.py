@@ -1,4 +1,4 @@
-"""Known lengths and known coordinates: scale bars and control points as tables."""
+"""Known lengths and coordinates as tables: scale bars, calibrated lengths, control points."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from ahf_ros.interchange.tables import Row, one_of, read_table
+from ahf_ros.orientation.measurement import CalibratedLength
 from ahf_ros.orientation.network import ControlPoint, FloatArray, ScaleBar
 
-ROLES = ('control', 'check')
+_ROLES = ('control', 'check')
 _SIGMAS = ('sigma_x', 'sigma_y', 'sigma_z')
 _ENTRIES = tuple(f'covariance_{it}' for it in ('xx', 'xy', 'xz', 'yy', 'yz', 'zz'))
 _MIXED = tuple(f'covariance_{it}' for it in ('xy', 'xz', 'yz'))  # beside sigmas, as in points.csv
@@ -18,14 +19,38 @@ _MIXED = tuple(f'covariance_{it}' for it in ('xy', 'xz', 'yz'))  # beside sigmas
 def read_scale_bars(path: str | Path) -> tuple[ScaleBar, ...]:
     """Return scale bars from a table with id_1, id_2, length, sigma and, perhaps, role."""
     _, rows = read_table(path, ('id_1', 'id_2', 'length', 'sigma'))
-    bars = []
-    for row in rows:
-        ends = row.text('id_1'), row.text('id_2')
-        if ends[0] == ends[1]:
-            raise ValueError(f'{row.where}: both ends are {ends[0]}, accepted are two targets')
-        check = row.choice('role', ROLES, 'control') == 'check'
-        bars.append(ScaleBar(ends, row.positive('length'), row.positive('sigma'), check))
-    return tuple(bars)
+    return tuple(
+        ScaleBar(_ends(row), row.positive('length'), row.positive('sigma'), _is_check(row))
+        for row in rows
+    )
+
+
+def read_lengths(path: str | Path) -> tuple[CalibratedLength, ...]:
+    """Return calibrated lengths from a table with id_1, id_2, length and, perhaps, sigma and line.
+
+    `line` names the measuring line that a length is part of.
+    """
+    columns, rows = read_table(path, ('id_1', 'id_2', 'length'))
+    return tuple(
+        CalibratedLength(
+            _ends(row),
+            row.positive('length'),
+            row.number('sigma', 0.0) if 'sigma' in columns else 0.0,
+            row.cells.get('line', ''),
+        )
+        for row in rows
+    )
+
+
+def _ends(row: Row) -> tuple[str, str]:
+    ends = row.text('id_1'), row.text('id_2')
+    if ends[0] == ends[1]:
+        raise ValueError(f'{row.where}: both ends are {ends[0]}, accepted are two targets')
+    return ends
+
+
+def _is_check(row: Row) -> bool:
+    return row.choice('role', _ROLES, 'control') == 'check'
 
 
 def read_control(path: str | Path, sigma: float = 0.0) -> tuple[ControlPoint, ...]:
@@ -51,8 +76,7 @@ def read_control(path: str | Path, sigma: float = 0.0) -> tuple[ControlPoint, ..
                 'below 0'
             )
         xyz = np.array([row.number(axis) for axis in 'xyz'])
-        check = row.choice('role', ROLES, 'control') == 'check'
-        points[name] = ControlPoint(name, xyz, covariance, check)
+        points[name] = ControlPoint(name, xyz, covariance, _is_check(row))
     return tuple(points.values())
 
 

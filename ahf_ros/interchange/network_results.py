@@ -18,7 +18,7 @@ from ahf_ros.interchange.files import csv_table, read_bytes, read_text, write_wh
 from ahf_ros.interchange.network_tables import calibration_files, tables
 from ahf_ros.interchange.target_json import parsed_json
 from ahf_ros.orientation.camera import PARAMETERS
-from ahf_ros.orientation.network import FloatArray, IntArray, Rejection
+from ahf_ros.orientation.network import CameraView, FloatArray, IntArray, Rejection
 from ahf_ros.orientation.points import MeasuredPoints, blocks
 from ahf_ros.orientation.solution import Solution
 from ahf_ros.orientation.strength import rays_of
@@ -33,15 +33,6 @@ DISTORTION = ('k1', 'k2', 'k3', 'p1', 'p2', 'shear')
 
 
 @dataclass(frozen=True)
-class CameraSize:
-    """Name of a camera, and width and height of its images, px."""
-
-    name: str
-    width: int
-    height: int
-
-
-@dataclass(frozen=True)
 class OrientedNetwork:
     """What `read_network` reads: measured points, and the cameras and photographs behind them.
 
@@ -50,7 +41,7 @@ class OrientedNetwork:
 
     points: MeasuredPoints
     rays: IntArray
-    cameras: tuple[CameraSize, ...]
+    cameras: tuple[CameraView, ...]
     calibrations: FloatArray
     camera_covariances: tuple[FloatArray, ...]
     photographs: tuple[str, ...]
@@ -128,14 +119,8 @@ def write_network(folder: str | Path, solution: Solution) -> tuple[Path, ...]:
 
 def _cameras(solution: Solution) -> list[dict[str, Any]]:
     cameras = []
-    for view, calibration, covariance in zip(
-        solution.network.cameras,
-        solution.start.calibrations,
-        solution.camera_covariances,
-        strict=True,
-    ):
-        if not np.isfinite(calibration).all():
-            continue
+    for index in np.flatnonzero(solution.calibrated):
+        view, calibration = solution.network.cameras[index], solution.start.calibrations[index]
         value = dict(zip(PARAMETERS, calibration.tolist(), strict=True))
         cameras.append(
             {
@@ -147,7 +132,7 @@ def _cameras(solution: Solution) -> list[dict[str, Any]]:
                 'cx': value['cx'],
                 'cy': value['cy'],
                 'distortion': {name: value[name] for name in DISTORTION},
-                'covariance': covariance.tolist(),
+                'covariance': solution.camera_covariances[index].tolist(),
             }
         )
     return cameras
@@ -156,27 +141,24 @@ def _cameras(solution: Solution) -> list[dict[str, Any]]:
 def _left_out(solution: Solution) -> list[str]:
     """Return which photographs and targets the solution has no values for."""
     network = solution.network
-    without = np.flatnonzero(~solution.oriented)
-    unknown = np.flatnonzero(~solution.determined)
     return [
-        f'{what} without {lacking}: {", ".join(names[index] for index in indices)}'
-        for what, lacking, names, indices in (
-            ('photographs', 'a pose', network.photographs, without),
-            ('targets', 'coordinates', network.targets, unknown),
+        f'{what}: {", ".join(names[index] for index in np.flatnonzero(~known))}'
+        for what, names, known in (
+            ('photographs without a pose', network.photographs, solution.oriented),
+            ('targets without coordinates', network.targets, solution.determined),
         )
-        if len(indices)
+        if not known.all()
     ]
 
 
 def _points_table(points: MeasuredPoints, rays: IntArray) -> bytes:
     """Return coordinates, their standard deviations, rays and covariances of each point."""
-    sides = [('x', 'y'), ('x', 'z'), ('y', 'z')]
-    header = ['id', 'x', 'y', 'z', 'sigma_x', 'sigma_y', 'sigma_z', 'rays']
-    table: list[Sequence[object]] = [[*header, *(f'covariance_{a}{b}' for a, b in sides)]]
+    header = 'id x y z sigma_x sigma_y sigma_z rays covariance_xy covariance_xz covariance_yz'
+    table: list[Sequence[object]] = [header.split()]
     own = blocks(points.covariance)
     for index, (name, block) in enumerate(zip(points.names, own, strict=True)):
         sigma = np.sqrt(np.maximum(np.diag(block), 0))
-        mixed = [f'{block["xyz".index(a), "xyz".index(b)]:.9g}' for a, b in sides]
+        mixed = [f'{value:.9g}' for value in block[np.triu_indices(3, 1)]]
         place = [f'{value:.12g}' for value in points.xyz[index]]
         table.append([name, *place, *(f'{it:.9g}' for it in sigma), int(rays[index]), *mixed])
     return csv_table(table)
@@ -228,7 +210,7 @@ def read_network(folder: str | Path) -> OrientedNetwork:
         points=measured,
         rays=np.array([int(it.number('rays')) for it in points], np.int64),
         cameras=tuple(
-            CameraSize(it.text('name'), int(it.number('width')), int(it.number('height')))
+            CameraView(it.text('name'), int(it.number('width')), int(it.number('height')))
             for it in cameras
         ),
         calibrations=_stacked([_calibration(it) for it in cameras], (len(PARAMETERS),)),

@@ -95,12 +95,8 @@ def _residuals(solution: Solution) -> Table:
 
 
 def _bars(solution: Solution) -> Table:
-    rows: Table = [
-        [
-            *('id_1', 'id_2', 'length', 'sigma', 'role'),
-            *('computed', 'deviation', 'sigma_deviation'),
-        ]
-    ]
+    header = 'id_1 id_2 length sigma role computed deviation sigma_deviation'
+    rows: Table = [header.split()]
     for it in bar_deviations(solution):
         numbers = [f'{value:.9g}' for value in (it.length, it.deviation, it.sigma)]
         role = 'check' if it.bar.check else 'control'
@@ -109,9 +105,8 @@ def _bars(solution: Solution) -> Table:
 
 
 def _control(solution: Solution) -> Table:
-    deviations = [f'deviation_{axis}' for axis in 'xyz']
-    sigmas = [f'sigma_{axis}' for axis in 'xyz']
-    rows: Table = [['id', 'x', 'y', 'z', 'role', *deviations, *sigmas]]
+    header = 'id x y z role deviation_x deviation_y deviation_z sigma_x sigma_y sigma_z'
+    rows: Table = [header.split()]
     for it in control_deviations(solution):
         numbers = [f'{value:.9g}' for value in (*it.deviation, *it.sigma)]
         role = 'check' if it.point.check else 'control'

@@ -59,10 +59,9 @@ def refine(
 
     Bars and control points are not used, and the frame stays about where it was. The parameters
     in `free` are estimated for every camera that is not fixed, those of lenses about as usual.
-    Photographs with fewer than three
-    and points with fewer than two used observations keep their values. Afterwards those
-    observations are used, of all with a pose and a point, that agree with the values to five
-    standard deviations, or five robust ones where the residuals are larger.
+    Photographs with fewer than three and points with fewer than two used observations keep their
+    values. Afterwards those observations are used, of all with a pose and a point, that agree with
+    the values to five standard deviations, or five robust ones where the residuals are larger.
 
     Raises `ValueError` if nothing is left that could be adjusted.
     """

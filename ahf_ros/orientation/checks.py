@@ -13,32 +13,23 @@ _ROUNDING = 1e-9  # of covariances, relative to their largest entry
 
 def check_network(network: Network) -> None:
     """Raise `ValueError` for observations, bars or control points that no adjustment can use."""
-    observations = network.observations
-    _refuse(
-        network, ~np.isfinite(observations.xy).all(axis=1), 'xy', observations.xy, 'finite numbers'
-    )
-    _refuse(
-        network,
-        ~np.isfinite(observations.covariance).all(axis=(1, 2)),
-        'covariance',
-        observations.covariance,
-        'finite numbers',
-    )
-    sizes = np.linalg.eigvalsh(observations.covariance)
-    skew = observations.covariance[:, 0, 1] - observations.covariance[:, 1, 0]
-    asymmetric = np.abs(skew) > _ROUNDING * np.abs(sizes[:, 1])
-    _refuse(
-        network,
-        asymmetric | (sizes[:, 0] <= _SINGULAR * np.abs(sizes[:, 1])),
-        'covariance',
-        observations.covariance,
-        'symmetric positive definite px²',
-    )
-    key = observations.photograph * len(network.targets) + observations.point
-    order = np.argsort(key, kind='stable')
-    twice = np.zeros(len(key), dtype=bool)
-    twice[order[1:]] = np.diff(key[order]) == 0
-    _refuse(network, twice, 'target', observations.xy, 'each target once in a photograph')
+    seen = network.observations
+    known = np.where(np.isfinite(seen.covariance), seen.covariance, 0)
+    sizes = np.linalg.eigvalsh(known)
+    largest = np.abs(sizes[:, 1])
+    skew = np.abs(known[:, 0, 1] - known[:, 1, 0])
+    key = seen.photograph * len(network.targets) + seen.point
+    twice = np.ones(len(key), dtype=bool)
+    twice[np.unique(key, return_index=True)[1]] = False
+    finite, positive = 'finite numbers', 'symmetric positive definite px²'
+    unusable = (skew > _ROUNDING * largest) | (sizes[:, 0] <= _SINGULAR * largest)
+    for bad, field, values, expected in (
+        (~np.isfinite(seen.xy).all(axis=1), 'xy', seen.xy, finite),
+        (~np.isfinite(seen.covariance).all(axis=(1, 2)), 'covariance', seen.covariance, finite),
+        (unusable, 'covariance', seen.covariance, positive),
+        (twice, 'target', seen.xy, 'each target once in a photograph'),
+    ):
+        _refuse(network, np.asarray(bad), field, values, expected)
     for bar in network.bars:
         name = 'scale bar ' + '-'.join(bar.ends)
         if bar.ends[0] == bar.ends[1]:
@@ -72,7 +63,7 @@ def _check_control(name: str, xyz: FloatArray, covariance: FloatArray) -> None:
 
 def _refuse(
     network: Network,
-    bad: NDArray[np.bool_] | np.bool_,
+    bad: NDArray[np.bool_],
     field: str,
     values: FloatArray,
     expected: str,

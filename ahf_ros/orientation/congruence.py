@@ -11,12 +11,8 @@ takes the share r_i = u_i' P_ii^-1 u_i of d' P d with it. Its movement against t
 P_ii^-1 u_i with the cofactors P_ii^-1, and r_i / (3 s2) ~ F(3, f) tests it alone [2]_. That is
 its best estimate if the others stood still, and the same for targets that are out of the datum.
 
-T sees many small movements and loses that of a single target among many: of 40 targets, one that
-moves by 5 standard deviations is seen in 4 of 10 cases. The tests of single targets, with
-Bonferroni's correction, are the other way round. So both are made, at shares of the level whose
-sum is a little above one, since both often fail together.
-While either fails, the target with the largest share leaves the datum. One that is not significant
-against the datum that remains comes back.
+While a test of all targets or one of a single target fails, the one with the largest share leaves
+the datum; see `stable_datum`.
 
 References
 ----------
@@ -30,24 +26,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
-from ahf_ros.orientation.datum import movements, s_transform
 from ahf_ros.orientation.network import FloatArray
-from ahf_ros.orientation.points import MeasuredPoints, blocks
-from ahf_ros.orientation.similarity import on_a_line, similarity_between
+from ahf_ros.orientation.points import MeasuredPoints
+from ahf_ros.orientation.similarity import on_a_line
+from ahf_ros.orientation.stable_datum import (
+    FEWEST,
+    Epochs,
+    GlobalTest,
+    Mask,
+    State,
+    f_probability,
+    localised,
+)
 from ahf_ros.text import counted
 
 LEVEL = 0.05
 """Share of pairs of epochs without movement that a test may take for one with."""
-
-_TOGETHER, _ALONE = 0.2, 0.9
-"""Of the level, for the test of all targets and those of single ones; measured, together one."""
-
-_MINIMUM = 3  # targets of a datum
-_TRIALS = 200  # fits to three targets; all of one half in all but 1 of 10^10 searches
-_SINGULAR = 1e-9
-"""Of the mean variance: smaller ones are those of coordinates that were not measured."""
 
 
 @dataclass(frozen=True)
@@ -60,25 +55,6 @@ class VarianceTest:
     """Of a ratio at least as large if the variances are the same."""
     equal: bool
     """Whether the test accepts that they are, so that they are pooled."""
-
-
-@dataclass(frozen=True)
-class GlobalTest:
-    """The congruence test T of the targets of a datum."""
-
-    targets: int
-    statistic: float
-    rank: int
-    redundancy: int
-    probability: float
-    """Of a statistic at least as large if none of these targets moved."""
-    level: float
-    """What the probability has to reach."""
-
-    @property
-    def passed(self) -> bool:
-        """Whether the targets may have stood still, as far as this test sees."""
-        return self.probability >= self.level
 
 
 @dataclass(frozen=True)
@@ -136,29 +112,6 @@ class Comparison:
         return tuple(it.name for it in found)
 
 
-@dataclass(frozen=True)
-class _Epochs:
-    """Common targets: coordinates (n, 3) of both epochs and covariances (3n, 3n), as tested."""
-
-    xyz: tuple[FloatArray, FloatArray]
-    covariances: tuple[FloatArray, FloatArray]
-    degrees: int
-    free_scale: bool
-    level: float
-
-
-@dataclass(frozen=True)
-class _State:
-    """What the tests say of a datum: movements, covariances and statistics of all targets."""
-
-    datum: NDArray[np.bool_]
-    movements: FloatArray
-    covariances: FloatArray
-    statistics: FloatArray
-    probabilities: FloatArray
-    test: GlobalTest
-
-
 def compare(
     first: MeasuredPoints,
     second: MeasuredPoints,
@@ -210,11 +163,10 @@ def compare(
     variances = _compared_variances(first, second, level)
     epochs = _weighted(first.chosen(names), second.chosen(names), variances, free, level)
     candidates = np.array([not stable or name in stable for name in names])
-    states = _localised(epochs, candidates)
+    states = localised(epochs, candidates)
     last = states[-1]
-    found = _passes(last, last.datum, level)
-    moved = (last.probabilities < level) & found  # without a datum, nothing can be named
-    warnings = _warnings(variances, states, names, moved, found)
+    moved = ~last.still & last.passed  # without a datum, nothing can be named
+    warnings = _warnings(variances, states, names, moved)
     return Comparison(
         movements=tuple(
             Movement(
@@ -231,7 +183,7 @@ def compare(
         ),
         variances=variances,
         tests=tuple(state.test for state in states),
-        congruent=_passes(states[0], np.full(len(names), True), level),
+        congruent=states[0].test.passed and bool(states[0].still.all()),
         only_first=tuple(name for name in first.names if name not in names),
         only_second=tuple(name for name in second.names if name not in names),
         free_scale=free,
@@ -239,11 +191,6 @@ def compare(
         unit=first.unit,
         warnings=tuple(warnings),
     )
-
-
-def _passes(state: _State, targets: NDArray[np.bool_], level: float) -> bool:
-    """Return whether the datum together, and each one of some targets, may have stood still."""
-    return state.test.passed and bool((state.probabilities[targets] >= level).all())
 
 
 def _free_scale(first: MeasuredPoints, second: MeasuredPoints, wanted: bool | None) -> bool:
@@ -267,7 +214,7 @@ def _common(
     if missing := [name for name in stable if name not in names]:
         raise ValueError(f'stable targets {", ".join(missing)} are not in both epochs')
     chosen = stable or names
-    if len(chosen) < _MINIMUM:
+    if len(chosen) < FEWEST:
         what = 'stable' if stable else 'common'
         raise ValueError(f'{counted(len(chosen), f"{what} target")}, accepted are three or more')
     for epoch in (first, second):
@@ -288,7 +235,7 @@ def _compared_variances(
             )
     larger, smaller = sorted((first, second), key=lambda it: -it.sigma0)
     ratio = (larger.sigma0 / smaller.sigma0) ** 2
-    tail = float(_f_probability(larger.redundancy, smaller.redundancy, ratio))
+    tail = float(f_probability(larger.redundancy, smaller.redundancy, ratio))
     probability = min(2 * tail, 1.0)
     return VarianceTest(ratio, probability, probability >= level)
 
@@ -299,7 +246,7 @@ def _weighted(
     variances: VarianceTest,
     free: bool,
     level: float,
-) -> _Epochs:
+) -> Epochs:
     """Return the epochs with covariances of the pooled variance, or each of its own.
 
     Of two variances, the degrees of freedom of the worse known one are on the safe side.
@@ -315,167 +262,14 @@ def _weighted(
             raise ValueError(
                 f'covariance of the {which} epoch is zero, accepted is that of an adjustment'
             )
-    return _Epochs((first.xyz, second.xyz), covariances, degrees, free, level)
-
-
-def _localised(epochs: _Epochs, candidates: NDArray[np.bool_]) -> list[_State]:
-    """Return what the tests say of the first datum, and of each that a target left or entered.
-
-    Where many targets moved together, their movement smears over the others, and targets leave
-    until too few are left. Then the datum starts from the half that fits best.
-    """
-    half = max(int(candidates.sum()) // 2 + 1, _MINIMUM)
-    states = _reduced(epochs, candidates, half)
-    if candidates.sum() == half or _passes(states[-1], states[-1].datum, epochs.level):
-        return states
-    others = _reduced(epochs, _best_half(epochs, candidates, half), _MINIMUM)
-    enlarged = others[-1].datum | (candidates & (others[-1].probabilities >= epochs.level))
-    others += _reduced(epochs, enlarged, half)
-    last = others[-1]
-    found = last.datum.sum() >= half and _passes(last, last.datum, epochs.level)
-    return [states[0], *others] if found else states
-
-
-def _reduced(epochs: _Epochs, datum: NDArray[np.bool_], least: int) -> list[_State]:
-    """Return what the tests say while targets leave a datum until it passes or `least` are left.
-
-    One that left and is not significant against the others comes back, once.
-    """
-    states, returned = [_tested(epochs, datum)], np.zeros_like(datum)
-    while not _passes(states[-1], states[-1].datum, epochs.level):
-        state = states[-1]
-        leaving = _leaving(epochs, state)
-        if leaving is None or state.datum.sum() <= least:
-            break
-        datum = state.datum.copy()
-        datum[leaving] = False
-        states.append(_tested(epochs, datum))
-        back = states[0].datum & ~datum & ~returned & (states[-1].probabilities >= epochs.level)
-        back[leaving] = False
-        if back.any():
-            index = np.flatnonzero(back)[np.argmin(states[-1].statistics[back])]
-            datum = datum.copy()
-            datum[index] = returned[index] = True
-            states.append(_tested(epochs, datum))
-    return states
-
-
-def _best_half(epochs: _Epochs, candidates: NDArray[np.bool_], half: int) -> NDArray[np.bool_]:
-    """Return the half of the candidates whose largest movement is least, by fits to three.
-
-    Rousseeuw, Least median of squares regression, J. Am. Stat. Assoc. 1984, 79, 871.
-    """
-    first, second = epochs.xyz
-    places, rng = np.flatnonzero(candidates), np.random.default_rng(0)
-    best, chosen = np.inf, candidates
-    for _ in range(_TRIALS):
-        three = rng.choice(places, _MINIMUM, replace=False)
-        if on_a_line(first[three]) or on_a_line(second[three]):
-            continue
-        fit = similarity_between(second[three], first[three], epochs.free_scale)
-        distances = np.linalg.norm(fit.moved(second) - first, axis=1)
-        nearest = places[np.argsort(distances[places])[:half]]
-        if distances[nearest[-1]] < best:
-            best, chosen = distances[nearest[-1]], np.zeros_like(candidates)
-            chosen[nearest] = True
-    return chosen
-
-
-def _leaving(epochs: _Epochs, state: _State) -> int | None:
-    """Return the target of the datum with the largest share; None where the others hold none."""
-    shares = np.where(state.datum, state.statistics, -np.inf)
-    index = int(np.argmax(shares))
-    others = state.datum.copy()
-    others[index] = False
-    enough = others.sum() >= _MINIMUM and not on_a_line(epochs.xyz[0][others])
-    return index if enough else None
-
-
-def _tested(epochs: _Epochs, datum: NDArray[np.bool_]) -> _State:
-    """Return what the tests say of the movements in the datum of some targets."""
-    first, second = epochs.xyz
-    fit = similarity_between(second[datum], first[datum], epochs.free_scale)
-    covariance = epochs.covariances[0] + fit.turned(epochs.covariances[1])
-    moved, covariance = s_transform(
-        fit.moved(second),
-        covariance,
-        datum.astype(float),
-        reference=first,
-        scale=epochs.free_scale,
-    )
-    difference, rows = moved - first, np.repeat(datum, 3)
-    weights = _pseudoinverse(
-        covariance[np.ix_(rows, rows)], movements(first[datum], epochs.free_scale)
-    )
-    pulls = (weights @ difference[datum].ravel()).reshape(-1, 3)
-    inverse = np.empty((len(first), 3, 3))
-    inverse[datum] = blocks(weights)
-    # What the movements of the datum, which are errors, say of those of the other targets.
-    gain = covariance[np.ix_(~rows, rows)] @ weights
-    difference[~datum] -= (gain @ difference[datum].ravel()).reshape(-1, 3)
-    covariances = np.empty_like(inverse)
-    covariances[~datum] = blocks(
-        covariance[np.ix_(~rows, ~rows)] - gain @ covariance[np.ix_(rows, ~rows)]
-    )
-    covariances[datum] = np.linalg.pinv(inverse[datum], _SINGULAR, hermitian=True)
-    inverse[~datum] = np.linalg.pinv(covariances[~datum], _SINGULAR, hermitian=True)
-    difference[datum] = np.einsum('nij,nj->ni', covariances[datum], pulls)
-    eigenvalues = np.linalg.eigvalsh(inverse)
-    ranks = (eigenvalues > _SINGULAR * eigenvalues[:, -1:]).sum(axis=1)
-    statistics = np.einsum('ni,nij,nj->n', difference, inverse, difference) / ranks
-    single = _f_probability(ranks, epochs.degrees, statistics)
-    rank = 3 * int(datum.sum()) - (7 if epochs.free_scale else 6)
-    statistic = float((pulls * (moved - first)[datum]).sum()) / rank
-    return _State(
-        datum,
-        difference,
-        covariances,
-        statistics,
-        np.minimum(single * len(first) / _ALONE, 1.0),
-        GlobalTest(
-            int(datum.sum()),
-            statistic,
-            rank,
-            epochs.degrees,
-            float(_f_probability(rank, epochs.degrees, statistic)),
-            _TOGETHER * epochs.level,
-        ),
-    )
-
-
-def _pseudoinverse(covariance: FloatArray, free: FloatArray) -> FloatArray:
-    """Return the pseudoinverse of a covariance whose null space is that of its datum, G.
-
-    (Q + G G')^-1 - G G' for orthonormal columns of G, scaled to the size of Q.
-    """
-    columns = np.linalg.qr(free)[0]
-    size = np.trace(covariance) / len(covariance)
-    added = columns @ columns.T
-    values, vectors = np.linalg.eigh(covariance / size + added)
-    if not values[0] > _SINGULAR:
-        raise ValueError(
-            'covariance of the common targets is singular beyond the datum, accepted is one of '
-            'coordinates that were all measured'
-        )
-    inverse: FloatArray = ((vectors / values) @ vectors.T - added) / size
-    return inverse
-
-
-def _f_probability(above: ArrayLike, below: ArrayLike, statistic: ArrayLike) -> FloatArray:
-    """Return the probability of a value of F at least as large, by its degrees of freedom."""
-    try:
-        from scipy.special import fdtrc
-    except ModuleNotFoundError as error:
-        raise ModuleNotFoundError("scipy: pip install 'ahf_ros[orient]'") from error
-    return np.asarray(fdtrc(above, below, np.maximum(statistic, 0.0)))
+    return Epochs((first.xyz, second.xyz), covariances, degrees, free, level)
 
 
 def _warnings(
     variances: VarianceTest,
-    states: Sequence[_State],
+    states: Sequence[State],
     names: Sequence[str],
-    moved: NDArray[np.bool_],
-    found: bool,
+    moved: Mask,
 ) -> list[str]:
     """Return what whoever reads the results must know, as sentences."""
     warnings = []
@@ -485,7 +279,7 @@ def _warnings(
             f'The variances of unit weight differ by a factor of {variances.ratio:.2f}: one epoch '
             'is better or worse than its covariances say. Each is weighted by its own variance.'
         )
-    if not found:
+    if not last.passed:
         warnings.append(
             'No datum is left that stood still: more than half of its targets moved, or there are '
             'too few to tell which. No target is named.'

@@ -9,7 +9,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -51,12 +51,10 @@ class Conditions:
         soft = self.variances > 0
         rows = self.rows[soft]
         weighted = rows / self.variances[soft, None]
-        return Normals(
-            equations.pose,
-            equations.mixed,
-            equations.rest + rows.T @ weighted,
-            equations.pose_right,
-            equations.rest_right + weighted.T @ self.gaps[soft],
+        return replace(
+            equations,
+            rest=equations.rest + rows.T @ weighted,
+            rest_right=equations.rest_right + weighted.T @ self.gaps[soft],
         )
 
     def border(self) -> tuple[FloatArray, FloatArray]:

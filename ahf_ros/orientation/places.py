@@ -17,8 +17,8 @@ from ahf_ros.orientation import camera, normals
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.normals import Layout
 from ahf_ros.orientation.solution import Start
+from ahf_ros.orientation.triangulation import SMALLEST_ANGLE, directions
 
-_LEAST_ANGLE = np.deg2rad(5)  # between two rays that shall meet
 _MOST_PAIRS = 400  # of rays that are tried, spread evenly
 _ROUNDS = 3  # of intersection and choice of rays
 
@@ -51,27 +51,24 @@ def _largest(
     """Return the place where most rays meet, by trying all pairs of them, or many."""
     pairs = np.array(list(combinations(range(len(rows)), 2)))
     pairs = pairs[np.unique(np.linspace(0, len(pairs) - 1, _MOST_PAIRS).astype(int))]
-    centres, directions = _rays(layout, state, rows)
-    cosines = (directions[pairs[:, 0]] * directions[pairs[:, 1]]).sum(axis=1)
-    pairs = pairs[cosines < np.cos(_LEAST_ANGLE)]
+    centres, towards = _rays(layout, state, rows)
+    cosines = (towards[pairs[:, 0]] * towards[pairs[:, 1]]).sum(axis=1)
+    pairs = pairs[cosines < np.cos(SMALLEST_ANGLE)]
     if not len(pairs):
         return None
-    points = _intersections(centres[pairs], directions[pairs])
-    lengths = normals.lengths_at(layout, state, np.repeat(rows, len(points)), _tiled(points, rows))
+    points = _intersections(centres[pairs], towards[pairs])
+    every = np.tile(points, (len(rows), 1))
+    lengths = normals.lengths_at(layout, state, np.repeat(rows, len(points)), every)
     met = lengths.reshape(len(rows), -1) < tolerance
     best = int(met.sum(axis=0).argmax())
     point, chosen = points[best], met[:, best]
     for _ in range(_ROUNDS):
         if chosen.sum() < 2:
             return None
-        point = _intersections(centres[None, chosen], directions[None, chosen])[0]
+        point = _intersections(centres[None, chosen], towards[None, chosen])[0]
         again = normals.lengths_at(layout, state, rows, np.tile(point, (len(rows), 1)))
         chosen = again < tolerance
     return Place(point, rows[chosen]) if chosen.sum() > 1 else None
-
-
-def _tiled(points: FloatArray, rows: NDArray[np.int64]) -> FloatArray:
-    return np.tile(points, (len(rows), 1))
 
 
 def _rays(layout: Layout, state: Start, rows: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
@@ -79,14 +76,12 @@ def _rays(layout: Layout, state: Start, rows: NDArray[np.int64]) -> tuple[FloatA
     photographs = layout.photographs[layout.photograph[rows]]
     calibrations = state.calibrations[layout.camera[rows]]
     ideal = camera.undistort(calibrations, layout.xy[rows], layout.backward)
-    seen = np.nan_to_num(np.column_stack([ideal, np.ones(len(ideal))]))
-    directions = np.einsum('nij,ni->nj', state.rotations[photographs], seen)
-    directions /= np.linalg.norm(directions, axis=1)[:, None]
-    return state.positions[photographs], directions
+    towards = directions(state.rotations[photographs], np.nan_to_num(ideal))
+    return state.positions[photographs], towards
 
 
-def _intersections(centres: FloatArray, directions: FloatArray) -> FloatArray:
+def _intersections(centres: FloatArray, towards: FloatArray) -> FloatArray:
     """Return the points (g, 3) nearest to groups of rays from centres (g, n, 3)."""
-    across = np.eye(3) - directions[..., :, None] * directions[..., None, :]
+    across = np.eye(3) - towards[..., :, None] * towards[..., None, :]
     right = (across @ centres[..., None]).sum(axis=1)
     return np.linalg.solve(across.sum(axis=1), right)[:, :, 0]

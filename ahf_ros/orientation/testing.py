@@ -13,6 +13,8 @@ References
 
 from __future__ import annotations
 
+from importlib import import_module
+from types import ModuleType
 from typing import NamedTuple
 
 import numpy as np
@@ -40,6 +42,16 @@ class UnitWeight(NamedTuple):
     plausible: bool
 
 
+def special() -> ModuleType:
+    """Return scipy.special, or raise a `ModuleNotFoundError` that says how to install it."""
+    try:
+        return import_module('scipy.special')
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError(
+            "scipy is needed for tests of adjustments: pip install 'ahf_ros[orient]'"
+        ) from error
+
+
 def unit_weight(cost: float, redundancy: int) -> UnitWeight:
     """Return the estimate and its two-sided chi-square test against 1, at 5 %.
 
@@ -47,13 +59,7 @@ def unit_weight(cost: float, redundancy: int) -> UnitWeight:
     """
     if redundancy <= 0:
         return UnitWeight(1.0, redundancy, True)
-    try:
-        from scipy.special import chdtri
-    except ModuleNotFoundError as error:
-        raise ModuleNotFoundError(
-            "scipy is needed to test an adjustment: pip install 'ahf_ros[orient]'"
-        ) from error
-    low, high = chdtri(redundancy, [1 - SIGNIFICANCE / 2, SIGNIFICANCE / 2])
+    low, high = special().chdtri(redundancy, [1 - SIGNIFICANCE / 2, SIGNIFICANCE / 2])
     return UnitWeight(float(np.sqrt(cost / redundancy)), redundancy, bool(low <= cost <= high))
 
 

@@ -8,6 +8,7 @@ from html import escape
 
 import numpy as np
 
+from ahf_ros.drawing.coordinates import apart, ellipse, round_number
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.solution import Solution
 
@@ -16,11 +17,9 @@ PICTURE = 300  # px, width of a figure of an image
 CELLS = 12  # columns of the map of a sensor
 NAMED = 150  # targets, above which they have no names in the figures
 _MARGIN = 28
-_NAME = 16, 9  # px, that a name takes
 _ALONE = 0.6  # of the extent of the network, below which targets are shown alone, too
 _ELLIPSE = 0.025  # of the width of a view: size that the median ellipse is enlarged to
 _ARROW = 0.03  # of the width of an image: size that the median residual is enlarged to
-_CONFIDENCE = 2.447  # semi-axes of the ellipse that holds 95 %, in standard deviations
 
 
 def views(solution: Solution) -> list[tuple[str, str]]:
@@ -82,7 +81,7 @@ def enlargement(solution: Solution) -> float:
     lengths = np.linalg.norm(solution.residuals[solution.start.used], axis=1)
     width = float(np.median([view.width for view in solution.network.cameras]))
     median = float(np.median(lengths)) if len(lengths) else 0.0
-    return _round(_ARROW * width / median) if median > 0 else 1.0
+    return round_number(_ARROW * width / median) if median > 0 else 1.0
 
 
 def sensor_map(solution: Solution, camera: int, enlarged: float) -> str:
@@ -150,10 +149,10 @@ def _view(solution: Solution, axes: FloatArray, with_cameras: bool) -> tuple[str
         moved = (places - middle) * (scale, -scale)
         return np.asarray(moved + np.array(VIEW) / 2)
 
-    ellipses = [_ellipse(block, axes) for block in solution.point_covariances[known]]
+    ellipses = [ellipse(block, axes) for block in solution.point_covariances[known]]
     sizes = [major for major, _, _ in ellipses if major > 0]
     wanted = _ELLIPSE * VIEW[0] / scale
-    enlarged = _round(wanted / float(np.median(sizes))) if sizes else 1.0
+    enlarged = round_number(wanted / float(np.median(sizes))) if sizes else 1.0
     parts = list(_grid_lines(step, middle, scale))
     for index, place in zip(np.flatnonzero(posed), placed(cameras), strict=True):
         forward = solution.start.rotations[index][2] @ axes.T
@@ -161,15 +160,14 @@ def _view(solution: Solution, axes: FloatArray, with_cameras: bool) -> tuple[str
     names = [solution.network.targets[index] for index in np.flatnonzero(known)]
     parts += _knowledge(solution, dict(zip(names, placed(points), strict=True)))
     written: list[tuple[float, float]] = []
-    for name, (x, y), ellipse in zip(names, placed(points), ellipses, strict=True):
-        major, minor, angle = ellipse
+    for name, (x, y), (major, minor, angle) in zip(names, placed(points), ellipses, strict=True):
         parts.append(
             f'<g class="target"><title>{escape(name)}</title><ellipse '
             f'rx="{scale * enlarged * major:.2f}" ry="{scale * enlarged * minor:.2f}" '
-            f'transform="translate({x:.1f} {y:.1f}) rotate({-math.degrees(angle):.1f})"/>'
+            f'transform="translate({x:.1f} {y:.1f}) rotate({angle:.1f})"/>'
             f'<circle cx="{x:.1f}" cy="{y:.1f}" r="1.4"/>'
         )
-        if len(names) <= NAMED and all(_apart(x - u, y - v) for u, v in written):
+        if len(names) <= NAMED and apart((x, y), written):
             written.append((x, y))
             parts.append(f'<text x="{x + 4:.1f}" y="{y - 4:.1f}">{escape(name)}</text>')
         parts.append('</g>')
@@ -192,18 +190,6 @@ def _known(path: str, check: bool) -> str:
     return f'<path class="known{" check" * check}" d="{path}"/>'
 
 
-def _apart(across: float, down: float) -> bool:
-    """Return whether two names at this distance, px, can be read."""
-    return abs(across) > _NAME[0] or abs(down) > _NAME[1]
-
-
-def _ellipse(covariance: FloatArray, axes: FloatArray) -> tuple[float, float, float]:
-    """Return semi-axes of the ellipse that holds 95 %, and the direction of the major one, rad."""
-    values, vectors = np.linalg.eigh(axes @ covariance @ axes.T)
-    minor, major = _CONFIDENCE * np.sqrt(np.maximum(values, 0))
-    return float(major), float(minor), math.atan2(vectors[1, 1], vectors[0, 1])
-
-
 def _bounds(places: FloatArray) -> tuple[FloatArray, FloatArray]:
     if not len(places):
         return np.zeros(2), np.ones(2)
@@ -212,13 +198,7 @@ def _bounds(places: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 def _step(extent: FloatArray) -> float:
     """Return the width of a grid of round numbers, about six lines."""
-    return _round(float(np.max(extent)) / 6) if np.max(extent) > 0 else 1.0
-
-
-def _round(number: float) -> float:
-    """Return 1, 2 or 5 times a power of ten, the largest below a number."""
-    power = 10 ** math.floor(math.log10(number))
-    return next(step * power for step in (5, 2, 1) if step * power <= number * (1 + 1e-9))
+    return round_number(float(np.max(extent)) / 6) if np.max(extent) > 0 else 1.0
 
 
 def _grid_lines(step: float, middle: FloatArray, scale: float) -> Iterator[str]:
