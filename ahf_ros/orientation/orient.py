@@ -239,8 +239,9 @@ def _doubtful(solution: Solution) -> str | None:
     share = float(np.mean(start.used[belongs])) if belongs.any() else 0.0
     if share < CONTRADICTING:
         return (
-            f'photographs: only {share:.0%} of the observations of what {names} show agree with each other, '
-            f'expected {CONTRADICTING:.0%} or more. Check IDs, cameras and whether targets moved'
+            f'photographs: only {share:.0%} of the observations of what {names} show agree with '
+            f'each other, expected {CONTRADICTING:.0%} or more. Check IDs, cameras and whether '
+            'targets moved'
         )
     return None
 

@@ -16,6 +16,7 @@ from ahf_ros.orientation.adjustment import free_parameters, refine
 from ahf_ros.orientation.camera import PARAMETERS, pinhole
 from ahf_ros.orientation.least_squares import normal_equations
 from ahf_ros.orientation.network import FloatArray, IntArray, Network
+from ahf_ros.orientation.normals import BEHIND
 from ahf_ros.orientation.planar import mirrored
 from ahf_ros.orientation.precision import precision
 from ahf_ros.orientation.relative import relative_orientations
@@ -356,7 +357,7 @@ def with_lens(network: Network, start: Start, rounds: int) -> tuple[Start, tuple
 def _misfit(lengths: FloatArray) -> float:
     """Return Cauchy's loss of residuals in standard deviations: what disagrees counts, too."""
     known = lengths[~np.isnan(lengths)]
-    return float(np.sum(np.log1p((np.nan_to_num(known) / BOUND) ** 2)))
+    return float(np.sum(np.log1p((np.minimum(known, BEHIND) / BOUND) ** 2)))
 
 
 def focal_sigma(network: Network, start: Start, free: tuple[str, ...]) -> float:
