@@ -29,6 +29,10 @@ CONTRADICTING = 0.6
 Those of its targets in photographs that could not be oriented disagree.
 """
 
+FEWEST_OF_A_LENS = 5
+BELIEVED_LENS = 0.8
+"""Photographs, and the share of their observations that must agree, for a lens to be believed."""
+
 ZOOMED = 0.03
 """Relative difference of a photograph's focal length that is no error of its camera's."""
 
@@ -105,7 +109,8 @@ def orient(
             solution = adjust(network, start, datum, release, test)
             reason = _doubtful(solution)
         if reason is None:
-            solutions.append(solution)
+            warnings = solution.warnings + _lenses(solution)
+            solutions.append(replace(solution, warnings=warnings))
         else:
             refused.append(reason)
     if not solutions:
@@ -244,6 +249,32 @@ def _doubtful(solution: Solution) -> str | None:
             'targets moved'
         )
     return None
+
+
+def _lenses(solution: Solution) -> tuple[str, ...]:
+    """Return warnings of lenses that were estimated and hardly checked.
+
+    What such photographs do not determine of a lens stays zero, and no covariance knows of it.
+    """
+    network, start = solution.network, solution.start
+    posed = np.isfinite(start.positions[:, 0])
+    warnings = []
+    for camera, view in enumerate(network.cameras):
+        own = posed & (network.camera_of == camera)
+        estimated = set(solution.released[camera]) - {'f'}
+        if view.calibration is not None or not estimated or not own.any():
+            continue
+        belongs = own[network.observations.photograph]
+        share = float(np.mean(start.used[belongs]))
+        if own.sum() < FEWEST_OF_A_LENS or share < BELIEVED_LENS:
+            warnings.append(
+                f'camera {view.name}: its lens is estimated from {own.sum()} photographs, of '
+                f'whose observations {share:.0%} agree. Coordinates may be off by many of their '
+                'standard deviations. Give a calibration, or take '
+                f'{FEWEST_OF_A_LENS} photographs or more: '
+                f'{TILT}'
+            )
+    return tuple(warnings)
 
 
 def _left_out(network: Network, solutions: Sequence[Solution]) -> tuple[str, ...]:
