@@ -12,6 +12,7 @@ import time
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -44,9 +45,19 @@ class Rendered:
 
 
 def rendered(
-    seed: int, *, flat: bool, known: bool, wrong: float = 0.0, photographs: int = 0
+    seed: int,
+    *,
+    flat: bool,
+    known: bool,
+    wrong: float = 0.0,
+    photographs: int = 0,
+    distorted: bool = False,
 ) -> Rendered:
-    """Return a random network: 8 to 60 photographs of 20 to 150 targets, tilted and rolled."""
+    """Return a random network: 8 to 60 photographs of 20 to 150 targets, tilted and rolled.
+
+    A distorted one has a lens as usual: k1 from -0.3 to 0.1, and a principal point that is off by
+    up to 2 % of the image's width.
+    """
     random = np.random.default_rng(seed)
     count = photographs or int(random.integers(8, 61))
     number = int(random.integers(20, 151))
@@ -68,6 +79,9 @@ def rendered(
     view = CameraView('camera', WIDTH, HEIGHT, focal if known else None)
     calibration = pinhole(focal, WIDTH, HEIGHT)
     cameras, of = (view,), np.zeros(count, dtype=int)
+    if distorted:
+        calibration[1:3] += WIDTH * random.uniform(-0.02, 0.02, 2)
+        calibration[3] = random.uniform(-0.3, 0.1)
     return photographed(
         points, rotations, positions, cameras, of, calibration[None], random, wrong
     )
@@ -94,6 +108,10 @@ def photographed(
         xy = project(calibrations[own], rotation, position, points)
         size = np.array([cameras[camera].width, cameras[camera].height])
         inside = np.all((xy > 10) & (xy < size - 10), axis=1)
+        ideal = (points - position) @ rotation.T
+        # No lens images twice: beyond this radius Brown's polynomial turns back.
+        turning = 1 + 3 * calibrations[own][3] * np.sum((ideal[:, :2] / ideal[:, 2:]) ** 2, axis=1)
+        inside &= turning > 0.2
         inside &= random.random(len(points)) < 0.9
         rows += [(photograph, point, *xy[point]) for point in np.flatnonzero(inside)]
     table = np.array(rows)
@@ -141,21 +159,30 @@ def deviations(points: FloatArray, truth: FloatArray) -> FloatArray:
 def starts_table(seeds: Sequence[int], runs: int) -> list[str]:
     """Return how many random networks were oriented, refused, and silently wrong."""
     rows = []
-    for flat in (False, True):
-        for known in (True, False):
-            counts: Counter[str] = Counter()
-            times = []
-            for run in range(runs):
-                seen = rendered(1000 * seeds[0] + run, flat=flat, known=known)
-                started = time.perf_counter()
-                counts[outcome(seen)] += 1
-                times.append(time.perf_counter() - started)
-            kinds = ('oriented', 'in part, said', 'refused', 'wrong')
-            shares = (f'{counts[kind]} ({counts[kind] / runs:.1%})' for kind in kinds)
-            field = 'plane' if flat else 'space'
-            focal = 'known' if known else 'unknown'
-            rows.append((field, focal, *shares, number(float(np.median(times)), 1)))
-    head = ('field', 'focal length', 'oriented', 'in part, said', 'refused', 'silently wrong', 's')
+    for flat, known, distorted in product((False, True), (True, False), (False, True)):
+        counts: Counter[str] = Counter()
+        times = []
+        for run in range(runs):
+            seen = rendered(1000 * seeds[0] + run, flat=flat, known=known, distorted=distorted)
+            started = time.perf_counter()
+            counts[outcome(seen)] += 1
+            times.append(time.perf_counter() - started)
+        kinds = ('oriented', 'in part, said', 'refused', 'wrong')
+        shares = (f'{counts[kind]} ({counts[kind] / runs:.1%})' for kind in kinds)
+        field = 'plane' if flat else 'space'
+        focal = 'known' if known else 'unknown'
+        lens = 'usual' if distorted else 'none'
+        rows.append((field, focal, lens, *shares, number(float(np.median(times)), 1)))
+    head = (
+        'field',
+        'focal length',
+        'distortion',
+        'oriented',
+        'in part, said',
+        'refused',
+        'silently wrong',
+        's',
+    )
     return table(head, rows)
 
 

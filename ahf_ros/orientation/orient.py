@@ -15,7 +15,7 @@ from ahf_ros.orientation.network import FloatArray, IntArray, Network, Rejection
 from ahf_ros.orientation.planar import principal_axes
 from ahf_ros.orientation.resection import FEWEST_POINTS, Resection, resections
 from ahf_ros.orientation.solution import Solution, Start
-from ahf_ros.orientation.start import oriented, reversal, starts
+from ahf_ros.orientation.start import FEWEST_PHOTOGRAPHS, oriented, reversal, starts
 from ahf_ros.orientation.triples import FEWEST_COMMON, STEPS, known_calibrations
 from ahf_ros.orientation.views import View, lengths_of, spread_of, views_of
 from ahf_ros.text import counted
@@ -24,7 +24,14 @@ LINE = 0.01
 """Targets are on a line where their spread across it is less than this share of that along it."""
 
 CONTRADICTING = 0.6
-"""Share of observations that must agree for a network to be believed."""
+"""Share of observations that must agree for a network to be believed.
+
+Those of its targets in photographs that could not be oriented disagree.
+"""
+
+FEWEST_OF_A_LENS = 5
+BELIEVED_LENS = 0.8
+"""Photographs, and the share of their observations that must agree, for a lens to be believed."""
 
 ZOOMED = 0.03
 """Relative difference of a photograph's focal length that is no error of its camera's."""
@@ -102,7 +109,8 @@ def orient(
             solution = adjust(network, start, datum, release, test)
             reason = _doubtful(solution)
         if reason is None:
-            solutions.append(solution)
+            warnings = solution.warnings + _lenses(solution)
+            solutions.append(replace(solution, warnings=warnings))
         else:
             refused.append(reason)
     if not solutions:
@@ -150,7 +158,7 @@ def _check(network: Network) -> None:
     needed = f'expected {FEWEST_COMMON} or more that three photographs have in common'
     if not targets:
         raise ValueError(f'targets: no ID is seen in two photographs, {needed}')
-    if photographs < 3:
+    if photographs < FEWEST_PHOTOGRAPHS:
         raise ValueError(
             f'photographs: {photographs} with targets, expected three or more: what two say is '
             'checked by nothing. Take more from other directions'
@@ -218,6 +226,11 @@ def _doubtful(solution: Solution) -> str | None:
     network, start = solution.network, solution.start
     photographs = oriented(start)
     names = _names(network.photographs, photographs)
+    if len(photographs) < FEWEST_PHOTOGRAPHS:
+        return (
+            f'photographs: only {names or "none"} agree with each other, expected '
+            f'{FEWEST_PHOTOGRAPHS} or more. Take more from other directions'
+        )
     known = known_calibrations(network)[:, 0]
     for camera in np.unique(network.camera_of[photographs]):
         if not np.isfinite(known[camera]) and 'f' not in solution.released[camera]:
@@ -227,14 +240,41 @@ def _doubtful(solution: Solution) -> str | None:
                 f'focal length, or {TILT}'
             )
     observed = network.observations
-    belongs = np.isfinite(start.positions[observed.photograph, 0])
+    belongs = np.isfinite(start.points[observed.point, 0])
     share = float(np.mean(start.used[belongs])) if belongs.any() else 0.0
     if share < CONTRADICTING:
         return (
-            f'photographs: only {share:.0%} of the observations in {names} agree with each other, '
-            f'expected {CONTRADICTING:.0%} or more. Check IDs, cameras and whether targets moved'
+            f'photographs: only {share:.0%} of the observations of what {names} show agree with '
+            f'each other, expected {CONTRADICTING:.0%} or more. Check IDs, cameras and whether '
+            'targets moved'
         )
     return None
+
+
+def _lenses(solution: Solution) -> tuple[str, ...]:
+    """Return warnings of lenses that were estimated and hardly checked.
+
+    What such photographs do not determine of a lens stays zero, and no covariance knows of it.
+    """
+    network, start = solution.network, solution.start
+    posed = np.isfinite(start.positions[:, 0])
+    warnings = []
+    for camera, view in enumerate(network.cameras):
+        own = posed & (network.camera_of == camera)
+        estimated = set(solution.released[camera]) - {'f'}
+        if view.calibration is not None or not estimated or not own.any():
+            continue
+        belongs = own[network.observations.photograph]
+        share = float(np.mean(start.used[belongs]))
+        if own.sum() < FEWEST_OF_A_LENS or share < BELIEVED_LENS:
+            warnings.append(
+                f'camera {view.name}: its lens is estimated from {own.sum()} photographs, of '
+                f'whose observations {share:.0%} agree. Coordinates may be off by many of their '
+                'standard deviations. Give a calibration, or take '
+                f'{FEWEST_OF_A_LENS} photographs or more: '
+                f'{TILT}'
+            )
+    return tuple(warnings)
 
 
 def _left_out(network: Network, solutions: Sequence[Solution]) -> tuple[str, ...]:

@@ -16,6 +16,7 @@ from ahf_ros.orientation.adjustment import free_parameters, refine
 from ahf_ros.orientation.camera import PARAMETERS, pinhole
 from ahf_ros.orientation.least_squares import normal_equations
 from ahf_ros.orientation.network import FloatArray, IntArray, Network
+from ahf_ros.orientation.normals import BEHIND
 from ahf_ros.orientation.planar import mirrored
 from ahf_ros.orientation.precision import precision
 from ahf_ros.orientation.relative import relative_orientations
@@ -38,6 +39,9 @@ LENS = (('f', 'k1'), ('f', 'k1', 'k2', 'cx', 'cy'))
 
 UNEXPLAINED = 2.0
 """Robust spread of residuals in standard deviations that a lens may explain."""
+
+MOST_AGREE = 0.9
+"""Share of observations below which a lens may explain why the others do not agree."""
 
 WEAK = 0.2
 """Relative standard deviation of a focal length that is hardly determined."""
@@ -248,11 +252,13 @@ def _hypotheses(
     _, a, b = np.intersect1d(first.points, second.points, True, return_indices=True)
     typical = float(np.median(np.concatenate([sigma[0][a], sigma[1][b]])))
     for pair in relative_orientations(xy[0][a], xy[1][b], typical)[:3]:
-        good = pair.agrees
         rays = directions(np.broadcast_to(np.eye(3), (len(a), 3, 3)), xy[0][a])
         others = directions(np.broadcast_to(pair.rotation, (len(b), 3, 3)), xy[1][b])
+        met = midpoints(rays, others, np.zeros(3), pair.position)
+        # Points that do not agree yet may do so with the lens.
+        before = (met[:, 2] > 0) & ((met - pair.position) @ pair.rotation[2] > 0)
         points = np.full((len(part.targets), 3), np.nan)
-        points[first.points[a[good]]] = midpoints(rays, others, np.zeros(3), pair.position)[good]
+        points[first.points[a[before]]] = met[before]
         seen = np.isfinite(points[third.points, 0])
         poses = resections(points[third.points[seen]], xy[2][seen], sigma[2][seen])
         for pose in poses[:2]:
@@ -280,7 +286,10 @@ def _refined(
     held = replace(part, cameras=tuple(views))
     try:
         start = refine(part, start, (), rounds=6)
-        start, free = with_lens(part, refine(held, start, ('f',), rounds=15), rounds=15)
+        start, free = min(
+            (with_lens(part, one, rounds=15) for one in _first(part, held, start)),
+            key=lambda pair: _misfit(lengths_of(part, pair[0])),
+        )
     except (ValueError, np.linalg.LinAlgError):
         return None
     focal = start.calibrations[unknown, 0]
@@ -301,6 +310,25 @@ def _refined(
     return Seed(triple, start, spread, cost, angle, sigma)
 
 
+def _first(part: Network, held: Network, start: Start) -> Iterator[Start]:
+    """Yield values without the lens, and with it where they leave residuals unexplained.
+
+    What is fitted without the lens may be far from where the lens explains them.
+    """
+    first = refine(held, start, ('f',), rounds=15)
+    yield first
+    if not all(camera.fixed for camera in part.cameras) and _unexplained(part, first):
+        known = ~np.isnan(lengths_of(part, start))
+        yield refine(part, replace(start, used=known), LENS[0], rounds=15)
+
+
+def _unexplained(network: Network, start: Start) -> bool:
+    """Return whether a lens may explain what is left of residuals."""
+    lengths = lengths_of(network, start)
+    agree = np.mean(start.used[~np.isnan(lengths)])
+    return bool(spread_of(lengths) >= UNEXPLAINED or agree <= MOST_AGREE)
+
+
 def with_lens(network: Network, start: Start, rounds: int) -> tuple[Start, tuple[str, ...]]:
     """Return the values with as much of the lenses as residuals ask for, and what was released.
 
@@ -308,18 +336,28 @@ def with_lens(network: Network, start: Start, rounds: int) -> tuple[Start, tuple
     observations, or photographs.
     """
     released: tuple[str, ...] = ('f',)
+    if all(camera.fixed for camera in network.cameras):
+        return start, released
     for free in LENS:
-        spread = spread_of(lengths_of(network, start))
-        if spread < UNEXPLAINED or all(camera.fixed for camera in network.cameras):
+        if not _unexplained(network, start):
             break
+        lengths = lengths_of(network, start)
+        known = ~np.isnan(lengths)
         try:
-            tried = refine(network, start, free, rounds=rounds)
+            tried = refine(network, replace(start, used=known), free, rounds=rounds)
         except (ValueError, np.linalg.LinAlgError):
             break
-        now = spread_of(lengths_of(network, tried))
-        if now < 0.9 * spread and now * focal_sigma(network, tried, free) < WEAK:
+        now = lengths_of(network, tried)
+        certain = spread_of(now) * focal_sigma(network, tried, free) < WEAK
+        if certain and _misfit(now[known]) < 0.9 * _misfit(lengths[known]):
             start, released = tried, free
     return start, released
+
+
+def _misfit(lengths: FloatArray) -> float:
+    """Return Cauchy's loss of residuals in standard deviations: what disagrees counts, too."""
+    known = lengths[~np.isnan(lengths)]
+    return float(np.sum(np.log1p((np.minimum(known, BEHIND) / BOUND) ** 2)))
 
 
 def focal_sigma(network: Network, start: Start, free: tuple[str, ...]) -> float:

@@ -7,10 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ahf_ros.orientation.camera import pinhole
+from ahf_ros.interchange.network_files import make_network
+from ahf_ros.interchange.observation_files import read_observations
+from ahf_ros.orientation.camera import PARAMETERS, pinhole
 from ahf_ros.orientation.network import CameraView, Network, Observations
 from ahf_ros.orientation.orient import once_a_photograph, orient
 from benchmarks.network_starts import Rendered, deviations, looking, photographed
+from support import ROOT
 
 pytest.importorskip('scipy', reason='the adjustment needs scipy')
 
@@ -42,10 +45,13 @@ def taken(
     depth: float = 0.3,
     number: int = 30,
     wrong: float = 0,
+    lens: dict[str, float] | None = None,
 ) -> Rendered:
     rotations, positions = ring(count, tilt)
     camera = CameraView('camera', 3000, 2000, focal)
     calibration = pinhole(FOCAL, 3000, 2000)[None]
+    for name, value in (lens or {}).items():
+        calibration[0, PARAMETERS.index(name)] += value
     random = np.random.default_rng(7)
     of = np.zeros(count, dtype=int)
     points = field(number, depth)
@@ -67,6 +73,35 @@ def test_nothing_but_ids_orients_a_network(depth: float, focal: float | None):
     assert np.isfinite(solution.start.positions).all()
     assert solution.start.calibrations[0, 0] == pytest.approx(FOCAL, rel=5e-3)
     assert 0.8 < solution.sigma0 < 1.2
+
+
+@pytest.mark.parametrize('k1', [-0.3, 0.1])
+def test_a_lens_with_distortion_that_nobody_gave(k1: float):
+    seen = taken(count=5, lens={'k1': k1, 'cx': 50.0, 'cy': -40.0})
+    (solution,) = orient(seen.network)
+    assert np.isfinite(solution.start.positions).all()
+    assert error(solution, seen.points) < 2e-3
+
+
+def test_half_of_the_photographs_of_the_panel():
+    """Its lens displaces image points by up to 40 px; true lengths are those of a scale bar."""
+    every = read_observations(ROOT / 'docs' / 'examples' / 'panel.csv')
+    network, _ = make_network(every[::2])
+    (solution,) = orient(network)
+    assert np.isfinite(solution.start.positions).all()
+    places = dict(zip(network.targets, solution.start.points, strict=True))
+    first, second = (np.linalg.norm(places[a] - places[b]) for a, b in (('5', '60'), ('22', '70')))
+    assert first / second == pytest.approx(608.8297 / 747.6563, rel=2e-4)
+
+
+def test_two_photographs_are_never_a_network():
+    """What is left of three photographs of which one contradicts the others is no network."""
+    network = taken(count=3, focal=FOCAL).network
+    mixed = network.observations.point.copy()
+    of_last = network.observations.photograph == 2
+    mixed[of_last] = np.random.default_rng(1).permutation(mixed[of_last])
+    with pytest.raises(ValueError, match='photographs'):
+        orient(replace(network, observations=replace(network.observations, point=mixed)))
 
 
 def test_wrong_ids_are_named():
