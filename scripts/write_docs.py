@@ -184,6 +184,7 @@ PAGES: dict[str, dict[str, Callable[[], str]]] = {
     'docs/figures.md': {'summary': summary, 'lights': lights, 'others': others},
     'docs/figures/disturbances.md': {
         **{name: partial(disturbed, name) for name in TABLES},
+        'look-alikes': partial(disturbed, 'look-alikes', 'disturbances_lookalikes'),
         'other families': partial(disturbed, 'disturbances', 'disturbances_families'),
         'square markers': partial(disturbed, 'disturbances', 'disturbances_square'),
         'traditional': partial(disturbed, 'disturbances', 'disturbances_traditional'),
