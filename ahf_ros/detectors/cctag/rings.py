@@ -34,9 +34,7 @@ _SIZES = 1.05  # ratio of radii that share templates, and of hypotheses of the r
 _TRIED_SHIFTS, _TRIED_BLURS = (-1.2, -0.6, 0.0, 0.6, 1.2), (-1.0, 0.0, 1.4)  # deviations
 _GROWN = (0.85, 0.9, 0.95, 1.0, 1.05)  # radii of the outermost circle, where that was found
 _NARROWEST = 0.5  # ring that is read, px; blur hides others
-_NARROWEST_IN_LIGHT = (
-    0.7  # ring, px, below which all but a small part of each ray must be explained
-)
+_NARROWEST_IN_LIGHT = 0.7  # ring, px, below which rays must be explained but for a small part
 _CLEAN = -5.4  # `left` of such rays
 _PROMISING = 0.6  # share of a profile that rings explain, from which they are looked at
 _LOOKED_AT = 4  # frames for an ID, at the most
@@ -60,10 +58,12 @@ _INDEPENDENT = 1.5  # distance of independent readings along a profile, px
 _SYSTEMATIC = 0.004  # standard deviation of what pixels and interpolation do to a centre, px
 _CLEAREST = 0.2  # share of rays
 _AGREEING = 0.5  # share of what a ray shows, that the rings explain
-_OF_TARGET = np.array([-15.5, -4.0, 1.2, -1.0])  # of one, `clear`, `plain`, `unusual`
+_OF_TARGET = np.array([-14.1, -1.5, 3.0, -1.0])  # of one, `clear`, `plain`, `unusual`
 _USUAL_EDGES = 0.13, 0.3  # deviations of growth, px, and of ln of the blur, of targets
-_PLAIN = -5.0, 3.0  # beyond which it says no more
-_HOPELESS = 5e-4  # probability of a target, up to which other IDs are not tried
+_PLAIN = -5.0, 5.0  # beyond which it says no more
+_BY_SIZE, _USUAL_SIZE = 2.5, 12.0  # what `plain` grows by ln of the radius, from its px
+_AS_CLEAR = -6.0  # as it gets, by anything that is round
+_HOPELESS = 1e-5  # probability of a target, up to which other IDs are not tried
 _OF_ID = np.array([-0.9, 2.2])  # of one, margin
 
 
@@ -129,7 +129,10 @@ class Aligned(ArrayRecord):
     @property
     def of_target(self) -> np.ndarray:
         """Probability that there is a target, shape (k,)."""
-        features = [self.clear, np.clip(self.plain, *_PLAIN), self.unusual]
+        size = frame.mean_radii(self.frames)
+        plain = self.plain - _BY_SIZE * np.log(size / _USUAL_SIZE)
+        clear = np.maximum(self.clear, _AS_CLEAR)
+        features = [clear, np.clip(plain, *_PLAIN), self.unusual]
         return logistic(np.stack(features, axis=1), _OF_TARGET)
 
     @property
@@ -241,7 +244,7 @@ def _templates(
     signed, inverse = np.unique((table * _signs(table)).round(6), return_inverse=True)
     radii, sign = np.abs(signed)[:, None], np.sign(signed)[:, None]
     most = _MOST_SHIFT * family.narrow * size
-    edges = [of for of in product(shifts, blurs) if abs(of[0]) <= most]
+    edges = list(product(dict.fromkeys(float(np.clip(of, -most, most)) for of in shifts), blurs))
     inks = []
     for shift, blur in edges:
         place = np.hypot(PROFILE, blur / size)
@@ -420,8 +423,8 @@ def _aligned(
     agreeing = (left < (1 - _AGREEING) * shown) & (
         np.sign(rays.step) == np.sign(np.median(rays.step, axis=1))[:, None]
     )
-    good = np.where(agreeing, 1.0, 1e-3)
     rest = np.log(np.maximum(left, 1e-6) / np.maximum(shown, 1e-6))
+    good = np.where(agreeing, np.exp(-rest), 1e-3)
     return Aligned(
         frames=frames,
         ids=ids,
@@ -461,8 +464,8 @@ def _usual_perspective(frames: np.ndarray) -> np.ndarray:
 def _plain(values: np.ndarray, good: np.ndarray, ink: np.ndarray, blur: np.ndarray) -> np.ndarray:
     """Return by how much better rings explain a profile than two edges of any height do, (k,).
 
-    It is the difference of ln of what is left of the mean of the good rays, shape (k, rays). The
-    blur is in radii.
+    It is the difference of ln of what is left of the weighted mean of rays, whose weights `good`
+    have the shape (k, rays). The blur is in radii.
     """
     weight = np.sqrt(PROFILE / PROFILE.sum())
     line, _ = np.linalg.qr(np.stack([weight, PROFILE * weight], axis=1))
