@@ -63,7 +63,8 @@ _USUAL_EDGES = 0.13, 0.3  # deviations of growth, px, and of ln of the blur, of 
 _PLAIN = -5.0, 5.0  # beyond which it says no more
 _BY_SIZE, _USUAL_SIZE = 2.5, 12.0  # what `plain` grows by ln of the radius, from its px
 _AS_CLEAR = -6.0  # as it gets, by anything that is round
-_HOPELESS = 1e-5  # probability of a target, up to which other IDs are not tried
+_HOPELESS = 1e-6, 1e-4  # probabilities of a target, up to which one ID and few IDs are enough
+_FEW_READINGS = 2  # IDs that are brought onto the image before the others
 _OF_ID = np.array([-0.9, 2.2])  # of one, margin
 
 
@@ -273,16 +274,22 @@ def identify(
     starts, ids, shift = _likely_ids(gray, frames, polarity, family, prior)
     # The likeliest ID often brings the frame to its place even if it is the wrong one.
     first = align(gray, starts[:, 0], ids[:, 0], shift[:, 0], family, prior)
-    likely = first.of_target > _HOPELESS
-    if not likely.any():
-        return NOTHING
+    likely = first.of_target > _HOPELESS[0]
     again = _likely_ids(gray, first.frames[likely], polarity, family, prior)
     starts, ids, shift = (
-        np.concatenate([of[likely], more], axis=1)
+        np.concatenate([more, of[likely]], axis=1)
         for of, more in zip((starts, ids, shift), again, strict=True)
     )
-    count = ids.shape[1]
-    every = align(gray, starts.reshape(-1, 3, 3), ids.ravel(), shift.ravel(), family, prior)
+    few = _tried(gray, starts, ids, shift, slice(_FEW_READINGS), family, prior)
+    possible = few.of_target.reshape(-1, _FEW_READINGS).max(axis=1, initial=0) > _HOPELESS[1]
+    if not possible.any():
+        return NOTHING
+    starts, ids, shift = (of[possible] for of in (starts, ids, shift))
+    more = _tried(gray, starts, ids, shift, slice(_FEW_READINGS, None), family, prior)
+    every = Aligned.joined([few.select(np.repeat(possible, _FEW_READINGS)), more])
+    count, rows = ids.shape[1], np.arange(len(ids))
+    of_row = [np.repeat(rows, of) for of in (_FEW_READINGS, count - _FEW_READINGS)]
+    every = every.select(np.argsort(np.concatenate(of_row), kind='stable'))
     independent = frame.mean_radii(starts[:, 0]) * np.ptp(PROFILE) / _INDEPENDENT
     left = np.where(every.colour == polarity, every.left, 0.0).reshape(-1, count)
     cost = (independent[:, None] * left + prior.squares(every).reshape(-1, count)) / 2
@@ -292,6 +299,20 @@ def identify(
     best = replace(best, margin=others - cost.min(axis=1))
     hidden = family.narrow * frame.mean_radii(best.frames) < _NARROWEST_IN_LIGHT
     return best.select((best.colour == polarity) & ~(hidden & (best.left > _CLEAN)))
+
+
+def _tried(
+    gray: np.ndarray,
+    starts: np.ndarray,
+    ids: np.ndarray,
+    shift: np.ndarray,
+    columns: slice,
+    family: CircleFamily,
+    prior: Prior,
+) -> Aligned:
+    """Return some of the hypotheses of k targets, (k, n), brought onto the image one by one."""
+    starts, ids, shift = (of[:, columns] for of in (starts, ids, shift))
+    return align(gray, starts.reshape(-1, 3, 3), ids.ravel(), shift.ravel(), family, prior)
 
 
 def _settled(gray: np.ndarray, rings: Aligned, family: CircleFamily, prior: Prior) -> Aligned:
