@@ -10,6 +10,7 @@ import pytest
 from ahf_ros.codes import CCTAG_NAMES
 from ahf_ros.detectors import create_detector
 from ahf_ros.synthetic.scene import Rendering
+from benchmarks.textures import lookalikes
 from support.scenes import counted, rendering
 
 SIZE = {'width': 560, 'height': 420, 'targets': 6, 'dot_radius': 14.0, 'seed': 2}
@@ -77,6 +78,18 @@ def test_targets_of_other_families_are_none(family: str, light: str) -> None:
         family, width=420, height=320, dot_radius=8.0, targets=2, light=light, ambient=0.3
     )
     assert create_detector(family='cctag3,cctag4')(shown.image) == []
+
+
+@pytest.mark.parametrize('seed', [312, 320])
+def test_rings_in_rings_are_none(seed: int) -> None:
+    assert create_detector(family='cctag3,cctag4')(lookalikes(seed)) == []
+
+
+def test_targets_are_read_where_ink_has_grown_by_much_of_a_ring() -> None:
+    shown = scene(edge_shift=0.5, dot_radius=12.0)
+    right, wrong, false = counted(shown, create_detector(family='cctag3')(shown.image))
+    assert right >= 4
+    assert (wrong, false) == (0, 0)
 
 
 def test_both_families_are_read_in_one_search() -> None:

@@ -34,9 +34,7 @@ _SIZES = 1.05  # ratio of radii that share templates, and of hypotheses of the r
 _TRIED_SHIFTS, _TRIED_BLURS = (-1.2, -0.6, 0.0, 0.6, 1.2), (-1.0, 0.0, 1.4)  # deviations
 _GROWN = (0.85, 0.9, 0.95, 1.0, 1.05)  # radii of the outermost circle, where that was found
 _NARROWEST = 0.5  # ring that is read, px; blur hides others
-_NARROWEST_IN_LIGHT = (
-    0.7  # ring, px, below which all but a small part of each ray must be explained
-)
+_NARROWEST_IN_LIGHT = 0.7  # ring, px, below which rays must be explained but for a small part
 _CLEAN = -5.4  # `left` of such rays
 _PROMISING = 0.6  # share of a profile that rings explain, from which they are looked at
 _LOOKED_AT = 4  # frames for an ID, at the most
@@ -60,10 +58,13 @@ _INDEPENDENT = 1.5  # distance of independent readings along a profile, px
 _SYSTEMATIC = 0.004  # standard deviation of what pixels and interpolation do to a centre, px
 _CLEAREST = 0.2  # share of rays
 _AGREEING = 0.5  # share of what a ray shows, that the rings explain
-_OF_TARGET = np.array([-15.5, -4.0, 1.2, -1.0])  # of one, `clear`, `plain`, `unusual`
+_OF_TARGET = np.array([-14.1, -1.5, 3.0, -1.0])  # of one, `clear`, `plain`, `unusual`
 _USUAL_EDGES = 0.13, 0.3  # deviations of growth, px, and of ln of the blur, of targets
-_PLAIN = -5.0, 3.0  # beyond which it says no more
-_HOPELESS = 5e-4  # probability of a target, up to which other IDs are not tried
+_PLAIN = -5.0, 5.0  # beyond which it says no more
+_BY_SIZE, _USUAL_SIZE = 2.5, 12.0  # what `plain` grows by ln of the radius, from its px
+_AS_CLEAR = -6.0  # as it gets, by anything that is round
+_HOPELESS = 1e-6, 1e-4  # probabilities of a target, up to which one ID and few IDs are enough
+_FEW_READINGS = 2  # IDs that are brought onto the image before the others
 _OF_ID = np.array([-0.9, 2.2])  # of one, margin
 
 
@@ -129,7 +130,10 @@ class Aligned(ArrayRecord):
     @property
     def of_target(self) -> np.ndarray:
         """Probability that there is a target, shape (k,)."""
-        features = [self.clear, np.clip(self.plain, *_PLAIN), self.unusual]
+        size = frame.mean_radii(self.frames)
+        plain = self.plain - _BY_SIZE * np.log(size / _USUAL_SIZE)
+        clear = np.maximum(self.clear, _AS_CLEAR)
+        features = [clear, np.clip(plain, *_PLAIN), self.unusual]
         return logistic(np.stack(features, axis=1), _OF_TARGET)
 
     @property
@@ -241,7 +245,7 @@ def _templates(
     signed, inverse = np.unique((table * _signs(table)).round(6), return_inverse=True)
     radii, sign = np.abs(signed)[:, None], np.sign(signed)[:, None]
     most = _MOST_SHIFT * family.narrow * size
-    edges = [of for of in product(shifts, blurs) if abs(of[0]) <= most]
+    edges = list(product(dict.fromkeys(float(np.clip(of, -most, most)) for of in shifts), blurs))
     inks = []
     for shift, blur in edges:
         place = np.hypot(PROFILE, blur / size)
@@ -270,16 +274,22 @@ def identify(
     starts, ids, shift = _likely_ids(gray, frames, polarity, family, prior)
     # The likeliest ID often brings the frame to its place even if it is the wrong one.
     first = align(gray, starts[:, 0], ids[:, 0], shift[:, 0], family, prior)
-    likely = first.of_target > _HOPELESS
-    if not likely.any():
-        return NOTHING
+    likely = first.of_target > _HOPELESS[0]
     again = _likely_ids(gray, first.frames[likely], polarity, family, prior)
     starts, ids, shift = (
-        np.concatenate([of[likely], more], axis=1)
+        np.concatenate([more, of[likely]], axis=1)
         for of, more in zip((starts, ids, shift), again, strict=True)
     )
-    count = ids.shape[1]
-    every = align(gray, starts.reshape(-1, 3, 3), ids.ravel(), shift.ravel(), family, prior)
+    few = _tried(gray, starts, ids, shift, slice(_FEW_READINGS), family, prior)
+    possible = few.of_target.reshape(-1, _FEW_READINGS).max(axis=1, initial=0) > _HOPELESS[1]
+    if not possible.any():
+        return NOTHING
+    starts, ids, shift = (of[possible] for of in (starts, ids, shift))
+    more = _tried(gray, starts, ids, shift, slice(_FEW_READINGS, None), family, prior)
+    every = Aligned.joined([few.select(np.repeat(possible, _FEW_READINGS)), more])
+    count, rows = ids.shape[1], np.arange(len(ids))
+    of_row = [np.repeat(rows, of) for of in (_FEW_READINGS, count - _FEW_READINGS)]
+    every = every.select(np.argsort(np.concatenate(of_row), kind='stable'))
     independent = frame.mean_radii(starts[:, 0]) * np.ptp(PROFILE) / _INDEPENDENT
     left = np.where(every.colour == polarity, every.left, 0.0).reshape(-1, count)
     cost = (independent[:, None] * left + prior.squares(every).reshape(-1, count)) / 2
@@ -289,6 +299,20 @@ def identify(
     best = replace(best, margin=others - cost.min(axis=1))
     hidden = family.narrow * frame.mean_radii(best.frames) < _NARROWEST_IN_LIGHT
     return best.select((best.colour == polarity) & ~(hidden & (best.left > _CLEAN)))
+
+
+def _tried(
+    gray: np.ndarray,
+    starts: np.ndarray,
+    ids: np.ndarray,
+    shift: np.ndarray,
+    columns: slice,
+    family: CircleFamily,
+    prior: Prior,
+) -> Aligned:
+    """Return some of the hypotheses of k targets, (k, n), brought onto the image one by one."""
+    starts, ids, shift = (of[:, columns] for of in (starts, ids, shift))
+    return align(gray, starts.reshape(-1, 3, 3), ids.ravel(), shift.ravel(), family, prior)
 
 
 def _settled(gray: np.ndarray, rings: Aligned, family: CircleFamily, prior: Prior) -> Aligned:
@@ -420,8 +444,8 @@ def _aligned(
     agreeing = (left < (1 - _AGREEING) * shown) & (
         np.sign(rays.step) == np.sign(np.median(rays.step, axis=1))[:, None]
     )
-    good = np.where(agreeing, 1.0, 1e-3)
     rest = np.log(np.maximum(left, 1e-6) / np.maximum(shown, 1e-6))
+    good = np.where(agreeing, np.exp(-rest), 1e-3)
     return Aligned(
         frames=frames,
         ids=ids,
@@ -461,8 +485,8 @@ def _usual_perspective(frames: np.ndarray) -> np.ndarray:
 def _plain(values: np.ndarray, good: np.ndarray, ink: np.ndarray, blur: np.ndarray) -> np.ndarray:
     """Return by how much better rings explain a profile than two edges of any height do, (k,).
 
-    It is the difference of ln of what is left of the mean of the good rays, shape (k, rays). The
-    blur is in radii.
+    It is the difference of ln of what is left of the weighted mean of rays, whose weights `good`
+    have the shape (k, rays). The blur is in radii.
     """
     weight = np.sqrt(PROFILE / PROFILE.sum())
     line, _ = np.linalg.qr(np.stack([weight, PROFILE * weight], axis=1))
