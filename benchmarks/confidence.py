@@ -20,7 +20,6 @@ from ahf_ros.codes.ring import canonical, family
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.ring.confidence import WEIGHTS, confidence, features
 from ahf_ros.detectors.ring.detector import find_hypotheses
-from ahf_ros.features.pyramid import image_pyramid
 from ahf_ros.imaging.image import as_gray
 from benchmarks.conditions import COMMON, scenes
 from benchmarks.reliability import NEAR, Parts, gathered, reliability_table, run
@@ -45,9 +44,7 @@ def readings(seed: int) -> Parts:
     """Yield condition, features and rightness of all plausible readings of each scene."""
     for scene in scenes(seed):
         code = family(scene.family)
-        settings = DetectorSettings(family=code.name)
-        pyramid = image_pyramid(as_gray(scene.image), settings.max_radius)
-        read = find_hypotheses(pyramid, settings)
+        read = find_hypotheses(as_gray(scene.image), DetectorSettings(family=code.name))
         read = read.select(read.words > 0)
         _, ids = canonical(read.words, code)
         true = [(target.x, target.y, target.id) for target in scene.truth]

@@ -219,8 +219,7 @@ def light() -> Figure:
 
 def _certain(image: np.ndarray, x: float) -> Hypotheses:
     """Return what the target was read as that is nearest to a column of the image."""
-    settings = DetectorSettings()
-    found = find_hypotheses(image_pyramid(image, settings.max_radius), settings)
+    found = find_hypotheses(image, DetectorSettings())
     found = found.select(found.certain)
     return found.select(np.argmin(np.abs(found.frames[:, 0, 2] - x), keepdims=True))
 

@@ -18,7 +18,6 @@ from ahf_ros.detectors.ring.decoding import CLEAR
 from ahf_ros.detectors.ring.detector import find_hypotheses
 from ahf_ros.detectors.ring.hypotheses import on_targets
 from ahf_ros.features import frame
-from ahf_ros.features.pyramid import image_pyramid
 from ahf_ros.imaging.image import as_gray, check_image
 
 _OF_WORDS = 0.5  # of what speaks against a word, which counts against a target
@@ -46,7 +45,7 @@ def estimate_count(image: np.ndarray, settings: DetectorSettings | None = None) 
     """
     settings = settings or DetectorSettings()
     check_image(image)
-    read = find_hypotheses(image_pyramid(as_gray(image), settings.max_radius), settings)
+    read = find_hypotheses(as_gray(image), settings)
     major, _, _ = frame.ellipse_axes(read.frames)
     minimum, maximum = settings.radii
     # Which of several words it is does not matter here.

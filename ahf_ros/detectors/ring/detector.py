@@ -82,7 +82,7 @@ class RingDetector:
     @one_blas_thread()
     def search(self, pyramid: ImagePyramid) -> list[Target]:
         """Identify the targets of one image; see `Searching`."""
-        return report(find_hypotheses(pyramid, self.settings, self.expected), self.settings)
+        return report(hypotheses_in(pyramid, self.settings, self.expected), self.settings)
 
     @one_blas_thread()
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
@@ -96,17 +96,23 @@ class RingDetector:
 
 
 def find_hypotheses(
-    pyramid: ImagePyramid, settings: DetectorSettings, expected: frozenset[int] = frozenset()
+    gray: np.ndarray, settings: DetectorSettings, expected: frozenset[int] = frozenset()
 ) -> Hypotheses:
     """Return all dots of an image and the words that their bands may show, before any decision.
 
     Parts of faint contrast are stretched and read as images of their own. Of what they show, only
-    certain words that the image itself does not show are added.
+    certain words that the image itself does not show are added. `gray` may be uint8 as well.
     """
-    found = read_image(pyramid, settings, expected)
+    return hypotheses_in(image_pyramid(gray, settings.max_radius), settings, expected)
+
+
+def hypotheses_in(
+    pyramid: ImagePyramid, settings: DetectorSettings, expected: frozenset[int]
+) -> Hypotheses:
+    """Return the same of the pyramid of an image."""
+    found = read_pyramid(pyramid, settings, expected, PROPOSALS)
     for part in faint_parts(pyramid.gray):
-        stretched = image_pyramid(part.gray, settings.max_radius)
-        seen = read_image(stretched, settings, expected, (propose_whole,))
+        seen = read_image(part.gray, settings, expected, (propose_whole,))
         seen = seen.select(seen.certain)
         seen = replace(seen, frames=frame.translated(seen.frames, part.x, part.y))
         new = ~seen.on_dots(found.select(found.certain))
@@ -115,7 +121,7 @@ def find_hypotheses(
 
 
 def read_image(
-    pyramid: ImagePyramid,
+    gray: np.ndarray,
     settings: DetectorSettings,
     expected: frozenset[int] = frozenset(),
     proposals: Sequence[Proposal] = PROPOSALS,
@@ -125,6 +131,16 @@ def read_image(
     Dots are proposed in several ways, one after the other. What is read of the dots of one
     explains edges, which the next ones need not look at.
     """
+    return read_pyramid(image_pyramid(gray, settings.max_radius), settings, expected, proposals)
+
+
+def read_pyramid(
+    pyramid: ImagePyramid,
+    settings: DetectorSettings,
+    expected: frozenset[int],
+    proposals: Sequence[Proposal],
+) -> Hypotheses:
+    """Return the same of the pyramid of an image."""
     described: Sequence[Family] = settings.codes(Family)
     families = described
     shown = list(families) if len(families) == 1 else []
