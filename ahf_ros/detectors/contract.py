@@ -22,6 +22,8 @@ from ahf_ros.target import Target
 if TYPE_CHECKING:
     import numpy as np
 
+    from ahf_ros.features.pyramid import ImagePyramid
+
 _MINIMUM_RADIUS = 4.0  # of a dot, px, where the user sets none
 _MINIMUM_RADII = {'gsi': 2.0, 'dots': 2.5}  # of kinds whose dot is small beside the target
 
@@ -138,6 +140,15 @@ class Expecting(Protocol):
         ids : frozenset of int
             Others are reported where nothing speaks for one of these.
         """
+        ...
+
+
+@runtime_checkable
+class Searching(Protocol):
+    """A detector that begins with the pyramid of an image, which detectors of one image share."""
+
+    def search(self, pyramid: ImagePyramid) -> list[Target]:
+        """Identify the targets of one image, as a call does."""
         ...
 
 

@@ -22,7 +22,11 @@ from ahf_ros.detectors.contract import (
     EarlyStopping,
     Expecting,
     Refiner,
+    Searching,
 )
+from ahf_ros.features.common_search import CommonSearch
+from ahf_ros.features.pyramid import image_pyramid
+from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, DottedTarget, Target, sorted_targets
 
 _DIGITS = 2  # of a confidence, beyond which one is not surer than another
@@ -59,13 +63,15 @@ class SeveralDetector:
 
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image; see `Detector`."""
-        return self._merged([detector(image) for detector in self.parts])
+        return self._merged(self._found(image, lambda it: it(image)))
 
     def draft(self, image: np.ndarray) -> list[Target]:
         """Identify targets as a call does, with rough centres where a detector is faster so."""
-        return self._merged(
-            [it.draft(image) if isinstance(it, Drafter) else it(image) for it in self.parts]
-        )
+
+        def drafted(it: Detector) -> list[Target]:
+            return it.draft(image) if isinstance(it, Drafter) else it(image)
+
+        return self._merged(self._found(image, drafted))
 
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
         """Return targets with the centres that the detectors of their families find."""
@@ -86,6 +92,21 @@ class SeveralDetector:
     def narrowed(self, families: Sequence[str]) -> Detector:
         """Return the detector of some of the families; see `Narrowing`."""
         return self.narrow(families)
+
+    def _found(
+        self, image: np.ndarray, alone: Callable[[Detector], list[Target]]
+    ) -> list[list[Target]]:
+        """Return the targets of each detector; those that search for dots do so together."""
+        check_image(image)
+        if sum(isinstance(it, Searching) for it in self.parts) < 2:
+            return [alone(it) for it in self.parts]
+        pyramid = replace(
+            image_pyramid(as_gray(image), self.settings.max_radius),
+            common=CommonSearch(self.settings.radii[0], self.settings.polarities),
+        )
+        return [
+            it.search(pyramid) if isinstance(it, Searching) else alone(it) for it in self.parts
+        ]
 
     def _merged(self, results: Sequence[Sequence[Target]]) -> list[Target]:
         """Return the targets of all detectors that own their places."""

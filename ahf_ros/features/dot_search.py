@@ -16,6 +16,7 @@ import numpy as np
 
 from ahf_ros.features import frame
 from ahf_ros.features.candidates import find_candidates
+from ahf_ros.features.common_search import VOTES, dots_in_common
 from ahf_ros.features.dots import NO_DOTS, Dots, best, distinct
 from ahf_ros.features.ellipses import fit_ellipses, resized
 from ahf_ros.features.log_edges import LogEdges
@@ -65,8 +66,15 @@ def voted_dots(
     the bounds of the radius, px of the image, may be among them. Edges within outlines that are
     explained already, each of shape (m, 2), do not vote.
     """
-    candidates = find_candidates(pyramid.edges, min_radius, max_radius, polarities, explained)
-    return distinct(fit_ellipses(pyramid.logs, candidates))
+
+    def search(
+        low: float, high: float, colours: Sequence[int], explained: Sequence[np.ndarray]
+    ) -> Dots:
+        candidates = find_candidates(pyramid.edges, low, high, colours, explained)
+        return distinct(fit_ellipses(pyramid.logs, candidates))
+
+    kind = min_radius, max_radius, polarities
+    return dots_in_common(pyramid.common, VOTES, search, *kind, explained)
 
 
 def whole_outlines(edges: LogEdges, min_radius: float, max_radius: float) -> Dots:

@@ -12,6 +12,7 @@ from math import ceil, log2
 import cv2
 import numpy as np
 
+from ahf_ros.features.common_search import CommonSearch
 from ahf_ros.features.log_edges import LOG_SCALE, LogEdges, find_edges
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
@@ -31,6 +32,7 @@ class ImagePyramid:
     halves: tuple[np.ndarray, ...]  # gray values, uint8 or float32, from the first half on
     logs: tuple[np.ndarray, ...]  # `log_image` of each level, the image as received first
     edges: tuple[LogEdges, ...]  # from the first half on: `edges[i]` belongs to `logs[i + 1]`
+    common: CommonSearch | None = None  # of the detectors that share it, in the first octave
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +73,13 @@ def octaves(pyramid: ImagePyramid, min_radius: float, max_radius: float) -> Iter
         if low <= high:
             gray, *halves = (pyramid.gray, *pyramid.halves)[level:]
             gray = gray.astype(np.float32, copy=False)
-            half = ImagePyramid(gray, tuple(halves), pyramid.logs[level:], pyramid.edges[level:])
+            half = ImagePyramid(
+                gray,
+                tuple(halves),
+                pyramid.logs[level:],
+                pyramid.edges[level:],
+                None if level else pyramid.common,
+            )
             yield Octave(level, half, (low, high))
 
 

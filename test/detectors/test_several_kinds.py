@@ -55,6 +55,20 @@ def assert_true(targets: list[Target] | tuple[Target, ...], *families: str) -> N
     assert np.allclose([it[2:] for it in found], [it[2:] for it in expected], atol=0.2)
 
 
+@pytest.mark.parametrize('light', ['normal', 'stripe'])
+def test_kinds_that_share_a_search_of_dots_are_all_found(light: str) -> None:
+    families = ('metashape12', 'gsi', 'dots')
+    size = replace(SMALL, width=640, height=480, dot_radius=5, light=light)
+    shown = [rendered(replace(size, family=name)) for name in families]
+    image = np.hstack([it.image for it in shown])
+    found = create_detector(family=','.join(families))(image)
+    alone = [target for name in families for target in create_detector(family=name)(image)]
+    assert len(alone) == 9
+    assert sorted((it.family, it.id) for it in found) == sorted((it.family, it.id) for it in alone)
+    places = {target.key: (target.x, target.y) for target in alone}
+    assert np.allclose([places[it.key] for it in found], [(it.x, it.y) for it in found], atol=0.05)
+
+
 def without_time(found: Identification) -> Identification:
     return replace(found, filter=replace(found.filter, duration=0.0))
 

@@ -77,6 +77,14 @@ def test_several_dictionaries_are_read_in_one_search():
     assert create_detector(family='aruco_4x4_50,apriltag_36h11').name == 'square'
 
 
+def test_markers_show_their_dictionary_together():
+    """ID 17 has so few edges between cells that alone it may be of no dictionary of many."""
+    shown = scene(targets=12, dot_radius=12.0, seed=5)
+    found = create_detector(family=','.join(SQUARE_NAMES))(shown.image)
+    assert 17 in {target.id for target in found}
+    assert counted(shown, found) == (12, 0, 0)
+
+
 def test_hardly_any_texture_is_a_marker():
     detect = create_detector(family=','.join(SQUARE_NAMES))
     assert sum(len(detect(textured_image(seed))) for seed in range(101, 115)) == 0

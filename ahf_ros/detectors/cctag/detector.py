@@ -57,12 +57,17 @@ class CctagDetector(FamilyDetector):
         """Printed designs of the families."""
         return self.settings.codes(CircleFamily)
 
-    @one_blas_thread()
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image; see `Detector`."""
         check_image(image)
-        pyramid = _doubled(image_pyramid(as_gray(image), self.settings.max_radius))
-        found = targets_of_octaves(pyramid, self.settings.radii, self._identify, self.refine)
+        return self.search(image_pyramid(as_gray(image), self.settings.max_radius))
+
+    @one_blas_thread()
+    def search(self, pyramid: ImagePyramid) -> list[Target]:
+        """Identify the targets of one image; see `Searching`."""
+        found = targets_of_octaves(
+            _doubled(pyramid), self.settings.radii, self._identify, self.refine
+        )
         return sorted_targets(best_targets(found, 1.0))
 
     @one_blas_thread()
@@ -209,4 +214,4 @@ def _doubled(pyramid: ImagePyramid) -> ImagePyramid:
     """Return a pyramid with twice the contrast of ln I."""
     logs = tuple(_GAIN * log for log in pyramid.logs)
     edges = tuple(find_edges(log) for log in logs[1:])
-    return replace(pyramid, logs=logs, edges=edges)
+    return replace(pyramid, logs=logs, edges=edges, common=None)

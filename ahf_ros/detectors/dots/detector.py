@@ -41,14 +41,16 @@ class DotsDetector(FamilyDetector):
         """Printed design of the family."""
         return self.settings.codes(DotFamily)[0]
 
-    @one_blas_thread()
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image; see `Detector`."""
         check_image(image)
-        code = self.design
-        pyramid = image_pyramid(as_gray(image), self.settings.max_radius)
+        return self.search(image_pyramid(as_gray(image), self.settings.max_radius))
+
+    @one_blas_thread()
+    def search(self, pyramid: ImagePyramid) -> list[Target]:
+        """Identify the targets of one image; see `Searching`."""
         found = targets_of_octaves(pyramid, self.settings.radii, self._identify, self.refine)
-        return sorted_targets(best_targets(found, code.border_radius))
+        return sorted_targets(best_targets(found, self.design.border_radius))
 
     @one_blas_thread()
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:

@@ -16,6 +16,7 @@ import numpy as np
 
 from ahf_ros.codes.dots import DotFamily
 from ahf_ros.detectors.contract import DetectorSettings
+from ahf_ros.features.common_search import BLOBS, dots_in_common
 from ahf_ros.features.dot_search import voted_dots, whole_dots
 from ahf_ros.features.dots import NO_DOTS, Dots, distinct
 from ahf_ros.features.frame import circle_outlines, circle_points, ellipse_axes, enlarged, scaled
@@ -126,11 +127,20 @@ def _blobs(
         if smallest > largest:
             continue
         rows, columns = (slice(2 * it.start // scale, 2 * it.stop // scale) for it in region)
-        log = np.ascontiguousarray(pyramid.logs[level][rows, columns])
-        blobs = small_dots(log, smallest, largest, settings.polarities, LOG_SCALE)
-        frames = blobs.frames.copy()
-        frames[:, :2, 2] += (columns.start, rows.start)
-        found.append(replace(blobs, frames=enlarged(frames, level)))
+        kind = smallest, largest, settings.polarities
+        common = None if level else pyramid.common
+        if common and BLOBS in common.found:  # in the whole image
+            blobs = dots_in_common(common, BLOBS, small_dots, *kind)
+            x, y = blobs.frames[:, :2, 2].T
+            within = (x >= columns.start) & (x < columns.stop)
+            within &= (y >= rows.start) & (y < rows.stop)
+            found.append(blobs.select(within))
+        else:
+            log = np.ascontiguousarray(pyramid.logs[level][rows, columns])
+            blobs = small_dots(log, *kind, LOG_SCALE)
+            frames = blobs.frames.copy()
+            frames[:, :2, 2] += (columns.start, rows.start)
+            found.append(replace(blobs, frames=enlarged(frames, level)))
     return found
 
 

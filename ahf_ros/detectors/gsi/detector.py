@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, ClassVar
 
 import cv2
@@ -39,6 +40,7 @@ from ahf_ros.detectors.gsi.refinement import (
     resized,
 )
 from ahf_ros.features import frame
+from ahf_ros.features.common_search import BLOBS, dots_in_common
 from ahf_ros.features.dot_search import voted_dots, whole_dots
 from ahf_ros.features.dots import Dots, distinct
 from ahf_ros.features.ellipse_targets import ellipse_fields, targets_from_frames
@@ -70,11 +72,14 @@ class GsiDetector(FamilyDetector):
         """Printed design of the family."""
         return self.settings.codes(PointFamily)[0]
 
-    @one_blas_thread()
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image; see `Detector`."""
         check_image(image)
-        pyramid = image_pyramid(as_gray(image), self.settings.max_radius)
+        return self.search(image_pyramid(as_gray(image), self.settings.max_radius))
+
+    @one_blas_thread()
+    def search(self, pyramid: ImagePyramid) -> list[Target]:
+        """Identify the targets of one image; see `Searching`."""
         found = targets_of_octaves(pyramid, self.settings.radii, self._identify, self.refine)
         single = [target for target in found if target.id == UNDECODED]
         decoded = [target for target in found if target.id != UNDECODED]
@@ -149,8 +154,9 @@ def _with_others(
     found = [whole, voted_dots(pyramid, minimum, maximum, settings.polarities, explained=known)]
     if minimum < _SMALL:
         radii = _SMALLER * minimum, min(maximum, _SMALL)
-        blobs = small_dots(pyramid.logs[0], *radii, settings.polarities, LOG_SCALE, explained)
-        found.append(blobs)
+        search = partial(small_dots, pyramid.logs[0], log_scale=LOG_SCALE)
+        kind = (*radii, settings.polarities, explained)
+        found.append(dots_in_common(pyramid.common, BLOBS, search, *kind))
     return distinct(Dots.joined(found))
 
 

@@ -37,7 +37,7 @@ from ahf_ros.detectors.ring.refinement import refine_centres
 from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import NO_FITS, Fit
 from ahf_ros.features.ellipse_targets import targets_from_frames
-from ahf_ros.features.pyramid import Octave, image_pyramid, octaves
+from ahf_ros.features.pyramid import ImagePyramid, Octave, image_pyramid, octaves
 from ahf_ros.imaging.faint import faint_parts
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, Target, UndecodedTarget, sorted_targets
@@ -74,11 +74,15 @@ class RingDetector:
         """Family of the codes, or several as the settings list them."""
         return self.settings.family
 
-    @one_blas_thread()
     def __call__(self, image: np.ndarray) -> list[Target]:
         """Identify the targets of one image; see `Detector`."""
         check_image(image)
-        return report(find_hypotheses(as_gray(image), self.settings, self.expected), self.settings)
+        return self.search(image_pyramid(as_gray(image), self.settings.max_radius))
+
+    @one_blas_thread()
+    def search(self, pyramid: ImagePyramid) -> list[Target]:
+        """Identify the targets of one image; see `Searching`."""
+        return report(hypotheses_in(pyramid, self.settings, self.expected), self.settings)
 
     @one_blas_thread()
     def refine(self, image: np.ndarray, targets: Sequence[Target]) -> list[Target]:
@@ -99,8 +103,15 @@ def find_hypotheses(
     Parts of faint contrast are stretched and read as images of their own. Of what they show, only
     certain words that the image itself does not show are added. `gray` may be uint8 as well.
     """
-    found = read_image(gray, settings, expected)
-    for part in faint_parts(gray):
+    return hypotheses_in(image_pyramid(gray, settings.max_radius), settings, expected)
+
+
+def hypotheses_in(
+    pyramid: ImagePyramid, settings: DetectorSettings, expected: frozenset[int]
+) -> Hypotheses:
+    """Return the same of the pyramid of an image."""
+    found = read_pyramid(pyramid, settings, expected, PROPOSALS)
+    for part in faint_parts(pyramid.gray):
         seen = read_image(part.gray, settings, expected, (propose_whole,))
         seen = seen.select(seen.certain)
         seen = replace(seen, frames=frame.translated(seen.frames, part.x, part.y))
@@ -120,10 +131,19 @@ def read_image(
     Dots are proposed in several ways, one after the other. What is read of the dots of one
     explains edges, which the next ones need not look at.
     """
+    return read_pyramid(image_pyramid(gray, settings.max_radius), settings, expected, proposals)
+
+
+def read_pyramid(
+    pyramid: ImagePyramid,
+    settings: DetectorSettings,
+    expected: frozenset[int],
+    proposals: Sequence[Proposal],
+) -> Hypotheses:
+    """Return the same of the pyramid of an image."""
     described: Sequence[Family] = settings.codes(Family)
     families = described
     shown = list(families) if len(families) == 1 else []
-    pyramid = image_pyramid(gray, settings.max_radius)
     images = (pyramid.gray, *pyramid.halves)
     found = [Hypotheses.unread(NO_FITS, families[0])]
     explained = Explained.by(found[0])

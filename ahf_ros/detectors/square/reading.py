@@ -41,6 +41,7 @@ _CORNER_WEIGHT = 0.7
 _DOUBT = 6.0  # logarithmic odds against a marker that nothing but a quadrilateral speaks for
 _PLAIN = 0.35  # logarithmic odds against a marker, for each edge less than random cells have
 _SEVERAL = 3.5  # times the logarithm of their number, against each of several groups
+_SHOWN = 6.9  # logarithmic odds on a group, 1000 to 1, from which its markers are not doubted
 _MINIMUM_ODDS = 2.2  # for a marker to be reported: nine to one
 
 
@@ -61,7 +62,7 @@ def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]])
     A group has dictionaries that begin with the same markers, the smallest first.
     """
     found = [np.zeros((0, 5))]
-    doubt = _DOUBT + _SEVERAL * log(len(groups))
+    doubt = _SEVERAL * log(len(groups))
     frames = _frames(corners)
     sizes = {words(group[0]).shape[1] for group in groups}
     bordered = _bordered(gray, frames)
@@ -74,7 +75,7 @@ def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]])
             prints, prior, plain = _table(tuple(group))
             odds = evidence @ prints - prior
             best = odds.argmax(axis=1)
-            total = odds[np.arange(len(best)), best] + against - doubt - plain[best]
+            total = odds[np.arange(len(best)), best] + against - _DOUBT - plain[best]
             likely = np.flatnonzero(total > _MINIMUM_ODDS)
             odds, best, total = odds[likely], best[likely], total[likely]
             # Against another marker of the group, and against none of them. A turn of the same
@@ -85,7 +86,11 @@ def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]])
             odds[rows, 4 * number[:, None] + np.arange(4)] = -np.inf
             second = odds.max(axis=1, initial=-np.inf)
             others = second + np.log(np.exp(odds - second[:, None]).sum(axis=1))
-            total = -np.logaddexp(-total, others)
+            # Different markers together show a group that each of them leaves in doubt.
+            of_group = np.zeros(prints.shape[1] // 4)
+            np.maximum.at(of_group, number, -np.logaddexp(doubt - total, others))
+            shown = of_group.sum() >= _SHOWN
+            total = -np.logaddexp((0 if shown else doubt) - total, others)
             good = total > _MINIMUM_ODDS
             columns = (bordered[which[likely]], np.full(len(best), index), number, turn, total)
             found.append(np.stack(columns, axis=1)[good])
