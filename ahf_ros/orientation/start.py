@@ -41,7 +41,7 @@ FEWEST_PHOTOGRAPHS = 3
 """What two photographs say is checked by nothing."""
 
 ONE_MINIMUM = np.radians(0.5)
-"""Networks whose photographs are turned against each other by less are the same."""
+"""Networks most of whose photographs are turned against each other by less are the same."""
 
 
 def starts(network: Network) -> list[Start]:
@@ -82,7 +82,8 @@ def reversal(network: Network, start: Start) -> tuple[Start, float]:
         each.rotations[group[1:]] @ each.rotations[group[0]].T for each in (start, other)
     )
     cosines = (np.einsum('kij,kij->k', turns, others) - 1) / 2
-    if not np.isfinite(cosines).all() or np.all(cosines > np.cos(ONE_MINIMUM)):
+    # Single photographs may be left behind where the others turn back.
+    if not np.isfinite(cosines).all() or np.mean(cosines > np.cos(ONE_MINIMUM)) > 0.5:
         return start, np.inf
     lengths = [np.nan_to_num(lengths_of(network, each), nan=0.0) for each in (start, other)]
     spread = min(spread_of(each[each > 0]) for each in lengths)
