@@ -83,7 +83,7 @@ def orient(
     Examples
     --------
     >>> import cv2
-    >>> from ahf_ros.orientation.camera import project
+    >>> from ahf_ros.orientation.camera import pinhole, project
     >>> from ahf_ros.orientation.network import CameraView, Observations
     >>> source = np.random.default_rng(1)
     >>> points, turns = source.uniform(-1, 1, (20, 3)), source.uniform(-0.5, 0.5, (6, 3))
