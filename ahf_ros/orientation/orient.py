@@ -48,7 +48,6 @@ TILT = (
 )
 
 
-@one_blas_thread()
 def orient(
     network: Network,
     datum: Datum | None = None,
@@ -83,7 +82,7 @@ def orient(
     Examples
     --------
     >>> import cv2
-    >>> from ahf_ros.orientation.camera import project
+    >>> from ahf_ros.orientation.camera import pinhole, project
     >>> from ahf_ros.orientation.network import CameraView, Observations
     >>> source = np.random.default_rng(1)
     >>> points, turns = source.uniform(-1, 1, (20, 3)), source.uniform(-0.5, 0.5, (6, 3))
@@ -99,7 +98,14 @@ def orient(
     >>> round(float(solution.start.calibrations[0, 0]), 2), solution.covariance_of_points.shape
     (1500.0, (60, 60))
     """
-    network = once_a_photograph(network)
+    with one_blas_thread():
+        return _oriented(once_a_photograph(network), datum, release, test)
+
+
+def _oriented(
+    network: Network, datum: Datum | None, release: tuple[str, ...] | None, test: bool
+) -> list[Solution]:
+    """Return the solutions of a network in which a target is once in a photograph."""
     _check(network)
     refused: list[str] = []
     solutions: list[Solution] = []
