@@ -93,7 +93,6 @@ def agreeing(network: Network, state: Start, adjusted: Layout) -> NDArray[np.boo
     return used
 
 
-@one_blas_thread()
 def adjust(
     network: Network,
     start: Start,
@@ -167,9 +166,10 @@ def adjust(
     True
     """
     check_network(network)
-    start, datum, warnings = placed(network, start, datum or Datum())
     try:
-        return _adjusted(network, start, datum, release, test, backward, warnings)
+        with one_blas_thread():
+            start, datum, warnings = placed(network, start, datum or Datum())
+            return _adjusted(network, start, datum, release, test, backward, warnings)
     except np.linalg.LinAlgError as error:
         raise ValueError(
             'the network is singular: the targets of a photograph, or all, lie on a line, or bars '

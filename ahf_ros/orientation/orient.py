@@ -48,7 +48,6 @@ TILT = (
 )
 
 
-@one_blas_thread()
 def orient(
     network: Network,
     datum: Datum | None = None,
@@ -99,7 +98,14 @@ def orient(
     >>> round(float(solution.start.calibrations[0, 0]), 2), solution.covariance_of_points.shape
     (1500.0, (60, 60))
     """
-    network = once_a_photograph(network)
+    with one_blas_thread():
+        return _oriented(once_a_photograph(network), datum, release, test)
+
+
+def _oriented(
+    network: Network, datum: Datum | None, release: tuple[str, ...] | None, test: bool
+) -> list[Solution]:
+    """Return the solutions of a network in which a target is once in a photograph."""
     _check(network)
     refused: list[str] = []
     solutions: list[Solution] = []
