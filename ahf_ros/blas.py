@@ -7,6 +7,7 @@ depend on their number, and so would coordinates.
 
 from __future__ import annotations
 
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -36,7 +37,7 @@ def one_blas_thread() -> Iterator[None]:
     global _holders, _limit
     with _lock:
         if not _holders:
-            _limit = _libraries().limit(limits=1)
+            _limit = _libraries('scipy.linalg' in sys.modules).limit(limits=1)
         _holders += 1
     try:
         yield
@@ -48,8 +49,10 @@ def one_blas_thread() -> Iterator[None]:
 
 
 @cache
-def _libraries() -> ThreadpoolController:
-    """Return the BLAS libraries of numpy and its like, found once: it takes 2 ms, a limit 10 us.
+def _libraries(with_scipy: bool) -> ThreadpoolController:
+    """Return the BLAS libraries of numpy, and of scipy once that is loaded.
+
+    They are found once: it takes 2 ms, a limit 10 us.
 
     OpenCV's own takes no time. Where both are limited in a process that was forked, the process
     crashes at its end.

@@ -255,11 +255,12 @@ def _stacked(rows: Sequence[Any], shape: tuple[int, ...]) -> FloatArray:
 
 def _covariance_of(path: Path, names: tuple[str, ...]) -> tuple[FloatArray, bool]:
     """Return the covariance of the points of these names in their order, and if it is scaled."""
+    content = read_bytes(path)
     try:
-        with np.load(io.BytesIO(read_bytes(path)), allow_pickle=False) as archive:
+        with np.load(io.BytesIO(content), allow_pickle=False) as archive:
             ids, covariance = archive['ids'].tolist(), np.array(archive['covariance'], float)
             scaled = bool(archive['scaled'])
-    except (KeyError, EOFError, zipfile.BadZipFile) as error:
+    except (KeyError, EOFError, ValueError, zipfile.BadZipFile) as error:
         raise ValueError(f'{path} is damaged, accepted is what ahf orient writes') from error
     size = 3 * len(ids)
     if sorted(map(str, ids)) != sorted(names) or covariance.shape != (size, size):

@@ -21,7 +21,7 @@ from ahf_ros.features import frame
 from ahf_ros.features.circle_fit import Fit
 
 _FIRST = 8  # doubtful words that rivals read first
-_MORE_SEEN = 3.0  # log odds against anything, by which a family that is not read beats one that is
+_MORE_SEEN = 6.0  # log odds against anything, by which a family that is not read beats one that is
 _DOUBT = 0.05  # odds of another family that has all prints, up to which one is sure
 _ALL_WORDS = 0.5  # odds of a family of all words against one of a rule, before any print is seen
 
