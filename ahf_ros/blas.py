@@ -15,6 +15,8 @@ from functools import cache
 
 from threadpoolctl import ThreadpoolController
 
+_WITH_BLAS = frozenset({'scipy.linalg', 'scipy.special'})
+
 _lock = threading.Lock()
 _holders = 0
 _limit: ThreadpoolController | None = None
@@ -37,7 +39,7 @@ def one_blas_thread() -> Iterator[None]:
     global _holders, _limit
     with _lock:
         if not _holders:
-            _limit = _libraries('scipy.linalg' in sys.modules).limit(limits=1)
+            _limit = _libraries(frozenset(_WITH_BLAS & sys.modules.keys())).limit(limits=1)
         _holders += 1
     try:
         yield
@@ -49,8 +51,8 @@ def one_blas_thread() -> Iterator[None]:
 
 
 @cache
-def _libraries(with_scipy: bool) -> ThreadpoolController:
-    """Return the BLAS libraries of numpy, and of scipy once that is loaded.
+def _libraries(modules: frozenset[str]) -> ThreadpoolController:
+    """Return the BLAS libraries of numpy, and of scipy where modules that bring it are loaded.
 
     They are found once: it takes 2 ms, a limit 10 us.
 
