@@ -18,7 +18,7 @@ from ahf_ros.orientation.solution import Solution, Start
 from ahf_ros.orientation.start import FEWEST_PHOTOGRAPHS, oriented, reversal, starts
 from ahf_ros.orientation.triples import FEWEST_COMMON, STEPS, known_calibrations
 from ahf_ros.orientation.views import View, lengths_of, spread_of, views_of
-from ahf_ros.text import counted
+from ahf_ros.text import counted, listed
 
 LINE = 0.01
 """Targets are on a line where their spread across it is less than this share of that along it."""
@@ -375,6 +375,4 @@ def _zooms(solutions: Sequence[Solution]) -> tuple[str, ...]:
 
 def _names(names: Sequence[str], indices: Sequence[int] | IntArray) -> str:
     """Return some of the names, and how many there are more."""
-    shown = ', '.join(names[index] for index in indices[:NAMED])
-    more = len(indices) - NAMED
-    return f'{shown} and {more} more' if more > 0 else shown
+    return listed([names[index] for index in indices], NAMED)

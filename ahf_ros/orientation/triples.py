@@ -22,7 +22,7 @@ from ahf_ros.orientation.precision import precision
 from ahf_ros.orientation.relative import relative_orientations
 from ahf_ros.orientation.resection import resections
 from ahf_ros.orientation.solution import Start
-from ahf_ros.orientation.triangulation import SMALLEST_ANGLE, directions, midpoints
+from ahf_ros.orientation.triangulation import SMALLEST_ANGLE, directions, largest_angle, midpoints
 from ahf_ros.orientation.usual_lens import usual_lens
 from ahf_ros.orientation.views import View, lengths_of, part_of, spread_of
 
@@ -386,8 +386,7 @@ def median_angle(network: Network, start: Start) -> float:
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
     angles = []
     for point in np.unique(observed.point[rows]):
-        own = rays[observed.point[rows] == point]
-        angles.append(np.arccos(np.clip(np.min(own @ own.T), -1, 1)))
+        angles.append(largest_angle(rays[observed.point[rows] == point]))
     return float(np.median(angles)) if angles else 0.0
 
 
