@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ahf_ros.cli import tell
+from ahf_ros.cli.mounting import add_mounting_arguments, check_mounting, write_mountings
 from ahf_ros.cli.options import add_option, add_quiet, parsed_by
 from ahf_ros.settings.parameter import Parameter
 
@@ -44,6 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     _add_camera_arguments(parser.add_argument_group('cameras'))
     _add_object_arguments(parser.add_argument_group('object'))
     _add_observation_arguments(parser.add_argument_group('observations'))
+    add_mounting_arguments(parser.add_argument_group('robots and rigs'))
     parser.add_argument(
         '--export',
         action='append',
@@ -162,6 +164,7 @@ def _export(text: str) -> tuple[str, Path]:
 def run(options: argparse.Namespace) -> int:
     """Orient the photographs, and write each group of them that hangs together."""
     try:
+        check_mounting(options)
         network, notes = _network(options)
         solutions = _oriented(network, options)
         if not solutions:
@@ -288,4 +291,9 @@ def _write(solution: Solution, number: int, options: argparse.Namespace) -> bool
             written = False
     if not options.quiet:
         print_network(solution, str(folder))
+    try:
+        write_mountings(solution, folder, options)
+    except ValueError as error:
+        tell('orient', error)
+        written = False
     return written

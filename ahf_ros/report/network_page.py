@@ -57,7 +57,7 @@ def _content(solution: Solution) -> dict[str, Any]:
         'advice': what_to_photograph(solution),
         'views': views(solution),
         'targets': _targets(solution),
-        'digits': decimals(np.sqrt(variances[solution.determined]).ravel()),
+        'digits': decimals(np.sqrt(np.maximum(variances[solution.determined], 0)).ravel()),
         'photographs': photographs,
         'pictures': [
             (it['name'], image_figure(solution, it['index'], enlarged))

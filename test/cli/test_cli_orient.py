@@ -9,11 +9,15 @@ import subprocess
 import sys
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
+from ruamel.yaml import YAML
 
 from ahf_ros.interchange.camera_files import ros_yaml
 from ahf_ros.interchange.network_results import read_network
+from ahf_ros.interchange.robot_files import read_robot_poses
+from ahf_ros.orientation.mounting import Rigid
 from support import ROOT
 from support.command_line import status
 from support.networks import CALIBRATION, SIZE, records, solution
@@ -21,6 +25,7 @@ from support.networks import CALIBRATION, SIZE, records, solution
 pytest.importorskip('scipy')
 
 TRUE = solution(photographs=8, targets=24)
+CAMERA_FRAME = 'camera_1600_x_1200_optical_frame'
 
 
 @pytest.fixture(scope='module')
@@ -178,3 +183,55 @@ def test_coordinates_do_not_depend_on_the_threads_of_blas(tmp_path: Path) -> Non
         subprocess.run([*command, str(tmp_path / threads)], env=variables, cwd=ROOT, check=True)
         tables.append((tmp_path / threads / 'points.csv').read_bytes())
     assert tables[0] == tables[1]
+
+
+def test_a_robot_says_where_its_camera_is(
+    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Poses in millimetres are recognised; files are in metres, as ROS has them."""
+    mount = Rigid(np.asarray(cv2.Rodrigues((0.1, -0.2, 1.5))[0]), np.array([0.02, -0.05, 0.1]))
+    base = Rigid(np.asarray(cv2.Rodrigues((3.0, 0.1, 0.2))[0]), np.array([0.8, 0.1, -0.2]))
+    rows = [('image', 'x', 'y', 'z', 'rx', 'ry', 'rz')]
+    for name, rotation, position in zip(
+        TRUE.network.photographs, TRUE.start.rotations, TRUE.start.positions, strict=True
+    ):
+        x, y, z, *turn = (base @ Rigid(rotation.T, 1e-3 * position) @ mount.inverse).vector
+        rows.append((name, *(f'{1e3 * it:.6f}' for it in (x, y, z)), *map(str, turn)))
+    with (tmp_path / 'robot.csv').open('w', newline='') as file:
+        csv.writer(file).writerows(rows)
+    folder = results.parent
+    known = '--calibration', folder / 'camera.yaml', '--control', folder / 'points.csv'
+    robot = '--robot-poses', tmp_path / 'robot.csv'
+    assert status('orient', results, '-o', tmp_path / 'network', *known, *robot) == 0
+    record = json.loads((tmp_path / 'network' / 'mounting.json').read_text())
+    camera, targets = record['transforms']
+    assert (camera['parent'], camera['child']) == ('tool0', CAMERA_FRAME)
+    assert (targets['parent'], targets['child']) == ('base', 'targets')
+    np.testing.assert_allclose(camera['translation'], mount.translation, atol=1e-3)
+    np.testing.assert_allclose(targets['translation'], base.translation, atol=1e-3)
+    assert min(np.diag(camera['covariance'])) > 0
+    launch = YAML(typ='safe').load(tmp_path / 'network' / 'static_transforms.launch.yaml')
+    arguments = launch['launch'][0]['node']['args'].split()
+    assert arguments[-4:] == ['--frame-id', 'tool0', '--child-frame-id', CAMERA_FRAME]
+    values = dict(zip(arguments[:-4:2], map(float, arguments[1:-4:2]), strict=True))
+    quaternion = [values[f'--q{it}'] for it in 'xyzw']
+    np.testing.assert_allclose(quaternion, camera['rotation'], atol=1e-9)
+    assert f'tool0 to {CAMERA_FRAME}' in capsys.readouterr().err
+    metres = '--robot-unit', 'm', *robot
+    assert status('orient', results, '-o', tmp_path / 'wrong', *known, *metres) == 1
+    assert 'the poses of the robot are in mm' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ('content', 'message'),
+    [
+        ('image,x,y,z\na.jpg,1,2,3\n', 'has no rotations, accepted are qx, qy, qz, qw'),
+        ('image,x,y,z,qx,qy,qz,qw\na.jpg,1,2,3,0,0,0,2\n', 'the quaternion has the length 2'),
+        ('image,x,y,z,rx,ry,rz\na.jpg,1,2,3,90,0,0\n', 'accepted is one in rad'),
+        ('image,x,y,z,rx,ry,rz\na,1,2,3,1,0,0\na,1,2,3,1,0,0\n', 'a is there twice'),
+    ],
+)
+def test_wrong_poses_of_a_robot_are_refused(tmp_path: Path, content: str, message: str) -> None:
+    (tmp_path / 'robot.csv').write_text(content)
+    with pytest.raises(ValueError, match=message):
+        read_robot_poses(tmp_path / 'robot.csv')

@@ -1,0 +1,190 @@
+"""Options of `ahf orient` for cameras on a robot or a rig, and what it says of their mounting."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ahf_ros.cli.options import add_option, parsed_by
+from ahf_ros.settings.parameter import Parameter
+
+if TYPE_CHECKING:
+    from ahf_ros.orientation.mounting import Mounted
+    from ahf_ros.orientation.solution import Solution
+
+_OPTICAL = '_optical_frame'
+_FIELD = 'targets'
+
+
+def add_mounting_arguments(group: argparse._ArgumentGroup) -> None:
+    """Give a parser what is known of a robot or a rig."""
+    group.add_argument(
+        '--robot-poses',
+        metavar='POSES.csv',
+        help='Poses of the hand in the frame of the base: image, x, y, z, and qx, qy, qz, qw or a '
+        'rotation vector rx, ry, rz in rad. Writes where the cameras are on the hand.',
+    )
+    group.add_argument(
+        '--robot-unit',
+        choices=('m', 'mm'),
+        default='',
+        help='Unit of x, y and z. A network that has a scale tells it.',
+    )
+    text = 'Standard deviation of positions of the hand, mm.'
+    add_option(group, Parameter('robot_position_sigma', 0.1, text, minimum=1e-6))
+    text = 'Standard deviation of rotations of the hand, degrees.'
+    add_option(group, Parameter('robot_rotation_sigma', 0.02, text, minimum=1e-6))
+    group.add_argument(
+        '--targets-on-hand',
+        action='store_true',
+        help='The hand moves the targets, before cameras that stand still.',
+    )
+    group.add_argument(
+        '--robot-frames',
+        type=parsed_by(_frames),
+        default=('base', 'tool0'),
+        metavar='BASE,HAND',
+        help='Names of the frames that are written. Default: base,tool0.',
+    )
+    group.add_argument(
+        '--stations',
+        metavar='STATIONS.csv',
+        help='Photographs that cameras fixed to each other took at once: image, station. Writes '
+        'where the cameras are on one of them.',
+    )
+
+
+def _frames(text: str) -> tuple[str, str]:
+    from ahf_ros.interchange.robot_files import frame_name
+
+    names = [it.strip() for it in text.split(',')]
+    if len(names) != 2 or names[0] == names[1] or any(it != frame_name(it) for it in names):
+        raise ValueError(f'robot_frames is {text!r}, accepted are two names such as base,tool0')
+    return names[0], names[1]
+
+
+def check_mounting(options: argparse.Namespace) -> None:
+    """Raise a ValueError for options that exclude each other, or that nothing uses."""
+    if options.robot_poses and options.stations:
+        raise ValueError('robot_poses and stations are given, accepted is one of them')
+    if not options.robot_poses:
+        for name in ('robot_unit', 'targets_on_hand'):
+            if getattr(options, name):
+                raise ValueError(f'{name} is given without robot_poses, which it describes')
+
+
+def write_mountings(solution: Solution, folder: Path, options: argparse.Namespace) -> None:
+    """Write where cameras are on a robot or a rig, if that is asked for, and print it."""
+    from ahf_ros.interchange.robot_files import write_mounting
+
+    if options.robot_poses:
+        record = _on_robot(solution, options)
+    elif options.stations:
+        record = _on_rig(solution, options)
+    else:
+        return
+    write_mounting(folder, record)
+    if not options.quiet:
+        _print(record)
+
+
+def _on_robot(solution: Solution, options: argparse.Namespace) -> dict[str, Any]:
+    import numpy as np
+
+    from ahf_ros.interchange.robot_files import frame_name, read_robot_poses
+    from ahf_ros.orientation.stations import mounted_on_robot
+
+    result, notes = mounted_on_robot(
+        solution,
+        read_robot_poses(options.robot_poses),
+        position_sigma=options.robot_position_sigma * 1e-3,
+        rotation_sigma=float(np.radians(options.robot_rotation_sigma)),
+        unit=options.robot_unit,
+        targets_on_hand=options.targets_on_hand,
+    )
+    base, hand = options.robot_frames
+
+    def name(camera: str) -> str:
+        return frame_name(camera) + _OPTICAL if camera else _FIELD
+
+    parts = [
+        (hand, name(camera), pose, result.mount_covariances[camera])
+        for camera, pose in result.mounts.items()
+    ] + [
+        (base, name(camera), pose, result.field_covariances[camera])
+        for camera, pose in result.fields.items()
+    ]
+    return _record(result, parts, notes)
+
+
+def _on_rig(solution: Solution, options: argparse.Namespace) -> dict[str, Any]:
+    from ahf_ros.interchange.robot_files import frame_name, read_stations
+    from ahf_ros.orientation.stations import mounted_on_rig
+
+    reference, result, notes = mounted_on_rig(solution, read_stations(options.stations))
+    parts = [
+        (
+            frame_name(reference) + _OPTICAL,
+            frame_name(camera) + _OPTICAL,
+            pose,
+            result.mount_covariances[camera],
+        )
+        for camera, pose in result.mounts.items()
+    ]
+    return _record(result, parts, notes)
+
+
+def _record(
+    result: Mounted, parts: list[tuple[str, str, Any, Any]], notes: tuple[str, ...]
+) -> dict[str, Any]:
+    from ahf_ros.interchange.robot_files import transform_record
+
+    return {
+        'unit': 'm',
+        'sigma0': result.sigma0,
+        'redundancy': result.redundancy,
+        'scale': result.scale,
+        'transforms': [transform_record(*part) for part in parts],
+        'residuals': [
+            {'image': image, 'translation': gaps[:3].tolist(), 'rotation': gaps[3:].tolist()}
+            for image, gaps in result.residuals.items()
+        ],
+        'rejected': [
+            {
+                'image': image,
+                'reason': 'its pose of the robot contradicts all others',
+                'normalised_residual': size,
+            }
+            for image, size in result.rejected.items()
+        ],
+        'warnings': list(notes),
+    }
+
+
+def _print(record: dict[str, Any]) -> None:
+    import numpy as np
+    from rich.markup import escape
+
+    from ahf_ros.cli.tables import print_table, terminal
+
+    console = terminal()
+    rows = []
+    for it in record['transforms']:
+        sigma = np.sqrt(np.diag(it['covariance']))
+        place = [f'{1e3 * value:.3f}' for value in it['translation']]
+        precision = f'{1e3 * sigma[:3].max():.3f}', f'{np.degrees(sigma[3:].max()):.4f}'
+        rows.append([f'{it["parent"]} to {it["child"]}', *place, *precision])
+    head = 'static transform', 'x, mm', 'y', 'z', 'sigma', 'sigma, degrees'
+    print_table('Mounting', head, rows, console)
+    gaps = np.array([[*it['translation'], *it['rotation']] for it in record['residuals']])
+    lengths = np.sqrt((gaps[:, :3] ** 2).sum(axis=1).mean())
+    turns = np.degrees(np.sqrt((gaps[:, 3:] ** 2).sum(axis=1).mean()))
+    console.print(
+        f'{len(gaps)} poses agree within {1e3 * lengths:.3f} mm and {turns:.4f} degrees (RMS), '
+        f'sigma0 {record["sigma0"]:.2f}',
+        highlight=False,
+    )
+    rejected = [f'{it["image"]}: {it["reason"]}' for it in record['rejected']]
+    for text in (*rejected, *record['warnings']):
+        console.print(f'[yellow]![/] {escape(text)}', highlight=False)
