@@ -36,6 +36,7 @@ COMMANDS = {
         'cli.learn_family',
         'Learn template, positions and numbers of point-distributed targets from a survey.',
     ),
+    'demo': ('cli.demo', 'Identify a rendered image in three ways, which shows the method.'),
     'targets': ('cli.targets', 'Print targets, true to scale, with their geometry.'),
 }
 """Module below `ahf_ros` and description of each command."""
