@@ -1,4 +1,4 @@
-"""Install what the nodes of ahf_ros need on a machine without ROS 2: pip install . ./ros
+"""Install what the nodes of ahf_ros need on a machine without ROS 2, by pip install . ./ros.
 
 The same CMakeLists.txt that colcon uses generates and compiles the messages, against the ROS 2
 wheels that distributions.ini lists. On a ROS 2 installation, build with colcon instead; this file

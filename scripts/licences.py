@@ -17,8 +17,8 @@ _MAXIMUM_LENGTH = 60  # characters; longer ones are the text of a licence
 
 HEAD = """# Licences
 
-What `pip install '.[test,docs,test-browser]' ./ros` installs beside ahf_ros, with the licences that the
-packages state. Printed by `python scripts/licences.py`.
+What `pip install '.[test,docs,test-browser]' ./ros` installs beside ahf_ros, with the licences
+that the packages state. Printed by `python scripts/licences.py`.
 
 | package | licence |
 |---|---|"""
