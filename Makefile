@@ -1,5 +1,6 @@
 # make demo    one striped image is identified in three ways: a line each, a picture in demo/
-#              DEMO='--light lattice --ambient 0.12' and so on; ahf_demo --help lists all options
+#              DEMO='--light lattice --ambient 0.12' and so on; ahf demo --help lists all options
+# make nodes   ROS 2 from PyPI, and the nodes: ahf_detector, ahf_illumination, ahf_scoreboard
 # make test    every check: ruff, mypy, the import rules, the site, the tests; then the tests that
 #              need no ROS with the oldest versions and without the processor's vector units
 # make site    the documentation as a site, build/site/index.html
@@ -12,6 +13,7 @@ DISTRIBUTION ?= jazzy
 VENV ?= .venv$(if $(filter-out jazzy,$(DISTRIBUTION)),-$(DISTRIBUTION))
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/installed
+NODES := $(VENV)/nodes
 READY := $(VENV)/ready
 QUIET := --quiet --disable-pip-version-check
 PIP := $(BIN)/python -m pip install $(QUIET)
@@ -29,12 +31,14 @@ OLDEST := .venv-oldest
 unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: demo test lint site test-native test-live test-computing test-oldest test-portable \
+.PHONY: demo nodes test lint site test-native test-live test-computing test-oldest test-portable \
 	test-kilted browser clean
 .DELETE_ON_ERROR:
 
 demo: $(INSTALLED)
-	$(BIN)/ahf_demo $(DEMO)
+	$(BIN)/ahf demo $(DEMO)
+
+nodes: $(NODES)
 
 # The longest first, so that two cores end at the same time.
 test: test-live test-oldest test-computing test-portable lint site
@@ -87,17 +91,24 @@ test-kilted:
 clean:
 	rm -rf .venv* build
 
-# The modules are used where they are; only the interfaces are generated and compiled.
-$(INSTALLED): pyproject.toml setup.py distributions.ini package.xml CMakeLists.txt \
-		$(wildcard msg/*.msg srv/*.srv)
+# The modules are used where they are.
+$(INSTALLED): pyproject.toml setup.py package.xml
 	@$(PYTHON) scripts/prerequisites.py
-	@echo 'Setting up $(VENV): ROS 2 from PyPI, and the messages compiled; takes 1 to 3 minutes.'
+	@echo 'Setting up $(VENV): numpy, OpenCV and what else the command line needs.'
 	$(PYTHON) -m venv $(VENV)
-	$(PIP) --editable .
+	$(BIN)/python -m pip install --disable-pip-version-check --editable .
+	touch $@
+
+$(NODES): $(INSTALLED) ros/setup.py ros/pyproject.toml distributions.ini CMakeLists.txt \
+		$(wildcard msg/*.msg srv/*.srv)
+	@$(PYTHON) scripts/prerequisites.py nodes
+	@echo 'Adding ROS 2 from PyPI to $(VENV), and compiling the messages; takes 1 to 3 minutes.'
+	$(PIP) ./ros
 	touch $@
 
 # What only checks need.
-$(READY): $(INSTALLED)
+$(READY): $(NODES)
+	@echo 'Adding what the checks need to $(VENV).'
 	$(PIP) 'ahf_ros[$(EXTRAS)]'
 	touch $@
 

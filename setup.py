@@ -1,155 +1,15 @@
-"""Install ahf_ros with pip on a machine without ROS 2.
-
-The same CMakeLists.txt that colcon uses generates and compiles the interfaces, against the ROS 2
-wheels that distributions.ini lists. On a ROS 2 installation, build with colcon instead; this file
-is not used there.
-"""
+"""Install ahf_ros with pip: pure Python, without ROS. ros/ adds what nodes need."""
 
 from __future__ import annotations
 
-import configparser
-import os
-import shutil
-import subprocess
-import sys
 import xml.etree.ElementTree as ElementTree
-from importlib import metadata
 from pathlib import Path
 
-from setuptools import Distribution, find_packages, setup
-from setuptools.command.build_ext import build_ext
-
-HERE = Path(__file__).resolve().parent
-NAME = 'ahf_ros'
-DISTRIBUTION = os.environ.get('AHF_ROS_DISTRIBUTION') or 'jazzy'
-REQUIREMENTS = [
-    'mcap>=1.2.1',
-    'numpy>=1.21',
-    'opencv-python-headless>=4.5',
-    'rich>=12',
-    'rosbags>=0.11.7',
-    'ruamel.yaml',
-    'threadpoolctl>=3.5',  # it knows the OpenBLAS of numpy's wheels
-    'zstandard',
-]
-SITE = Path(f'lib/python{sys.version_info[0]}.{sys.version_info[1]}/site-packages')
-
-
-def wheels(purpose: str) -> list[str]:
-    """Return the ROS 2 wheels of the distribution that are needed to `build` or to `run`."""
-    distributions = configparser.ConfigParser()
-    distributions.read(HERE / 'distributions.ini', encoding='utf-8')
-    if DISTRIBUTION not in distributions:
-        accepted = ', '.join(distributions.sections())
-        sys.exit(f'AHF_ROS_DISTRIBUTION is {DISTRIBUTION!r}, accepted is one of {accepted}')
-    return distributions[DISTRIBUTION][purpose].split()
-
-
-def ros_prefix() -> Path | None:
-    """Return the prefix that the ROS 2 wheels are installed in, None where there are none."""
-    try:
-        files = metadata.files('ros-ament-cmake-core') or []
-    except metadata.PackageNotFoundError:
-        return None
-    marker = 'share/ament_cmake_core/package.xml'
-    for file in files:
-        if file.as_posix().endswith(marker):
-            return Path(str(file.locate())).resolve().parents[2]
-    return None
-
-
-class CMakeBuild(build_ext):
-    """Generate and compile the interfaces with CMake and put them into the wheel."""
-
-    def initialize_options(self) -> None:
-        """Start without generated files."""
-        super().initialize_options()
-        self.generated: list[str] = []
-
-    def run(self) -> None:
-        """Build, then hand the result to the package and to `data_files`."""
-        stage = self.build_interfaces()
-        data: dict[str, list[str]] = {}
-        for source in sorted(stage.rglob('*')):
-            relative = source.relative_to(stage)
-            if not source.is_file() or relative.parts[0] not in ('lib', 'share'):
-                continue
-            if not relative.is_relative_to(SITE):
-                # Libraries, executables and share/ go below sys.prefix, as in the ROS wheels.
-                data.setdefault(str(relative.parent), []).append(str(source))
-            elif self.is_generated(relative.relative_to(SITE)):
-                self.place_generated(source, relative, data)
-        self.distribution.data_files = sorted(data.items())
-
-    def build_interfaces(self) -> Path:
-        """Run CMake and return the directory that it installed into."""
-        # Always start clean: pip's isolated build environment has a new path each time, and CMake
-        # would remember the old one.
-        work = Path(self.build_temp).resolve() / NAME
-        shutil.rmtree(work, ignore_errors=True)
-        stage = work / 'stage'
-        environment = dict(os.environ)
-        prefix = ros_prefix()
-        if prefix:
-            environment['AMENT_PREFIX_PATH'] = environment['CMAKE_PREFIX_PATH'] = str(prefix)
-        configure = [
-            'cmake', '-S', str(HERE), '-B', str(work / 'cmake'), '-G', 'Ninja',
-            '-DCMAKE_BUILD_TYPE=Release', '-DBUILD_TESTING=OFF',
-            f'-DCMAKE_INSTALL_PREFIX={stage}',
-            f'-DPython3_EXECUTABLE={sys.executable}',
-            f'-DPYTHON_INSTALL_DIR={SITE.as_posix()}',
-        ]  # fmt: skip
-        build = ['cmake', '--build', str(work / 'cmake'), '--target', 'install']
-        for command in (configure, build):
-            subprocess.check_call(command, env=environment)
-        return stage
-
-    def is_generated(self, module: Path) -> bool:
-        """Return whether an installed file of the Python package is not one of the sources."""
-        return (
-            module.parts[0] == NAME
-            and module.suffix in ('.py', '.pyi', '.so')
-            and not (HERE / module).exists()
-        )
-
-    def place_generated(self, source: Path, relative: Path, data: dict[str, list[str]]) -> None:
-        """Put a generated file beside the hand-written modules of the wheel."""
-        if self.editable_mode:
-            # An editable wheel holds no modules, only a path to the sources; `extend_path` in
-            # ahf_ros/__init__.py finds what is installed here.
-            data.setdefault(str(relative.parent), []).append(str(source))
-            return
-        target = Path(self.build_lib) / relative.relative_to(SITE)
-        target.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy2(source, target)
-        self.generated.append(str(target))
-
-    def get_outputs(self) -> list[str]:
-        """Return the generated files of the package."""
-        return self.generated
-
-    def get_output_mapping(self) -> dict[str, str]:
-        """Return an empty mapping: no generated file lies in the source tree."""
-        return {}
-
-
-class BinaryDistribution(Distribution):
-    """A distribution that is compiled although it lists no extension modules."""
-
-    def has_ext_modules(self) -> bool:
-        """Return True: the wheel is for one Python and one machine."""
-        return True
-
-    def has_data(self) -> bool:
-        """Answer editable_wheel, which asks for this where distutils has `has_data_files`."""
-        return self.has_data_files()
-
+from setuptools import find_packages, setup
 
 setup(
-    version=ElementTree.parse(HERE / 'package.xml').findtext('version'),
-    setup_requires=wheels('build'),
-    install_requires=REQUIREMENTS + wheels('run'),
-    packages=find_packages(include=[NAME, f'{NAME}.*']),
+    version=ElementTree.parse(Path(__file__).with_name('package.xml')).findtext('version'),
+    packages=find_packages(include=['ahf_ros', 'ahf_ros.*']),
     package_data={
         '': ['*.json', 'py.typed'],
         'ahf_ros.codes': ['ring_families/*'],
@@ -157,6 +17,4 @@ setup(
     },
     # With this an editable installation is one path to the sources, new modules included.
     package_dir={'': '.'},
-    distclass=BinaryDistribution,
-    cmdclass={'build_ext': CMakeBuild},
 )

@@ -24,7 +24,8 @@ GRACE = 3.0
 """Time to end in order, s; of processors, where others may be busy."""
 
 _WITH_NOHUP = (signal.SIGINT, signal.SIGTERM)
-_ENDING = (*_WITH_NOHUP, signal.SIGHUP)
+_HANGUP = getattr(signal, 'SIGHUP', None)  # not on Windows, nor are there timers
+_ENDING = (*_WITH_NOHUP, *((_HANGUP,) if _HANGUP else ()))
 _IMPORT = '<frozen importlib'  # file of the code that imports
 
 # Signal handlers set and read these, so they have no lock.
@@ -36,7 +37,7 @@ _actions: list[Callable[[], None]] = []
 
 def ending_signals() -> tuple[signal.Signals, ...]:
     """Return the signals that end this process: SIGHUP as well unless nohup has it ignored."""
-    ignored = signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+    ignored = _HANGUP and signal.getsignal(_HANGUP) == signal.SIG_IGN
     return _WITH_NOHUP if ignored else _ENDING
 
 
@@ -59,7 +60,8 @@ def handled() -> Iterator[None]:
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
+        if hasattr(signal, 'setitimer'):
+            signal.setitimer(signal.ITIMER_REAL, 0)
         if has_begun():
             ignore_ending()
         else:
@@ -91,7 +93,7 @@ def interrupt(frame: FrameType | None) -> None:
 
 def _raise_after_import(_: int, frame: FrameType | None) -> None:
     while frame and time.monotonic() < _limit:
-        if frame.f_code.co_filename.startswith(_IMPORT):
+        if frame.f_code.co_filename.startswith(_IMPORT) and hasattr(signal, 'setitimer'):
             signal.signal(signal.SIGALRM, _raise_after_import)
             signal.setitimer(signal.ITIMER_REAL, POLL)
             return

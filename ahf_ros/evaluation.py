@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ahf_ros.deprecation import deprecated_arguments
-from ahf_ros.target import UNDECODED, Target, TrueTarget, Truth
+from ahf_ros.target import UNDECODED, Identification, Target, TrueTarget, Truth
 from ahf_ros.text import printable
 
 if TYPE_CHECKING:
@@ -271,3 +271,26 @@ def _pairs(
     near = np.flatnonzero(distances <= tolerance)
     near = near[np.lexsort((targets[near], reports[near], distances[near]))]
     return list(zip(reports[near].tolist(), targets[near].tolist(), strict=True))
+
+
+def line(found: Identification, truth: Sequence[Target]) -> str:
+    """Return in words how well the targets of an image were identified, and how."""
+    figures = score(truth, found)
+    words = [
+        f'{figures.right} of {figures.expected} right',
+        f'{figures.wrong} wrong',
+        f'{figures.false_positives} false',
+        f'{figures.expected - figures.found} missed',
+    ]
+    if figures.rmse is not None:
+        words.append(f'RMSE {figures.rmse[2]:.3f} px')
+    return f'{", ".join(words)}; {method(found)}, {found.filter.duration:.2f} s'
+
+
+def method(found: Identification) -> str:
+    """Return in words which filter led to an identification, and how many trials it took."""
+    used = found.filter
+    words = 'no filter'
+    if used.applied:
+        words = f'gamma_high {used.gamma_high:.2f}, gamma_low {used.gamma_low:.2f}'
+    return f'{words}, {used.evaluations} trial{"" if used.evaluations == 1 else "s"}'

@@ -11,14 +11,14 @@ import xml.etree.ElementTree as ElementTree
 from importlib.metadata import Distribution, distributions
 from pathlib import Path
 
-OURS = ('ahf-ros', 'pip')
+OURS = ('ahf-ros', 'ahf-ros-interfaces', 'pip')
 UNKNOWN = 'not stated'
 _MAXIMUM_LENGTH = 60  # characters; longer ones are the text of a licence
 
 HEAD = """# Licences
 
-What `pip install '.[test,docs,test-browser]'` installs beside ahf_ros, with the licences that the
-packages state. Printed by `python scripts/licences.py`.
+What `pip install '.[test,docs,test-browser]' ./ros` installs beside ahf_ros, with the licences
+that the packages state. Printed by `python scripts/licences.py`.
 
 | package | licence |
 |---|---|"""

@@ -1,4 +1,4 @@
-"""Say at once what a machine lacks to build ahf_ros with pip, not in a page of compiler output.
+"""Say at once what a machine lacks to install ahf_ros, or its nodes, with pip.
 
 Runs on any Python from 3.6, also on one that is too old for the package.
 """
@@ -14,12 +14,26 @@ OLDEST, NEWEST = (3, 10), (3, 13)
 
 
 def missing():
-    """Return what is missing, one line each."""
+    """Return what pip lacks to install the package, one line each."""
     lines = []
-    if not OLDEST <= sys.version_info[:2] <= NEWEST:
+    if sys.version_info[:2] < OLDEST:
+        oldest = '.'.join(map(str, OLDEST))
+        lines.append(
+            f'Python is {platform.python_version()}, accepted is {oldest} or newer: '
+            'make PYTHON=python3.12 ...'
+        )
+    if not all(importlib.util.find_spec(name) for name in ('venv', 'ensurepip')):
+        lines.append('Python has no venv module: apt install python3-venv')
+    return lines
+
+
+def missing_for_nodes():
+    """Return what else is missing to install ROS 2 from PyPI and to compile the messages."""
+    lines = []
+    if sys.version_info[:2] > NEWEST:
         oldest, newest = ('.'.join(map(str, version)) for version in (OLDEST, NEWEST))
         lines.append(
-            f'Python is {platform.python_version()}, accepted is {oldest} to {newest}: '
+            f'Python is {platform.python_version()}, ROS 2 on PyPI is for {oldest} to {newest}: '
             'make PYTHON=python3.12 ...'
         )
     if (platform.system(), platform.machine()) != ('Linux', 'x86_64'):
@@ -27,14 +41,15 @@ def missing():
             f'The machine is {platform.system()} {platform.machine()}, ROS 2 on PyPI is for Linux '
             'x86_64: install ROS 2 and use colcon'
         )
-    if not all(importlib.util.find_spec(name) for name in ('venv', 'ensurepip')):
-        lines.append('Python has no venv module: apt install python3-venv')
+    lacking = []
     if not Path(sysconfig.get_path('include'), 'Python.h').exists():
-        lines.append('Python has no headers: apt install python3-dev')
+        lacking.append('python3-dev')
     if not all(shutil.which(name) for name in ('gcc', 'g++')):
-        lines.append('There is no C and C++ compiler: apt install g++')
+        lacking.append('g++')
+    if lacking:
+        lines.append('The messages cannot be compiled: apt install ' + ' '.join(lacking))
     return lines
 
 
 if __name__ == '__main__':
-    sys.exit('\n'.join(missing()) or 0)
+    sys.exit('\n'.join(missing() + (missing_for_nodes() if 'nodes' in sys.argv else [])) or 0)

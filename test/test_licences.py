@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import ast
 import configparser
 import re
+from importlib import metadata
 
 from support import ROOT
 
@@ -16,13 +16,8 @@ def normalized(requirement: str) -> str:
 
 
 def declared() -> set[str]:
-    """Return the names of what setup.py and distributions.ini need to run."""
-    parsed = ast.parse((ROOT / 'setup.py').read_text()).body
-    (own,) = (
-        ast.literal_eval(node.value)
-        for node in parsed
-        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == 'REQUIREMENTS'
-    )
+    """Return the names of what the package and its nodes need to run."""
+    own = [it for it in metadata.requires('ahf_ros') or () if 'extra ==' not in it]
     distributions = configparser.ConfigParser()
     distributions.read(ROOT / 'distributions.ini')
     return {normalized(it) for it in [*own, *distributions['jazzy']['run'].split()]}

@@ -162,8 +162,9 @@ def test_the_demo_installs_only_what_it_needs(tmp_path: Path) -> None:
         subprocess.check_output([*command, target], cwd=ROOT, text=True)
         for target in ('demo', 'lint')
     ]
-    assert [text.count('pip install') for text in told] == [1, 2]
-    assert ['ahf_ros[test' in text for text in told] == [False, True]
+    assert [text.count('pip install') for text in told] == [1, 3]
+    for extra in ('ahf_ros[test', './ros'):
+        assert [extra in text for text in told] == [False, True]
 
 
 def test_ros2_run_finds_every_program() -> None:

@@ -20,7 +20,7 @@ import traceback
 from contextlib import suppress
 from dataclasses import dataclass
 from enum import IntEnum
-from multiprocessing import Pipe
+from multiprocessing import Pipe, get_context
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from types import FrameType
@@ -37,7 +37,7 @@ _PIPE_CLOSED = (EOFError, OSError)  # what the pipe of a process that has ended 
 _PACKAGE = str(Path(__file__).parents[2])
 _BEGIN = (
     'import sys; sys.path.insert(0, sys.argv[1]); '
-    'from ahf_ros.batch.processes import work; work(int(sys.argv[2]))'
+    'from ahf_ros.batch.processes import work_on; work_on(int(sys.argv[2]))'
 )
 
 
@@ -49,15 +49,19 @@ class Kind(IntEnum):
     RAISED = 2
 
 
-def work(descriptor: int) -> None:
-    """Process tasks that come through a pipe until it is closed."""
+def work_on(descriptor: int) -> None:
+    """Process tasks that come through a pipe until it is closed, or until a signal ends that."""
     for number in (signal.SIGINT, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)  # the parent gets it, too, and ends
     signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
     signal.signal(signal.SIGTERM, _end)
     signal.signal(signal.SIGPROF, _interrupt)
     threading.Thread(target=_watch, args=(descriptor,), daemon=True).start()
-    pipe = Connection(descriptor)
+    work(Connection(descriptor))
+
+
+def work(pipe: Connection) -> None:
+    """Process tasks that come through a pipe until it is closed."""
 
     def report(*values: Any) -> None:
         with suppress(*_PIPE_CLOSED):  # this process is about to end
@@ -110,11 +114,33 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
     ending.interrupt(frame)
 
 
+class _Spawned:
+    """A process of multiprocessing, with the face of one of subprocess."""
+
+    def __init__(self, pipe: Connection) -> None:
+        self._process = get_context('spawn').Process(target=work, args=(pipe,), daemon=True)
+        self._process.start()
+
+    @property
+    def returncode(self) -> int:
+        """Exit status, 0 where it still runs."""
+        return self._process.exitcode or 0
+
+    def wait(self, timeout: float | None = None) -> int:
+        """Wait for its end."""
+        self._process.join(timeout)
+        return self.returncode
+
+    def kill(self) -> None:
+        """End it at once."""
+        self._process.kill()
+
+
 @dataclass(slots=True, eq=False)
 class _Worker:
     """A process, the pipe to it, and the task that it has; it is idle before the first try."""
 
-    process: subprocess.Popen[bytes]
+    process: subprocess.Popen[bytes] | _Spawned
     pipe: Connection
     number: int = -1
     task: Any = None
@@ -205,6 +231,10 @@ class ProcessEngine:
 
 def _start() -> _Worker:
     pipe, other = Pipe()
+    if not hasattr(signal, 'pthread_sigmask'):  # on Windows, where a pipe is not inherited either
+        spawned = _Spawned(other)
+        other.close()
+        return _Worker(spawned, pipe)
     # It does not heed Ctrl-C before it can ignore it.
     before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
     try:

@@ -145,7 +145,7 @@ class Results:
                 while written < len(content):
                     written += self._file.write(content[written:])  # less where the disk is full
             except OSError:
-                os.truncate(self.path, end)
+                self._file.truncate(end)
                 raise
             if time.monotonic() - self._synchronised > _SYNCHRONISED:
                 os.fsync(self._file.fileno())
@@ -234,14 +234,18 @@ class Results:
                 file.write(self._content(entry))
             file.flush()
             os.fsync(file.fileno())
-            part.replace(self.path)
-            self._file.close()
-            self._file = self.path.open('a+b', buffering=0)
+            file.close()
+            self._file.close()  # Windows replaces no open file
+            try:
+                part.replace(self.path)
+            finally:
+                self._file = self.path.open('a+b', buffering=0)
         self._entries, self._damaged = entries, 0
 
     def _content(self, entry: _Entry) -> bytes:
         with file_errors(self.path, 'read'):
-            return os.pread(self._file.fileno(), entry.length, entry.place)
+            self._file.seek(entry.place)
+            return self._file.read(entry.length)
 
 
 def _fingerprint(task: ImageTask) -> str:

@@ -105,7 +105,7 @@ def _tasks(options: argparse.Namespace) -> list[BagTask]:
         from ahf_ros.bag.run import BagTask
     except ModuleNotFoundError as error:
         raise ValueError(
-            f'{error.name} is not installed, bags need it: pip install rosbags mcap'
+            f"{error.name} is not installed, bags need it: pip install 'ahf_ros[bag]'"
         ) from error
 
     jobs = min(options.jobs, len(options.bags))

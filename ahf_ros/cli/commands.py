@@ -36,6 +36,8 @@ COMMANDS = {
         'cli.learn_family',
         'Learn template, positions and numbers of point-distributed targets from a survey.',
     ),
+    'demo': ('cli.demo', 'Identify a rendered image in three ways, which shows the method.'),
+    'doctor': ('cli.doctor', 'Say what is installed, and what is missing for what.'),
     'targets': ('cli.targets', 'Print targets, true to scale, with their geometry.'),
 }
 """Module below `ahf_ros` and description of each command."""

@@ -34,6 +34,7 @@ import numpy as np
 from ahf_ros.filtering.settings import FilterSettings
 from ahf_ros.imaging.image import check_image
 from ahf_ros.imaging.logarithm import logarithm, mapping, sample_lattice
+from ahf_ros.target import FilterState
 
 _TOLERANCE = 1e-3  # weight of a kernel, of 1, beyond its last tap: errors within one gray level
 _MARGIN = 12  # width of the periodic border around a logarithm, px; few filters reach further
@@ -271,3 +272,14 @@ def _filtered_samples(padded: np.ndarray, blur: _Blur, shape: tuple[int, int]) -
     centres = np.array([strip[blur.above] for strip in around])
     inside = columns + blur.beside
     return blur.high * centres[:, inside] - blur.difference * blurred[:, inside]
+
+
+def filtered(
+    image: np.ndarray, used: FilterState, settings: FilterSettings | None = None
+) -> np.ndarray:
+    """Return the image as the filter of an identification leaves it."""
+    if not used.applied:
+        return image
+    return HomomorphicFilter(image, settings).filtered(
+        used.gamma_high, used.gamma_low, used.cutoff, used.attenuation
+    )

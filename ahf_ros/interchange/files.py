@@ -6,21 +6,29 @@ URLs are those of whatever storage fsspec reaches: https://, s3://, memory:// an
 from __future__ import annotations
 
 import csv
-import fcntl
 import io
 import os
 import re
+import sqlite3
 import time
-from collections.abc import Collection, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from importlib import import_module
 from pathlib import Path, PurePath
 from typing import Any, BinaryIO
 
 from ahf_ros.text import reason_of, shown
 
+_fcntl: Any
+try:
+    _fcntl = import_module('fcntl')
+except ImportError:  # on Windows
+    _fcntl = None
+
 RESULTS_FILE = 'results.jsonl'
 """Name of the file in a folder that `ahf identify --output` writes."""
 
+_LOCK_FILE = '.lock'
 _TRY_LOCK = 0.1  # s between two attempts
 _URL = re.compile(r'[a-z][a-z0-9+.-]*://', re.IGNORECASE)
 _CHANGED = ('mtime', 'LastModified', 'last_modified', 'updated', 'ETag', 'created')
@@ -42,18 +50,42 @@ def locked(folder: str | Path, lock_timeout: float = 0.0) -> Iterator[None]:
 
     Raises a ValueError if another process still has locked it after `lock_timeout` s.
     """
-    descriptor = os.open(folder, os.O_RDONLY)
     limit = time.monotonic() + lock_timeout
-    try:
-        while True:
-            try:
-                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                break
-            except BlockingIOError as error:
-                if time.monotonic() >= limit:
-                    raise ValueError(f'{folder} is being written by another process') from error
-                time.sleep(_TRY_LOCK)
+    with _lock_of(folder) as try_lock:
+        while not try_lock():
+            if time.monotonic() >= limit:
+                raise ValueError(f'{folder} is being written by another process')
+            time.sleep(_TRY_LOCK)
         yield
+
+
+@contextmanager
+def _lock_of(folder: str | Path) -> Iterator[Callable[[], bool]]:
+    """Yield what tries to lock a folder and returns whether it could."""
+    if _fcntl is None:  # folders cannot be locked; a database can, by any process
+        database = sqlite3.connect(Path(folder, _LOCK_FILE), timeout=0, isolation_level=None)
+
+        def locked_database() -> bool:
+            with suppress(sqlite3.OperationalError):
+                database.execute('BEGIN EXCLUSIVE')
+                return True
+            return False
+
+        try:
+            yield locked_database
+        finally:
+            database.close()
+        return
+    descriptor = os.open(folder, os.O_RDONLY)
+
+    def locked_folder() -> bool:
+        with suppress(BlockingIOError):
+            _fcntl.flock(descriptor, _fcntl.LOCK_EX | _fcntl.LOCK_NB)
+            return True
+        return False
+
+    try:
+        yield locked_folder
     finally:
         os.close(descriptor)
 

@@ -12,13 +12,11 @@ from ahf_ros import msg
 from ahf_ros.advice import Adviser
 from ahf_ros.detectors import Detector, create_detector
 from ahf_ros.detectors.contract import Unavailable
-from ahf_ros.filtering.homomorphic import HomomorphicFilter
-from ahf_ros.filtering.settings import FilterSettings
+from ahf_ros.filtering.homomorphic import filtered
 from ahf_ros.interchange.target_messages import coded_target_array
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.settings import LOSSLESS, DetectorNodeSettings
 from ahf_ros.stream import Answer, Stream
-from ahf_ros.target import FilterState
 
 STOPPING = 'the node stops'
 """Why an image that waits is not answered."""
@@ -69,17 +67,6 @@ class Pipeline:
         """Return the filtered image in which the targets of an answer were identified."""
         settings = self.settings.identification.adaptive.filter
         return filtered(answer.image, answer.identification.filter, settings)
-
-
-def filtered(
-    image: np.ndarray, used: FilterState, settings: FilterSettings | None = None
-) -> np.ndarray:
-    """Return the image as the filter of an identification leaves it."""
-    if not used.applied:
-        return image
-    return HomomorphicFilter(image, settings).filtered(
-        used.gamma_high, used.gamma_low, used.cutoff, used.attenuation
-    )
 
 
 def _check_running(stopping: threading.Event) -> None:

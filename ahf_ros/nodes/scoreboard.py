@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-from ahf_ros.evaluation import score
+from ahf_ros.evaluation import line
 from ahf_ros.interchange.image_messages import nanoseconds
 from ahf_ros.interchange.target_messages import identification_from
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.parameters import ParameterSettings
 from ahf_ros.nodes.process import ProcessNode, run
 from ahf_ros.nodes.settings import ScoreboardSettings
-from ahf_ros.target import Identification, Target
 
 KEPT = 1000
 """Number of truths that wait for the answer to their image."""
@@ -48,29 +45,6 @@ class Scoreboard(ProcessNode):
         print(f'image {self._count}: {words}', flush=True)
         if self._count == images:
             self.ended.set_result(0)
-
-
-def line(found: Identification, truth: Sequence[Target]) -> str:
-    """Return in words how well the targets of an image were identified, and how."""
-    figures = score(truth, found)
-    words = [
-        f'{figures.right} of {figures.expected} right',
-        f'{figures.wrong} wrong',
-        f'{figures.false_positives} false',
-        f'{figures.expected - figures.found} missed',
-    ]
-    if figures.rmse is not None:
-        words.append(f'RMSE {figures.rmse[2]:.3f} px')
-    return f'{", ".join(words)}; {method(found)}, {found.filter.duration:.2f} s'
-
-
-def method(found: Identification) -> str:
-    """Return in words which filter led to an identification, and how many trials it took."""
-    used = found.filter
-    words = 'no filter'
-    if used.applied:
-        words = f'gamma_high {used.gamma_high:.2f}, gamma_low {used.gamma_low:.2f}'
-    return f'{words}, {used.evaluations} trial{"" if used.evaluations == 1 else "s"}'
 
 
 def main(arguments: list[str] | None = None) -> int:

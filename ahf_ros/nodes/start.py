@@ -9,30 +9,38 @@ from importlib import import_module
 from ahf_ros.ending import has_arrived, ignore_ending, signalled
 
 NODES = {
-    'demo': 'ahf_ros.nodes.demo',
     'detector': 'ahf_ros.nodes.detector',
     'illumination': 'ahf_ros.nodes.illumination',
     'scoreboard': 'ahf_ros.nodes.scoreboard',
 }
 """Modules whose `main` runs a node, by the name of the node."""
 
+INSTALL = (
+    'nodes need ROS 2: source an installation, or install it from PyPI in the sources of ahf_ros '
+    'with pip install . ./ros'
+)
+
 
 def start(node: str, arguments: list[str] | None = None) -> int:
     """Run one of `NODES` and return its exit status.
 
     Where there are no arguments, `sys.argv` has them. `--help` before those that ROS reads prints
-    what the node does; the demo has options of its own.
+    what the node does.
     """
     signalled()
     own = sys.argv[1:] if arguments is None else arguments
     if '--ros-args' in own:
         own = own[: own.index('--ros-args')]
-    if node != 'demo' and not {'-h', '--help'}.isdisjoint(own):
+    if not {'-h', '--help'}.isdisjoint(own):
         from ahf_ros.nodes.interfaces import help_text
 
         print(help_text(node), end='')
         return 0
-    module = import_module(NODES[node])
+    try:
+        module = import_module(NODES[node])
+    except ModuleNotFoundError as error:
+        print(f'ahf_{node}: {error.name} is missing, {INSTALL}', file=sys.stderr)
+        return 1
     if has_arrived():
         ignore_ending()
         return 0
@@ -40,4 +48,4 @@ def start(node: str, arguments: list[str] | None = None) -> int:
     return status
 
 
-demo, detector, illumination, scoreboard = (partial(start, node) for node in NODES)
+detector, illumination, scoreboard = (partial(start, node) for node in NODES)

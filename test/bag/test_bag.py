@@ -373,4 +373,4 @@ def test_a_missing_library_is_named(
     monkeypatch.delitem(sys.modules, 'ahf_ros.bag.run')
     monkeypatch.setitem(sys.modules, 'rosbags.rosbag2', None)
     assert status(recording, tmp_path / 'out') == 2
-    assert 'is not installed, bags need it: pip install rosbags' in capfd.readouterr().err
+    assert "is not installed, bags need it: pip install 'ahf_ros[bag]'" in capfd.readouterr().err

@@ -32,7 +32,7 @@ def test_help_names_topics_services_and_parameters(
 
 
 def test_every_node_has_help() -> None:
-    assert {*NODES, 'demo'} == set(start.NODES)  # the demo has options
+    assert set(NODES) == set(start.NODES)
 
 
 def test_help_is_asked_for_before_the_arguments_of_ros(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -51,7 +51,8 @@ def run(*command: str, **environment: str) -> tuple[int, str]:
 
 
 @pytest.mark.parametrize(
-    ('node', 'number'), [('detector', 'SIGINT'), ('demo', 'SIGTERM'), ('detector', 'SIGHUP')]
+    ('node', 'number'),
+    [('detector', 'SIGINT'), ('illumination', 'SIGTERM'), ('detector', 'SIGHUP')],
 )
 def test_a_signal_during_the_imports_ends_in_order(node: str, number: str) -> None:
     assert node in NODES

@@ -8,12 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-pytest.importorskip('rclpy', reason='ROS 2 is not installed')
-
+from ahf_ros.cli.demo import WAYS, tile
 from ahf_ros.drawing.overlay import DECODED_COLOUR, MISSED_COLOUR, WRONG_COLOUR
 from ahf_ros.interchange.image_files import read_image
-from ahf_ros.nodes.demo import WAYS, main, tile
 from ahf_ros.target import FilterState, Identification, Target
+from support.command_line import status
 
 GRAY = np.full((240, 320), 120, np.uint8)
 
@@ -21,7 +20,7 @@ GRAY = np.full((240, 320), 120, np.uint8)
 def test_the_demo_shows_one_image_in_three_ways(
     tmp_path: Path, capsys: pytest.CaptureFixture
 ) -> None:
-    assert main(['--output', str(tmp_path)]) == 0
+    assert status('demo', '--output', tmp_path) == 0
     said = capsys.readouterr()
     assert said.err == ''
     found = re.findall(r'^  (\w.*?)  +(\d+) of 12 right.* (\d+) missed.*; (.*), ', said.out, re.M)
@@ -53,8 +52,7 @@ def test_the_demo_shows_one_image_in_three_ways(
 def test_bad_options_of_the_demo_are_named(
     option: list[str], words: str, capsys: pytest.CaptureFixture
 ) -> None:
-    with pytest.raises(SystemExit, match='2'):
-        main(option)
+    assert status('demo', *option) == 2
     assert words in capsys.readouterr().err
 
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import inspect
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ahf_ros import ending
+from ahf_ros.cli.options import add_option
 from ahf_ros.drawing.overlay import (
     DECODED_COLOUR,
     MISSED_COLOUR,
@@ -18,11 +17,12 @@ from ahf_ros.drawing.overlay import (
     overlay,
 )
 from ahf_ros.drawing.tiles import Tile, side_by_side
-from ahf_ros.evaluation import FALSE, RIGHT, WRONG, judge
+from ahf_ros.evaluation import FALSE, RIGHT, WRONG, judge, line, method
+from ahf_ros.filtering.homomorphic import filtered
+from ahf_ros.interchange.files import file_errors
 from ahf_ros.interchange.image_files import write_image
-from ahf_ros.nodes.pipeline import filtered
-from ahf_ros.nodes.scoreboard import line, method
 from ahf_ros.session import create_identifier
+from ahf_ros.settings.parameter import Parameter
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
 from ahf_ros.synthetic.scene import SceneSettings, render
 from ahf_ros.target import Identification, Target, TrueTarget
@@ -41,28 +41,30 @@ WIDTH = 800
 """Width of one of the images side by side, px."""
 
 
-def main(arguments: list[str] | None = None) -> int:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Give a parser the arguments of the command."""
+    scene = SceneSettings()
+    parser.add_argument(
+        '--light', choices=LIGHT_NAMES, default='stripe', help='Projected light. Default: stripe.'
+    )
+    text = 'Ambient light as a share of the projected light.'
+    add_option(parser, Parameter('ambient', scene.ambient, text))
+    add_option(parser, Parameter('seed', scene.seed, 'Seed of the image.'))
+    parser.add_argument('--output', default='demo', help='Folder for the picture. Default: demo.')
+
+
+def run(options: argparse.Namespace) -> int:
     """Identify the same image in three ways.
 
     The three ways are the detector `traditional` alone, the same with a filter that AHF finds,
     and the detector `ring`, which needs no filter. One line for each says what was right and
     wrong, and one picture shows it.
     """
-    made = parser()
-    options = made.parse_args(arguments)
     picture = Path(options.output, 'image_1.jpg')
-    try:
-        scene = SceneSettings(
-            **SCENE, light=options.light, ambient=options.ambient, seed=options.seed
-        )
+    scene = SceneSettings(**SCENE, light=options.light, ambient=options.ambient, seed=options.seed)
+    with file_errors(picture.parent, 'made'):
         picture.parent.mkdir(parents=True, exist_ok=True)
-    except (ValueError, OSError) as error:
-        made.error(str(error))
-    try:
-        with ending.handled():
-            show(scene, picture)
-    except KeyboardInterrupt:
-        return 130
+    show(scene, picture)
     return 0
 
 
@@ -103,23 +105,3 @@ def tile(title: str, image: np.ndarray, found: Identification, truth: tuple[Targ
     ]
     unit = max(1, image.shape[1] // WIDTH)
     return Tile(overlay(image, found.targets, wrong, missed, unit), title, remarks)
-
-
-def parser() -> argparse.ArgumentParser:
-    """Return the parser of the command line."""
-    made = argparse.ArgumentParser(
-        prog='ahf_demo',
-        description=inspect.getdoc(main),
-        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
-    )
-    scene = SceneSettings()
-    made.add_argument('--light', choices=LIGHT_NAMES, default='stripe', help='projected light')
-    made.add_argument(
-        '--ambient',
-        type=float,
-        default=scene.ambient,
-        help='ambient light as a share of the projected light',
-    )
-    made.add_argument('--seed', type=int, default=scene.seed, help='seed of the image')
-    made.add_argument('--output', default='demo', help='folder for the picture')
-    return made
