@@ -1,0 +1,351 @@
+"""The pose of one image of known points by least squares, and tests of its points.
+
+Image points are weighted by their covariances and by those of the coordinates [1]_. Points are
+tested as those of networks are, by the decrease of the sum of squares without them [2]_.
+
+References
+----------
+.. [1] Förstner & Wrobel, Photogrammetric Computer Vision, Springer 2016, sections 4.4 and 12.2.
+.. [2] Baarda, A testing procedure for use in geodetic networks, 1968.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ahf_ros.orientation.camera import linearise, pinhole, rotation_matrices
+from ahf_ros.orientation.network import FloatArray, IntArray
+from ahf_ros.orientation.normals import BEHIND, robust_spread
+from ahf_ros.orientation.planar import mirrored
+from ahf_ros.orientation.points import entries
+from ahf_ros.orientation.resection import Resection, resections
+from ahf_ros.orientation.solution import Start
+from ahf_ros.orientation.testing import CRITICAL
+
+ROUNDS = 20
+"""Steps of a fit, and rounds of tests."""
+
+SIGNIFICANCE = 0.025
+"""Error probability of the test whether the sum of squares is larger than by chance."""
+
+_CONVERGED = 1e-9  # decrease of the sum of weighted squares
+_RECOMPUTED = 3  # times that the weights are computed: coordinates have theirs from the pose
+_ONE = pinhole(1.0, 1, 1)  # a camera that sees places in the plane z = 1
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Sight:
+    """Known points (n, 3) at places (n, 2) of the plane z = 1, with both covariances.
+
+    Those of the places are (n, 2, 2), that of all coordinates is (3n, 3n).
+    """
+
+    points: FloatArray
+    places: FloatArray
+    covariances: FloatArray
+    of_points: FloatArray
+
+    @property
+    def sigma(self) -> FloatArray:
+        """Standard deviations (n,) of a coordinate of the places, the mean of both."""
+        sigma: FloatArray = np.sqrt(np.trace(self.covariances, axis1=1, axis2=2) / 2)
+        return sigma
+
+    def chosen(self, rows: IntArray) -> Sight:
+        """Return some of the points."""
+        some = entries(rows)
+        return Sight(
+            self.points[rows],
+            self.places[rows],
+            self.covariances[rows],
+            self.of_points[np.ix_(some, some)],
+        )
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A pose of least squares: X_camera = R (X - position).
+
+    `cofactors` (6, 6) are of (position, rotation vector in the camera's frame), `lengths` (n,) the
+    residuals of all points over their standard deviations, as Baarda's test has them.
+    """
+
+    rotation: FloatArray
+    position: FloatArray
+    used: Mask
+    cost: float
+    cofactors: FloatArray
+    lengths: FloatArray
+
+    @property
+    def redundancy(self) -> int:
+        """Observations beyond those that a pose needs."""
+        return 2 * int(self.used.sum()) - 6
+
+    @property
+    def by_chance(self) -> float:
+        """Probability of at least this sum of squares.
+
+        The redundancy is even, so that the distribution is a sum of Poisson's (Abramowitz and
+        Stegun 1964, 26.4.21).
+        """
+        half, terms = self.cost / 2, np.arange(self.redundancy // 2)
+        logarithms = terms * math.log(max(half, 1e-300)) - half
+        return float(np.exp(logarithms - [math.lgamma(term + 1) for term in terms]).sum())
+
+    @property
+    def plausible(self) -> bool:
+        """Whether the sum of squares is that of these weights, and not larger."""
+        return self.redundancy <= 0 or self.by_chance > SIGNIFICANCE
+
+    @property
+    def spread(self) -> float:
+        """Standard deviation of unit weight that points are tested with."""
+        return 1.0 if self.plausible else max(1.0, robust_spread(self.lengths[self.used]))
+
+    def worst(self) -> int:
+        """Return the used point that fits least."""
+        return int(np.argmax(np.where(self.used, self.lengths, 0)))
+
+
+def tested_fit(sight: Sight) -> Fit | None:
+    """Return the pose on which most points agree; None where none is found.
+
+    Points that do not agree are off, by tests one by one, off and on again. Where all agree, as
+    nearly always, a direct solution is the start.
+    """
+    every = np.ones(len(sight.points), bool)
+    start = direct(sight)
+    result = fitted(sight, every, *start) if start else None
+    if result and result.lengths.max() < CRITICAL * result.spread and result.spread == 1:
+        return result
+    robust = agreeing(sight)
+    if not robust or robust.agrees.sum() < 4:
+        return result
+    used, rotation, position = robust.agrees, robust.rotation, robust.position
+    returned = ~every
+    for _ in range(ROUNDS):
+        found = fitted(sight, used, rotation, position)
+        if not found:
+            return result
+        result, rotation, position = found, found.rotation, found.position
+        lengths = found.lengths / found.spread
+        on = ~used & (lengths < CRITICAL) & ~returned
+        off = np.zeros_like(used)
+        off[found.worst()] = lengths[found.worst()] > CRITICAL
+        if not (on | off).any() or used.sum() <= 4:
+            break
+        returned |= on
+        used = (used & ~off) | on
+    return result
+
+
+def direct(sight: Sight) -> tuple[FloatArray, FloatArray] | None:
+    """Return the pose of all points by SQPnP (Terzakis and Lourakis, ECCV 2020)."""
+    count, turns, shifts, _ = cv2.solvePnPGeneric(
+        sight.points, sight.places, np.eye(3), None, flags=cv2.SOLVEPNP_SQPNP
+    )
+    for turn, shift in zip(turns[:count], shifts[:count], strict=True):
+        rotation = np.asarray(cv2.Rodrigues(turn)[0], float)
+        position = -rotation.T @ shift.ravel()
+        if np.isfinite(rotation).all() and np.isfinite(position).all():
+            return rotation, position
+    return None
+
+
+def agreeing(sight: Sight) -> Resection | None:
+    """Return the robust pose of points of which some are wrong."""
+    found = resections(sight.points, sight.places, sight.sigma)
+    return found[0] if found else None
+
+
+def other_fit(sight: Sight, fit: Fit) -> Fit | None:
+    """Return the fit of the same points beyond Necker's reversal, None if that is no minimum."""
+    state = Start(
+        calibrations=_ONE[None],
+        rotations=fit.rotation[None],
+        positions=fit.position[None],
+        points=sight.points[fit.used],
+        used=fit.used,
+    )
+    start = mirrored(state)
+    other = fitted(sight, fit.used, start.rotations[0], start.positions[0])
+    if other is None:
+        return None
+    apart = np.arccos(np.clip((np.sum(other.rotation * fit.rotation) - 1) / 2, -1, 1))
+    return other if apart > 3 * np.sqrt(np.linalg.eigvalsh(fit.cofactors[3:, 3:])[-1]) else None
+
+
+def fitted(sight: Sight, used: Mask, rotation: FloatArray, position: FloatArray) -> Fit | None:
+    """Return the weighted least-squares fit of the used points (n,) from a start.
+
+    None if the start has used points behind the camera, or the points do not determine a pose.
+    """
+    rows = np.flatnonzero(used)
+    part = sight.chosen(rows)
+    if _depths(part.points, rotation, position).min() <= 0:
+        return None
+    cost = np.inf
+    for _ in range(_RECOMPUTED):
+        whitening = _whitening(part, rotation, position)
+        before = cost
+        moved = _minimised(part, whitening, rotation, position)
+        if moved is None:
+            return None
+        rotation, position, cost = moved
+        if abs(before - cost) < _CONVERGED * max(cost, 1) or not part.of_points.any():
+            break
+    return _rated(sight, part, rows, rotation, position)
+
+
+def _minimised(
+    part: Sight, whitening: FloatArray, rotation: FloatArray, position: FloatArray
+) -> tuple[FloatArray, FloatArray, float] | None:
+    """Return the pose of least squares by Gauss-Newton steps, halved until the sum decreases."""
+    misclosure, design = _linearised(part, rotation, position)
+    rest, jacobian = whitening @ misclosure, whitening @ design
+    cost = float(rest @ rest)
+    for _ in range(ROUNDS):
+        normal = jacobian.T @ jacobian
+        scale = np.sqrt(np.diag(normal))
+        if not (scale > 0).all():
+            return None
+        try:
+            step = np.linalg.solve(normal / np.outer(scale, scale), jacobian.T @ rest / scale)
+        except np.linalg.LinAlgError:
+            return None
+        promised = float(step @ (jacobian.T @ rest / scale))
+        if promised < _CONVERGED:
+            break
+        step = step / scale
+        for _ in range(ROUNDS):
+            turned = rotation_matrices(step[None, 3:])[0] @ rotation
+            moved = position + step[:3]
+            if _depths(part.points, turned, moved).min() > 0:
+                misclosure, design = _linearised(part, turned, moved)
+                rest = whitening @ misclosure
+                if rest @ rest < cost:
+                    break
+            step = step / 2
+        else:
+            break
+        rotation, position, cost = turned, moved, float(rest @ rest)
+        jacobian = whitening @ design
+    return rotation, position, cost
+
+
+def _rated(
+    sight: Sight, part: Sight, rows: IntArray, rotation: FloatArray, position: FloatArray
+) -> Fit | None:
+    """Return the fit at its minimum, with the tests of all points."""
+    misclosure, design = _linearised(part, rotation, position)
+    covariance = _covariance(part, rotation, position)
+    weights = np.linalg.inv(covariance)
+    weighted = weights @ design
+    normal = design.T @ weighted
+    scale = np.sqrt(np.diag(normal))
+    try:
+        cofactors = np.linalg.inv(normal / np.outer(scale, scale)) / np.outer(scale, scale)
+    except np.linalg.LinAlgError:
+        return None
+    if not np.isfinite(cofactors).all() or np.diag(cofactors).min() <= 0:
+        return None
+    used = np.zeros(len(sight.points), bool)
+    used[rows] = True
+    lengths = np.full(len(used), BEHIND)
+    # The decrease of the sum of squares without a point, also where points are correlated.
+    of_rest = _own_blocks(weights - weighted @ cofactors @ weighted.T)
+    pull = (weights @ misclosure).reshape(-1, 2)
+    lengths[rows] = _mahalanobis(pull, of_rest)
+    others = np.flatnonzero(~used)
+    others = others[_depths(sight.points[others], rotation, position) > 0]
+    if len(others):
+        rest = sight.chosen(others)
+        missed, by_pose = _linearised(rest, rotation, position)
+        of_missed = _covariance(rest, rotation, position) + by_pose @ cofactors @ by_pose.T
+        lengths[others] = _mahalanobis(missed.reshape(-1, 2), _own_blocks(of_missed))
+    cost = float(misclosure @ weights @ misclosure)
+    return Fit(rotation, position, used, cost, (cofactors + cofactors.T) / 2, lengths)
+
+
+def residuals(sight: Sight, fit: Fit) -> FloatArray:
+    """Return measured minus computed places (n, 2) of the used points."""
+    part = sight.chosen(np.flatnonzero(fit.used))
+    return _linearised(part, fit.rotation, fit.position)[0].reshape(-1, 2)
+
+
+def nearest(sight: Sight, fit: Fit, place: int, points: FloatArray) -> tuple[int, float]:
+    """Return which of other points (k, 3) is imaged nearest to a measured place, and how far.
+
+    The distance is in standard deviations of the place.
+    """
+    before = np.where(_depths(points, fit.rotation, fit.position)[:, None] > 0, points, np.nan)
+    seen = (before - fit.position) @ fit.rotation.T
+    gaps = sight.places[place] - seen[:, :2] / seen[:, 2:]
+    inverse = np.linalg.inv(sight.covariances[place])
+    lengths = np.nan_to_num(np.sqrt(np.einsum('ni,ij,nj->n', gaps, inverse, gaps)), nan=np.inf)
+    best = int(np.argmin(lengths))
+    return best, float(lengths[best])
+
+
+def _depths(points: FloatArray, rotation: FloatArray, position: FloatArray) -> FloatArray:
+    depths: FloatArray = (points - position) @ rotation[2]
+    return depths
+
+
+def _linearised(
+    part: Sight, rotation: FloatArray, position: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return measured minus computed (2n,), and derivatives of the latter by the pose (2n, 6)."""
+    design = linearise(_ONE, rotation, position, part.points)
+    return (part.places - design.xy).ravel(), design.by_pose.reshape(-1, 6)
+
+
+def _covariance(part: Sight, rotation: FloatArray, position: FloatArray) -> FloatArray:
+    """Return the covariance (2n, 2n) of measured minus computed, with that of the coordinates."""
+    count = len(part.points)
+    each = np.arange(count)
+    covariance = np.zeros((count, 2, count, 2))
+    if part.of_points.any():
+        by_point = linearise(_ONE, rotation, position, part.points).by_point
+        blocks = part.of_points.reshape(count, 3, count, 3)
+        half = np.einsum('iab,ibjc->iajc', by_point, blocks, optimize=True)
+        covariance = np.einsum('iajc,jdc->iajd', half, by_point, optimize=True)
+    covariance[each, :, each] += part.covariances
+    return covariance.reshape(2 * count, 2 * count)
+
+
+def _whitening(part: Sight, rotation: FloatArray, position: FloatArray) -> FloatArray:
+    """Return the matrix (2n, 2n) that makes errors of unit weight of those of the places."""
+    whitening: FloatArray = np.linalg.inv(
+        np.linalg.cholesky(_covariance(part, rotation, position))
+    )
+    return whitening
+
+
+def _own_blocks(matrix: FloatArray) -> FloatArray:
+    """Return the blocks (n, 2, 2) on the diagonal of a matrix (2n, 2n)."""
+    count = len(matrix) // 2
+    each = np.arange(count)
+    blocks: FloatArray = matrix.reshape(count, 2, count, 2)[each, :, each]
+    return blocks
+
+
+def _mahalanobis(vectors: FloatArray, covariances: FloatArray) -> FloatArray:
+    """Return lengths (n,) of vectors (n, 2) in the metric of their covariances.
+
+    That of a point that no other checks is singular: its length is zero.
+    """
+    sizes, axes = np.linalg.eigh(covariances)
+    along = (axes.transpose(0, 2, 1) @ vectors[:, :, None])[:, :, 0]
+    known = sizes > 1e-9 * sizes[:, 1:]
+    squares = np.where(known, along**2 / np.where(known, sizes, 1), 0)
+    lengths: FloatArray = np.sqrt(squares.sum(axis=1))
+    return lengths
