@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ahf_ros.orientation.camera import linearise, pinhole, rotation_matrices
+from ahf_ros.orientation.camera import pinhole
 from ahf_ros.orientation.network import FloatArray, IntArray
 from ahf_ros.orientation.normals import BEHIND, robust_spread
 from ahf_ros.orientation.planar import mirrored
@@ -33,9 +33,9 @@ ROUNDS = 20
 SIGNIFICANCE = 0.025
 """Error probability of the test whether the sum of squares is larger than by chance."""
 
-_CONVERGED = 1e-9  # decrease of the sum of weighted squares
-_RECOMPUTED = 3  # times that the weights are computed: coordinates have theirs from the pose
-_ONE = pinhole(1.0, 1, 1)  # a camera that sees places in the plane z = 1
+_CONVERGED = 1e-9  # decrease of the sum of weighted squares that a step promises
+_FEW_ROUNDS = 6
+_WEIGHTED = 2  # times that the weights are computed: coordinates have theirs from the pose
 
 Mask = NDArray[np.bool_]
 
@@ -166,21 +166,37 @@ def agreeing(sight: Sight) -> Resection | None:
     return found[0] if found else None
 
 
-def other_fit(sight: Sight, fit: Fit) -> Fit | None:
-    """Return the fit of the same points beyond Necker's reversal, None if that is no minimum."""
+def other_fit(sight: Sight, fit: Fit, unlikely: float) -> Fit | None:
+    """Return the fit of the same points beyond Necker's reversal.
+
+    None if that is no other minimum, or one whose sum of squares is larger by `unlikely` or more.
+    One that matters is near the reversal, so that a few steps find it.
+    """
+    rows = np.flatnonzero(fit.used)
+    part = sight.chosen(rows)
     state = Start(
-        calibrations=_ONE[None],
+        calibrations=pinhole(1.0, 1, 1)[None],
         rotations=fit.rotation[None],
         positions=fit.position[None],
-        points=sight.points[fit.used],
-        used=fit.used,
+        points=part.points,
+        used=np.ones(len(rows), bool),
     )
     start = mirrored(state)
-    other = fitted(sight, fit.used, start.rotations[0], start.positions[0])
-    if other is None:
+    rotation, position = start.rotations[0], start.positions[0]
+    if _seen(part.points, rotation, position)[:, 2].min() <= 0:
         return None
-    apart = np.arccos(np.clip((np.sum(other.rotation * fit.rotation) - 1) / 2, -1, 1))
-    return other if apart > 3 * np.sqrt(np.linalg.eigvalsh(fit.cofactors[3:, 3:])[-1]) else None
+    whitening = _whitening(part, rotation, position)
+    found = _minimised(part, whitening, rotation, position, _FEW_ROUNDS)
+    if found is None:
+        return None
+    rest = whitening @ _misclosure(part, _seen(part.points, *found))
+    if rest @ rest >= fit.cost + unlikely:
+        return None
+    cosine = (np.sum(found[0] * fit.rotation) - 1) / 2
+    apart = np.arccos(np.clip(cosine, -1, 1)) ** 2
+    if apart < 9 * np.linalg.eigvalsh(fit.cofactors[3:, 3:])[-1]:
+        return None
+    return fitted(sight, fit.used, *found)
 
 
 def fitted(sight: Sight, used: Mask, rotation: FloatArray, position: FloatArray) -> Fit | None:
@@ -190,64 +206,66 @@ def fitted(sight: Sight, used: Mask, rotation: FloatArray, position: FloatArray)
     """
     rows = np.flatnonzero(used)
     part = sight.chosen(rows)
-    if _depths(part.points, rotation, position).min() <= 0:
+    if _seen(part.points, rotation, position)[:, 2].min() <= 0:
         return None
-    cost = np.inf
-    for _ in range(_RECOMPUTED):
+    for _ in range(_WEIGHTED if part.of_points.any() else 1):
         whitening = _whitening(part, rotation, position)
-        before = cost
         moved = _minimised(part, whitening, rotation, position)
         if moved is None:
             return None
-        rotation, position, cost = moved
-        if abs(before - cost) < _CONVERGED * max(cost, 1) or not part.of_points.any():
-            break
-    return _rated(sight, part, rows, rotation, position)
+        rotation, position = moved
+    return _rated(sight, part, rows, whitening, rotation, position)
 
 
 def _minimised(
-    part: Sight, whitening: FloatArray, rotation: FloatArray, position: FloatArray
-) -> tuple[FloatArray, FloatArray, float] | None:
+    part: Sight,
+    whitening: FloatArray,
+    rotation: FloatArray,
+    position: FloatArray,
+    rounds: int = ROUNDS,
+) -> tuple[FloatArray, FloatArray] | None:
     """Return the pose of least squares by Gauss-Newton steps, halved until the sum decreases."""
-    misclosure, design = _linearised(part, rotation, position)
-    rest, jacobian = whitening @ misclosure, whitening @ design
-    cost = float(rest @ rest)
-    for _ in range(ROUNDS):
-        normal = jacobian.T @ jacobian
+    seen = _seen(part.points, rotation, position)
+    rest = whitening @ _misclosure(part, seen)
+    for _ in range(rounds):
+        jacobian = whitening @ _by_pose(seen, rotation)
+        normal, right = jacobian.T @ jacobian, jacobian.T @ rest
         scale = np.sqrt(np.diag(normal))
         if not (scale > 0).all():
             return None
         try:
-            step = np.linalg.solve(normal / np.outer(scale, scale), jacobian.T @ rest / scale)
+            step = np.linalg.solve(normal / np.outer(scale, scale), right / scale) / scale
         except np.linalg.LinAlgError:
             return None
-        promised = float(step @ (jacobian.T @ rest / scale))
-        if promised < _CONVERGED:
+        if step @ right < _CONVERGED:
             break
-        step = step / scale
+        before = rest @ rest
         for _ in range(ROUNDS):
-            turned = rotation_matrices(step[None, 3:])[0] @ rotation
+            turned = cv2.Rodrigues(step[3:])[0] @ rotation
             moved = position + step[:3]
-            if _depths(part.points, turned, moved).min() > 0:
-                misclosure, design = _linearised(part, turned, moved)
-                rest = whitening @ misclosure
-                if rest @ rest < cost:
-                    break
+            seen = _seen(part.points, turned, moved)
+            rest = whitening @ _misclosure(part, seen)
+            if seen[:, 2].min() > 0 and rest @ rest < before:
+                break
             step = step / 2
         else:
             break
-        rotation, position, cost = turned, moved, float(rest @ rest)
-        jacobian = whitening @ design
-    return rotation, position, cost
+        rotation, position = turned, moved
+    return rotation, position
 
 
 def _rated(
-    sight: Sight, part: Sight, rows: IntArray, rotation: FloatArray, position: FloatArray
+    sight: Sight,
+    part: Sight,
+    rows: IntArray,
+    whitening: FloatArray,
+    rotation: FloatArray,
+    position: FloatArray,
 ) -> Fit | None:
     """Return the fit at its minimum, with the tests of all points."""
-    misclosure, design = _linearised(part, rotation, position)
-    covariance = _covariance(part, rotation, position)
-    weights = np.linalg.inv(covariance)
+    seen = _seen(part.points, rotation, position)
+    misclosure, design = _misclosure(part, seen), _by_pose(seen, rotation)
+    weights = whitening.T @ whitening
     weighted = weights @ design
     normal = design.T @ weighted
     scale = np.sqrt(np.diag(normal))
@@ -268,7 +286,8 @@ def _rated(
     others = others[_depths(sight.points[others], rotation, position) > 0]
     if len(others):
         rest = sight.chosen(others)
-        missed, by_pose = _linearised(rest, rotation, position)
+        seen = _seen(rest.points, rotation, position)
+        missed, by_pose = _misclosure(rest, seen), _by_pose(seen, rotation)
         of_missed = _covariance(rest, rotation, position) + by_pose @ cofactors @ by_pose.T
         lengths[others] = _mahalanobis(missed.reshape(-1, 2), _own_blocks(of_missed))
     cost = float(misclosure @ weights @ misclosure)
@@ -278,7 +297,7 @@ def _rated(
 def residuals(sight: Sight, fit: Fit) -> FloatArray:
     """Return measured minus computed places (n, 2) of the used points."""
     part = sight.chosen(np.flatnonzero(fit.used))
-    return _linearised(part, fit.rotation, fit.position)[0].reshape(-1, 2)
+    return _misclosure(part, _seen(part.points, fit.rotation, fit.position)).reshape(-1, 2)
 
 
 def nearest(sight: Sight, fit: Fit, place: int, points: FloatArray) -> tuple[int, float]:
@@ -300,26 +319,48 @@ def _depths(points: FloatArray, rotation: FloatArray, position: FloatArray) -> F
     return depths
 
 
-def _linearised(
-    part: Sight, rotation: FloatArray, position: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return measured minus computed (2n,), and derivatives of the latter by the pose (2n, 6)."""
-    design = linearise(_ONE, rotation, position, part.points)
-    return (part.places - design.xy).ravel(), design.by_pose.reshape(-1, 6)
+def _seen(points: FloatArray, rotation: FloatArray, position: FloatArray) -> FloatArray:
+    """Return points (n, 3) in the frame of the camera."""
+    seen: FloatArray = (points - position) @ rotation.T
+    return seen
+
+
+def _misclosure(part: Sight, seen: FloatArray) -> FloatArray:
+    """Return measured minus computed places (2n,) of points in the frame of the camera."""
+    return (part.places - seen[:, :2] / seen[:, 2:]).ravel()
+
+
+def _by_seen(seen: FloatArray) -> FloatArray:
+    """Return the derivatives (n, 2, 3) of places by points in the frame of the camera."""
+    inverse = 1 / seen[:, 2]
+    derivative = np.zeros((len(seen), 2, 3))
+    derivative[:, 0, 0] = derivative[:, 1, 1] = inverse
+    derivative[:, :, 2] = -seen[:, :2] * (inverse**2)[:, None]
+    return derivative
+
+
+def _by_pose(seen: FloatArray, rotation: FloatArray) -> FloatArray:
+    """Return the derivatives (2n, 6) of places by position and turn, R <- exp([r]x) R."""
+    x, y = (seen[:, :2] / seen[:, 2:]).T
+    derivative = np.empty((len(seen), 2, 6))
+    derivative[:, :, :3] = -_by_seen(seen) @ rotation
+    derivative[:, 0, 3:] = np.column_stack((-x * y, 1 + x**2, -y))
+    derivative[:, 1, 3:] = np.column_stack((-1 - y**2, x * y, x))
+    return derivative.reshape(-1, 6)
 
 
 def _covariance(part: Sight, rotation: FloatArray, position: FloatArray) -> FloatArray:
     """Return the covariance (2n, 2n) of measured minus computed, with that of the coordinates."""
     count = len(part.points)
-    each = np.arange(count)
-    covariance = np.zeros((count, 2, count, 2))
+    covariance = np.zeros((2 * count, 2 * count))
     if part.of_points.any():
-        by_point = linearise(_ONE, rotation, position, part.points).by_point
-        blocks = part.of_points.reshape(count, 3, count, 3)
-        half = np.einsum('iab,ibjc->iajc', by_point, blocks, optimize=True)
-        covariance = np.einsum('iajc,jdc->iajd', half, by_point, optimize=True)
-    covariance[each, :, each] += part.covariances
-    return covariance.reshape(2 * count, 2 * count)
+        by_point = _by_seen(_seen(part.points, rotation, position)) @ rotation
+        half = by_point @ part.of_points.reshape(count, 3, 3 * count)
+        whole = by_point @ half.reshape(2 * count, count, 3).transpose(1, 2, 0)
+        covariance = whole.reshape(2 * count, 2 * count)
+    each = np.arange(count)
+    covariance.reshape(count, 2, count, 2)[each, :, each] += part.covariances
+    return covariance
 
 
 def _whitening(part: Sight, rotation: FloatArray, position: FloatArray) -> FloatArray:

@@ -179,17 +179,17 @@ def pose_of(seen: NamedPlaces, points: MeasuredPoints) -> Pose:
             f'there is no pose from which the {len(rows)} targets are seen before the camera: '
             'wrong coordinates, a mirrored frame, or wrong IDs'
         )
-    other = other_fit(sight, fit)
+    scale = 1.0 if fit.plausible else fit.cost / fit.redundancy
+    other = other_fit(sight, fit, UNLIKELY * scale)
     if other and other.cost < fit.cost:
         fit, other = other, fit
+        scale = 1.0 if fit.plausible else fit.cost / fit.redundancy
     _check_agreement(seen, fit)
-    scale = 1.0 if fit.plausible else fit.cost / fit.redundancy
     camera = _transform(fit, scale)
     _check_precision(sight, fit, camera)
-    likely = other and (other.cost - fit.cost) / scale < UNLIKELY
     return Pose(
         camera=camera,
-        second=_transform(other, scale) if other and likely else None,
+        second=_transform(other, scale) if other else None,
         targets=_names(seen, fit.used),
         residuals=residuals(sight, fit),
         rejected=(*seen.aside, *_rejected(seen, sight, fit, points)),
