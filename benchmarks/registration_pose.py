@@ -21,8 +21,8 @@ FIELDS = {
     'nearly a plane': (1.0, 0.03),
     'relief': (1.0, 0.15),
     'space': (1.0, 0.5),
-    'small plane': (0.05, 0.0),
-    'nearly a small plane': (0.05, 0.001),
+    'small plane': (0.1, 0.0),
+    'nearly a small plane': (0.1, 0.002),
 }
 """Width and half the depth of fields of targets, m. Small ones hardly show perspective."""
 
