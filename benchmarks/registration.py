@@ -1,6 +1,6 @@
 """Figures of poses and registered scans.
 
-    python -m benchmarks.registration --table TABLE [--seed 301] [--runs N]
+`python -m benchmarks.registration --table TABLE [--seed 301] [--runs N]` prints one of them.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ahf_ros.orientation.camera import pinhole, project, rotation_matrices
+from ahf_ros.orientation.camera import project, rotation_matrices
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.points import MeasuredPoints
 from ahf_ros.orientation.pose import Pose, Transform
@@ -144,9 +144,7 @@ def _count(counts: Counts, of: View, pose: Pose) -> None:
         counts.named += of.wrong in left_out
         others = [it for it in of.targets if str(it.id) != of.wrong]
         without = resect(others, of.points, CAMERA)
-        counts.moved = max(
-            counts.moved, normalised_square(pose.camera, without.camera) ** 0.5
-        )
+        counts.moved = max(counts.moved, normalised_square(pose.camera, without.camera) ** 0.5)
     if pose.second:
         counts.ambiguous += 1
         return
@@ -159,7 +157,8 @@ def table(seed: int, runs: int) -> list[str]:
     """Return the figures of each field as lines of Markdown."""
     lines = [
         '| field | images | NEES of 6 | refused | marked as ambiguous | beyond 10 sigma '
-        '| wrong IDs named | largest shift by them, sigma | good left out | processor time, ms: mean, most |',
+        '| wrong IDs named | largest shift by them, sigma | good left out '
+        '| processor time, ms: mean, most |',
         '|---' * 10 + '|',
     ]
     resect(*_warm(seed))

@@ -155,9 +155,7 @@ def places_with_covariances(
     camera: Calibration, points: np.ndarray, covariances: np.ndarray, rectified: bool = False
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return `places` of points (k, 2) in px, and their covariances of those in px², (k, 2, 2)."""
-    derivatives = _derivatives(
-        lambda of, xy: places(of, xy, rectified), camera, points, _MARGIN
-    )
+    derivatives = _derivatives(lambda of, xy: places(of, xy, rectified), camera, points, _MARGIN)
     moved = derivatives @ covariances @ derivatives.transpose(0, 2, 1)
     return places(camera, points, rectified), moved
 

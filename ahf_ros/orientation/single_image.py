@@ -15,7 +15,15 @@ from ahf_ros.orientation.network import FloatArray, Rejection
 from ahf_ros.orientation.planar import principal_axes
 from ahf_ros.orientation.points import MeasuredPoints, entries
 from ahf_ros.orientation.pose import Pose, Transform
-from ahf_ros.orientation.pose_fit import Fit, Sight, nearest, other_fit, residuals, tested_fit
+from ahf_ros.orientation.pose_fit import (
+    Fit,
+    Mask,
+    Sight,
+    nearest,
+    other_fit,
+    residuals,
+    tested_fit,
+)
 from ahf_ros.orientation.testing import CRITICAL
 from ahf_ros.target import UNDECODED, Target
 from ahf_ros.text import counted, listed
@@ -25,9 +33,6 @@ FEWEST = 4
 
 UNLIKELY = 9.2
 """Chi-squares that differ by less leave another pose a probability of more than 1 %."""
-
-ASSUMED_SIGMA = 0.1
-"""Standard deviation of a centre without a covariance, px."""
 
 TWICE = 'its ID is in this image twice'
 NO_PLACE = 'the calibration of the lens does not reach its place'
@@ -56,7 +61,7 @@ def resect(
     points: MeasuredPoints,
     calibration: ArrayLike,
     *,
-    sigma: float = ASSUMED_SIGMA,
+    sigma: float = 0.1,
 ) -> Pose:
     """Return the pose of the camera of one image among targets of known coordinates.
 
@@ -200,7 +205,8 @@ def pose_of(seen: NamedPlaces, points: MeasuredPoints) -> Pose:
 
 def _reached(seen: NamedPlaces) -> NamedPlaces:
     """Return the targets that have a place, and set the others aside."""
-    good = np.isfinite(seen.places).all(axis=1) & np.isfinite(seen.covariances).all(axis=(1, 2))
+    finite = np.isfinite(seen.places).all(axis=1), np.isfinite(seen.covariances).all(axis=(1, 2))
+    good = np.logical_and(*finite)
     if good.all():
         return seen
     lost = [
@@ -236,9 +242,10 @@ def _check_agreement(seen: NamedPlaces, fit: Fit) -> None:
 def _check_precision(sight: Sight, fit: Fit, camera: Transform) -> None:
     """Refuse a pose whose errors are too large to be told from another one."""
     part = sight.points[fit.used]
-    variances = np.linalg.eigvalsh(camera.covariance[:3, :3])[-1:], np.linalg.eigvalsh(
-        camera.covariance[3:, 3:]
-    )[-1:]
+    variances = (
+        np.linalg.eigvalsh(camera.covariance[:3, :3])[-1:],
+        np.linalg.eigvalsh(camera.covariance[3:, 3:])[-1:],
+    )
     shift, turn = (float(np.sqrt(it[0])) for it in variances)
     distance = float(np.linalg.norm(part.mean(axis=0) - fit.position))
     if shift < _MOST_TURN * distance and turn < _MOST_TURN:
@@ -293,7 +300,7 @@ def _rejected(
     return rejected
 
 
-def _names(seen: NamedPlaces, of: FloatArray) -> tuple[str, ...]:
+def _names(seen: NamedPlaces, of: Mask) -> tuple[str, ...]:
     return tuple(name for name, there in zip(seen.names, of, strict=True) if there)
 
 
