@@ -10,7 +10,7 @@ import numpy as np
 from ahf_ros.orientation.camera import project, rotation_matrices
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.points import MeasuredPoints
-from ahf_ros.orientation.pose import Pose, Transform
+from ahf_ros.orientation.pose import Pose, Transform, cross_matrix
 from ahf_ros.orientation.single_image import resect
 from ahf_ros.target import Target
 
@@ -100,14 +100,21 @@ def with_wrong_id(of: View, random: np.random.Generator) -> View:
 
 
 def error(found: Transform, true: Transform) -> FloatArray:
-    """Return shift and turn (6,) from a pose to the true one, about the axes of the frame."""
-    turn = true.rotation @ found.rotation.T
-    vector = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
-    sine, cosine = np.linalg.norm(vector) / 2, (np.trace(turn) - 1) / 2
-    angle = np.arctan2(sine, cosine)
-    return np.concatenate(
-        (true.translation - found.translation, vector / 2 * (angle / sine if sine > 0 else 1))
-    )
+    """Return shift and turn (6,) from a pose to the true one, about the axes of the frame.
+
+    Both are those of the even screw motion from one to the other (Barfoot 2017, 7.1.3): the
+    position of a camera that turns about far targets moves on an arc, whose height would else be
+    many standard deviations.
+    """
+    turned = true.rotation @ found.rotation.T
+    sines = np.array([turned[2, 1], turned[0, 2], turned[1, 0]]) - turned[[1, 2, 0], [2, 0, 1]]
+    sine, cosine = np.linalg.norm(sines) / 2, (np.trace(turned) - 1) / 2
+    angle = float(np.arctan2(sine, cosine))
+    turn = sines / 2 / np.sinc(angle / np.pi)
+    cross = cross_matrix(turn)
+    along = np.eye(3) + (0.5 - angle**2 / 24) * cross + (1 / 6 - angle**2 / 120) * cross @ cross
+    shift = np.linalg.solve(along, true.translation - turned @ found.translation)
+    return np.concatenate((shift + np.cross(turn, found.translation), turn))
 
 
 def normalised_square(found: Transform, true: Transform) -> float:

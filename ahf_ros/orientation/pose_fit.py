@@ -35,6 +35,7 @@ SIGNIFICANCE = 0.025
 
 _CONVERGED = 1e-9  # decrease of the sum of weighted squares that a step promises
 _FEW_ROUNDS = 6
+_BENT = 4  # times that the sum of squares grows less than a covariance says, where it is none
 _WEIGHTED = 2  # times that the weights are computed: coordinates have theirs from the pose
 
 Mask = NDArray[np.bool_]
@@ -167,10 +168,11 @@ def agreeing(sight: Sight) -> Resection | None:
 
 
 def other_fit(sight: Sight, fit: Fit, unlikely: float) -> Fit | None:
-    """Return the fit of the same points beyond Necker's reversal.
+    """Return a pose beyond Necker's reversal at which the same points fit about as well.
 
-    None if that is no other minimum, or one whose sum of squares is larger by `unlikely` or more.
-    One that matters is near the reversal, so that a few steps find it.
+    None if the sum of squares is larger by `unlikely` there, or no smaller than the covariance of
+    the fit says. A pose that matters is near the reversal, so that a few steps find it; where two
+    minima merge, it may be none.
     """
     rows = np.flatnonzero(fit.used)
     part = sight.chosen(rows)
@@ -189,14 +191,14 @@ def other_fit(sight: Sight, fit: Fit, unlikely: float) -> Fit | None:
     found = _minimised(part, whitening, rotation, position, _FEW_ROUNDS)
     if found is None:
         return None
-    rest = whitening @ _misclosure(part, _seen(part.points, *found))
-    if rest @ rest >= fit.cost + unlikely:
+    other = _rated(sight, part, rows, whitening, *found)
+    if other is None or other.cost >= fit.cost + unlikely:
         return None
-    cosine = (np.sum(found[0] * fit.rotation) - 1) / 2
-    apart = np.arccos(np.clip(cosine, -1, 1)) ** 2
-    if apart < 9 * np.linalg.eigvalsh(fit.cofactors[3:, 3:])[-1]:
-        return None
-    return fitted(sight, fit.used, *found)
+    turn = cv2.Rodrigues(other.rotation @ fit.rotation.T)[0].ravel()
+    gap = np.concatenate((other.position - fit.position, turn))
+    scale = np.sqrt(np.diag(fit.cofactors))
+    whitened = np.linalg.solve(fit.cofactors / np.outer(scale, scale), gap / scale)
+    return other if gap / scale @ whitened > _BENT * unlikely else None
 
 
 def fitted(sight: Sight, used: Mask, rotation: FloatArray, position: FloatArray) -> Fit | None:

@@ -19,6 +19,7 @@ from ahf_ros.orientation.pose_fit import (
     Fit,
     Mask,
     Sight,
+    fitted,
     nearest,
     other_fit,
     residuals,
@@ -39,6 +40,7 @@ NO_PLACE = 'the calibration of the lens does not reach its place'
 
 _LINE = 0.05  # extent across a line, relative to that along it, of points that are nearly on it
 _MOST_TURN = 0.1  # rad, and share of the distance: standard deviations of a pose that is none
+_MISFIT = 0.02  # share of residuals of the extent of targets; wrong lenses have less
 _CONTRADICTION = 1e-3  # probability of a sum of squares of four targets, which name no wrong one
 
 
@@ -187,16 +189,17 @@ def pose_of(seen: NamedPlaces, points: MeasuredPoints) -> Pose:
     scale = 1.0 if fit.plausible else fit.cost / fit.redundancy
     other = other_fit(sight, fit, UNLIKELY * scale)
     if other and other.cost < fit.cost:
-        fit, other = other, fit
+        fit, other = fitted(sight, other.used, other.rotation, other.position) or other, fit
         scale = 1.0 if fit.plausible else fit.cost / fit.redundancy
-    _check_agreement(seen, fit)
+    rest = residuals(sight, fit)
+    _check_agreement(seen, fit, rest)
     camera = _transform(fit, scale)
     _check_precision(sight, fit, camera)
     return Pose(
         camera=camera,
         second=_transform(other, scale) if other else None,
         targets=_names(seen, fit.used),
-        residuals=residuals(sight, fit),
+        residuals=rest,
         rejected=(*seen.aside, *_rejected(seen, sight, fit, points)),
         sigma0=float(np.sqrt(fit.cost / fit.redundancy)),
         redundancy=fit.redundancy,
@@ -223,8 +226,8 @@ def _reached(seen: NamedPlaces) -> NamedPlaces:
     )
 
 
-def _check_agreement(seen: NamedPlaces, fit: Fit) -> None:
-    """Refuse a pose on which too few targets agree to tell wrong ones."""
+def _check_agreement(seen: NamedPlaces, fit: Fit, rest: FloatArray) -> None:
+    """Refuse a pose on which too few targets agree to tell wrong ones, or none really."""
     count, agree = len(fit.used), int(fit.used.sum())
     lengths = fit.lengths / fit.spread
     if agree == FEWEST and (count > agree or fit.by_chance < _CONTRADICTION):
@@ -236,6 +239,14 @@ def _check_agreement(seen: NamedPlaces, fit: Fit) -> None:
         raise ValueError(
             f'{agree} of {count} targets agree with one pose, accepted are more than half of '
             'them: wrong coordinates or IDs, or another camera'
+        )
+    places = seen.places[fit.used]
+    share = float(np.sqrt((rest**2).sum() / ((places - places.mean(axis=0)) ** 2).sum()))
+    if share > _MISFIT:
+        raise ValueError(
+            f'residuals are {100 * share:.2g} % of the extent of the targets in the image, '
+            f'accepted are {100 * _MISFIT:g} %: wrong coordinates, a mirrored frame, or another '
+            'camera'
         )
 
 

@@ -82,7 +82,9 @@ def test_covariances_are_about_the_fixed_axes_of_the_frame(back: bool) -> None:
 
 def test_the_inverse_of_the_inverse_is_the_transform() -> None:
     root = seeded(1).normal(size=(6, 6))
-    of = Transform(rotation_matrices(np.array([[0.3, -2.0, 1.0]]))[0], np.arange(3.0), root @ root.T)
+    of = Transform(
+        rotation_matrices(np.array([[0.3, -2.0, 1.0]]))[0], np.arange(3.0), root @ root.T
+    )
     again = of.inverse.inverse
     for name in ('rotation', 'translation', 'covariance'):
         assert np.allclose(getattr(of, name), getattr(again, name))
@@ -134,7 +136,9 @@ def test_a_small_plane_has_a_second_pose() -> None:
     counts = run(0.05, 0.0, seed=5, runs=60)
     assert counts.ambiguous >= 3
     assert counts.flipped == 0
-    marked = [located(view(0.05, 0.0, seeded(5, 500, 0, number))).second for number in range(1, 20)]
+    marked = [
+        located(view(0.05, 0.0, seeded(5, 500, 0, number))).second for number in range(1, 20)
+    ]
     found = [it for it in marked if it]
     assert all(np.isfinite(it.covariance).all() for it in found)
 
@@ -145,9 +149,9 @@ def test_covariances_that_are_too_small_are_scaled() -> None:
     exact = replace(of.points, covariance=0 * of.points.covariance)
     usual, scaled = located(of, points=exact), located(of, targets=small, points=exact)
     assert scaled.sigma0 == pytest.approx(5 * usual.sigma0, rel=0.1)
-    assert scaled.camera.covariance[0, 0] == pytest.approx(
-        usual.sigma0**2 * usual.camera.covariance[0, 0], rel=0.1
-    )
+    for pose in (usual, scaled):
+        assert pose.sigma0 > 1.2  # the coordinates have errors that they do not tell
+    assert np.allclose(scaled.camera.covariance, usual.camera.covariance, rtol=1e-3)
 
 
 def test_centres_without_a_covariance_have_that_of_sigma() -> None:
@@ -178,7 +182,7 @@ def line(bend: float) -> View:
     rotation, position = np.diag([1.0, -1.0, -1.0]), np.array([0, 0, 2.0])
     seen = project(CAMERA, rotation, position, xyz)
     targets = tuple(
-        Target(it.id, 0, float(x), float(y), 8.0, 8.0, covariance=(0.04, 0, 0, 0.04))
+        Target(it.id, 0, float(x), float(y), 8.0, 8.0, covariance=(0.25, 0, 0, 0.25))
         for it, (x, y) in zip(of.targets, seen, strict=True)
     )
     points = MeasuredPoints(of.points.names, xyz, np.zeros((3 * len(xyz), 3 * len(xyz))))
@@ -197,7 +201,10 @@ def mirrored(of: View) -> View:
         (line(0.0), 'targets are on a line'),
         (line(0.0005), 'do not determine the pose, they are nearly on a line: its standard'),
         (some(with_wrong_id(scene(), seeded(2)), 4), ''),
-        (mirrored(scene(depth=0.5)), 'agree with one pose, accepted are more than half'),
+        (
+            mirrored(scene(depth=0.5)),
+            '% of the extent of the targets in the image, accepted are 2 %',
+        ),
     ],
 )
 def test_what_is_not_determined_is_refused_with_the_reason(of: View, words: str) -> None:
