@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ahf_ros import Target, resect
-from ahf_ros.orientation.camera import rotation_matrices
+from ahf_ros.orientation.camera import project, rotation_matrices
 from ahf_ros.orientation.points import MeasuredPoints
 from ahf_ros.orientation.pose import Transform
 from benchmarks.registration_pose import (
@@ -57,8 +57,6 @@ def test_covariances_are_about_the_fixed_axes_of_the_frame(back: bool) -> None:
     start = located(of, points=exact).camera
     true = start.inverse if back else start
     errors, stated = [], []
-    from ahf_ros.orientation.camera import project
-
     rows = exact.indices([str(it.id) for it in of.targets])
     seen = project(CAMERA, start.rotation.T, start.translation, exact.xyz[rows])
     roots = np.linalg.cholesky([np.reshape(it.covariance, (2, 2)) for it in of.targets])
@@ -177,8 +175,6 @@ def line(bend: float) -> View:
     of = scene()
     along = np.linspace(-0.5, 0.5, len(of.points.names))
     xyz = np.column_stack((along, bend * np.cos(20 * along), bend * np.sin(13 * along)))
-    from ahf_ros.orientation.camera import project
-
     rotation, position = np.diag([1.0, -1.0, -1.0]), np.array([0, 0, 2.0])
     seen = project(CAMERA, rotation, position, xyz)
     targets = tuple(
@@ -219,11 +215,11 @@ def test_what_is_not_determined_is_refused_with_the_reason(of: View, words: str)
 def test_targets_that_are_left_out_are_told_where_too_few_remain() -> None:
     of = some(scene(), 5)
     again = [replace(it, x=it.x + 99) for it in of.targets[:2]]
-    with pytest.raises(ValueError, match='3 targets with .*; left out: 1, 2, .*, its ID is in'):
+    with pytest.raises(ValueError, match=r'3 targets with .*; left out: 1, 2, .*, its ID is in'):
         located(of, targets=[*of.targets, *again])
 
 
 @pytest.mark.parametrize('calibration', [np.zeros(10), CAMERA[:9], np.full(10, np.nan)])
 def test_a_camera_that_is_none_is_refused(calibration: np.ndarray) -> None:
-    with pytest.raises(ValueError, match='calibration is .*, accepted are 10 finite numbers, f'):
+    with pytest.raises(ValueError, match=r'calibration is .*, accepted are 10 finite numbers, f'):
         located(scene(), calibration=calibration)
