@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from contextlib import suppress
 from importlib import import_module
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.node import NodeNameNonExistentError
 from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header
 
@@ -83,8 +85,9 @@ class PoseNode(ProcessNode):
             self._open_tf()
         self._diagnostic_array = self.publisher(DiagnosticArray, '/diagnostics', 10)
         self.every(PERIOD, self._publish_diagnostics)
-        self.subscribe(
-            CameraInfo, 'camera_info', self._calibrations.put, MutuallyExclusiveCallbackGroup()
+        self._informed = False
+        self._camera_info = self.subscribe(
+            CameraInfo, 'camera_info', self._on_camera_info, MutuallyExclusiveCallbackGroup()
         )
         self._targets = self.subscribe(
             CodedTargetArray,
@@ -116,6 +119,10 @@ class PoseNode(ProcessNode):
     def _on_tf(self, message: Any) -> None:
         for it in message.transforms:
             self._parents.add(it.header.frame_id, it.child_frame_id)
+
+    def _on_camera_info(self, message: CameraInfo) -> None:
+        self._informed = True
+        self._calibrations.put(message)
 
     def _on_targets(self, message: CodedTargetArray) -> None:
         begin = time.monotonic()
@@ -282,16 +289,18 @@ class PoseNode(ProcessNode):
         if timeout and silent > timeout:
             why = silence(source, publishers, self._published)
             tally.silent = f'no coded_targets for {silent:.0f} s: {why}'
-        known = set(self.get_node_names_and_namespaces())
-        read = [
-            topic
-            for it in publishers
-            if (it.node_name, it.node_namespace) in known
-            for topic, kinds in self.get_subscriber_names_and_types_by_node(
-                it.node_name, it.node_namespace
-            )
-            if kinds[0] in _IMAGES
-        ]
+        tally.uncalibrated = ''
+        if tally.received and not self._informed:
+            source = self._camera_info
+            why = silence(source, source.publishers(), self._published)
+            tally.uncalibrated = f'no camera_info: {why}'
+        read = set()
+        for it in publishers:
+            with suppress(NodeNameNonExistentError):  # it has ended meanwhile
+                topics = self.get_subscriber_names_and_types_by_node(
+                    it.node_name, it.node_namespace
+                )
+                read |= {topic for topic, kinds in topics if kinds[0] in _IMAGES}
         self._images_of_detector = tuple(sorted(read))
 
     def _published(self) -> dict[str, list[str]]:

@@ -29,6 +29,7 @@ class PoseTally:
     latency: float = 0.0  # from the arrival of the last message to its pose, s
     no_tf: str = ''  # why there is no tf
     rectified: str = ''  # message about images that are, or are not, rectified
+    uncalibrated: str = ''  # why no camera_info arrives
     mistaken: str = ''  # message about other types on the topic
     silent: str = ''  # message about targets that do not arrive
 
@@ -93,6 +94,7 @@ def _warning(tally: PoseTally, before: PoseTally) -> str:
     reports = (
         tally.mistaken,
         not tally.mistaken and tally.silent,
+        tally.uncalibrated,
         refused and f'{refused} images without a pose: {tally.reason}',
         tally.no_tf and f'no tf: {tally.no_tf}',
         ambiguous and f'{ambiguous} images with a second pose that fits about as well',

@@ -174,7 +174,8 @@ def test_what_is_wrong_is_said_and_nothing_is_published(graph: Any, tmp_path: Pa
         return send
 
     topic = '/wrong/camera_info'
-    node.says(f'images without a pose: no camera_info has come on {topic}', image())
+    told = node.says(f'images without a pose: no camera_info has come on {topic}', image())
+    assert '; no camera_info: ' in told
     for given, words in (
         ({'k': np.zeros(9)}, 'k of camera_info has the focal lengths 0 and 0, accepted'),
         ({'k': [1e3, 0, 0, 0, 1e3, 0, 0, 0, 1]}, 'has the principal point 0, 0, accepted'),

@@ -42,40 +42,36 @@ def located(of: View, **changes: Any) -> Any:
 
 @pytest.mark.parametrize(('width', 'depth'), [(1.0, 0.0), (1.0, 0.2), (0.1, 0.0)])
 def test_errors_are_as_large_as_covariances_say(width: float, depth: float) -> None:
-    counts = run(width, depth, seed=11, runs=200)
-    assert np.mean(counts.squares) == pytest.approx(6, abs=0.75)  # three standard deviations
+    counts = run(width, depth, seed=11, runs=100)
+    assert np.mean(counts.squares) == pytest.approx(6, abs=1.05)  # three standard deviations
     assert (counts.refused, counts.flipped, counts.good_rejected) == (0, 0, 0)
-    assert counts.named == counts.wrong == 10
+    assert counts.named == counts.wrong == 5
     assert counts.moved < 1e-3
 
 
-@pytest.mark.parametrize('back', [False, True])
-def test_covariances_are_about_the_fixed_axes_of_the_frame(back: bool) -> None:
+def test_covariances_are_about_the_fixed_axes_of_the_frame() -> None:
     """Their entries, from many images of one scene, also of the inverse transform."""
     of = scene()
     exact = MeasuredPoints(of.points.names, of.points.xyz, np.zeros_like(of.points.covariance))
-    start = located(of, points=exact).camera
-    true = start.inverse if back else start
-    errors, stated = [], []
+    true = located(of, points=exact).camera
     rows = exact.indices([str(it.id) for it in of.targets])
-    seen = project(CAMERA, start.rotation.T, start.translation, exact.xyz[rows])
+    seen = project(CAMERA, true.rotation.T, true.translation, exact.xyz[rows])
     roots = np.linalg.cholesky([np.reshape(it.covariance, (2, 2)) for it in of.targets])
-    for number in range(400):
+    found = []
+    for number in range(300):
         noise = (roots @ seeded(4, number).normal(size=(len(seen), 2, 1)))[:, :, 0]
         targets = [
             replace(it, x=float(x), y=float(y))
             for it, (x, y) in zip(of.targets, seen + noise, strict=True)
         ]
-        found = located(of, targets=targets, points=exact).camera
-        found = found.inverse if back else found
-        errors.append(error(found, true))
-        stated.append(found.covariance)
-    covariance = np.mean(stated, axis=0)
-    root = np.linalg.inv(np.linalg.cholesky(covariance))
-    whitened = root @ np.cov(np.transpose(errors)) @ root.T
-    # 1.96 and 1.96 / sqrt(2) times 1 / sqrt(400) are 95 % bounds of single entries; all 21 hold.
-    assert np.abs(whitened - np.eye(6)).max() < 0.25
-    assert np.diag(covariance).min() > 0
+        found.append(located(of, targets=targets, points=exact).camera)
+    for poses, truth in ((found, true), ([it.inverse for it in found], true.inverse)):
+        covariance = np.mean([it.covariance for it in poses], axis=0)
+        root = np.linalg.inv(np.linalg.cholesky(covariance))
+        whitened = root @ np.cov(np.transpose([error(it, truth) for it in poses])) @ root.T
+        # Standard deviations are 0.08 on the diagonal, 0.06 beside it.
+        assert np.abs(whitened - np.eye(6)).max() < 0.25
+        assert np.diag(covariance).min() > 0
 
 
 def test_the_inverse_of_the_inverse_is_the_transform() -> None:
