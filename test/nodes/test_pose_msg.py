@@ -123,3 +123,18 @@ def test_what_is_published_needs_its_packages(monkeypatch: pytest.MonkeyPatch) -
     with pytest.raises(ValueError, match="tf is 'targets' and the package tf2_msgs is not there"):
         PoseNodeSettings(coordinates='a', tf='targets')
     assert PoseNodeSettings(coordinates='a').tf == 'none'
+
+
+@pytest.mark.parametrize(
+    ('given', 'words'),
+    [
+        ({'targets_frame': '/map'}, "targets_frame is '/map', accepted is a name without spaces"),
+        ({'targets_frame': 'a b'}, "targets_frame is 'a b', accepted is a name without spaces"),
+        ({'tf': 'map'}, "tf is 'map', accepted is one of none, camera, targets"),
+        ({'camera_matrix': 'd'}, "camera_matrix is 'd', accepted is one of k, p"),
+        ({'unit': 'px'}, "unit is 'px', accepted is one of m, cm, mm, um, in, ft, or nothing"),
+    ],
+)
+def test_settings_name_what_is_accepted(given: dict[str, str], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        PoseNodeSettings(coordinates='a', **given)
