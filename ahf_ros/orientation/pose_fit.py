@@ -36,7 +36,7 @@ SIGNIFICANCE = 0.025
 _CONVERGED = 1e-9  # decrease of the sum of weighted squares that a step promises
 _FEW_ROUNDS = 6
 _BENT = 4  # times that the sum of squares grows less than a covariance says, where it is none
-_WEIGHTED = 2  # times that the weights are computed: coordinates have theirs from the pose
+_SAME = 1e-4  # share of the distance that points move between poses of about the same weights
 
 Mask = NDArray[np.bool_]
 
@@ -210,12 +210,17 @@ def fitted(sight: Sight, used: Mask, rotation: FloatArray, position: FloatArray)
     part = sight.chosen(rows)
     if _seen(part.points, rotation, position)[:, 2].min() <= 0:
         return None
-    for _ in range(_WEIGHTED if part.of_points.any() else 1):
+    for _ in range(ROUNDS):
         whitening = _whitening(part, rotation, position)
         moved = _minimised(part, whitening, rotation, position)
         if moved is None:
             return None
+        before = _seen(part.points, rotation, position)
         rotation, position = moved
+        after = _seen(part.points, rotation, position)
+        # Weights that follow from coordinates depend on the pose that they are computed at.
+        if np.abs(after - before).max() < _SAME * after[:, 2].min() or not part.of_points.any():
+            break
     return _rated(sight, part, rows, whitening, rotation, position)
 
 
