@@ -149,13 +149,25 @@ def tested_fit(sight: Sight) -> Fit | None:
 
 
 def direct(sight: Sight) -> tuple[FloatArray, FloatArray] | None:
-    """Return the pose of all points by SQPnP (Terzakis and Lourakis, ECCV 2020)."""
-    count, turns, shifts, _ = cv2.solvePnPGeneric(
-        sight.points, sight.places, np.eye(3), None, flags=cv2.SOLVEPNP_SQPNP
-    )
+    """Return the pose of all points by SQPnP (Terzakis and Lourakis, ECCV 2020).
+
+    OpenCV asserts bounds that are not relative, so that points are scaled.
+    """
+    centre = sight.points.mean(axis=0)
+    scale = np.abs(sight.points - centre).max()
+    try:
+        count, turns, shifts, _ = cv2.solvePnPGeneric(
+            (sight.points - centre) / scale,
+            sight.places,
+            np.eye(3),
+            None,
+            flags=cv2.SOLVEPNP_SQPNP,
+        )
+    except cv2.error:
+        return None
     for turn, shift in zip(turns[:count], shifts[:count], strict=True):
         rotation = np.asarray(cv2.Rodrigues(turn)[0], float)
-        position = -rotation.T @ shift.ravel()
+        position = centre - scale * rotation.T @ shift.ravel()
         if np.isfinite(rotation).all() and np.isfinite(position).all():
             return rotation, position
     return None

@@ -166,6 +166,16 @@ def centre_covariances(targets: Sequence[Target], sigma: float) -> FloatArray:
 @one_blas_thread()
 def pose_of(seen: NamedPlaces, points: MeasuredPoints) -> Pose:
     """Return the pose of one image of named points; a ValueError says why there is none."""
+    try:
+        return _determined(seen, points)
+    except np.linalg.LinAlgError as error:
+        raise ValueError(
+            f'the targets {listed(seen.names)} do not determine the pose: {error}'
+        ) from error
+
+
+def _determined(seen: NamedPlaces, points: MeasuredPoints) -> Pose:
+    """Return the pose; a ValueError says why there is none, or LinAlgError that it is singular."""
     seen = _reached(seen)
     if len(seen.names) < FEWEST:
         raise ValueError(
@@ -241,7 +251,8 @@ def _check_agreement(seen: NamedPlaces, fit: Fit, rest: FloatArray) -> None:
             'them: wrong coordinates or IDs, or another camera'
         )
     places = seen.places[fit.used]
-    share = float(np.sqrt((rest**2).sum() / ((places - places.mean(axis=0)) ** 2).sum()))
+    extent = float(np.linalg.norm(places - places.mean(axis=0)))
+    share = float(np.linalg.norm(rest)) / max(extent, np.finfo(float).tiny)
     if share > _MISFIT:
         raise ValueError(
             f'residuals are {100 * share:.2g} % of the extent of the targets in the image, '

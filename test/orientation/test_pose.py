@@ -166,6 +166,33 @@ def test_families_name_targets_where_coordinates_have_them() -> None:
     assert pose.rejected == ()
 
 
+@pytest.mark.parametrize('scale', [1e-3, 1e3])
+def test_the_unit_makes_no_difference(scale: float) -> None:
+    of = scene()
+    other = replace(
+        of.points, xyz=scale * of.points.xyz, covariance=scale**2 * of.points.covariance
+    )
+    pose, scaled = located(of), located(of, points=other)
+    assert np.allclose(scaled.camera.translation, scale * pose.camera.translation)
+    assert np.allclose(scaled.camera.rotation, pose.camera.rotation)
+    assert np.allclose(scaled.camera.covariance[3:, 3:], pose.camera.covariance[3:, 3:])
+
+
+def test_garbage_is_refused_and_nothing_else_happens() -> None:
+    """Places and coordinates that no camera sees: all at one place, far away, not finite."""
+    random = seeded(9)
+    for number in range(150):
+        count = int(random.integers(4, 12))
+        xyz = random.choice([1e-9, 1.0, 1e6]) * random.normal(size=(count, 3))
+        xy = random.choice([0, 1e-9, 1e9]) * random.normal(size=(count, 2)) + 900
+        if number % 5 == 0:
+            xy[0] = np.nan
+        points = MeasuredPoints(tuple(map(str, range(count))), xyz, np.zeros((3 * count,) * 2))
+        targets = [Target(index, 0, *place, 5.0, 5.0) for index, place in enumerate(xy)]
+        with pytest.raises(ValueError, match=r'target'):
+            resect(targets, points, CAMERA)
+
+
 def line(bend: float) -> View:
     """Return an image of targets on a line, or nearly."""
     of = scene()
