@@ -35,6 +35,7 @@ _MODULES = {
     'orient': 'orientation.orient',
     'read_image': 'interchange.image_files',
     'render': 'synthetic.scene',
+    'resect': 'orientation.single_image',
     'score': 'evaluation',
     'write_image': 'interchange.image_files',
 }
@@ -55,6 +56,7 @@ if TYPE_CHECKING:  # which takes what is imported `as` itself for public
     from ahf_ros.orientation.adjustment import adjust as adjust
     from ahf_ros.orientation.congruence import compare as compare
     from ahf_ros.orientation.orient import orient as orient
+    from ahf_ros.orientation.single_image import resect as resect
     from ahf_ros.session import create_identifier as create_identifier
     from ahf_ros.session import identify as identify
     from ahf_ros.session_settings import IdentificationSettings as IdentificationSettings

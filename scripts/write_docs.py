@@ -13,6 +13,7 @@ from typing import Any
 
 from ahf_ros.nodes.drivers import DRIVERS
 from ahf_ros.nodes.interfaces import NODES
+from ahf_ros.nodes.pose_settings import PoseNodeSettings
 from ahf_ros.nodes.settings import DetectorNodeSettings
 from ahf_ros.settings.nested import flat_parameters
 from ahf_ros.settings.parameter import Parameter
@@ -33,10 +34,10 @@ BLURS = {'blur 2 px, 0.12': '2 px, 0.12'}
 AHF_LIGHTS = ('normal 0.3', 'stripe 0.3', 'stripe 0.12', 'lattice 0.3', 'lattice 0.12')
 
 
-def parameters() -> str:
-    """Return the parameters of the node `detector`."""
+def parameters(settings: type = DetectorNodeSettings) -> str:
+    """Return the parameters of a node."""
     rows = [('parameter', 'default', 'accepted', 'meaning')]
-    rows += [parameter(item) for item in flat_parameters(DetectorNodeSettings)]
+    rows += [parameter(item) for item in flat_parameters(settings)]
     return table(rows)
 
 
@@ -179,6 +180,7 @@ PAGES: dict[str, dict[str, Callable[[], str]]] = {
         'blurs': partial(limits, 'blur, ambient light', BLURS),
     },
     'docs/parameters.md': {'parameters': parameters},
+    'docs/pose.md': {'parameters of pose': partial(parameters, PoseNodeSettings)},
     'docs/ros.md': {'interfaces': interfaces},
     'docs/rig.md': {'drivers': drivers, 'settings of drivers': driver_settings},
     'docs/figures.md': {'summary': summary, 'lights': lights, 'others': others},

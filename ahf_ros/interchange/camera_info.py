@@ -49,7 +49,8 @@ class Calibration:
     offset: tuple[int, int]
     binning: tuple[int, int]
     matrix: np.ndarray
-    projection: np.ndarray
+    projection: np.ndarray  # the camera matrix where `projects` is false
+    projects: bool
     rotation: np.ndarray
     model: str
     distortion: np.ndarray
@@ -106,6 +107,7 @@ def calibration(message: Any) -> Calibration:
         binning=binning,
         matrix=matrix,
         projection=projection if projection[0, 0] > 0 else matrix,
+        projects=bool(projection[0, 0] > 0),
         rotation=rotation if rotation.any() else np.eye(3),
         model=model,
         distortion=distortion,
@@ -125,15 +127,53 @@ def undistorted(camera: Calibration, points: np.ndarray) -> np.ndarray:
     0.05 px away at the edge of an ordinary image.
     """
     binning, offset = np.array(camera.binning), np.array(camera.offset)
-    sensor = (points + 0.5) * binning - 0.5 + offset
+    there = _rays(camera, points) @ camera.projection.T
+    return (there[:, :2] / there[:, 2:] - offset + 0.5) / binning - 0.5
+
+
+def places(camera: Calibration, points: np.ndarray, rectified: bool = False) -> np.ndarray:
+    """Return where the rays of image points, of shape (k, 2), meet the plane z = 1.
+
+    That plane is before the rectified camera, also for points of an image as received: `r` of the
+    message is the identity but for stereo, and whoever reads its frame takes it for that camera.
+    With `rectified`, points are those of a rectified image. They are NaN as in `undistorted`.
+    """
+    if not rectified:
+        rays = _rays(camera, points)
+    else:
+        if not camera.projects or not np.isfinite(camera.projection).all():
+            raise ValueError(
+                'p of camera_info has zeros or no numbers, accepted for rectified images is a '
+                'projection with focal lengths above 0'
+            )
+        ahead = np.column_stack((_on_sensor(camera, points), np.ones(len(points))))
+        rays = np.linalg.solve(camera.projection, ahead.T).T
+    return rays[:, :2] / rays[:, 2:]
+
+
+def places_with_covariances(
+    camera: Calibration, points: np.ndarray, covariances: np.ndarray, rectified: bool = False
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return `places` of points (k, 2) in px, and their covariances of those in px², (k, 2, 2)."""
+    derivatives = _derivatives(lambda of, xy: places(of, xy, rectified), camera, points, _MARGIN)
+    moved = derivatives @ covariances @ derivatives.transpose(0, 2, 1)
+    return places(camera, points, rectified), moved
+
+
+def _on_sensor(camera: Calibration, points: np.ndarray) -> np.ndarray:
+    """Return points of an image, (k, 2), in pixels of the sensor."""
+    return (points + 0.5) * np.array(camera.binning) - 0.5 + np.array(camera.offset)
+
+
+def _rays(camera: Calibration, points: np.ndarray) -> np.ndarray:
+    """Return directions (k, 3) of points in the frame of the rectified camera, or NaN."""
     focal, centre = camera.matrix[[0, 1], [0, 1]], camera.matrix[:2, 2]
-    seen = (sensor - centre) / focal
+    seen = (_on_sensor(camera, points) - centre) / focal
     seen[:, 0] -= camera.matrix[0, 1] / focal[0] * seen[:, 1]
     ideal = _inverse(camera, seen)
     rays = np.column_stack((ideal, np.ones(len(ideal)))) @ camera.rotation.T
     rays[~(rays[:, 2] > 0)] = math.nan
-    there = rays @ camera.projection.T
-    return (there[:, :2] / there[:, 2:] - offset + 0.5) / binning - 0.5
+    return rays
 
 
 def _distorted(camera: Calibration, points: np.ndarray) -> np.ndarray:

@@ -10,6 +10,7 @@ import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ahf_ros.nodes.pose_settings import PoseNodeSettings
 from ahf_ros.nodes.settings import (
     DetectorNodeSettings,
     IlluminationNodeSettings,
@@ -93,6 +94,19 @@ out camera_info sensor_msgs/CameraInfo the calibration of the camera that is ren
 out ground_truth ahf_ros/CodedTargetArray the exact truth
 """)
 
+_POSE = _interfaces("""
+in coded_targets ahf_ros/CodedTargetArray every one is answered, in order
+in camera_info sensor_msgs/CameraInfo calibration of the camera
+out ~/pose geometry_msgs/PoseWithCovarianceStamped \
+    of the camera in the frame of the targets, where the image determines it
+out ~/detections vision_msgs/Detection3DArray \
+    with `detections`: poses of targets in the frame of the camera
+out /tf tf2_msgs/TFMessage with `tf` and `target_frames`
+in /tf tf2_msgs/TFMessage with `tf` and `target_frames`: parents that others publish
+in /tf_static tf2_msgs/TFMessage likewise
+out /diagnostics diagnostic_msgs/DiagnosticArray once per second
+""")
+
 _SCOREBOARD = _interfaces("""
 in coded_targets ahf_ros/CodedTargetArray answers
 in ground_truth ahf_ros/CodedTargetArray the truth
@@ -115,6 +129,12 @@ NODES = {
         interfaces=_ILLUMINATION,
         settings=IlluminationNodeSettings,
         usual=('light', 'ambient', 'targets', 'width', 'height', 'dot_radius', 'rate', 'seed'),
+    ),
+    'pose': NodeInterface(
+        purpose='Computes the pose of the camera from identified targets of known coordinates.',
+        interfaces=_POSE,
+        settings=PoseNodeSettings,
+        usual=('coordinates', 'unit', 'tf', 'targets_frame', 'camera_matrix', 'target_frames'),
     ),
     'scoreboard': NodeInterface(
         purpose='Compares answers with the truth and prints one line per image.',

@@ -11,6 +11,7 @@ from ahf_ros.ending import has_arrived, ignore_ending, signalled
 NODES = {
     'detector': 'ahf_ros.nodes.detector',
     'illumination': 'ahf_ros.nodes.illumination',
+    'pose': 'ahf_ros.nodes.pose',
     'scoreboard': 'ahf_ros.nodes.scoreboard',
 }
 """Modules whose `main` runs a node, by the name of the node."""
@@ -48,4 +49,4 @@ def start(node: str, arguments: list[str] | None = None) -> int:
     return status
 
 
-detector, illumination, scoreboard = (partial(start, node) for node in NODES)
+detector, illumination, pose, scoreboard = (partial(start, node) for node in NODES)

@@ -1,0 +1,332 @@
+"""The node `pose`: where the camera of each image is among targets of known coordinates."""
+
+from __future__ import annotations
+
+import time
+from contextlib import suppress
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.node import NodeNameNonExistentError
+from sensor_msgs.msg import CameraInfo
+from std_msgs.msg import Header
+
+from ahf_ros.interchange.camera_info import Calibration, places_with_covariances
+from ahf_ros.interchange.coordinate_files import read_coordinates
+from ahf_ros.interchange.image_messages import nanoseconds
+from ahf_ros.interchange.target_messages import identification_from
+from ahf_ros.msg import CodedTargetArray
+from ahf_ros.nodes.parameters import ParameterSettings
+from ahf_ros.nodes.pose_diagnostics import PoseDiagnostics, PoseTally
+from ahf_ros.nodes.pose_msg import (
+    PosedTarget,
+    detections_message,
+    pose_message,
+    target_transform,
+    transform_message,
+)
+from ahf_ros.nodes.pose_settings import CAMERA, NONE, PoseNodeSettings
+from ahf_ros.nodes.process import LOG_PERIOD, ProcessNode, run
+from ahf_ros.nodes.tf_parents import Parents
+from ahf_ros.nodes.topics import ANSWERS_KEPT, DETECTIONS
+from ahf_ros.nodes.undistortion import Calibrations
+from ahf_ros.nodes.watch import other_types, silence
+from ahf_ros.orientation.points import blocks
+from ahf_ros.orientation.pose import Pose
+from ahf_ros.orientation.single_image import (
+    NamedPlaces,
+    centre_covariances,
+    known_targets,
+    pose_of,
+)
+from ahf_ros.target import UNDECODED, Target
+from ahf_ros.text import listed, printable
+
+POSE = '~/pose'
+"""Topic of the pose of the camera in the frame of the targets."""
+
+PERIOD = 1.0
+"""Period of /diagnostics, s."""
+
+TF_KEPT = 100
+"""Depth of tf, as tf2_ros has it."""
+
+_IMAGES = ('sensor_msgs/msg/Image', 'sensor_msgs/msg/CompressedImage')
+
+
+class PoseNode(ProcessNode):
+    """Publishes the pose of the camera for every image that determines one, and why not."""
+
+    def __init__(self) -> None:
+        super().__init__('pose')
+        self._settings = ParameterSettings(self, PoseNodeSettings)
+        settings = self._settings.current
+        self._points = read_coordinates(settings.coordinates, settings.unit)
+        self._rows = {name: row for row, name in enumerate(self._points.names)}
+        self._own_covariances = blocks(self._points.covariance)
+        self._tally = PoseTally()
+        name = self.get_fully_qualified_name().lstrip('/')
+        self._diagnostics = PoseDiagnostics(f'{name}: pose', self._tally)
+        self._calibrations = Calibrations()
+        self._parents = Parents()
+        self._images_of_detector: tuple[str, ...] = ()
+        self._poses = self.publisher(PoseWithCovarianceStamped, POSE, ANSWERS_KEPT)
+        self._detections: tuple[Any, Any] | None = None
+        if settings.detections:
+            kinds: Any = import_module('vision_msgs.msg')
+            publisher = self.publisher(kinds.Detection3DArray, DETECTIONS, ANSWERS_KEPT)
+            self._detections = kinds, publisher
+        self._tf: tuple[Any, Any] | None = None
+        if settings.tf != NONE or settings.target_frames:
+            self._open_tf()
+        self._diagnostic_array = self.publisher(DiagnosticArray, '/diagnostics', 10)
+        self.every(PERIOD, self._publish_diagnostics)
+        self._informed = False
+        self._camera_info = self.subscribe(
+            CameraInfo, 'camera_info', self._on_camera_info, MutuallyExclusiveCallbackGroup()
+        )
+        self._targets = self.subscribe(
+            CodedTargetArray,
+            'coded_targets',
+            self._on_targets,
+            MutuallyExclusiveCallbackGroup(),
+            lossless=True,
+        )
+
+    def introduction(self) -> str:
+        """Return how many targets are known, how far they extend, and the topics."""
+        settings, points = self._settings.current, self._points
+        extent = ' x '.join(f'{it:.3g}' for it in np.ptp(points.xyz, axis=0))
+        names = {'targets': 'coded_targets', 'calibration': 'camera_info', 'poses': POSE}
+        topics = [f'{what} on {self.resolve_topic_name(it)}' for what, it in names.items()]
+        return (
+            f'{len(points.names)} targets over {extent} m, '
+            f'frame {settings.targets_frame}, tf {settings.tf}, {", ".join(topics)}'
+        )
+
+    def _open_tf(self) -> None:
+        """Publish tf, and follow what others publish."""
+        kinds: Any = import_module('tf2_msgs.msg')
+        self._tf = kinds, self.publisher(kinds.TFMessage, '/tf', TF_KEPT)
+        group = MutuallyExclusiveCallbackGroup()
+        for topic in ('/tf', '/tf_static'):
+            self.subscribe(kinds.TFMessage, topic, self._on_tf, group, lossless=True)
+
+    def _on_tf(self, message: Any) -> None:
+        for it in message.transforms:
+            self._parents.add(it.header.frame_id, it.child_frame_id)
+
+    def _on_camera_info(self, message: CameraInfo) -> None:
+        self._informed = True
+        self._calibrations.put(message)
+
+    def _on_targets(self, message: CodedTargetArray) -> None:
+        begin = time.monotonic()
+        tally, settings = self._tally, self._settings.current
+        tally.received += 1
+        if text := tally.compare_stamps(nanoseconds(message.header)):
+            self.get_logger().warning(text, throttle_duration_sec=LOG_PERIOD)
+        try:
+            camera = self._camera(message, settings)
+            targets = identification_from(message).targets
+            pose = self._pose(targets, camera, settings)
+        except ValueError as error:
+            tally.refused += 1
+            tally.reason = printable(str(error), 1000)
+            logger = self.get_logger()
+            logger.warning(f'no pose: {tally.reason}', throttle_duration_sec=LOG_PERIOD)
+            return
+        if pose.rejected:
+            tally.wrong += 1
+            tally.rejected = listed([f'{it.target}, {it.reason}' for it in pose.rejected], 4)
+            logger = self.get_logger()
+            text = f'targets left out: {tally.rejected}'
+            logger.warning(text, throttle_duration_sec=LOG_PERIOD)
+        tally.used, tally.sigma0 = len(pose.targets), pose.sigma0
+        self._publish(pose, targets, message.header, settings)
+        tally.latency = time.monotonic() - begin
+
+    def _camera(self, message: CodedTargetArray, settings: PoseNodeSettings) -> Calibration:
+        """Return the calibration of an image; a ValueError says why there is none."""
+        header = message.header
+        camera = self._calibrations.at(nanoseconds(header))
+        if camera is None:
+            topic = self.resolve_topic_name('camera_info')
+            raise ValueError(f'no camera_info has come on {topic}')
+        camera.check(header.frame_id, message.width, message.height)
+        if not camera.matrix[:2, 2].any():
+            raise ValueError(
+                'k of camera_info has the principal point 0, 0, accepted is one in the image: a '
+                'camera that is calibrated'
+            )
+        self._tally.rectified = self._mistaken_matrix(camera, settings.camera_matrix == 'p')
+        return camera
+
+    def _pose(
+        self, targets: tuple[Target, ...], camera: Calibration, settings: PoseNodeSettings
+    ) -> Pose:
+        """Return the pose of an image; a ValueError says why there is none."""
+        names, known, aside = known_targets(targets, self._rows)
+        unknown = [
+            f'{it.family}:{it.id}'
+            for it in targets
+            if it.id != UNDECODED
+            and str(it.id) not in self._rows
+            and f'{it.family}:{it.id}' not in self._rows
+        ]
+        self._tally.unknown = listed(unknown)
+        if not known and unknown:
+            raise ValueError(
+                f'no target has known coordinates: seen are {listed(unknown)}, coordinates are of '
+                f'{listed(self._points.names)}'
+            )
+        centres = np.array([(it.x, it.y) for it in known], float).reshape(-1, 2)
+        covariances = centre_covariances(known, settings.centre_deviation)
+        seen = places_with_covariances(camera, centres, covariances, settings.camera_matrix == 'p')
+        pose = pose_of(NamedPlaces(names, *seen, aside), self._points)
+        if pose.second:
+            self._tally.ambiguous += 1
+            if not settings.publish_ambiguous:
+                raise ValueError(
+                    f'two poses fit about as well, turned by {_turn(pose):.0f} deg: targets in '
+                    'a plane, far away or seen from the front; publish_ambiguous publishes the '
+                    'likelier one'
+                )
+        return pose
+
+    def _publish(
+        self,
+        pose: Pose,
+        targets: tuple[Target, ...],
+        header: Header,
+        settings: PoseNodeSettings,
+    ) -> None:
+        of_targets = Header(stamp=header.stamp, frame_id=settings.targets_frame)
+        self._poses.publish(pose_message(pose.camera, of_targets))
+        self._tally.published += 1
+        used = set(pose.targets)
+        posed = []
+        if settings.target_frames or self._detections:
+            names, known, _ = known_targets(targets, self._rows)
+            both = zip(names, known, strict=True)
+            posed = [self._posed(pose, name, it) for name, it in both if name in used]
+        if self._detections:
+            kinds, publisher = self._detections
+            publisher.publish(detections_message(posed, header, kinds))
+        if self._tf:
+            transforms, self._tally.no_tf = [], ''
+            if settings.tf == CAMERA:
+                to_camera = pose.camera.inverse
+                transforms.append(transform_message(to_camera, header, settings.targets_frame))
+            elif settings.tf != NONE:
+                transforms.append(transform_message(pose.camera, of_targets, header.frame_id))
+            if settings.target_frames:
+                transforms += [transform_message(it.transform, header, it.frame) for it in posed]
+            self._publish_tf(transforms)
+
+    def _posed(self, pose: Pose, name: str, target: Target) -> PosedTarget:
+        row = self._rows[name]
+        transform = target_transform(
+            pose.camera, self._points.xyz[row], self._own_covariances[row]
+        )
+        return PosedTarget(target.family, target.id, target.confidence, transform)
+
+    def _publish_tf(self, transforms: list[Any]) -> None:
+        """Publish transforms, but for those whose frames would get two parents or a loop."""
+        assert self._tf
+        accepted = []
+        for it in transforms:
+            if text := self._parents.refusal(it.header.frame_id, it.child_frame_id):
+                self._tally.no_tf = text
+                logger = self.get_logger()
+                logger.warning(f'no tf: {text}', throttle_duration_sec=LOG_PERIOD)
+            else:
+                self._parents.add(it.header.frame_id, it.child_frame_id)
+                accepted.append(it)
+        if accepted:
+            kinds, publisher = self._tf
+            publisher.publish(kinds.TFMessage(transforms=accepted))
+
+    def _mistaken_matrix(self, camera: Calibration, rectified: bool) -> str:
+        """Return a message if images seem to follow the other matrix of camera_info."""
+        read = self._images_of_detector
+        if rectified:
+            if camera.distortion.any() and any(name.endswith('image_raw') for name in read):
+                return (
+                    f'camera_matrix is p, for rectified images, but {read[0]} is not rectified: '
+                    'set camera_matrix to k'
+                )
+            return ''
+        scale = camera.matrix[0, 0]
+        other = np.abs(camera.projection - camera.matrix).max() > 1e-6 * scale
+        other |= np.abs(camera.rotation - np.eye(3)).max() > 1e-6
+        if not camera.distortion.any() and other:
+            return (
+                'camera_info has no distortion, and p or r differ from k, as for rectified '
+                'images, but camera_matrix is k: set it to p if they are'
+            )
+        named = [name for name in read if 'rect' in name.rpartition('/')[2]]
+        if camera.distortion.any() and named:
+            return (
+                f'{named[0]} seems to be rectified, but camera_matrix is k, which distorts: set '
+                'it to p'
+            )
+        return ''
+
+    def _look(self) -> None:
+        """Bring what depends on publishers and on time up to date."""
+        tally, source = self._tally, self._targets
+        publishers = source.publishers()
+        tally.mistaken = other_types(source, publishers)
+        tally.lost += source.losses.newly_lost()
+        silent = time.monotonic() - source.arrived
+        timeout = self._settings.current.targets_timeout
+        tally.silent = ''
+        if timeout and silent > timeout:
+            why = silence(source, publishers, self._published)
+            tally.silent = f'no coded_targets for {silent:.0f} s: {why}'
+        tally.uncalibrated = ''
+        if tally.received and not self._informed:
+            source = self._camera_info
+            why = silence(source, source.publishers(), self._published)
+            tally.uncalibrated = f'no camera_info: {why}'
+        read = set()
+        for it in publishers:
+            with suppress(NodeNameNonExistentError):  # it has ended meanwhile
+                topics = self.get_subscriber_names_and_types_by_node(
+                    it.node_name, it.node_namespace
+                )
+                read |= {topic for topic, kinds in topics if kinds[0] in _IMAGES}
+        self._images_of_detector = tuple(sorted(read))
+
+    def _published(self) -> dict[str, list[str]]:
+        """Return the types of the topics that others publish."""
+        own = self.get_fully_qualified_name()
+        return {
+            name: kinds
+            for name, kinds in self.get_topic_names_and_types()
+            if not name.startswith(f'{own}/') and self.count_publishers(name)
+        }
+
+    def _publish_diagnostics(self) -> None:
+        header = Header(stamp=self.get_clock().now().to_msg())
+        self._look()
+        status = self._diagnostics.status(PERIOD)
+        self._diagnostic_array.publish(DiagnosticArray(header=header, status=[status]))
+
+
+def _turn(pose: Pose) -> float:
+    """Return the angle between a pose and its second one, deg."""
+    if pose.second is None:
+        return 0.0
+    cosine = (np.sum(pose.camera.rotation * pose.second.rotation) - 1) / 2
+    return float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the node."""
+    return run(PoseNode, arguments)

@@ -1,0 +1,185 @@
+"""Whether poses of single images are as exact as their covariances say, and how long they take."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ahf_ros.orientation.camera import project, rotation_matrices
+from ahf_ros.orientation.network import FloatArray
+from ahf_ros.orientation.points import MeasuredPoints
+from ahf_ros.orientation.pose import Pose, Transform, cross_matrix
+from ahf_ros.orientation.single_image import resect
+from ahf_ros.target import Target
+
+SIZE = 2464, 2056
+CAMERA = np.array([2400.0, 1240.0, 1020.0, -0.1, 0.08, -0.02, 3e-4, -2e-4, 0.0, 0.0])
+FIELDS = {
+    'plane': (1.0, 0.0),
+    'nearly a plane': (1.0, 0.03),
+    'relief': (1.0, 0.15),
+    'space': (1.0, 0.5),
+    'small plane': (0.1, 0.0),
+    'nearly a small plane': (0.1, 0.002),
+}
+"""Width and half the depth of fields of targets, m. Small ones hardly show perspective."""
+
+
+@dataclass(frozen=True)
+class View:
+    """One image of targets, its true pose, and the coordinates as somebody measured them."""
+
+    targets: tuple[Target, ...]
+    points: MeasuredPoints
+    true: Transform
+    wrong: str = ''  # name of the target with another's ID
+
+
+@dataclass
+class Counts:
+    """What becomes of the images of a row."""
+
+    squares: list[float] = field(default_factory=list)
+    seconds: list[float] = field(default_factory=list)
+    refused: int = 0
+    ambiguous: int = 0
+    flipped: int = 0  # wrong ones that are not marked
+    named: int = 0
+    wrong: int = 0
+    good_rejected: int = 0
+    moved: float = 0.0  # by wrong IDs, in standard deviations
+
+
+def view(
+    width: float, depth: float, random: np.random.Generator, sigma_points: float = 2e-5
+) -> View:
+    """Return an image of 20 to 50 targets in a field of this width and half the depth, m.
+
+    Centres have covariances of their own; the coordinates have a common one.
+    """
+    count = int(random.integers(20, 51))
+    xyz = random.uniform(-1, 1, (count, 3)) * (width / 2, width / 2, depth)
+    turn = rotation_matrices(random.normal(size=(1, 3)))[0]  # of the field in its frame
+    shift = random.uniform(-2, 2, 3)
+    direction = random.normal(size=3) * (0.6, 0.6, 0)
+    direction[2] = -1
+    distance = random.uniform(1.5, 3.0)
+    forward = -direction / np.linalg.norm(direction)
+    aside = np.cross(forward, random.normal(size=3))
+    aside /= np.linalg.norm(aside)
+    rotation = np.array([aside, np.cross(forward, aside), forward])
+    position = -distance * forward + random.uniform(-0.1, 0.1, 3)
+    exact = project(CAMERA, rotation, position, xyz)
+    mixing = random.normal(size=(count, 2, 2)) * random.uniform(0.02, 0.2, (count, 1, 1))
+    covariances = mixing @ mixing.transpose(0, 2, 1) + 1e-4 * np.eye(2)
+    noise = np.linalg.cholesky(covariances) @ random.normal(size=(count, 2, 1))
+    seen = exact + noise[:, :, 0]
+    root = sigma_points * random.normal(size=(3 * count, 3 * count)) / np.sqrt(3 * count)
+    root += sigma_points * np.eye(3 * count)
+    measured = (xyz @ turn.T + shift).ravel() + root @ random.normal(size=3 * count)
+    names = tuple(str(number) for number in range(1, count + 1))
+    points = MeasuredPoints(names, measured.reshape(-1, 3), root @ root.T, unit='m')
+    targets = tuple(
+        Target(number + 1, 0, x, y, 8.0, 8.0, covariance=tuple(covariances[number].ravel()))
+        for number, (x, y) in enumerate(seen.tolist())
+    )
+    true = Transform(turn @ rotation.T, turn @ position + shift, np.zeros((6, 6)))
+    return View(targets, points, true)
+
+
+def with_wrong_id(of: View, random: np.random.Generator) -> View:
+    """Return the image with one target that is read as another one, which is not seen."""
+    lost, wrong = random.choice(len(of.targets), 2, replace=False)
+    renamed = replace(of.targets[wrong], id=of.targets[lost].id)
+    targets = tuple(
+        renamed if index == wrong else it for index, it in enumerate(of.targets) if index != lost
+    )
+    return replace(of, targets=targets, wrong=str(renamed.id))
+
+
+def error(found: Transform, true: Transform) -> FloatArray:
+    """Return shift and turn (6,) from a pose to the true one, about the axes of the frame.
+
+    Both are those of the even screw motion from one to the other (Barfoot 2017, 7.1.3): the
+    position of a camera that turns about far targets moves on an arc, whose height would else be
+    many standard deviations.
+    """
+    turned = true.rotation @ found.rotation.T
+    sines = np.array([turned[2, 1], turned[0, 2], turned[1, 0]]) - turned[[1, 2, 0], [2, 0, 1]]
+    sine, cosine = np.linalg.norm(sines) / 2, (np.trace(turned) - 1) / 2
+    angle = float(np.arctan2(sine, cosine))
+    turn = sines / 2 / np.sinc(angle / np.pi)
+    cross = cross_matrix(turn)
+    along = np.eye(3) + (0.5 - angle**2 / 24) * cross + (1 / 6 - angle**2 / 120) * cross @ cross
+    shift = np.linalg.solve(along, true.translation - turned @ found.translation)
+    return np.concatenate((shift + np.cross(turn, found.translation), turn))
+
+
+def normalised_square(found: Transform, true: Transform) -> float:
+    """Return the squared error in the metric of the covariance, 6 in the mean."""
+    gap = error(found, true)
+    return float(gap @ np.linalg.solve(found.covariance, gap))
+
+
+def run(width: float, depth: float, seed: int, runs: int) -> Counts:
+    """Return the counts of images of a field; five in a hundred have a wrong ID."""
+    counts = Counts()
+    for number in range(runs):
+        random = np.random.default_rng([seed, round(1e4 * width), round(1e4 * depth), number])
+        of = view(width, depth, random)
+        if number % 20 == 0:
+            of = with_wrong_id(of, random)
+        begin = time.process_time()
+        try:
+            pose = resect(of.targets, of.points, CAMERA)
+        except ValueError:
+            counts.refused += 1
+            continue
+        finally:
+            counts.seconds.append(time.process_time() - begin)
+        _count(counts, of, pose)
+    return counts
+
+
+def _count(counts: Counts, of: View, pose: Pose) -> None:
+    left_out = {it.target for it in pose.rejected}
+    counts.good_rejected += len(left_out - {of.wrong})
+    if of.wrong:
+        counts.wrong += 1
+        counts.named += of.wrong in left_out
+        others = [it for it in of.targets if str(it.id) != of.wrong]
+        without = resect(others, of.points, CAMERA)
+        counts.moved = max(counts.moved, normalised_square(pose.camera, without.camera) ** 0.5)
+    if pose.second:
+        counts.ambiguous += 1
+        return
+    square = normalised_square(pose.camera, of.true)
+    counts.flipped += square > 100
+    counts.squares.append(square)
+
+
+def table(seed: int, runs: int) -> list[str]:
+    """Return the figures of each field as lines of Markdown."""
+    lines = [
+        '| field | images | NEES of 6 | refused | marked as ambiguous | beyond 10 sigma '
+        '| wrong IDs named | largest shift by them, sigma | good left out '
+        '| processor time, ms: mean, most |',
+        '|---' * 10 + '|',
+    ]
+    resect(*_warm(seed))
+    for name, (width, depth) in FIELDS.items():
+        of = run(width, depth, seed, runs)
+        of.seconds.sort()
+        lines.append(
+            f'| {name} | {runs} | {np.mean(of.squares):.2f} | {of.refused} | {of.ambiguous} '
+            f'| {of.flipped} | {of.named} of {of.wrong} | {of.moved:.1e} | {of.good_rejected} '
+            f'| {1e3 * np.mean(of.seconds):.1f}, {1e3 * of.seconds[-1]:.1f} |'
+        )
+    return lines
+
+
+def _warm(seed: int) -> tuple[tuple[Target, ...], MeasuredPoints, FloatArray]:
+    of = view(1.0, 0.0, np.random.default_rng(seed))
+    return of.targets, of.points, CAMERA

@@ -1,0 +1,267 @@
+"""The node `pose` over real DDS: every message is answered, and what is wrong is said."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy', reason='ROS 2 is not installed')
+
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import CameraInfo, Image
+from std_msgs.msg import Header
+
+from ahf_ros.msg import CodedTarget, CodedTargetArray
+from benchmarks.registration_pose import CAMERA, SIZE, View, view
+from support.detector import overrides, own, values
+
+EVERY = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.RELIABLE)
+
+
+def scene() -> View:
+    return view(1.0, 0.0, np.random.default_rng(31))
+
+
+def coordinates(path: Path, of: View) -> Path:
+    """Write the coordinates of a scene as JSON in mm."""
+    known = of.points
+    sigmas = np.sqrt(np.diag(known.covariance)).reshape(-1, 3)
+    names = 'x', 'y', 'z', 'sigma_x', 'sigma_y', 'sigma_z'
+    rows = (1000 * np.hstack((known.xyz, sigmas))).tolist()
+    points = [
+        {'id': name, **dict(zip(names, row, strict=True))}
+        for name, row in zip(known.names, rows, strict=True)
+    ]
+    path.write_text(json.dumps({'unit': 'mm', 'points': points}))
+    return path
+
+
+def info(**changes: Any) -> CameraInfo:
+    f, cx, cy, k1, k2, k3, p1, p2, *_ = CAMERA.tolist()
+    k = [f, 0.0, cx, 0.0, f, cy, 0.0, 0.0, 1.0]
+    p = [f, 0.0, cx, 0.0, 0.0, f, cy, 0.0, 0.0, 0.0, 1.0, 0.0]
+    given = {
+        'header': Header(frame_id='camera'),
+        'width': SIZE[0],
+        'height': SIZE[1],
+        'distortion_model': 'plumb_bob',
+        'd': [k1, k2, p1, p2, k3],
+        'k': k,
+        'r': np.eye(3).ravel(),
+        'p': p,
+    }
+    return CameraInfo(**(given | changes))
+
+
+def seen(of: View, number: int, first_id: int = 0, frame: str = 'camera') -> CodedTargetArray:
+    """Return the targets of a scene in an image taken after so many ms."""
+    header = Header(stamp=Time(sec=1 + number // 1000, nanosec=number % 1000 * 10**6))
+    header.frame_id = frame
+    targets = [
+        CodedTarget(
+            id=it.id + first_id,
+            x=it.x,
+            y=it.y,
+            covariance=it.covariance,
+            family='cct12',
+            confidence=1.0,
+        )
+        for it in of.targets
+    ]
+    return CodedTargetArray(header=header, width=SIZE[0], height=SIZE[1], targets=targets)
+
+
+def number_of(message: Any) -> int:
+    """Return the number that `seen` was given."""
+    return (message.header.stamp.sec - 1) * 1000 + message.header.stamp.nanosec // 10**6
+
+
+class PoseProcess:
+    """The node in a namespace of its own, and what it publishes."""
+
+    def __init__(self, graph: Any, space: str, file: Path, *arguments: str) -> None:
+        self.graph = graph
+        given = overrides(coordinates=file)
+        self.process = graph.start('pose', *own(space), *given, *arguments)
+        self.poses = graph.listen(PoseWithCovarianceStamped, f'{space}/pose/pose', EVERY)
+        self.diagnostics = graph.listen(DiagnosticArray, f'{space}/diagnostics')
+        self.targets = graph.node.create_publisher(
+            CodedTargetArray, f'{space}/coded_targets', EVERY
+        )
+        self.camera = graph.publisher(CameraInfo, f'{space}/camera_info')
+        graph.until(self.targets.get_subscription_count)
+
+    def says(self, words: str, send: Callable[[], Any]) -> str:
+        """Return the value and the message of the diagnostics with these words, sending on."""
+        message = ''
+
+        def said() -> bool:
+            nonlocal message
+            send()
+            count = len(self.diagnostics)
+            self.graph.until(lambda: len(self.diagnostics) > count)
+            message = self.diagnostics[-1].status[0].message
+            return words in message
+
+        self.graph.until(said)
+        return message
+
+    def calibrated(self, of: View) -> None:
+        """Send a calibration until the node has it, with images before all others."""
+        self.camera.publish(info())
+
+        def posed() -> bool:
+            self.targets.publish(seen(of, 0))
+            count = len(self.diagnostics)
+            self.graph.until(lambda: self.poses or len(self.diagnostics) > count)
+            return bool(self.poses)
+
+        self.graph.until(posed)
+
+
+def test_no_message_is_lost_at_100_hz_and_poses_are_those_of_the_camera(
+    graph: Any, tmp_path: Path
+) -> None:
+    of = scene()
+    node = PoseProcess(graph, '/fast', coordinates(tmp_path / 'points.json', of))
+    node.calibrated(of)
+    numbers = range(10, 3010, 10)
+    for number in numbers:  # faster than 100 Hz: as fast as they are sent
+        node.targets.publish(seen(of, number))
+    graph.until(lambda: number_of(node.poses[-1]) == numbers[-1])
+    assert [number_of(it) for it in node.poses if number_of(it)] == list(numbers)
+    count = len(node.diagnostics)
+    graph.until(lambda: len(node.diagnostics) > count + 1)
+    told = values(node.diagnostics[-1])
+    assert (told['lost in transport'], told['targets used']) == ('0', str(len(of.targets)))
+    assert told['received'] == told['published'] == str(len(node.poses))
+    found = node.poses[-1]
+    assert found.header.frame_id == 'targets'
+    position = found.pose.pose.position
+    covariance = np.reshape(found.pose.covariance, (6, 6))
+    gap = np.array([position.x, position.y, position.z]) - of.true.translation
+    assert gap @ np.linalg.solve(covariance[:3, :3], gap) < 40
+    assert np.linalg.eigvalsh(covariance)[0] > 0
+    x, y, z, w = (getattr(found.pose.pose.orientation, it) for it in 'xyzw')
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    turn = np.eye(3) + 2 * w * cross + 2 * cross @ cross
+    assert np.abs(turn - of.true.rotation).max() < 0.01
+    assert node.process.end() == (0, '')
+
+
+def test_what_is_wrong_is_said_and_nothing_is_published(graph: Any, tmp_path: Path) -> None:
+    of = scene()
+    node = PoseProcess(graph, '/wrong', coordinates(tmp_path / 'points.json', of))
+    number = 1000
+
+    def image(**changes: Any) -> Callable[[], None]:
+        def send() -> None:
+            nonlocal number
+            number += 10
+            node.targets.publish(seen(of, number, **changes))
+
+        return send
+
+    topic = '/wrong/camera_info'
+    told = node.says(f'images without a pose: no camera_info has come on {topic}', image())
+    assert f'no camera_info: /test publishes on {topic}' in told
+    for given, words in (
+        ({'k': np.zeros(9)}, 'k of camera_info has the focal lengths 0 and 0, accepted'),
+        ({'k': [1e3, 0, 0, 0, 1e3, 0, 0, 0, 1]}, 'has the principal point 0, 0, accepted'),
+        ({'width': 640, 'height': 480}, 'camera_info is of an image of 640 x 480 px, accepted'),
+        ({'header': Header(frame_id='other')}, "frame_id of camera_info is 'other', accepted"),
+    ):
+        node.camera.publish(info(**given))
+        node.says(words, image())
+    node.camera.publish(info())
+    words = 'no target has known coordinates: seen are cct12:501, cct12:502'
+    node.says(words, image(first_id=500))
+    assert not node.poses
+    node.says('poses', image())
+    assert node.poses
+    count = len(node.poses)
+    told = node.says(
+        'stamps went backwards',
+        lambda: [node.targets.publish(seen(of, it)) for it in (number + 500, number + 100)],
+    )
+    assert 'without a pose' not in told
+    assert len(node.poses) >= count + 2
+    flat = info(d=[], p=[2e3, 0, 1200, 0, 0, 2e3, 1000, 0, 0, 0, 1, 0])
+    node.camera.publish(flat)
+    node.says('p or r differ from k, as for rectified images, but camera_matrix is k', image())
+    swapped = seen(of, 10**6)
+    swapped.targets = [*swapped.targets[:-2], swapped.targets[-1]]
+    swapped.targets[-1].id = of.targets[-2].id
+    node.camera.publish(info())
+    words = f'{of.targets[-2].id}, wrong ID: the place of target {of.targets[-1].id}'
+    node.says(words, lambda: node.targets.publish(swapped))
+
+
+def test_rectified_images_of_the_detector_are_noticed(graph: Any, tmp_path: Path) -> None:
+    of = scene()
+    node = PoseProcess(graph, '/rect', coordinates(tmp_path / 'points.json', of))
+    graph.node.create_subscription(Image, '/rect/image_rect', lambda _: None, 1)
+    node.camera.publish(info())
+    words = '/rect/image_rect seems to be rectified, but camera_matrix is k'
+    number = iter(range(10, 10**6, 10))
+    node.says(words, lambda: node.targets.publish(seen(of, next(number))))
+
+
+@pytest.mark.parametrize(
+    ('given', 'words'),
+    [
+        ({}, "coordinates is '', accepted is a folder of ahf orient, its network.json, CSV or"),
+        ({'coordinates': '{}/points.json', 'unit': 'm'}, "unit is 'm', accepted is that of {}/p"),
+    ],
+)
+def test_bad_parameters_end_the_node_with_the_reason(
+    graph: Any, tmp_path: Path, given: dict[str, str], words: str
+) -> None:
+    coordinates(tmp_path / 'points.json', scene())
+    filled = {name: value.format(tmp_path) for name, value in given.items()}
+    status, errors = graph.start('pose', *overrides(**filled)).wait()
+    assert status == 1
+    assert words.format(tmp_path) in errors
+    assert len(errors.splitlines()) == 1
+
+
+@pytest.mark.parametrize('parent', ['camera', 'targets'])
+def test_tf_has_one_parent(graph: Any, tmp_path: Path, parent: str) -> None:
+    TFMessage = pytest.importorskip('tf2_msgs.msg', reason='tf2_msgs is not installed').TFMessage
+    of, space, frame = scene(), f'/tf_{parent}', f'camera_{parent}'
+    file = coordinates(tmp_path / 'points.json', of)
+    given = overrides(tf=parent, target_frames='true', targets_frame=f'field_{parent}')
+    topics = ('-r', f'/tf:={space}/tf', '-r', f'/tf_static:={space}/tf_static')
+    node = PoseProcess(graph, space, file, *given, *topics)
+    heard = graph.listen(TFMessage, f'{space}/tf', EVERY)
+    node.camera.publish(info(header=Header(frame_id=frame)))
+    numbers = iter(range(10, 10**6, 10))
+
+    def image() -> None:
+        node.targets.publish(seen(of, next(numbers), frame=frame))
+
+    def transformed() -> bool:
+        image()
+        count = len(node.diagnostics)
+        graph.until(lambda: heard or len(node.diagnostics) > count)
+        return bool(heard)
+
+    graph.until(transformed)
+    pairs = {(it.header.frame_id, it.child_frame_id) for it in heard[0].transforms}
+    frames = {'camera': frame, 'targets': f'field_{parent}'}
+    child = 'targets' if parent == 'camera' else 'camera'
+    assert (frames[parent], frames[child]) in pairs
+    assert {it for it in pairs if ':' in it[1]} == {(frame, f'cct12:{it.id}') for it in of.targets}
+    other = TFMessage(transforms=[TransformStamped(child_frame_id=frames[child])])
+    other.transforms[0].header.frame_id = 'base'
+    static = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    graph.node.create_publisher(TFMessage, f'{space}/tf_static', static).publish(other)
+    node.says(f"no tf: '{frames[child]}' has the parent 'base' already, accepted is one", image)
