@@ -56,7 +56,7 @@ class CameraView:
     width: int
     height: int
     focal_length: float | None = None
-    """Start value in px; None where nothing is known."""
+    """Start value in px where no calibration is given; None where nothing is known."""
     calibration: FloatArray | None = None
     """All of `camera.PARAMETERS` where a calibration is given."""
     fixed: bool = False

@@ -11,6 +11,7 @@ from ahf_ros.orientation.adjustment import free_parameters
 from ahf_ros.orientation.camera import undistort
 from ahf_ros.orientation.network import FloatArray, IntArray, Network
 from ahf_ros.orientation.solution import Start
+from ahf_ros.orientation.triangulation import largest_angle
 
 NOWHERE = 1e3
 """Coordinate in focal lengths, far outside every image."""
@@ -91,3 +92,17 @@ def spread_of(lengths: FloatArray) -> float:
     """Return the robust spread of residuals in standard deviations, at least one."""
     known = lengths[~np.isnan(lengths)]
     return max(1.0, normals.robust_spread(known)) if len(known) else np.inf
+
+
+def largest_angles(network: Network, start: Start) -> FloatArray:
+    """Return the largest angle between two used rays of each target, rad; NaN below two rays."""
+    angles = np.full(len(network.targets), np.nan)
+    observed = network.observations
+    for target in range(len(network.targets)):
+        photographs = observed.photograph[(observed.point == target) & start.used]
+        directions = start.positions[photographs] - start.points[target]
+        directions = directions[np.isfinite(directions).all(axis=1)]
+        if len(directions) > 1:
+            directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+            angles[target] = largest_angle(directions)
+    return angles
