@@ -330,7 +330,8 @@ def _left_out(network: Network, solutions: Sequence[Solution]) -> tuple[str, ...
 def _zoom(network: Network, view: View, start: Start) -> float | None:
     """Return a photograph's focal length over its camera's where it alone fits, or None."""
     calibration = start.calibrations[view.camera]
-    if not np.isfinite(calibration[0]):
+    seen = np.isfinite(start.points[view.points, 0])
+    if not np.isfinite(calibration[0]) or seen.sum() <= FEWEST_POINTS:
         return None
     spread = spread_of(lengths_of(network, start))
 
@@ -338,7 +339,6 @@ def _zoom(network: Network, view: View, start: Start) -> float | None:
         changed = start.calibrations.copy()
         changed[view.camera, 0] *= factor
         xy, sigma = view.normalised(changed)
-        seen = np.isfinite(start.points[view.points, 0])
         poses = resections(start.points[view.points[seen]], xy[seen], sigma[seen] * spread)
         return (poses[0].scale, poses[0]) if poses else (np.inf, None)
 

@@ -143,6 +143,36 @@ def test_a_target_twice_in_a_photograph_is_set_aside():
     ) == 2
 
 
+def of_few(number: int, changed: int | None = None) -> Network:
+    """Return a network whose last photograph shows few targets, one of them perhaps another."""
+    network = taken(count=8, focal=FOCAL).network
+    observed = network.observations
+    last = np.flatnonzero(observed.photograph == 7)
+    kept = np.setdiff1d(np.arange(len(observed.xy)), last[number:])
+    point = observed.point.copy()
+    if changed is not None:
+        point[last[changed]] = observed.point[last[-1]]
+    return replace(
+        network,
+        observations=Observations(
+            observed.photograph[kept], point[kept], observed.xy[kept], observed.covariance[kept]
+        ),
+    )
+
+
+def test_four_targets_orient_a_photograph_if_they_agree():
+    (solution,) = orient(of_few(4))
+    assert solution.oriented.all() and not any('not oriented' in it for it in solution.warnings)
+    whole = orient(taken(count=8, focal=FOCAL).network)[0].start
+    few = solution.start
+    turns = [it.rotations[7] @ it.rotations[0].T for it in (whole, few)]
+    assert np.abs(turns[0] - turns[1]).max() < 1e-3
+    for network, reason in ((of_few(4, 2), 'no pose fits well'), (of_few(3), 'fewer than 4')):
+        (solution,) = orient(network)
+        assert solution.oriented.tolist() == 7 * [True] + [False]
+        assert any('7.png' in it and reason in it for it in solution.warnings)
+
+
 def test_groups_that_do_not_hang_together_are_oriented_each_by_itself():
     seen = taken(count=8, focal=FOCAL)
     observed = seen.network.observations
