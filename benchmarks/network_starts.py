@@ -301,15 +301,7 @@ def _without(network: Network, rows: IntArray) -> Network:
     """Return the network without some observations."""
     observed = network.observations
     keep = np.setdiff1d(np.arange(len(observed.xy)), rows)
-    return replace(
-        network,
-        observations=Observations(
-            observed.photograph[keep],
-            observed.point[keep],
-            observed.xy[keep],
-            observed.covariance[keep],
-        ),
-    )
+    return replace(network, observations=observed.rows(keep))
 
 
 def _against(solution: Solution, truth: dict[str, list[float]]) -> tuple[float, float, float, int]:

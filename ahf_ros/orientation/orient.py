@@ -11,7 +11,7 @@ import numpy as np
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.orientation.adjustment import adjust
 from ahf_ros.orientation.datum import Datum
-from ahf_ros.orientation.network import FloatArray, IntArray, Network, Rejection
+from ahf_ros.orientation.network import FloatArray, IntArray, Network, once_a_photograph
 from ahf_ros.orientation.planar import principal_axes
 from ahf_ros.orientation.resection import FEWEST_POINTS, Resection, resections
 from ahf_ros.orientation.solution import Solution, Start
@@ -127,33 +127,6 @@ def _oriented(
         replace(first, warnings=first.warnings + tuple(refused) + left + _zooms(solutions)),
         *solutions[1:],
     ]
-
-
-def once_a_photograph(network: Network) -> Network:
-    """Return the network without targets that are twice in a photograph: both are set aside."""
-    observed = network.observations
-    key = observed.photograph * len(network.targets) + observed.point
-    _, inverse, counts = np.unique(key, return_inverse=True, return_counts=True)
-    twice = counts[inverse.ravel()] > 1
-    if not twice.any():
-        return network
-    aside = tuple(
-        Rejection(
-            network.photographs[observed.photograph[row]],
-            network.targets[observed.point[row]],
-            (float(observed.xy[row, 0]), float(observed.xy[row, 1])),
-            'its ID is more than once in the photograph',
-        )
-        for row in np.flatnonzero(twice)
-    )
-    kept = replace(
-        observed,
-        photograph=observed.photograph[~twice],
-        point=observed.point[~twice],
-        xy=observed.xy[~twice],
-        covariance=observed.covariance[~twice],
-    )
-    return replace(network, observations=kept, set_aside=network.set_aside + aside)
 
 
 def _check(network: Network) -> None:

@@ -15,7 +15,7 @@ from ahf_ros.orientation import normals
 from ahf_ros.orientation.adjustment import free_parameters, refine
 from ahf_ros.orientation.camera import known_calibration, pinhole
 from ahf_ros.orientation.least_squares import normal_equations
-from ahf_ros.orientation.network import FloatArray, IntArray, Network
+from ahf_ros.orientation.network import FloatArray, IntArray, Network, part_of
 from ahf_ros.orientation.normals import BEHIND
 from ahf_ros.orientation.planar import mirrored
 from ahf_ros.orientation.precision import precision
@@ -24,7 +24,7 @@ from ahf_ros.orientation.resection import resections
 from ahf_ros.orientation.solution import Start
 from ahf_ros.orientation.triangulation import SMALLEST_ANGLE, directions, midpoints
 from ahf_ros.orientation.usual_lens import usual_lens
-from ahf_ros.orientation.views import View, largest_angles, lengths_of, part_of, spread_of
+from ahf_ros.orientation.views import View, largest_angles, lengths_of, spread_of
 
 STEPS = np.geomspace(0.5, 4.0, 14)
 """Focal lengths that are tried where none is known, in widths of the image: 17 % apart."""

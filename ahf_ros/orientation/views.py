@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -51,24 +51,6 @@ def views_of(network: Network) -> list[View]:
         rows = rows[first]
         made.append(View(int(camera), points, observed.xy[rows], sigma[rows], rows))
     return made
-
-
-def part_of(network: Network, photographs: IntArray) -> tuple[Network, IntArray]:
-    """Return a network of some photographs with all points, and the rows of its observations."""
-    observed = network.observations
-    index = np.full(len(network.photographs), -1)
-    index[photographs] = np.arange(len(photographs))
-    rows = np.flatnonzero(index[observed.photograph] >= 0)
-    part = replace(
-        observed,
-        photograph=index[observed.photograph[rows]],
-        point=observed.point[rows],
-        xy=observed.xy[rows],
-        covariance=observed.covariance[rows],
-    )
-    names = tuple(network.photographs[photograph] for photograph in photographs)
-    cameras = network.camera_of[photographs]
-    return replace(network, photographs=names, camera_of=cameras, observations=part), rows
 
 
 def lengths_of(network: Network, start: Start) -> FloatArray:
