@@ -13,10 +13,10 @@ from itertools import islice
 
 import numpy as np
 
-from ahf_ros.orientation.adjustment import refine
 from ahf_ros.orientation.camera import pinhole
 from ahf_ros.orientation.network import FloatArray, IntArray, Network
 from ahf_ros.orientation.planar import mirrored
+from ahf_ros.orientation.refinement import refine
 from ahf_ros.orientation.resection import ALIKE, BOUND, FEWEST_POINTS, Resection, resections
 from ahf_ros.orientation.solution import Start
 from ahf_ros.orientation.triangulation import intersect

@@ -12,13 +12,13 @@ from itertools import combinations
 import numpy as np
 
 from ahf_ros.orientation import normals
-from ahf_ros.orientation.adjustment import free_parameters, refine
 from ahf_ros.orientation.camera import known_calibration, pinhole
 from ahf_ros.orientation.least_squares import normal_equations
 from ahf_ros.orientation.network import FloatArray, IntArray, Network, part_of
 from ahf_ros.orientation.normals import BEHIND
 from ahf_ros.orientation.planar import mirrored
 from ahf_ros.orientation.precision import precision
+from ahf_ros.orientation.refinement import free_parameters, refine
 from ahf_ros.orientation.relative import relative_orientations
 from ahf_ros.orientation.resection import resections
 from ahf_ros.orientation.solution import Start

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ahf_ros.orientation import normals
-from ahf_ros.orientation.adjustment import free_parameters
 from ahf_ros.orientation.camera import undistort
 from ahf_ros.orientation.network import FloatArray, IntArray, Network
+from ahf_ros.orientation.refinement import free_parameters
 from ahf_ros.orientation.solution import Start
 from ahf_ros.orientation.triangulation import largest_angle
 
