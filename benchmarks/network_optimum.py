@@ -41,7 +41,12 @@ class _Named(NamedTuple):
 def table(seeds: Sequence[int], runs: int) -> list[str]:
     """Return the bounds for each field that `network_epochs` simulates, by `runs` pairs each."""
     rows = [
-        (field.name, field.targets, 'fixed' if bar else 'free', *_row(field, bar, seed, runs))
+        (
+            field.name,
+            field.targets,
+            'fixed' if bar else 'free',
+            *(number(100 * share, 1) for share in located(field, bar, seed, runs)),
+        )
         for seed in seeds
         for field in progress([one for one in FIELDS if not one.adjusted], 'networks')
         for bar in (True, False)
@@ -50,7 +55,7 @@ def table(seeds: Sequence[int], runs: int) -> list[str]:
     return [*markdown(head, rows), '', f'{runs} pairs of epochs a row.']
 
 
-def _row(field: Field, bar: bool, seed: int, runs: int) -> tuple[str, str]:
+def located(field: Field, bar: bool, seed: int, runs: int) -> tuple[float, float]:
     """Return how often the most powerful test, and that of the largest share, are right."""
     random = np.random.default_rng(seed)
     xyz = random.uniform(-0.5, 0.5, (field.targets, 3)) * field.extent
@@ -88,4 +93,4 @@ def _row(field: Field, bar: bool, seed: int, runs: int) -> tuple[str, str]:
     targets = np.concatenate(right)
     by_ratio = (found.ratio > np.quantile(nothing.ratio, 1 - LEVEL)) & (found.by_ratio == targets)
     by_share = (found.share > np.quantile(nothing.share, 1 - LEVEL)) & (found.by_share == targets)
-    return number(100 * float(by_ratio.mean()), 1), number(100 * float(by_share.mean()), 1)
+    return float(by_ratio.mean()), float(by_share.mean())
