@@ -14,8 +14,8 @@ from ahf_ros.orientation.adjustment import adjust
 from ahf_ros.orientation.camera import PARAMETERS
 from ahf_ros.orientation.network import Network
 from ahf_ros.orientation.similarity import similarity_between
-from ahf_ros.orientation.simulation import Field, approximate, simulate
 from ahf_ros.orientation.solution import Start
+from benchmarks.network_scenes import Field, approximate, simulate
 
 SIZES = (8, 15, 30, 60)
 OPENCV = (0, 0, 1, 2, 3, 4, 6, 7)  # COLMAP's fx, fy, cx, cy, k1, k2, p1, p2

@@ -8,8 +8,8 @@ import numpy as np
 
 from ahf_ros.orientation.adjustment import adjust
 from ahf_ros.orientation.similarity import similarity_between
-from ahf_ros.orientation.simulation import Field, approximate, simulate
 from ahf_ros.orientation.solution import Solution, Start
+from benchmarks.network_scenes import Field, approximate, simulate
 
 CHI_SQUARE = 7.814728  # 95 % of three degrees
 RELEASED = ('f', 'cx', 'cy', 'k1', 'k2', 'p1', 'p2')

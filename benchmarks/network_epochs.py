@@ -39,9 +39,9 @@ from ahf_ros.orientation.datum import movements, s_transform
 from ahf_ros.orientation.network import FloatArray, ScaleBar
 from ahf_ros.orientation.points import MeasuredPoints
 from ahf_ros.orientation.similarity import Similarity
-from ahf_ros.orientation.simulation import Field as Scene
-from ahf_ros.orientation.simulation import simulate
 from ahf_ros.orientation.solution import Solution
+from benchmarks.network_scenes import Field as Scene
+from benchmarks.network_scenes import simulate
 from benchmarks.report import progress
 from benchmarks.report import table as markdown
 

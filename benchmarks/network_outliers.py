@@ -11,8 +11,8 @@ from ahf_ros.orientation.adjustment import adjust
 from ahf_ros.orientation.camera import project
 from ahf_ros.orientation.network import Network
 from ahf_ros.orientation.refinement import refine
-from ahf_ros.orientation.simulation import Field, approximate, simulate
 from ahf_ros.orientation.solution import Start
+from benchmarks.network_scenes import Field, approximate, simulate
 
 WRONG = 0.05
 LARGE = 5.0  # standard deviations of a wrong observation that must not be accepted

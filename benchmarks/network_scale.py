@@ -9,8 +9,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ahf_ros.orientation.adjustment import adjust
-from ahf_ros.orientation.simulation import Field, approximate, simulate
 from benchmarks.network_ellipsoids import RELEASED
+from benchmarks.network_scenes import Field, approximate, simulate
 
 SIZES = (125, 250, 500, 1000)
 

@@ -90,12 +90,25 @@ def adjust(
 
     Examples
     --------
-    >>> from ahf_ros.orientation.simulation import Field, approximate, simulate
-    >>> random = np.random.default_rng(1)
-    >>> network, truth = simulate(Field(photographs=8, targets=20), random)
-    >>> solution = adjust(network, approximate(truth, random))
-    >>> 0.8 < solution.sigma0 < 1.2, solution.covariance_of_points.shape
-    (True, (60, 60))
+    >>> import cv2
+    >>> from ahf_ros.orientation.camera import pinhole, project
+    >>> from ahf_ros.orientation.network import CameraView, Observations
+    >>> source = np.random.default_rng(1)
+    >>> points, turns = source.uniform(-1, 1, (20, 3)), source.uniform(-0.5, 0.5, (6, 3))
+    >>> rotations = [cv2.Rodrigues(turn + (0, 0, roll))[0] for roll, turn in enumerate(turns)]
+    >>> lens = pinhole(1500.0, 1600, 1200)
+    >>> xy = np.concatenate([project(lens, it, -5 * it[2], points) for it in rotations])
+    >>> photograph, point = np.divmod(np.arange(len(xy)), len(points))
+    >>> seen = Observations(photograph, point, xy, np.tile(1e-4 * np.eye(2), (len(xy), 1, 1)))
+    >>> cameras = (CameraView('camera', 1600, 1200),)
+    >>> names = tuple('123456'), tuple('ABCDEFGHIJKLMNOPQRST')
+    >>> network = Network(names[0], np.zeros(6, int), cameras, names[1], seen)
+    >>> positions = np.array([-5 * it[2] for it in rotations])
+    >>> used = np.ones(len(xy), bool)
+    >>> start = Start(lens[None], np.array(rotations), positions, points + 0.01, used)
+    >>> solution = adjust(network, start)
+    >>> float(np.abs(solution.residuals).max()) < 1e-6
+    True
     """
     check_network(network)
     try:

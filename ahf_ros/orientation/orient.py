@@ -76,11 +76,22 @@ def orient(
 
     Examples
     --------
-    >>> from ahf_ros.orientation.simulation import Field, simulate
-    >>> network, truth = simulate(Field(photographs=8, targets=20), np.random.default_rng(1))
+    >>> import cv2
+    >>> from ahf_ros.orientation.camera import pinhole, project
+    >>> from ahf_ros.orientation.network import CameraView, Observations
+    >>> source = np.random.default_rng(1)
+    >>> points, turns = source.uniform(-1, 1, (20, 3)), source.uniform(-0.5, 0.5, (6, 3))
+    >>> rotations = [cv2.Rodrigues(turn + (0, 0, roll))[0] for roll, turn in enumerate(turns)]
+    >>> lens = pinhole(1500.0, 1600, 1200)
+    >>> xy = np.concatenate([project(lens, it, -5 * it[2], points) for it in rotations])
+    >>> photograph, point = np.divmod(np.arange(len(xy)), len(points))
+    >>> seen = Observations(photograph, point, xy, np.tile(1e-4 * np.eye(2), (len(xy), 1, 1)))
+    >>> cameras = (CameraView('camera', 1600, 1200),)
+    >>> names = tuple('123456'), tuple('ABCDEFGHIJKLMNOPQRST')
+    >>> network = Network(names[0], np.zeros(6, int), cameras, names[1], seen)
     >>> (solution,) = orient(network)
-    >>> round(float(solution.start.calibrations[0, 0]), -2), solution.covariance_of_points.shape
-    (3200.0, (60, 60))
+    >>> round(float(solution.start.calibrations[0, 0]), 2), solution.covariance_of_points.shape
+    (1500.0, (60, 60))
     """
     with one_blas_thread():
         return _oriented(once_a_photograph(network), datum, release, test)
