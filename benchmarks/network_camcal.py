@@ -13,9 +13,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ahf_ros.orientation.adjustment import adjust, refine
+from ahf_ros.orientation.adjustment import adjust
 from ahf_ros.orientation.camera import PARAMETERS, pinhole, undistort
 from ahf_ros.orientation.network import CameraView, ControlPoint, Network, Observations
+from ahf_ros.orientation.refinement import refine
 from ahf_ros.orientation.solution import Solution, Start
 
 WIDTH, HEIGHT = 2272, 1704

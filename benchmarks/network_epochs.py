@@ -216,11 +216,11 @@ def figures(field: Field, bar: bool, runs: int, rng: np.random.Generator) -> dic
 
     exact = [_points(xyz, it.covariance, it.redundancy, bar) for it in epochs]
     covariances = np.array([it.covariance for it in compare(*exact).movements])
-    differences = _differences(xyz, epochs[0].covariance + epochs[1].covariance, bar)
+    against_others = differences(xyz, epochs[0].covariance + epochs[1].covariance, bar)
     degrees = sum(it.redundancy for it in epochs)
     critical = f.isf(LEVEL * 0.9 / field.targets, 3, degrees)
     shares = {}
-    for kind, sigmas in (('', differences), ('conditional_', covariances)):
+    for kind, sigmas in (('', against_others), ('conditional_', covariances)):
         hits, bounds = [], []
         for _ in range(runs // 4):
             target, movement = int(rng.integers(field.targets)), still.copy()
@@ -255,14 +255,14 @@ def figures(field: Field, bar: bool, runs: int, rng: np.random.Generator) -> dic
     }
 
 
-def _differences(xyz: FloatArray, covariance: FloatArray, bar: bool) -> FloatArray:
+def differences(xyz: FloatArray, covariance: FloatArray, bar: bool) -> FloatArray:
     """Return the covariances (n, 3, 3) of differences, each in the datum of all other targets."""
-    differences = []
+    found = []
     for index in range(len(xyz)):
         others = np.arange(len(xyz)) != index
         moved = s_transform(xyz, covariance, others.astype(float), scale=not bar)[1]
-        differences.append(moved[3 * index : 3 * index + 3, 3 * index : 3 * index + 3])
-    return np.array(differences)
+        found.append(moved[3 * index : 3 * index + 3, 3 * index : 3 * index + 3])
+    return np.array(found)
 
 
 def _movement(covariance: FloatArray, sigmas: float, rng: np.random.Generator) -> FloatArray:

@@ -7,9 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ahf_ros.orientation.adjustment import adjust, refine
+from ahf_ros.orientation.adjustment import adjust
 from ahf_ros.orientation.camera import project
 from ahf_ros.orientation.network import Network
+from ahf_ros.orientation.refinement import refine
 from ahf_ros.orientation.solution import Start
 from benchmarks.network_scenes import Field, approximate, simulate
 

@@ -136,8 +136,9 @@ def _view(
                 f'camera {name} may have any of the calibrations {paths}, accepted is one whose '
                 'camera_name is that of the camera'
             )
-        values = file.calibration
-        return CameraView(name, width, height, float(values[0]), values, not known.adjusted)
+        return CameraView(
+            name, width, height, calibration=file.calibration, fixed=not known.adjusted
+        )
     if known.focal_length is not None:
         return CameraView(name, width, height, known.focal_length(width, height))
     lengths = [it.pixels for it in exif if it.pixels is not None]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import PurePath
@@ -15,13 +15,11 @@ from ahf_ros.orientation.network import (
     ControlPoint,
     Network,
     Observations,
-    Rejection,
     ScaleBar,
+    once_a_photograph,
+    without,
 )
 from ahf_ros.text import counted
-
-TWICE = 'its ID is in this photograph twice'
-SINGULAR = 'its covariance is singular'
 
 _SINGULAR = 1e-9  # least ratio of the variances of an image point along its axes
 
@@ -48,11 +46,8 @@ def make_network(
     views, camera_of = camera_views(photographs, names, cameras or CameraKnowledge(), notes)
     labels = _labels(photographs)
     rows: list[tuple[int, str, ImagePoint]] = []
-    aside: list[Rejection] = []
     for index, photograph in enumerate(photographs):
-        kept, rejected = _sorted_out(photograph, names[index], labels)
-        rows += [(index, label, point) for label, point in kept]
-        aside += rejected
+        rows += [(index, labels(point), point) for point in photograph.points]
     targets = sorted({label for _, label, _ in rows}, key=_order)
     numbers = {label: index for index, label in enumerate(targets)}
     unknown = sum(point.covariance is None for *_, point in rows)
@@ -80,9 +75,11 @@ def make_network(
         bars=known_bars,
         control=known_control,
         unit=unit if scaled else '',
-        set_aside=tuple(aside),
     )
-    return network, notes
+    network = once_a_photograph(network)
+    least, most = np.linalg.eigvalsh(network.observations.covariance).T
+    singular = ~(least > _SINGULAR * most)
+    return without(network, singular, 'its covariance is singular'), notes
 
 
 def _photograph_names(photographs: Sequence[ObservedPhotograph]) -> list[str]:
@@ -103,25 +100,6 @@ def _order(label: str) -> tuple[str, int, str]:
     """Return what sorts labels by family and by number."""
     family, _, number = label.rpartition(':')
     return (family, int(number), '') if number.isdecimal() else (family, -1, number)
-
-
-def _sorted_out(
-    photograph: ObservedPhotograph, name: str, label: Callable[[ImagePoint], str]
-) -> tuple[list[tuple[str, ImagePoint]], list[Rejection]]:
-    """Return the points of a photograph with their labels, and those that cannot be used."""
-    count = Counter(label(point) for point in photograph.points)
-    kept, rejected = [], []
-    for point in photograph.points:
-        target = label(point)
-        reason = TWICE if count[target] > 1 else ''
-        if point.covariance is not None:
-            least, most = np.linalg.eigvalsh(point.covariance)
-            reason = reason or (SINGULAR if not least > _SINGULAR * most else '')
-        if reason:
-            rejected.append(Rejection(name, target, point.xy, reason))
-        else:
-            kept.append((target, point))
-    return kept, rejected
 
 
 def _by_id(targets: Sequence[str]) -> Callable[[str], str | None]:

@@ -1,7 +1,4 @@
-"""Bundle adjustment: from approximate values and observations to coordinates.
-
-`refine` is the light one, robust and without covariances, for the search of approximate values.
-"""
+"""Bundle adjustment: from approximate values and observations to coordinates."""
 
 from __future__ import annotations
 
@@ -26,71 +23,19 @@ from ahf_ros.orientation.network import FloatArray, IntArray, Network, Rejection
 from ahf_ros.orientation.normals import Layout
 from ahf_ros.orientation.placing import placed
 from ahf_ros.orientation.precision import precision
+from ahf_ros.orientation.refinement import NEEDED, agreeing, free_parameters
 from ahf_ros.orientation.rejection import Adjusted, adjusted, rejections, relocated, tested
 from ahf_ros.orientation.solution import Solution, Start
 from ahf_ros.orientation.testing import CRITICAL, UnitWeight, unit_weight
-from ahf_ros.orientation.usual_lens import usual_lens
+from ahf_ros.orientation.zoom import zoomed
 
-_AGREES = 5.0  # standard deviations, or robust ones, of an observation that agrees
-_ZOOMED = 0.01  # change of a photograph's focal length that is another zoom
-_SUSPECT = 0.8  # share of a photograph's observations that agree, below which its zoom is tested
-_LARGE_SPREAD = 3.0  # of residuals, in standard deviations, from which on all zooms are tested
 _CHECKED = 1e-6  # share of a variance that others must leave for a condition to be tested
 _MISFIT = 3.0  # sigma0 that is no matter of weights
-_NEEDED = (
-    'no used observation has a pose and a point in front of it, expected photographs with three '
-    'points and points with two rays'
-)
 _MISFITS = (
     'sigma0 is {:.1f}: image points fit so many times worse than their covariances say. Do not '
     'trust the coordinates before the reason is found: a wrong focal length or calibration, '
     'wrong IDs, targets that moved, or covariances that are too small'
 )
-
-
-def refine(
-    network: Network,
-    start: Start,
-    free: tuple[str, ...] = (),
-    *,
-    rounds: int = 30,
-) -> Start:
-    """Return approximate values bettered by a robust adjustment of the used observations.
-
-    Bars and control points are not used, and the frame stays about where it was. The parameters
-    in `free` are estimated for every camera that is not fixed, those of lenses about as usual.
-    Photographs with fewer than three and points with fewer than two used observations keep their
-    values. Afterwards those observations are used, of all with a pose and a point, that agree with
-    the values to five standard deviations, or five robust ones where the residuals are larger.
-
-    Raises `ValueError` if nothing is left that could be adjusted.
-    """
-    layout = normals.lay_out(network, start, start.used, free_parameters(network, free))
-    if not len(layout.xy):
-        raise ValueError('start: nothing to refine; ' + _NEEDED)
-    refined, _ = minimise(layout, start, usual_lens(network, layout), 'cauchy', rounds)
-    return replace(refined, used=agreeing(network, refined, layout))
-
-
-def free_parameters(network: Network, names: tuple[str, ...]) -> NDArray[np.bool_]:
-    """Return the mask (cameras, parameters) of named parameters of cameras that are not fixed."""
-    unknown = set(names) - set(PARAMETERS)
-    if unknown:
-        raise ValueError(f'free: {sorted(unknown)} is no parameter, expected {list(PARAMETERS)}')
-    mask = np.array([name in names for name in PARAMETERS])
-    return np.array([mask & (not view.fixed) for view in network.cameras])
-
-
-def agreeing(network: Network, state: Start, adjusted: Layout) -> NDArray[np.bool_]:
-    """Return which observations (m,), adjusted or not, agree with the values."""
-    everything = np.ones(len(network.observations.xy), dtype=bool)
-    every = normals.lay_out(network, state, everything, adjusted.free, backward=adjusted.backward)
-    lengths = normals.whitened_lengths(every, state)
-    among = np.isin(every.observations, adjusted.observations)
-    spread = max(1.0, normals.robust_spread(lengths[among]))
-    used = np.zeros(len(network.observations.xy), dtype=bool)
-    used[every.observations[lengths < _AGREES * spread]] = True
-    return used
 
 
 def adjust(
@@ -202,7 +147,7 @@ def _adjusted(
             backward=backward,
         )
         if not len(layout.xy):
-            raise ValueError('start: nothing to adjust; ' + _NEEDED)
+            raise ValueError('start: nothing to adjust; ' + NEEDED)
         return layout
 
     def known(layout: Layout) -> Knowledge:
@@ -324,50 +269,6 @@ def doubtful(network: Network, result: Adjusted, datum: Datum, sigma0: float) ->
         f'{name} contradicts the rest: known minus adjusted {text}'
         for name, text in failed.items()
     )
-
-
-def zoomed(network: Network, layout: Layout, state: Start) -> tuple[str, ...]:
-    """Return warnings of photographs whose focal length is not that of their camera.
-
-    Photographs of which a fifth disagrees, or all where residuals are large throughout, get a
-    focal length of their own each.
-    """
-    observations = network.observations
-    everything = np.bincount(observations.photograph, minlength=len(network.photographs))
-    agrees = np.bincount(observations.photograph[state.used], minlength=len(everything))
-    suspect = agrees < _SUSPECT * everything
-    if normals.robust_spread(normals.whitened_lengths(layout, state)) > _LARGE_SPREAD:
-        suspect[:] = True
-    own = np.intersect1d(np.flatnonzero(suspect), layout.photographs)
-    camera_of, usual = network.camera_of.copy(), network.camera_of[own]
-    camera_of[own] = len(network.cameras) + np.arange(len(own))
-    views = network.cameras + tuple(
-        replace(network.cameras[place], fixed=False) for place in usual
-    )
-    freed = refine(
-        replace(network, cameras=views, camera_of=camera_of),
-        replace(
-            state,
-            calibrations=np.concatenate([state.calibrations, state.calibrations[usual]]),
-            used=state.used | np.isin(observations.photograph, own),
-        ),
-        ('f',),
-    )
-    better = np.bincount(observations.photograph[freed.used], minlength=len(everything))[own]
-    focal = freed.calibrations[camera_of[layout.photographs], 0]
-    warnings = []
-    for camera in np.unique(usual):
-        middle = np.median(focal[network.camera_of[layout.photographs] == camera])
-        relative = freed.calibrations[len(network.cameras) :, 0] / middle - 1
-        other = (usual == camera) & (np.abs(relative) > _ZOOMED)
-        other &= better >= _SUSPECT * everything[own]
-        if other.any():
-            warnings.append(
-                f'camera {network.cameras[camera].name}: {other.sum()} photographs, such as '
-                f'{network.photographs[own[other][0]]}, have another focal length than the rest; '
-                'expected one zoom for a camera: give them a camera of their own'
-            )
-    return tuple(warnings)
 
 
 def _of_cameras(layout: Layout, covariance: FloatArray) -> tuple[FloatArray, ...]:

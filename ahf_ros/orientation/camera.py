@@ -25,7 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ahf_ros.orientation.network import FloatArray
+from ahf_ros.orientation.network import CameraView, FloatArray
 
 PARAMETERS = ('f', 'cx', 'cy', 'k1', 'k2', 'k3', 'p1', 'p2', 'affinity', 'shear')
 
@@ -51,6 +51,13 @@ def pinhole(focal_length: float, width: int, height: int) -> FloatArray:
     calibration = np.zeros(len(PARAMETERS))
     calibration[:3] = focal_length, (width - 1) / 2, (height - 1) / 2
     return calibration
+
+
+def known_calibration(view: CameraView) -> FloatArray:
+    """Return what is given of a camera: no lens and a focal length of NaN where nothing is."""
+    if view.calibration is not None:
+        return view.calibration
+    return pinhole(view.focal_length or np.nan, view.width, view.height)
 
 
 def project(

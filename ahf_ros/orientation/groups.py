@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ahf_ros.orientation.network import part_of
 from ahf_ros.orientation.solution import Solution
 
 Mask = NDArray[np.bool_]
@@ -32,31 +33,12 @@ def separated(solutions: Sequence[Solution]) -> list[Solution]:
 
 def part(solution: Solution, photographs: Mask, targets: Mask) -> Solution:
     """Return a solution with some of its photographs and targets; cameras stay as they are."""
-    network, start, seen = solution.network, solution.start, solution.network.observations
-    rows = photographs[seen.photograph] & targets[seen.point]
-    images = tuple(np.array(network.photographs, object)[photographs])
-    names = tuple(np.array(network.targets, object)[targets])
-    observations = replace(
-        seen,
-        photograph=(np.cumsum(photographs) - 1)[seen.photograph[rows]],
-        point=(np.cumsum(targets) - 1)[seen.point[rows]],
-        xy=seen.xy[rows],
-        covariance=seen.covariance[rows],
-    )
-    kept = set(names)
+    start = solution.start
+    network, rows = part_of(solution.network, np.flatnonzero(photographs), np.flatnonzero(targets))
     entries = np.repeat(targets, 3)
     return replace(
         solution,
-        network=replace(
-            network,
-            photographs=images,
-            camera_of=network.camera_of[photographs],
-            targets=names,
-            observations=observations,
-            bars=tuple(it for it in network.bars if kept.issuperset(it.ends)),
-            control=tuple(it for it in network.control if it.name in kept),
-            set_aside=tuple(it for it in network.set_aside if it.photograph in images),
-        ),
+        network=network,
         start=replace(
             start,
             rotations=start.rotations[photographs],
@@ -68,5 +50,5 @@ def part(solution: Solution, photographs: Mask, targets: Mask) -> Solution:
         normalised=solution.normalised[rows],
         pose_covariances=solution.pose_covariances[photographs],
         covariance_of_points=solution.covariance_of_points[np.ix_(entries, entries)],
-        rejected=tuple(it for it in solution.rejected if it.photograph in images),
+        rejected=tuple(it for it in solution.rejected if it.photograph in network.photographs),
     )

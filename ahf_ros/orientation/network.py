@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,12 @@ class Observations:
     point: IntArray
     xy: FloatArray
     covariance: FloatArray
+
+    def rows(self, chosen: IntArray | NDArray[np.bool_]) -> Observations:
+        """Return some of the observations, by index or mask."""
+        return Observations(
+            self.photograph[chosen], self.point[chosen], self.xy[chosen], self.covariance[chosen]
+        )
 
 
 @dataclass(frozen=True)
@@ -56,7 +62,7 @@ class CameraView:
     width: int
     height: int
     focal_length: float | None = None
-    """Start value in px; None where nothing is known."""
+    """Start value in px where no calibration is given; None where nothing is known."""
     calibration: FloatArray | None = None
     """All of `camera.PARAMETERS` where a calibration is given."""
     fixed: bool = False
@@ -92,3 +98,67 @@ class Rejection:
     xy: tuple[float, float]
     reason: str
     normalised_residual: float | None = None
+
+
+def once_a_photograph(network: Network) -> Network:
+    """Return the network without targets that are twice in a photograph: both are set aside."""
+    observed = network.observations
+    key = observed.photograph * len(network.targets) + observed.point
+    _, inverse, counts = np.unique(key, return_inverse=True, return_counts=True)
+    return without(
+        network, counts[inverse.ravel()] > 1, 'its ID is more than once in the photograph'
+    )
+
+
+def without(network: Network, rows: NDArray[np.bool_], reason: str) -> Network:
+    """Return the network whose marked observations (m,) are set aside, for a reason."""
+    observed = network.observations
+    aside = tuple(
+        Rejection(
+            network.photographs[observed.photograph[row]],
+            network.targets[observed.point[row]],
+            (float(observed.xy[row, 0]), float(observed.xy[row, 1])),
+            reason,
+        )
+        for row in np.flatnonzero(rows)
+    )
+    kept = observed.rows(~rows)
+    return replace(network, observations=kept, set_aside=network.set_aside + aside)
+
+
+def part_of(
+    network: Network, photographs: IntArray, targets: IntArray | None = None
+) -> tuple[Network, IntArray]:
+    """Return a network of some photographs and targets by index, and its rows of observations.
+
+    Without `targets` it has all of them. Bars and control points stay whose targets are in it.
+    """
+    if targets is None:
+        targets = np.arange(len(network.targets))
+    image, target = (
+        _places(chosen, len(names))
+        for chosen, names in ((photographs, network.photographs), (targets, network.targets))
+    )
+    seen = network.observations
+    rows = np.flatnonzero((image[seen.photograph] >= 0) & (target[seen.point] >= 0))
+    some = seen.rows(rows)
+    images = tuple(network.photographs[index] for index in photographs)
+    names = tuple(network.targets[index] for index in targets)
+    part = replace(
+        network,
+        photographs=images,
+        camera_of=network.camera_of[photographs],
+        targets=names,
+        observations=replace(some, photograph=image[some.photograph], point=target[some.point]),
+        bars=tuple(it for it in network.bars if set(names).issuperset(it.ends)),
+        control=tuple(it for it in network.control if it.name in names),
+        set_aside=tuple(it for it in network.set_aside if it.photograph in images),
+    )
+    return part, rows
+
+
+def _places(chosen: IntArray, number: int) -> IntArray:
+    """Return where each of a number of indices is among the chosen ones, -1 where it is not."""
+    places = np.full(number, -1)
+    places[chosen] = np.arange(len(chosen))
+    return places

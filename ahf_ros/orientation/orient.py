@@ -11,13 +11,14 @@ import numpy as np
 from ahf_ros.blas import one_blas_thread
 from ahf_ros.orientation.adjustment import adjust
 from ahf_ros.orientation.datum import Datum
-from ahf_ros.orientation.network import FloatArray, IntArray, Network, Rejection
+from ahf_ros.orientation.network import FloatArray, IntArray, Network, once_a_photograph
 from ahf_ros.orientation.planar import principal_axes
-from ahf_ros.orientation.resection import FEWEST_POINTS, Resection, resections
+from ahf_ros.orientation.resection import FEWEST_POINTS
 from ahf_ros.orientation.solution import Solution, Start
 from ahf_ros.orientation.start import FEWEST_PHOTOGRAPHS, oriented, reversal, starts
-from ahf_ros.orientation.triples import FEWEST_COMMON, STEPS, known_calibrations
-from ahf_ros.orientation.views import View, lengths_of, spread_of, views_of
+from ahf_ros.orientation.triples import FEWEST_COMMON, known_calibrations
+from ahf_ros.orientation.views import views_of
+from ahf_ros.orientation.zoom import OWN_CAMERA, zoom_of, zooms_of_groups
 from ahf_ros.text import counted, listed
 
 LINE = 0.01
@@ -32,12 +33,6 @@ Those of its targets in photographs that could not be oriented disagree.
 FEWEST_OF_A_LENS = 5
 BELIEVED_LENS = 0.8
 """Photographs, and the share of their observations that must agree, for a lens to be believed."""
-
-ZOOMED = 0.03
-"""Relative difference of a photograph's focal length that is no error of its camera's."""
-
-FITS = 6.0
-"""Robust spread of a photograph, in those of the network, that another zoom must reach."""
 
 NAMED = 8
 """Photographs or targets that a message names."""
@@ -124,36 +119,11 @@ def _oriented(
     left = _left_out(network, solutions)
     first = solutions[0]
     return [
-        replace(first, warnings=first.warnings + tuple(refused) + left + _zooms(solutions)),
+        replace(
+            first, warnings=first.warnings + tuple(refused) + left + zooms_of_groups(solutions)
+        ),
         *solutions[1:],
     ]
-
-
-def once_a_photograph(network: Network) -> Network:
-    """Return the network without targets that are twice in a photograph: both are set aside."""
-    observed = network.observations
-    key = observed.photograph * len(network.targets) + observed.point
-    _, inverse, counts = np.unique(key, return_inverse=True, return_counts=True)
-    twice = counts[inverse.ravel()] > 1
-    if not twice.any():
-        return network
-    aside = tuple(
-        Rejection(
-            network.photographs[observed.photograph[row]],
-            network.targets[observed.point[row]],
-            (float(observed.xy[row, 0]), float(observed.xy[row, 1])),
-            'its ID is more than once in the photograph',
-        )
-        for row in np.flatnonzero(twice)
-    )
-    kept = replace(
-        observed,
-        photograph=observed.photograph[~twice],
-        point=observed.point[~twice],
-        xy=observed.xy[~twice],
-        covariance=observed.covariance[~twice],
-    )
-    return replace(network, observations=kept, set_aside=network.set_aside + aside)
 
 
 def _check(network: Network) -> None:
@@ -297,7 +267,7 @@ def _left_out(network: Network, solutions: Sequence[Solution]) -> tuple[str, ...
         seen = np.isfinite(start.points[views[index].points, 0])
         if seen.sum() < FEWEST_POINTS:
             few.append(index)
-        elif (factor := _zoom(network, views[index], start)) is not None:
+        elif (factor := zoom_of(network, views[index], start)) is not None:
             zoomed.append((index, factor))
         else:
             alike.append(index)
@@ -315,8 +285,7 @@ def _left_out(network: Network, solutions: Sequence[Solution]) -> tuple[str, ...
     for index, factor in zoomed:
         warnings.append(
             f'{network.photographs[index]}: not oriented, its focal length is about {factor:.2f} '
-            f'times that of camera {network.cameras[views[index].camera].name}. Photographs of '
-            'another zoom need a camera of their own'
+            f'times that of camera {network.cameras[views[index].camera].name}. {OWN_CAMERA}'
         )
     seen = np.bincount(network.observations.point, minlength=len(network.targets)) > 0
     if lost := np.flatnonzero(~placed & seen).tolist():
@@ -324,52 +293,6 @@ def _left_out(network: Network, solutions: Sequence[Solution]) -> tuple[str, ...
             f'targets {_names(network.targets, lost)}: no coordinates, fewer than two rays that '
             'agree and meet under 5 degrees or more. Take more photographs of them'
         )
-    return tuple(warnings)
-
-
-def _zoom(network: Network, view: View, start: Start) -> float | None:
-    """Return a photograph's focal length over its camera's where it alone fits, or None."""
-    calibration = start.calibrations[view.camera]
-    if not np.isfinite(calibration[0]):
-        return None
-    spread = spread_of(lengths_of(network, start))
-
-    def fit(factor: float) -> tuple[float, Resection | None]:
-        changed = start.calibrations.copy()
-        changed[view.camera, 0] *= factor
-        xy, sigma = view.normalised(changed)
-        seen = np.isfinite(start.points[view.points, 0])
-        poses = resections(start.points[view.points[seen]], xy[seen], sigma[seen] * spread)
-        return (poses[0].scale, poses[0]) if poses else (np.inf, None)
-
-    camera = network.cameras[view.camera]
-    width = max(camera.width, camera.height)
-    factors = list(STEPS * width / calibration[0])
-    best = min(factors, key=lambda factor: fit(factor)[0])
-    step = STEPS[1] / STEPS[0]
-    for _ in range(6):
-        step = np.sqrt(step)
-        best = min((best / step, best, best * step), key=lambda factor: fit(factor)[0])
-    alone, own = fit(best)[0], fit(1.0)[0]
-    return best if abs(best - 1) > ZOOMED and alone < FITS and alone < own / 3 else None
-
-
-def _zooms(solutions: Sequence[Solution]) -> tuple[str, ...]:
-    """Return warnings of cameras whose focal length differs between groups of photographs."""
-    network = solutions[0].network
-    warnings = []
-    for camera, view in enumerate(network.cameras):
-        lengths = [
-            float(solution.start.calibrations[camera, 0])
-            for solution in solutions
-            if np.any(network.camera_of[oriented(solution.start)] == camera)
-        ]
-        if lengths and max(lengths) > (1 + ZOOMED) * min(lengths):
-            text = ', '.join(f'{length:.0f}' for length in lengths)
-            warnings.append(
-                f'camera {view.name}: its focal length is {text} px in groups of photographs. '
-                'Photographs of another zoom need a camera of their own'
-            )
     return tuple(warnings)
 
 

@@ -13,8 +13,8 @@ from ahf_ros.orientation.camera import rotation_matrices
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.planar import is_flat, planar_poses
 
-FEWEST_POINTS = 5
-"""Known points of a photograph that is oriented: one more than decide between the poses."""
+FEWEST_POINTS = 4
+"""Known points of a photograph that is oriented: three leave four poses, the fourth decides."""
 
 SAMPLES = 60
 """Triples that are tried: of 60, one is free of wrong IDs with certainty while half are right."""

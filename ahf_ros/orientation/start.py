@@ -13,10 +13,10 @@ from itertools import islice
 
 import numpy as np
 
-from ahf_ros.orientation.adjustment import refine
 from ahf_ros.orientation.camera import pinhole
 from ahf_ros.orientation.network import FloatArray, IntArray, Network
 from ahf_ros.orientation.planar import mirrored
+from ahf_ros.orientation.refinement import refine
 from ahf_ros.orientation.resection import ALIKE, BOUND, FEWEST_POINTS, Resection, resections
 from ahf_ros.orientation.solution import Start
 from ahf_ros.orientation.triangulation import intersect
@@ -32,6 +32,9 @@ from ahf_ros.orientation.triples import (
 from ahf_ros.orientation.views import View, lengths_of, spread_of, views_of
 
 MOST_SEEDS = 5
+
+GROWING = 5
+"""Known points of a photograph that is added while points and lenses are still uncertain."""
 
 BATCH = 4
 """One photograph for so many oriented ones, at least one, is added between two adjustments: the
@@ -116,43 +119,43 @@ def _grown(
     """Return the values of all photographs and points that a seed reaches."""
     start = seed.start
     postponed: dict[int, int] = {}
-    last = False
+    fewest = GROWING
     try:
         start = _adjusted(network, start)
         while True:
             start = _intersected(network, views, start)
-            chosen = _next(views, start, among, postponed)
-            if not chosen and (last or not postponed):
+            chosen = _next(views, start, among, postponed, fewest)
+            if not chosen and (fewest == FEWEST_POINTS or len(oriented(start)) == len(among)):
                 break
             if not chosen:  # all others are there: what was doubtful may be certain by now
-                start = _pruned(views, _adjusted(network, start, rounds=30), postponed)
+                start = _pruned(views, _adjusted(network, start, rounds=30), postponed, fewest)
                 postponed.clear()
-                last = True
+                fewest = FEWEST_POINTS
                 continue
             spread = spread_of(lengths_of(network, start))
             added = 0
             for photograph in chosen:
-                pose, calibration = _pose(network, views[photograph], start, spread)
+                pose, calibration = _pose(network, views[photograph], start, spread, fewest)
                 if pose is None:
                     postponed[photograph] = _known(views[photograph], start)
                     continue
                 start = _with_pose(start, views[photograph], photograph, pose, calibration)
                 added += 1
             if added:
-                start = _pruned(views, _adjusted(network, start), postponed)
-        start = _pruned(views, _adjusted(network, start, rounds=30), postponed)
+                start = _pruned(views, _adjusted(network, start), postponed, fewest)
+        start = _pruned(views, _adjusted(network, start, rounds=30), postponed, fewest)
         return _intersected(network, views, start)
     except (ValueError, np.linalg.LinAlgError):
         return None
 
 
-def _pruned(views: Sequence[View], start: Start, postponed: dict[int, int]) -> Start:
+def _pruned(views: Sequence[View], start: Start, postponed: dict[int, int], fewest: int) -> Start:
     """Return the values without photographs most of whose points do not agree."""
     rotations, positions, used = start.rotations.copy(), start.positions.copy(), start.used.copy()
     for photograph in oriented(start):
         view = views[photograph]
         known = _known(view, start)
-        if start.used[view.rows].sum() < max(FEWEST_POINTS, known / 2):
+        if start.used[view.rows].sum() < max(fewest, known / 2):
             rotations[photograph], positions[photograph] = np.nan, np.nan
             used[view.rows] = False
             postponed[photograph] = known
@@ -165,7 +168,11 @@ def _known(view: View, start: Start) -> int:
 
 
 def _next(
-    views: Sequence[View], start: Start, among: Sequence[int], postponed: dict[int, int]
+    views: Sequence[View],
+    start: Start,
+    among: Sequence[int],
+    postponed: dict[int, int],
+    fewest: int,
 ) -> list[int]:
     """Return the photographs to orient next, those with most known points first.
 
@@ -179,14 +186,14 @@ def _next(
     able = [
         index
         for index, number in known.items()
-        if number >= FEWEST_POINTS and number > postponed.get(index, 0)
+        if number >= fewest and number > postponed.get(index, 0)
     ]
     able.sort(key=lambda index: (-known[index], index))
     return able[: max(1, len(oriented(start)) // BATCH)]
 
 
 def _pose(
-    network: Network, view: View, start: Start, spread: float
+    network: Network, view: View, start: Start, spread: float, fewest: int
 ) -> tuple[Resection | None, FloatArray]:
     """Return the pose of a photograph and its calibration; None while it is not certain.
 
@@ -205,7 +212,7 @@ def _pose(
         if not able:
             return None, calibration
         poses, calibration = min(able, key=lambda pair: pair[0][0].scale * pair[1][0])
-    if not poses or poses[0].agrees.sum() < max(FEWEST_POINTS, seen.sum() / 2):
+    if not poses or poses[0].agrees.sum() < max(fewest, seen.sum() / 2):
         return None, calibration
     doubtful = len(poses) > 1 and poses[1].chi_square < poses[0].chi_square + ALIKE
     return (None if doubtful else poses[0]), calibration

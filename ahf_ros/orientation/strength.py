@@ -10,7 +10,7 @@ import numpy as np
 from ahf_ros.orientation.calibration import rolled
 from ahf_ros.orientation.network import FloatArray, IntArray
 from ahf_ros.orientation.solution import Solution
-from ahf_ros.orientation.triangulation import largest_angle
+from ahf_ros.orientation.views import largest_angles
 from ahf_ros.text import listed
 
 FEW_RAYS = 3
@@ -30,21 +30,6 @@ def rays_of(solution: Solution) -> IntArray:
     return np.bincount(used, minlength=len(solution.network.targets)).astype(np.int64)
 
 
-def largest_angles(solution: Solution) -> FloatArray:
-    """Return the largest angle between two used rays of each target, rad; NaN below two rays."""
-    network, values = solution.network, solution.start
-    angles = np.full(len(network.targets), np.nan)
-    observed = network.observations
-    for target in range(len(network.targets)):
-        photographs = observed.photograph[(observed.point == target) & values.used]
-        directions = values.positions[photographs] - values.points[target]
-        directions = directions[np.isfinite(directions).all(axis=1)]
-        if len(directions) > 1:
-            directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-            angles[target] = largest_angle(directions)
-    return angles
-
-
 def semi_axes(solution: Solution) -> FloatArray:
     """Return the standard deviations along the axes of each target's ellipsoid, largest first."""
     own = solution.point_covariances
@@ -58,7 +43,8 @@ def what_to_photograph(solution: Solution) -> list[str]:
     """Return what would make a weak network stronger, one sentence a weakness."""
     network = solution.network
     known = solution.determined
-    rays, angles, largest = rays_of(solution), largest_angles(solution), semi_axes(solution)[:, 0]
+    angles = largest_angles(network, solution.start)
+    rays, largest = rays_of(solution), semi_axes(solution)[:, 0]
     advice = []
     if np.any(few := known & (rays < FEW_RAYS)):
         advice.append(

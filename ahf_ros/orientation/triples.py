@@ -12,19 +12,19 @@ from itertools import combinations
 import numpy as np
 
 from ahf_ros.orientation import normals
-from ahf_ros.orientation.adjustment import free_parameters, refine
-from ahf_ros.orientation.camera import PARAMETERS, pinhole
+from ahf_ros.orientation.camera import known_calibration, pinhole
 from ahf_ros.orientation.least_squares import normal_equations
-from ahf_ros.orientation.network import FloatArray, IntArray, Network
+from ahf_ros.orientation.network import FloatArray, IntArray, Network, part_of
 from ahf_ros.orientation.normals import BEHIND
 from ahf_ros.orientation.planar import mirrored
 from ahf_ros.orientation.precision import precision
+from ahf_ros.orientation.refinement import free_parameters, refine
 from ahf_ros.orientation.relative import relative_orientations
 from ahf_ros.orientation.resection import resections
 from ahf_ros.orientation.solution import Start
-from ahf_ros.orientation.triangulation import SMALLEST_ANGLE, directions, largest_angle, midpoints
+from ahf_ros.orientation.triangulation import SMALLEST_ANGLE, directions, midpoints
 from ahf_ros.orientation.usual_lens import usual_lens
-from ahf_ros.orientation.views import View, lengths_of, part_of, spread_of
+from ahf_ros.orientation.views import View, largest_angles, lengths_of, spread_of
 
 STEPS = np.geomspace(0.5, 4.0, 14)
 """Focal lengths that are tried where none is known, in widths of the image: 17 % apart."""
@@ -75,14 +75,8 @@ class Seed:
 
 
 def known_calibrations(network: Network) -> FloatArray:
-    """Return the calibrations (cameras, parameters) that are given, NaN where none is."""
-    rows = np.full((len(network.cameras), len(PARAMETERS)), np.nan)
-    for index, view in enumerate(network.cameras):
-        if view.calibration is not None:
-            rows[index] = view.calibration
-        elif view.focal_length is not None:
-            rows[index] = pinhole(view.focal_length, view.width, view.height)
-    return rows
+    """Return what is given of the cameras (cameras, parameters)."""
+    return np.array([known_calibration(view) for view in network.cameras])
 
 
 def seeds(network: Network, views: Sequence[View], among: Sequence[int]) -> Iterator[Seed]:
@@ -303,7 +297,8 @@ def _refined(
     cost = float(
         np.sum(np.minimum(np.nan_to_num(lengths[~np.isnan(lengths)]), BOUND * spread) ** 2)
     )
-    angle = median_angle(part, start)
+    angles = largest_angles(part, start)
+    angle = float(np.median(angles[np.isfinite(angles)])) if np.isfinite(angles).any() else 0.0
     if angle < SMALLEST_ANGLE / 2:
         return None
     sigma = spread * focal_sigma(part, start, free) if unknown else 0.0
@@ -376,18 +371,6 @@ def focal_sigma(network: Network, start: Start, free: tuple[str, ...]) -> float:
     if np.any(variance <= 0) or not np.isfinite(variance).all():
         return np.inf
     return float(np.max(np.sqrt(variance) / start.calibrations[layout.free[:, 0], 0]))
-
-
-def median_angle(network: Network, start: Start) -> float:
-    """Return the median over points of the largest angle in rad of their used rays."""
-    observed = network.observations
-    rows = np.flatnonzero(start.used)
-    rays = start.points[observed.point[rows]] - start.positions[observed.photograph[rows]]
-    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
-    angles = []
-    for point in np.unique(observed.point[rows]):
-        angles.append(largest_angle(rays[observed.point[rows] == point]))
-    return float(np.median(angles)) if angles else 0.0
 
 
 def _whole(network: Network, seed: Seed, rows: IntArray) -> Seed:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ahf_ros.orientation.camera import PARAMETERS, pinhole
+from ahf_ros.orientation.camera import PARAMETERS, known_calibration
 from ahf_ros.orientation.datum import movements
 from ahf_ros.orientation.least_squares import Conditions, Knowledge
 from ahf_ros.orientation.network import FloatArray, IntArray, Network
@@ -47,9 +47,7 @@ def _expected(network: Network, layout: Layout) -> tuple[IntArray, FloatArray, F
     """
     expected = []
     for camera, column in zip(network.cameras, layout.columns, strict=True):
-        focal = camera.focal_length or np.nan
-        middle = pinhole(focal, camera.width, camera.height)
-        middle = middle if camera.calibration is None else camera.calibration
+        middle = known_calibration(camera)
         off = OFF_CENTRE * max(camera.width, camera.height)
         sigmas = USUAL | {'f': FOCAL_LENGTH * middle[0], 'cx': off, 'cy': off}
         expected += [

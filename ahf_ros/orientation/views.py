@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ahf_ros.orientation import normals
-from ahf_ros.orientation.adjustment import free_parameters
 from ahf_ros.orientation.camera import undistort
 from ahf_ros.orientation.network import FloatArray, IntArray, Network
+from ahf_ros.orientation.refinement import free_parameters
 from ahf_ros.orientation.solution import Start
+from ahf_ros.orientation.triangulation import largest_angle
 
 NOWHERE = 1e3
 """Coordinate in focal lengths, far outside every image."""
@@ -52,24 +53,6 @@ def views_of(network: Network) -> list[View]:
     return made
 
 
-def part_of(network: Network, photographs: IntArray) -> tuple[Network, IntArray]:
-    """Return a network of some photographs with all points, and the rows of its observations."""
-    observed = network.observations
-    index = np.full(len(network.photographs), -1)
-    index[photographs] = np.arange(len(photographs))
-    rows = np.flatnonzero(index[observed.photograph] >= 0)
-    part = replace(
-        observed,
-        photograph=index[observed.photograph[rows]],
-        point=observed.point[rows],
-        xy=observed.xy[rows],
-        covariance=observed.covariance[rows],
-    )
-    names = tuple(network.photographs[photograph] for photograph in photographs)
-    cameras = network.camera_of[photographs]
-    return replace(network, photographs=names, camera_of=cameras, observations=part), rows
-
-
 def lengths_of(network: Network, start: Start) -> FloatArray:
     """Return residuals (m,) in standard deviations, NaN where pose or point are not known.
 
@@ -91,3 +74,17 @@ def spread_of(lengths: FloatArray) -> float:
     """Return the robust spread of residuals in standard deviations, at least one."""
     known = lengths[~np.isnan(lengths)]
     return max(1.0, normals.robust_spread(known)) if len(known) else np.inf
+
+
+def largest_angles(network: Network, start: Start) -> FloatArray:
+    """Return the largest angle between two used rays of each target, rad; NaN below two rays."""
+    angles = np.full(len(network.targets), np.nan)
+    observed = network.observations
+    for target in range(len(network.targets)):
+        photographs = observed.photograph[(observed.point == target) & start.used]
+        directions = start.positions[photographs] - start.points[target]
+        directions = directions[np.isfinite(directions).all(axis=1)]
+        if len(directions) > 1:
+            directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+            angles[target] = largest_angle(directions)
+    return angles

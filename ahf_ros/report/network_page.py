@@ -13,11 +13,11 @@ from ahf_ros.orientation.solution import Solution
 from ahf_ros.orientation.strength import (
     FEW_RAYS,
     SMALL_ANGLE,
-    largest_angles,
     rays_of,
     semi_axes,
     what_to_photograph,
 )
+from ahf_ros.orientation.views import largest_angles
 from ahf_ros.report.network_figures import enlargement, image_figure, sensor_map, views
 from ahf_ros.report.network_summary import (
     bar_rows,
@@ -74,7 +74,8 @@ def _content(solution: Solution) -> dict[str, Any]:
 
 def _targets(solution: Solution) -> list[dict[str, Any]]:
     known, rays = solution.determined, rays_of(solution)
-    angles, axes = largest_angles(solution), semi_axes(solution)
+    angles = largest_angles(solution.network, solution.start)
+    axes = semi_axes(solution)
     sigmas = np.sqrt(np.maximum(np.diag(solution.covariance_of_points), 0)).reshape(-1, 3)
     longest = np.nanmax(axes[:, 0], initial=0) or 1.0
     return [

@@ -10,7 +10,8 @@ from ahf_ros.interchange.network_results import rejections
 from ahf_ros.orientation.camera import PARAMETERS
 from ahf_ros.orientation.deviations import bar_deviations, control_deviations
 from ahf_ros.orientation.solution import Solution
-from ahf_ros.orientation.strength import largest_angles, rays_of, semi_axes
+from ahf_ros.orientation.strength import rays_of, semi_axes
+from ahf_ros.orientation.views import largest_angles
 from ahf_ros.text import decimals
 
 Rows = Sequence[tuple[str, ...]]
@@ -34,7 +35,8 @@ def summary(solution: Solution) -> Rows:
         rms = np.sqrt((solution.residuals[used] ** 2).mean(axis=0))
         rows.append(('RMS residual x, y', f'{rms[0]:.4f}, {rms[1]:.4f} px'))
     if known.any():
-        rays, angles = rays_of(solution)[known], np.degrees(largest_angles(solution)[known])
+        rays = rays_of(solution)[known]
+        angles = np.degrees(largest_angles(solution.network, solution.start)[known])
         middle = np.median(rays)
         rows.append(('rays a target', f'{rays.min()} to {rays.max()}, median {middle:g}'))
         between = f'{np.nanmin(angles):.0f} to {np.nanmax(angles):.0f} degrees'

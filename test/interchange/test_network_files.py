@@ -84,11 +84,11 @@ def test_an_id_twice_and_a_singular_covariance_are_set_aside(results: Path) -> N
     line = target(7, covariance=(1e-4, 1e-4, 1e-4, 1e-4))
     found = read(results, record('a.png', target(3), target(3, 50.0), target(5), line))
     network, _ = make_network(found, NOTHING)
-    assert network.targets == ('5',)
+    assert network.targets == ('3', '5', '7') and network.observations.point.tolist() == [1]
     told = [(it.photograph, it.target, it.xy[0], it.reason) for it in network.set_aside]
     assert told == [
-        ('a.png', '3', 10.0, 'its ID is in this photograph twice'),
-        ('a.png', '3', 50.0, 'its ID is in this photograph twice'),
+        ('a.png', '3', 10.0, 'its ID is more than once in the photograph'),
+        ('a.png', '3', 50.0, 'its ID is more than once in the photograph'),
         ('a.png', '7', 10.0, 'its covariance is singular'),
     ]
 

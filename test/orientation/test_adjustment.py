@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from ahf_ros.orientation import normals
-from ahf_ros.orientation.adjustment import adjust, refine
+from ahf_ros.orientation.adjustment import adjust
 from ahf_ros.orientation.camera import PARAMETERS, project
 from ahf_ros.orientation.datum import Datum, movements
 from ahf_ros.orientation.network import CameraView, ControlPoint, ScaleBar
+from ahf_ros.orientation.refinement import refine
 from ahf_ros.orientation.similarity import similarity_between
 from benchmarks.network_camcal import dbat, folder, in_dbat_units, solve
 from benchmarks.network_ellipsoids import RELEASED, coverage

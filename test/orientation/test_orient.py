@@ -10,8 +10,8 @@ import pytest
 from ahf_ros.interchange.network_files import make_network
 from ahf_ros.interchange.observation_files import read_observations
 from ahf_ros.orientation.camera import PARAMETERS, pinhole
-from ahf_ros.orientation.network import CameraView, Network, Observations
-from ahf_ros.orientation.orient import once_a_photograph, orient
+from ahf_ros.orientation.network import CameraView, Network, once_a_photograph
+from ahf_ros.orientation.orient import orient
 from benchmarks.network_starts import Rendered, deviations, looking, photographed
 from support import ROOT
 
@@ -127,12 +127,7 @@ def test_a_target_twice_in_a_photograph_is_set_aside():
     seen = taken(focal=FOCAL)
     observed = seen.network.observations
     rows = np.append(np.arange(len(observed.xy)), 3)
-    double = Observations(
-        observed.photograph[rows],
-        observed.point[rows],
-        observed.xy[rows],
-        observed.covariance[rows],
-    )
+    double = observed.rows(rows)
     double.xy[-1] += 100
     once = once_a_photograph(replace(seen.network, observations=double))
     assert len(once.observations.xy) == len(observed.xy) - 1
@@ -141,6 +136,31 @@ def test_a_target_twice_in_a_photograph_is_set_aside():
     assert [one.reason for one in solution.rejected].count(
         'its ID is more than once in the photograph'
     ) == 2
+
+
+def of_few(number: int, changed: int | None = None) -> Network:
+    """Return a network whose last photograph shows few targets, one of them perhaps another."""
+    network = taken(count=5, focal=FOCAL).network
+    observed = network.observations
+    last = np.flatnonzero(observed.photograph == 4)
+    kept = np.setdiff1d(np.arange(len(observed.xy)), last[number:])
+    point = observed.point.copy()
+    if changed is not None:
+        point[last[changed]] = observed.point[last[-1]]
+    return replace(network, observations=replace(observed, point=point).rows(kept))
+
+
+def test_four_targets_orient_a_photograph_if_they_agree():
+    (solution,) = orient(of_few(4))
+    assert solution.oriented.all() and not any('not oriented' in it for it in solution.warnings)
+    whole = orient(taken(count=5, focal=FOCAL).network)[0].start
+    few = solution.start
+    turns = [it.rotations[4] @ it.rotations[0].T for it in (whole, few)]
+    assert np.abs(turns[0] - turns[1]).max() < 1e-3
+    for network, reason in ((of_few(4, 2), 'no pose fits well'), (of_few(3), 'fewer than 4')):
+        (solution,) = orient(network)
+        assert solution.oriented.tolist() == 4 * [True] + [False]
+        assert any('4.png' in it and reason in it for it in solution.warnings)
 
 
 def test_groups_that_do_not_hang_together_are_oriented_each_by_itself():
@@ -197,12 +217,7 @@ def without(network: Network, keep: np.ndarray) -> Network:
     observed = network.observations
     return replace(
         network,
-        observations=Observations(
-            observed.photograph[keep],
-            observed.point[keep],
-            observed.xy[keep],
-            observed.covariance[keep],
-        ),
+        observations=observed.rows(keep),
     )
 
 

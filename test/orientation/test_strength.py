@@ -10,11 +10,11 @@ import pytest
 from ahf_ros.orientation.deviations import bar_deviations, control_deviations
 from ahf_ros.orientation.solution import Solution
 from ahf_ros.orientation.strength import (
-    largest_angles,
     rays_of,
     semi_axes,
     what_to_photograph,
 )
+from ahf_ros.orientation.views import largest_angles
 from support.networks import known, solution
 
 
@@ -35,8 +35,10 @@ def test_rays_and_angles_are_those_of_used_observations() -> None:
     assert rays_of(weak).tolist() == [6, 6, 6, 2, *[6] * 8]
     rays = weak.start.positions[[1, 2]] - weak.start.points[3]
     first, second = rays / np.linalg.norm(rays, axis=1)[:, None]
-    assert largest_angles(weak)[3] == pytest.approx(np.arccos(first @ second))
-    assert np.isnan(largest_angles(used_by(3, [1]))[3])
+    angles = largest_angles(weak.network, weak.start)
+    assert angles[3] == pytest.approx(np.arccos(first @ second))
+    alone = used_by(3, [1])
+    assert np.isnan(largest_angles(alone.network, alone.start)[3])
 
 
 def test_semi_axes_are_those_of_the_ellipsoid() -> None:
