@@ -366,7 +366,7 @@ def _of_borders(
     near = np.logical_or.reduce([np.roll(hidden, by, axis=1) for by in range(-_NEAR, _NEAR + 1)])
     every, seen = _borders(bits, hidden), _borders(bits, near)
     share = np.log(len(family.words) * family.bits) / np.maximum(every, 1)
-    further = np.clip(every - of_arcs, 0, seen)
+    further = np.maximum(seen - of_arcs, 0)
     return np.asarray(price * (every - further) + np.minimum(price, share) * further)
 
 
