@@ -157,13 +157,13 @@ def decode(
     bare = np.maximum(turned.paper.sum(axis=1), 0)
     other, of_other = _sectors_as_they_look(some, phases[rows, best], per_sector)
     arcs, of_arcs = _free_paths(turned)
-    of_best_word = bits[rows, best]
+    of_best_word = bits[rows, best], mixed[rows, best]
     found = Words(
         words=words[rows, best],
         starts=2 * np.pi * phases[rows, best] / angles,
         margin=margin.astype(np.float64),
         marked=score - bare + some.dot,
-        coded=score - arcs - _of_borders(of_best_word, hidden, of_arcs, _border(turned), family),
+        coded=score - arcs - _of_borders(*of_best_word, hidden, of_arcs, _border(turned), family),
         ends=np.zeros(len(read)),
         other=other,
         ahead=of_other - score,
@@ -355,19 +355,32 @@ def _borders(bits: np.ndarray, unknown: np.ndarray) -> np.ndarray:
 
 
 def _of_borders(
-    bits: np.ndarray, hidden: np.ndarray, of_arcs: np.ndarray, price: np.ndarray, family: Family
+    bits: np.ndarray,
+    mixed: np.ndarray,
+    hidden: np.ndarray,
+    of_arcs: np.ndarray,
+    price: np.ndarray,
+    family: Family,
 ) -> np.ndarray:
-    """Return what the borders of words cost, from bits and what is hidden, (k, m), shape (k,).
+    """Return what the borders of words cost, from what is mixed and hidden, (k, m), shape (k,).
 
-    As many as arcs of any length have, (k,), cost what they do there, and so do those beside a
-    cover. Arcs do without borders that are not worth this price of any place; those of a word only
-    cost their share of its choice.
+    As many as arcs of any length have, (k,), cost what they do there. Arcs do without those of
+    sectors that blur mixes throughout, which are not worth the price of any place; such borders of
+    a word only cost their share of its choice, unless a cover is beside them.
     """
-    near = np.logical_or.reduce([np.roll(hidden, by, axis=1) for by in range(-_NEAR, _NEAR + 1)])
+    near = _any_of_next(hidden, 2 * _NEAR + 1, _NEAR)
+    per_sector = bits.shape[1] // family.bits
+    clear = ~_any_of_next(~_any_of_next(~mixed, per_sector), per_sector, per_sector - 1)
     every, seen = _borders(bits, hidden), _borders(bits, near)
     share = np.log(len(family.words) * family.bits) / np.maximum(every, 1)
-    further = np.maximum(seen - of_arcs, 0)
+    further = np.clip(seen - of_arcs, 0, _borders(bits, near | clear))
     return np.asarray(price * (every - further) + np.minimum(price, share) * further)
+
+
+def _any_of_next(which: np.ndarray, count: int, before: int = 0) -> np.ndarray:
+    """Return whether any of some angles is, from so many before each one on, both (k, m)."""
+    steps = range(-before, count - before)
+    return np.logical_or.reduce([np.roll(which, -step, axis=1) for step in steps])
 
 
 def _border(evidence: Evidence) -> np.ndarray:
