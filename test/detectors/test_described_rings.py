@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ahf_ros.codes.cyclic import smallest_rotation
 from ahf_ros.codes.ring import ring_family
 from ahf_ros.detectors import DetectorSettings, create_detector
 from ahf_ros.detectors.ring.detector import find_hypotheses
@@ -83,3 +84,16 @@ def test_a_single_mark_of_many_sectors_is_read(tmp_path: Path, radius: float) ->
     found = create_detector(family='mine', family_file=str(file))(scene.image)
     assert 1 in ring_family(str(file)).words
     assert sorted(it.id for it in found) == [1, 2, 3]
+
+
+@pytest.mark.parametrize(('light', 'least'), [('normal', 10), ('lattice', 6)])
+def test_sectors_that_blur_mixes_are_read(tmp_path: Path, light: str, least: int) -> None:
+    generator = np.random.default_rng(4)
+    words = np.unique(smallest_rotation(generator.integers(1, (1 << 24) - 1, 40), 24)).tolist()
+    file = tmp_path / 'mine.yaml'
+    file.write_text(f'family: mine\nbits: 24\nband: [1.6, 2.2]\nwords: {words}\n')
+    changes = {'dot_radius': 6.4, 'edge_shift': -0.5, 'polarity': 'dark', 'light': light}
+    scene = shown(str(file), **changes)
+    found = score(scene, create_detector(family='mine', family_file=str(file))(scene.image))
+    assert found.right >= least
+    assert found.wrong == found.false_positives == 0

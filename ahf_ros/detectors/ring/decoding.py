@@ -156,12 +156,14 @@ def decode(
     score = scores[rows, best].astype(np.float64)
     bare = np.maximum(turned.paper.sum(axis=1), 0)
     other, of_other = _sectors_as_they_look(some, phases[rows, best], per_sector)
+    arcs, of_arcs = _free_paths(turned)
+    of_best_word = bits[rows, best], mixed[rows, best]
     found = Words(
         words=words[rows, best],
         starts=2 * np.pi * phases[rows, best] / angles,
         margin=margin.astype(np.float64),
         marked=score - bare + some.dot,
-        coded=score - _free_paths(turned) - _border(turned) * _borders(bits[rows, best], hidden),
+        coded=score - arcs - _of_borders(*of_best_word, hidden, of_arcs, _border(turned), family),
         ends=np.zeros(len(read)),
         other=other,
         ahead=of_other - score,
@@ -352,24 +354,66 @@ def _borders(bits: np.ndarray, unknown: np.ndarray) -> np.ndarray:
     return np.count_nonzero(border, axis=1)
 
 
+def _of_borders(
+    bits: np.ndarray,
+    mixed: np.ndarray,
+    hidden: np.ndarray,
+    of_arcs: np.ndarray,
+    price: np.ndarray,
+    family: Family,
+) -> np.ndarray:
+    """Return what the borders of words cost, from what is mixed and hidden, (k, m), shape (k,).
+
+    As many as arcs of any length have, (k,), cost what they do there. Arcs do without those of
+    sectors that blur mixes throughout, which are not worth the price of any place; such borders of
+    a word only cost their share of its choice, unless a cover is beside them.
+    """
+    near = _any_of_next(hidden, 2 * _NEAR + 1, _NEAR)
+    per_sector = bits.shape[1] // family.bits
+    clear = ~_any_of_next(~_any_of_next(~mixed, per_sector), per_sector, per_sector - 1)
+    every, seen = _borders(bits, hidden), _borders(bits, near)
+    share = np.log(len(family.words) * family.bits) / np.maximum(every, 1)
+    further = np.clip(seen - of_arcs, 0, _borders(bits, near | clear))
+    return np.asarray(price * (every - further) + np.minimum(price, share) * further)
+
+
+def _any_of_next(which: np.ndarray, count: int, before: int = 0) -> np.ndarray:
+    """Return whether any of some angles is, from so many before each one on, both (k, m)."""
+    steps = range(-before, count - before)
+    return np.logical_or.reduce([np.roll(which, -step, axis=1) for step in steps])
+
+
 def _border(evidence: Evidence) -> np.ndarray:
     """Return the prices of a border of an arc of any length, at one of all readings, (k,)."""
     return np.asarray(np.log(evidence.weight * evidence.paper.shape[1]))
 
 
-def _free_paths(evidence: Evidence) -> np.ndarray:
-    """Return the evidence for arcs of ink of any length, with their best covers, shape (k,)."""
+def _free_paths(evidence: Evidence) -> tuple[np.ndarray, np.ndarray]:
+    """Return the evidence for arcs of ink of any length, with their best covers, shape (k,).
+
+    With it comes the number of borders of these arcs, each of which has its price.
+    """
     cost = np.float32(_COVERED) * evidence.weight
     border, cover = _border(evidence), np.float32(_COVER)
     paper, ink = evidence.paper.T, evidence.ink.T
     white, dark = paper[0], ink[0]
     covered = np.full_like(white, _NEVER)
+    of_white, of_dark, of_covered = np.zeros((3, len(white)), np.intp)
     mixed = np.maximum(np.maximum(paper, ink), 0) - border
     for of_paper, of_ink, of_border in zip(paper[1:], ink[1:], mixed[1:], strict=True):
-        begun = np.maximum(white, dark) - cover
-        white, dark = (
-            np.maximum(np.maximum(white, covered) + of_paper, dark + of_border),
-            np.maximum(np.maximum(dark, covered) + of_ink, white + of_border),
-        )
-        covered = np.maximum(covered, begun) - cost
-    return np.maximum(np.maximum(white, dark), covered)
+        begun, of_begun = _better(white, of_white, dark, of_dark)
+        to_white, to_dark = (dark + of_border, of_dark + 1), (white + of_border, of_white + 1)
+        white, of_white = _better(white, of_white, covered, of_covered)
+        dark, of_dark = _better(dark, of_dark, covered, of_covered)
+        white, of_white = _better(white + of_paper, of_white, *to_white)
+        dark, of_dark = _better(dark + of_ink, of_dark, *to_dark)
+        covered, of_covered = _better(covered, of_covered, begun - cover, of_begun)
+        covered = covered - cost
+    return _better(*_better(white, of_white, dark, of_dark), covered, of_covered)
+
+
+def _better(
+    score: np.ndarray, count: np.ndarray, other: np.ndarray, of_other: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the scores of the better ones of two paths, and what was counted along these."""
+    return np.maximum(score, other), np.where(other > score, of_other, count)
