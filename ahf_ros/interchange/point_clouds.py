@@ -15,6 +15,9 @@ from ahf_ros.interchange.image_messages import check_rows
 AXES = ('x', 'y', 'z')
 """Fields that a cloud must have."""
 
+COVARIANCE = ('xx', 'xy', 'xz', 'yy', 'yz', 'zz')
+"""Fields of target points with the covariance of x, y and z."""
+
 FLOAT32, FLOAT64 = 7, 8
 """Accepted types of these fields, as numbered in sensor_msgs/PointField."""
 

@@ -20,6 +20,7 @@ from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import ImageMarker, Marker, MarkerArray
 
 from ahf_ros.drawing.overlay import DECODED_COLOUR, DOUBTFUL_COLOUR, Colour
+from ahf_ros.interchange.point_clouds import COVARIANCE
 from ahf_ros.localisation import Positions
 from ahf_ros.msg import CodedTarget, CodedTargetArray
 from ahf_ros.target import UNDECODED
@@ -31,6 +32,7 @@ _POINT = {
     'id': PointField.INT32,
     'confidence': PointField.FLOAT32,
     'deviation': PointField.FLOAT32,  # of `Positions`
+    **dict.fromkeys(COVARIANCE, PointField.FLOAT32),
 }
 _KINDS = {PointField.FLOAT32: '<f4', PointField.INT32: '<i4'}
 _POINT_TYPE = np.dtype([(name, _KINDS[kind]) for name, kind in _POINT.items()])
@@ -109,6 +111,9 @@ def target_points(targets: Sequence[CodedTarget], found: Positions, header: Head
     points['id'] = [target.id for target in targets]
     points['confidence'] = [target.confidence for target in targets]
     points['deviation'] = found.deviations
+    rows, columns = np.triu_indices(3)
+    for name, values in zip(COVARIANCE, found.covariances[:, rows, columns].T, strict=True):
+        points[name] = values
     fields = [
         PointField(name=name, offset=4 * number, datatype=datatype, count=1)
         for number, (name, datatype) in enumerate(_POINT.items())
