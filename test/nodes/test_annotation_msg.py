@@ -11,8 +11,8 @@ from std_msgs.msg import Header
 from visualization_msgs.msg import ImageMarker, Marker
 
 from ahf_ros import msg
-from ahf_ros.interchange.target_messages import coded_target_array
 from ahf_ros.interchange.point_clouds import COVARIANCE
+from ahf_ros.interchange.target_messages import coded_target_array
 from ahf_ros.localisation import Positions
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.target_msg import target_annotations, target_labels, target_points
