@@ -19,7 +19,7 @@ DISTANCE = 1.0
 
 
 def ring(count: int, common: int, random: np.random.Generator) -> FloatArray:
-    """Return targets (count, common, 3) of an object, m: group k is common to scans k and k + 1."""
+    """Return targets (count, common, 3), m; group k is common to scans k and k + 1."""
     angle = (np.arange(count)[:, None] + random.uniform(0.1, 0.9, (count, common))) / count
     turn = 2 * np.pi * angle
     radius = RADIUS + random.uniform(-0.03, 0.03, turn.shape)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable
 from pathlib import Path
 
 import numpy as np
@@ -61,6 +62,13 @@ def read_control(path: str | Path, sigma: float = 0.0) -> tuple[ControlPoint, ..
     the table says nothing; 0 fixes a point.
     """
     columns, rows = read_table(path, ('id', 'x', 'y', 'z'))
+    return control_points(path, columns, rows, sigma)
+
+
+def control_points(
+    path: str | Path, columns: Collection[str], rows: Iterable[Row], sigma: float = 0.0
+) -> tuple[ControlPoint, ...]:
+    """Return control points from rows with these columns, as `read_control` accepts them."""
     whole = 'covariance_xx' in columns
     group = one_of(path, columns, [_SIGMAS, _ENTRIES if whole else ('covariance_xx',)])
     points: dict[str, ControlPoint] = {}

@@ -13,13 +13,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ahf_ros.orientation.network import ControlPoint, FloatArray, IntArray
-from ahf_ros.orientation.points import entries
+from ahf_ros.orientation.network import FloatArray, IntArray
+from ahf_ros.orientation.points import MeasuredPoints, blocks, entries
 from ahf_ros.registration.refusals import Match, check_shape, checked_fit
 from ahf_ros.registration.rigid import Transform
 from ahf_ros.registration.scan import Scan, block_diagonal
 
-_EXACT = 1e-6  # m, standard deviation of known coordinates that are given as exact
+_EXACT = 1e-6  # m, of known coordinates, beside their own precision
 
 
 @dataclass(frozen=True)
@@ -65,10 +65,7 @@ class Field:
     @property
     def covariances(self) -> FloatArray:
         """Covariance of each target, (n, 3, 3)."""
-        count = len(self.names)
-        each = np.arange(count)
-        result: FloatArray = self.covariance.reshape(count, 3, count, 3)[each, :, each]
-        return result
+        return blocks(self.covariance)
 
     @property
     def start(self) -> Field:
@@ -76,18 +73,16 @@ class Field:
         return self.origin or self
 
 
-def known_field(points: Sequence[ControlPoint]) -> Field:
+def known_field(points: MeasuredPoints | None) -> Field:
     """Return a field of known coordinates, m; without any, the first scan gives the frame.
 
-    Coordinates that are given as exact have a standard deviation of 1 micrometre.
+    Each of them has a standard deviation of 1 micrometre more than is given, which may be zero.
     """
-    own = np.array([it.covariance for it in points], float).reshape(-1, 3, 3)
-    return Field(
-        tuple(it.name for it in points),
-        np.array([it.xyz for it in points], float).reshape(-1, 3),
-        block_diagonal(own + _EXACT**2 * np.eye(3)),
-        known=len(points),
-    )
+    if points is None:
+        return Field()
+    exact = _EXACT**2 * np.eye(points.xyz.size)
+    count = len(points.names)
+    return Field(points.names, points.xyz, points.covariance + exact, known=count)
 
 
 def added(before: Field, scan: Scan) -> Field:

@@ -1,8 +1,8 @@
 """The rigid transform between two sets of points whose covariances are both known.
 
-With f = R x + t, it minimises r' W r of r = f - R x - t, with W as the inverse of the covariance of
-r, C_f + R C_x R'. The start is the transform with equal weights (Umeyama, IEEE Trans. PAMI 1991,
-13, 376); Gauss-Newton steps on SE(3) follow, t -> t + a and R -> exp(b) R [1]_.
+It minimises r' W r of r = f - R x - t, with W as the inverse of the covariance of r, which is
+C_f + R C_x R'. The start is the transform with equal weights (Umeyama, IEEE Trans. PAMI 1991, 13,
+376); Gauss-Newton steps on SE(3) follow, t -> t + a and R -> exp(b) R [1]_.
 
 References
 ----------
@@ -60,23 +60,6 @@ class Transform:
         """Return the transform after small changes (6,) of t and b."""
         turn = rotation_matrices(step[None, 3:])[0]
         return Transform(turn @ self.rotation, self.translation + step[:3], self.covariance)
-
-    @property
-    def quaternion(self) -> FloatArray:
-        """The rotation as x, y, z, w, with w not negative."""
-        r = self.rotation
-        # Bar-Itzhack, J. Guidance, Control, and Dynamics 2000, 23, 1085.
-        table = np.array(
-            [
-                [r[0, 0] - r[1, 1] - r[2, 2], 0, 0, 0],
-                [r[0, 1] + r[1, 0], r[1, 1] - r[0, 0] - r[2, 2], 0, 0],
-                [r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], r[2, 2] - r[0, 0] - r[1, 1], 0],
-                [r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1], np.trace(r)],
-            ]
-        )
-        column = np.linalg.eigh((table + np.tril(table, -1).T) / 3)[1][:, -1]
-        result: FloatArray = column if column[3] >= 0 else -column
-        return result
 
 
 @dataclass(frozen=True)

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from ahf_ros.blas import one_blas_thread
-from ahf_ros.orientation.network import ControlPoint
+from ahf_ros.orientation.points import MeasuredPoints
 from ahf_ros.registration.adjustment import Adjusted, adjusted
 from ahf_ros.registration.field import Field, RegisteredScan, added, known_field
 from ahf_ros.registration.scan import Scan
@@ -17,7 +15,7 @@ class Registration:
     The number of threads of BLAS changes no bit of it.
     """
 
-    def __init__(self, known: Sequence[ControlPoint] = ()) -> None:
+    def __init__(self, known: MeasuredPoints | None = None) -> None:
         self._states = [known_field(known)]
 
     @property

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ahf_ros.orientation.camera import rotation_matrices
-from ahf_ros.orientation.network import ControlPoint, FloatArray
+from ahf_ros.orientation.network import FloatArray
+from ahf_ros.orientation.points import MeasuredPoints
 from ahf_ros.registration.field import added, known_field
-from ahf_ros.registration.rigid import Transform, chi_square_limit
+from ahf_ros.registration.rigid import chi_square_limit
 from ahf_ros.registration.scan import Scan
 from ahf_ros.registration.session import Registration
 from support.scans import inverse, measured, relative, ring, squared_error, station
@@ -105,17 +105,12 @@ def test_an_adjustment_closes_the_chain() -> None:
 def test_known_coordinates_give_the_frame() -> None:
     points = true_points(5)
     sigma = 1e-5
-    control = [
-        ControlPoint(name, point, sigma**2 * np.eye(3))
-        for name, point in zip(names(*range(COUNT)), points, strict=True)
-    ]
     squares = []
     for seed in range(60):
         random = np.random.default_rng(seed)
-        known = [
-            replace(it, xyz=it.xyz + sigma * random.standard_normal(3)) for it in control[:COMMON]
-        ]
-        registration = Registration(known)
+        near = points[:COMMON] + sigma * random.standard_normal((COMMON, 3))
+        covariance = sigma**2 * np.eye(3 * COMMON)
+        registration = Registration(MeasuredPoints(tuple(names(0)), near, covariance, unit='m'))
         for number in (0, 1):
             groups = [(number - 1) % COUNT, number]
             seen = points.reshape(COUNT, COMMON, 3)[groups].reshape(-1, 3)
@@ -128,12 +123,8 @@ def test_known_coordinates_give_the_frame() -> None:
 
 def test_exact_coordinates_are_accepted() -> None:
     points = true_points(5)[: 2 * COMMON]
-    field = known_field(
-        [
-            ControlPoint(name, xyz, np.zeros((3, 3)))
-            for name, xyz in zip(names(0, 1), points, strict=True)
-        ]
-    )
+    exact = MeasuredPoints(tuple(names(0, 1)), points, np.zeros((points.size, points.size)))
+    field = known_field(exact)
     scan = measured(names(0, 1), points, station(1, COUNT), SIGMA, np.random.default_rng(0))
     found = added(field, scan).scans[0]
     assert squared_error(found.transform, station(1, COUNT)) < chi_square_limit(6)
@@ -261,14 +252,3 @@ def test_bad_scans_are_refused(change: dict, words: str) -> None:
     }
     with pytest.raises(ValueError, match=words):
         Scan(**(good | change))
-
-
-def test_quaternions_are_those_of_the_rotation() -> None:
-    for vector in [*np.random.default_rng(0).normal(size=(50, 3)), np.array([np.pi, 0, 0])]:
-        x, y, z, w = Transform(rotation_matrices(vector[None])[0]).quaternion
-        angle = 2 * np.arctan2(np.linalg.norm((x, y, z)), w)
-        axis = np.array((x, y, z)) / np.sin(angle / 2)
-        assert rotation_matrices(angle * axis[None])[0] == pytest.approx(
-            rotation_matrices(vector[None])[0], abs=1e-7
-        )
-        assert w >= 0
