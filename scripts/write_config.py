@@ -1,4 +1,4 @@
-"""Write config/detector.yaml and config/illumination.yaml from the declarations in the code."""
+"""Write the parameter files in config/ from the declarations in the code."""
 
 from __future__ import annotations
 
@@ -6,12 +6,20 @@ import json
 import textwrap
 from pathlib import Path
 
-from ahf_ros.nodes.settings import DetectorNodeSettings, IlluminationNodeSettings
+from ahf_ros.nodes.settings import (
+    DetectorNodeSettings,
+    IlluminationNodeSettings,
+    RegistrationNodeSettings,
+)
 from ahf_ros.settings.nested import flat_parameters
 from ahf_ros.settings.parameter import Parameter
 
 CONFIG = Path(__file__).resolve().parent.parent / 'config'
-NODES = {'detector': DetectorNodeSettings, 'illumination': IlluminationNodeSettings}
+NODES = {
+    'detector': DetectorNodeSettings,
+    'illumination': IlluminationNodeSettings,
+    'registration': RegistrationNodeSettings,
+}
 WIDTH = 99
 HEADER = """\
 # Parameters of the node `{node}`: what each one means, what is accepted, and its default.

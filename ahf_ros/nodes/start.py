@@ -12,6 +12,7 @@ NODES = {
     'demo': 'ahf_ros.nodes.demo',
     'detector': 'ahf_ros.nodes.detector',
     'illumination': 'ahf_ros.nodes.illumination',
+    'registration': 'ahf_ros.nodes.registration',
     'scoreboard': 'ahf_ros.nodes.scoreboard',
 }
 """Modules whose `main` runs a node, by the name of the node."""
@@ -40,4 +41,4 @@ def start(node: str, arguments: list[str] | None = None) -> int:
     return status
 
 
-demo, detector, illumination, scoreboard = (partial(start, node) for node in NODES)
+demo, detector, illumination, registration, scoreboard = (partial(start, node) for node in NODES)

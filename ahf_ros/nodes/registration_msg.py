@@ -1,0 +1,119 @@
+"""Registered scans as messages: transforms, residuals, targets and clouds in the common frame."""
+
+from __future__ import annotations
+
+import array
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from geometry_msgs.msg import (
+    Point,
+    Pose,
+    PoseWithCovariance,
+    PoseWithCovarianceStamped,
+    Quaternion,
+    Transform,
+    TransformStamped,
+    Vector3,
+)
+from sensor_msgs.msg import PointCloud2, PointField
+from std_msgs.msg import Header
+
+from ahf_ros.interchange.network_tables import quaternion
+from ahf_ros.interchange.point_clouds import AXES, COVARIANCE
+from ahf_ros.interchange.registration_files import in_common_frame
+from ahf_ros.registration import rigid
+from ahf_ros.registration.field import Field, RegisteredScan
+from ahf_ros.target import UNDECODED
+
+_TYPES = dict(enumerate(('i1', 'u1', 'i2', 'u2', 'i4', 'u4', 'f4', 'f8'), start=1))
+_NUMBERS = {kind: number for number, kind in _TYPES.items()}
+_PLACE = [(name, '<f4') for name in AXES] + [('id', '<i4')]
+_RESIDUAL = np.dtype([*_PLACE, *((name, '<f4') for name in ('dx', 'dy', 'dz', 'length'))])
+_TARGET = np.dtype([*_PLACE, *((name, '<f4') for name in COVARIANCE)])
+
+
+def pose_message(transform: rigid.Transform, header: Header) -> PoseWithCovarianceStamped:
+    """Return the pose of a scanner in the frame of the header.
+
+    Its covariance is that of small rotations about the fixed axes of this frame.
+    """
+    x, y, z = transform.translation.tolist()
+    turn = Quaternion(**_quaternion(transform))
+    pose = Pose(position=Point(x=x, y=y, z=z), orientation=turn)
+    covariance = transform.covariance.ravel().tolist()
+    return PoseWithCovarianceStamped(
+        header=header, pose=PoseWithCovariance(pose=pose, covariance=covariance)
+    )
+
+
+def transform_message(transform: rigid.Transform, header: Header, child: str) -> TransformStamped:
+    """Return a transform for tf, from the frame of the header to that of a scan."""
+    x, y, z = transform.translation.tolist()
+    return TransformStamped(
+        header=header,
+        child_frame_id=child,
+        transform=Transform(
+            translation=Vector3(x=x, y=y, z=z), rotation=Quaternion(**_quaternion(transform))
+        ),
+    )
+
+
+def _quaternion(transform: rigid.Transform) -> dict[str, float]:
+    return dict(zip('xyzw', quaternion(transform.rotation).tolist(), strict=True))
+
+
+def residual_points(field: Field, scan: RegisteredScan, header: Header) -> PointCloud2:
+    """Return one point for each target that the transform of a scan rests on.
+
+    It has the place of the target in the field, its ID, and its residual: field minus scan.
+    """
+    points = _places(field, scan.common, _RESIDUAL)
+    for axis, name in enumerate(('dx', 'dy', 'dz')):
+        points[name] = scan.residuals[:, axis]
+    points['length'] = np.linalg.norm(scan.residuals, axis=1)
+    return cloud_message(points[None], header)
+
+
+def field_points(field: Field, header: Header) -> PointCloud2:
+    """Return one point for each target of a field, with its covariance."""
+    points = _places(field, field.names, _TARGET)
+    rows, columns = np.triu_indices(3)
+    for name, values in zip(COVARIANCE, field.covariances[:, rows, columns].T, strict=True):
+        points[name] = values
+    return cloud_message(points[None], header)
+
+
+def _places(field: Field, names: tuple[str, ...], kind: np.dtype) -> np.ndarray:
+    """Return an array with place and ID of targets; an ID that is no number is `UNDECODED`."""
+    points = np.zeros(len(names), kind)
+    for axis, name in enumerate(AXES):
+        points[name] = field.points[field.rows(names), axis]
+    points['id'] = [int(it) if it.isdecimal() and len(it) < 10 else UNDECODED for it in names]
+    return points
+
+
+def moved_cloud(cloud: np.ndarray, transform: rigid.Transform, header: Header) -> PointCloud2:
+    """Return an organised cloud in the frame of the header; missing points are NaN."""
+    return cloud_message(in_common_frame(cloud, transform), header)
+
+
+def cloud_message(points: np.ndarray, header: Header) -> PointCloud2:
+    """Return points (height, width) with fields as a message."""
+    height, width = points.shape
+    kinds: Mapping[str, Any] = points.dtype.fields or {}
+    return PointCloud2(
+        header=header,
+        height=height,
+        width=width,
+        fields=[
+            PointField(name=name, offset=entry[1], datatype=_NUMBERS[entry[0].str[1:]], count=1)
+            for name, entry in kinds.items()
+        ],
+        is_bigendian=any(entry[0].str[0] == '>' for entry in kinds.values()),
+        point_step=points.dtype.itemsize,
+        row_step=width * points.dtype.itemsize,
+        data=array.array('B', points.tobytes()),
+        is_dense=bool(np.isfinite(points['z']).all()),
+    )
