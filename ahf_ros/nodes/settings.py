@@ -286,6 +286,7 @@ class RegistrationNodeSettings:
         '',
         'Unit of these coordinates where the file does not say it.',
         choices=('', 'm', 'cm', 'mm', 'um', 'in', 'ft'),
+        form='one of m, cm, mm, um, in, ft, or an empty text',
         read_only=True,
     )
     minimum_confidence: float = parameter(
