@@ -13,12 +13,10 @@ from ahf_ros.interchange.files import read_text
 from ahf_ros.interchange.network_results import read_network
 from ahf_ros.interchange.tables import Row, read_table
 from ahf_ros.interchange.target_json import parsed_json
+from ahf_ros.interchange.units import UNITS
 from ahf_ros.orientation.network import ControlPoint
 from ahf_ros.orientation.points import MeasuredPoints
 from ahf_ros.text import shown
-
-UNITS = {'m': 1.0, 'cm': 0.01, 'mm': 0.001, 'um': 1e-6, 'in': 0.0254, 'ft': 0.3048}
-"""Units of length, and how many metres they are."""
 
 _COLUMNS = ('id', 'x', 'y', 'z')
 

@@ -12,7 +12,6 @@ import numpy as np
 
 from ahf_ros.interchange.cloud_files import write_pcd, write_ply
 from ahf_ros.interchange.files import csv_table, write_whole
-from ahf_ros.interchange.network_tables import quaternion
 from ahf_ros.interchange.point_clouds import AXES
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.registration.field import Field, RegisteredScan
@@ -97,7 +96,7 @@ def _scan(record: ScanRecord, scan: RegisteredScan) -> dict[str, Any]:
         'stamp': record.stamp,
         'frame_id': record.frame_id,
         'translation': transform.translation.tolist(),
-        'quaternion': quaternion(transform.rotation).tolist(),
+        'quaternion': transform.quaternion.tolist(),
         'matrix': matrix.tolist(),
         'covariance': transform.covariance.tolist(),
         'residuals': {
@@ -111,7 +110,7 @@ def _as_table(field: Field, records: Sequence[ScanRecord]) -> bytes:
     rows: list[Sequence[object]] = [['name', 'stamp', *_POSE, *_COVARIANCE]]
     for record, scan in zip(records, field.scans, strict=True):
         transform = scan.transform
-        place = [*transform.translation, *quaternion(transform.rotation)]
+        place = [*transform.translation, *transform.quaternion]
         entries = transform.covariance[np.triu_indices(6)]
         rows.append([record.name, record.stamp, *_digits(place, 12), *_digits(entries, 9)])
     return csv_table(rows)

@@ -23,13 +23,12 @@ from ahf_ros.interchange.registration_files import ScanRecord, write_registratio
 from ahf_ros.nodes.cloud import ANSWER, ANSWERS, CLOUD, Matcher
 from ahf_ros.nodes.frames import MISSING, StaticFrames
 from ahf_ros.nodes.parameters import ParameterSettings
+from ahf_ros.nodes.pose_msg import pose_message, transform_message
 from ahf_ros.nodes.process import LOG_PERIOD, ProcessNode, run
 from ahf_ros.nodes.registration_msg import (
     field_points,
     moved_cloud,
-    pose_message,
     residual_points,
-    transform_message,
 )
 from ahf_ros.nodes.settings import RegistrationNodeSettings
 from ahf_ros.nodes.topics import ANSWERS_KEPT, POINTS

@@ -1,4 +1,4 @@
-"""Registered scans as messages: transforms, residuals, targets and clouds in the common frame."""
+"""Registered scans as messages: residuals, targets and clouds in the common frame."""
 
 from __future__ import annotations
 
@@ -7,24 +7,13 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from geometry_msgs.msg import (
-    Point,
-    Pose,
-    PoseWithCovariance,
-    PoseWithCovarianceStamped,
-    Quaternion,
-    Transform,
-    TransformStamped,
-    Vector3,
-)
 from sensor_msgs.msg import PointCloud2, PointField
 from std_msgs.msg import Header
 
-from ahf_ros.interchange.network_tables import quaternion
 from ahf_ros.interchange.point_clouds import AXES, COVARIANCE
 from ahf_ros.interchange.registration_files import in_common_frame
-from ahf_ros.registration import rigid
 from ahf_ros.registration.field import Field, RegisteredScan
+from ahf_ros.registration.rigid import Transform
 from ahf_ros.target import UNDECODED
 
 _TYPES = dict(enumerate(('i1', 'u1', 'i2', 'u2', 'i4', 'u4', 'f4', 'f8'), start=1))
@@ -32,36 +21,6 @@ _NUMBERS = {kind: number for number, kind in _TYPES.items()}
 _PLACE = [(name, '<f4') for name in AXES] + [('id', '<i4')]
 _RESIDUAL = np.dtype([*_PLACE, *((name, '<f4') for name in ('dx', 'dy', 'dz', 'length'))])
 _TARGET = np.dtype([*_PLACE, *((name, '<f4') for name in COVARIANCE)])
-
-
-def pose_message(transform: rigid.Transform, header: Header) -> PoseWithCovarianceStamped:
-    """Return the pose of a scanner in the frame of the header.
-
-    Its covariance is that of small rotations about the fixed axes of this frame.
-    """
-    x, y, z = transform.translation.tolist()
-    turn = Quaternion(**_quaternion(transform))
-    pose = Pose(position=Point(x=x, y=y, z=z), orientation=turn)
-    covariance = transform.covariance.ravel().tolist()
-    return PoseWithCovarianceStamped(
-        header=header, pose=PoseWithCovariance(pose=pose, covariance=covariance)
-    )
-
-
-def transform_message(transform: rigid.Transform, header: Header, child: str) -> TransformStamped:
-    """Return a transform for tf, from the frame of the header to that of a scan."""
-    x, y, z = transform.translation.tolist()
-    return TransformStamped(
-        header=header,
-        child_frame_id=child,
-        transform=Transform(
-            translation=Vector3(x=x, y=y, z=z), rotation=Quaternion(**_quaternion(transform))
-        ),
-    )
-
-
-def _quaternion(transform: rigid.Transform) -> dict[str, float]:
-    return dict(zip('xyzw', quaternion(transform.rotation).tolist(), strict=True))
 
 
 def residual_points(field: Field, scan: RegisteredScan, header: Header) -> PointCloud2:
@@ -94,7 +53,7 @@ def _places(field: Field, names: tuple[str, ...], kind: np.dtype) -> np.ndarray:
     return points
 
 
-def moved_cloud(cloud: np.ndarray, transform: rigid.Transform, header: Header) -> PointCloud2:
+def moved_cloud(cloud: np.ndarray, transform: Transform, header: Header) -> PointCloud2:
     """Return an organised cloud in the frame of the header; missing points are NaN."""
     return cloud_message(in_common_frame(cloud, transform), header)
 

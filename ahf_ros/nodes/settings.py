@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
 
 from ahf_ros.detectors import DETECTOR, detector_name
+from ahf_ros.interchange.units import UNITS
 from ahf_ros.localisation import FULL, NEIGHBOURHOOD, CloudGrid
 from ahf_ros.session import create_identifier
 from ahf_ros.session_settings import AnyTargetSettings, IdentificationSettings, StackSettings
@@ -285,8 +286,8 @@ class RegistrationNodeSettings:
     unit: str = parameter(
         '',
         'Unit of these coordinates where the file does not say it.',
-        choices=('', 'm', 'cm', 'mm', 'um', 'in', 'ft'),
-        form='one of m, cm, mm, um, in, ft, or an empty text',
+        choices=('', *UNITS),
+        form=f'one of {", ".join(UNITS)}, or nothing',
         read_only=True,
     )
     minimum_confidence: float = parameter(

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ahf_ros.orientation import pose
 from ahf_ros.orientation.camera import rotation_matrices
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.similarity import similarity_between
@@ -26,12 +27,11 @@ _CONVERGED = 1e-12  # decrease of the sum of weighted squares that a step promis
 
 
 @dataclass(frozen=True)
-class Transform:
-    """The movement x' = R x + t from the frame of a scanner into another one, the fixed frame.
+class Transform(pose.Transform):
+    """A transform from the frame of a scanner into a fixed one, R, t, and how it acts on points.
 
-    The covariance (6, 6) is that of x, y, z of t, then of small rotations about the axes x, y, z
-    of the fixed frame, in m and rad: R_true = exp(b) R, in the order of geometry_msgs. It is zero
-    where the fixed frame is that of the scan.
+    Its covariance, in m and rad, is zero where the fixed frame is that of the scan. Small errors
+    are a of t, and a turn b about the fixed axes.
     """
 
     rotation: FloatArray = field(default_factory=lambda: np.eye(3))
@@ -49,7 +49,7 @@ class Transform:
         return result
 
     def changes(self, points: FloatArray) -> FloatArray:
-        """Return how `moved` of points (n, 3) changes with t and b, (n, 3, 6)."""
+        """Return how `moved` of points (n, 3) changes with a and b, (n, 3, 6)."""
         result = np.zeros((len(points), 3, 6))
         result[:, :, :3] = np.eye(3)
         turned = points @ self.rotation.T

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,6 @@ from test_nodes import header
 from ahf_ros.interchange.cloud_files import read_cloud
 from ahf_ros.interchange.coordinate_files import read_coordinates
 from ahf_ros.interchange.point_clouds import COVARIANCE, target_scan, whole_points
-from ahf_ros.nodes.frames import Parents
 from ahf_ros.nodes.registration_msg import cloud_message
 from ahf_ros.registration.field import RegisteredScan
 from ahf_ros.registration.rigid import Transform
@@ -75,9 +75,12 @@ def organised(of: Header, frame: str = 'scanner') -> PointCloud2:
 class Registrar:
     """The node `registration` in a namespace of its own, and what it says."""
 
-    def __init__(self, graph: Any, namespace: str, **settings: Any) -> None:
+    def __init__(
+        self, graph: Any, namespace: str, *arguments: str, tf: str = 'false', **settings: Any
+    ) -> None:
         self.graph, self.namespace = graph, namespace
-        graph.start('registration', *own(namespace), *overrides(tf='false', **settings))
+        given = overrides(tf=tf, **settings)
+        graph.start('registration', *own(namespace), *arguments, *given)
         self.poses = graph.listen(PoseWithCovarianceStamped, f'{namespace}/registration/transform')
         self.residuals = graph.listen(PointCloud2, f'{namespace}/registration/residuals')
         self.targets = graph.listen(PointCloud2, f'{namespace}/registration/targets')
@@ -204,10 +207,6 @@ def test_scans_that_do_not_fit_are_refused_and_the_node_goes_on(node: Registrar)
     early, good = header(), scan(1)
     node.send(target_points(header(), good))
     assert node.refused(target_points(early, good)).startswith('stamp is ')
-    millimetres = node.refused(target_points(header(), scan(2), factor=1000))
-    assert 'the scan is in millimetres, the field in metres' in millimetres
-    text = node.refused(target_points(header(), scan(4)))
-    assert text.startswith('0 of the targets of the scan, 30, 31,')
     moved = scan(2)
     moved.points[1] += 0.01
     text = node.refused(target_points(header(), moved))
@@ -268,11 +267,31 @@ def test_a_node_does_not_start_without_its_coordinates(graph: Any, tmp_path: Pat
     assert f'{path} cannot be read' in text
 
 
-def test_a_frame_has_one_parent() -> None:
-    parents = Parents()
-    parents.see([TransformStamped(header=Header(frame_id='/robot'), child_frame_id='scan_1')])
-    assert 'frame scan_1 has the parent robot by tf' in parents.refusal('scan_1', 'registered')
-    assert parents.refusal('scan_1', 'robot') == parents.refusal('scan_2', 'registered') == ''
+@pytest.mark.skipif(find_spec('tf2_msgs') is None, reason='tf2_msgs is not installed')
+def test_scans_have_frames_in_tf_with_one_parent(graph: Any) -> None:
+    from tf2_msgs.msg import TFMessage
+
+    names = '-r', '/tf:=/frames/tf', '-r', '/tf_static:=/frames/tf_static'
+    node = Registrar(graph, '/frames', *names, tf='true')
+    heard = graph.listen(TFMessage, '/frames/tf_static')
+    node.send(target_points(header(), scan(0)))
+    other = TransformStamped(header=Header(frame_id='robot'), child_frame_id='scan_2')
+    graph.publisher(TFMessage, '/frames/tf').publish(TFMessage(transforms=[other]))
+    for number in (1, 2):
+        node.send(target_points(header(), scan(number)))
+    graph.until(lambda: heard and heard[-1].transforms[-1].child_frame_id == 'scan_3')
+    assert [it.child_frame_id for it in heard[-1].transforms] == ['scan_1', 'scan_3']
+    words = "no tf: 'scan_2' has the parent 'robot' already"
+    graph.until(lambda: words in node.diagnostics[-1].status[0].message)
+
+
+@pytest.mark.skipif(find_spec('tf2_msgs') is not None, reason='tf2_msgs is installed')
+def test_the_node_says_that_there_is_no_tf(graph: Any) -> None:
+    process = graph.start('registration', *own('/silent'))
+    graph.listen(PointCloud2, '/silent/registration/targets')
+    status, text = process.end()
+    assert status == 0
+    assert 'tf is True and the package tf2_msgs is not there: no tf' in text
 
 
 def test_targets_without_id_or_confidence_are_left_out() -> None:
