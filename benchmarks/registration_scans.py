@@ -113,11 +113,11 @@ def run(measure: Measure, seed: int, runs: int) -> Figures:
 def _register(figures: Figures, scans: Sequence[Scan], true: Sequence[Transform]) -> None:
     """Add the figures of one object, whose last scan closes the chain."""
     shared = [name for name in scans[-1].names if name in scans[0].names]
-    opened = Registration()
+    registration = Registration()
     for scan in scans[:-1]:
-        opened.add(scan)
-    last = opened.add(scans[-1].without(shared)).transform
-    chain = [it.transform for it in opened.field.scans]
+        registration.add(scan)
+    last = registration.add(scans[-1].without(shared)).transform
+    chain = [it.transform for it in registration.field.scans]
     first, end = (it.rows(shared) for it in (scans[0], scans[-1]))
     gap = scans[0].points[first] - last.moved(scans[-1].points[end])
     changes = last.changes(scans[-1].points[end]).reshape(-1, 6)
@@ -125,11 +125,10 @@ def _register(figures: Figures, scans: Sequence[Scan], true: Sequence[Transform]
     own = scans[0].covariances[first] + last.turned(scans[-1].covariances[end])
     for row, block in enumerate(own):
         covariance[3 * row : 3 * row + 3, 3 * row : 3 * row + 3] += block
-    closed = Registration()
-    for scan in scans:
-        closed.add(scan)
-    adjusted = closed.adjust()
-    poses = [it.transform for it in closed.field.scans]
+    registration.undo()
+    registration.add(scans[-1])
+    adjusted = registration.adjust()
+    poses = [it.transform for it in registration.field.scans]
     after = scans[0].points[first] - poses[-1].moved(scans[-1].points[end])
     figures.closing.append(float(gap.ravel() @ np.linalg.solve(covariance, gap.ravel())))
     figures.before.append(1e3 * float(np.linalg.norm(gap.mean(axis=0))))
