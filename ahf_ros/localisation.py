@@ -32,7 +32,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ahf_ros.features.robust import NORMAL
-from ahf_ros.interchange.point_clouds import AXES
+from ahf_ros.interchange.point_clouds import AXES, COVARIANCE, TARGET_POINT
 from ahf_ros.target import Target
 
 NEIGHBOURHOOD = 3.0
@@ -138,6 +138,20 @@ def positions(
     return Positions(
         rows[:, :3], rows[:, 3], rows[:, 4] / grid.step, rows[:, 5:].reshape(-1, 3, 3)
     )
+
+
+def labelled(targets: Sequence[Target], found: Positions) -> np.ndarray:
+    """Return one `TARGET_POINT` per target, in their order; NaN if it has no position."""
+    points = np.empty(len(targets), TARGET_POINT)
+    for axis, name in enumerate(AXES):
+        points[name] = found.points[:, axis]
+    points['id'] = [target.id for target in targets]
+    points['confidence'] = [target.confidence for target in targets]
+    points['deviation'] = found.deviations
+    rows, columns = np.triu_indices(3)
+    for name, values in zip(COVARIANCE, found.covariances[:, rows, columns].T, strict=True):
+        points[name] = values
+    return points
 
 
 def _centre_covariance(target: Target) -> np.ndarray:

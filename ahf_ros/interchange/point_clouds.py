@@ -21,10 +21,21 @@ AXES = ('x', 'y', 'z')
 COVARIANCE = ('xx', 'xy', 'xz', 'yy', 'yz', 'zz')
 """Fields of target points with the covariance of x, y and z."""
 
+TARGET_POINT = np.dtype(
+    [
+        *((name, '<f4') for name in AXES),
+        ('id', '<i4'),
+        *((name, '<f4') for name in ('confidence', 'deviation', *COVARIANCE)),
+    ]
+)
+"""A point of ~/target_points; the deviation is that of `ahf_ros.localisation.Positions`."""
+
 FLOAT32, FLOAT64 = 7, 8
 """Accepted types of these fields, as numbered in sensor_msgs/PointField."""
 
-_NUMBERS = dict(enumerate(('i1', 'u1', 'i2', 'u2', 'i4', 'u4', 'f4', 'f8'), start=1))
+NUMBERS = dict(enumerate(('i1', 'u1', 'i2', 'u2', 'i4', 'u4', 'f4', 'f8'), start=1))
+"""Types of numbers, as numbered in sensor_msgs/PointField."""
+
 _KINDS = {FLOAT32: 'f4', FLOAT64: 'f8'}
 
 
@@ -63,7 +74,7 @@ def whole_points(message: Any) -> np.ndarray:
     order = '>' if message.is_bigendian else '<'
     kinds = []
     for field in message.fields:
-        kind = _NUMBERS.get(field.datatype)
+        kind = NUMBERS.get(field.datatype)
         if kind is None or field.count > 1:
             raise ValueError(
                 f'field {shown(field.name)} has the datatype {field.datatype} and the count '
@@ -93,13 +104,13 @@ def whole_points(message: Any) -> np.ndarray:
     return np.ndarray(shape, point, message.data, strides=(message.row_step, message.point_step))
 
 
-def target_scan(message: Any, minimum_confidence: float = 0.0) -> Scan:
-    """Return the targets of a cloud as the detector publishes it on ~/target_points.
+def target_scan(points: np.ndarray, minimum_confidence: float = 0.0) -> Scan:
+    """Return the targets of an array with the fields of ~/target_points.
 
     Targets without an ID or a position, or of less confidence, are left out. A ValueError names
     fields that are missing, or a covariance that is none.
     """
-    points = whole_points(message).ravel()
+    points = points.ravel()
     needed = (*AXES, 'id', *COVARIANCE)
     names = points.dtype.names or ()
     if missing := [name for name in needed if name not in names]:

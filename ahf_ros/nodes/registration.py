@@ -154,7 +154,8 @@ class RegistrationNode(ProcessNode):
                 f'stamp is {stamp / 1e9:.9f} s, before that of the last scan, '
                 f'{self._records[-1].stamp / 1e9:.9f} s; ~/reset begins anew'
             )
-        self._registration.add(target_scan(message, settings.minimum_confidence))
+        points = whole_points(message)
+        self._registration.add(target_scan(points, settings.minimum_confidence))
 
     def _on_cloud(self, cloud: PointCloud2) -> None:
         record = self._matcher.put(CLOUD, nanoseconds(cloud.header), cloud, len(cloud.data))

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import array
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
-from sensor_msgs.msg import PointCloud2, PointField
+from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 
 from ahf_ros.interchange.point_clouds import AXES, COVARIANCE
 from ahf_ros.interchange.registration_files import in_common_frame
+from ahf_ros.nodes.cloud_msg import cloud_message
 from ahf_ros.registration.field import Field, RegisteredScan
 from ahf_ros.registration.rigid import Transform
 from ahf_ros.target import UNDECODED
 
-_TYPES = dict(enumerate(('i1', 'u1', 'i2', 'u2', 'i4', 'u4', 'f4', 'f8'), start=1))
-_NUMBERS = {kind: number for number, kind in _TYPES.items()}
 _PLACE = [(name, '<f4') for name in AXES] + [('id', '<i4')]
 _RESIDUAL = np.dtype([*_PLACE, *((name, '<f4') for name in ('dx', 'dy', 'dz', 'length'))])
 _TARGET = np.dtype([*_PLACE, *((name, '<f4') for name in COVARIANCE)])
@@ -56,23 +51,3 @@ def _places(field: Field, names: tuple[str, ...], kind: np.dtype) -> np.ndarray:
 def moved_cloud(cloud: np.ndarray, transform: Transform, header: Header) -> PointCloud2:
     """Return an organised cloud in the frame of the header; missing points are NaN."""
     return cloud_message(in_common_frame(cloud, transform), header)
-
-
-def cloud_message(points: np.ndarray, header: Header) -> PointCloud2:
-    """Return points (height, width) with fields as a message."""
-    height, width = points.shape
-    kinds: Mapping[str, Any] = points.dtype.fields or {}
-    return PointCloud2(
-        header=header,
-        height=height,
-        width=width,
-        fields=[
-            PointField(name=name, offset=entry[1], datatype=_NUMBERS[entry[0].str[1:]], count=1)
-            for name, entry in kinds.items()
-        ],
-        is_bigendian=any(entry[0].str[0] == '>' for entry in kinds.values()),
-        point_step=points.dtype.itemsize,
-        row_step=width * points.dtype.itemsize,
-        data=array.array('B', points.tobytes()),
-        is_dense=bool(np.isfinite(points['z']).all()),
-    )

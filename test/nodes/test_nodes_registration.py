@@ -21,9 +21,13 @@ from test_nodes import header
 
 from ahf_ros.interchange.cloud_files import read_cloud
 from ahf_ros.interchange.coordinate_files import read_coordinates
-from ahf_ros.interchange.point_clouds import COVARIANCE, target_scan, whole_points
-from ahf_ros.nodes.registration_msg import cloud_message
-from ahf_ros.registration.field import RegisteredScan
+from ahf_ros.interchange.point_clouds import (
+    COVARIANCE,
+    TARGET_POINT,
+    target_scan,
+    whole_points,
+)
+from ahf_ros.nodes.cloud_msg import cloud_message
 from ahf_ros.registration.rigid import Transform
 from ahf_ros.registration.scan import Scan
 from support.detector import overrides, own, values
@@ -32,11 +36,6 @@ from support.scans import measured, relative, ring, squared_error, station
 COUNT, COMMON = 6, 5
 SIGMA = 20e-6  # m
 GROUPS = ring(COUNT, COMMON, np.random.default_rng(1))
-POINT = np.dtype(
-    [(name, '<f4') for name in 'xyz']
-    + [('id', '<i4')]
-    + [(name, '<f4') for name in ('confidence', 'deviation', *COVARIANCE)]
-)
 
 
 def scan(number: int, seed: int = 0) -> Scan:
@@ -50,7 +49,7 @@ def scan(number: int, seed: int = 0) -> Scan:
 
 def target_points(of: Header, shown: Scan, factor: float = 1.0) -> PointCloud2:
     """Return a scan as the detector publishes it, with a target without an ID."""
-    points = np.zeros(len(shown.names) + 1, POINT)
+    points = np.zeros(len(shown.names) + 1, TARGET_POINT)
     points['id'] = [*map(int, shown.names), -1]
     for axis, name in enumerate('xyz'):
         points[name][:-1] = factor * shown.points[:, axis]
@@ -295,9 +294,10 @@ def test_the_node_says_that_there_is_no_tf(graph: Any) -> None:
 
 
 def test_targets_without_id_or_confidence_are_left_out() -> None:
-    message = target_points(header(), scan(0))
-    assert len(target_scan(message).names) == 2 * COMMON
-    assert target_scan(message, 1.0).names == scan(0).names
-    points = whole_points(message)
+    points = whole_points(target_points(header(), scan(0)))
     assert points['id'][0, -1] == -1
-    assert RegisteredScan(target_scan(message), Transform()).rms == 0
+    assert len(target_scan(points).names) == 2 * COMMON
+    points['confidence'][0, 3:] = 0.5
+    assert target_scan(points, 0.9).names == scan(0).names[:3]
+    points['x'][0, 0] = np.nan
+    assert target_scan(points, 0.9).names == scan(0).names[1:3]
