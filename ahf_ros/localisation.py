@@ -51,6 +51,13 @@ _MINIMUM_AREA = 0.1  # of the triangle of three points, squared reaches
 _SPREADS = np.array([0.8191725134, 0.6710436067, 0.5497004779])  # Roberts' sequence in 3-D
 _OUTLIER = 3.0  # standard deviations
 _PASSES = 3
+_TRIMMED = 1.056
+"""Variance of a mean without outliers beyond `_OUTLIER` over that estimated from the rest.
+
+This is for noise in one direction, as along the rays of a scanner: of a standard normal variable
+with density f, P = 0.9973 are within c = 3, with the mean square V = 0.9733 of these. Its mean has
+the variance P V / (P - 2 c f(c))^2 (Huber, Robust Statistics, 1981, 3.2), and V / P is estimated.
+"""
 _UNKNOWNS = 11
 _CENTRE = 0.05  # px, standard deviation of centres whose covariance is not known
 
@@ -238,7 +245,7 @@ def _covariance(
     flat = design.reshape(-1, _UNKNOWNS)
     solver = np.linalg.pinv(flat.T @ flat, hermitian=True)[:3]
     gains = np.einsum('uk,nak->nua', solver, design) * (1 + unit @ perspective)[:, None, None]
-    noise = residuals.T @ residuals / (count - _UNKNOWNS / 3)
+    noise = _TRIMMED * residuals.T @ residuals / (count - _UNKNOWNS / 3)
     covariance: np.ndarray = np.einsum('nua,ab,nvb->uv', gains, noise, gains, optimize=True)
     return covariance
 
