@@ -15,6 +15,11 @@ positions are 0.005 mm off; those of the four nearest points are 0.08 mm off, an
 without perspective, g and h, 0.32 mm. With ink four times as noisy and no points on the dot, the
 homography is 0.007 mm off and the four nearest points give no position. For such a dot, 17 degrees
 off the axis, a distortion of k1 = 0.1 adds 0.01 mm.
+
+The covariance of a position is that of a, from the residuals of the fit, whatever their
+distribution over the directions, plus that of the centre in the image, which P takes into space.
+It counts the noise of the points as independent of each other, and is never zero: positions are
+rounded to float32.
 """
 
 from __future__ import annotations
@@ -27,7 +32,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ahf_ros.features.robust import NORMAL
-from ahf_ros.interchange.point_clouds import AXES
+from ahf_ros.interchange.point_clouds import AXES, COVARIANCE, TARGET_POINT
 from ahf_ros.target import Target
 
 NEIGHBOURHOOD = 3.0
@@ -46,6 +51,15 @@ _MINIMUM_AREA = 0.1  # of the triangle of three points, squared reaches
 _SPREADS = np.array([0.8191725134, 0.6710436067, 0.5497004779])  # Roberts' sequence in 3-D
 _OUTLIER = 3.0  # standard deviations
 _PASSES = 3
+_TRIMMED = 1.056
+"""Variance of a mean without outliers beyond `_OUTLIER` over that estimated from the rest.
+
+This is for noise in one direction, as along the rays of a scanner: of a standard normal variable
+with density f, P = 0.9973 are within c = 3, with the mean square V = 0.9733 of these. Its mean has
+the variance P V / (P - 2 c f(c))^2 (Huber, Robust Statistics, 1981, 3.2), and V / P is estimated.
+"""
+_UNKNOWNS = 11
+_CENTRE = 0.05  # px, standard deviation of centres whose covariance is not known
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,12 +103,13 @@ class Positions:
     Points of shape (n, 3) are x, y, z of the centres. Deviations, shape (n,), are the root mean
     square of the residuals of the fit: the noise of the scanner, or more if a target is not flat.
     Spacings, shape (n,), are the distances on the target of two adjacent pixels, along the axis
-    where they are larger.
+    where they are larger. Covariances, shape (n, 3, 3), are those of the points.
     """
 
     points: np.ndarray
     deviations: np.ndarray
     spacings: np.ndarray
+    covariances: np.ndarray
 
     @property
     def known(self) -> np.ndarray:
@@ -117,16 +132,39 @@ def positions(
     less than a fifth, of the pixels around it have points on its plane, or if all of these are on
     one side of its centre: nothing is extrapolated.
     """
-    rows = np.full((len(targets), 5), np.nan)
+    rows = np.full((len(targets), 14), np.nan)
     with np.errstate(all='ignore'):  # bad points end in values that are not finite
         for row, target in zip(rows, targets, strict=True):
             offsets, points, pixels = _neighbours(cloud, target, neighbourhood, grid)
             minimum = max(MINIMUM_POINTS, _MINIMUM_SHARE * pixels)
             if len(points) >= minimum:
                 with suppress(np.linalg.LinAlgError):
-                    row[:] = _position(offsets, points, minimum)
+                    centre = _centre_covariance(target) / grid.step**2
+                    row[:] = _position(offsets, points, minimum, centre)
     rows[~np.isfinite(rows).all(axis=1)] = np.nan
-    return Positions(rows[:, :3], rows[:, 3], rows[:, 4] / grid.step)
+    return Positions(
+        rows[:, :3], rows[:, 3], rows[:, 4] / grid.step, rows[:, 5:].reshape(-1, 3, 3)
+    )
+
+
+def labelled(targets: Sequence[Target], found: Positions) -> np.ndarray:
+    """Return one `TARGET_POINT` per target, in their order; NaN if it has no position."""
+    points = np.empty(len(targets), TARGET_POINT)
+    for axis, name in enumerate(AXES):
+        points[name] = found.points[:, axis]
+    points['id'] = [target.id for target in targets]
+    points['confidence'] = [target.confidence for target in targets]
+    points['deviation'] = found.deviations
+    rows, columns = np.triu_indices(3)
+    for name, values in zip(COVARIANCE, found.covariances[:, rows, columns].T, strict=True):
+        points[name] = values
+    return points
+
+
+def _centre_covariance(target: Target) -> np.ndarray:
+    """Return the covariance (2, 2) of a centre, px^2; detectors say zero where it is not known."""
+    given = np.array(target.covariance, float).reshape(2, 2)
+    return given if given.any() else _CENTRE**2 * np.eye(2)
 
 
 def _neighbours(
@@ -160,8 +198,13 @@ def _neighbours(
     return offsets[inside][real], points[real], int(inside.sum())
 
 
-def _position(offsets: np.ndarray, points: np.ndarray, minimum: float) -> list[float]:
-    """Return position, deviation and spacing of a target; LinAlgError if its points are few."""
+def _position(
+    offsets: np.ndarray, points: np.ndarray, minimum: float, centre: np.ndarray
+) -> np.ndarray:
+    """Return position, deviation, spacing and covariance of a target, in a row of 14.
+
+    The covariance of the centre is in steps of the grid. Raises LinAlgError if points are few.
+    """
     reach = np.abs(offsets).max()
     unit = offsets / reach
     origin = np.median(points, axis=0)
@@ -174,11 +217,43 @@ def _position(offsets: np.ndarray, points: np.ndarray, minimum: float) -> list[f
             raise np.linalg.LinAlgError('too few points are on the plane, or all on one side')
         plane, perspective = _homography(unit[near], shifted[near])
         seen = plane[0] + unit @ plane[1:]
-        distances = np.linalg.norm(shifted - seen / (1 + unit @ perspective)[:, None], axis=1)
+        residuals = shifted - seen / (1 + unit @ perspective)[:, None]
+        distances = np.linalg.norm(residuals, axis=1)
     deviation = math.sqrt(np.mean(distances[near] ** 2))
     across = (plane[1:] - np.outer(perspective, plane[0])) / reach
     spacing = np.linalg.norm(across, axis=1).max()
-    return [*(origin + plane[0]), deviation, float(spacing)]
+    position = origin + plane[0]
+    covariance = _covariance(unit[near], shifted[near], residuals[near], perspective)
+    covariance += across.T @ centre @ across + np.diag(_rounding(position))
+    return np.concatenate((position, [deviation, spacing], covariance.ravel()))
+
+
+def _covariance(
+    unit: np.ndarray, shifted: np.ndarray, residuals: np.ndarray, perspective: np.ndarray
+) -> np.ndarray:
+    """Return the covariance (3, 3) of P(0, 0) from the residuals of its homography.
+
+    An error of point i changes the eleven unknowns by N^-1 J_i' (1 + g u_i + h v_i) times the
+    error, with the rows J_i of `_homography` and N as the sum of J_i' J_i.
+    """
+    count = len(unit)
+    design = np.zeros((count, 3, _UNKNOWNS))
+    for column, values in enumerate((np.ones(count), *unit.T)):
+        for axis in range(3):
+            design[:, axis, 3 * column + axis] = values
+    design[:, :, 9:] = -shifted[:, :, None] * unit[:, None, :]
+    flat = design.reshape(-1, _UNKNOWNS)
+    solver = np.linalg.pinv(flat.T @ flat, hermitian=True)[:3]
+    gains = np.einsum('uk,nak->nua', solver, design) * (1 + unit @ perspective)[:, None, None]
+    noise = _TRIMMED * residuals.T @ residuals / (count - _UNKNOWNS / 3)
+    covariance: np.ndarray = np.einsum('nua,ab,nvb->uv', gains, noise, gains, optimize=True)
+    return covariance
+
+
+def _rounding(position: np.ndarray) -> np.ndarray:
+    """Return the variances (3,) of rounding the coordinates of a point to float32."""
+    steps = np.finfo(np.float32).eps * max(np.abs(position).max(), np.finfo(np.float32).tiny)
+    return np.full(3, steps**2 / 12)
 
 
 def _distances_from_median_plane(unit: np.ndarray, shifted: np.ndarray) -> np.ndarray:

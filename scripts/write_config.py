@@ -1,4 +1,4 @@
-"""Write the parameter files of the nodes in config/ from the declarations in the code."""
+"""Write the parameter files in config/ from the declarations in the code."""
 
 from __future__ import annotations
 
@@ -7,7 +7,11 @@ import textwrap
 from pathlib import Path
 
 from ahf_ros.nodes.pose_settings import PoseNodeSettings
-from ahf_ros.nodes.settings import DetectorNodeSettings, IlluminationNodeSettings
+from ahf_ros.nodes.settings import (
+    DetectorNodeSettings,
+    IlluminationNodeSettings,
+    RegistrationNodeSettings,
+)
 from ahf_ros.settings.nested import flat_parameters
 from ahf_ros.settings.parameter import Parameter
 
@@ -16,6 +20,7 @@ NODES = {
     'detector': DetectorNodeSettings,
     'illumination': IlluminationNodeSettings,
     'pose': PoseNodeSettings,
+    'registration': RegistrationNodeSettings,
 }
 WIDTH = 99
 HEADER = """\

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import numpy.lib.recfunctions as rfn
@@ -79,6 +80,33 @@ def test_noise_is_told_and_averaged() -> None:
     cloud = scan(0.5, NOISE)
     assert found(cloud).deviations[0] == pytest.approx(NOISE, rel=0.15)
     assert error(cloud, 0.5) < NOISE / 8
+
+
+@pytest.mark.parametrize('along_rays', [True, False])
+def test_covariances_agree_with_errors(along_rays: bool) -> None:
+    """The normalised squared errors of 3 coordinates have the mean 3, here within 4 deviations."""
+    random = np.random.default_rng(2)
+    covariance = np.array([[9e-4, 3e-4], [3e-4, 16e-4]])  # px^2
+    exact, true = on_plane(PIXELS, 0.6), on_plane(np.array(CENTRE), 0.6)
+    squares = []
+    for _ in range(100):
+        noise = random.standard_normal((100, 120, 1 if along_rays else 3))
+        cloud = exact * (1 + NOISE / 1000 * noise) if along_rays else exact + NOISE * noise
+        x, y = random.multivariate_normal(CENTRE, covariance)
+        seen = replace(target(x, y), covariance=tuple(covariance.ravel().tolist()))
+        result = positions(organised(cloud, KIND), [seen])
+        error = result.points[0] - true
+        squares.append(error @ np.linalg.solve(result.covariances[0], error))
+    assert np.mean(squares) == pytest.approx(3, abs=4 * math.sqrt(6 / 100))
+
+
+def test_covariances_are_never_zero() -> None:
+    result = positions(organised(np.ones((100, 120, 3)), KIND), [target()])
+    assert np.linalg.eigvalsh(result.covariances[0])[0] > 0
+    few, many = (
+        positions(scan(0.5, noise), [target()]).covariances[0] for noise in (0, 10 * NOISE)
+    )
+    assert np.linalg.eigvalsh(many - few)[0] > 0  # noise adds in every direction
 
 
 def test_a_dot_without_points_has_a_position() -> None:

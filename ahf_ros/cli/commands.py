@@ -31,6 +31,10 @@ COMMANDS = {
         'cli.measure',
         'Measure distances, deviations from nominal coordinates and length errors in a network.',
     ),
+    'register': (
+        'cli.register',
+        'Put scans, clouds with their images, into one frame by their coded targets.',
+    ),
     'compare': ('cli.compare', 'Find the targets that moved between two networks.'),
     'learn-family': (
         'cli.learn_family',

@@ -14,6 +14,7 @@ from ahf_ros.nodes.pose_settings import PoseNodeSettings
 from ahf_ros.nodes.settings import (
     DetectorNodeSettings,
     IlluminationNodeSettings,
+    RegistrationNodeSettings,
     ScoreboardSettings,
 )
 from ahf_ros.settings.nested import flat_parameters
@@ -107,6 +108,24 @@ in /tf_static tf2_msgs/TFMessage likewise
 out /diagnostics diagnostic_msgs/DiagnosticArray once per second
 """)
 
+_REGISTRATION = _interfaces("""
+in target_points sensor_msgs/PointCloud2 \
+    the targets of each scan, `~/target_points` of a detector
+in points sensor_msgs/PointCloud2 with `cloud`: the cloud of each scan
+in /tf tf2_msgs/TFMessage with `tf`: whether a frame has another parent
+out ~/transform geometry_msgs/PoseWithCovarianceStamped the scanner in the frame, for every scan
+out ~/residuals sensor_msgs/PointCloud2 \
+    of the last scan, by target: place, ID, field minus scan, length
+out ~/targets sensor_msgs/PointCloud2 all targets in the frame, with their covariances
+out ~/cloud sensor_msgs/PointCloud2 with `cloud`: every cloud in the frame
+out /tf_static tf2_msgs/TFMessage with `tf`: the frames of all scans
+out /diagnostics diagnostic_msgs/DiagnosticArray once per second
+service ~/save std_srvs/Trigger write clouds, transforms and targets to `folder`
+service ~/undo std_srvs/Trigger take back the last scan or adjustment
+service ~/reset std_srvs/Trigger forget all scans
+service ~/adjust std_srvs/Trigger adjust all scans and targets jointly
+""")
+
 _SCOREBOARD = _interfaces("""
 in coded_targets ahf_ros/CodedTargetArray answers
 in ground_truth ahf_ros/CodedTargetArray the truth
@@ -135,6 +154,12 @@ NODES = {
         interfaces=_POSE,
         settings=PoseNodeSettings,
         usual=('coordinates', 'unit', 'tf', 'targets_frame', 'camera_matrix', 'target_frames'),
+    ),
+    'registration': NodeInterface(
+        purpose='Registers scans in one frame by the targets that they have in common.',
+        interfaces=_REGISTRATION,
+        settings=RegistrationNodeSettings,
+        usual=('frame', 'coordinates', 'unit', 'cloud', 'cloud_tolerance', 'folder'),
     ),
     'scoreboard': NodeInterface(
         purpose='Compares answers with the truth and prints one line per image.',

@@ -7,11 +7,13 @@ from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
 
 from ahf_ros.detectors import DETECTOR, detector_name
+from ahf_ros.interchange.units import UNITS
 from ahf_ros.localisation import FULL, NEIGHBOURHOOD, CloudGrid
 from ahf_ros.session import create_identifier
 from ahf_ros.session_settings import AnyTargetSettings, IdentificationSettings, StackSettings
 from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.synthetic.scene import SceneSettings
+from ahf_ros.text import shown
 
 LATEST, LOSSLESS = 'latest', 'lossless'
 """What becomes of images that arrive while another one is being identified."""
@@ -25,6 +27,7 @@ MAXIMUM_TOLERANCE = 10.0
 NUMBER_UNKNOWN = 'unknown (expected_targets is 0)'
 """What stands for N in the log where no filter is searched for."""
 
+_FRAME = re.compile(r'[A-Za-z_][\w.-]*(/[\w.-]+)*', re.ASCII)
 _SERVICE_NAME = re.compile(r'[~/]?/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*', re.ASCII)
 
 
@@ -253,3 +256,72 @@ class ScoreboardSettings:
     def __post_init__(self) -> None:
         """Refuse values that are not accepted."""
         check_parameters(self)
+
+
+@dataclass(frozen=True, slots=True)
+class RegistrationNodeSettings:
+    """Settings of the node `registration`: which frame, and what is kept and written."""
+
+    frame: str = parameter(
+        'registered',
+        'Frame that all scans are registered in.',
+        form='the name of a frame, without a slash at its start',
+        read_only=True,
+    )
+    scan_frame: str = parameter(
+        'scan_',
+        'Beginning of the names of the frames of the scans: the first one is scan_1.',
+        form='the beginning of the name of a frame, without a slash at its start',
+        read_only=True,
+    )
+    tf: bool = parameter(
+        True, 'Whether to publish the frames of all scans on /tf_static.', read_only=True
+    )
+    coordinates: str = parameter(
+        '',
+        'File of known coordinates of targets: a folder of ahf orient, CSV or JSON; empty: the '
+        'first scan gives the frame.',
+        read_only=True,
+    )
+    unit: str = parameter(
+        '',
+        'Unit of these coordinates where the file does not say it.',
+        choices=('', *UNITS),
+        form=f'one of {", ".join(UNITS)}, or nothing',
+        read_only=True,
+    )
+    minimum_confidence: float = parameter(
+        0.9, 'Minimum confidence of targets that are used.', minimum=0.0, maximum=1.0
+    )
+    cloud: bool = parameter(
+        False,
+        'Whether to subscribe to clouds on points, to publish them in the frame on ~/cloud, and '
+        'to keep them for ~/save.',
+        read_only=True,
+    )
+    cloud_tolerance: float = parameter(
+        1e-6,
+        'Maximum difference between the stamps of target points and their cloud, s.',
+        minimum=0.0,
+        maximum=MAXIMUM_TOLERANCE,
+        read_only=True,
+    )
+    cloud_memory: int = parameter(
+        4096,
+        'Memory for clouds that are kept for ~/save, MB; those beyond are not kept.',
+        minimum=0,
+        maximum=2**20,
+    )
+    maximum_scans: int = parameter(
+        1000, 'Number of scans beyond which others are refused.', minimum=1, maximum=100_000
+    )
+    folder: str = parameter('', 'Folder that ~/save writes to.')
+
+    def __post_init__(self) -> None:
+        """Refuse values that are not accepted."""
+        check_parameters(self)
+        for name in ('frame', 'scan_frame'):
+            value = getattr(self, name)
+            if not _FRAME.fullmatch(value):
+                accepted = 'the name of a frame, without a slash at its start'
+                raise ValueError(f'{name} is {shown(value)}, accepted is {accepted}')

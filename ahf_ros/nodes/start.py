@@ -12,6 +12,7 @@ NODES = {
     'detector': 'ahf_ros.nodes.detector',
     'illumination': 'ahf_ros.nodes.illumination',
     'pose': 'ahf_ros.nodes.pose',
+    'registration': 'ahf_ros.nodes.registration',
     'scoreboard': 'ahf_ros.nodes.scoreboard',
 }
 """Modules whose `main` runs a node, by the name of the node."""
@@ -49,4 +50,4 @@ def start(node: str, arguments: list[str] | None = None) -> int:
     return status
 
 
-detector, illumination, pose, scoreboard = (partial(start, node) for node in NODES)
+detector, illumination, pose, registration, scoreboard = (partial(start, node) for node in NODES)

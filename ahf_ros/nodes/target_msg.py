@@ -7,7 +7,6 @@ of one marker. Markers have no text: IDs are drawn into the debug image.
 
 from __future__ import annotations
 
-import array
 import math
 from collections.abc import Sequence
 from itertools import pairwise
@@ -15,25 +14,15 @@ from types import ModuleType
 
 import numpy as np
 from geometry_msgs.msg import Point, Pose, Vector3
-from sensor_msgs.msg import PointCloud2, PointField
+from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import ImageMarker, Marker, MarkerArray
 
 from ahf_ros.drawing.overlay import DECODED_COLOUR, DOUBTFUL_COLOUR, Colour
-from ahf_ros.localisation import Positions
+from ahf_ros.localisation import Positions, labelled
 from ahf_ros.msg import CodedTarget, CodedTargetArray
+from ahf_ros.nodes.cloud_msg import cloud_message
 from ahf_ros.target import UNDECODED
-
-_POINT = {
-    'x': PointField.FLOAT32,
-    'y': PointField.FLOAT32,
-    'z': PointField.FLOAT32,
-    'id': PointField.INT32,
-    'confidence': PointField.FLOAT32,
-    'deviation': PointField.FLOAT32,  # of `Positions`
-}
-_KINDS = {PointField.FLOAT32: '<f4', PointField.INT32: '<i4'}
-_POINT_TYPE = np.dtype([(name, _KINDS[kind]) for name, kind in _POINT.items()])
 
 
 def target_detections(answer: CodedTargetArray, types: ModuleType) -> object:
@@ -103,26 +92,7 @@ def target_points(targets: Sequence[CodedTarget], found: Positions, header: Head
 
     The header names the coordinate frame of the positions.
     """
-    points = np.empty(len(targets), _POINT_TYPE)
-    for axis, name in enumerate('xyz'):
-        points[name] = found.points[:, axis]
-    points['id'] = [target.id for target in targets]
-    points['confidence'] = [target.confidence for target in targets]
-    points['deviation'] = found.deviations
-    fields = [
-        PointField(name=name, offset=4 * number, datatype=datatype, count=1)
-        for number, (name, datatype) in enumerate(_POINT.items())
-    ]
-    return PointCloud2(
-        header=header,
-        height=1,
-        width=len(points),
-        fields=fields,
-        point_step=_POINT_TYPE.itemsize,
-        row_step=points.nbytes,
-        data=array.array('B', points.tobytes()),
-        is_dense=bool(found.known.all()),
-    )
+    return cloud_message(labelled(targets, found)[None], header)
 
 
 def target_labels(targets: Sequence[CodedTarget], found: Positions, header: Header) -> MarkerArray:

@@ -11,6 +11,7 @@ from std_msgs.msg import Header
 from visualization_msgs.msg import ImageMarker, Marker
 
 from ahf_ros import msg
+from ahf_ros.interchange.point_clouds import COVARIANCE
 from ahf_ros.interchange.target_messages import coded_target_array
 from ahf_ros.localisation import Positions
 from ahf_ros.msg import CodedTargetArray
@@ -62,20 +63,26 @@ def test_without_targets_there_are_no_lines() -> None:
 
 
 FOUND = Positions(
-    np.array([(1.0, 2.0, 3.0), (math.nan,) * 3]), np.array([0.1, math.nan]), np.array([0.5, 0.5])
+    np.array([(1.0, 2.0, 3.0), (math.nan,) * 3]),
+    np.array([0.1, math.nan]),
+    np.array([0.5, 0.5]),
+    np.array([[(1.0, 2.0, 3.0), (2.0, 4.0, 5.0), (3.0, 5.0, 6.0)], np.full((3, 3), math.nan)]),
 )
 
 
 def test_points_carry_ids_and_are_nan_where_they_are_not_known() -> None:
     message = target_points(answer(SEEN, LOST).targets, FOUND, HEADER)
     assert (message.header, message.width, message.is_dense) == (HEADER, 2, False)
-    first, second = np.frombuffer(message.data, 'f4,f4,f4,i4,f4,f4').tolist()
-    assert first == pytest.approx((1, 2, 3, 18, 0.75, 0.1))
-    assert second[3:5] == (UNDECODED, 1.0)
+    first, second = np.frombuffer(message.data, 'f4,f4,f4,i4,8f4').tolist()
+    assert first[:4] == (1, 2, 3, 18)
+    assert first[4].tolist() == pytest.approx([0.75, 0.1, *range(1, 7)])
+    assert (second[3], second[4][0]) == (UNDECODED, 1.0)
+    assert np.isnan(second[4][1:]).all()
     assert math.isnan(second[0])
-    assert [field.name for field in message.fields[:4]] == ['x', 'y', 'z', 'id']
-    assert (message.point_step, message.row_step, len(message.data)) == (24, 48, 48)
-    empty = Positions(np.empty((0, 3)), np.empty(0), np.empty(0))
+    names = ['x', 'y', 'z', 'id', 'confidence', 'deviation', *COVARIANCE]
+    assert [field.name for field in message.fields] == names
+    assert (message.point_step, message.row_step, len(message.data)) == (48, 96, 96)
+    empty = Positions(np.empty((0, 3)), np.empty(0), np.empty(0), np.empty((0, 3, 3)))
     assert target_points((), empty, HEADER).is_dense
 
 

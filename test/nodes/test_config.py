@@ -8,7 +8,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 
 
-@pytest.mark.parametrize('node', ['detector', 'illumination', 'pose'])
+@pytest.mark.parametrize('node', ['detector', 'illumination', 'pose', 'registration'])
 def test_parameter_files_are_current(node: str) -> None:
     script = runpy.run_path(str(ROOT / 'scripts' / 'write_config.py'))
     written = (ROOT / 'config' / f'{node}.yaml').read_text()

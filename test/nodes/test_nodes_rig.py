@@ -17,6 +17,7 @@ from std_msgs.msg import Header
 from test_nodes import header
 from visualization_msgs.msg import ImageMarker, Marker, MarkerArray
 
+from ahf_ros.interchange.point_clouds import COVARIANCE
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.synthetic.camera import Camera, tilted_camera
@@ -128,7 +129,7 @@ def read(message: PointCloud2) -> np.ndarray:
 def assert_true(message: PointCloud2) -> None:
     """Assert that a labelled cloud says where the targets of the rendering are."""
     points = read(message)
-    assert points.dtype.names == ('x', 'y', 'z', 'id', 'confidence', 'deviation')
+    assert points.dtype.names == ('x', 'y', 'z', 'id', 'confidence', 'deviation', *COVARIANCE)
     assert points['id'].tolist() == [target.id for target in RENDERING.targets]
     pixels = np.array([(target.x, target.y) for target in RENDERING.targets])
     true = in_space(CAMERA, pixels)
@@ -138,6 +139,9 @@ def assert_true(message: PointCloud2) -> None:
     assert np.isnan(errors[WITHOUT_POINTS])
     assert points['deviation'][known] == pytest.approx(0.05, rel=0.3)
     assert points['confidence'].min() > 0.5
+    sigmas = np.sqrt(points['xx'] + points['yy'] + points['zz'])
+    assert (errors[known] < 5 * sigmas[known]).all()
+    assert sigmas[known].max() < MAXIMUM_ERROR
 
 
 @pytest.mark.parametrize('cloud_first', [True, False])

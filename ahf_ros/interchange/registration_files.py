@@ -1,0 +1,130 @@
+"""Registered scans as files: clouds in the common frame, transforms and targets."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ahf_ros.interchange.cloud_files import write_pcd, write_ply
+from ahf_ros.interchange.files import csv_table, write_whole
+from ahf_ros.interchange.point_clouds import AXES
+from ahf_ros.orientation.network import FloatArray
+from ahf_ros.registration.field import Field, RegisteredScan
+from ahf_ros.registration.rigid import Transform
+
+TRANSFORMS_JSON, TRANSFORMS_CSV, TARGETS_CSV = 'transforms.json', 'transforms.csv', 'targets.csv'
+
+_POSE = ('x', 'y', 'z', 'qx', 'qy', 'qz', 'qw')
+_AXES = ('x', 'y', 'z', 'rx', 'ry', 'rz')
+_COVARIANCE = [f'covariance_{_AXES[i]}_{_AXES[j]}' for i in range(6) for j in range(i, 6)]
+
+
+@dataclass(frozen=True)
+class ScanRecord:
+    """What a scan is called, and its cloud, an array (height, width), where it is kept.
+
+    The stamp is in ns; `frame_id` is the frame of the scanner.
+    """
+
+    name: str
+    stamp: int = 0
+    frame_id: str = ''
+    cloud: np.ndarray | None = None
+
+
+def in_common_frame(cloud: np.ndarray, transform: Transform) -> np.ndarray:
+    """Return a copy of a cloud in the common frame.
+
+    Points that are not finite or at 0, 0, 0 are missing: their coordinates become NaN. All other
+    fields stay as they are.
+    """
+    points = np.stack([cloud[name].astype(float) for name in AXES], axis=-1)
+    with np.errstate(invalid='ignore', over='ignore'):
+        moved = transform.moved(points)
+        moved[~(np.isfinite(points).all(axis=-1) & points.any(axis=-1))] = np.nan
+        result = cloud.copy()
+        for axis, name in enumerate(AXES):
+            result[name] = moved[..., axis]
+    return result
+
+
+def write_registration(
+    folder: str | Path, frame: str, field: Field, records: Sequence[ScanRecord]
+) -> list[Path]:
+    """Write the scans of a field to a folder, each file as a whole, and return the paths.
+
+    Each cloud becomes a PLY and a PCD file with the name of its scan, in the common frame. There
+    is one record for each scan.
+    """
+    paths = []
+    for record, scan in zip(records, field.scans, strict=True):
+        if record.cloud is None:
+            continue
+        moved = in_common_frame(record.cloud, scan.transform)
+        for suffix, write in (('.ply', write_ply), ('.pcd', write_pcd)):
+            paths.append(Path(folder) / f'{record.name}{suffix}')
+            write_whole(paths[-1], write(moved))
+    files = {
+        TRANSFORMS_JSON: _as_json(frame, field, records),
+        TRANSFORMS_CSV: _as_table(field, records),
+        TARGETS_CSV: _targets(field),
+    }
+    for name, content in files.items():
+        paths.append(Path(folder) / name)
+        write_whole(paths[-1], content)
+    return paths
+
+
+def _as_json(frame: str, field: Field, records: Sequence[ScanRecord]) -> bytes:
+    """Return the transforms as JSON: from the frame of each scan into the common one."""
+    scans = [_scan(record, scan) for record, scan in zip(records, field.scans, strict=True)]
+    content = {'version': 1, 'unit': 'm', 'frame': frame, 'scans': scans}
+    return (json.dumps(content, indent=1, allow_nan=False) + '\n').encode()
+
+
+def _scan(record: ScanRecord, scan: RegisteredScan) -> dict[str, Any]:
+    transform = scan.transform
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = transform.rotation, transform.translation
+    return {
+        'name': record.name,
+        'stamp': record.stamp,
+        'frame_id': record.frame_id,
+        'translation': transform.translation.tolist(),
+        'quaternion': transform.quaternion.tolist(),
+        'matrix': matrix.tolist(),
+        'covariance': transform.covariance.tolist(),
+        'residuals': {
+            name: residual.tolist()
+            for name, residual in zip(scan.common, scan.residuals, strict=True)
+        },
+    }
+
+
+def _as_table(field: Field, records: Sequence[ScanRecord]) -> bytes:
+    rows: list[Sequence[object]] = [['name', 'stamp', *_POSE, *_COVARIANCE]]
+    for record, scan in zip(records, field.scans, strict=True):
+        transform = scan.transform
+        place = [*transform.translation, *transform.quaternion]
+        entries = transform.covariance[np.triu_indices(6)]
+        rows.append([record.name, record.stamp, *_digits(place, 12), *_digits(entries, 9)])
+    return csv_table(rows)
+
+
+def _targets(field: Field) -> bytes:
+    """Return the targets of a field as `ahf orient --control` reads them, m."""
+    header = 'id x y z sigma_x sigma_y sigma_z covariance_xy covariance_xz covariance_yz unit'
+    rows: list[Sequence[object]] = [header.split()]
+    for name, point, own in zip(field.names, field.points, field.covariances, strict=True):
+        precision = [*np.sqrt(np.diag(own)), *own[np.triu_indices(3, 1)]]
+        rows.append([name, *_digits(point, 12), *_digits(precision, 9), 'm'])
+    return csv_table(rows)
+
+
+def _digits(values: Sequence[float] | FloatArray, count: int) -> list[str]:
+    return [f'{value:.{count}g}' for value in values]

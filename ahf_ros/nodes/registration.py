@@ -1,0 +1,332 @@
+"""The node `registration`: scans in, one frame for all of them out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.time import Time
+from sensor_msgs.msg import PointCloud2
+from std_msgs.msg import Header
+from std_srvs.srv import Trigger
+
+from ahf_ros.interchange.coordinate_files import read_coordinates
+from ahf_ros.interchange.image_messages import nanoseconds
+from ahf_ros.interchange.point_clouds import organised_points, target_scan, whole_points
+from ahf_ros.interchange.registration_files import ScanRecord, write_registration
+from ahf_ros.nodes.cloud import ANSWER, ANSWERS, CLOUD, Matcher
+from ahf_ros.nodes.frames import MISSING, StaticFrames
+from ahf_ros.nodes.parameters import ParameterSettings
+from ahf_ros.nodes.pose_msg import pose_message, transform_message
+from ahf_ros.nodes.process import LOG_PERIOD, ProcessNode, run
+from ahf_ros.nodes.registration_msg import (
+    field_points,
+    moved_cloud,
+    residual_points,
+)
+from ahf_ros.nodes.settings import RegistrationNodeSettings
+from ahf_ros.nodes.topics import ANSWERS_KEPT, POINTS
+from ahf_ros.registration.session import Registration
+from ahf_ros.text import counted, printable
+
+DIAGNOSTICS_PERIOD = 1.0
+"""Period of /diagnostics, s."""
+
+WAITING_MEMORY = 1024 * 2**20
+"""Memory for clouds that wait for their target points, bytes."""
+
+_MILLIMETRES = 1000.0
+
+
+@dataclass(slots=True)
+class RegistrationTally:
+    """Counts since the start, and what is to be said; empty if nothing is."""
+
+    received: int = 0
+    refused: int = 0
+    reason: str = ''  # why the last refused scan was refused
+    clouds: int = 0  # published in the frame
+    clouds_refused: int = 0
+    cloud_reason: str = ''
+    lost: int = 0  # in transport
+
+
+class RegistrationNode(ProcessNode):
+    """Registers every scan, by its target points, in the frame of the scans before.
+
+    A scan that does not fit is refused with the reason, and nothing changes.
+    """
+
+    def __init__(self) -> None:
+        super().__init__('registration')
+        self._settings = ParameterSettings(self, RegistrationNodeSettings)
+        settings = self._settings.current
+        known = None
+        if settings.coordinates:
+            known = read_coordinates(settings.coordinates, settings.unit)
+        self._registration = Registration(known)
+        self._records: list[ScanRecord] = []
+        self._numbers = 0  # of scans since the start or a reset, so that no name comes twice
+        self._tally = RegistrationTally()
+        self._told = replace(self._tally)
+        # One after the other: scans, clouds and services change the same field.
+        group = MutuallyExclusiveCallbackGroup()
+        self._transform = self.publisher(PoseWithCovarianceStamped, '~/transform', ANSWERS_KEPT)
+        self._residuals = self.publisher(PointCloud2, '~/residuals', ANSWERS_KEPT)
+        self._targets = self.publisher(PointCloud2, '~/targets')
+        self._frames: StaticFrames | None = None
+        if settings.tf:
+            if StaticFrames.available():
+                self._frames = StaticFrames(self, group)
+            else:
+                self.get_logger().warning(MISSING)
+        self._unmatched = [0, 0]  # clouds, and scans
+        tolerance = round(settings.cloud_tolerance * 1e9)
+        self._matcher = Matcher(tolerance, (WAITING_MEMORY, ANSWERS), self._unmatched)
+        self._inputs_of_scans = [
+            self.subscribe(PointCloud2, 'target_points', self._on_scan, group, lossless=True)
+        ]
+        if settings.cloud:
+            self._cloud = self.publisher(PointCloud2, '~/cloud', 10)
+            self._inputs_of_scans.append(
+                self.subscribe(PointCloud2, POINTS, self._on_cloud, group, lossless=True)
+            )
+        for name, work in (
+            ('save', self._save),
+            ('undo', self._undo),
+            ('reset', self._reset),
+            ('adjust', self._adjust),
+        ):
+            respond = partial(self._respond, work)
+            self.create_service(Trigger, f'~/{name}', respond, callback_group=group)
+        self._diagnostics = self.publisher(DiagnosticArray, '/diagnostics', 10)
+        self.every(DIAGNOSTICS_PERIOD, self._publish_diagnostics)
+
+    def introduction(self) -> str:
+        """Return what is registered where."""
+        settings = self._settings.current
+        names = [self.resolve_topic_name(it.topic) for it in self._inputs_of_scans]
+        known = self._registration.field.known
+        origin = f'of {counted(known, "known target")}' if known else 'of the first scan'
+        return f'registers scans in the frame {settings.frame}, that {origin}, from ' + ', '.join(
+            names
+        )
+
+    def _on_scan(self, message: PointCloud2) -> None:
+        self._tally.received += 1
+        stamp = nanoseconds(message.header)
+        name = f'{self._settings.current.scan_frame}{self._numbers + 1}'
+        record = ScanRecord(name, stamp, message.header.frame_id)
+        try:
+            self._register(message, stamp)
+        except ValueError as error:
+            record = replace(record, name='')
+            self._tally.refused += 1
+            self._tally.reason = printable(str(error), 1000)
+            self.get_logger().warning(
+                f'scan refused: {self._tally.reason}', throttle_duration_sec=LOG_PERIOD
+            )
+        else:
+            self._numbers += 1
+            self._records.append(record)
+            self._publish(len(self._records) - 1)
+            self._publish_all()
+        if self._settings.current.cloud:
+            cloud = self._matcher.put(ANSWER, stamp, record)
+            if cloud is not None:
+                self._take(record, cloud)
+
+    def _register(self, message: PointCloud2, stamp: int) -> None:
+        """Register a scan, or raise a ValueError that says why not."""
+        settings = self._settings.current
+        if len(self._records) >= settings.maximum_scans:
+            raise ValueError(
+                f'{len(self._records)} scans are registered, accepted is maximum_scans'
+            )
+        if self._records and stamp < self._records[-1].stamp:
+            raise ValueError(
+                f'stamp is {stamp / 1e9:.9f} s, before that of the last scan, '
+                f'{self._records[-1].stamp / 1e9:.9f} s; ~/reset begins anew'
+            )
+        points = whole_points(message)
+        self._registration.add(target_scan(points, settings.minimum_confidence))
+
+    def _on_cloud(self, cloud: PointCloud2) -> None:
+        record = self._matcher.put(CLOUD, nanoseconds(cloud.header), cloud, len(cloud.data))
+        if record is not None:
+            self._take(record, cloud)
+
+    def _take(self, record: ScanRecord, cloud: PointCloud2) -> None:
+        """Publish the cloud of a scan in the frame, and keep it, unless the scan was refused."""
+        names = [it.name for it in self._records]
+        stamps = [it.stamp for it in self._records]
+        if record.name not in names or stamps[names.index(record.name)] != record.stamp:
+            return
+        number = names.index(record.name)
+        try:
+            if cloud.header.frame_id != record.frame_id:
+                raise ValueError(
+                    f'frame_id is {cloud.header.frame_id!r}, accepted is that of the target '
+                    f'points, {record.frame_id!r}'
+                )
+            organised_points(cloud)
+            points = whole_points(cloud)
+        except ValueError as error:
+            self._refuse_cloud(str(error))
+            return
+        scan = self._registration.field.scans[number]
+        self._cloud.publish(moved_cloud(points, scan.transform, self._header(record)))
+        self._tally.clouds += 1
+        used = sum(it.cloud.nbytes for it in self._records if it.cloud is not None)
+        if used + points.nbytes > self._settings.current.cloud_memory * 2**20:
+            self._refuse_cloud(
+                f'clouds take {used / 2**20:.0f} MB, and cloud_memory has no room for '
+                f'{points.nbytes / 2**20:.0f} more; that of {record.name} is published and not '
+                'kept'
+            )
+            return
+        self._records[number] = replace(record, cloud=points)
+
+    def _refuse_cloud(self, reason: str) -> None:
+        self._tally.clouds_refused += 1
+        self._tally.cloud_reason = printable(reason, 1000)
+        self.get_logger().warning(
+            f'cloud refused: {self._tally.cloud_reason}', throttle_duration_sec=LOG_PERIOD
+        )
+
+    def _header(self, record: ScanRecord) -> Header:
+        stamp = Time(nanoseconds=record.stamp).to_msg()
+        return Header(stamp=stamp, frame_id=self._settings.current.frame)
+
+    def _publish(self, number: int) -> None:
+        """Publish transform and residuals of a scan."""
+        field, header = self._registration.field, self._header(self._records[number])
+        scan = field.scans[number]
+        self._transform.publish(pose_message(scan.transform, header))
+        self._residuals.publish(residual_points(field, scan, header))
+
+    def _publish_all(self) -> None:
+        """Publish what belongs to all scans: targets and tf."""
+        field = self._registration.field
+        now = self.get_clock().now().to_msg()
+        header = Header(stamp=now, frame_id=self._settings.current.frame)
+        self._targets.publish(field_points(field, header))
+        if self._frames:
+            before = self._frames.problem
+            self._frames.publish(
+                transform_message(scan.transform, header, record.name)
+                for record, scan in zip(self._records, field.scans, strict=True)
+            )
+            if (problem := self._frames.problem) and problem != before:
+                self.get_logger().warning(problem)
+
+    def _respond(
+        self, work: Callable[[], str], _: Trigger.Request, response: Trigger.Response
+    ) -> Any:
+        try:
+            response.message = work()
+            response.success = True
+        except ValueError as error:
+            response.message = str(error)
+        return response
+
+    def _save(self) -> str:
+        settings = self._settings.current
+        if not settings.folder:
+            raise ValueError("folder is '', accepted is the name of a folder")
+        field = self._registration.field
+        paths = write_registration(settings.folder, settings.frame, field, self._records)
+        return (
+            f'{counted(len(field.scans), "scan")} in {counted(len(paths), "file")} in '
+            f'{paths[-1].parent.resolve()}'
+        )
+
+    def _undo(self) -> str:
+        what = 'the adjustment'
+        if self._registration.undo():
+            what = self._records.pop().name
+            self._numbers -= 1
+        else:
+            self._publish_scans()
+        self._publish_all()
+        return f'{what} is taken back; {counted(len(self._records), "scan")} registered'
+
+    def _reset(self) -> str:
+        self._registration.reset()
+        count = len(self._records)
+        self._records.clear()
+        self._numbers = 0
+        self._publish_all()
+        return f'{counted(count, "scan")} forgotten'
+
+    def _adjust(self) -> str:
+        text = self._registration.adjust().words()
+        self._publish_scans()
+        self._publish_all()
+        return text
+
+    def _publish_scans(self) -> None:
+        for number in range(len(self._records)):
+            self._publish(number)
+
+    def _publish_diagnostics(self) -> None:
+        tally, told = self._tally, self._told
+        for it in self._inputs_of_scans:
+            tally.lost += it.losses.newly_lost()
+        source = self._inputs_of_scans[0]
+        silent = not (tally.received or source.publishers())
+        reports = (
+            silent and f'nobody publishes {source.name}: remap with -r target_points:=...',
+            tally.refused > told.refused
+            and f'{tally.refused - told.refused} scans refused: {tally.reason}',
+            tally.clouds_refused > told.clouds_refused and f'cloud refused: {tally.cloud_reason}',
+            tally.lost > told.lost and f'{tally.lost - told.lost} messages lost in transport',
+            self._frames.problem if self._frames else '',
+        )
+        warning = '; '.join(text for text in reports if text)
+        self._told = replace(tally)
+        field = self._registration.field
+        values: dict[str, object] = {
+            'scans received': tally.received,
+            'scans registered': len(field.scans),
+            'scans refused': tally.refused,
+            'last reason for refusal': tally.reason,
+            'targets': len(field.names),
+            'known targets': field.known,
+            'clouds published': tally.clouds,
+            'clouds refused': tally.clouds_refused,
+            'last reason for refusal of a cloud': tally.cloud_reason,
+            'clouds without target points': self._unmatched[CLOUD],
+            'target points without a cloud': self._unmatched[ANSWER],
+            'messages lost in transport': tally.lost,
+        }
+        if field.scans:
+            last = field.scans[-1]
+            sigmas = np.sqrt(np.diag(last.transform.covariance))
+            values |= {
+                'common targets of the last scan': len(last.common),
+                'residuals of the last scan (mm, RMS)': f'{last.rms * _MILLIMETRES:.4f}',
+                'position of the last scan (mm, standard deviation)': (
+                    f'{np.linalg.norm(sigmas[:3]) * _MILLIMETRES:.4f}'
+                ),
+            }
+        name = self.get_fully_qualified_name().lstrip('/')
+        status = DiagnosticStatus(
+            level=DiagnosticStatus.WARN if warning else DiagnosticStatus.OK,
+            name=f'{name}: registration',
+            message=warning or f'{counted(len(field.scans), "scan")} registered',
+            values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
+        )
+        header = Header(stamp=self.get_clock().now().to_msg())
+        self._diagnostics.publish(DiagnosticArray(header=header, status=[status]))
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the node."""
+    return run(RegistrationNode, arguments)

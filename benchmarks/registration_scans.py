@@ -1,0 +1,169 @@
+"""Scans around an object, registered by the targets that neighbours share.
+
+`drawn` targets have errors drawn from their covariances. Those of `clouds` are measured in
+simulated clouds, as ~/target_points are, so that their covariances are estimated, too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ahf_ros.interchange.point_clouds import AXES
+from ahf_ros.localisation import positions
+from ahf_ros.orientation.network import FloatArray
+from ahf_ros.registration.rigid import Transform
+from ahf_ros.registration.scan import Scan
+from ahf_ros.registration.session import Registration
+from ahf_ros.target import Target
+from support.scans import inverse, measured, relative, ring, squared_error, station
+
+COUNT = 20
+"""Number of scans around the object."""
+
+COMMON = 6
+"""Number of targets that two neighbours share."""
+
+SIGMA = 20e-6  # m, of the targets that are drawn
+NOISE = 0.1e-3  # m, of the points of a cloud
+FOCAL_LENGTH = 2500.0  # px
+DOT = 8.0  # px, radius
+CENTRE = 0.03  # px, standard deviation of the centres
+
+Measure = Callable[[Sequence[str], FloatArray, Transform, np.random.Generator], Scan]
+
+
+@dataclass
+class Figures:
+    """What all runs came to; lengths in mm."""
+
+    chain: list[list[float]] = field(default_factory=list)  # squared errors of each scan
+    adjusted: list[list[float]] = field(default_factory=list)
+    closing: list[float] = field(default_factory=list)  # squared gap over its covariance
+    before: list[float] = field(default_factory=list)  # gap
+    after: list[float] = field(default_factory=list)
+    sigma0: list[float] = field(default_factory=list)
+    refused: int = 0
+
+
+def drawn(
+    names: Sequence[str], points: FloatArray, pose: Transform, random: np.random.Generator
+) -> Scan:
+    """Return targets with errors drawn from their covariances."""
+    return measured(names, points, pose, SIGMA, random)
+
+
+def clouds(
+    names: Sequence[str], points: FloatArray, pose: Transform, random: np.random.Generator
+) -> Scan:
+    """Return targets that are measured in clouds; their planes face away from the axis."""
+    places, covariances = [], []
+    for point in points:
+        normal = pose.rotation.T @ (point * (1, 1, 0))
+        place, covariance = _in_cloud(inverse(pose, point), normal, random)
+        places.append(place)
+        covariances.append(covariance)
+    return Scan(tuple(names), np.array(places), np.array(covariances))
+
+
+def _in_cloud(
+    true: FloatArray, normal: FloatArray, random: np.random.Generator
+) -> tuple[FloatArray, FloatArray]:
+    """Return position and covariance of a target from the points around it."""
+    centre = FOCAL_LENGTH * true[:2] / true[2]
+    first = np.round(centre) - 3 * DOT - 2
+    size = int(6 * DOT + 5)
+    rows, columns = np.mgrid[:size, :size]
+    pixels = np.stack((columns, rows), axis=-1) + first
+    rays = np.concatenate((pixels / FOCAL_LENGTH, np.ones((size, size, 1))), axis=-1)
+    depth = (true @ normal) / (rays @ normal)
+    depth += NOISE * random.standard_normal(depth.shape)
+    cloud = np.zeros((size, size), [(name, '<f4') for name in AXES])
+    for axis, name in enumerate(AXES):
+        cloud[name] = rays[..., axis] * depth
+    x, y = centre + CENTRE * random.standard_normal(2)
+    seen = x - first[0], y - first[1]
+    target = Target(1, 1, *seen, DOT, DOT, covariance=(CENTRE**2, 0.0, 0.0, CENTRE**2))
+    found = positions(cloud, [target])
+    return found.points[0], found.covariances[0]
+
+
+def run(measure: Measure, seed: int, runs: int) -> Figures:
+    """Return the figures of chains that are adjusted after they close."""
+    figures = Figures()
+    poses = [station(number, COUNT) for number in range(COUNT)]
+    true = [relative(it, poses[0]) for it in poses]
+    for number in range(runs):
+        random = np.random.default_rng([seed, number])
+        groups = ring(COUNT, COMMON, random)
+        scans = []
+        for place, pose in enumerate(poses):
+            seen = [(place - 1) % COUNT, place]
+            names = [f'{100 * group + it}' for group in seen for it in range(COMMON)]
+            scans.append(measure(names, groups[seen].reshape(-1, 3), pose, random))
+        try:
+            _register(figures, scans, true)
+        except ValueError:
+            figures.refused += 1
+    return figures
+
+
+def _register(figures: Figures, scans: Sequence[Scan], true: Sequence[Transform]) -> None:
+    """Add the figures of one object, whose last scan closes the chain."""
+    shared = [name for name in scans[-1].names if name in scans[0].names]
+    registration = Registration()
+    for scan in scans[:-1]:
+        registration.add(scan)
+    last = registration.add(scans[-1].without(shared)).transform
+    chain = [it.transform for it in registration.field.scans]
+    first, end = (it.rows(shared) for it in (scans[0], scans[-1]))
+    gap = scans[0].points[first] - last.moved(scans[-1].points[end])
+    changes = last.changes(scans[-1].points[end]).reshape(-1, 6)
+    covariance = changes @ last.covariance @ changes.T
+    own = scans[0].covariances[first] + last.turned(scans[-1].covariances[end])
+    for row, block in enumerate(own):
+        covariance[3 * row : 3 * row + 3, 3 * row : 3 * row + 3] += block
+    registration.undo()
+    registration.add(scans[-1])
+    adjusted = registration.adjust()
+    poses = [it.transform for it in registration.field.scans]
+    after = scans[0].points[first] - poses[-1].moved(scans[-1].points[end])
+    figures.closing.append(float(gap.ravel() @ np.linalg.solve(covariance, gap.ravel())))
+    figures.before.append(1e3 * float(np.linalg.norm(gap.mean(axis=0))))
+    figures.after.append(1e3 * float(np.linalg.norm(after.mean(axis=0))))
+    figures.sigma0.append(adjusted.sigma0)
+    for squares, found in ((figures.chain, chain), (figures.adjusted, poses)):
+        squares.append([squared_error(a, b) for a, b in zip(found[1:], true[1:], strict=True)])
+
+
+def table(seed: int, runs: int) -> list[str]:
+    """Return the figures of both kinds of targets as lines of Markdown."""
+    lines = [
+        '| targets | objects | refused | NEES of 6 in the chain: mean, least, most of a scan '
+        f'| after the adjustment | NEES of {3 * COMMON} where the chain closes '
+        '| gap there, mm: mean, most | after the adjustment | sigma0 |',
+        '|---' * 9 + '|',
+    ]
+    for measure in (drawn, clouds):
+        it = run(measure, seed, runs)
+        squares = ' | '.join(
+            f'{np.mean(each):.2f}, {np.mean(each, axis=0).min():.2f}, '
+            f'{np.mean(each, axis=0).max():.2f}'
+            for each in (it.chain, it.adjusted)
+        )
+        gaps = ' | '.join(
+            f'{np.mean(each):.3f}, {max(each):.3f}' for each in (it.before, it.after)
+        )
+        lines.append(
+            f'| {measure.__name__} | {runs} | {it.refused} | {squares} '
+            f'| {np.mean(it.closing):.2f} | {gaps} | {np.mean(it.sigma0):.3f} |'
+        )
+    return lines
+
+
+if __name__ == '__main__':
+    import sys
+
+    print('\n'.join(table(*map(int, sys.argv[1:] or ['301', '100']))))

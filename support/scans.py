@@ -1,0 +1,76 @@
+"""Simulated scans around an object: a ring of stations whose neighbours share targets."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ahf_ros.orientation.camera import rotation_matrices
+from ahf_ros.orientation.network import FloatArray
+from ahf_ros.registration.rigid import Transform
+from ahf_ros.registration.scan import Scan
+
+RADIUS = 0.5
+"""Radius of the object, m."""
+
+DISTANCE = 1.0
+"""Distance of the scanner from the axis of the object, m."""
+
+
+def ring(count: int, common: int, random: np.random.Generator) -> FloatArray:
+    """Return targets (count, common, 3), m; group k is common to scans k and k + 1."""
+    angle = (np.arange(count)[:, None] + random.uniform(0.1, 0.9, (count, common))) / count
+    turn = 2 * np.pi * angle
+    radius = RADIUS + random.uniform(-0.03, 0.03, turn.shape)
+    # Spread over the height, or a narrow group would be near a line by chance.
+    height = (np.arange(common) + random.uniform(0, 1, turn.shape)) / common - 0.5
+    return np.stack((radius * np.cos(turn), radius * np.sin(turn), 0.8 * height), axis=-1)
+
+
+def station(number: int, count: int) -> Transform:
+    """Return the pose of a scanner that looks at the groups before and after its number."""
+    turn = 2 * np.pi * number / count
+    outward = np.array([np.cos(turn), np.sin(turn), 0.0])
+    rotation = np.column_stack((np.cross([0.0, 0.0, 1.0], outward), [0.0, 0.0, -1.0], -outward))
+    return Transform(rotation, (RADIUS + DISTANCE) * outward)
+
+
+def inverse(transform: Transform, points: FloatArray) -> FloatArray:
+    """Return points (..., 3) in the frame of a scanner."""
+    return (points - transform.translation) @ transform.rotation
+
+
+def relative(transform: Transform, first: Transform) -> Transform:
+    """Return a pose in the frame of the first one."""
+    return Transform(first.rotation.T @ transform.rotation, inverse(first, transform.translation))
+
+
+def covariances(count: int, sigma: float, random: np.random.Generator) -> FloatArray:
+    """Return covariances (n, 3, 3) with axes of 0.5 to 2 sigma in all directions, m^2."""
+    turns = rotation_matrices(random.normal(size=(count, 3)))
+    sizes = (sigma * random.uniform(0.5, 2, (count, 3))) ** 2
+    return turns * sizes[:, None] @ turns.transpose(0, 2, 1)
+
+
+def measured(
+    names: Sequence[str],
+    points: FloatArray,
+    transform: Transform,
+    sigma: float,
+    random: np.random.Generator,
+) -> Scan:
+    """Return what a scanner measures of points (n, 3) of the object."""
+    spread = covariances(len(points), sigma, random)
+    errors = np.linalg.cholesky(spread) @ random.normal(size=(len(points), 3, 1))
+    return Scan(tuple(names), inverse(transform, points) + errors[:, :, 0], spread)
+
+
+def squared_error(found: Transform, true: Transform) -> float:
+    """Return the squared error of a transform over its covariance: 6 on average."""
+    turn = true.rotation @ found.rotation.T
+    angles = 0.5 * np.array(
+        [turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]
+    )
+    error = np.concatenate((true.translation - found.translation, angles))
+    return float(error @ np.linalg.solve(found.covariance, error))
