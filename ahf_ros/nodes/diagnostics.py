@@ -13,6 +13,9 @@ from ahf_ros.interchange.image_messages import nanoseconds
 from ahf_ros.target import Identification
 from ahf_ros.text import printable
 
+BEHIND = 10
+"""Images dropped in a row after which identification is slower than the camera."""
+
 LOSS_REMEDY = 'more depth of the publisher, or config/fastdds_shm.xml on both sides, may help'
 """What to do about images that get lost, in words."""
 
@@ -65,9 +68,11 @@ class Tally:
     lossless: bool = False  # whether every image counts
     mistaken: str = ''  # message about other types on the topic of the images
     several: str = ''  # message about several publishers of images
+    twins: str = ''  # message about other nodes with the same name or on the same topic of answers
     silent: str = ''  # message about images that do not arrive
     uncalibrated: str = ''  # why the last answer has no undistorted targets, if they are asked for
-    advice: str = ''  # what may help where nothing is identified in several images
+    advice: str = ''  # what may help where images in a row do not show what they should
+    behind: int = 0  # images dropped since none last waited after an identification
     inactive: str = ''  # state of a managed node that is not active
     latency: float = 0.0  # from the arrival of the last image to its answer, s
     last: Identification = field(default_factory=lambda: Identification(()))
@@ -78,6 +83,19 @@ class Tally:
         waiting = max(0, self.received - self.answered - self.dropped - self.rejected)
         self.dropped += waiting
         return waiting
+
+    @property
+    def slow(self) -> str:
+        """Message about images that the identification is too slow for."""
+        if self.behind < BEHIND:
+            return ''
+        searching = self.last.filter.evaluations > 1
+        shorter = ', max_duration or max_evaluations to shorten searches,' if searching else ''
+        return (
+            f'{self.behind} images were dropped in a row, because identification is slower than '
+            f'the camera: set queue to lossless to answer all of them later{shorter} or the '
+            'camera to fewer images'
+        )
 
     def compare_stamps(self, header: Header) -> str:
         """Count stamps that go backwards, as when a replay starts over; return what to report."""
@@ -166,6 +184,8 @@ def _warning(tally: Tally, before: Tally) -> str:
         (incomplete or split) and f'{incomplete} stacks were not full, {split} were split',
         lost and tally.lossless and f'{lost} images were lost in transport; {LOSS_REMEDY}',
         tally.several,
+        tally.twins,
+        tally.slow,
         changes and f'size or encoding changed {changes} times: {tally.change}',
         tally.last.mirrored and 'the last image seems to be mirrored',
         edge_shift_remark(tally.last.edge_shift),

@@ -123,6 +123,7 @@ class ImageQueue:
             else:  # it takes the turn of the oldest one
                 self._waiting.remove(replaceable[0])
                 self._tally.dropped += 1
+                self._tally.behind += 1
 
     def identify(self, message: ImageMessage, expected: int | None = None) -> CodedTargetArray:
         """Identify an image out of turn; called in the thread of the worker.
@@ -161,6 +162,9 @@ class ImageQueue:
         elif last and last.number != image.number - 1:
             self._tally.dropped += stream.forget()
         self._handle(image, stream.add(lambda: message_frame(image.take())))
+        with self._lock:
+            if not self._waiting:
+                self._tally.behind = 0
 
     def _settle(self) -> None:
         """End a stack that was begun with other parameters."""
