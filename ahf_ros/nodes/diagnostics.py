@@ -56,6 +56,8 @@ class Tally:
     dropped: int = 0  # replaced by a newer one before their turn, or given up
     rejected: int = 0
     reason: str = ''  # why the last rejected image was rejected
+    damaged: int = 0  # not whole, and identified as far as they go
+    damage: str = ''  # of the last of these
     backwards: int = 0  # whose stamp is earlier than the stamp before
     stamp: int = 0  # of the last image, ns
     kind: str = ''  # size and encoding of the last image
@@ -103,7 +105,7 @@ class Tally:
         if self.stamp >= before:
             return ''
         self.backwards += 1
-        return f'stamp is {_seconds(self.stamp)}, that of the image before is {_seconds(before)}'
+        return f'stamp is {seconds(self.stamp)}, that of the image before is {seconds(before)}'
 
     def compare_kinds(self, kind: str) -> str:
         """Count changes of size or encoding; return what to report."""
@@ -141,6 +143,7 @@ class Diagnostics:
             'lost in transport': f'{tally.lost}{unknown}',
             'rejected': tally.rejected,
             'last reason for rejection': tally.reason,
+            'damaged': tally.damaged,
             'stamps that went backwards': tally.backwards,
             'changes of size or encoding': tally.changes,
             'stacks that were not full': tally.incomplete,
@@ -174,9 +177,11 @@ def _warning(tally: Tally, before: Tally) -> str:
     backwards = tally.backwards - before.backwards
     incomplete, split = tally.incomplete - before.incomplete, tally.split - before.split
     changes, lost = tally.changes - before.changes, tally.lost - before.lost
+    damaged = tally.damaged - before.damaged
     reports = (
         tally.mistaken,
         rejected and f'{rejected} images rejected: {tally.reason}',
+        damaged and f'{damaged} images damaged, the last: {tally.damage}',
         not tally.mistaken and tally.silent,
         rejected_clouds and f'{rejected_clouds} clouds rejected: {clouds.reason}',
         clouds.waiting,
@@ -195,5 +200,6 @@ def _warning(tally: Tally, before: Tally) -> str:
     return '; '.join(text for text in reports if text)
 
 
-def _seconds(stamp: int) -> str:
+def seconds(stamp: int) -> str:
+    """Return a stamp, ns, in words."""
     return f'{stamp // 10**9}.{stamp % 10**9:09} s'

@@ -26,9 +26,10 @@ from std_msgs.msg import Header
 
 from ahf_ros.detectors.contract import Unavailable
 from ahf_ros.filtering.settling import settled_families
+from ahf_ros.interchange.image_messages import nanoseconds
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.answers import Answers
-from ahf_ros.nodes.diagnostics import Tally
+from ahf_ros.nodes.diagnostics import Tally, seconds
 from ahf_ros.nodes.pipeline import Pipeline, Stopping
 from ahf_ros.nodes.process import LOG_PERIOD, ProcessNode
 from ahf_ros.nodes.settings import LOSSLESS
@@ -58,6 +59,7 @@ class _Waiting:
     take: Take
     pipeline: Pipeline
     arrived: float  # s of the monotonic clock
+    stamp: int  # ns
 
     @property
     def lossless(self) -> bool:
@@ -115,7 +117,8 @@ class ImageQueue:
                 self._tell(why_refused(error))
                 return
         with self._lock:
-            image = _Waiting(next(self._numbers), take, pipeline, time.monotonic())
+            arrived, stamp = time.monotonic(), nanoseconds(message.header)
+            image = _Waiting(next(self._numbers), take, pipeline, arrived, stamp)
             replaceable = [] if image.lossless else [it for it in self._waiting if not it.lossless]
             self._waiting.append(image)
             if len(replaceable) < settings.stacking.stack:
@@ -133,7 +136,10 @@ class ImageQueue:
         """
         pipeline = self.pipeline
         try:
-            return pipeline.message(pipeline.stream.identify(message_frame(message), expected))
+            frame = message_frame(message)
+            if frame.damage:
+                self._tell_damage(f'the image is damaged: {frame.damage}', frame.stamp)
+            return pipeline.message(pipeline.stream.identify(frame, expected))
         except Stopping:
             raise
         except Exception as error:
@@ -193,7 +199,9 @@ class ImageQueue:
         """Publish the answers of a stream, and tell its remarks."""
         try:
             for it in said:
-                if isinstance(it, Remark):
+                if isinstance(it, Remark) and it.kind == Kind.DAMAGED:
+                    self._tell_damage(it.text, image.stamp)
+                elif isinstance(it, Remark):
                     self._tell(it)
                 else:
                     self._publish(it, image)
@@ -212,6 +220,11 @@ class ImageQueue:
         except Exception as error:
             # No image may end the node.
             self._tell(why_refused(error))
+
+    def _tell_damage(self, text: str, stamp: int) -> None:
+        self._tally.damaged += 1
+        self._tally.damage = f'{text}, stamp {seconds(stamp)}'
+        self._logger.warning(self._tally.damage, throttle_duration_sec=LOG_PERIOD)
 
     def _tell(self, remark: Remark) -> None:
         """Count and log a remark."""

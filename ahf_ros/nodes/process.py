@@ -10,7 +10,7 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from functools import partial
-from typing import Any
+from typing import Any, NoReturn
 
 import rclpy
 from rcl_interfaces.msg import SetParametersResult
@@ -192,6 +192,7 @@ def run(make_node: Callable[[], ProcessNode], arguments: list[str] | None = None
     on stderr. Where there are no arguments, `sys.argv` has them.
     """
     reuse_memory()
+    outlive_others()
     arrived = signalled()
     given = sys.argv[1:] if arguments is None else arguments
     try:
@@ -224,6 +225,21 @@ def run(make_node: Callable[[], ProcessNode], arguments: list[str] | None = None
         rclpy.shutdown()
         ignore_ending()
     return node.ended.result()
+
+
+def outlive_others() -> None:
+    """Let a detector of another package that calls `os._exit(0)` fail, and not end this process.
+
+    It would seem to have ended in order. A process that the detector has forked ends as it likes.
+    """
+    leave, own = os._exit, os.getpid()
+
+    def refused(status: int) -> NoReturn:
+        if status or os.getpid() != own:
+            leave(status)
+        raise SystemExit('os._exit(0) would end the process')
+
+    os._exit = refused
 
 
 def reuse_memory() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 
 from ahf_ros.target import Identification
-from ahf_ros.text import listed
+from ahf_ros.text import counted, listed
 
 IN_A_ROW = 10
 """Images with n other than N after which it is said."""
@@ -58,5 +58,6 @@ def _of(last: tuple[Identification, ...]) -> str:
             'what is looked for'
         )
     name = 'expected_ids' if ids else 'expected_targets'
-    shown = f'{counts[0]} to {counts[-1]}' if len(counts) > 1 else f'{counts[0]}'
-    return f'show {shown} targets, N is {expected}: set {name} to what is in view'
+    fewest = f'{counts[0]} to ' if len(counts) > 1 else ''
+    shown = f'{fewest}{counted(counts[-1], "target")}'
+    return f'show {shown}, N is {expected}: set {name} to what is in view'
