@@ -110,14 +110,15 @@ class ImageQueue:
         pipeline = self.pipeline
         settings = pipeline.settings
         take: Take = lambda: message  # noqa: E731
+        stamp = nanoseconds(message.header)
         if settings.queue == LOSSLESS:
             try:
                 take = self._messages.put(message, settings.queue_memory * 2**20)
             except ValueError as error:
-                self._tell(why_refused(error))
+                self._tell(why_refused(error), stamp)
                 return
         with self._lock:
-            arrived, stamp = time.monotonic(), nanoseconds(message.header)
+            arrived = time.monotonic()
             image = _Waiting(next(self._numbers), take, pipeline, arrived, stamp)
             replaceable = [] if image.lossless else [it for it in self._waiting if not it.lossless]
             self._waiting.append(image)
@@ -138,13 +139,14 @@ class ImageQueue:
         try:
             frame = message_frame(message)
             if frame.damage:
-                self._tell_damage(f'the image is damaged: {frame.damage}', frame.stamp)
+                said = f'the image is damaged: {frame.damage}'
+                self._tell(Remark(Kind.DAMAGED, said), frame.stamp)
             return pipeline.message(pipeline.stream.identify(frame, expected))
         except Stopping:
             raise
         except Exception as error:
             remark = why_refused(error)
-            self._tell(remark)
+            self._tell(remark, nanoseconds(message.header))
             raise ValueError(remark.text) from error
 
     def _count(self, message: ImageMessage) -> None:
@@ -199,16 +201,14 @@ class ImageQueue:
         """Publish the answers of a stream, and tell its remarks."""
         try:
             for it in said:
-                if isinstance(it, Remark) and it.kind == Kind.DAMAGED:
-                    self._tell_damage(it.text, image.stamp)
-                elif isinstance(it, Remark):
-                    self._tell(it)
+                if isinstance(it, Remark):
+                    self._tell(it, image.stamp)
                 else:
                     self._publish(it, image)
         except Stopping:
             return
         except Unavailable as error:
-            self._tell(why_refused(error))
+            self._tell(why_refused(error), image.stamp)
 
     def _publish(self, answer: Answer[Header], image: _Waiting) -> None:
         try:
@@ -219,28 +219,27 @@ class ImageQueue:
             self._families = memory.families
         except Exception as error:
             # No image may end the node.
-            self._tell(why_refused(error))
+            self._tell(why_refused(error), image.stamp)
 
-    def _tell_damage(self, text: str, stamp: int) -> None:
-        self._tally.damaged += 1
-        self._tally.damage = f'{text}, stamp {seconds(stamp)}'
-        self._logger.warning(self._tally.damage, throttle_duration_sec=LOG_PERIOD)
-
-    def _tell(self, remark: Remark) -> None:
-        """Count and log a remark."""
+    def _tell(self, remark: Remark, stamp: int) -> None:
+        """Count and log a remark on an image with a stamp, ns."""
         if remark.kind == Kind.INCOMPLETE:
             self._tally.incomplete += 1
             self._logger.warning(remark.text, throttle_duration_sec=LOG_PERIOD)
         elif remark.kind == Kind.SPLIT:
             self._tally.split += 1
             self._logger.warning(remark.text, throttle_duration_sec=LOG_PERIOD)
+        elif remark.kind == Kind.DAMAGED:
+            self._tally.damaged += 1
+            self._tally.damage = f'{remark.text}, stamp {seconds(stamp)}'
+            self._logger.warning(self._tally.damage, throttle_duration_sec=LOG_PERIOD)
         else:
             self._tally.rejected += 1
             self._tally.reason = remark.text
             if remark.error and not isinstance(remark.error, ValueError):
                 lines = ''.join(traceback.format_exception(remark.error)).splitlines()
                 self._logger.error('\n'.join(map(printable, lines)))
-            text = f'image refused: {remark.text}'
+            text = f'image refused: {remark.text}, stamp {seconds(stamp)}'
             self._logger.warning(text, throttle_duration_sec=LOG_PERIOD)
 
 

@@ -182,9 +182,9 @@ def test_an_image_that_a_decoder_fills_up_is_named_with_its_stamp(graph: Any) ->
     given = overrides(image_transport='compressed', image_timeout=0)
     detector = Talking(graph, '/cut', *given, subscribed=False)
     camera = graph.publisher(CompressedImage, '/cut/image/compressed')
-    _, data = cv2.imencode('.jpg', render(SCENE).image)
+    data = cv2.imencode('.jpg', render(SCENE).image)[1].tobytes()
     cut = CompressedImage(header=header(), format='jpeg')
-    cut.data = array.array('B', data[: len(data) // 2].tobytes())
+    cut.data = array.array('B', data[: len(data) // 2] + data[-2:])
     assert detector.diagnostics
     camera.publish(cut)
     stamp = f'stamp {cut.header.stamp.sec}.000000000 s'
