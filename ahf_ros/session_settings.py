@@ -13,6 +13,7 @@ from ahf_ros.detectors import DETECTOR, DetectorSettings, detector_name, estimat
 from ahf_ros.filtering.settings import AdaptiveSettings
 from ahf_ros.imaging import MAXIMUM_IMAGES
 from ahf_ros.settings.parameter import check_parameters, parameter, parameters
+from ahf_ros.text import counted
 
 MAXIMUM_TARGETS = 100_000
 """Maximum of N."""
@@ -72,6 +73,17 @@ class IdentificationSettings:
         self.check_detector()
         if self.estimate_expected:
             estimator(self.detection)
+        count = len(self.adaptive.listed)
+        if count and self.expected_targets not in (0, count):
+            raise ValueError(
+                f'expected_targets is {self.expected_targets} and expected_ids has '
+                f'{counted(count, "ID")}; accepted with these is their number, or 0'
+            )
+
+    @property
+    def number(self) -> int:
+        """N as it is given, by a number or by IDs; 0 where it is not."""
+        return self.expected_targets or len(self.adaptive.listed)
 
     def check_detector(self) -> None:
         """Refuse a detector that does not identify the family."""

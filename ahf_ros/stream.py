@@ -38,6 +38,7 @@ class Frame(Generic[Item]):
     image: np.ndarray  # of uint8, uint16, float32 or float64, shape (height, width)
     kind: Hashable  # its size and encoding; another one begins a new stack
     stamp: int  # its time, ns; an earlier one than before begins a new stack
+    damage: str = ''  # what is missing in it, empty where it is whole
 
 
 def message_frame(message: Any) -> Frame[Any]:
@@ -92,6 +93,8 @@ class Kind(Enum):
     """The images of a stack cannot be identified together."""
     REFUSED = auto()
     """An image or a stack is not accepted."""
+    DAMAGED = auto()
+    """An image is not whole; what is left of it is identified."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,6 +214,8 @@ class Stream(Generic[Item]):
         except Exception as error:
             yield refusal(error)
             return
+        if frame.damage:
+            yield Remark(Kind.DAMAGED, f'the image is damaged: {frame.damage}')
         yield from self._window.add(frame, frame.kind, frame.stamp)
 
     def _answers(self, gathered: Gathered[Frame[Item]]) -> Iterator[Answer[Item] | Remark]:

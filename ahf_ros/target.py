@@ -270,6 +270,8 @@ class Identification:
         The search for a filter; None if there was none.
     edge_shift : float, optional
         Edge shift of the image, px, as in `Target`; None where it is unknown.
+    other_ids : tuple of int
+        IDs that were read but are not among `expected_ids`, in ascending order.
 
     Examples
     --------
@@ -290,6 +292,7 @@ class Identification:
     expected_ids: tuple[int, ...] = ()
     search: SearchTrace | None = None
     edge_shift: float | None = None
+    other_ids: tuple[int, ...] = ()
 
     def __len__(self) -> int:
         """Return the number of targets, undecoded ones included."""

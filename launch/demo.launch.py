@@ -8,7 +8,7 @@ from launch.actions import DeclareLaunchArgument, SetEnvironmentVariable, Shutdo
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
-from ahf_ros.nodes.launching import config
+from ahf_ros.nodes.launching import config, declared
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
 
 PARAMETERS = {
@@ -27,11 +27,13 @@ def generate_launch_description():
     profiles = config('fastdds_shm.xml')
     return LaunchDescription(
         [
-            DeclareLaunchArgument(
-                'light',
-                default_value='stripe',
-                choices=list(LIGHT_NAMES),
-                description='Light that is projected onto the targets.',
+            *declared(
+                DeclareLaunchArgument(
+                    'light',
+                    default_value='stripe',
+                    choices=list(LIGHT_NAMES),
+                    description='Light that is projected onto the targets.',
+                )
             ),
             *(SetEnvironmentVariable(name, profiles) for name in variables),
             *(

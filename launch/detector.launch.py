@@ -6,7 +6,7 @@ ros2 launch ahf_ros detector.launch.py namespace:=left image:=/left/image_raw
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
 
-from ahf_ros.nodes.launching import USUAL, arguments, detector
+from ahf_ros.nodes.launching import USUAL, arguments, declared, detector
 
 PARAMETERS = (*USUAL, 'cloud')
 
@@ -14,16 +14,20 @@ PARAMETERS = (*USUAL, 'cloud')
 def generate_launch_description():
     return LaunchDescription(
         [
-            DeclareLaunchArgument(
-                'image',
-                default_value='image',
-                description='Topic of the images; with image_transport compressed, /compressed '
-                'is appended.',
+            *declared(
+                DeclareLaunchArgument(
+                    'image',
+                    default_value='image',
+                    description='Topic of the images; with image_transport compressed, '
+                    '/compressed is appended.',
+                ),
+                DeclareLaunchArgument(
+                    'points',
+                    default_value='points',
+                    description='Topic of the clouds, with cloud.',
+                ),
+                *arguments(PARAMETERS),
             ),
-            DeclareLaunchArgument(
-                'points', default_value='points', description='Topic of the clouds, with cloud.'
-            ),
-            *arguments(PARAMETERS),
             OpaqueFunction(function=nodes),
         ]
     )

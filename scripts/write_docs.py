@@ -6,7 +6,7 @@ docs/figures.md has the commands that make these files.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -75,14 +75,19 @@ def drivers() -> str:
 
 def driver_settings() -> str:
     """Return what is to be set for each driver, in the node and in the driver."""
-    rows = [('driver', 'the launch file sets', 'to do in the driver')]
+    rows = [('driver', 'set in the detector', 'set in the driver', 'what else to do')]
     for name, driver in DRIVERS.items():
         settings = {'cloud': 'true', **driver.settings}
         if not driver.reliable:
             settings['reliability'] = 'best_effort'
-        cells = ', '.join(f'`{key}:={value}`' for key, value in settings.items())
-        rows.append((f'`{name}`', cells, driver.setup))
+        rows.append((f'`{name}`', _assigned(settings), _assigned(driver.parameters), driver.setup))
     return table(rows)
+
+
+def _assigned(values: Mapping[str, object]) -> str:
+    """Return values by their names, as a command line has them."""
+    texts = {name: str(value).lower() for name, value in values.items()}
+    return ', '.join(f'`{name}:={text}`' for name, text in texts.items())
 
 
 def lights() -> str:

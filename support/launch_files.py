@@ -10,7 +10,7 @@ import runpy
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
@@ -22,6 +22,7 @@ MODULES = {
     'launch': ('LaunchDescription',),
     'launch.actions': (
         'DeclareLaunchArgument',
+        'LogInfo',
         'OpaqueFunction',
         'SetEnvironmentVariable',
         'Shutdown',
@@ -43,6 +44,12 @@ class Entity:
         self.given = given
         self.named = named
 
+    @property
+    def name(self) -> str:
+        """The name of an argument."""
+        (name,) = self.given
+        return name
+
 
 @dataclass(frozen=True)
 class Started:
@@ -50,6 +57,7 @@ class Started:
 
     node: str
     arguments: list[str]
+    package: str = 'ahf_ros'
 
 
 @dataclass(frozen=True)
@@ -59,6 +67,7 @@ class Launched:
     declared: dict[str, Entity]
     nodes: list[Started]
     environment: dict[str, str]
+    said: list[str] = field(default_factory=list)
 
 
 def launched(name: str, **given: str) -> Launched:
@@ -98,15 +107,18 @@ def _done(entities: list[Entity], given: dict[str, str]) -> Launched:
     for entity in entities:
         kind = type(entity).__name__
         if kind == 'DeclareLaunchArgument':
-            (name,) = entity.given
-            result.declared[name] = entity
-            _set(name, entity.named, given)
+            result.declared[entity.name] = entity
+            _set(entity.name, entity.named, given)
         elif kind == 'SetEnvironmentVariable':
             variable, value = entity.given
             result.environment[variable] = _text(value, given)
         elif kind == 'OpaqueFunction':
             context = SimpleNamespace(launch_configurations=given)
-            result.nodes.extend(_process(it, given) for it in entity.named['function'](context))
+            for it in entity.named['function'](context):
+                if type(it).__name__ == 'LogInfo':
+                    result.said.append(it.named['msg'])
+                else:
+                    result.nodes.append(_process(it, given))
         else:
             result.nodes.append(_process(entity, given))
     return result
@@ -124,13 +136,14 @@ def _process(entity: Entity, given: dict[str, str]) -> Started:
     """Return what launch_ros makes of a node: arguments for its command line."""
     node = entity.named
     assert type(entity).__name__ == 'Node'
-    assert node['package'] == 'ahf_ros'
     assert node['output'] == 'screen'
     assert type(node['on_exit']).__name__ == 'Shutdown'
-    assert (ROOT / 'scripts' / node['executable']).is_file()
+    assert node['package'] != 'ahf_ros' or (ROOT / 'scripts' / node['executable']).is_file()
     arguments = []
     if space := node.get('namespace', ''):
-        arguments += ['-r', f'__ns:=/{space}']
+        arguments += ['-r', f'__ns:=/{space.lstrip("/")}']
+    if name := node.get('name', ''):
+        arguments += ['-r', f'__node:={name}']
     for item in node.get('parameters', []):
         if isinstance(item, dict):
             for name, value in item.items():
@@ -140,7 +153,7 @@ def _process(entity: Entity, given: dict[str, str]) -> Started:
             arguments += ['--params-file', item]
     for source, target in node.get('remappings', []):
         arguments += ['-r', f'{source}:={target}']
-    return Started(node['executable'], arguments)
+    return Started(node['executable'], arguments, node['package'])
 
 
 def _yaml(value: Any, given: dict[str, str]) -> str:

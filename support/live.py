@@ -50,11 +50,12 @@ def errors_of(log: str) -> str:
     """Return the errors among what nodes write to standard error.
 
     Information is none, nor is a port of shared memory that a process of whatever domain takes at
-    the same moment: Fast DDS says so and takes the next one.
+    the same moment: Fast DDS says so and takes the next one. Nor is that this machine is slow.
     """
     lines = log.splitlines(keepends=True)
+    none = 'Failed init_port', 'identification is slower than the camera'
     return ''.join(
-        it for it in lines if not it.startswith('[INFO] ') and 'Failed init_port' not in it
+        it for it in lines if not it.startswith('[INFO] ') and not any(text in it for text in none)
     )
 
 

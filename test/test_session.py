@@ -99,6 +99,10 @@ def test_an_identification_is_interrupted_between_two_trials() -> None:
     [
         ({'expected': 5}, 'expected is not a parameter, accepted is one of detector, expected_t'),
         ({'expected_targets': -1}, 'expected_targets is -1, accepted is an integer from 0 to 1'),
+        (
+            {'expected_targets': 4, 'expected_ids': '1-3'},
+            'expected_targets is 4 and expected_ids has 3 IDs; accepted with these is their numb',
+        ),
         ({'detector': 'magic'}, "detector is 'magic', accepted is one of auto, ring, "),
         ({'family': 'ring12'}, "family is 'ring12', accepted is one of metashape12, .*_36h11"),
         ({'detector': 'ring', 'family': 'aruco_4x4_50'}, "detector is 'ring' and family is 'aru"),

@@ -179,7 +179,7 @@ def _hint(settings: IdentificationSettings, identified: int) -> str:
         return 'targets of all families were looked for\n'
     if not identified:
         return f'targets of {family} were looked for; --family names others\n'
-    if settings.expected_targets or settings.adaptive.listed or settings.estimate_expected:
+    if settings.number or settings.estimate_expected:
         return ''
 
     from ahf_ros.detectors import EarlyStopping
@@ -197,8 +197,7 @@ def _advice(paths: Sequence[str], settings: IdentificationSettings) -> str:
     from ahf_ros.advice import LOOKED_AT, advice
     from ahf_ros.interchange.image_files import read_image
 
-    known = settings.expected_targets or len(settings.adaptive.listed)
-    known = known or int(settings.estimate_expected)
+    known = settings.number or int(settings.estimate_expected)
     for path in paths[:LOOKED_AT]:
         try:
             lines = advice(read_image(path), settings.detection, known)

@@ -264,6 +264,7 @@ class Identifier:
             expected_ids=tuple(sorted(listed)),
             search=_trace_of(choice.search, trials, stack) if choice.search else None,
             edge_shift=median_edge_shift(ordered),
+            other_ids=trials.left_out(choice.filter),
         )
 
     def _trials(self, stack: ImageStack) -> Trials:

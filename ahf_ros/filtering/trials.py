@@ -123,6 +123,11 @@ class Trials:
             ]
         return count_codes(self.targets[values])
 
+    def left_out(self, values: Values | None) -> tuple[int, ...]:
+        """Return the IDs that a filter showed and that are not expected."""
+        shown = {target.id for target in self.found[values]}
+        return tuple(sorted(shown - self._listed - {UNDECODED})) if self._listed else ()
+
     def reduced(self) -> Trials:
         """Return trials of all images at half their size."""
         draft = self._draft

@@ -34,6 +34,10 @@ class Encoding:
         return self.samples * np.dtype(self.kind).itemsize
 
 
+WITH_PLANES = 'nv21', 'nv24'
+"""Encodings with gray values first, and colours in planes behind them."""
+
+
 def _encodings() -> dict[str, Encoding]:
     encodings = {'mono8': Encoding('u1'), 'mono16': Encoding('u2')}
     colours = {
@@ -61,8 +65,7 @@ def _encodings() -> dict[str, Encoding]:
             encodings[f'{name}C{samples}'] = Encoding(kind, samples, to_gray)
     encodings |= dict.fromkeys(('yuv422', 'uyvy'), Encoding('u1', 2, gray=1))
     encodings |= dict.fromkeys(('yuv422_yuy2', 'yuyv'), Encoding('u1', 2))
-    # Gray values come first, colours in planes behind them.
-    encodings |= dict.fromkeys(('nv21', 'nv24'), Encoding('u1'))
+    encodings |= dict.fromkeys(WITH_PLANES, Encoding('u1'))
     return encodings
 
 
@@ -79,8 +82,8 @@ def decode_image(message: Any) -> np.ndarray:
     order of the machine, it is a view of its data. Values that are not finite, with which scanners
     mark missing pixels, are 0, unless the whole image is not finite.
 
-    A ValueError names the field if the encoding is not accepted, the image is empty, or `step` or
-    `data` is too short.
+    A ValueError names the field if the encoding is not accepted, the image is empty, `step` or
+    `data` is too short, or `data` is too long.
     """
     encoding = ENCODINGS.get(message.encoding)
     if encoding is None:
@@ -92,6 +95,12 @@ def decode_image(message: Any) -> np.ndarray:
             raise ValueError(f'{name} is {size}, accepted is an integer of at least 1')
     row = message.width * encoding.size
     check_rows(message, 'step', row, f'a row of {message.width} px of {message.encoding}')
+    size = message.height * message.step
+    if len(message.data) > size and message.encoding not in WITH_PLANES:
+        raise ValueError(
+            f'data has {len(message.data)} bytes, accepted are {size}: '
+            f'{message.height} rows of {message.step} bytes'
+        )
     image = _gray(_samples(message, encoding), encoding)
     if image.dtype.kind == 'f':
         finite = np.isfinite(image)

@@ -21,7 +21,7 @@ from ahf_ros.nodes.pipeline import Pipeline
 from ahf_ros.nodes.process import ProcessNode
 from ahf_ros.nodes.settings import DetectorNodeSettings
 from ahf_ros.nodes.target_msg import target_annotations, target_detections
-from ahf_ros.nodes.topics import ANSWERS_KEPT, DETECTIONS
+from ahf_ros.nodes.topics import ANSWERS_KEPT, CODED_TARGETS, DETECTIONS
 from ahf_ros.nodes.undistortion import UndistortedTargets
 from ahf_ros.stream import Answer
 
@@ -32,7 +32,7 @@ class Answers:
     def __init__(self, node: ProcessNode, tally: Tally) -> None:
         self._node = node
         self._tally = tally
-        self._targets = node.publisher(CodedTargetArray, 'coded_targets', ANSWERS_KEPT)
+        self._targets = node.publisher(CodedTargetArray, CODED_TARGETS, ANSWERS_KEPT)
         self._debug_image = node.publisher(Image, '~/debug_image')
         self._filtered_image = node.publisher(Image, '~/filtered_image')
         self._annotations = node.publisher(ImageMarker, '~/annotations')
@@ -86,7 +86,9 @@ class Answers:
         self._tally.latency = time.monotonic() - received
         self._tally.last = found
         pipeline.adviser.see(answer.stack.images[0], found.count)
-        self._tally.advice = '; '.join(pipeline.adviser.lines)
+        pipeline.shortfall.see(found)
+        lines = pipeline.shortfall.line, *pipeline.adviser.lines
+        self._tally.advice = '; '.join(filter(None, lines))
         if clouds := self._clouds:
             clouds.locate(message)
         if self._detections and self._detecting:

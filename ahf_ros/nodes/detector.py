@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError
 from functools import partial
 from typing import Any
@@ -28,8 +28,11 @@ from ahf_ros.nodes.process import ProcessNode, run
 from ahf_ros.nodes.service_detector import ServiceDetector
 from ahf_ros.nodes.settings import LOSSLESS, SERVICE, DetectorNodeSettings
 from ahf_ros.nodes.topics import (
+    CODED_TARGETS,
     IMAGE_TYPES,
+    LOSSLESS_SUBSCRIPTION,
     POINTS,
+    SUBSCRIPTION,
     camera_info_topic,
     declare_topics,
     image_topic,
@@ -186,13 +189,31 @@ class DetectorNode(ProcessNode, LifecycleNodeMixin):
         if not self._configured:
             return f'the node is {self.state} and waits for the service ~/change_state'
         settings = self._settings.current
-        names = {'answers': 'coded_targets', 'images': image_topic(self, settings.image_transport)}
+        names = {'answers': CODED_TARGETS, 'images': image_topic(self, settings.image_transport)}
         if settings.cloud.cloud:
             names['clouds'] = POINTS
         if settings.answers.undistort:
             names['calibration'] = camera_info_topic(self)
         topics = [f'{what} on {self.resolve_topic_name(it)}' for what, it in names.items()]
         return f'{settings.described()}, {", ".join(topics)}'
+
+    def ineffective(self, arguments: Sequence[str]) -> Iterator[str]:
+        """Yield a message for each argument and parameter that has no effect on the node."""
+        yield from super().ineffective(arguments)
+        try:
+            settings = self._settings.current
+        except ValueError:  # which the step `configure` will say
+            return
+        yield from settings.ineffective()
+        unused, used = f'.{LOSSLESS_SUBSCRIPTION}.', f'.{SUBSCRIPTION}.'
+        if settings.queue == LOSSLESS:
+            unused, used = used, unused
+        topics = *(image_topic(self, it) for it in IMAGE_TYPES), POINTS
+        begins = [f'qos_overrides.{self.resolve_topic_name(it)}{unused}' for it in topics]
+        for name in self._parameter_overrides:
+            instead = name.replace(unused, used)
+            if name.startswith(tuple(begins)) and instead not in self._parameter_overrides:
+                yield f'{name} has no effect: queue is {settings.queue}, which needs {instead}'
 
     def _renew(self) -> None:
         """Put the current parameters into force, unless the node is not configured."""

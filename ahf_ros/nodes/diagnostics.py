@@ -13,6 +13,9 @@ from ahf_ros.interchange.image_messages import nanoseconds
 from ahf_ros.target import Identification
 from ahf_ros.text import printable
 
+BEHIND = 10
+"""Images dropped in a row after which identification is slower than the camera."""
+
 LOSS_REMEDY = 'more depth of the publisher, or config/fastdds_shm.xml on both sides, may help'
 """What to do about images that get lost, in words."""
 
@@ -53,6 +56,8 @@ class Tally:
     dropped: int = 0  # replaced by a newer one before their turn, or given up
     rejected: int = 0
     reason: str = ''  # why the last rejected image was rejected
+    damaged: int = 0  # not whole, and identified as far as they go
+    damage: str = ''  # of the last of these
     backwards: int = 0  # whose stamp is earlier than the stamp before
     stamp: int = 0  # of the last image, ns
     kind: str = ''  # size and encoding of the last image
@@ -65,9 +70,11 @@ class Tally:
     lossless: bool = False  # whether every image counts
     mistaken: str = ''  # message about other types on the topic of the images
     several: str = ''  # message about several publishers of images
+    twins: str = ''  # message about other nodes with the same name or on the same topic of answers
     silent: str = ''  # message about images that do not arrive
     uncalibrated: str = ''  # why the last answer has no undistorted targets, if they are asked for
-    advice: str = ''  # what may help where nothing is identified in several images
+    advice: str = ''  # what may help where images in a row do not show what they should
+    behind: int = 0  # images dropped since none last waited after an identification
     inactive: str = ''  # state of a managed node that is not active
     latency: float = 0.0  # from the arrival of the last image to its answer, s
     last: Identification = field(default_factory=lambda: Identification(()))
@@ -79,13 +86,26 @@ class Tally:
         self.dropped += waiting
         return waiting
 
+    @property
+    def slow(self) -> str:
+        """Message about images that the identification is too slow for."""
+        if self.behind < BEHIND:
+            return ''
+        searching = self.last.filter.evaluations > 1
+        shorter = ', max_duration or max_evaluations to shorten searches,' if searching else ''
+        return (
+            f'{self.behind} images were dropped in a row, because identification is slower than '
+            f'the camera: set queue to lossless to answer all of them later{shorter} or the '
+            'camera to fewer images'
+        )
+
     def compare_stamps(self, header: Header) -> str:
         """Count stamps that go backwards, as when a replay starts over; return what to report."""
         before, self.stamp = self.stamp, nanoseconds(header)
         if self.stamp >= before:
             return ''
         self.backwards += 1
-        return f'stamp is {_seconds(self.stamp)}, that of the image before is {_seconds(before)}'
+        return f'stamp is {seconds(self.stamp)}, that of the image before is {seconds(before)}'
 
     def compare_kinds(self, kind: str) -> str:
         """Count changes of size or encoding; return what to report."""
@@ -123,6 +143,7 @@ class Diagnostics:
             'lost in transport': f'{tally.lost}{unknown}',
             'rejected': tally.rejected,
             'last reason for rejection': tally.reason,
+            'damaged': tally.damaged,
             'stamps that went backwards': tally.backwards,
             'changes of size or encoding': tally.changes,
             'stacks that were not full': tally.incomplete,
@@ -156,9 +177,11 @@ def _warning(tally: Tally, before: Tally) -> str:
     backwards = tally.backwards - before.backwards
     incomplete, split = tally.incomplete - before.incomplete, tally.split - before.split
     changes, lost = tally.changes - before.changes, tally.lost - before.lost
+    damaged = tally.damaged - before.damaged
     reports = (
         tally.mistaken,
         rejected and f'{rejected} images rejected: {tally.reason}',
+        damaged and f'{damaged} images damaged, the last: {tally.damage}',
         not tally.mistaken and tally.silent,
         rejected_clouds and f'{rejected_clouds} clouds rejected: {clouds.reason}',
         clouds.waiting,
@@ -166,6 +189,8 @@ def _warning(tally: Tally, before: Tally) -> str:
         (incomplete or split) and f'{incomplete} stacks were not full, {split} were split',
         lost and tally.lossless and f'{lost} images were lost in transport; {LOSS_REMEDY}',
         tally.several,
+        tally.twins,
+        tally.slow,
         changes and f'size or encoding changed {changes} times: {tally.change}',
         tally.last.mirrored and 'the last image seems to be mirrored',
         edge_shift_remark(tally.last.edge_shift),
@@ -175,5 +200,6 @@ def _warning(tally: Tally, before: Tally) -> str:
     return '; '.join(text for text in reports if text)
 
 
-def _seconds(stamp: int) -> str:
+def seconds(stamp: int) -> str:
+    """Return a stamp, ns, in words."""
     return f'{stamp // 10**9}.{stamp % 10**9:09} s'

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True, slots=True)
 class Driver:
-    """What a driver publishes for one shot, and what the node `detector` needs to know about it.
+    """How a driver is started, what it publishes for one shot, and what the detector needs for it.
 
     All clouds are organised and in metres, with x, y and z as FLOAT32 at 0, 4 and 8.
     """
@@ -22,7 +22,10 @@ class Driver:
     points: str  # topic of sensor_msgs/PointCloud2 with the same view
     encoding: str  # of the image
     stamps: str  # where they come from
-    setup: str  # what to do in the driver
+    setup: str  # what else to do in the driver
+    executable: str = ''  # of the package; empty if only a launch file of its own starts it
+    node: str = ''  # full name that its topics need; empty: its own
+    parameters: Mapping[str, bool | str] = field(default_factory=dict)  # of the driver
     point_step: int = 16  # bytes
     missing: str = 'NaN'  # what stands for a pixel without a point, or 0
     cloud_first: bool = False  # whether the cloud is published before the image
@@ -38,8 +41,9 @@ DRIVERS = {
         encoding='rgba8',
         stamps='the same header',
         cloud_first=True,
-        setup='`color_space:=srgb`, because linear images are dark; call `capture`: '
-        '`capture_2d` has no cloud',
+        executable='zivid_camera',
+        parameters={'color_space': 'srgb'},
+        setup='linear images are dark; call `capture`: `capture_2d` has no cloud',
     ),
     'ensenso': Driver(
         package='ensenso_camera',
@@ -48,6 +52,7 @@ DRIVERS = {
         encoding='mono8',
         stamps='the same time; that of the cloud is cut to whole microseconds',
         settings={'cloud_tolerance': 1e-5},
+        executable='ensenso_camera_node',
         setup='request rectified images and the point cloud together; with a disparity map '
         'offset, the cloud is narrower than the image by `cloud_offset_x`',
     ),
@@ -59,6 +64,7 @@ DRIVERS = {
         point_step=12,
         stamps='when each is published, by services of their own',
         settings={'cloud_tolerance': 3.0},
+        executable='start',
         setup='call `capture_color_image`, then `capture_point_cloud` within 3 s, and move '
         'nothing meanwhile; `cloud_step` if the image is larger',
     ),
@@ -70,9 +76,15 @@ DRIVERS = {
         point_step=20,
         missing='0',
         stamps='those of one set of frames',
-        setup='`enable_infra1:=true pointcloud.enable:=true pointcloud.ordered_pc:=true`; the '
-        'cloud has the view of infra1, not that of the colour image, even if their sizes are '
-        'equal',
+        executable='realsense2_camera_node',
+        node='/camera/camera',
+        parameters={
+            'enable_infra1': True,
+            'pointcloud.enable': True,
+            'pointcloud.ordered_pc': True,
+        },
+        setup='the cloud has the view of infra1, not that of the colour image, even if their '
+        'sizes are equal',
     ),
     'phoxi': Driver(
         package='phoxi_camera_ros2',
@@ -84,7 +96,8 @@ DRIVERS = {
         stamps='when each is published',
         reliable=False,
         settings={'cloud_tolerance': 0.2},
-        setup='`use_texture: True`, `use_pointcloud: True`, `trigger_mode: freerun`',
+        parameters={'use_texture': True, 'use_pointcloud': True, 'trigger_mode': 'freerun'},
+        setup='started by its own `phoxi_camera.launch.py`, which configures and activates it',
     ),
 }
 """Drivers by the name that the argument `driver` of `rig.launch.py` takes."""

@@ -26,9 +26,10 @@ from std_msgs.msg import Header
 
 from ahf_ros.detectors.contract import Unavailable
 from ahf_ros.filtering.settling import settled_families
+from ahf_ros.interchange.image_messages import nanoseconds
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.answers import Answers
-from ahf_ros.nodes.diagnostics import Tally
+from ahf_ros.nodes.diagnostics import Tally, seconds
 from ahf_ros.nodes.pipeline import Pipeline, Stopping
 from ahf_ros.nodes.process import LOG_PERIOD, ProcessNode
 from ahf_ros.nodes.settings import LOSSLESS
@@ -58,6 +59,7 @@ class _Waiting:
     take: Take
     pipeline: Pipeline
     arrived: float  # s of the monotonic clock
+    stamp: int  # ns
 
     @property
     def lossless(self) -> bool:
@@ -108,14 +110,16 @@ class ImageQueue:
         pipeline = self.pipeline
         settings = pipeline.settings
         take: Take = lambda: message  # noqa: E731
+        stamp = nanoseconds(message.header)
         if settings.queue == LOSSLESS:
             try:
                 take = self._messages.put(message, settings.queue_memory * 2**20)
             except ValueError as error:
-                self._tell(why_refused(error))
+                self._tell(why_refused(error), stamp)
                 return
         with self._lock:
-            image = _Waiting(next(self._numbers), take, pipeline, time.monotonic())
+            arrived = time.monotonic()
+            image = _Waiting(next(self._numbers), take, pipeline, arrived, stamp)
             replaceable = [] if image.lossless else [it for it in self._waiting if not it.lossless]
             self._waiting.append(image)
             if len(replaceable) < settings.stacking.stack:
@@ -123,6 +127,7 @@ class ImageQueue:
             else:  # it takes the turn of the oldest one
                 self._waiting.remove(replaceable[0])
                 self._tally.dropped += 1
+                self._tally.behind += 1
 
     def identify(self, message: ImageMessage, expected: int | None = None) -> CodedTargetArray:
         """Identify an image out of turn; called in the thread of the worker.
@@ -132,12 +137,16 @@ class ImageQueue:
         """
         pipeline = self.pipeline
         try:
-            return pipeline.message(pipeline.stream.identify(message_frame(message), expected))
+            frame = message_frame(message)
+            if frame.damage:
+                said = f'the image is damaged: {frame.damage}'
+                self._tell(Remark(Kind.DAMAGED, said), frame.stamp)
+            return pipeline.message(pipeline.stream.identify(frame, expected))
         except Stopping:
             raise
         except Exception as error:
             remark = why_refused(error)
-            self._tell(remark)
+            self._tell(remark, nanoseconds(message.header))
             raise ValueError(remark.text) from error
 
     def _count(self, message: ImageMessage) -> None:
@@ -161,6 +170,9 @@ class ImageQueue:
         elif last and last.number != image.number - 1:
             self._tally.dropped += stream.forget()
         self._handle(image, stream.add(lambda: message_frame(image.take())))
+        with self._lock:
+            if not self._waiting:
+                self._tally.behind = 0
 
     def _settle(self) -> None:
         """End a stack that was begun with other parameters."""
@@ -190,13 +202,13 @@ class ImageQueue:
         try:
             for it in said:
                 if isinstance(it, Remark):
-                    self._tell(it)
+                    self._tell(it, image.stamp)
                 else:
                     self._publish(it, image)
         except Stopping:
             return
         except Unavailable as error:
-            self._tell(why_refused(error))
+            self._tell(why_refused(error), image.stamp)
 
     def _publish(self, answer: Answer[Header], image: _Waiting) -> None:
         try:
@@ -207,23 +219,27 @@ class ImageQueue:
             self._families = memory.families
         except Exception as error:
             # No image may end the node.
-            self._tell(why_refused(error))
+            self._tell(why_refused(error), image.stamp)
 
-    def _tell(self, remark: Remark) -> None:
-        """Count and log a remark."""
+    def _tell(self, remark: Remark, stamp: int) -> None:
+        """Count and log a remark on an image with a stamp, ns."""
         if remark.kind == Kind.INCOMPLETE:
             self._tally.incomplete += 1
             self._logger.warning(remark.text, throttle_duration_sec=LOG_PERIOD)
         elif remark.kind == Kind.SPLIT:
             self._tally.split += 1
             self._logger.warning(remark.text, throttle_duration_sec=LOG_PERIOD)
+        elif remark.kind == Kind.DAMAGED:
+            self._tally.damaged += 1
+            self._tally.damage = f'{remark.text}, stamp {seconds(stamp)}'
+            self._logger.warning(self._tally.damage, throttle_duration_sec=LOG_PERIOD)
         else:
             self._tally.rejected += 1
             self._tally.reason = remark.text
             if remark.error and not isinstance(remark.error, ValueError):
                 lines = ''.join(traceback.format_exception(remark.error)).splitlines()
                 self._logger.error('\n'.join(map(printable, lines)))
-            text = f'image refused: {remark.text}'
+            text = f'image refused: {remark.text}, stamp {seconds(stamp)}'
             self._logger.warning(text, throttle_duration_sec=LOG_PERIOD)
 
 

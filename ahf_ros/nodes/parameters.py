@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator
+from contextlib import suppress
 from difflib import get_close_matches
 from typing import Generic, TypeVar
 
@@ -43,6 +44,8 @@ class ParameterSettings(Generic[Settings]):
             self._current = self._assembled({})
         except ValueError as error:
             self._current = error
+        self._items = {item.name: item for item in flat_parameters(settings)}
+        node.add_pre_set_parameters_callback(self._read)
         node.add_on_set_parameters_callback(self._check)
         node.add_post_set_parameters_callback(self._apply)
 
@@ -72,6 +75,18 @@ class ParameterSettings(Generic[Settings]):
                 )
         return assemble(self._type, values)
 
+    def _read(self, parameters: list[RosParameter]) -> list[RosParameter]:
+        """Return parameters as they are meant where the tools of ROS read a text as YAML.
+
+        `ros2 param load` turns 1e-06 into a text, and the text 5 into a number.
+        """
+        return [
+            RosParameter(it.name, value=as_meant(self._items[it.name], it.value))
+            if it.name in self._items
+            else it
+            for it in parameters
+        ]
+
     def _changes(self, parameters: Iterable[RosParameter]) -> dict[str, object]:
         """Return the new values of our parameters, without those that rclpy declares."""
         return {item.name: item.value for item in parameters if item.name in self._values}
@@ -85,11 +100,28 @@ class ParameterSettings(Generic[Settings]):
         return SetParametersResult(successful=True)
 
     def _apply(self, parameters: Iterable[RosParameter]) -> None:
-        if changes := self._changes(parameters):
+        changes = self._changes(parameters)
+        if changes.items() - self._values.items():
             self._current = self._assembled(changes)
             self._values |= changes
             if self._changed is not None:
                 self._changed()
+
+
+def as_meant(item: Parameter, value: object) -> object:
+    """Return a value as a number or a text where the parameter is one and YAML made it the other.
+
+    Examples
+    --------
+    >>> as_meant(Parameter('tolerance', 0.0, 'Tolerance, s.'), '1e-06')
+    1e-06
+    """
+    if isinstance(item.default, float) and isinstance(value, str):
+        with suppress(ValueError):
+            return float(value)
+    if isinstance(item.default, str) and type(value) is int:
+        return str(value)
+    return value
 
 
 def unknown_parameters(given: Iterable[str], known: Collection[str]) -> Iterator[str]:

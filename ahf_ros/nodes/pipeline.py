@@ -16,6 +16,7 @@ from ahf_ros.filtering.homomorphic import filtered
 from ahf_ros.interchange.target_messages import coded_target_array
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.settings import LOSSLESS, DetectorNodeSettings
+from ahf_ros.nodes.shortfall import Shortfall
 from ahf_ros.stream import Answer, Stream
 
 STOPPING = 'the node stops'
@@ -48,7 +49,8 @@ class Pipeline:
             identification.detector, settings=identification.detection
         )
         self._family = detector.family
-        self.adviser = Adviser(identification.detection, identification.expected_targets)
+        self.adviser = Adviser(identification.detection, identification.number)
+        self.shortfall = Shortfall()
         self.stream: Stream[Header] = Stream(
             identification,
             settings.stacking,

@@ -9,15 +9,19 @@ import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from typing import Any
+from functools import partial
+from typing import Any, NoReturn
 
 import rclpy
+from rcl_interfaces.msg import SetParametersResult
+from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.callback_groups import CallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.exceptions import InvalidHandle, ParameterException
 from rclpy.executors import MultiThreadedExecutor
 from rclpy.logging import LoggingSeverity, get_logger_effective_level, set_logger_level
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
@@ -31,6 +35,9 @@ from ahf_ros.text import reason_of, shown
 
 LOG_PERIOD = 5.0
 """Minimum time between two log lines of the same kind about messages, s."""
+
+MAXIMUM_PARAMETERS = 1000
+"""Maximum number of parameters in one call of a service."""
 
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD, _M_ARENA_MAX = -1, -3, -8  # of glibc's malloc.h
 
@@ -78,6 +85,8 @@ class ProcessNode(Node):
 
     def __init__(self, name: str) -> None:
         super().__init__(name)
+        for service in self.services:
+            service.callback = partial(self._bounded, service.callback)
         self.ended = Ending()  # an exit status ends the node, as a signal does
         self._inputs: list[Input] = []
         self._listening = True
@@ -95,6 +104,36 @@ class ProcessNode(Node):
         if unread := remove_ros_args(arguments):
             meant = '--ros-args -p NAME:=VALUE sets a parameter'
             yield f'arguments {shown(" ".join(unread))} have no effect; {meant}'
+
+    def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
+        """Set parameters together; a value that is read only and stays what it is, is no mistake.
+
+        `ros2 param dump` writes these, too, and `ros2 param load` sets them.
+        """
+        changed = [it for it in parameter_list if not self._is_settled(it)]
+        if parameter_list and not changed:
+            return SetParametersResult(successful=True)
+        return super().set_parameters_atomically(changed)
+
+    def _is_settled(self, given: Parameter) -> bool:
+        if not self.has_parameter(given.name) or not self.describe_parameter(given.name).read_only:
+            return False
+        return str(given.value) == str(self.get_parameter(given.name).value)
+
+    def _bounded(self, answer: Callable[[Any, Any], Any], request: Any, response: Any) -> Any:
+        """Answer a request about parameters, unless it is about more than a node can have."""
+        fields = ('parameters', 'names', 'prefixes')
+        count = max(len(getattr(request, name, ())) for name in fields)
+        if count <= MAXIMUM_PARAMETERS:
+            return answer(request, response)
+        reason = f'{count} parameters in one call, accepted are at most {MAXIMUM_PARAMETERS}'
+        self.get_logger().warning(reason, throttle_duration_sec=LOG_PERIOD)
+        refused = SetParametersResult(successful=False, reason=reason)
+        if hasattr(response, 'results'):
+            response.results = [refused] * count
+        elif isinstance(response, SetParametersAtomically.Response):
+            response.result = refused
+        return response
 
     def close(self) -> None:
         """End the threads of the node, while topics and the log still work."""
@@ -153,6 +192,7 @@ def run(make_node: Callable[[], ProcessNode], arguments: list[str] | None = None
     on stderr. Where there are no arguments, `sys.argv` has them.
     """
     reuse_memory()
+    outlive_others()
     arrived = signalled()
     given = sys.argv[1:] if arguments is None else arguments
     try:
@@ -185,6 +225,21 @@ def run(make_node: Callable[[], ProcessNode], arguments: list[str] | None = None
         rclpy.shutdown()
         ignore_ending()
     return node.ended.result()
+
+
+def outlive_others() -> None:
+    """Let a detector of another package that calls `os._exit(0)` fail, and not end this process.
+
+    It would seem to have ended in order. A process that the detector has forked ends as it likes.
+    """
+    leave, own = os._exit, os.getpid()
+
+    def refused(status: int) -> NoReturn:
+        if status or os.getpid() != own:
+            leave(status)
+        raise SystemExit('os._exit(0) would end the process')
+
+    os._exit = refused
 
 
 def reuse_memory() -> None:

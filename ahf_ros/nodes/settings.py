@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
 
+from ahf_ros.codes.families import families_of
 from ahf_ros.detectors import DETECTOR, detector_name
 from ahf_ros.interchange.units import UNITS
 from ahf_ros.localisation import FULL, NEIGHBOURHOOD, CloudGrid
@@ -13,7 +15,7 @@ from ahf_ros.session import create_identifier
 from ahf_ros.session_settings import AnyTargetSettings, IdentificationSettings, StackSettings
 from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.synthetic.scene import SceneSettings
-from ahf_ros.text import shown
+from ahf_ros.text import printable, shown
 
 LATEST, LOSSLESS = 'latest', 'lossless'
 """What becomes of images that arrive while another one is being identified."""
@@ -24,7 +26,7 @@ SERVICE = 'service'
 MAXIMUM_TOLERANCE = 10.0
 """Maximum difference between the stamps of an image and its cloud, s."""
 
-NUMBER_UNKNOWN = 'unknown (expected_targets is 0)'
+NUMBER_UNKNOWN = 'unknown (expected_targets is 0, expected_ids is empty)'
 """What stands for N in the log where no filter is searched for."""
 
 _FRAME = re.compile(r'[A-Za-z_][\w.-]*(/[\w.-]+)*', re.ASCII)
@@ -188,8 +190,8 @@ class DetectorNodeSettings:
         detector = self.service
         if of.detector != SERVICE:
             detector = detector_name(of.detector, of.detection.family, of.detection.family_file)
-        number = str(of.expected_targets)
-        if not of.expected_targets:
+        number = str(of.number)
+        if not of.number:
             number = 'estimated' if of.estimate_expected else NUMBER_UNKNOWN
         search = of.adaptive.ahf and number != NUMBER_UNKNOWN
         return (
@@ -197,6 +199,24 @@ class DetectorNodeSettings:
             f'search for a filter {"on" if search else "off"}, queue {self.queue}, '
             f'stack {self.stacking.stack}'
         )
+
+    def ineffective(self) -> Iterator[str]:
+        """Yield a message for each value that has no effect beside the others."""
+        if self.autostart and not self.managed:
+            yield 'autostart has no effect: managed is False'
+        detection = self.identification.detection
+        if not detection.family_file:
+            return
+        none = f'family_file has no effect: family is {detection.family}'
+        try:
+            described = families_of(detection.family_file)
+        except ValueError as error:  # nobody has read it
+            yield f'{none}; {printable(str(error))}'
+            return
+        # A file takes the place of a usual design of its kind, which is named by that.
+        names = {name for code in described.values() for name in (code.name, code.kind)}
+        if not names & set(detection.families):
+            yield f'{none}, and the file describes {", ".join(described)}'
 
     def __post_init__(self) -> None:
         """Refuse values that are not accepted."""

@@ -23,6 +23,9 @@ IMAGE = 'image'
 IMAGE_TYPES = {'raw': Image, 'compressed': CompressedImage}
 """Type of the images by image transport."""
 
+CODED_TARGETS = 'coded_targets'
+"""What is identified."""
+
 POINTS, TARGET_POINTS, TARGET_LABELS = 'points', '~/target_points', '~/target_labels'
 """Clouds, and what their positions of targets are published on."""
 

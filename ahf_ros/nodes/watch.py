@@ -15,9 +15,12 @@ from ahf_ros.nodes.diagnostics import Tally
 from ahf_ros.nodes.inputs import Input
 from ahf_ros.nodes.process import ProcessNode
 from ahf_ros.nodes.settings import MAXIMUM_TOLERANCE
-from ahf_ros.nodes.topics import qos_words
+from ahf_ros.nodes.topics import CODED_TARGETS, qos_words
 
-_DIGITS = re.compile(r'\d+')  # a report whose numbers alone have changed is not logged again
+AGAIN = 10.0
+"""Time without a report after which it is logged again, s."""
+
+_NUMBERS = re.compile(r'\d+(, \d+)*( and \d+ more)?')  # these alone make no other report
 
 
 class Watch:
@@ -29,7 +32,7 @@ class Watch:
     def __init__(self, node: ProcessNode, tally: Tally) -> None:
         self._node = node
         self._tally = tally
-        self._reported: frozenset[str] = frozenset()
+        self._reported: dict[str, float] = {}  # when what was last to be said, s
 
     def look(self, images: Input, timeout: float, clouds: tuple[Input, Waiting] | None) -> None:
         """Bring the tally up to date.
@@ -40,6 +43,7 @@ class Watch:
         tally, publishers = self._tally, images.publishers()
         tally.mistaken = other_types(images, publishers)
         tally.several = several(images, publishers)
+        tally.twins = self._twins()
         tally.lost += images.losses.newly_lost()
         tally.lost_unknown = images.losses.unknown
         tally.silent = why = waiting = ''
@@ -52,7 +56,8 @@ class Watch:
         if tally.clouds:
             tally.clouds.waiting = waiting
             tally.clouds.lost += clouds[0].losses.newly_lost() if clouds else 0
-        self._log(tally.mistaken, tally.several, why, waiting)
+        said = tally.mistaken, tally.several, tally.twins, tally.slow, tally.advice
+        self._log(*said, why, waiting)
 
     def _unmatched(self, source: Input, waiting: Waiting) -> str:
         """Return why images wait for their clouds."""
@@ -70,20 +75,41 @@ class Watch:
             f'set cloud_tolerance to at least {enough / 1e9:g}'
         )
 
+    def _twins(self) -> str:
+        """Return a message if another node has the same name, or publishes on the same topic."""
+        node = self._node
+        own = node.get_fully_qualified_name()
+        names = [
+            f'{space.rstrip("/")}/{name}' for name, space in node.get_node_names_and_namespaces()
+        ]
+        if (count := names.count(own)) > 1:
+            return f'{count} nodes are named {own}: give one another name by -r __node:=OTHER'
+        topic = node.resolve_topic_name(CODED_TARGETS)
+        answering = sorted(map(_node, node.get_publishers_info_by_topic(topic)))
+        if len(answering) < 2:
+            return ''
+        return (
+            f'{len(answering)} nodes publish on {topic}, {", ".join(answering)}: give one another '
+            f'topic by -r {CODED_TARGETS}:=OTHER, or a namespace by -r __ns:=/OTHER'
+        )
+
     def _topics(self) -> Mapping[str, Sequence[str]]:
         """Return the types of the topics that others publish."""
         own = self._node.get_fully_qualified_name()
         return {
-            name: kinds
-            for name, kinds in self._node.get_topic_names_and_types()
-            if not name.startswith(f'{own}/') and self._node.count_publishers(name)
+            name: [it.topic_type for it in self._node.get_publishers_info_by_topic(name)]
+            for name, _ in self._node.get_topic_names_and_types()
+            if not name.startswith(f'{own}/')
         }
 
     def _log(self, *reports: str) -> None:
-        now = {_DIGITS.sub('', text): text for text in reports if text}
-        for form in sorted(now.keys() - self._reported):
-            self._node.get_logger().warning(now[form])
-        self._reported = frozenset(now)
+        now = time.monotonic()
+        for text in filter(None, reports):
+            form = _NUMBERS.sub('', text)
+            if form not in self._reported:
+                self._node.get_logger().warning(text)
+            self._reported[form] = now
+        self._reported = {form: at for form, at in self._reported.items() if now - at < AGAIN}
 
 
 def other_types(source: Input, publishers: Iterable[TopicEndpointInfo]) -> str:
@@ -115,6 +141,8 @@ def silence(
     `topics` returns the types of all topics that others publish.
     """
     ours = [it for it in publishers if it.topic_type == source.type_name]
+    if not ours and publishers:
+        return other_types(source, publishers)
     if not ours:
         return f'nobody publishes {source.type_name} on {source.name}{_nearby(source, topics())}'
     unfit = [

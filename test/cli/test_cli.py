@@ -282,6 +282,7 @@ def test_files_that_cannot_be_read_do_not_stop_the_others(folder, tmp_path, caps
             "expected_targets is '-1', accepted is an integer from 0 to 100000",
         ),
         ('--expected-targets ' + '9' * 400, "expected_targets is '999"),
+        ('--expected-targets 4 --expected-ids 1-3', 'expected_targets is 4 and expected_ids'),
         ('--population 1', "population is '1', accepted is an integer from 2 to"),
         ('--family ring', "family is 'ring', accepted is one of metashape12, metashape14"),
         ('--detector magic', "detector is 'magic', accepted is one of"),

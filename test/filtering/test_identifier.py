@@ -420,9 +420,11 @@ def test_ids_that_are_listed_beat_a_number():
     assert [target.id for target in found.targets] == [1, 2, 3]
     assert (found.expected, found.filter.applied) == (3, True)
     assert (found.expected_ids, without.expected_ids) == ((1, 2, 3), ())
+    assert (found.other_ids, without.other_ids) == ((), ())
     seen = identify(image, detector, 0, AdaptiveSettings(expected_ids='1-2'))
     assert [target.id for target in seen.targets] == [1, 2]
     assert (seen.expected, seen.filter.evaluations, seen.filter.applied) == (2, 1, False)
+    assert seen.other_ids == (99,)
     only = identify(image, detector, 0, replace(listed, ahf=False))
     assert [target.id for target in only.targets] == [1, 2]
     with pytest.raises(ValueError, match="expected_ids has '3-1', accepted are integers"):

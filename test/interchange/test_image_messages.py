@@ -15,7 +15,12 @@ from hypothesis import strategies as st
 
 from ahf_ros.detectors import create_detector
 from ahf_ros.imaging.image import as_gray, check_image
-from ahf_ros.interchange.image_messages import ENCODINGS, decode_compressed, decode_image
+from ahf_ros.interchange.image_messages import (
+    ENCODINGS,
+    WITH_PLANES,
+    decode_compressed,
+    decode_image,
+)
 from ahf_ros.synthetic.scene import SceneSettings, render
 from support.hostile import IMAGES, SIDES, Fields, generators, mutated
 
@@ -142,6 +147,17 @@ def test_a_header_of_gigapixels_with_little_data():
         decode_image(huge)
 
 
+def test_data_that_is_longer_than_its_rows_is_named_but_for_planes_of_colour():
+    long = message('mono8', GRAY)
+    rows, step = long.height, long.step
+    long.data = np.concatenate([np.asarray(long.data), np.zeros(4, np.uint8)])
+    words = f'data has {len(long.data)} bytes, accepted are {rows * step}: {rows} rows of {step} b'
+    with pytest.raises(ValueError, match=words):
+        decode_image(long)
+    long.encoding = 'nv24'
+    assert (decode_image(long) == GRAY).all()
+
+
 SCENE = render(SceneSettings(width=800, height=600, targets=6, seed=5))
 IDS = [target.id for target in SCENE.targets]
 
@@ -228,12 +244,13 @@ def test_any_message_is_an_image_or_refused(fields):
     if image is None:
         return
     assert image.shape == (fields['height'], fields['width'])
-    # Neither what lies behind the rows nor what lies behind the image is looked at.
+    # Neither what lies behind the rows nor what planes lie behind the image is looked at.
     row = fields['width'] * ENCODINGS[fields['encoding']].size
     size = fields['step'] * fields['height']
     rows = np.frombuffer(fields['data'][:size], np.uint8).reshape(-1, fields['step']).copy()
     rows[:, row:] ^= 255
-    for more in (b'', b'\xff' * 99):
+    planes = [b'\xff' * 99] if fields['encoding'] in WITH_PLANES else []
+    for more in (b'', *planes):
         other = attempt(decode_image, {**fields, 'data': rows.tobytes() + more})
         assert other is not None
         assert np.array_equal(image, other)

@@ -11,7 +11,8 @@ pytest.importorskip('rclpy', reason='ROS 2 is not installed')
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
 from ahf_ros.nodes.diagnostics import Diagnostics, Tally
-from ahf_ros.target import Identification
+from ahf_ros.nodes.shortfall import IN_A_ROW, Shortfall
+from ahf_ros.target import Identification, Target
 from support.detector import values
 
 
@@ -49,3 +50,49 @@ def test_advice_is_a_warning_while_nothing_is_identified() -> None:
     status = Diagnostics('detector', tally).status(1.0)
     assert (status.level, status.message) == (DiagnosticStatus.WARN, tally.advice)
     assert values(DiagnosticArray(status=[status]))['advice'] == tally.advice
+
+
+def shown(*ids: int, expected: int = 0, listed: tuple[int, ...] = (), **more: Any) -> Any:
+    targets = tuple(Target(number, number, 5.0, 5.0, 3.0, 3.0) for number in ids)
+    return Identification(targets, expected or len(listed), expected_ids=listed, **more)
+
+
+@pytest.mark.parametrize(
+    ('found', 'words'),
+    [
+        ([shown(7, 8, expected=2)], ''),
+        ([shown(7, 8)], ''),
+        ([shown(7, expected=2, estimated=True)], ''),
+        ([shown(expected=2)], 'show no target, N is 2: family, polarity, min_radius and max_radi'),
+        ([shown(7, expected=2)], 'show 1 target, N is 2: set expected_targets to what is in v'),
+        (
+            [shown(7, expected=2), shown(5, 6, 7, expected=2)],
+            'show 1 to 3 targets, N is 2: set expected_targets to what is in view',
+        ),
+        (
+            [shown(7, listed=(7, 8, 9)), shown(8, listed=(7, 8, 9))],
+            'lack IDs 9 of expected_ids: leave out of expected_ids what is not in view',
+        ),
+        (
+            [shown(7, listed=(7, 8)), shown(8, listed=(7, 8))],
+            'show 1 target, N is 2: set expected_ids to what is in view',
+        ),
+        (
+            [shown(listed=(7, 8), other_ids=(1, 3))],
+            'show IDs 1, 3 and none of expected_ids: set expected_ids to those of the targets',
+        ),
+        (
+            [shown(listed=(7, 8), other_ids=(1, 3), mirrored=True)],
+            'show no target, N is 2',
+        ),
+    ],
+)
+def test_ten_images_in_a_row_without_what_is_expected_are_told(found: list, words: str) -> None:
+    shortfall = Shortfall()
+    for number in range(IN_A_ROW):
+        assert shortfall.line == ''
+        shortfall.see(found[number % len(found)])
+    assert shortfall.line.startswith(f'{IN_A_ROW} images in a row {words}' if words else '')
+    assert bool(shortfall.line) == bool(words)
+    shortfall.see(shown(7, expected=1))
+    assert shortfall.line == ''

@@ -90,6 +90,16 @@ def test_of_the_images_that_wait_the_latest_is_identified(worker: Worker) -> Non
     assert (bench.tally.received, bench.tally.answered, bench.tally.dropped) == (4, 2, 2)
 
 
+def test_images_that_are_dropped_in_a_row_are_counted_until_none_waits(worker: Worker) -> None:
+    bench = Bench(worker)
+    bench.put(*range(1, 11))
+    assert (bench.tally.behind, bench.tally.slow) == (9, '')
+    bench.put(11)
+    assert bench.tally.slow.startswith('10 images were dropped in a row')
+    bench.work()
+    assert (bench.tally.behind, bench.tally.slow, bench.tally.dropped) == (0, '', 10)
+
+
 def test_every_image_of_a_lossless_queue_is_identified(worker: Worker) -> None:
     bench = Bench(worker, queue='lossless', queue_memory=1)
     large = np.tile(np.arange(1000, dtype=np.uint8), (700, 1))

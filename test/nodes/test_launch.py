@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import runpy
 import sys
 from pathlib import Path
@@ -85,11 +86,11 @@ def test_what_is_no_argument_is_left_to_the_file_of_parameters(
 
 
 def test_what_is_given_has_the_type_of_the_parameter() -> None:
-    given = {'expected_ids': '5', 'expected_targets': '4', 'ahf': 'False', 'max_duration': '2'}
+    given = {'expected_ids': '5', 'expected_targets': '1', 'ahf': 'False', 'max_duration': '2'}
     (detector,) = launched('detector', namespace='left', image='raw', **given).nodes
     assert detector.arguments == [
         *('-r', '__ns:=/left', '--params-file', DETECTOR_FILE),
-        *('-p', 'expected_targets:=4', '-p', "expected_ids:='5'"),
+        *('-p', 'expected_targets:=1', '-p', "expected_ids:='5'"),
         *('-p', 'ahf:=false', '-p', 'max_duration:=2.0'),
         *('-r', 'image:=raw', '-r', 'points:=points'),
     ]
@@ -109,6 +110,62 @@ def test_what_is_given_has_the_type_of_the_parameter() -> None:
 def test_bad_arguments_start_nothing(name: str, given: dict[str, str], words: str) -> None:
     with pytest.raises(ValueError, match=words):
         launched(name, **given)
+
+
+@pytest.mark.parametrize(
+    ('name', 'given', 'said'),
+    [
+        ('detector', 'expected_target', ['expected_targets']),
+        ('detector', 'expected', ['expected_targets']),
+        ('rig', 'imgae', ['image']),
+        ('demo', 'ligth', ['light']),
+        ('detector', 'seed', []),
+        ('detector', 'ros_namespace', []),
+    ],
+)
+def test_arguments_that_may_be_misspelt_are_said(name: str, given: str, said: list[str]) -> None:
+    messages = [f'no argument is named {given}; the nearest is {nearest}' for nearest in said]
+    assert launched(name, **REQUIRED[name], **{given: 'some'}).said == messages
+
+
+def installed(package: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let a package be one that is installed, as far as its name tells."""
+    index = folder / 'share' / 'ament_index' / 'resource_index' / 'packages'
+    index.mkdir(parents=True)
+    (index / package).touch()
+    monkeypatch.setenv('AMENT_PREFIX_PATH', str(folder), prepend=os.pathsep)
+
+
+def test_the_rig_starts_its_driver_as_it_has_to_be_set(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    installed('realsense2_camera', tmp_path, monkeypatch)
+    given = {'driver': 'realsense', 'driver_parameters': DETECTOR_FILE}
+    assert [it.node for it in launched('rig', **given).nodes] == ['detector']
+    detector, camera = launched('rig', start_driver='true', **given).nodes
+    assert detector.node == 'detector'
+    assert camera.package == 'realsense2_camera'
+    assert camera.node == 'realsense2_camera_node'
+    assert camera.arguments == [
+        *('-r', '__ns:=/camera', '-r', '__node:=camera', '-p', 'enable_infra1:=true'),
+        *('-p', 'pointcloud.enable:=true', '-p', 'pointcloud.ordered_pc:=true'),
+        *('--params-file', DETECTOR_FILE),
+    ]
+    other = {'driver_package': 'realsense2_camera', 'driver_executable': 'other'}
+    _, camera = launched('rig', driver='phoxi', start_driver='true', **other).nodes
+    assert (camera.package, camera.node) == ('realsense2_camera', 'other')
+
+
+@pytest.mark.parametrize(
+    ('driver', 'words'),
+    [
+        ('zivid', 'driver_package is zivid_camera, which is not installed or not sourced, accept'),
+        ('phoxi', 'driver_executable is empty, .* started by its own `phoxi_camera.launch.py`'),
+    ],
+)
+def test_a_driver_that_cannot_be_started_is_named(driver: str, words: str) -> None:
+    with pytest.raises(ValueError, match=f'{words}.*; start_driver:=false starts the rest'):
+        launched('rig', driver=driver, start_driver='true')
 
 
 def test_the_lights_of_the_demo_are_choices() -> None:

@@ -22,6 +22,7 @@ from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.nodes.process import JoiningExecutor
 from ahf_ros.nodes.start import NODES
 from support import live, packages
+from support.detector import DetectorProcess
 
 SIGNALLED = """
 import os, signal, sys
@@ -111,6 +112,34 @@ def test_the_end_does_not_wait_for_a_detector_of_another_package(
     image.publish(image_message(np.tile(np.arange(40, dtype=np.uint8), (30, 1)), Header()))
     graph.until(mark.exists)
     assert node.end()[0] == 0
+
+
+LEAVING = """
+import os
+class MyDetector:
+    name = family = 'mine'
+    def __init__(self, settings):
+        if not os.fork():
+            os._exit(0)
+        assert os.wait()[1] == 0
+    def __call__(self, image):
+        os._exit(0)
+"""
+
+
+def test_a_detector_of_another_package_does_not_end_the_node_without_a_word(
+    graph: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    packages.write_package(tmp_path, 'leaving', LEAVING)
+    monkeypatch.setenv('PYTHONPATH', f'{tmp_path}{os.pathsep}{os.environ.get("PYTHONPATH", "")}')
+    node = DetectorProcess(graph, '/leaving', '-p', 'detector:=mine')
+    node.image.publish(image_message(np.tile(np.arange(40, dtype=np.uint8), (30, 1)), Header()))
+    graph.until(lambda: node.told('rejected') == '1')
+    reason = "detector 'mine' failed: SystemExit: os._exit(0) would end the process"
+    assert node.told('last reason for rejection') == reason
+    status, errors = node.process.end()
+    assert status == 0
+    assert f'image refused: {reason}' in errors
 
 
 def test_the_end_waits_for_callbacks(graph: Any) -> None:
