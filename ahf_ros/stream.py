@@ -19,6 +19,7 @@ from ahf_ros.filtering.identifier import Identifier, Memory
 from ahf_ros.imaging.image import check_image
 from ahf_ros.imaging.movement import displacement, find_edges
 from ahf_ros.imaging.stack import ImageStack, unlike
+from ahf_ros.interchange.image_files import NotedImage
 from ahf_ros.interchange.image_messages import decode_compressed, decode_image, nanoseconds
 from ahf_ros.session import create_identifier
 from ahf_ros.session_settings import SLIDING, IdentificationSettings, StackSettings
@@ -38,6 +39,7 @@ class Frame(Generic[Item]):
     image: np.ndarray  # of uint8, uint16, float32 or float64, shape (height, width)
     kind: Hashable  # its size and encoding; another one begins a new stack
     stamp: int  # its time, ns; an earlier one than before begins a new stack
+    damage: str = ''  # what is missing in it, empty where it is whole
 
 
 def message_frame(message: Any) -> Frame[Any]:
@@ -46,7 +48,8 @@ def message_frame(message: Any) -> Frame[Any]:
     An image that is not accepted raises a ValueError.
     """
     compressed = hasattr(message, 'format')
-    image = decode_compressed(message) if compressed else decode_image(message)
+    noted = decode_compressed(message) if compressed else NotedImage(decode_image(message))
+    image = noted.image
     height, width = image.shape
     coding = message.format if compressed else message.encoding
     return Frame(
@@ -54,6 +57,7 @@ def message_frame(message: Any) -> Frame[Any]:
         image=image,
         kind=f'{width} x {height} px, {coding}',
         stamp=nanoseconds(message.header),
+        damage=noted.damage,
     )
 
 
@@ -92,6 +96,8 @@ class Kind(Enum):
     """The images of a stack cannot be identified together."""
     REFUSED = auto()
     """An image or a stack is not accepted."""
+    DAMAGED = auto()
+    """An image is not whole; what is left of it is identified."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,6 +217,8 @@ class Stream(Generic[Item]):
         except Exception as error:
             yield refusal(error)
             return
+        if frame.damage:
+            yield Remark(Kind.DAMAGED, f'the image is damaged: {frame.damage}')
         yield from self._window.add(frame, frame.kind, frame.stamp)
 
     def _answers(self, gathered: Gathered[Frame[Item]]) -> Iterator[Answer[Item] | Remark]:

@@ -67,7 +67,8 @@ class Entry:
     timestamp: int  # of recording, ns
     memory: Memory  # what the image leaves to the next one of the topic
     reason: str = ''  # why the image was refused; empty if it was not
-    note: str = ''  # what became of its stack, if that is not what was asked for
+    note: str = ''  # what else there is to say, such as what became of its stack
+    damaged: bool = False  # whether the image is not whole
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +77,7 @@ class Outcome:
 
     images: int  # their number
     refused: int  # of these; they were not accepted
+    damaged: int = 0  # of these; they are not whole
     lost: tuple[str, ...] = ()  # messages that are missing, with topic and time where known
     left_out: tuple[str, ...] = ()  # what else of the source the new bag does not have
 
@@ -156,6 +158,7 @@ def finished(output: Path) -> Outcome | None:
         outcome = Outcome(
             images=fields['images'],
             refused=fields['refused'],
+            damaged=fields['damaged'],
             lost=tuple(fields['lost']),
             left_out=tuple(fields['left_out']),
         )
@@ -203,6 +206,7 @@ def write_bag(
     outcome = Outcome(
         images=len(journal.entries),
         refused=sum(bool(entry.reason) for entry in journal.entries),
+        damaged=sum(entry.damaged for entry in journal.entries),
         lost=tuple(source.lost),
         left_out=tuple(source.left_out),
     )

@@ -73,7 +73,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Process all bags; the status is 1 as well if an image was refused or a bag is damaged."""
+    """Process all bags; the status is 1 as well if an image or a bag is refused or damaged."""
     tasks = _tasks(options)
     jobs = min(options.jobs, len(tasks))
     columns = TextColumn('{task.description}'), BarColumn(), MofNCompleteColumn()
@@ -158,16 +158,17 @@ def _report(task: BagTask, outcome: Outcome | ValueError) -> bool:
         tell('bag', outcome)
         return False
     refused = f', {outcome.refused} of them not accepted' if outcome.refused else ''
-    print(f'{task.output}: {outcome.images} images answered{refused}', file=sys.stderr)
+    damaged = f', {outcome.damaged} of them damaged' if outcome.damaged else ''
+    print(f'{task.output}: {outcome.images} images answered{refused}{damaged}', file=sys.stderr)
     for lost in outcome.lost:
         tell('bag', f'{task.source}: missing: {lost}')
     for left_out in outcome.left_out:
         tell('bag', f'{task.source}: left out: {left_out}')
-    if not outcome.refused and not outcome.lost:
+    if not (outcome.refused or outcome.damaged or outcome.lost):
         return True
     tell(
         'bag',
-        f'{task.output}: what was not accepted or is missing is not tried again; to do so, '
-        'remove this bag or name another one',
+        f'{task.output}: what was not accepted, is damaged or missing is not tried again; to do '
+        'so, remove this bag or name another one',
     )
     return False

@@ -217,6 +217,8 @@ class ImageQueue:
         elif remark.kind == Kind.SPLIT:
             self._tally.split += 1
             self._logger.warning(remark.text, throttle_duration_sec=LOG_PERIOD)
+        elif remark.kind == Kind.DAMAGED:
+            self._logger.warning(remark.text, throttle_duration_sec=LOG_PERIOD)
         else:
             self._tally.rejected += 1
             self._tally.reason = remark.text

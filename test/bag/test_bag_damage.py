@@ -10,6 +10,7 @@ from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -22,7 +23,7 @@ from rosbags.interfaces import QosDurability
 from ruamel.yaml import YAML
 
 from ahf_ros.bag import source as sources
-from ahf_ros.bag.definitions import IMAGE, MAXIMUM_DEFINITION, typestore
+from ahf_ros.bag.definitions import COMPRESSED_IMAGE, IMAGE, MAXIMUM_DEFINITION, typestore
 from ahf_ros.bag.output import Journal
 from ahf_ros.bag.source import Source
 from ahf_ros.cli import main
@@ -408,3 +409,18 @@ def test_more_topics_than_can_be_written_in_time_are_refused(tmp_path: Path, run
     channels = [mcap.channel(number, 0, f'/t{number}') for number in range(2, 2002)]
     source = mcap.McapFile([*image_records(), *channels]).write(tmp_path / 'in.mcap')
     assert 'has 2001 topics, accepted are at most 2000' in run(source, 1)
+
+
+def test_a_damaged_image_is_answered_and_named(tmp_path: Path, run: Run) -> None:
+    store = typestore()
+    messages = []
+    for number, suffix in enumerate(('.png', '.jpg'), start=1):
+        message = bags.compressed(store, np.tile(PIXELS[0], (4, 4)), number * 10**8)
+        data = cv2.imencode(suffix, np.tile(PIXELS[0], (4, 4)))[1].ravel()
+        message.data = data if suffix == '.png' else np.delete(data, slice(-300, -2))
+        messages.append(('/image', COMPRESSED_IMAGE, number * 10**8, message))
+    source = bags.write_ros2(tmp_path / 'in', messages)
+    for _ in range(2):  # what was finished is known, too
+        said = run(source, 1)
+        assert '2 images answered, 1 of them damaged' in said
+    assert counts(tmp_path / 'out') == {'/image': 2, '/image/coded_targets': 2}

@@ -125,3 +125,18 @@ def test_commands_and_options_are_completed(tmp_path: Path, line: str, completed
     command = [sys.executable, '-m', 'ahf_ros.cli']
     subprocess.run(command, env=os.environ | asked, check=True, timeout=120)
     assert answer.read_text().split() == [completed]
+
+
+def test_a_damaged_image_is_named_and_the_rest_goes_on(tmp_path, capfd):
+    scene = render(SceneSettings(width=400, height=300, targets=4, dot_radius=10.0)).image
+    whole = cv2.imencode('.jpg', scene)[1].tobytes()
+    (tmp_path / 'a.jpg').write_bytes(whole[: len(whole) // 2] + whole[-2:])
+    (tmp_path / 'b.jpg').write_bytes(whole[: len(whole) // 2])
+    (tmp_path / 'c.jpg').write_bytes(whole)
+    assert status('identify', tmp_path, '--detector', 'traditional', '--json') == 1
+    said = capfd.readouterr()
+    assert 'a.jpg: the image is damaged: Corrupt JPEG data' in said.err
+    assert 'b.jpg' in said.err
+    assert 'it has no end marker, so it is cut' in said.err
+    assert 'c.jpg: the image is damaged' not in said.err
+    assert 'c.jpg' in said.out
