@@ -10,6 +10,7 @@ import fcntl
 import io
 import os
 import re
+import stat
 import time
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -65,6 +66,21 @@ def read_bytes(path: str | Path) -> bytes:
             return bytes(storage.cat_file(place))
     with file_errors(path, 'read'):
         return Path(path).read_bytes()
+
+
+def check_regular(path: str | Path, most: int) -> None:
+    """Raise a ValueError for a pipe or device, which may never end, and a file over `most` bytes.
+
+    URLs are not looked at.
+    """
+    if is_url(str(path)):
+        return
+    with file_errors(path, 'read'):
+        status = Path(path).stat()
+    if not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)):
+        raise ValueError(f'{path} cannot be read: it is not a regular file')
+    if status.st_size > most:
+        raise ValueError(f'{path} has {status.st_size} bytes, accepted are at most {most}')
 
 
 def read_text(path: str | Path) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.cli.identify import image_paths
-from ahf_ros.interchange.image_files import as_oriented, read_image
+from ahf_ros.interchange.image_files import as_oriented, read_image, write_image
 from ahf_ros.interchange.target_json import read_results
 from ahf_ros.synthetic.scene import SceneSettings, render
 from support.command_line import status
@@ -140,3 +140,18 @@ def test_a_damaged_image_is_named_and_the_rest_goes_on(tmp_path, capfd):
     assert 'it has no end marker, so it is cut' in said.err
     assert 'c.jpg: the image is damaged' not in said.err
     assert 'c.jpg' in said.out
+
+
+def test_what_is_no_file_is_named_at_once_and_the_rest_goes_on(tmp_path, capfd):
+    scene = render(SceneSettings(width=400, height=300, targets=4, dot_radius=10.0)).image
+    write_image(tmp_path / 'c.png', scene)
+    os.mkfifo(tmp_path / 'a.png')
+    with (tmp_path / 'b.png').open('wb') as large:
+        large.truncate(2**31)
+    assert status('identify', tmp_path, '--detector', 'traditional', '--json') == 1
+    said = capfd.readouterr()
+    assert 'a.png cannot be read: it is not a regular file' in said.err
+    assert 'b.png has 2147483648 bytes, accepted are at most 2147483647' in said.err
+    assert 'c.png' in said.out
+    for family in (tmp_path / 'a.png', tmp_path / 'b.png', '/dev/zero'):
+        assert status('identify', tmp_path / 'c.png', '--family-file', family) == 2
