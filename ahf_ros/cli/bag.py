@@ -22,6 +22,7 @@ from ahf_ros.cli.options import (
     add_target_options,
     settings_from,
 )
+from ahf_ros.detectors import is_foreign
 from ahf_ros.session_settings import IdentificationSettings, StackSettings
 from ahf_ros.settings.parameter import Parameter
 
@@ -86,7 +87,15 @@ def run(options: argparse.Namespace) -> int:
             if remark:
                 tell('bag', f'{tasks[number].source}: {remark}')
 
-        engine = create_engine('bag', _attempt, jobs, options.scheduler, _with_machine, report)
+        engine = create_engine(
+            'bag',
+            _attempt,
+            jobs,
+            options.scheduler,
+            _with_machine,
+            report,
+            isolated=is_foreign(tasks[0].identification.detector),
+        )
         try:
             with closing(engine):
                 for item in finished_tasks(engine, tasks):

@@ -111,6 +111,7 @@ def _run(options: argparse.Namespace, output: TextIO | None) -> int:
     from ahf_ros.batch.identification import identify_images
     from ahf_ros.batch.results import Unwritable
     from ahf_ros.batch.settling import settled_tasks
+    from ahf_ros.detectors import is_foreign
     from ahf_ros.filtering.settling import families_line
     from ahf_ros.interchange.export.survey import measured_image
 
@@ -119,7 +120,14 @@ def _run(options: argparse.Namespace, output: TextIO | None) -> int:
     empty: list[str] = []
     measured: list[MeasuredImage] = []
     shown: set[str] = set()
-    engine = create_engine('identify', identify_images, jobs, options.scheduler, with_machine)
+    engine = create_engine(
+        'identify',
+        identify_images,
+        jobs,
+        options.scheduler,
+        with_machine,
+        isolated=is_foreign(settings.detector),
+    )
     with closing(engine), progress_bar(len(tasks) > 1 and not options.quiet) as progress:
         try:
             outcomes = _outcomes(engine, settled_tasks(engine, tasks), options)
@@ -149,11 +157,16 @@ def _run(options: argparse.Namespace, output: TextIO | None) -> int:
 
 
 def check_settings(settings: IdentificationSettings) -> None:
-    """Raise a ValueError if the settings do not fit together, before any image is read."""
+    """Raise a ValueError if the settings do not fit together, before any image is read.
+
+    A detector of another package is made where it works only, in a process of its own.
+    """
     from ahf_ros.batch.identification import detector_of
+    from ahf_ros.detectors import is_foreign
     from ahf_ros.session import create_identifier
 
-    create_identifier(detector=detector_of(settings), settings=settings)
+    if not is_foreign(settings.detector):
+        create_identifier(detector=detector_of(settings), settings=settings)
 
 
 def print_outcome(command: str, outcome: ImageOutcome, output: TextIO | None, quiet: bool) -> None:
