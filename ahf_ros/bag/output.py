@@ -23,6 +23,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from ruamel.yaml import YAML
 
 from ahf_ros.bag.definitions import CODED_TARGETS, COMPRESSED_IMAGE, typestore
+from ahf_ros.bag.mcap_records import add_checksums
 from ahf_ros.bag.source import METADATA, Source, read_metadata
 from ahf_ros.filtering.identifier import Memory
 
@@ -203,6 +204,8 @@ def write_bag(
     bag = output / _ASSEMBLED / output.name
     with Writer(bag, version=9, storage_plugin=STORAGES[storage]) as writer:
         _write(source, output, topics, journal, writer)
+    for file in bag.glob('*.mcap'):
+        add_checksums(file)
     outcome = Outcome(
         images=len(journal.entries),
         refused=sum(bool(entry.reason) for entry in journal.entries),
