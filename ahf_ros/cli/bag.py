@@ -12,7 +12,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemaini
 
 from ahf_ros.batch.engine import EngineLost, TaskFailed, finished_tasks
 from ahf_ros.batch.processes import SHUTDOWN_TIMEOUT
-from ahf_ros.cli import tell
+from ahf_ros.cli import say, tell
 from ahf_ros.cli.engines import create_engine, progress_bar, shared_settings
 from ahf_ros.cli.options import (
     add_engine_options,
@@ -168,7 +168,7 @@ def _report(task: BagTask, outcome: Outcome | ValueError) -> bool:
         return False
     refused = f', {outcome.refused} of them not accepted' if outcome.refused else ''
     damaged = f', {outcome.damaged} of them damaged' if outcome.damaged else ''
-    print(f'{task.output}: {outcome.images} images answered{refused}{damaged}', file=sys.stderr)
+    say(f'{task.output}: {outcome.images} images answered{refused}{damaged}')
     for lost in outcome.lost:
         tell('bag', f'{task.source}: missing: {lost}')
     for left_out in outcome.left_out:

@@ -155,3 +155,21 @@ def test_what_is_no_file_is_named_at_once_and_the_rest_goes_on(tmp_path, capfd):
     assert 'c.png' in said.out
     for family in (tmp_path / 'a.png', tmp_path / 'b.png', '/dev/zero'):
         assert status('identify', tmp_path / 'c.png', '--family-file', family) == 2
+
+
+def test_names_cannot_command_a_terminal_or_a_spreadsheet(tmp_path, capfd):
+    scene = render(SceneSettings(width=400, height=300, targets=4, dot_radius=10.0)).image
+    bad = '=1+1\x1b[31m\n.png'
+    write_image(tmp_path / bad, scene)
+    (tmp_path / 'no\x1b.png').write_text('no image')
+    folder = tmp_path / 'csv'
+    options = '--detector', 'traditional', '--export', f'csv={folder}', '--output', tmp_path / 'o'
+    assert status('identify', tmp_path, *options) == 1
+    said = capfd.readouterr().err
+    assert '=1+1\\x1b[31m\\n.png' in said
+    assert 'no\\x1b.png is not an image' in said
+    table = (folder / 'targets.csv').read_text()
+    assert "\n'=1+1\\x1b[31m\\n.png," in table
+    assert status('report', tmp_path / 'o', '--output', tmp_path / 'page.html') == 0
+    for text in (said, table, (tmp_path / 'page.html').read_text()):
+        assert '\x1b' not in text
