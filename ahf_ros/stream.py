@@ -392,7 +392,7 @@ def _witnessed(identifier: Identifier) -> Confirmed:
         told = targets_moved(moved, before, after)
         if told is not None or not identifier.expected:
             return told is not False
-        apart = min(abs(identifier.expected - count_codes(it)) for it in (before, after))
+        apart = max(abs(identifier.expected - count_codes(it)) for it in (before, after))
         together = identifier.seen(ImageStack(tuple(images)))
         return abs(identifier.expected - count_codes(together)) >= apart
 

@@ -12,7 +12,7 @@ from ahf_ros.target import UNDECODED, Target
 _MINIMUM = 3  # targets that are in both images
 _SHARE = 0.5  # of a displacement: targets that moved less stayed where they were
 _MAXIMUM = 0.3  # px, by which light moves the centres of targets that stayed
-_CERTAIN = 3.0  # standard deviations of the median
+_SIGNIFICANT = 4.0  # standard deviations of the median, a movement
 _MEDIAN = 1.4826 * 1.2533  # from the median deviation to the deviation of the median of one
 
 
@@ -36,6 +36,7 @@ def targets_moved(
     middle = np.median(shifts, axis=0)
     spread = np.median(np.abs(shifts - middle), axis=0) * _MEDIAN / np.sqrt(len(shifts))
     length, limit = np.hypot(*middle), min(_SHARE * np.hypot(moved.x, moved.y), _MAXIMUM)
-    if abs(length - limit) < _CERTAIN * np.hypot(*spread):
-        return None
-    return bool(length > limit)
+    deviation = np.hypot(*spread)
+    if length > limit:
+        return True if length > _SIGNIFICANT * deviation else None
+    return False if deviation < limit else None
