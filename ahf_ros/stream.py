@@ -17,12 +17,14 @@ import numpy as np
 from ahf_ros.detectors.contract import Detector, Unavailable
 from ahf_ros.filtering.identifier import Identifier, Memory
 from ahf_ros.imaging.image import check_image
-from ahf_ros.imaging.movement import displacement, find_edges
+from ahf_ros.imaging.movement import Displacement, displacement, find_edges
 from ahf_ros.imaging.stack import ImageStack, unlike
+from ahf_ros.imaging.witnesses import targets_moved
+from ahf_ros.interchange.image_files import NotedImage
 from ahf_ros.interchange.image_messages import decode_compressed, decode_image, nanoseconds
 from ahf_ros.session import create_identifier
 from ahf_ros.session_settings import SLIDING, IdentificationSettings, StackSettings
-from ahf_ros.target import Identification
+from ahf_ros.target import Identification, Target, count_codes
 from ahf_ros.text import printable, reason_of
 
 Item = TypeVar('Item')
@@ -47,7 +49,8 @@ def message_frame(message: Any) -> Frame[Any]:
     An image that is not accepted raises a ValueError.
     """
     compressed = hasattr(message, 'format')
-    image = decode_compressed(message) if compressed else decode_image(message)
+    noted = decode_compressed(message) if compressed else NotedImage(decode_image(message))
+    image = noted.image
     height, width = image.shape
     coding = message.format if compressed else message.encoding
     return Frame(
@@ -55,6 +58,7 @@ def message_frame(message: Any) -> Frame[Any]:
         image=image,
         kind=f'{width} x {height} px, {coding}',
         stamp=nanoseconds(message.header),
+        damage=noted.damage,
     )
 
 
@@ -332,7 +336,15 @@ class Part:
     split: str = ''  # why the stack was split before the first of them; empty at its beginning
 
 
-def unmoved_parts(images: Sequence[np.ndarray], look_for_movement: bool = True) -> list[Part]:
+Confirmed = Callable[[Displacement, Sequence[np.ndarray]], bool]
+"""Whether a scene moved as it seems to have, between the first and the last of some images."""
+
+
+def unmoved_parts(
+    images: Sequence[np.ndarray],
+    look_for_movement: bool = True,
+    confirmed: Confirmed = lambda moved, images: True,
+) -> list[Part]:
     """Return the parts of a stack that can be combined and in which nothing moved.
 
     `images` are of shape (height, width) and of type uint8, uint16, float32 or float64, in the
@@ -353,12 +365,38 @@ def unmoved_parts(images: Sequence[np.ndarray], look_for_movement: bool = True) 
             why = f'image {index + 1} of the stack {why}'
         elif look_for_movement:
             edges = edges or find_edges(images[begin])
-            if moved := displacement(edges, images[index]):
+            moved = displacement(edges, images[index])
+            if moved and confirmed(moved, images[begin : index + 1]):
                 why = f'the scene moved by {moved} before image {index + 1} of the stack'
         if why:
             parts.append(Part(range(begin, index), split))
             begin, split, edges = index, why, None
     return [*parts, Part(range(begin, len(images)), split)]
+
+
+def _witnessed(identifier: Identifier) -> Confirmed:
+    """Return how the targets of images confirm a movement.
+
+    Where too few of them tell, the images have moved unless together they show a number of targets
+    that is nearer to N.
+    """
+    known: dict[int, list[Target]] = {}
+
+    def seen(image: np.ndarray) -> list[Target]:
+        if id(image) not in known:
+            known[id(image)] = identifier.seen(ImageStack((image,)))
+        return known[id(image)]
+
+    def confirmed(moved: Displacement, images: Sequence[np.ndarray]) -> bool:
+        before, after = seen(images[0]), seen(images[-1])
+        told = targets_moved(moved, before, after)
+        if told is not None or not identifier.expected:
+            return told is not False
+        apart = max(abs(identifier.expected - count_codes(it)) for it in (before, after))
+        together = identifier.seen(ImageStack(tuple(images)))
+        return abs(identifier.expected - count_codes(together)) >= apart
+
+    return confirmed
 
 
 def identify_parts(
@@ -394,7 +432,7 @@ def identify_parts(
     [(range(0, 2), 3)]
     """
     first_fresh = 0 if fresh is None else len(images) - fresh
-    for part in unmoved_parts(images, settings.stack_movement):
+    for part in unmoved_parts(images, settings.stack_movement, _witnessed(identifier)):
         if part.images.stop > first_fresh:
             stack = ImageStack(tuple(images[index] for index in part.images))
             yield part, stack, identifier.identify(stack)

@@ -109,6 +109,17 @@ def test_a_stack_is_split_where_the_scene_moved():
     assert [part.images for part, _, _ in fresh] == [range(2, 4)]
 
 
+@pytest.mark.parametrize(('shift', 'expected', 'parts'), [(0, 8, 1), (3, 8, 2), (0, 0, 2)])
+def test_a_fine_pattern_that_moves_is_no_scene_that_moved(shift, expected, parts):
+    scene = replace(SCENE, targets=8, dot_radius=6.0, light='fine_stripe', light_scale=0.3)
+    scene = replace(scene, tilt=20.0, ambient=0.12, phases=4, seed=7)
+    images = [np.roll(render(scene, it).image, shift * it, axis=1) for it in range(2)]
+    assert len(unmoved_parts(images)) == 2
+    identifier = create_identifier(detector='traditional', expected_targets=expected, ahf=False)
+    found = list(identify_parts(identifier, images, StackSettings(stack=2)))
+    assert len(found) == parts
+
+
 def test_images_of_another_type_are_a_part_of_their_own():
     image = render(SCENE).image
     parts = unmoved_parts([image, image.astype(np.uint16), image.astype(np.uint16)])

@@ -23,6 +23,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from ruamel.yaml import YAML
 
 from ahf_ros.bag.definitions import CODED_TARGETS, COMPRESSED_IMAGE, typestore
+from ahf_ros.bag.mcap_records import add_checksums
 from ahf_ros.bag.source import METADATA, Source, read_metadata
 from ahf_ros.filtering.identifier import Memory
 
@@ -67,7 +68,8 @@ class Entry:
     timestamp: int  # of recording, ns
     memory: Memory  # what the image leaves to the next one of the topic
     reason: str = ''  # why the image was refused; empty if it was not
-    note: str = ''  # what became of its stack, if that is not what was asked for
+    note: str = ''  # what else there is to say, such as what became of its stack
+    damaged: bool = False  # whether the image is not whole
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +78,7 @@ class Outcome:
 
     images: int  # their number
     refused: int  # of these; they were not accepted
+    damaged: int = 0  # of these; they are not whole
     lost: tuple[str, ...] = ()  # messages that are missing, with topic and time where known
     left_out: tuple[str, ...] = ()  # what else of the source the new bag does not have
 
@@ -156,6 +159,7 @@ def finished(output: Path) -> Outcome | None:
         outcome = Outcome(
             images=fields['images'],
             refused=fields['refused'],
+            damaged=fields['damaged'],
             lost=tuple(fields['lost']),
             left_out=tuple(fields['left_out']),
         )
@@ -200,9 +204,12 @@ def write_bag(
     bag = output / _ASSEMBLED / output.name
     with Writer(bag, version=9, storage_plugin=STORAGES[storage]) as writer:
         _write(source, output, topics, journal, writer)
+    for file in bag.glob('*.mcap'):
+        add_checksums(file)
     outcome = Outcome(
         images=len(journal.entries),
         refused=sum(bool(entry.reason) for entry in journal.entries),
+        damaged=sum(entry.damaged for entry in journal.entries),
         lost=tuple(source.lost),
         left_out=tuple(source.left_out),
     )

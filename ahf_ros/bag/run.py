@@ -21,6 +21,7 @@ from rosbags.rosbag2 import WriterError
 
 from ahf_ros import ending
 from ahf_ros.bag.definitions import CODED_TARGETS, COMPRESSED_IMAGE, message_types, typestore
+from ahf_ros.bag.mcap_records import seconds
 from ahf_ros.bag.output import (
     JOURNAL,
     AnswerTopics,
@@ -35,7 +36,7 @@ from ahf_ros.bag.output import (
     remove_unfinished,
     write_bag,
 )
-from ahf_ros.bag.source import Message, Source, seconds
+from ahf_ros.bag.source import METADATA, Message, Source
 from ahf_ros.detectors import create_detector
 from ahf_ros.drawing.overlay import draw
 from ahf_ros.filtering.settling import settled_families
@@ -52,7 +53,7 @@ Report = Callable[[int, int, str], None]
 """Called after each image with the number of finished images, the number of all images or 0 if
 unknown, and what there is to say about this image or its stack, empty if there is nothing."""
 
-_FORMAT = 3  # version of the journal and of the data stored in a bag
+_FORMAT = 4  # version of the journal and of the data stored in a bag
 _TOPIC_NAME = re.compile(r'/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*', re.ASCII)
 _ADDRESS = re.compile('[?#%]')  # rosbags opens SQLite files by an address
 
@@ -90,6 +91,7 @@ def answer_bag(task: BagTask, report: Report) -> Outcome:
         raise ValueError(
             f'output is {task.output}, accepted with storage sqlite3 is a path without ?, # and %'
         )
+    _check_outside(task)
     with Source(task.source) as source:
         topics = _answer_topics(task, source)
         origin = _origin(task, source, topics)
@@ -105,6 +107,20 @@ def answer_bag(task: BagTask, report: Report) -> Outcome:
                     )
             remove_unfinished(task.output)
     return outcome
+
+
+def _check_outside(task: BagTask) -> None:
+    """Refuse an output in the folder of the recording, which would become part of it."""
+    folder = task.source.resolve()
+    if not folder.is_dir():
+        folder = folder.parent
+        if not (folder / METADATA).exists():
+            return
+    if task.output.resolve().is_relative_to(folder):
+        raise ValueError(
+            f'output is {task.output}, which is in the recording {folder}; accepted is another '
+            'folder'
+        )
 
 
 def _answer_topics(task: BagTask, source: Source) -> dict[str, AnswerTopics]:
@@ -252,6 +268,7 @@ class _Answering:
             memory=self._streams[topic].memory,
             reason='; '.join(it.text for it in remarks if it.kind == Kind.REFUSED),
             note='; '.join(it.text for it in remarks if it.kind != Kind.REFUSED),
+            damaged=any(it.kind == Kind.DAMAGED for it in remarks),
         )
         return entry, outputs
 

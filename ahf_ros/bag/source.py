@@ -20,16 +20,16 @@ from urllib.parse import quote
 
 import zstandard
 from mcap.reader import make_reader
-from mcap.records import Attachment, Channel, McapRecord, Schema
+from mcap.records import Attachment, Channel, ChunkIndex, McapRecord, Schema
 from mcap.records import Message as McapMessage
 from mcap.records import Metadata as McapMetadata
-from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 from rosbags import rosbag1, rosbag2
 from rosbags.interfaces import Connection, ConnectionExtRosbag1, ConnectionExtRosbag2
 from ruamel.yaml import YAML
 
 from ahf_ros.bag.definitions import COMPRESSED_IMAGE, IMAGE, TypeStores, as_ros2
+from ahf_ros.bag.mcap_records import CutFile, read_records, seconds
 from ahf_ros.text import counted, printable, reason_of
 
 Message = tuple[Connection, int, bytes]
@@ -158,13 +158,15 @@ class Source(ExitStack):
         kinds = {item.topic: item.msgtype for item in self.connections}
         accepted = [topic for topic, kind in kinds.items() if kind in (IMAGE, COMPRESSED_IMAGE)]
         if not accepted:
-            lost = f'; not readable: {"; ".join(self.lost)}' if self.lost else ''
-            lost += ''.join(
+            if self.lost:
+                lost = '; '.join(self.lost)
+                raise ValueError(f'{self.path} has no images that can be read: {lost}')
+            foreign = ''.join(
                 f'; {it.topic} is serialized as {_encoding(it)}' for it in self.foreign
             )
             raise ValueError(
                 f'{self.path} has no images, accepted are topics of {IMAGE} or '
-                f'{COMPRESSED_IMAGE}{lost}'
+                f'{COMPRESSED_IMAGE}{foreign}'
             )
         for name in names:
             if name not in accepted:
@@ -303,13 +305,17 @@ class Source(ExitStack):
         return copy
 
     def _is_indexed(self, path: Path) -> bool:
-        """Return whether an MCAP file has an index; note what a copy will not have."""
+        """Return whether an MCAP file has an index, of chunks that are there once.
+
+        Note what a copy will not have.
+        """
         with path.open('rb') as file, suppress(Exception):
             summary = make_reader(file).get_summary()
             if summary is not None and summary.statistics is not None:
                 self._leave_out(summary.attachment_indexes, 'attachment')
                 self._leave_out(summary.metadata_indexes, 'metadata')
-                return bool(summary.chunk_indexes)
+                chunks = {_extent(it) for it in summary.chunk_indexes}
+                return bool(chunks) and len(chunks) == len(summary.chunk_indexes)
         return False
 
     def _leave_out(self, items: Iterable[Any], what: str) -> None:
@@ -372,14 +378,16 @@ class Source(ExitStack):
     def _records(self, path: Path) -> Iterator[McapRecord]:
         """Yield the records of an MCAP file up to its end or to a damage, which is noted."""
         time: int | None = None
-        with path.open('rb') as file:
-            reader = StreamReader(file, validate_crcs=True, record_size_limit=MAXIMUM_SIZE)
-            try:
-                for record in reader.records:
-                    yield record
-                    time = record.log_time if isinstance(record, McapMessage) else time
-            except Exception as error:
-                self._note_damage(path.name, time, error)
+
+        def leave_out(what: str) -> None:
+            self.left_out[f'{path.name}: {what}'] = None
+
+        try:
+            for record in read_records(path, MAXIMUM_SIZE, leave_out):
+                yield record
+                time = record.log_time if isinstance(record, McapMessage) else time
+        except Exception as error:
+            self._note_damage(path.name, time, error)
 
     def _topics(self, connections: Iterable[Connection]) -> dict[int, _Topic]:
         """Return topics as those of ROS 2, by their numbers; note those that cannot be."""
@@ -423,14 +431,9 @@ class Source(ExitStack):
 
     def _note_damage(self, name: str, last: int | None, error: Exception) -> None:
         where = 'nothing' if last is None else f'nothing after {seconds(last)} s'
-        reason = reason_of(error).removesuffix(': ')
+        cut = isinstance(error, CutFile)
+        reason = str(error) if cut else reason_of(error).removesuffix(': ')
         self._damages[name] = f'{name}: {where} can be read: {reason}'
-
-
-def seconds(timestamp: int) -> str:
-    """Return a time in ns as seconds, exactly."""
-    whole, part = divmod(abs(timestamp), 10**9)
-    return f'{"-" if timestamp < 0 else ""}{whole}.{part:09}'
 
 
 def _refused(topic: str, count: int, reason: str) -> str:
@@ -441,6 +444,12 @@ def _encoding(item: Connection) -> str:
     """Return how the messages of a topic are serialized."""
     assert isinstance(item.ext, ConnectionExtRosbag2)
     return item.ext.serialization_format
+
+
+def _extent(chunk: ChunkIndex) -> tuple[int, ...]:
+    """Return what two chunks have in common that may be the same."""
+    times = chunk.message_start_time, chunk.message_end_time
+    return *times, chunk.uncompressed_size, chunk.compressed_size
 
 
 def _ending(path: Path) -> str:

@@ -53,14 +53,17 @@ def identify_images(task: ImageTask, report: Report = no_report) -> ImageOutcome
                 file = str(Path(task.folder, path))
             files.append(file_fingerprint(file))
             try:
-                image, note = read_noted_image(file, upright=task.upright)
+                noted = read_noted_image(file, upright=task.upright)
             except ValueError as error:  # which names the file
                 messages.append(Message(refusal(error).text, Level.PROBLEM))
                 continue
-            check_image(image)
-            images[path] = image
-            if note:
-                messages.append(Message(note))
+            check_image(noted.image)
+            images[path] = noted.image
+            if noted.note:
+                messages.append(Message(noted.note))
+            if noted.damage:
+                text = f'{path}: the image is damaged: {noted.damage}'
+                messages.append(Message(text, Level.PROBLEM))
     if images and len(images) < task.minimum > 1:
         text = f'{task.paths[0]}: {len(images)} of {task.minimum} images of a stack'
         messages.append(Message(text, Level.WARNING))

@@ -12,6 +12,7 @@ import sys
 from collections.abc import Sequence
 
 from ahf_ros import ending
+from ahf_ros.text import printable
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -40,7 +41,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def tell(command: str, problem: object) -> None:
     """Say on standard error what a command could not do."""
-    print(f'ahf {command}: {problem}', file=sys.stderr)
+    say(f'ahf {command}: {problem}')
+
+
+def say(text: str) -> None:
+    """Say a line on standard error; names in it cannot command a terminal."""
+    print(printable(text, len(text)), file=sys.stderr)
 
 
 def _replace_closed() -> None:

@@ -12,7 +12,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemaini
 
 from ahf_ros.batch.engine import EngineLost, TaskFailed, finished_tasks
 from ahf_ros.batch.processes import SHUTDOWN_TIMEOUT
-from ahf_ros.cli import tell
+from ahf_ros.cli import say, tell
 from ahf_ros.cli.engines import create_engine, progress_bar, shared_settings
 from ahf_ros.cli.options import (
     add_engine_options,
@@ -22,6 +22,7 @@ from ahf_ros.cli.options import (
     add_target_options,
     settings_from,
 )
+from ahf_ros.detectors import is_foreign
 from ahf_ros.session_settings import IdentificationSettings, StackSettings
 from ahf_ros.settings.parameter import Parameter
 
@@ -73,7 +74,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Process all bags; the status is 1 as well if an image was refused or a bag is damaged."""
+    """Process all bags; the status is 1 as well if an image or a bag is refused or damaged."""
     tasks = _tasks(options)
     jobs = min(options.jobs, len(tasks))
     columns = TextColumn('{task.description}'), BarColumn(), MofNCompleteColumn()
@@ -86,7 +87,15 @@ def run(options: argparse.Namespace) -> int:
             if remark:
                 tell('bag', f'{tasks[number].source}: {remark}')
 
-        engine = create_engine('bag', _attempt, jobs, options.scheduler, _with_machine, report)
+        engine = create_engine(
+            'bag',
+            _attempt,
+            jobs,
+            options.scheduler,
+            _with_machine,
+            report,
+            isolated=is_foreign(tasks[0].identification.detector),
+        )
         try:
             with closing(engine):
                 for item in finished_tasks(engine, tasks):
@@ -158,16 +167,17 @@ def _report(task: BagTask, outcome: Outcome | ValueError) -> bool:
         tell('bag', outcome)
         return False
     refused = f', {outcome.refused} of them not accepted' if outcome.refused else ''
-    print(f'{task.output}: {outcome.images} images answered{refused}', file=sys.stderr)
+    damaged = f', {outcome.damaged} of them damaged' if outcome.damaged else ''
+    say(f'{task.output}: {outcome.images} images answered{refused}{damaged}')
     for lost in outcome.lost:
         tell('bag', f'{task.source}: missing: {lost}')
     for left_out in outcome.left_out:
         tell('bag', f'{task.source}: left out: {left_out}')
-    if not outcome.refused and not outcome.lost:
+    if not (outcome.refused or outcome.damaged or outcome.lost):
         return True
     tell(
         'bag',
-        f'{task.output}: what was not accepted or is missing is not tried again; to do so, '
-        'remove this bag or name another one',
+        f'{task.output}: what was not accepted, is damaged or missing is not tried again; to do '
+        'so, remove this bag or name another one',
     )
     return False

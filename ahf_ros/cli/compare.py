@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ahf_ros.cli import tell
+from ahf_ros.cli import say, tell
 from ahf_ros.cli.options import add_option, add_quiet, parsed_by
 from ahf_ros.cli.tables import identifiers, print_table
 from ahf_ros.settings.parameter import Parameter
@@ -132,7 +131,7 @@ def _show(found: Comparison) -> None:
     ]
     head = 'target', f'dx, {unit}', 'dy', 'dz', 'length', 'sigma', 'probability', ''
     print_table('Movements', head, rows)
-    print(_verdict(found), file=sys.stderr)
+    say(_verdict(found))
 
 
 def _verdict(found: Comparison) -> str:

@@ -50,7 +50,7 @@ def create_engine(
 
     `located` is as for `ahf_ros.batch.cluster.DaskEngine`, and `report` is called with the number
     of the task before what the job reports. `isolated` starts a process where there is but one,
-    too. A ValueError says so if the cluster cannot be used.
+    too: what ends it does not end the command. A ValueError says so if the cluster cannot be used.
     """
     if scheduler:
         from ahf_ros.batch.cluster import DaskEngine

@@ -6,11 +6,10 @@ What computes is imported where it is used, because `ahf identify --help` lists 
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from ahf_ros.cli import tell
+from ahf_ros.cli import say, tell
 from ahf_ros.cli.options import Group, add_option, parsed_by
 from ahf_ros.interchange.export.formats import FORMATS, Export
 from ahf_ros.settings.parameter import Parameter
@@ -125,10 +124,10 @@ def write_exports(
         if quiet:
             continue
         count = f'{counted(len(images), "image")}, {counted(len(files), "file")}'
-        print(f'{export.folder}: {export.format}, {count}', file=sys.stderr)
+        say(f'{export.folder}: {export.format}, {count}')
         if control and not FORMATS[export.format].control:
-            print(f'{export.folder}: {export.format} has no control points', file=sys.stderr)
+            say(f'{export.folder}: {export.format} has no control points')
     if control and exports and written and not quiet:
         for note in notes_on(control, make_survey(images, control)):
-            print(note, file=sys.stderr)
+            say(note)
     return written

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 from ahf_ros.batch.engine import Engine, EngineLost, available_cores
 from ahf_ros.batch.task import ImageOutcome, ImageTask, Level, with_machine
-from ahf_ros.cli import tell
+from ahf_ros.cli import say, tell
 from ahf_ros.cli.engines import create_engine, progress_bar, shared_settings
 from ahf_ros.cli.export import add_export_arguments, check_control, control_from, write_exports
 from ahf_ros.cli.options import (
@@ -111,6 +111,7 @@ def _run(options: argparse.Namespace, output: TextIO | None) -> int:
     from ahf_ros.batch.identification import identify_images
     from ahf_ros.batch.results import Unwritable
     from ahf_ros.batch.settling import settled_tasks
+    from ahf_ros.detectors import is_foreign
     from ahf_ros.filtering.settling import families_line
     from ahf_ros.interchange.export.survey import measured_image
 
@@ -119,7 +120,14 @@ def _run(options: argparse.Namespace, output: TextIO | None) -> int:
     empty: list[str] = []
     measured: list[MeasuredImage] = []
     shown: set[str] = set()
-    engine = create_engine('identify', identify_images, jobs, options.scheduler, with_machine)
+    engine = create_engine(
+        'identify',
+        identify_images,
+        jobs,
+        options.scheduler,
+        with_machine,
+        isolated=is_foreign(settings.detector),
+    )
     with closing(engine), progress_bar(len(tasks) > 1 and not options.quiet) as progress:
         try:
             outcomes = _outcomes(engine, settled_tasks(engine, tasks), options)
@@ -139,21 +147,28 @@ def _run(options: argparse.Namespace, output: TextIO | None) -> int:
             return 1
     if results and not options.quiet:
         if shown and AUTO == settings.detection.family == settings.detector:
-            print(families_line(sorted(shown)), file=sys.stderr)
-        print(_hint(settings, identified), end='', file=sys.stderr)
+            say(families_line(sorted(shown)))
+        for line in _hint(settings, identified):
+            say(line)
         if 2 * len(empty) >= results:
-            print(_advice(empty, settings), end='', file=sys.stderr)
+            for line in _advice(empty, settings):
+                say(line)
     if not write_exports('identify', options.export, measured, control, options.quiet):
         failed = True
     return int(failed)
 
 
 def check_settings(settings: IdentificationSettings) -> None:
-    """Raise a ValueError if the settings do not fit together, before any image is read."""
+    """Raise a ValueError if the settings do not fit together, before any image is read.
+
+    A detector of another package is made where it works only, in a process of its own.
+    """
     from ahf_ros.batch.identification import detector_of
+    from ahf_ros.detectors import is_foreign
     from ahf_ros.session import create_identifier
 
-    create_identifier(detector=detector_of(settings), settings=settings)
+    if not is_foreign(settings.detector):
+        create_identifier(detector=detector_of(settings), settings=settings)
 
 
 def print_outcome(command: str, outcome: ImageOutcome, output: TextIO | None, quiet: bool) -> None:
@@ -167,32 +182,32 @@ def print_outcome(command: str, outcome: ImageOutcome, output: TextIO | None, qu
     for message in outcome.messages:
         if message.level >= minimum:
             before = f'ahf {command}: ' if message.level == Level.PROBLEM else ''
-            print(f'{before}{message.text}', file=sys.stderr)
+            say(f'{before}{message.text}')
 
 
-def _hint(settings: IdentificationSettings, identified: int) -> str:
-    """Return a line that says what may help, empty if nothing does."""
+def _hint(settings: IdentificationSettings, identified: int) -> list[str]:
+    """Return a line that says what may help, none if nothing does."""
     from ahf_ros.batch.identification import detector_of
 
     family = detector_of(settings).family
     if not identified and family == AUTO:
-        return 'targets of all families were looked for\n'
+        return ['targets of all families were looked for']
     if not identified:
-        return f'targets of {family} were looked for; --family names others\n'
+        return [f'targets of {family} were looked for; --family names others']
     if settings.number or settings.estimate_expected:
-        return ''
+        return []
 
     from ahf_ros.detectors import EarlyStopping
 
     if isinstance(detector_of(settings), EarlyStopping):  # filters show it hardly more
-        return ''
-    return (
+        return []
+    return [
         'N is not given, so that no filter was searched for: with --expected-targets N, AHF '
-        'searches for a filter wherever an image shows fewer than N targets\n'
-    )
+        'searches for a filter wherever an image shows fewer than N targets'
+    ]
 
 
-def _advice(paths: Sequence[str], settings: IdentificationSettings) -> str:
+def _advice(paths: Sequence[str], settings: IdentificationSettings) -> list[str]:
     """Return lines on the first image in which nothing was identified that shows why."""
     from ahf_ros.advice import LOOKED_AT, advice
     from ahf_ros.interchange.image_files import read_image
@@ -204,8 +219,8 @@ def _advice(paths: Sequence[str], settings: IdentificationSettings) -> str:
         except ValueError:  # which the identification has said
             continue
         if lines:
-            return ''.join(f'{path}: {line}\n' for line in lines)
-    return ''
+            return [f'{path}: {line}' for line in lines]
+    return []
 
 
 def _tasks(
@@ -269,12 +284,12 @@ def _outcomes(
         yield from outcomes_in_order(engine, tasks)
         return
 
-    def say(text: str) -> None:
+    def noted(text: str) -> None:
         if not options.quiet:
-            print(text, file=sys.stderr)
+            say(text)
 
     with closing(Results(options.output)) as results:
-        yield from kept_outcomes_in_order(engine, tasks, results, say)
+        yield from kept_outcomes_in_order(engine, tasks, results, noted)
 
 
 def image_paths(arguments: Sequence[str]) -> tuple[list[str], list[str]]:

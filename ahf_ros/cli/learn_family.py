@@ -7,12 +7,11 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ahf_ros.cli import tell
+from ahf_ros.cli import say, tell
 from ahf_ros.cli.identify import image_paths
 from ahf_ros.cli.options import add_option
 from ahf_ros.detectors.contract import DetectorSettings
@@ -157,17 +156,16 @@ def _write_rings(
     write_whole(str(file), text.encode())
     ring_family(str(file))
     write_image(file.with_suffix('.png'), _contact_sheet(learnt, crops))
-    print(
+    say(
         f'{file}: {seen}, {learnt.bits} bits (log odds against the next number: '
         f'{learnt.lead:.0f}), band {inner:g} to {outer:g}, {learnt.polarity}, '
-        f'{f"pinhole {pinhole:g}, " if pinhole else ""}ink {learnt.growth:+.1f} px',
-        file=sys.stderr,
+        f'{f"pinhole {pinhole:g}, " if pinhole else ""}ink {learnt.growth:+.1f} px'
     )
-    print(f'{file}: words: {rules} (probability {learnt.likely[0][1]:.2f})', file=sys.stderr)
+    say(f'{file}: words: {rules} (probability {learnt.likely[0][1]:.2f})')
     for of in maybe:
-        print(f'{file}: {of}', file=sys.stderr)
+        say(f'{file}: {of}')
     for known in learnt.known():
-        print(f'{file}: {known} has all of these words and about this band', file=sys.stderr)
+        say(f'{file}: {known} has all of these words and about this band')
 
 
 def _crops(image: np.ndarray, bands: Bands) -> dict[bytes, np.ndarray]:
@@ -236,8 +234,7 @@ def _report(learnt: Learnt, base: PointFamily, options: argparse.Namespace) -> N
     sizes = [target.scale for target in learnt.targets]
     numbers = ', '.join(str(target.number) for target in learnt.targets)
     spread = max(np.hypot(*(target.template - base.template).T).max() for target in learnt.targets)
-    print(
+    say(
         f'{options.output}: {len(learnt.targets)} targets ({numbers}), {1 / np.mean(sizes):.4f} '
-        f'times the size of {base.name}, template within {spread:.3f} {base.unit} of it',
-        file=sys.stderr,
+        f'times the size of {base.name}, template within {spread:.3f} {base.unit} of it'
     )

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ahf_ros.cli import tell
+from ahf_ros.cli import say, tell
 from ahf_ros.cli.options import add_quiet, parsed_by
 from ahf_ros.cli.tables import identifiers, print_table
 from ahf_ros.text import decimals
@@ -242,13 +241,13 @@ def _show(points: MeasuredPoints, *found: Any) -> None:
         squares = np.mean([it.xyz**2 for it in off], axis=0)
         each = ', '.join(f'{value:.4g}' for value in np.sqrt(squares))
         text = f'RMS deviation x, y, z: {each}; of the distance: {np.sqrt(squares.sum()):.4g}'
-        print(f'{text} {points.unit}'.rstrip(), file=sys.stderr)
+        say(f'{text} {points.unit}'.rstrip())
     test: LengthTest | None = found[2]
     if test:
         text = f'largest length error: {test.largest.error:+.4g} {points.unit}'
         if test.passed is not None:
             text += ', all are permissible' if test.passed else ', NOT all are permissible'
-        print(text, file=sys.stderr)
+        say(text)
 
 
 def _write(folder: Path, *found: Any) -> None:

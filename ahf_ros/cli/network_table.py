@@ -10,6 +10,7 @@ from ahf_ros.cli.tables import print_table, terminal
 from ahf_ros.orientation.solution import Solution
 from ahf_ros.orientation.strength import what_to_photograph
 from ahf_ros.report import network_summary
+from ahf_ros.text import printable
 
 
 def print_network(solution: Solution, folder: str, console: Console | None = None) -> None:
@@ -32,4 +33,4 @@ def print_network(solution: Solution, folder: str, console: Console | None = Non
         print_table(f'{len(rejected)} left out', head, rejected, console)
     for mark, texts in (('yellow]!', solution.warnings), ('cyan]>', what_to_photograph(solution))):
         for text in texts:
-            console.print(f'[{mark}[/] {escape(text)}', highlight=False)
+            console.print(f'[{mark}[/] {escape(printable(text, len(text)))}', highlight=False)

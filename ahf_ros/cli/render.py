@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 from ahf_ros import ending
-from ahf_ros.cli import tell
+from ahf_ros.cli import say, tell
 from ahf_ros.cli.options import add_option, settings_from
 from ahf_ros.interchange.image_files import write_image
 from ahf_ros.interchange.truth_files import read_truth, write_truth
@@ -52,7 +51,7 @@ def run(options: Namespace) -> int:
             truth[name] = tuple(map(TrueTarget.of, rendering.targets))
             write_truth(truth_path, truth)
             count = len(rendering.targets)
-            print(f'{options.folder / name}: {count} targets', file=sys.stderr)
+            say(f'{options.folder / name}: {count} targets')
     except ValueError as error:  # of a file, or an impossible scene
         tell('render', error)
         return 1

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from functools import partial
 from pathlib import Path
 
-from ahf_ros.cli import tell
+from ahf_ros.cli import say, tell
 from ahf_ros.cli.engines import progress_bar
 from ahf_ros.cli.options import add_options, add_quiet, settings_from
 from ahf_ros.interchange.truth_files import read_truth
@@ -68,5 +67,5 @@ def run(options: argparse.Namespace) -> int:
     if not options.quiet:
         size = options.output.stat().st_size / 1e6
         count = counted(len(results), 'image')
-        print(f'{options.output}: {count}, {size:.1f} MB', file=sys.stderr)
+        say(f'{options.output}: {count}, {size:.1f} MB')
     return int(bool(problems or lost))

@@ -6,6 +6,8 @@ import sys
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
+from ahf_ros.text import printable
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -43,13 +45,16 @@ def print_table(
     from rich.markup import escape
     from rich.table import Table
 
+    def cell(text: str) -> str:
+        return escape(printable(text, len(text)))
+
     rows = list(rows)
-    table = Table(title=escape(title), title_justify='left', title_style='bold')
+    table = Table(title=cell(title), title_justify='left', title_style='bold')
     table.show_header = any(head)
     for number, name in enumerate(head):
         table.add_column(escape(name), justify='right' if number and name != 'why' else 'left')
     for row in rows[:_ROWS]:
-        table.add_row(*map(escape, row))
+        table.add_row(*map(cell, row))
     if len(rows) > _ROWS:
         table.add_row(f'and {len(rows) - _ROWS} more', *[''] * (len(head) - 1))
     (console or terminal()).print(table)

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
-from ahf_ros.cli import tell
+from ahf_ros.cli import say, tell
 from ahf_ros.cli.options import add_options, settings_from
 from ahf_ros.interchange.files import write_whole
 from ahf_ros.printing.files import geometry_text, sheet_files
@@ -54,10 +53,7 @@ def run(options: argparse.Namespace) -> int:
     if failed:
         return 1
     pages = counted(sheets.count, 'page')
-    print(
-        f'{options.output}: {sheets.title}, on {pages} {sheets.settings.paper.name}',
-        file=sys.stderr,
-    )
+    say(f'{options.output}: {sheets.title}, on {pages} {sheets.settings.paper.name}')
     if sheets.settings.best:
-        print(f'IDs: {", ".join(map(str, sheets.numbers))}', file=sys.stderr)
+        say(f'IDs: {", ".join(map(str, sheets.numbers))}')
     return 0

@@ -58,6 +58,7 @@ __all__ = [
     'create_detector',
     'detector_name',
     'estimator',
+    'is_foreign',
 ]
 
 GROUP = 'ahf_ros.detectors'
@@ -213,6 +214,11 @@ def _several(settings: DetectorSettings) -> Detector:
         tuple(map(tuple, groups.values())),
         lambda families: create_detector(settings=settings.narrowed(families)),
     )
+
+
+def is_foreign(name: str) -> bool:
+    """Return whether a detector is of another package, which may end its process."""
+    return name in _ADDED
 
 
 def check_expected_ids(ids: Iterable[int], name: str, settings: DetectorSettings) -> None:

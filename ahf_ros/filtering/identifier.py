@@ -181,6 +181,21 @@ class Identifier:
         """Forget what worked for earlier images."""
         self.memory = Memory()
 
+    @property
+    def expected(self) -> int:
+        """N, the number of coded targets in every image; 0 where it is unknown."""
+        return len(self._settings.listed) or self._expected_targets
+
+    @one_blas_thread()
+    def seen(self, stack: ImageStack) -> list[Target]:
+        """Return the targets of an image, or of the first combination, as it is received.
+
+        It is part of no identification, and leaves nothing to the next one.
+        """
+        trials = self._trials(stack)
+        trials.count(trials.plain[0])
+        return trials.targets[trials.plain[0]]
+
     @deprecated_arguments(positions=('expected_targets',))
     @one_blas_thread()
     def identify(

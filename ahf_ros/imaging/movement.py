@@ -10,7 +10,7 @@ displacement, the scene moved by this.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -53,11 +53,20 @@ Gradients = tuple[np.ndarray, np.ndarray]
 
 @dataclass(frozen=True, slots=True)
 class Displacement:
-    """A displacement of a scene between two images and the deviation of its length, px."""
+    """A displacement of a scene between two images and the deviation of its length, px.
+
+    `region` is the part of the image that shows it: its edges left, top, right and bottom, px.
+    """
 
     x: float
     y: float
     deviation: float
+    region: tuple[float, float, float, float] = (-np.inf, -np.inf, np.inf, np.inf)
+
+    def covers(self, x: float, y: float) -> bool:
+        """Return whether a point is in the region."""
+        left, top, right, bottom = self.region
+        return left <= x < right and top <= y < bottom
 
     def exceeds(self, minimum: float) -> bool:
         """Return whether it is longer than a minimum, and significant."""
@@ -232,7 +241,10 @@ def displacement(edges: Edges, image: np.ndarray) -> Displacement | None:
     for number in range(_TILES**2):
         part = _measured(edges.normals[tile == number], found[tile == number])
         if part and part.exceeds(_MINIMUM_PART_SHIFT):
-            return part
+            row, column = divmod(number, _TILES)
+            left, top = column * width / _TILES, row * height / _TILES
+            region = left, top, left + width / _TILES, top + height / _TILES
+            return replace(part, region=region)
     return None
 
 

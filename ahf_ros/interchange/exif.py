@@ -10,7 +10,8 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-from ahf_ros.interchange.files import is_url, read_bytes
+from ahf_ros.interchange.files import check_regular, is_url, read_bytes
+from ahf_ros.interchange.image_files import MAXIMUM_BYTES
 
 FILM_DIAGONAL = math.hypot(36, 24)
 """Diagonal of a film frame, mm, which equivalent focal lengths refer to (CIPA DCG-001)."""
@@ -47,6 +48,7 @@ def read_exif(path: str | Path) -> tuple[Exif, tuple[int, int]]:
         raise ModuleNotFoundError(
             "Pillow is needed to read Exif data: pip install 'ahf_ros[orient]'"
         ) from error
+    check_regular(path, MAXIMUM_BYTES)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter('ignore')  # large images, damaged fields

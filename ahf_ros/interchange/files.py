@@ -10,6 +10,7 @@ import io
 import os
 import re
 import sqlite3
+import stat
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -17,7 +18,7 @@ from importlib import import_module
 from pathlib import Path, PurePath
 from typing import Any, BinaryIO
 
-from ahf_ros.text import reason_of, shown
+from ahf_ros.text import printable, reason_of, shown
 
 _fcntl: Any
 try:
@@ -29,6 +30,8 @@ RESULTS_FILE = 'results.jsonl'
 """Name of the file in a folder that `ahf identify --output` writes."""
 
 _LOCK_FILE = '.lock'
+_APOSTROPHE = "'"
+_FORMULA = frozenset('=+-@')  # how a formula begins; tabs and line ends are escaped
 _TRY_LOCK = 0.1  # s between two attempts
 _URL = re.compile(r'[a-z][a-z0-9+.-]*://', re.IGNORECASE)
 _CHANGED = ('mtime', 'LastModified', 'last_modified', 'updated', 'ETag', 'created')
@@ -99,6 +102,21 @@ def read_bytes(path: str | Path) -> bytes:
         return Path(path).read_bytes()
 
 
+def check_regular(path: str | Path, most: int) -> None:
+    """Raise a ValueError for a pipe or device, which may never end, and a file over `most` bytes.
+
+    URLs are not looked at.
+    """
+    if is_url(str(path)):
+        return
+    with file_errors(path, 'read'):
+        status = Path(path).stat()
+    if not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)):
+        raise ValueError(f'{path} cannot be read: it is not a regular file')
+    if status.st_size > most:
+        raise ValueError(f'{path} has {status.st_size} bytes, accepted are at most {most}')
+
+
 def read_text(path: str | Path) -> str:
     """Return the text of a UTF-8 file, or raise a ValueError that names the file."""
     try:
@@ -121,10 +139,44 @@ def write_whole(path: str | Path, content: bytes) -> None:
 
 
 def csv_table(rows: Iterable[Sequence[object]]) -> bytes:
-    """Return rows as CSV in UTF-8."""
+    """Return rows as CSV in UTF-8, in which no text is a formula or has control characters.
+
+    Before a text that a spreadsheet would compute stands an apostrophe, as OWASP advises;
+    `csv_text` takes it away.
+    """
     file = io.StringIO()
-    csv.writer(file, lineterminator='\n').writerows(rows)
+    lines = csv.writer(file, lineterminator='\n')
+    lines.writerows([_csv_cell(cell) for cell in row] for row in rows)
     return file.getvalue().encode()
+
+
+def csv_text(cell: str) -> str:
+    """Return the text of a cell that `csv_table` has written.
+
+    Examples
+    --------
+    >>> csv_text("'=1+1"), csv_text("'a'"), csv_text('-1')
+    ('=1+1', "'a'", '-1')
+    """
+    return cell[1:] if cell.startswith(_APOSTROPHE) and _is_formula(cell) else cell
+
+
+def _csv_cell(value: object) -> object:
+    if not isinstance(value, str):
+        return value
+    text = printable(value, len(value))
+    return _APOSTROPHE + text if _is_formula(text) else text
+
+
+def _is_formula(text: str) -> bool:
+    """Return whether a spreadsheet would compute a text without the apostrophes before it."""
+    if text.lstrip(_APOSTROPHE)[:1] not in _FORMULA:
+        return False
+    try:
+        float(text)
+    except ValueError:
+        return True
+    return False
 
 
 @contextmanager

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import struct
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
@@ -18,20 +18,38 @@ import numpy as np
 
 from ahf_ros.deprecation import deprecated_arguments
 from ahf_ros.imaging.image import check_size
-from ahf_ros.interchange.files import read_bytes, write_whole
+from ahf_ros.imaging.tiff import first_directory, is_tiff
+from ahf_ros.imaging.whole import decoded
+from ahf_ros.interchange.files import check_regular, read_bytes, write_whole
 
 SUFFIXES = ('.bmp', '.jpeg', '.jpg', '.png', '.tif', '.tiff')
 """Endings of the image files that are tested; others are tried."""
+
+MAXIMUM_BYTES = 2**31 - 1
+"""Bytes that an image file may have; OpenCV counts them as an int."""
 
 UPRIGHT = 1
 """Orientation of an image whose first row is the upper one and whose first column is the left."""
 
 _PNG = b'\x89PNG\r\n\x1a\n'
 _WIDTH, _HEIGHT, _ORIENTATION = 256, 257, 274  # tags of TIFF
-_LAYOUTS = {1: 'B', 3: 'H', 4: 'L', 16: 'Q'}  # of integers, by the type of a TIFF field
 _FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}  # JPEG markers with the size
-_FIELDS = 4096  # of a directory, that are read at most
 _DAMAGES = struct.error, ValueError, OverflowError  # of headers
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NotedImage:
+    """An image from a file, of shape (height, width), and what there is to say about the file.
+
+    `orientation` is as in Exif, 1 to 8. `note` is a line for people on it, empty where the pixels
+    are upright. `damage` says what is missing, empty where the image is whole: decoders fill up
+    the rest, so targets may be found in what is left.
+    """
+
+    image: np.ndarray
+    orientation: int = UPRIGHT
+    note: str = ''
+    damage: str = ''
 
 
 @deprecated_arguments(names={'turned': 'upright'})
@@ -67,23 +85,23 @@ def read_image(path: str | Path, *, upright: bool = False) -> np.ndarray:
     >>> image.shape, image.dtype, int(image[-1, -1])
     ((20, 20), dtype('uint16'), 399)
     """
-    return read_noted_image(path, upright=upright)[0]
+    return read_noted_image(path, upright=upright).image
 
 
-def read_noted_image(path: str | Path, *, upright: bool = False) -> tuple[np.ndarray, str]:
-    """Return an image as `read_image` does, and a line for people on the orientation in its file.
-
-    The line is empty if the file notes none.
-    """
-    image, orientation = _decoded(read_bytes(path), str(path))
-    if orientation == UPRIGHT:
-        return image, ''
+def read_noted_image(path: str | Path, *, upright: bool = False) -> NotedImage:
+    """Return an image as `read_image` does, with what there is to say about its file."""
+    check_regular(path, MAXIMUM_BYTES)
+    noted = _decoded(read_bytes(path), str(path))
+    if noted.orientation == UPRIGHT:
+        return noted
     if upright:
-        image = as_oriented(image, orientation)
+        image = as_oriented(noted.image, noted.orientation)
         done, of = 'is applied', 'the upright image'
     else:
+        image = noted.image
         done, of = 'is not applied', 'the pixels'
-    return image, f'{path}: orientation {orientation} {done}; coordinates are those of {of}'
+    note = f'{path}: orientation {noted.orientation} {done}; coordinates are those of {of}'
+    return replace(noted, image=image, note=note)
 
 
 def as_oriented(image: np.ndarray, orientation: int) -> np.ndarray:
@@ -100,16 +118,16 @@ def as_oriented(image: np.ndarray, orientation: int) -> np.ndarray:
     return np.ascontiguousarray(image)
 
 
-def decode_bytes(encoded: bytes, name: str) -> np.ndarray:
-    """Return the gray values of an encoded image, as `read_image` does.
+def decode_bytes(encoded: bytes, name: str) -> NotedImage:
+    """Return an encoded image with the gray values that `read_image` returns.
 
     Errors call the image `name`. `encoded` may be any object with a buffer.
     """
-    return _decoded(bytes(encoded), name)[0]
+    return _decoded(bytes(encoded), name)
 
 
-def _decoded(content: bytes, name: str) -> tuple[np.ndarray, int]:
-    """Return the gray values of an encoded image as they are stored, and its orientation."""
+def _decoded(content: bytes, name: str) -> NotedImage:
+    """Return an encoded image as its pixels are stored."""
     if not content:
         raise ValueError(f'{name} is empty, accepted is an image')
     header = read_header(content)
@@ -121,14 +139,13 @@ def _decoded(content: bytes, name: str) -> tuple[np.ndarray, int]:
         struct.pack_into(layout, stored, place, UPRIGHT)
     flags = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
     try:
-        image = cv2.imdecode(stored, flags)
+        image, damage = decoded(stored, flags)
     except cv2.error as error:  # for instance if the header says that the image is too large
         raise ValueError(f'{name} cannot be decoded: {error.err}') from error
     if image is None:
-        raise ValueError(
-            f'{name} is not an image, or is damaged; accepted is one of {", ".join(SUFFIXES)}'
-        )
-    return image, header.orientation
+        what = f'is damaged: {damage}' if damage else 'is not an image, or is damaged'
+        raise ValueError(f'{name} {what}; accepted is one of {", ".join(SUFFIXES)}')
+    return NotedImage(image, header.orientation, damage=damage)
 
 
 def write_image(path: str | Path, image: np.ndarray) -> None:
@@ -182,7 +199,7 @@ def read_header(content: bytes) -> ImageHeader:
             return _png(content)
         if content.startswith(b'\xff\xd8'):
             return _jpeg(content)
-        if content[:4] in (b'II*\0', b'MM\0*', b'II+\0', b'MM\0+'):
+        if is_tiff(content):
             return _tiff(content)
         if content.startswith(b'BM'):
             width, height = struct.unpack_from('<ii', content, 18)
@@ -231,20 +248,15 @@ def _exif(content: bytes) -> int:
 
 def _tiff(content: bytes) -> ImageHeader:
     """Return what the fields with one integer in the first directory say."""
-    order = '<' if content[:2] == b'II' else '>'
-    big = content[2:4] in (b'+\0', b'\0+')
-    offset_at, word, count_layout, field = (8, 'Q', 'Q', 'HHQ') if big else (4, 'L', 'H', 'HHL')
-    (start,) = struct.unpack_from(order + word, content, offset_at)
-    (count,) = struct.unpack_from(order + count_layout, content, start)
-    place = start + struct.calcsize(order + count_layout)
-    found: dict[int, tuple[int, tuple[int, str]]] = {}
-    for _ in range(min(count, _FIELDS)):
-        tag, kind, values = struct.unpack_from(order + field, content, place)
-        place += struct.calcsize(order + field)
-        if values == 1 and kind in _LAYOUTS:
-            layout = order + _LAYOUTS[kind]
-            found[tag] = struct.unpack_from(layout, content, place)[0], (place, layout)
-        place += struct.calcsize(order + word)
-    width, height = (found.get(tag, (0, None))[0] for tag in (_WIDTH, _HEIGHT))
-    orientation, orientation_at = found.get(_ORIENTATION, (UPRIGHT, None))
-    return ImageHeader(width, height, orientation, orientation_at)
+    fields = {tag: it for tag, it in first_directory(content).items() if it.count == 1}
+
+    def value(tag: int, default: int) -> int:
+        return int(fields[tag].values(content)[0]) if tag in fields else default
+
+    noted = fields.get(_ORIENTATION)
+    return ImageHeader(
+        value(_WIDTH, 0),
+        value(_HEIGHT, 0),
+        value(_ORIENTATION, UPRIGHT),
+        (noted.place, noted.layout) if noted else None,
+    )

@@ -12,7 +12,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from ahf_ros.interchange.image_files import decode_bytes
+from ahf_ros.interchange.image_files import NotedImage, decode_bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,8 +150,8 @@ def _gray(samples: np.ndarray, encoding: Encoding) -> np.ndarray:
     return cv2.cvtColor(np.ascontiguousarray(samples), encoding.to_gray)
 
 
-def decode_compressed(message: Any) -> np.ndarray:
-    """Return the gray image of a sensor_msgs/CompressedImage, of shape (height, width).
+def decode_compressed(message: Any) -> NotedImage:
+    """Return the gray image of a sensor_msgs/CompressedImage, and whether it is damaged.
 
     It holds a file that OpenCV reads, such as a JPEG, or a PNG of 8 or 16 bit; if not, a
     ValueError is raised.

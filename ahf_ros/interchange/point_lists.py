@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ahf_ros.interchange.files import read_text
+from ahf_ros.interchange.files import csv_text, read_text
 
 
 def read_point_list(path: str | Path) -> dict[str, np.ndarray]:
@@ -33,7 +33,7 @@ def read_point_list(path: str | Path) -> dict[str, np.ndarray]:
                 raise ValueError(
                     f'{path}, line {number}: {name} is {cell!r}, accepted is a finite number'
                 )
-        label = cells[0]
+        label = csv_text(cells[0])
         if label in points:
             raise ValueError(
                 f'{path}, line {number}: label is {label!r}, which line {lines[label]} has '

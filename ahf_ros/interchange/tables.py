@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from ahf_ros.interchange.files import read_text
+from ahf_ros.interchange.files import csv_text, read_text
 from ahf_ros.text import shown
 
 
@@ -119,6 +119,6 @@ def _cells(lines: list[str], delimiter: str, path: str) -> Iterator[tuple[int, l
     try:
         for cells in reader:
             if any(cell.strip() for cell in cells) and not cells[0].startswith('#'):
-                yield reader.line_num, [cell.strip() for cell in cells]
+                yield reader.line_num, [csv_text(cell.strip()) for cell in cells]
     except csv.Error as error:
         raise ValueError(f'{path}, line {reader.line_num}: {error}') from error

@@ -7,7 +7,13 @@ import math
 from pathlib import Path
 from typing import Any
 
-from ahf_ros.interchange.files import checked_file_name, csv_table, read_text, write_whole
+from ahf_ros.interchange.files import (
+    checked_file_name,
+    csv_table,
+    csv_text,
+    read_text,
+    write_whole,
+)
 from ahf_ros.target import UNDECODED, TrueTarget, Truth
 from ahf_ros.target_check import MAXIMUM_ID, MAXIMUM_LENGTH_PX
 from ahf_ros.text import shown
@@ -37,8 +43,9 @@ def read_truth(path: str | Path) -> dict[str, tuple[TrueTarget, ...]]:
             raise ValueError(f'{path} has no column {", ".join(sorted(missing))}')
         for row in rows:
             where = f'{path}, line {rows.line_num}'
-            name = checked_file_name(row['image'], f'{where}: image')
-            if images.setdefault(name, row['image']) != row['image']:
+            image = csv_text(row['image'] or '')
+            name = checked_file_name(image, f'{where}: image')
+            if images.setdefault(name, image) != image:
                 raise ValueError(
                     f'{where}: {name} is in two folders, accepted is one image a name'
                 )

@@ -38,7 +38,7 @@ from ahf_ros.target import (
     UndecodedTarget,
     count_codes,
 )
-from ahf_ros.text import reason_of
+from ahf_ros.text import printable, reason_of
 
 _PAGE = Path(__file__).parent / 'page'  # the template, and the styles and scripts that it holds
 _SCRIPTS = ('data', 'table', 'viewer', 'plots', 'details', 'overview', 'main')  # in their order
@@ -101,8 +101,8 @@ def row(
         missed = sorted(number for number, _, _ in judged['missed'])
     expected = len(known) if known else result.expected
     return {
-        'image': result.image,
-        'images': list(result.images),
+        'image': printable(result.image, len(result.image)),
+        'images': [printable(it, len(it)) for it in result.images],
         'combination': result.combination,
         'width': result.width,
         'height': result.height,

@@ -9,20 +9,24 @@ from collections import Counter
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
+from zlib import crc32
 
+import cv2
 import numpy as np
 import pytest
 
 pytest.importorskip('rosbags', reason='rosbags is not installed')
 
 import zstandard
-from mcap.writer import Writer
+from mcap.records import Chunk
+from mcap.stream_reader import StreamReader
+from mcap.writer import CompressionType, Writer
 from rosbags import rosbag1, rosbag2
 from rosbags.interfaces import QosDurability
 from ruamel.yaml import YAML
 
 from ahf_ros.bag import source as sources
-from ahf_ros.bag.definitions import IMAGE, MAXIMUM_DEFINITION, typestore
+from ahf_ros.bag.definitions import COMPRESSED_IMAGE, IMAGE, MAXIMUM_DEFINITION, typestore
 from ahf_ros.bag.output import Journal
 from ahf_ros.bag.source import Source
 from ahf_ros.cli import main
@@ -408,3 +412,88 @@ def test_more_topics_than_can_be_written_in_time_are_refused(tmp_path: Path, run
     channels = [mcap.channel(number, 0, f'/t{number}') for number in range(2, 2002)]
     source = mcap.McapFile([*image_records(), *channels]).write(tmp_path / 'in.mcap')
     assert 'has 2001 topics, accepted are at most 2000' in run(source, 1)
+
+
+def test_a_damaged_image_is_answered_and_named(tmp_path: Path, run: Run) -> None:
+    store = typestore()
+    messages = []
+    for number, suffix in enumerate(('.png', '.jpg'), start=1):
+        message = bags.compressed(store, np.tile(PIXELS[0], (4, 4)), number * 10**8)
+        data = cv2.imencode(suffix, np.tile(PIXELS[0], (4, 4)))[1].ravel()
+        message.data = data if suffix == '.png' else np.delete(data, slice(-300, -2))
+        messages.append(('/image', COMPRESSED_IMAGE, number * 10**8, message))
+    source = bags.write_ros2(tmp_path / 'in', messages)
+    for _ in range(2):  # what was finished is known, too
+        said = run(source, 1)
+        assert '2 images answered, 1 of them damaged' in said
+    assert counts(tmp_path / 'out') == {'/image': 2, '/image/coded_targets': 2}
+
+
+@pytest.mark.parametrize('compressed', [False, True])
+def test_a_cut_file_says_where_and_gives_what_is_before(
+    tmp_path: Path, run: Run, compressed: bool
+) -> None:
+    noise = np.random.default_rng(0).integers(0, 255, (3, 400, 500), np.uint8)
+    store = typestore()
+    images = [bytes(store.serialize_cdr(bags.image(store, it, 10**8), IMAGE)) for it in noise]
+    messages = [mcap.message(1, it * 10**8, of) for it, of in enumerate(images, start=1)]
+    whole = mcap.chunk(b''.join([*IMAGES, *messages]), 10**8, 3 * 10**8, compressed=compressed)
+    source = mcap.McapFile([whole]).write(tmp_path / 'in.mcap')
+    content = source.read_bytes()
+    source.write_bytes(content[:450_000])
+    errors = run(source, 1)
+    assert '2 images answered' in errors
+    assert 'the file is cut in a message of /image at 0.300000000 s' in errors
+    assert counts(tmp_path / 'out') == {'/image': 2, '/image/coded_targets': 2}
+
+
+def test_a_file_that_is_cut_before_its_first_message_says_so(tmp_path: Path, run: Run) -> None:
+    chunk = mcap.chunk(b''.join([*IMAGES, mcap.message(1, 5, serialized()[0])]), 5, 5)
+    source = mcap.McapFile([chunk]).write(tmp_path / 'in.mcap')
+    source.write_bytes(source.read_bytes()[:150])
+    errors = run(source, 1)
+    cut = 'the file is cut in a chunk with messages from 0.000000005 to 0.000000005 s'
+    assert f'has no images that can be read: in.mcap: nothing can be read: {cut}' in errors
+
+
+def test_a_chunk_that_is_there_again_is_said(tmp_path: Path, run: Run) -> None:
+    one, two, _ = serialized()
+    first, second = (
+        mcap.chunk(mcap.message(1, it, of), it, it) for it, of in ((1, one), (5, two))
+    )
+    source = mcap.McapFile([*IMAGES, first, second, first]).write(tmp_path / 'in.mcap')
+    again = 'left out: in.mcap: a chunk with messages from 0.000000001 to 0.000000001 s'
+    assert again in run(source, 0)
+    assert counts(tmp_path / 'out') == {'/image': 2, '/image/coded_targets': 2}
+
+
+def test_a_chunk_that_its_index_names_twice_is_said(tmp_path: Path, run: Run) -> None:
+    source = tmp_path / 'in.mcap'
+    with source.open('wb') as file:
+        writer = Writer(file, chunk_size=1, compression=CompressionType.NONE)
+        writer.start(profile='ros2')
+        schema = writer.register_schema(IMAGE, 'ros2msg', definition(IMAGE).encode())
+        channel = writer.register_channel('/image', 'cdr', schema)
+        for _ in range(3):  # the first one is in a chunk with the schema
+            writer.add_message(channel, 10, serialized()[0], 10)
+        writer.finish()
+    assert 'which is there again' in run(source, 0)
+    assert counts(tmp_path / 'out') == {'/image': 2, '/image/coded_targets': 2}
+
+
+def test_chunks_are_written_with_their_checksums(tmp_path: Path) -> None:
+    assert status(recorded(tmp_path), tmp_path / 'out') == 0
+    (made,) = (tmp_path / 'out').glob('*.mcap')
+    with made.open('rb') as file:
+        reader = StreamReader(file, emit_chunks=True)
+        chunks = [it for it in reader.records if isinstance(it, Chunk)]
+    assert chunks
+    assert all(it.uncompressed_crc == crc32(it.data) for it in chunks)
+
+
+def test_an_output_in_the_recording_is_refused(tmp_path: Path, capfd) -> None:
+    source = recorded(tmp_path)
+    for of in (source, next(source.glob('*.mcap'))):
+        assert status(of, source / 'out') == 1
+        assert 'which is in the recording' in capfd.readouterr().err
+    assert not (source / 'out').exists()

@@ -181,20 +181,48 @@ class Field:
         for _ in range(2):
             os.kill(os.getpid(), signal.SIGINT)
             time.sleep(0.1)
-class MyDetector:
-    name = family = 'mine'
+class Settings:
     field = Field()
-    def __init__(self, settings):
-        pass
-    def __call__(self, image):
-        return []
+"""
+IMPORTING = """
+import sys, time
+from ahf_ros import ending
+try:
+    with ending.handled():
+        import interrupting
+        time.sleep(60)
+except KeyboardInterrupt:
+    sys.exit(130)
 """
 
 
-def test_a_signal_that_an_import_would_lose_ends_the_command(tmp_path: Path, image: Path) -> None:
-    packages.write_package(tmp_path, 'interrupting', INTERRUPTING)
-    process = start('identify', '--json', image, '--detector', 'mine', path=tmp_path)
+def test_a_signal_that_an_import_would_lose_ends_the_process(tmp_path: Path) -> None:
+    (tmp_path / 'interrupting.py').write_text(INTERRUPTING)
+    environment = {**os.environ, 'PYTHONPATH': f'{ROOT}{os.pathsep}{tmp_path}'}
+    process = subprocess.Popen(
+        [sys.executable, '-c', IMPORTING],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env=environment,
+    )
     assert end_of(process) == (130, b'', b'')
+
+
+@pytest.mark.parametrize(
+    ('where', 'command'), [('import', 'identify'), ('__init__', 'bag'), ('__call__', 'identify')]
+)
+def test_a_detector_of_another_package_that_ends_its_process_is_said(
+    tmp_path: Path, image: Path, where: str, command: str
+) -> None:
+    body = 'import os\nclass MyDetector:\n    name = family = "mine"\n'
+    for name in ('__init__', '__call__'):
+        body += f'    def {name}(self, _):\n        {"os._exit(0)" if name == where else "pass"}\n'
+    packages.write_package(tmp_path, 'leaving', body + 'os._exit(0)\n' * (where == 'import'))
+    bag = bags.write_ros2(tmp_path / 'in', bags.recorded(typestore(), [RAMP]))
+    inputs = [image] if command == 'identify' else [bag, tmp_path / 'out']
+    status, _, errors = end_of(start(command, *inputs, '--detector', 'mine', path=tmp_path))
+    assert status == 1
+    assert b'2 processes that worked on it died, the last with status 0' in errors
 
 
 def test_workers_end_with_their_parent_and_a_rerun_is_accepted(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ahf_ros.cli.identify import image_paths
-from ahf_ros.interchange.image_files import as_oriented, read_image
+from ahf_ros.interchange.image_files import as_oriented, read_image, write_image
 from ahf_ros.interchange.target_json import read_results
 from ahf_ros.synthetic.scene import SceneSettings, render
 from support.command_line import status
@@ -125,3 +125,53 @@ def test_commands_and_options_are_completed(tmp_path: Path, line: str, completed
     command = [sys.executable, '-m', 'ahf_ros.cli']
     subprocess.run(command, env=os.environ | asked, check=True, timeout=120)
     assert answer.read_text().split() == [completed]
+
+
+def test_a_damaged_image_is_named_and_the_rest_goes_on(tmp_path, capfd):
+    scene = render(SceneSettings(width=400, height=300, targets=4, dot_radius=10.0)).image
+    whole = cv2.imencode('.jpg', scene)[1].tobytes()
+    (tmp_path / 'a.jpg').write_bytes(whole[: len(whole) // 2] + whole[-2:])
+    (tmp_path / 'b.jpg').write_bytes(whole[: len(whole) // 2])
+    (tmp_path / 'c.jpg').write_bytes(whole)
+    assert status('identify', tmp_path, '--detector', 'traditional', '--json') == 1
+    said = capfd.readouterr()
+    assert 'a.jpg: the image is damaged: Corrupt JPEG data' in said.err
+    assert 'b.jpg' in said.err
+    assert 'it has no end marker, so it is cut' in said.err
+    assert 'c.jpg: the image is damaged' not in said.err
+    assert 'c.jpg' in said.out
+
+
+def test_what_is_no_file_is_named_at_once_and_the_rest_goes_on(tmp_path, capfd):
+    scene = render(SceneSettings(width=400, height=300, targets=4, dot_radius=10.0)).image
+    write_image(tmp_path / 'c.png', scene)
+    os.mkfifo(tmp_path / 'a.png')
+    with (tmp_path / 'b.png').open('wb') as large:
+        large.truncate(2**31)
+    assert status('identify', tmp_path, '--detector', 'traditional', '--json') == 1
+    said = capfd.readouterr()
+    assert 'a.png cannot be read: it is not a regular file' in said.err
+    assert 'b.png has 2147483648 bytes, accepted are at most 2147483647' in said.err
+    assert 'c.png' in said.out
+    for family in (tmp_path / 'a.png', tmp_path / 'b.png', '/dev/zero'):
+        assert status('identify', tmp_path / 'c.png', '--family-file', family) == 2
+
+
+def test_names_cannot_command_a_terminal_or_a_spreadsheet(tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    scene = render(SceneSettings(width=320, height=240, targets=3, dot_radius=8)).image
+    write_image('=1+1.png', scene)
+    write_image('a\x1b[31m\n.png', scene)
+    Path('no\x1b.png').write_text('no image')
+    options = '--family', 'metashape12', '--output', 'results'
+    assert status('identify', tmp_path, *options) == 1
+    said = capfd.readouterr().err
+    assert 'a\\x1b[31m\\n.png' in said
+    assert 'no\\x1b.png is not an image' in said
+    assert status('report', 'results', '--output', 'page.html') == 0
+    page = Path('page.html').read_text()
+    assert 'x1b[31m' in page
+    assert '\x1b' not in said + page
+    assert '\\u001b' not in page
+    assert status('identify', '=1+1.png', *options[:2], '--export', 'csv=csv') == 0
+    assert "\n'=1+1.png," in Path('csv/targets.csv').read_text()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import resource
+import signal
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -101,6 +103,49 @@ def test_a_program_that_writes_without_end_is_ended(tmp_path, monkeypatch):
     script = 'import os\nwhile True:\n    os.write(1, bytes(2**16))\n'
     with pytest.raises(ValueError, match='bytes, accepted are at most 1048576'):
         detector(tmp_path, script)(IMAGE)
+
+
+def test_a_program_ends_with_all_that_it_started_in_sessions_of_their_own(tmp_path):
+    pid = tmp_path / 'pid'
+    script = (
+        'import subprocess, sys\n'
+        'code = "import time; time.sleep(600)"\n'
+        'child = subprocess.Popen([sys.executable, "-c", code], start_new_session=True)\n'
+        f'open({str(pid)!r}, "w").write(str(child.pid))\n'
+    )
+    assert detector(tmp_path, script + printing('{"targets": []}'))(IMAGE) == []
+    limit = time.monotonic() + 60
+    while _runs(int(pid.read_text())):
+        assert time.monotonic() < limit
+        time.sleep(0.1)
+
+
+@pytest.mark.parametrize('when', ['before', 'meanwhile'])
+def test_a_temporary_folder_that_vanishes_is_named(tmp_path, monkeypatch, when):
+    scratch = tmp_path / 'scratch'
+    scratch.mkdir()
+    monkeypatch.setattr('tempfile.tempdir', str(scratch))
+    script = f'import shutil\nshutil.rmtree({str(scratch)!r})\n' + printing('{"targets": []}')
+    made = detector(tmp_path, script)
+    if when == 'before':
+        scratch.rmdir()
+    with pytest.raises(ValueError, match='the temporary folder cannot be used: No such file'):
+        made(IMAGE)
+
+
+def test_a_temporary_folder_that_is_full_is_named(tmp_path, monkeypatch):
+    monkeypatch.setattr('tempfile.tempdir', str(tmp_path))
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    image = np.random.default_rng(0).integers(0, 255, (300, 300), np.uint8)
+    made = detector(tmp_path, printing('{"targets": []}'))
+    before = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limits[1]))
+    try:
+        with pytest.raises(ValueError, match='folder cannot be used: File too large'):
+            made(image)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        signal.signal(signal.SIGXFSZ, before)
 
 
 def _runs(pid: int) -> bool:

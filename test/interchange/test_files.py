@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import os
 import re
 from pathlib import Path
@@ -9,8 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ahf_ros.interchange.files import write_whole
+from ahf_ros.interchange.files import csv_table, write_whole
 from ahf_ros.interchange.image_files import write_image
+from ahf_ros.interchange.tables import read_table
 from ahf_ros.interchange.truth_files import write_truth
 from ahf_ros.target import TrueTarget
 from support.disk import room_for
@@ -62,3 +64,14 @@ def test_a_device_is_written_to_and_stays_one() -> None:
     with pytest.raises(ValueError, match='/dev/full cannot be written: No space left on device'):
         write_whole('/dev/full', b'content')
     assert Path('/dev/null').is_char_device() and Path('/dev/full').is_char_device()
+
+
+def test_tables_hold_no_formula_and_read_back(tmp_path):
+    names = ['=1+1', '+a', '-a', '@a', "'=1", "''-x", "'a", 'a=', '-1.5', '+2', 'a,b', '']
+    path = tmp_path / 'table.csv'
+    path.write_bytes(csv_table([('id', 'x'), *((name, '-0.25') for name in names)]))
+    cells = [line[0] for line in csv.reader(path.read_text().splitlines())][1:]
+    assert cells[:6] == ["'=1+1", "'+a", "'-a", "'@a", "''=1", 3 * "'" + '-x']
+    assert cells[6:] == names[6:]
+    assert [row.cells['id'] for row in read_table(path, ('id', 'x'))[1]] == names
+    assert '\t' not in csv_table([('\t=1',)]).decode()

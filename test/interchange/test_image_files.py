@@ -135,7 +135,7 @@ def header_of(content: bytes) -> tuple[int, int, int]:
 def test_pixels_of_tiff_are_those_that_are_stored(orientation, order, pixels):
     content = tiff(pixels, orientation, order)
     stored = pixels if pixels.ndim == 2 else pixels[:, :, 0]
-    np.testing.assert_array_equal(decode_bytes(content, 'image'), stored)
+    np.testing.assert_array_equal(decode_bytes(content, 'image').image, stored)
     assert header_of(content) == (30, 20, orientation)
 
 
@@ -144,18 +144,18 @@ def test_pixels_of_tiff_are_those_that_are_stored(orientation, order, pixels):
 def test_pixels_of_other_formats_are_those_that_are_stored(orientation, suffix):
     content = with_exif(suffix, DARK, orientation)
     plain = cv2.imdecode(cv2.imencode(suffix, DARK)[1], cv2.IMREAD_GRAYSCALE)
-    np.testing.assert_array_equal(decode_bytes(content, 'image'), plain)
+    np.testing.assert_array_equal(decode_bytes(content, 'image').image, plain)
     assert header_of(content) == (30, 20, orientation)
 
 
 def test_the_orientation_is_reported(tmp_path: Path, capfd: pytest.CaptureFixture[str]):
     path = tmp_path / 'turned.tif'
     path.write_bytes(tiff(GRAY, 6))
-    assert read_noted_image(path)[1].startswith(f'{path}: orientation 6 is not applied')
+    assert read_noted_image(path).note.startswith(f'{path}: orientation 6 is not applied')
     assert main(['identify', str(path), '--detector', 'traditional']) == 0
     assert 'orientation 6 is not applied' in capfd.readouterr().err
     path.write_bytes(tiff(GRAY, 1))
-    assert read_noted_image(path)[1] == ''
+    assert read_noted_image(path).note == ''
 
 
 @pytest.mark.parametrize('suffix', ['.png', '.jpg', '.bmp', '.tif'])

@@ -1,6 +1,8 @@
 """A detector that is another program: it gets an image file and prints what it found as JSON.
 
-A program has limits of time and output, and ends with this process.
+A program has limits of time and output, and ends with this process, with all that it started. Of
+these, processes with a session of their own are found by their environment in /proc; where there
+is none, as on macOS, or where they clear their environment, they go on.
 """
 
 from __future__ import annotations
@@ -13,10 +15,12 @@ import subprocess
 import tempfile
 import threading
 import time
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from secrets import token_hex
 from typing import IO, Any, ClassVar
 
 import cv2
@@ -32,7 +36,9 @@ from ahf_ros.text import MAXIMUM_LENGTH, printable, reason_of
 MAXIMUM_OUTPUT = 64 * 2**20
 """Bytes that a program may write to standard output or standard error."""
 
-_running: set[subprocess.Popen[Any]] = set()
+_LOOKS = 100  # at most, for processes of a program that ends
+
+_running: dict[subprocess.Popen[Any], str] = {}  # with the marks in their environments
 _lock = threading.RLock()  # a signal handler may interrupt its own thread
 
 
@@ -68,17 +74,24 @@ class CommandDetector:
         Unavailable
             If the command cannot be started.
         ValueError
-            If the image is not accepted; if this process ends; if the command takes longer than
-            its time limit, ends with another status than 0, or prints what is not accepted.
+            If the image is not accepted; if this process ends; if the temporary folder cannot be
+            used; if the command takes longer than its time limit, ends with another status than
+            0, or prints what is not accepted.
         """
         check_image(image)
         _check_running(self._named)
-        with tempfile.TemporaryDirectory(prefix='ahf_') as folder:
-            path = Path(folder, 'image.png')
-            cv2.imwrite(str(path), as_gray(image).astype(np.uint8, copy=False))
-            words = self._words(str(path))
-            timeout = self.settings.detector_timeout
-            printed = _output_of(words, Path(folder), timeout, self._named)
+        try:
+            with tempfile.TemporaryDirectory(prefix='ahf_') as folder:
+                path = Path(folder, 'image.png')
+                _, encoded = cv2.imencode('.png', as_gray(image).astype(np.uint8, copy=False))
+                path.write_bytes(encoded.tobytes())
+                words = self._words(str(path))
+                timeout = self.settings.detector_timeout
+                printed = _output_of(words, Path(folder), timeout, self._named)
+        except OSError as error:
+            raise ValueError(
+                f'{self._named}: the temporary folder cannot be used: {error.strerror}'
+            ) from error
         try:
             record = json.loads(printed)
         except (ValueError, RecursionError) as error:
@@ -125,8 +138,8 @@ def _output_of(words: list[str], folder: Path, timeout: float, name: str) -> str
             status = _awaited(process, (output, errors), timeout, name)
         finally:
             with _lock:
-                _running.discard(process)
-            _kill(process)
+                mark = _running.pop(process)
+            _kill(process, mark)
             process.wait()
     if status:
         with errors.open('rb') as file:
@@ -139,13 +152,19 @@ def _output_of(words: list[str], folder: Path, timeout: float, name: str) -> str
 
 def _started(words: list[str], out: IO[bytes], err: IO[bytes]) -> subprocess.Popen[Any]:
     """Start a program that ends with this process, whenever that begins to end."""
+    mark = f'AHF_COMMAND_{token_hex(8)}=1'
     with _lock:
         process = subprocess.Popen(
-            words, stdin=subprocess.DEVNULL, stdout=out, stderr=err, start_new_session=True
+            words,
+            stdin=subprocess.DEVNULL,
+            stdout=out,
+            stderr=err,
+            start_new_session=True,
+            env={**os.environ, **dict([mark.split('=')])},
         )
-        _running.add(process)
+        _running[process] = mark
     if ending.has_begun():
-        _kill(process)
+        _kill(process, mark)
     return process
 
 
@@ -170,17 +189,33 @@ def _awaited(
 
 def _kill_running() -> None:
     with _lock:
-        running = list(_running)
-    for process in running:
-        _kill(process)
+        running = list(_running.items())
+    for process, mark in running:
+        _kill(process, mark)
 
 
-def _kill(process: subprocess.Popen[Any]) -> None:
-    """End a process that has not, and all that it started."""
-    try:
+def _kill(process: subprocess.Popen[Any], mark: str) -> None:
+    """End a process that has not, and all that it started: these have a mark in their environment.
+
+    What they start meanwhile is found by another look.
+    """
+    with suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGKILL)
-    except ProcessLookupError:
-        return
+    for _ in range(_LOOKS):
+        found = [pid for pid in _marked(mark) if pid != process.pid]
+        for pid in found:
+            with suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+        if not found:
+            return
+
+
+def _marked(mark: str) -> Iterator[int]:
+    """Yield the processes of this user that have a mark in their environment."""
+    for environment in Path('/proc').glob('[0-9]*/environ'):
+        with suppress(OSError):
+            if mark.encode() in environment.read_bytes().split(b'\0'):
+                yield int(environment.parent.name)
 
 
 ending.at_begin(_kill_running)
