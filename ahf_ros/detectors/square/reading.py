@@ -12,18 +12,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import product
 from math import erf, log, sqrt
 
 import cv2
 import numpy as np
 
-from ahf_ros.codes.square import words
+from ahf_ros.codes.square import borders, words
 from ahf_ros.features.frame import project
 from ahf_ros.features.sampling import sample
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
-_BORDERS = (1, 2)  # cells; the markers of AprilGrids have two
 _IN_CELL = (-0.2, 0.2)  # where a cell is sampled, from its centre, in cells
 _BLUR = 0.7  # of the image, standard deviation in px
 _MOST_MIXED = 0.2  # share that a cell takes from each neighbour, at most
@@ -66,8 +64,10 @@ def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]])
     doubt = _SEVERAL * log(len(groups))
     frames = _frames(corners)
     bordered = np.flatnonzero(_dark_inside(gray, frames, _DEPTH))
-    sizes = {words(group[0]).shape[1] for group in groups}
-    for cells, border in product(sorted(sizes), _BORDERS):
+    grids = [
+        {(words(group[0]).shape[1], border) for border in borders(group[0])} for group in groups
+    ]
+    for cells, border in sorted(set().union(*grids)):
         some = bordered
         if border > 1:
             innermost = (border - 0.5) / (cells + 2 * border)
@@ -77,7 +77,7 @@ def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]])
         evidence, against, which = _evidence(gray, frames[some], corners[some], cells, border)
         which = some[which]
         for index, group in enumerate(groups):
-            if words(group[0]).shape[1] != cells or not len(which):
+            if (cells, border) not in grids[index] or not len(which):
                 continue
             prints, prior, plain = _table(tuple(group))
             odds = evidence @ prints - prior
@@ -103,13 +103,13 @@ def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]])
             columns = (which[likely], alike[0], number, turn, alike[1], total)
             found.append(np.stack(columns, axis=1)[good])
     table = np.concatenate(found)
-    which, group, number, turn, borders = table[:, :5].T.astype(int)
+    which, group, number, turn, widths = table[:, :5].T.astype(int)
     return Readings(
         quadrilateral=which,
         group=group,
         number=number,
         turn=turn,
-        border=borders,
+        border=widths,
         odds=table[:, 5],
     )
 
