@@ -104,6 +104,8 @@ class SquareMarker(Target):
     ----------
     corners : tuple of 4 tuples of 2 float
         Corners, px, clockwise from the top left corner of the upright marker.
+    border : int
+        Width of the dark border, cells: 1, or 2 as in the AprilGrids of Kalibr.
 
     Examples
     --------
@@ -113,6 +115,7 @@ class SquareMarker(Target):
     """
 
     corners: tuple[tuple[float, float], ...] = ()
+    border: int = 1
 
 
 @dataclass(frozen=True, slots=True)

@@ -41,6 +41,8 @@ def identify_images(task: ImageTask, report: Report = no_report) -> ImageOutcome
     >>> identify_images(ImageTask(('missing.png',))).messages[0].text
     'missing.png cannot be read: No such file or directory'
     """
+    if task.outcome:
+        return task.outcome
     messages: list[Message] = []
     records: list[dict[str, Any]] = []
     files: list[str] = []

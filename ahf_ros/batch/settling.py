@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import chain
 
-from ahf_ros.batch.engine import Engine, finished_tasks
+from ahf_ros.batch.engine import Engine, finished_tasks, in_order
 from ahf_ros.batch.results import outcome_of
-from ahf_ros.batch.task import ImageTask
+from ahf_ros.batch.task import ImageOutcome, ImageTask
 from ahf_ros.codes.families import AUTO
 from ahf_ros.filtering.settling import FIRST
+from ahf_ros.session_settings import IdentificationSettings
 from ahf_ros.settings.nested import updated
 from ahf_ros.target import UNDECODED
 
@@ -20,20 +22,37 @@ def settled_tasks(engine: Engine, tasks: Sequence[ImageTask]) -> Sequence[ImageT
     """Return tasks with the families that the first of them show, where all are looked for.
 
     The result does not depend on the engine. A single task settles its families itself, and so do
-    all tasks if the first ones show no target.
+    all tasks if the first ones show no target. Where looking has identified what the families of
+    all show, the task carries its outcome.
     """
     if len(tasks) < 2:
         return tasks
     settings = tasks[0].settings
     if not AUTO == settings.detection.family == settings.detector:
         return tasks
-    first = [
-        replace(task, overlays=(), settings=updated(task.settings, _LOOK))
-        for task in tasks[:FIRST]
+    first = [replace(task, overlays=(), settings=_looking(task)) for task in tasks[:FIRST]]
+    outcomes = [outcome_of(it.task, it.result) for it in in_order(finished_tasks(engine, first))]
+    shown = [_shown(outcome) for outcome in outcomes]
+    together = frozenset().union(*chain(*shown))
+    families = tuple(name for name in settings.detection.families if name in together)
+    settled = [replace(task, families=families) for task in tasks]
+    for number, (look, outcome) in enumerate(zip(first, outcomes, strict=True)):
+        if look == tasks[number] and {together} == set(shown[number]):
+            settled[number] = replace(settled[number], outcome=outcome)
+    return settled
+
+
+def _looking(task: ImageTask) -> IdentificationSettings:
+    """Return the settings with which a task is looked at: without a search for a filter."""
+    counted = task.settings.adaptive.listed or task.settings.expected_targets
+    if counted or task.settings.estimate_expected:
+        return updated(task.settings, _LOOK)
+    return task.settings  # which leads to no search
+
+
+def _shown(outcome: ImageOutcome) -> list[frozenset[str]]:
+    """Return the families of each record."""
+    return [
+        frozenset(it['family'] for it in record['targets'] if it['id'] != UNDECODED)
+        for record in outcome.records
     ]
-    shown: set[str] = set()
-    for item in finished_tasks(engine, first):
-        for record in outcome_of(item.task, item.result).records:
-            shown |= {it['family'] for it in record['targets'] if it['id'] != UNDECODED}
-    families = tuple(name for name in settings.detection.families if name in shown)
-    return [replace(task, families=families) for task in tasks]

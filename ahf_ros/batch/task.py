@@ -27,6 +27,20 @@ class Message:
 
 
 @dataclass(frozen=True, slots=True)
+class ImageOutcome:
+    """What became of an `ImageTask`."""
+
+    records: tuple[dict[str, Any], ...] = ()  # as JSON, one for each part of the stack
+    messages: tuple[Message, ...] = ()  # in the order in which they came up
+    files: tuple[str, ...] = ()  # `file_fingerprint` of each before it was read
+
+    @property
+    def failed(self) -> bool:
+        """Whether something could not be read, identified or written."""
+        return any(message.level == Level.PROBLEM for message in self.messages)
+
+
+@dataclass(frozen=True, slots=True)
 class ImageTask:
     """Image files that are identified together, independently of all others."""
 
@@ -41,25 +55,12 @@ class ImageTask:
     overlays: tuple[str, ...] = ()  # files to draw the first image of each result to
     families: tuple[str, ...] = ()  # that other images have settled, where all are looked for
     folder: str = ''  # where paths start that are not absolute; the working folder where empty
+    outcome: ImageOutcome | None = None  # if it is known, as images settled families
 
     @property
     def name(self) -> str:
         """What messages call the task."""
         return ', '.join(self.paths)
-
-
-@dataclass(frozen=True, slots=True)
-class ImageOutcome:
-    """What became of an `ImageTask`."""
-
-    records: tuple[dict[str, Any], ...] = ()  # as JSON, one for each part of the stack
-    messages: tuple[Message, ...] = ()  # in the order in which they came up
-    files: tuple[str, ...] = ()  # `file_fingerprint` of each before it was read
-
-    @property
-    def failed(self) -> bool:
-        """Whether something could not be read, identified or written."""
-        return any(message.level == Level.PROBLEM for message in self.messages)
 
 
 def with_machine(outcome: ImageOutcome, machine: str) -> ImageOutcome:

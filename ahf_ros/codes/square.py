@@ -65,3 +65,11 @@ def words(name: str) -> np.ndarray:
     count, side = len(table.bytesList), table.markerSize + 2
     prints = [cv2.aruco.generateImageMarker(table, number, side) for number in range(count)]
     return np.array(prints)[:, 1:-1, 1:-1] > 0
+
+
+def borders(name: str) -> tuple[int, ...]:
+    """Return the widths that the border of a dictionary's markers may have, cells.
+
+    Kalibr prints AprilTags with two in its AprilGrids.
+    """
+    return (1, 2) if name.startswith('apriltag_') else (1,)

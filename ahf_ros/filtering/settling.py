@@ -25,6 +25,7 @@ FIRST = 3
 """Images with targets in which all families are looked for."""
 
 _EVIDENCE = 2.99  # decimal logarithm of the odds on a family: one target certain to 0.999
+_OF_ONE = 1.49  # maximum of what a target that is not so certain adds, as texture repeats itself
 _DOUBTFUL = 0.9  # confidence up to which words are read in nearly any texture
 _CERTAIN = 1e-3  # probability that a target is wrong, below which it counts for no more
 
@@ -38,12 +39,17 @@ def evident(targets: Sequence[Target]) -> list[Target]:
     """Return the targets of families that they are evidence for, and undecoded ones.
 
     Where all families are looked for, words of some are read in nearly any texture. Most are
-    doubtful, which is no evidence, and the others are few of one family.
+    doubtful, which is no evidence, and the others are few of one family: one that is certain is
+    evidence, or three. What is read in several places, as letters may be, counts once.
     """
-    evidence: defaultdict[str, float] = defaultdict(float)
+    surest: defaultdict[tuple[str, int], float] = defaultdict(float)
     for target in targets:
-        if target.confidence > _DOUBTFUL:
-            evidence[target.family] -= math.log10(max(1 - target.confidence, _CERTAIN))
+        surest[target.key] = max(surest[target.key], target.confidence)
+    evidence: defaultdict[str, float] = defaultdict(float)
+    for (family, _), confidence in surest.items():
+        if confidence > _DOUBTFUL:
+            own = -math.log10(max(1 - confidence, _CERTAIN))
+            evidence[family] += own if own > _EVIDENCE else min(own, _OF_ONE)
     return [it for it in targets if it.id == UNDECODED or evidence[it.family] > _EVIDENCE]
 
 

@@ -187,7 +187,8 @@ def _of_its_kind(target: Target, item: dict[str, Any], name: str) -> Target:
         polarity = checked_integer(item.get('polarity', 1), f'{name}: polarity', -1, 1)
         return DottedTarget(**known, dots=dots, template_dots=template, polarity=polarity)
     if item.get('corners'):
-        return SquareMarker(**known, corners=_rows(item, 'corners', 2, 4, name))
+        border = checked_integer(item.get('border', 1), f'{name}: border', 1, 2)
+        return SquareMarker(**known, corners=_rows(item, 'corners', 2, 4, name), border=border)
     if 'reason' not in item:
         return target
     if item['reason'] not in _REASONS:

@@ -6,10 +6,15 @@ import json
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from ahf_ros.batch.engine import SerialEngine
+from ahf_ros.batch.identification import identify_images
+from ahf_ros.batch.settling import settled_tasks
+from ahf_ros.batch.task import ImageTask
 from ahf_ros.detectors import DetectorSettings, Narrowing, check_expected_ids, create_detector
 from ahf_ros.filtering.identifier import Memory
 from ahf_ros.filtering.settling import evident, settled_families
@@ -114,6 +119,8 @@ def test_doubtful_targets_of_few_are_no_evidence_for_a_family() -> None:
 
     doubtful = [target('cct8', 1, 0.95), target('cct8', 2, 0.9), target('cct9', 2, 0.98)]
     doubtful += [target('cctag3', 5, 0.89), target('cctag3', 21, 0.99), target('cctag3', 28, 0.76)]
+    doubtful += [target('gsi', it, 0.987) for it in (1, 2)]  # two do not show a family
+    doubtful += [target('aruco_original', 1023, 0.99)] * 4  # as letters are
     sure = [target('aicon12', 5, 0.9995), *(target('cct12', it, 0.95) for it in range(3))]
     undecoded = target('', -1, 0.5)
     assert evident([*doubtful, *sure, undecoded]) == [*sure, undecoded]
@@ -206,3 +213,27 @@ def test_a_batch_is_the_same_with_any_number_of_processes(
     assert [len(record['targets']) for record in lines[0]] == [3, 6, 0, 6, 6]
     assert status(*arguments) == 0
     assert '5 of 5 results are there already' in capsys.readouterr().err
+
+
+def test_what_settles_the_families_of_a_batch_is_not_identified_again(tmp_path: Path) -> None:
+    settings = IdentificationSettings(detection=DetectorSettings(family='auto'))
+    tasks = []
+    for number, image in enumerate((image_of('metashape12'), BOTH)):
+        path = str(tmp_path / f'{number}.png')
+        write_image(Path(path), image)
+        tasks.append(ImageTask((path,), settings))
+    settled = settled_tasks(SerialEngine(identify_images), tasks)
+    assert [task.families for task in settled] == [tuple(TWO.split(','))] * 2
+    assert [task.outcome is None for task in settled] == [True, False]
+    again = identify_images(replace(settled[1], outcome=None)).records
+    kept = identify_images(settled[1]).records
+    assert without_times(kept) == without_times(again)
+    assert len(kept[0]['targets']) == 6
+    drawn = replace(tasks[0], overlays=(str(tmp_path / 'overlay.png'),))
+    counted = replace(tasks[0], settings=replace(settings, expected_targets=3))
+    settled = settled_tasks(SerialEngine(identify_images), [drawn, counted])
+    assert [task.outcome for task in settled] == [None] * 2
+
+
+def without_times(records: tuple[dict[str, Any], ...]) -> list[dict[str, Any]]:
+    return [{key: record[key] for key in record.keys() - {'elapsed_s'}} for record in records]

@@ -115,6 +115,8 @@ def test_markers_of_an_aprilgrid_touch_squares_and_have_wide_borders():
     rows, columns = np.divmod(np.arange(9), count)
     expected = middle + 7 * period * np.stack([columns, rows], axis=1)
     assert np.abs(np.array([(it.x, it.y) for it in found]) - expected).max() < 0.02
+    assert {it.border for it in found} == {2}
+    assert max(abs(it.edge_shift) for it in found) < 0.1
 
 
 @pytest.mark.parametrize('gray', [0, 90, 255])

@@ -90,7 +90,7 @@ def test_searches_and_the_reasons_of_undecoded_targets_become_json():
     targets = (
         UndecodedTarget(-1, 0, 5.0, 6.0, 2.0, 1.0, 0.0, 0.4, NONE, '', 'uncertain', 17, 'aicon14'),
         DottedTarget(7, 19, 1.25, 2.5, 20.0, 18.0, dots=dots, template_dots=1, polarity=-1),
-        SquareMarker(8, 8, 1.0, 2.5, 20.0, 18.0, corners=((0.0, 1.0),) * 4),
+        SquareMarker(8, 8, 1.0, 2.5, 20.0, 18.0, corners=((0.0, 1.0),) * 4, border=2),
     )
     trace = SearchTrace('found', (2, 0), (2.0, 3.0), (0.5, 0.8), (90.0, 80.0), (1.5, 2.2), (2,))
     found = Identification(targets, 2, expected_ids=(7, 17), search=trace)
@@ -113,6 +113,7 @@ def test_searches_and_the_reasons_of_undecoded_targets_become_json():
         ({'dots': [[1, 2, 3]]}, 'dots has .1, 2, 3., accepted are rows of 5 numbers'),
         ({'dots': [[1, 2, 3, 4, math.inf]]}, 'dots is inf'),
         ({'corners': [[1, 2, 3]]}, 'corners has .1, 2, 3., accepted are rows of 2 numbers'),
+        ({'corners': [[1, 2]], 'border': 3}, 'target 0: border is 3'),
         ({'dots': [[1, 2, 3, 4, 5]], 'template_dots': 2}, 'template_dots is 2'),
     ],
 )

@@ -21,7 +21,9 @@ from test_nodes_rig import cloud_message
 
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.image_msg import image_message
+from ahf_ros.synthetic.scene import SceneSettings
 from support.detector import DetectorProcess, overrides, own, values
+from support.scenes import rendered
 
 LATCHED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 WEAK = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -191,3 +193,17 @@ def assert_losses_are_counted(quiet: Quiet, answers: list[CodedTargetArray]) -> 
     told = quiet.says('images were lost in transport; more depth of the publisher')
     assert int(told['lost in transport']) > 0
     quiet.graph.node.destroy_publisher(camera)
+
+
+def test_the_families_of_a_stream_are_said_when_they_settle(graph: Any) -> None:
+    detector = DetectorProcess(graph, '/settling', *overrides(family='auto'))
+    shown = rendered(SceneSettings(width=320, height=240, targets=3, dot_radius=8, seed=3))
+    found = [detector.answer(image_message(shown.image, header())) for _ in range(2)]
+    assert [[it.id for it in answer.targets] for answer in found] == [
+        [it.id for it in shown.targets]
+    ] * 2
+    assert {target.family for target in found[0].targets} == {'metashape12'}
+    assert detector.process.end() == (0, '')
+    said = [line for line in detector.process.log.splitlines() if 'families: ' in line]
+    assert len(said) == 1
+    assert said[0].endswith('families: metashape12')

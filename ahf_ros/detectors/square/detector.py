@@ -26,7 +26,6 @@ from ahf_ros.target import SquareMarker, Target, sorted_targets
 
 _DRAFT_DEVIATION = 0.3  # standard deviation of a centre from corners of contours, px
 _MINIMUM_SHARE = 0.3  # of the edges on each side, for a fit to be accepted
-_BORDER = 2  # cells of a marker that are its border
 _SMALLEST_HALF = 24  # smaller side of a half that markers are looked for in, px
 _SAME_PLACE = 0.3  # distance of two readings of one marker, in sides
 _LARGE = 120.0  # side of a marker whose contour gives its corners to about two pixels, px
@@ -66,7 +65,7 @@ class SquareDetector(FamilyDetector):
         gray = np.ascontiguousarray(as_gray(image).astype(np.uint8, copy=False))
         groups = self.design
         levels = max(0, int(log2(max(min(gray.shape) / _SMALLEST_HALF, 1))))
-        corners, readings = [np.zeros((0, 4, 2))], [np.zeros((0, 3))]
+        corners, readings = [np.zeros((0, 4, 2))], [np.zeros((0, 4))]
         for level, half in enumerate(halved(gray, levels)):
             found = find_quadrilaterals(half)
             read_as = read(half, found, groups)
@@ -75,12 +74,13 @@ class SquareDetector(FamilyDetector):
                 for index, turn in zip(read_as.quadrilateral, read_as.turn, strict=True)
             ]
             corners.append((np.array(turned).reshape(-1, 4, 2) + 0.5) * 2**level - 0.5)
-            readings.append(np.stack([read_as.group, read_as.number, read_as.odds], axis=1))
+            columns = (read_as.group, read_as.number, read_as.border, read_as.odds)
+            readings.append(np.stack(columns, axis=1))
         places, rows = np.concatenate(corners), np.concatenate(readings)
-        chosen = _best(places, rows[:, 2])
+        chosen = _best(places, rows[:, 3])
         if not len(chosen):
             return []
-        which, numbers, odds = rows[chosen].T
+        which, numbers, borders, odds = rows[chosen].T
         families = [
             next(name for name in group if len(words(name)) > numbers[which == index].max())
             if index in which
@@ -96,10 +96,11 @@ class SquareDetector(FamilyDetector):
                 code=int(number),
                 family=families[int(index)],
                 confidence=confidence,
+                border=int(border),
                 **place,
             )
-            for index, number, confidence, place in zip(
-                which, numbers, confidences.tolist(), fields, strict=True
+            for index, number, border, confidence, place in zip(
+                which, numbers, borders, confidences.tolist(), fields, strict=True
             )
         )
 
@@ -112,19 +113,20 @@ class SquareDetector(FamilyDetector):
         check_image(image)
         gray = as_gray(image).astype(np.float32, copy=False)
         refined = list(targets)
-        for cells in {words(group[0]).shape[1] + _BORDER for group in self.design}:
-            markers = [
-                it
-                for it in targets
-                if isinstance(it, SquareMarker) and words(it.family).shape[1] + _BORDER == cells
-            ]
-            if markers:
-                corners = _from_halves(gray, np.array([it.corners for it in markers]), cells)
-                sides = fit_sides(gray, corners, cells)
-                places = _places(sides.corners, sides.covariance, sides.edge_shift)
-                good = sides.share >= _MINIMUM_SHARE
-                refined = moved_targets(refined, markers, places, good)
+        markers = [it for it in targets if isinstance(it, SquareMarker)]
+        for cells, border in dict.fromkeys(map(_grid, markers)):
+            alike = [it for it in markers if _grid(it) == (cells, border)]
+            corners = np.array([it.corners for it in alike])
+            sides = fit_sides(gray, _from_halves(gray, corners, cells, border), cells, border)
+            places = _places(sides.corners, sides.covariance, sides.edge_shift)
+            good = sides.share >= _MINIMUM_SHARE
+            refined = moved_targets(refined, alike, places, good)
         return refined
+
+
+def _grid(marker: SquareMarker) -> tuple[int, int]:
+    """Return how many cells a side of a marker has, its border included, and this border."""
+    return words(marker.family).shape[1] + 2 * marker.border, marker.border
 
 
 def _best(corners: np.ndarray, odds: np.ndarray) -> list[int]:
@@ -139,7 +141,7 @@ def _best(corners: np.ndarray, odds: np.ndarray) -> list[int]:
     return chosen
 
 
-def _from_halves(gray: np.ndarray, corners: np.ndarray, cells: int) -> np.ndarray:
+def _from_halves(gray: np.ndarray, corners: np.ndarray, cells: int, border: int) -> np.ndarray:
     """Return the corners, shape (k, 4, 2), of large markers as halves of the image show them.
 
     The contour of a large marker gives its corners to a part of its side, not to two pixels.
@@ -150,7 +152,7 @@ def _from_halves(gray: np.ndarray, corners: np.ndarray, cells: int) -> np.ndarra
     halves = halved(gray, levels)
     for level in range(levels, 0, -1):
         which = np.flatnonzero(sides > _LARGE * 2 ** (level - 1))
-        fit = fit_sides(halves[level], reduced(corners[which], level), cells)
+        fit = fit_sides(halves[level], reduced(corners[which], level), cells, border)
         good = fit.share >= _MINIMUM_SHARE
         corners[which[good]] = (fit.corners[good] + 0.5) * 2**level - 0.5
     return corners

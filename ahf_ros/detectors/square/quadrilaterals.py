@@ -22,6 +22,7 @@ _MINIMUM_STEP = 24  # from the darkest to the brightest pixel of a window, of 25
 _SMALLEST = 8.0  # side of a quadrilateral, px
 _SHORTEST = 2.8  # outline, in such sides
 _SOLID = 0.3  # minimum area of a region with its holes, as a share of a square's of its perimeter
+_THICK = 1.0  # minimum area of a region that is parted, per pixel of its outline, px
 _TATTERED, _FILLED = 4.0, 0.15  # bounds of outline and area of a region whose hull is taken
 _TOLERANCE = 0.025  # of the corners of an outline, as a share of its length
 _MAXIMUM_CORNERS = 14  # of the polygon of an outline
@@ -30,6 +31,7 @@ _SAME_LINE = 0.15, 0.03  # sides of one line: sine of their angle, distance in p
 _NEAR = 0.02, 1.2  # of points that belong to a side, as a share of the perimeter, and px
 _ENDS = 0.1  # of a side, left out at its ends, where blur rounds the corner
 _FEWEST = 3  # points of a side
+_TOGETHER = 200  # regions that lines are fitted to at a time, which bounds the memory
 _COMMON_AREA = 0.6, 1.9  # of a quadrilateral, as a share of its region's
 _DEPTH, _SIDE = 0.12, 0.2  # of samples beside a side, to the middle; share of them with a step
 _ALONG = np.linspace(0.06, 0.94, 10)  # a side, where they are
@@ -54,24 +56,23 @@ def find_quadrilaterals(gray: np.ndarray) -> np.ndarray:
     They are clockwise in the image, and known to about half a pixel.
     """
     window = np.ones((_WINDOW, _WINDOW), np.uint8)
-    found: list[np.ndarray] = []
+    found = [np.zeros((0, 4, 2, 2))]
     for table, growth in _SCALES:
         values = cv2.LUT(gray, table)
         low, high = cv2.erode(values, window), cv2.dilate(values, window)
         middle = cv2.addWeighted(low, 0.5, high, 0.5, 0)
         height = cv2.subtract(high, low)
-        dark = cv2.compare(values, middle, cv2.CMP_LT)
-        dark *= height > _MINIMUM_STEP
+        _, step = cv2.threshold(height, _MINIMUM_STEP, 255, cv2.THRESH_BINARY)
+        dark = cv2.bitwise_and(cv2.compare(values, middle, cv2.CMP_LT), step)
         outlines = _outlines(dark)
         for some, lost in ((outlines, 0.0), (_parted(dark, outlines), 1.0)):
             regions = [region for outline in some if (region := _region(outline))]
             sides, four = _four_sides(regions)
             areas = np.array([regions[index].area for index in four])
-            for index in _bordered(values, sides, areas):
-                fitted = _fitted(regions[four[index]], sides[index], growth + lost)
-                if fitted is not None:
-                    found.append(fitted)
-    lines = np.array(found, np.float64).reshape(-1, 4, 2, 2)
+            bordered = _bordered(values, sides, areas)
+            chosen = [regions[index] for index in four[bordered]]
+            found.append(_fitted(chosen, sides[bordered], growth + lost))
+    lines = np.concatenate(found)
     before = np.roll(lines, 1, axis=1)
     corners = meet(before[:, :, 0], before[:, :, 1], lines[:, :, 0], lines[:, :, 1])
     convex = [cv2.isContourConvex(of) for of in corners.astype(np.float32)]
@@ -92,11 +93,14 @@ def _parted(dark: np.ndarray, outlines: list[np.ndarray]) -> list[np.ndarray]:
     their outermost pixels.
     """
     labels = np.zeros(dark.shape, np.int32)
-    regions = (of for of in outlines if len(of) >= 2 * _SHORTEST * _SMALLEST)
-    for label, outline in enumerate(regions, start=1):
+    thick = (
+        of
+        for of in outlines
+        if len(of) >= 2 * _SHORTEST * _SMALLEST and cv2.contourArea(of) >= _THICK * len(of)
+    )
+    for label, outline in enumerate(thick, start=1):
         cv2.drawContours(labels, [outline], 0, label, cv2.FILLED)
-    eroded = cv2.erode(dark * (labels > 0), np.ones((3, 3), np.uint8))
-    parts = _outlines(eroded)
+    parts = _outlines(cv2.erode(dark * (labels > 0), np.ones((3, 3), np.uint8)))
     whole = [labels[of[0, 0, 1], of[0, 0, 0]] for of in parts]
     count = np.bincount(whole, minlength=1)
     return [of for of, label in zip(parts, whole, strict=True) if count[label] > 1]
@@ -196,25 +200,49 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
-def _fitted(region: _Region, sides: np.ndarray, growth: float) -> np.ndarray | None:
-    """Return the ends of lines fitted to the points near four sides, shape (4, 2, 2)."""
-    starts, ends = sides[:, 0], sides[:, 1]
-    points, length = region.outline.astype(np.float64), region.length
-    vectors = ends - starts
-    lengths = np.hypot(*vectors.T)[:, None]
-    along = vectors / lengths
-    normals = np.stack([along[:, 1], -along[:, 0]], axis=1)
-    offsets = normals @ points.T - (normals * starts).sum(axis=1, keepdims=True)
-    places = (along @ points.T - (along * starts).sum(axis=1, keepdims=True)) / lengths - 0.5
-    near = np.abs(offsets) < max(_NEAR[0] * length, _NEAR[1])
-    weights = (near & (np.abs(places) < 0.5 - _ENDS)).astype(np.float64)
-    count = weights.sum(axis=1)
-    if count.min() < _FEWEST:
-        return None
-    middle = (weights * places).sum(axis=1) / count
-    across = (weights * offsets).sum(axis=1) / count
-    places -= middle[:, None]
-    squares = np.maximum((weights * places**2).sum(axis=1), 1e-9)
-    slope = (weights * places * offsets).sum(axis=1) / squares
-    first, last = (across + slope * (end - middle) + growth for end in (-0.5, 0.5))
-    return sides + np.stack([first, last], axis=1)[..., None] * normals[:, None]
+def _fitted(regions: list[_Region], sides: np.ndarray, growth: float) -> np.ndarray:
+    """Return the ends of lines fitted to the points near four sides of regions, (k, 4, 2, 2).
+
+    Regions are left out that have a side with few points.
+    """
+    fitted = [np.zeros((0, 4, 2, 2))]
+    for start in range(0, len(regions), _TOGETHER):
+        some = slice(start, start + _TOGETHER)
+        fitted.append(_lines(regions[some], sides[some], growth))
+    return np.concatenate(fitted)
+
+
+def _lines(regions: list[_Region], sides: np.ndarray, growth: float) -> np.ndarray:
+    counts = [len(region.outline) for region in regions]
+    first = np.cumsum([0, *counts[:-1]])
+    points = np.concatenate([region.outline for region in regions]).astype(np.float64)
+    vectors = sides[:, :, 1] - sides[:, :, 0]
+    lengths = np.hypot(vectors[..., 0], vectors[..., 1])
+    along = vectors / lengths[..., None]
+    normals = np.stack([along[..., 1], -along[..., 0]], axis=2)
+    near = np.maximum(_NEAR[0] * np.array([region.length for region in regions]), _NEAR[1])
+
+    def of_points(values: np.ndarray) -> np.ndarray:
+        return np.repeat(values, counts, axis=0)
+
+    def coordinates(axes: np.ndarray) -> np.ndarray:
+        """Return the distances of points from the starts of sides, along axes, (n, 4)."""
+        there = (axes * sides[:, :, 0]).sum(axis=2)
+        x, y = (of_points(axes[..., axis]) for axis in (0, 1))
+        return x * points[:, :1] + y * points[:, 1:] - of_points(there)
+
+    offsets = coordinates(normals)
+    places = coordinates(along / lengths[..., None]) - 0.5
+    used = (np.abs(offsets) < of_points(near)[:, None]) & (np.abs(places) < 0.5 - _ENDS)
+
+    def total(values: np.ndarray) -> np.ndarray:
+        return np.add.reduceat(np.where(used, values, 0.0), first, axis=0)
+
+    count = np.maximum(total(np.ones_like(places)), 1)
+    middle, across = total(places) / count, total(offsets) / count
+    places -= of_points(middle)
+    slope = total(places * offsets) / np.maximum(total(places**2), 1e-9)
+    ends = np.stack([across + slope * (end - middle) + growth for end in (-0.5, 0.5)], axis=2)
+    lines = sides + ends[..., None] * normals[:, :, None]
+    fitted: np.ndarray = lines[count.min(axis=1) >= _FEWEST]
+    return fitted

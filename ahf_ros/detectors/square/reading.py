@@ -12,18 +12,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import product
 from math import erf, log, sqrt
 
 import cv2
 import numpy as np
 
-from ahf_ros.codes.square import words
+from ahf_ros.codes.square import borders, words
 from ahf_ros.features.frame import project
 from ahf_ros.features.sampling import sample
 from ahf_ros.imaging.logarithm import LOG_OFFSET
 
-_BORDERS = (1, 2)  # cells; the markers of AprilGrids have two
 _IN_CELL = (-0.2, 0.2)  # where a cell is sampled, from its centre, in cells
 _BLUR = 0.7  # of the image, standard deviation in px
 _MOST_MIXED = 0.2  # share that a cell takes from each neighbour, at most
@@ -53,6 +51,7 @@ class Readings:
     group: np.ndarray  # of dictionaries, its index
     number: np.ndarray  # ID
     turn: np.ndarray  # index of the corner that is top left in the upright marker
+    border: np.ndarray  # width of the border, cells
     odds: np.ndarray  # logarithmic, that the marker is this one
 
 
@@ -61,16 +60,24 @@ def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]])
 
     A group has dictionaries that begin with the same markers, the smallest first.
     """
-    found = [np.zeros((0, 5))]
+    found = [np.zeros((0, 6))]
     doubt = _SEVERAL * log(len(groups))
     frames = _frames(corners)
-    sizes = {words(group[0]).shape[1] for group in groups}
-    bordered = _bordered(gray, frames)
-    frames, corners = frames[bordered], corners[bordered]
-    for cells, border in product(sorted(sizes), _BORDERS) if len(corners) else ():
-        evidence, against, which = _evidence(gray, frames, corners, cells, border)
+    bordered = np.flatnonzero(_dark_inside(gray, frames, _DEPTH))
+    grids = [
+        {(words(group[0]).shape[1], border) for border in borders(group[0])} for group in groups
+    ]
+    for cells, border in sorted(set().union(*grids)):
+        some = bordered
+        if border > 1:
+            innermost = (border - 0.5) / (cells + 2 * border)
+            some = some[_dark_inside(gray, frames[some], innermost)]
+        if not len(some):
+            continue
+        evidence, against, which = _evidence(gray, frames[some], corners[some], cells, border)
+        which = some[which]
         for index, group in enumerate(groups):
-            if words(group[0]).shape[1] != cells or not len(which):
+            if (cells, border) not in grids[index] or not len(which):
                 continue
             prints, prior, plain = _table(tuple(group))
             odds = evidence @ prints - prior
@@ -92,11 +99,19 @@ def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]])
             shown = of_group.sum() >= _SHOWN
             total = -np.logaddexp((0 if shown else doubt) - total, others)
             good = total > _MINIMUM_ODDS
-            columns = (bordered[which[likely]], np.full(len(best), index), number, turn, total)
+            alike = np.full((2, len(best)), [[index], [border]])
+            columns = (which[likely], alike[0], number, turn, alike[1], total)
             found.append(np.stack(columns, axis=1)[good])
     table = np.concatenate(found)
-    which, group, number, turn = table[:, :4].T.astype(int)
-    return Readings(which, group, number, turn, table[:, 4])
+    which, group, number, turn, widths = table[:, :5].T.astype(int)
+    return Readings(
+        quadrilateral=which,
+        group=group,
+        number=number,
+        turn=turn,
+        border=widths,
+        odds=table[:, 5],
+    )
 
 
 @lru_cache(maxsize=32)
@@ -128,26 +143,25 @@ def _frames(corners: np.ndarray) -> np.ndarray:
     return np.array(found).reshape(-1, 3, 3)
 
 
-def _bordered(gray: np.ndarray, frames: np.ndarray) -> np.ndarray:
-    """Return the indices of quadrilaterals that are dark inside all sides and bright outside."""
-    if not len(frames):
-        return np.zeros(0, int)
+def _dark_inside(gray: np.ndarray, frames: np.ndarray, depth: float) -> np.ndarray:
+    """Return whether quadrilaterals are dark inside all sides, bright outside, shape (k,).
+
+    The depth inside is a share of a side.
+    """
     along = np.linspace(-0.45, 0.45, _POINTS)
     turns = [np.linalg.matrix_power(np.array([[0, -1], [1, 0]]), turn) for turn in range(4)]
-    ink, paper = (
-        np.log(
-            sample(
-                gray,
-                project(
-                    frames, np.stack([np.stack([along, across], axis=1) @ of for of in turns])
-                ).reshape(len(frames), -1, 2),
-            )
-            + LOG_OFFSET
-        ).reshape(-1, 4, _POINTS)
-        for across in (np.full(_POINTS, -0.5 + _DEPTH), np.full(_POINTS, -0.5 - _DEPTH))
-    )
-    seen = (paper - ink > _MINIMUM_STEP / 2).mean(axis=2).min(axis=1) >= _SIDE
-    return np.flatnonzero(seen)
+
+    def logs(across: float) -> np.ndarray:
+        side = np.stack([along, np.full(_POINTS, across)], axis=1)
+        points = project(frames, np.stack([side @ turn for turn in turns]))
+        values = sample(gray, points.reshape(len(frames), -1, 2))
+        return np.log(values + LOG_OFFSET).reshape(-1, 4, _POINTS)
+
+    if not len(frames):
+        return np.zeros(0, bool)
+    dark = logs(-0.5 - _DEPTH) - logs(-0.5 + depth) > _MINIMUM_STEP / 2
+    inside: np.ndarray = dark.mean(axis=2).min(axis=1) >= _SIDE
+    return inside
 
 
 def _evidence(

@@ -37,7 +37,7 @@ from ahf_ros.features.robust import median, reweight, spread
 _PROFILES = 32  # per side
 _ENDS = 0.06  # of a side, left out at its ends, where blur rounds the corner
 _REACH = 3.0  # half the distance within which a corner may lie from where it was, px
-_REACH_IN_CELLS = 0.45  # the same in cells of the marker; other edges are a cell away
+_REACH_IN_WIDTHS = 0.45  # the same in widths of what it limits, as the next edge is that far
 _MEASUREMENTS = 5
 _OF_COMMON, _BY_LIGHT = 1.2, 2.0  # of the variance, as rendered scenes have it
 _ROUNDS = 6  # iterations of robust least squares
@@ -51,10 +51,10 @@ _WEAK_PRIOR = 1e-3  # of the position of a side, in gray values^2 / px^2
 _DIFFERENCE = 1e-3  # step of numerical derivatives, px
 _MINIMUM_EDGES = 3.0  # independent edges of a side; its line takes two
 _NO_WEIGHT = 1e-9  # instead of a sum of no weights
-_THROUGH = 0.25  # of what cells behind the border do to a centre, px, by (blur / cell)^2
+_THROUGH = 0.25  # of what cells behind the border do to a centre, px, by (blur / border)^2
 _IN_CELL = (0.35, 0.5, 0.65)  # where the inner edge of the border is measured, in each cell
 _MINIMUM_INNER_EDGES = 6  # such edges; the usual one has the shift of all edges
-_THICK = 4.0  # width of a border whose two edges can be separated, blurs
+_THICK = 4.0  # width of cells, and so of a border, whose two edges can be separated, blurs
 _SYSTEMATIC = 0.003  # standard deviation of the effects of lens distortion and pixels, px
 
 _ALONG = np.linspace(_ENDS, 1 - _ENDS, _PROFILES)  # positions of profiles along a side, 0 to 1
@@ -91,7 +91,7 @@ def centres(corners: np.ndarray) -> np.ndarray:
     return meet(corners[:, 0], corners[:, 2], corners[:, 1], corners[:, 3])
 
 
-def fit_sides(gray: np.ndarray, corners: np.ndarray, cells: int) -> Sides:
+def fit_sides(gray: np.ndarray, corners: np.ndarray, cells: int, border: int) -> Sides:
     """Return markers whose corners are the intersections of their sides.
 
     Parameters
@@ -102,13 +102,16 @@ def fit_sides(gray: np.ndarray, corners: np.ndarray, cells: int) -> Sides:
         To about two pixels, clockwise in the image. The border of a marker is dark.
     cells : int
         Number of cells along a side, including the border.
+    border : int
+        Width of the border, cells.
     """
     blur, contrast = np.full(len(corners), USUAL_BLUR), np.ones(len(corners))
     share, covariance = np.zeros(len(corners)), np.zeros((len(corners), 2, 2))
     for _ in range(_MEASUREMENTS if len(corners) else 0):
         starts, ends = corners, np.roll(corners, -1, axis=1)
         normals = _normals(starts, ends)
-        edges = measure_outlines(gray, _outlines(starts, ends, normals, cells), blur, reach=1.0)
+        outlines = _outlines(starts, ends, normals, border / cells)
+        edges = measure_outlines(gray, outlines, blur, reach=1.0)
         blur = np.clip(blur + median(edges.softness, edges.visible, 0.0), *BLURS)
         own = weigh_edges(edges)
         contrast = own.contrast
@@ -126,10 +129,10 @@ def fit_sides(gray: np.ndarray, corners: np.ndarray, cells: int) -> Sides:
         corners = np.where(near[:, None, None], met, starts)
         share = np.where(near, lines.share.min(axis=1), 0.0)
         cell = np.linalg.norm(ends - starts, axis=2).mean(axis=1) / cells
-        through = _THROUGH * (blur / np.maximum(cell, 1.0)) ** 2
+        through = _THROUGH * (blur / np.maximum(border * cell, 1.0)) ** 2
         covariance *= (1 + _BY_LIGHT * uneven)[:, None, None]
         covariance += (through**2)[:, None, None] * np.eye(2)
-    shift = _edge_shift(gray, corners, cells, blur, contrast)
+    shift = _edge_shift(gray, corners, cells, border, blur, contrast)
     back = np.where(np.isfinite(shift), -shift, 0.0)[:, None, None]
     ends = np.roll(corners, -1, axis=1)
     moved = back * _normals(corners, ends)
@@ -138,15 +141,20 @@ def fit_sides(gray: np.ndarray, corners: np.ndarray, cells: int) -> Sides:
 
 
 def _edge_shift(
-    gray: np.ndarray, corners: np.ndarray, cells: int, blur: np.ndarray, contrast: np.ndarray
+    gray: np.ndarray,
+    corners: np.ndarray,
+    cells: int,
+    border: int,
+    blur: np.ndarray,
+    contrast: np.ndarray,
 ) -> np.ndarray:
     """Return by how much dark areas have grown, shape (k,), from both edges of the borders.
 
     Corners are where the sides that were measured meet. The blur of edges is a standard deviation,
     px, the contrast the ratio of the gray values of ink and paper, both of shape (k,).
     """
-    along = np.add.outer(np.arange(1, cells - 1), _IN_CELL).ravel() / cells
-    side = np.stack([along, np.full(along.size, 1 / cells)], axis=1) - 0.5
+    along = np.add.outer(np.arange(border, cells - border), _IN_CELL).ravel() / cells
+    side = np.stack([along, np.full(along.size, border / cells)], axis=1) - 0.5
     turns = [np.linalg.matrix_power(np.array([[0, -1], [1, 0]]), turn) for turn in range(4)]
     print_corners = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]], np.float32)
     planes = [cv2.getPerspectiveTransform(print_corners, of.astype(np.float32)) for of in corners]
@@ -162,7 +170,7 @@ def _edge_shift(
         points=points.reshape(*each, 2),
         normals=normals.reshape(*each, 2),
         polarity=-np.ones(each, int),
-        scale=_REACH_IN_CELLS * cell.reshape(each),
+        scale=_REACH_IN_WIDTHS * cell.reshape(each),
         spacing=(cell * (_IN_CELL[1] - _IN_CELL[0])).reshape(each),
         curvature=np.zeros(each),
     )
@@ -171,7 +179,7 @@ def _edge_shift(
     seen = edges.visible & (edges.bright > _MINIMUM_STEP) & (edges.dark < halfway)
     thick = cell.reshape(each).min(axis=1, initial=np.inf) > _THICK * blur
     # The outer sides, whose places these are relative to, have moved outwards by it.
-    shift = -median(edges.offset, seen, np.nan) / (2 - 2 / cells)
+    shift = -median(edges.offset, seen, np.nan) / (2 - 2 * border / cells)
     return np.where(thick & (seen.sum(axis=1) >= _MINIMUM_INNER_EDGES), shift, np.nan)
 
 
@@ -195,9 +203,9 @@ def _normals(starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
 
 
 def _outlines(
-    starts: np.ndarray, ends: np.ndarray, normals: np.ndarray, cells: int
+    starts: np.ndarray, ends: np.ndarray, normals: np.ndarray, border: float
 ) -> OutlinePoints:
-    """Return the expected edges of the sides."""
+    """Return the expected edges of the sides; the width of the border is a share of a side."""
     count = len(starts)
     points = starts[:, :, None] + _ALONG[:, None] * (ends - starts)[:, :, None]
     lengths = np.linalg.norm(ends - starts, axis=2)
@@ -206,7 +214,7 @@ def _outlines(
         points=points.reshape(count, -1, 2),
         normals=np.repeat(normals, _PROFILES, axis=1),
         polarity=np.ones((count, 4 * _PROFILES), int),
-        scale=np.repeat(_REACH_IN_CELLS * depth / cells, _PROFILES, axis=1),
+        scale=np.repeat(_REACH_IN_WIDTHS * border * depth, _PROFILES, axis=1),
         spacing=np.repeat(lengths * (_ALONG[1] - _ALONG[0]), _PROFILES, axis=1),
         curvature=np.zeros((count, 4 * _PROFILES)),
     )
