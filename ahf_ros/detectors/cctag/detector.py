@@ -34,7 +34,7 @@ from ahf_ros.target import UNDECODED, Target, sorted_targets
 _GAIN = 2  # of ln I, for circles that blur makes gray
 _INNERMOST = 0.25  # of the radii of circles that are looked for
 _COMMON_CENTRE = 8.0, 20.0  # radii of targets whose rings vote together for their centre, px
-_COMMON_CENTRE_STEP, _COMMON_CENTRE_VOTES, _COMMON_CENTRE_SIZES = 1.0, 1.2, 1.25
+_COMMON_CENTRE_STEP, _COMMON_CENTRE_VOTES, _COMMON_CENTRE_SIZES = 1.0, 1.5, 1.25
 _TELLING = 0.98  # confidence of targets that tell of others
 _PROBABLE = 0.5  # confidence of targets that tell of edges together
 _ROUNDS = 2  # in which doubtful targets are read with what others tell
