@@ -34,7 +34,7 @@ from ahf_ros.target import UNDECODED, Target, sorted_targets
 _GAIN = 2  # of ln I, for circles that blur makes gray
 _INNERMOST = 0.25  # of the radii of circles that are looked for
 _COMMON_CENTRE = 8.0, 20.0  # radii of targets whose rings vote together for their centre, px
-_COMMON_CENTRE_STEP, _COMMON_CENTRE_VOTES, _COMMON_CENTRE_SIZES = 1.0, 2.0, 1.25
+_COMMON_CENTRE_STEP, _COMMON_CENTRE_VOTES, _COMMON_CENTRE_SIZES = 1.0, 1.5, 1.25
 _TELLING = 0.98  # confidence of targets that tell of others
 _PROBABLE = 0.5  # confidence of targets that tell of edges together
 _ROUNDS = 2  # in which doubtful targets are read with what others tell
@@ -88,8 +88,10 @@ class CctagDetector(FamilyDetector):
             start = frame.affine_frames(*np.array(columns).T)
             shift = np.array([target.edge_shift or 0.0 for target in known])
             ids = np.array([it.id for it in known])
-            light = in_light(gray, align(gray, start, ids, shift, family), family)
-            of = align(light, start, ids, shift, family)
+            of = align(gray, start, ids, shift, family)
+            light = in_light(gray, of, family)
+            if light is not gray:
+                of = align(light, start, ids, shift, family)
             moved = np.hypot(*(of.frames[:, :2, 2] - start[:, :2, 2]).T)
             reach = np.maximum(_MAXIMUM_MOVE, _MAXIMUM_MOVE_SHARE * frame.mean_radii(start))
             places = ellipse_fields(of.frames, of.covariance, of.edge_shift)
@@ -135,9 +137,9 @@ def _identified(
     light = in_light(gray, likely, family)
     if not len(likely.ids):
         return rings.select(rings.of_target >= _POSSIBLE), gray
-    likely = replace(
-        align(light, likely.frames, likely.ids, likely.shift, family), margin=likely.margin
-    )
+    if light is not gray:
+        again = align(light, likely.frames, likely.ids, likely.shift, family)
+        likely = replace(again, margin=likely.margin)
     for _ in range(_ROUNDS):
         told = likely.confidence >= _TELLING
         unread = frames[~_near(frames, likely.frames).any(axis=1)]

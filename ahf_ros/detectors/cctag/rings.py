@@ -34,13 +34,12 @@ _SIZES = 1.05  # ratio of radii that share templates, and of hypotheses of the r
 _TRIED_SHIFTS, _TRIED_BLURS = (-1.2, -0.6, 0.0, 0.6, 1.2), (-1.0, 0.0, 1.4)  # deviations
 _GROWN = (0.85, 0.9, 0.95, 1.0, 1.05)  # radii of the outermost circle, where that was found
 _NARROWEST = 0.5  # ring that is read, px; blur hides others
-_NARROWEST_IN_LIGHT = 0.7  # ring, px, below which rays must be explained but for a small part
-_CLEAN = -5.4  # `left` of such rays
 _PROMISING = 0.6  # share of a profile that rings explain, from which they are looked at
 _LOOKED_AT = 4  # frames for an ID, at the most
 _APART = 0.5  # distance of the centres of different targets, radii
 _PART = 2048, 48  # hypotheses and targets at a time, which bounds the memory
-_GAMMAS = (2.2,)  # of gray values, besides 1
+_GAMMA = 2.2  # of gray values, unless they are light
+_CLEARLY = 0.15  # `left` by which rings must be better explained; edges of light explain little
 _TELLING_OF_GAMMA = 16  # targets
 _ENOUGH = 4  # certain targets, that tell of the edges of an image
 _SCALES = (0.93, 0.965, 1.0, 1.035, 1.07)  # of the radius, about a frame
@@ -297,8 +296,7 @@ def identify(
     others = np.where(ids == best.ids[:, None], np.inf, cost).min(axis=1)
     best = _settled(gray, best, family, prior)
     best = replace(best, margin=others - cost.min(axis=1))
-    hidden = family.narrow * frame.mean_radii(best.frames) < _NARROWEST_IN_LIGHT
-    return best.select((best.colour == polarity) & ~(hidden & (best.left > _CLEAN)))
+    return best.select(best.colour == polarity)
 
 
 def _tried(
@@ -358,18 +356,17 @@ def _likely_ids(
 
 
 def in_light(gray: np.ndarray, rings: Aligned, family: CircleFamily) -> np.ndarray:
-    """Return an image of light, where rings that are read tell the gamma of its gray values.
+    """Return an image of light, where rings show clearly that its gray values have a gamma.
 
-    Blur mixes light, and not gray values, which matters where rings are narrow.
+    Blur mixes light, and not gray values, which matters where rings are narrow. Under edges of
+    light it matters less than these, which are weaker in gray values.
     """
     some = rings.select(np.argsort(rings.left, kind='stable')[:_TELLING_OF_GAMMA])
     if not len(some.ids):
         return gray
-    images = [gray] + [255 * (gray.clip(0) / 255) ** np.float32(gamma) for gamma in _GAMMAS]
-    left = [
-        float(np.mean(align(of, some.frames, some.ids, some.shift, family).left)) for of in images
-    ]
-    return images[int(np.argmin(left))]
+    light: np.ndarray = 255 * (gray.clip(0) / 255) ** np.float32(_GAMMA)
+    left = align(light, some.frames, some.ids, some.shift, family).left
+    return light if np.mean(left) < np.mean(some.left) - _CLEARLY else gray
 
 
 def align(
