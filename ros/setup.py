@@ -7,11 +7,13 @@ is not used there.
 
 from __future__ import annotations
 
+import atexit
 import configparser
 import os
 import shutil
 import subprocess
 import sys
+import tempfile
 import xml.etree.ElementTree as ElementTree
 from importlib import metadata
 from pathlib import Path
@@ -73,10 +75,7 @@ class CMakeBuild(build_ext):
 
     def build_interfaces(self) -> Path:
         """Run CMake and return the directory that it installed into."""
-        # Always start clean: pip's isolated build environment has a new path each time, and CMake
-        # would remember the old one.
         work = Path(self.build_temp).resolve() / NAME
-        shutil.rmtree(work, ignore_errors=True)
         stage = work / 'stage'
         environment = dict(os.environ)
         prefix = ros_prefix()
@@ -123,7 +122,12 @@ class BinaryDistribution(Distribution):
 
 
 if __name__ == '__main__':
+    # A folder of its own each time: pip's isolated build environment has a new path, and CMake
+    # would remember the old one; and two environments may be set up at once.
+    scratch = tempfile.mkdtemp(prefix='ahf_ros_')
+    atexit.register(shutil.rmtree, scratch, ignore_errors=True)
     setup(
+        options={'build': {'build_base': scratch}, 'egg_info': {'egg_base': scratch}},
         version=ElementTree.parse(HERE / 'package.xml').findtext('version'),
         setup_requires=wheels('build'),
         install_requires=wheels('run'),
