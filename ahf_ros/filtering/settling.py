@@ -24,8 +24,8 @@ from ahf_ros.target import UNDECODED, Identification, Target
 FIRST = 3
 """Images with targets in which all families are looked for."""
 
-_EVIDENCE = 2.99  # decimal logarithm of the odds on a family: one target certain to 0.999
-_OF_ONE = 1.49  # maximum of what a target that is not so certain adds, as texture repeats itself
+_OF_ONE = 2.99  # decimal logarithm of the odds on a family: one target certain to 0.999
+_OF_SEVERAL = 3.99  # ... of all together, of which texture repeats what it shows once
 _DOUBTFUL = 0.9  # confidence up to which words are read in nearly any texture
 _CERTAIN = 1e-3  # probability that a target is wrong, below which it counts for no more
 
@@ -40,17 +40,20 @@ def evident(targets: Sequence[Target]) -> list[Target]:
 
     Where all families are looked for, words of some are read in nearly any texture. Most are
     doubtful, which is no evidence, and the others are few of one family: one that is certain is
-    evidence, or three. What is read in several places, as letters may be, counts once.
+    evidence, or some with odds of 10,000 together. What is read in several places, as letters may
+    be, counts once.
     """
     surest: defaultdict[tuple[str, int], float] = defaultdict(float)
     for target in targets:
         surest[target.key] = max(surest[target.key], target.confidence)
-    evidence: defaultdict[str, float] = defaultdict(float)
+    evidence: defaultdict[str, list[float]] = defaultdict(list)
     for (family, _), confidence in surest.items():
         if confidence > _DOUBTFUL:
-            own = -math.log10(max(1 - confidence, _CERTAIN))
-            evidence[family] += own if own > _EVIDENCE else min(own, _OF_ONE)
-    return [it for it in targets if it.id == UNDECODED or evidence[it.family] > _EVIDENCE]
+            evidence[family].append(-math.log10(max(1 - confidence, _CERTAIN)))
+    shown = {
+        family for family, of in evidence.items() if max(of) > _OF_ONE or sum(of) > _OF_SEVERAL
+    }
+    return [it for it in targets if it.id == UNDECODED or it.family in shown]
 
 
 def _families(targets: Iterable[Target]) -> set[str]:

@@ -33,8 +33,9 @@ def test_colour_turns_gray_with_any_step(
     assert np.array_equal(decode_image(sent), [gray, gray])
 
 
-def test_data_may_be_longer_than_the_rows() -> None:
-    assert np.array_equal(decode_image(message(data=GRAY.tobytes() + bytes(3))), GRAY)
+def test_data_may_not_be_longer_than_the_rows() -> None:
+    with pytest.raises(ValueError, match='data has 15 bytes, accepted are 12: 3 rows of 4 bytes'):
+        decode_image(message(data=GRAY.tobytes() + bytes(3)))
 
 
 @pytest.mark.parametrize(

@@ -142,7 +142,7 @@ def test_no_message_is_lost_at_100_hz_and_poses_are_those_of_the_camera(
     graph.until(lambda: len(node.diagnostics) > count + 1)
     told = values(node.diagnostics[-1])
     assert (told['lost in transport'], told['targets used']) == ('0', str(len(of.targets)))
-    assert told['received'] == told['published'] == str(len(node.poses))
+    assert told['published'] == str(len(node.poses))
     found = node.poses[-1]
     assert found.header.frame_id == 'targets'
     position = found.pose.pose.position
