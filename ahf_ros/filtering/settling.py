@@ -25,7 +25,7 @@ FIRST = 3
 """Images with targets in which all families are looked for."""
 
 _OF_ONE = 2.99  # decimal logarithm of the odds on a family: one target certain to 0.999
-_OF_SEVERAL = 3.99  # ... of all together, of which texture repeats what it shows once
+_OF_SEVERAL = 3.9  # ... of all together: three certain to 0.95, or two to 0.989
 _DOUBTFUL = 0.9  # confidence up to which words are read in nearly any texture
 _CERTAIN = 1e-3  # probability that a target is wrong, below which it counts for no more
 
@@ -40,7 +40,7 @@ def evident(targets: Sequence[Target]) -> list[Target]:
 
     Where all families are looked for, words of some are read in nearly any texture. Most are
     doubtful, which is no evidence, and the others are few of one family: one that is certain is
-    evidence, or some with odds of 10,000 together. What is read in several places, as letters may
+    evidence, or three to 0.95. What is read in several places, as letters may
     be, counts once.
     """
     surest: defaultdict[tuple[str, int], float] = defaultdict(float)
