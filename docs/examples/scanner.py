@@ -4,8 +4,9 @@
         pose:=true coordinates:=box.csv
     python scanner.py box.csv
 
-The second command writes the coordinates of the targets on two sides of the box, and makes four
-scans, each of which sees two sides. `ros2 bag record -a` keeps them, `ros2 bag play` repeats them.
+The second command writes the coordinates of the targets on two sides of the box, and makes a scan
+of two sides for every Enter, until it has been around. `ros2 bag record -a` keeps the scans,
+`ros2 bag play` repeats them.
 """
 
 from __future__ import annotations
@@ -187,17 +188,18 @@ def table() -> str:
 
 
 def main() -> None:
-    """Write the coordinates, and publish four scans once somebody listens."""
+    """Write the coordinates, and publish a scan for every line on the input."""
     Path(sys.argv[1]).write_text(table(), encoding='utf-8')
     rclpy.init()
     node = rclpy.create_node('zivid_camera')
     publishers = {name: node.create_publisher(kind, name, 1) for name, kind in TOPICS.items()}
-    while not all(it.get_subscription_count() for it in publishers.values()):
-        time.sleep(0.1)
     for number in range(len(SEEDS)):
+        input('Enter: next scan')
+        while not all(it.get_subscription_count() for it in publishers.values()):
+            time.sleep(0.1)
         for topic, message in messages(scan(number), time.time_ns()):
             publishers[topic].publish(message)
-        time.sleep(3)
+    input('Enter: end')
     node.destroy_node()
     rclpy.shutdown()
 

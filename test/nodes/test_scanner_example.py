@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import runpy
+import subprocess
+import sys
 import time
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,17 +26,30 @@ from test_nodes_registration import transform_of
 from ahf_ros.interchange.point_clouds import whole_points
 from support import ROOT, bags
 from support.launch_files import launched
-from support.live import Graph
+from support.live import PATIENCE, Graph, ros_environment
 from support.scans import squared_error
 
-SCANNER = runpy.run_path(str(ROOT / 'docs' / 'examples' / 'scanner.py'))
+EXAMPLE = ROOT / 'docs' / 'examples' / 'scanner.py'
+SCANNER = runpy.run_path(str(EXAMPLE))
 SCANS = range(len(SCANNER['SEEDS']))
 POSED = [0, 1, 3]  # scans that see targets of known coordinates
 UNLIKELY = 40.0  # of a chi-square of 6 degrees of freedom, which rarely exceeds 30
 
 
+@pytest.fixture
+def scanner(graph: Any, tmp_path: Path) -> Iterator[subprocess.Popen]:
+    """Return the example as a process that has written its coordinates."""
+    table = tmp_path / 'box.csv'
+    command = sys.executable, EXAMPLE, table
+    environment = {**os.environ, **ros_environment()}
+    with subprocess.Popen(command, env=environment, stdin=subprocess.PIPE, text=True) as process:
+        graph.until(table.is_file)
+        yield process
+        process.kill()
+
+
 class Rig:
-    """What a launch of the rig starts, with a scanner of one's own."""
+    """What a launch of the rig starts, and what it says of scans."""
 
     def __init__(self, graph: Graph, **given: str) -> None:
         self.graph = graph
@@ -42,17 +59,11 @@ class Rig:
         self.residuals = graph.listen(PointCloud2, '/registration/residuals')
         self.clouds = graph.listen(PointCloud2, '/registration/cloud')
         self.poses = graph.listen(PoseWithCovarianceStamped, '/pose/pose')
-        self.scanner = {
-            name: graph.publisher(kind, name) for name, kind in SCANNER['TOPICS'].items()
-        }
 
-    def play(self, messages: list[tuple[str, bytes]]) -> None:
-        """Publish scans, each as soon as the one before is registered."""
-        for topic, message in messages:
-            count = len(self.clouds)
-            self.scanner[topic].publish(message)
-            if topic == '/color/image_color':
-                self.graph.until(lambda count=count: len(self.clouds) > count)
+    def until_registered(self, scans: int, posed: int) -> None:
+        """Return when there are so many scans and poses of the camera."""
+        others = self.transforms, self.residuals, self.clouds
+        self.graph.until(lambda: len(self.poses) >= posed and min(map(len, others)) >= scans)
 
     def call(self, name: str) -> str:
         response = self.graph.call(Trigger, f'/registration/{name}', Trigger.Request())
@@ -60,31 +71,19 @@ class Rig:
         return response.message
 
 
-def recording() -> list[tuple[str, str, int, bytes]]:
-    """Return the messages of all scans: topic, type, time and bytes."""
+def recording(path: Path) -> Path:
+    """Write a bag of all scans."""
     now = time.time_ns()
-    return [
-        (
-            topic,
-            f'sensor_msgs/msg/{type(message).__name__}',
-            now + number,
-            serialize_message(message),
-        )
+    messages = [
+        (topic, f'sensor_msgs/msg/{type(it).__name__}', now + number, serialize_message(it))
         for number in SCANS
-        for topic, message in SCANNER['messages'](SCANNER['scan'](number), now + number)
+        for topic, it in SCANNER['messages'](SCANNER['scan'](number), now + number)
     ]
+    return bags.write_raw(path, messages)
 
 
-def test_scans_of_a_box_live_and_recorded_are_in_its_frame(graph: Any, tmp_path: Path) -> None:
-    table, folder = tmp_path / 'box.csv', tmp_path / 'scans'
-    table.write_text(SCANNER['table']())
-    rig = Rig(
-        graph, coordinates=str(table), folder=str(folder), frame='box', expected_targets='12'
-    )
-    recorded = recording()
-    rig.play([(topic, message) for topic, _, _, message in recorded])
-    graph.until(lambda: len(rig.transforms) == len(rig.residuals) == len(SCANS))
-    graph.until(lambda: len(rig.poses) == len(POSED))
+def assert_true(rig: Rig) -> None:
+    """Assert that all scans, and the camera, are where the scanner was."""
     for number in SCANS:
         of = SCANNER['scan'](number)
         found = [rig.transforms[number]]
@@ -101,15 +100,33 @@ def test_scans_of_a_box_live_and_recorded_are_in_its_frame(graph: Any, tmp_path:
         walls = np.maximum(np.abs(cloud['x']), np.abs(cloud['y']))
         assert np.isfinite(walls).sum() > 100_000
         assert np.nanmax(np.abs(walls - SCANNER['WIDTH'] / 2)) < 1e-3
+
+
+def test_scans_of_a_box_live_and_recorded_are_in_its_frame(
+    graph: Any, scanner: subprocess.Popen, tmp_path: Path
+) -> None:
+    folder = tmp_path / 'scans'
+    given = {'coordinates': str(tmp_path / 'box.csv'), 'folder': str(folder), 'frame': 'box'}
+    rig = Rig(graph, expected_targets='12', **given)
+    for number in (*SCANS, len(SCANS)):
+        scanner.stdin.write('\n')
+        scanner.stdin.flush()
+        rig.until_registered(min(number + 1, len(SCANS)), sum(it <= number for it in POSED))
+    assert scanner.wait(PATIENCE) == 0
+    assert_true(rig)
     assert rig.call('save').startswith('4 scans in ')
     assert len(list(folder.glob('*.ply'))) == len(SCANS)
 
-    bag = bags.write_raw(tmp_path / 'bag', recorded)
     assert rig.call('reset') == '4 scans forgotten'
-    rig.play([(topic, message) for topic, _, message in bags.read(bag)])
-    graph.until(lambda: len(rig.transforms) == 2 * len(SCANS))
-    graph.until(lambda: len(rig.poses) == 2 * len(POSED))
-    for said in (rig.transforms, rig.poses, rig.clouds):
+    publishers = {name: graph.publisher(kind, name) for name, kind in SCANNER['TOPICS'].items()}
+    recorded = bags.read(recording(tmp_path / 'bag'))
+    for place, (topic, _, message) in enumerate(recorded, 1):
+        publishers[topic].publish(message)
+        if place % len(publishers) == 0:
+            rig.until_registered(len(SCANS) + place // len(publishers), 0)
+    rig.until_registered(2 * len(SCANS), 2 * len(POSED))
+    poses = [[it.pose for it in said] for said in (rig.transforms, rig.poses)]
+    for said in (*poses, [it.data for it in rig.clouds]):
         assert said[len(said) // 2 :] == said[: len(said) // 2]
     for process in rig.processes:
         assert process.end()[0] == 0
