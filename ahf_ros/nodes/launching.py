@@ -147,7 +147,8 @@ def detector(given: Mapping[str, str], names: Iterable[str], driver: Driver | No
     image, points = _topics(given, driver)
     values: dict[str, Any] = {'cloud': True, **driver.settings} if driver else {}
     values |= _values('detector', names, given)
-    values |= _best_effort(given, driver, image, points)
+    whatever_queue = SUBSCRIPTION, LOSSLESS_SUBSCRIPTION
+    values |= _best_effort(given, driver, (image, points), whatever_queue)
     return _node(
         'detector', given, given['parameters'], values, {'image': image, 'points': points}
     )
@@ -180,7 +181,7 @@ def registration(given: Mapping[str, str], driver: Driver) -> Node:
     values: dict[str, Any] = {'cloud': True}
     values |= {'cloud_tolerance': tolerance} if tolerance else {}
     values |= _values('registration', OF_REGISTRATION, given)
-    values |= _best_effort(given, driver, points)
+    values |= _best_effort(given, driver, (points,), (LOSSLESS_SUBSCRIPTION,))
     topics = {'target_points': 'detector/target_points', 'points': points}
     return _node('registration', given, given['registration_parameters'], values, topics)
 
@@ -193,14 +194,16 @@ def _topics(given: Mapping[str, str], driver: Driver | None) -> tuple[str, str]:
     return image, points
 
 
-def _best_effort(given: Mapping[str, str], driver: Driver | None, *topics: str) -> dict[str, str]:
+def _best_effort(
+    given: Mapping[str, str], driver: Driver | None, topics: Iterable[str], ends: Sequence[str]
+) -> dict[str, str]:
     """Return parameters that make subscriptions best effort, if the topics of a driver are."""
     values = {}
     if driver and not driver.reliable:
         space = given['namespace'].strip('/')
         for topic in topics:
             name = topic if topic.startswith('/') else f'/{space}/{topic}'.replace('//', '/')
-            for end in (SUBSCRIPTION, LOSSLESS_SUBSCRIPTION):  # whatever the queue
+            for end in ends:
                 values[f'qos_overrides.{name}.{end}.reliability'] = 'best_effort'
     return values
 
