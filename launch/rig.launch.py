@@ -17,6 +17,7 @@ from ahf_ros.nodes.launching import (
     driver_node,
     pose,
     registration,
+    without_effect,
 )
 
 PARAMETERS = (*USUAL, 'cloud_tolerance', 'cloud_offset_x', 'cloud_offset_y', 'cloud_step')
@@ -73,4 +74,4 @@ def nodes(context):
     if given['start_driver'] == 'true':
         chosen = {name: given[f'driver_{name}'] for name in OF_DRIVER}
         started.append(driver_node(driver, **chosen))
-    return started
+    return [*without_effect(given), *started]

@@ -186,6 +186,17 @@ def registration(given: Mapping[str, str], driver: Driver) -> Node:
     return _node('registration', given, given['registration_parameters'], values, topics)
 
 
+def without_effect(given: Mapping[str, str]) -> list[LogInfo]:
+    """Return what says of arguments that no node is started that has them."""
+    users = dict.fromkeys((*OF_POSE, 'camera_info'), ('pose',)) | {'folder': ('registration',)}
+    users |= dict.fromkeys(('coordinates', 'unit'), ('pose', 'registration'))
+    return [
+        LogInfo(msg=f'{name} has no effect: {" and ".join(f"{it} is false" for it in nodes)}')
+        for name, nodes in users.items()
+        if given[name] and not any(given[it] == 'true' for it in nodes)
+    ]
+
+
 def _topics(given: Mapping[str, str], driver: Driver | None) -> tuple[str, str]:
     """Return the topics of images and clouds."""
     image, points = given.get('image', ''), given.get('points', '')

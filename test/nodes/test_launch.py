@@ -21,10 +21,11 @@ from support.launch_files import USERS, Started, launched
 
 NODES = {
     'detector': ['detector'],
-    'rig': ['detector'],
+    'rig': ['detector', 'pose', 'registration'],
     'demo': ['illumination', 'detector', 'scoreboard'],
 }
-REQUIRED = {'detector': {}, 'rig': {'driver': 'zivid'}, 'demo': {}}
+RIG = {'driver': 'zivid', 'pose': 'true', 'registration': 'true', 'coordinates': 'box.csv'}
+REQUIRED = {'detector': {}, 'rig': RIG, 'demo': {}}
 DETECTOR_FILE, POSE_FILE, REGISTRATION_FILE = (
     str(ROOT / 'config' / f'{name}.yaml') for name in ('detector', 'pose', 'registration')
 )
@@ -132,6 +133,16 @@ def test_bad_arguments_start_nothing(name: str, given: dict[str, str], words: st
 def test_arguments_that_may_be_misspelt_are_said(name: str, given: str, said: list[str]) -> None:
     messages = [f'no argument is named {given}; the nearest is {nearest}' for nearest in said]
     assert launched(name, **REQUIRED[name], **{given: 'some'}).said == messages
+
+
+def test_arguments_without_effect_are_said() -> None:
+    said = launched('rig', driver='zivid', coordinates='box.csv', tf='camera', pose='false').said
+    assert said == [
+        'coordinates has no effect: pose is false and registration is false',
+        'tf has no effect: pose is false',
+    ]
+    given = {'registration': 'true', 'coordinates': 'box.csv', 'folder': 'scans'}
+    assert launched('rig', driver='zivid', **given).said == []
 
 
 def installed(package: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
