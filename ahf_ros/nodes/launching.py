@@ -188,7 +188,8 @@ def registration(given: Mapping[str, str], driver: Driver) -> Node:
 
 def without_effect(given: Mapping[str, str]) -> list[LogInfo]:
     """Return what says of arguments that no node is started that has them."""
-    users = dict.fromkeys((*OF_POSE, 'camera_info'), ('pose',)) | {'folder': ('registration',)}
+    users: dict[str, tuple[str, ...]] = {'folder': ('registration',)}
+    users |= dict.fromkeys((*OF_POSE, 'camera_info'), ('pose',))
     users |= dict.fromkeys(('coordinates', 'unit'), ('pose', 'registration'))
     return [
         LogInfo(msg=f'{name} has no effect: {" and ".join(f"{it} is false" for it in nodes)}')
