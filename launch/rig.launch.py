@@ -1,16 +1,27 @@
-"""Driver of a scanner and detector: IDs of targets and their positions in space.
+"""A scanner that knows where it is: driver, detector, pose and registration.
 
-ros2 launch ahf_ros rig.launch.py driver:=zivid start_driver:=true
+ros2 launch ahf_ros rig.launch.py driver:=zivid start_driver:=true registration:=true \\
+    pose:=true coordinates:=targets.csv unit:=mm
 """
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
 
 from ahf_ros.nodes.drivers import DRIVERS
-from ahf_ros.nodes.launching import USUAL, arguments, declared, detector, driver_node
+from ahf_ros.nodes.launching import (
+    USUAL,
+    arguments,
+    arguments_of_poses,
+    declared,
+    detector,
+    driver_node,
+    pose,
+    registration,
+    without_effect,
+)
 
 PARAMETERS = (*USUAL, 'cloud_tolerance', 'cloud_offset_x', 'cloud_offset_y', 'cloud_step')
-TOPICS = {'image': 'images', 'points': 'point clouds'}
+TOPICS = {'image': 'images', 'points': 'point clouds', 'camera_info': 'calibration'}
 OF_DRIVER = {
     'package': 'Package of the driver that is started, where it is not the usual one.',
     'executable': 'Executable in this package, where it is not the usual one.',
@@ -47,6 +58,7 @@ def generate_launch_description():
                     for topic, what in TOPICS.items()
                 ),
                 *arguments(PARAMETERS),
+                *arguments_of_poses(),
             ),
             OpaqueFunction(function=nodes),
         ]
@@ -57,7 +69,9 @@ def nodes(context):
     given = context.launch_configurations
     driver = DRIVERS[given['driver']]
     started = [detector(given, PARAMETERS, driver)]
+    more = {'pose': pose, 'registration': registration}
+    started += [made(given, driver) for node, made in more.items() if given[node] == 'true']
     if given['start_driver'] == 'true':
         chosen = {name: given[f'driver_{name}'] for name in OF_DRIVER}
         started.append(driver_node(driver, **chosen))
-    return started
+    return [*without_effect(given), *started]

@@ -59,11 +59,13 @@ def interfaces() -> str:
 
 def drivers() -> str:
     """Return what the drivers of scanners publish."""
-    rows = [('driver', 'image', 'cloud', 'bytes per point, missing points', 'stamps', 'QoS')]
+    head = 'driver', 'image', 'calibration', 'cloud', 'bytes per point, missing points', 'stamps'
+    rows = [(*head, 'QoS')]
     for name, driver in DRIVERS.items():
         cells = (
             f'`{name}`: {driver.package}',
             f'`{driver.image}`, {driver.encoding}',
+            f'`{driver.camera_info}`' if driver.calibrated else 'none',
             f'`{driver.points}`{", before the image" if driver.cloud_first else ""}',
             f'{driver.point_step}, {driver.missing}',
             driver.stamps,
@@ -75,12 +77,13 @@ def drivers() -> str:
 
 def driver_settings() -> str:
     """Return what is to be set for each driver, in the node and in the driver."""
-    rows = [('driver', 'set in the detector', 'set in the driver', 'what else to do')]
+    rows = [('driver', 'set in the detector', 'in `pose`', 'in the driver', 'what else to do')]
     for name, driver in DRIVERS.items():
         settings = {'cloud': 'true', **driver.settings}
         if not driver.reliable:
             settings['reliability'] = 'best_effort'
-        rows.append((f'`{name}`', _assigned(settings), _assigned(driver.parameters), driver.setup))
+        cells = map(_assigned, (settings, driver.pose, driver.parameters))
+        rows.append((f'`{name}`', *cells, driver.setup))
     return table(rows)
 
 

@@ -80,6 +80,13 @@ def write_ros2(path: Path, messages: list[Recorded], storage: str = 'mcap') -> P
     return path
 
 
+def write_raw(path: Path, messages: list[tuple[str, str, int, bytes]]) -> Path:
+    """Write a bag of ROS 2 from serialised messages: topic, type, time in ns, and bytes."""
+    with rosbag2.Writer(path, version=9, storage_plugin=rosbag2.StoragePlugin.MCAP) as writer:
+        _write(writer, messages, typestore(), lambda message, _: message)
+    return path
+
+
 def write_ros1(path: Path, messages: list[Recorded]) -> Path:
     """Write a bag of ROS 1."""
     store = ros1()

@@ -47,7 +47,8 @@ def in_common_frame(cloud: np.ndarray, transform: Transform) -> np.ndarray:
     with np.errstate(invalid='ignore', over='ignore'):
         moved = transform.moved(points)
         moved[~(np.isfinite(points).all(axis=-1) & points.any(axis=-1))] = np.nan
-        result = cloud.copy()
+        result = np.zeros(cloud.shape, cloud.dtype)  # also between the fields
+        result[...] = cloud
         for axis, name in enumerate(AXES):
             result[name] = moved[..., axis]
     return result

@@ -31,6 +31,19 @@ class Driver:
     cloud_first: bool = False  # whether the cloud is published before the image
     reliable: bool = True  # otherwise, the topics are best effort
     settings: Mapping[str, float] = field(default_factory=dict)  # of the node, beside cloud
+    calibrated: bool = True  # whether it publishes camera_info, beside the image
+    pose: Mapping[str, str] = field(default_factory=dict)  # settings of the node `pose`
+
+    @property
+    def camera_info(self) -> str:
+        """Topic of sensor_msgs/CameraInfo; empty if there is none."""
+        return beside(self.image) if self.calibrated else ''
+
+
+def beside(image: str) -> str:
+    """Return the topic where image_transport publishes the calibration of an image."""
+    space, slash, _ = image.rpartition('/')
+    return f'{space}{slash}camera_info'
 
 
 DRIVERS = {
@@ -52,6 +65,7 @@ DRIVERS = {
         encoding='mono8',
         stamps='the same time; that of the cloud is cut to whole microseconds',
         settings={'cloud_tolerance': 1e-5},
+        pose={'camera_matrix': 'p'},  # k is the identity
         executable='ensenso_camera_node',
         setup='request rectified images and the point cloud together; with a disparity map '
         'offset, the cloud is narrower than the image by `cloud_offset_x`',
@@ -91,6 +105,7 @@ DRIVERS = {
         image='/phoxi/phoxi_camera/texture',
         points='/phoxi/phoxi_camera/cloud',
         encoding='32FC1',
+        calibrated=False,
         missing='0',
         cloud_first=True,
         stamps='when each is published',

@@ -1,4 +1,4 @@
-"""What the launch files have in common: arguments with texts and choices, detector and driver."""
+"""What the launch files have in common: arguments with texts and choices, and the nodes."""
 
 from __future__ import annotations
 
@@ -16,9 +16,8 @@ from ament_index_python.packages import (
 from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction, Shutdown
 from launch_ros.actions import Node
 
-from ahf_ros.nodes.drivers import Driver
+from ahf_ros.nodes.drivers import Driver, beside
 from ahf_ros.nodes.interfaces import NODES
-from ahf_ros.nodes.settings import DetectorNodeSettings
 from ahf_ros.nodes.topics import LOSSLESS_SUBSCRIPTION, SUBSCRIPTION
 from ahf_ros.settings.nested import flat_parameters
 from ahf_ros.settings.parameter import Parameter
@@ -26,10 +25,13 @@ from ahf_ros.settings.parameter import Parameter
 USUAL = NODES['detector'].usual
 """Parameters that are arguments of every launch file with a detector of the user's."""
 
-_PARAMETERS = {
-    **{item.name: item for item in flat_parameters(DetectorNodeSettings)},
-    'use_sim_time': Parameter('use_sim_time', False, 'Whether to take the time from /clock.'),
-}
+OF_POSE = ('coordinates', 'unit', 'tf', 'camera_matrix')
+"""Parameters of the node `pose` that are arguments of `rig.launch.py`."""
+
+OF_REGISTRATION = ('frame', 'coordinates', 'unit', 'folder', 'cloud_tolerance')
+"""Likewise of `registration`."""
+
+_SIM_TIME = Parameter('use_sim_time', False, 'Whether to take the time from /clock.')
 
 
 def config(name: str) -> str:
@@ -63,32 +65,75 @@ def arguments(names: Iterable[str]) -> list[DeclareLaunchArgument]:
 
     An argument that is not given is empty, and the parameter file decides.
     """
+    namespace = DeclareLaunchArgument(
+        'namespace', default_value='', description='Namespace of the nodes, such as left.'
+    )
+    items = [_item('detector', name) for name in (*names, _SIM_TIME.name)]
+    return [namespace, parameter_file('detector'), *map(_argument, items)]
+
+
+def arguments_of_poses() -> list[DeclareLaunchArgument]:
+    """Return launch arguments for the nodes `pose` and `registration`.
+
+    Both have the same coordinates in the same frame.
+    """
+    nodes = 'pose', 'registration'
     made = [
         DeclareLaunchArgument(
-            'namespace', default_value='', description='Namespace of the node, such as left.'
-        ),
-        DeclareLaunchArgument(
-            'parameters',
-            default_value=config('detector.yaml'),
-            description='Parameter file of the node; arguments take precedence over it.',
-        ),
-    ]
-    for item in _items(names):
-        accepted = '' if item.choices else f' Accepted is {item.accepted}.'
-        argument = DeclareLaunchArgument(
-            item.name,
-            default_value='',
-            choices=['', *item.choices] if item.choices else None,
-            description=(
-                f'{item.description}{accepted} Default: the value in the parameter file.'
-            ),
+            node,
+            default_value='false',
+            choices=['true', 'false'],
+            description=f'Whether to start the node {node}, too. {NODES[node].purpose}',
         )
-        made.append(argument)
-    return made
+        for node in nodes
+    ]
+    frame = _item('registration', 'frame')
+    made.append(
+        DeclareLaunchArgument(
+            'frame',
+            default_value=frame.default,
+            description='Frame of the coordinates, and of scans: `targets_frame` of pose, `frame` '
+            'of registration.',
+        )
+    )
+    items = (_item('pose', name) for name in OF_POSE)
+    made += [*map(_argument, items), _argument(_item('registration', 'folder'))]
+    return [*made, *(parameter_file(node, f'{node}_parameters') for node in nodes)]
 
 
-def _items(names: Iterable[str]) -> list[Parameter]:
-    return [_PARAMETERS[name] for name in (*names, 'use_sim_time')]
+def parameter_file(node: str, name: str = 'parameters') -> DeclareLaunchArgument:
+    """Return the launch argument for the parameter file of a node."""
+    return DeclareLaunchArgument(
+        name,
+        default_value=config(f'{node}.yaml'),
+        description=f'Parameter file of the node {node}; arguments take precedence over it.',
+    )
+
+
+def _argument(item: Parameter) -> DeclareLaunchArgument:
+    accepted = '' if item.choices else f' Accepted is {item.accepted}.'
+    return DeclareLaunchArgument(
+        item.name,
+        default_value='',
+        choices=list(dict.fromkeys(('', *item.choices))) if item.choices else None,
+        description=f'{item.description}{accepted} Default: the value in the parameter file.',
+    )
+
+
+def _item(node: str, name: str) -> Parameter:
+    """Return a parameter of a node."""
+    if name == _SIM_TIME.name:
+        return _SIM_TIME
+    return next(it for it in flat_parameters(NODES[node].settings) if it.name == name)
+
+
+def _values(node: str, names: Iterable[str], given: Mapping[str, str]) -> dict[str, Any]:
+    """Return the parameters in `names` that have an argument, by name."""
+    return {
+        name: _item(node, name).value_of(text)
+        for name in (*names, _SIM_TIME.name)
+        if (text := given.get(name))
+    }
 
 
 def detector(given: Mapping[str, str], names: Iterable[str], driver: Driver | None = None) -> Node:
@@ -99,29 +144,97 @@ def detector(given: Mapping[str, str], names: Iterable[str], driver: Driver | No
     driver where no argument names another. Raises a ValueError that names the argument, the value
     and what is accepted, if a value is not.
     """
+    image, points = _topics(given, driver)
+    values: dict[str, Any] = {'cloud': True, **driver.settings} if driver else {}
+    values |= _values('detector', names, given)
+    whatever_queue = SUBSCRIPTION, LOSSLESS_SUBSCRIPTION
+    values |= _best_effort(given, driver, (image, points), whatever_queue)
+    return _node(
+        'detector', given, given['parameters'], values, {'image': image, 'points': points}
+    )
+
+
+def pose(given: Mapping[str, str], driver: Driver) -> Node:
+    """Return the node `pose` for the detector of a rig, whose end ends the launch.
+
+    Raises a ValueError as `detector` does, or if the driver has no calibration.
+    """
+    camera_info = given['camera_info']
+    if not camera_info and not driver.calibrated:
+        raise ValueError(
+            f'camera_info is empty, accepted with {driver.package} is a topic that somebody '
+            'publishes: the driver has none'
+        )
+    image, _ = _topics(given, driver)
+    values = {'targets_frame': given['frame'], **driver.pose, **_values('pose', OF_POSE, given)}
+    topics = {'camera_info': camera_info or beside(image)}
+    return _node('pose', given, given['pose_parameters'], values, topics)
+
+
+def registration(given: Mapping[str, str], driver: Driver) -> Node:
+    """Return the node `registration` for the detector of a rig, whose end ends the launch.
+
+    Raises a ValueError as `detector` does.
+    """
+    _, points = _topics(given, driver)
+    tolerance = driver.settings.get('cloud_tolerance')
+    values: dict[str, Any] = {'cloud': True}
+    values |= {'cloud_tolerance': tolerance} if tolerance else {}
+    values |= _values('registration', OF_REGISTRATION, given)
+    values |= _best_effort(given, driver, (points,), (LOSSLESS_SUBSCRIPTION,))
+    topics = {'target_points': 'detector/target_points', 'points': points}
+    return _node('registration', given, given['registration_parameters'], values, topics)
+
+
+def without_effect(given: Mapping[str, str]) -> list[LogInfo]:
+    """Return what says of arguments that no node is started that has them."""
+    users: dict[str, tuple[str, ...]] = {'folder': ('registration',)}
+    users |= dict.fromkeys((*OF_POSE, 'camera_info'), ('pose',))
+    users |= dict.fromkeys(('coordinates', 'unit'), ('pose', 'registration'))
+    return [
+        LogInfo(msg=f'{name} has no effect: {" and ".join(f"{it} is false" for it in nodes)}')
+        for name, nodes in users.items()
+        if given[name] and not any(given[it] == 'true' for it in nodes)
+    ]
+
+
+def _topics(given: Mapping[str, str], driver: Driver | None) -> tuple[str, str]:
+    """Return the topics of images and clouds."""
     image, points = given.get('image', ''), given.get('points', '')
-    values: dict[str, Any] = {}
     if driver:
-        image, points = image or driver.image, points or driver.points
-        values = {'cloud': True, **driver.settings}
-    for item in _items(names):
-        if text := given.get(item.name):
-            values[item.name] = item.value_of(text)
+        return image or driver.image, points or driver.points
+    return image, points
+
+
+def _best_effort(
+    given: Mapping[str, str], driver: Driver | None, topics: Iterable[str], ends: Sequence[str]
+) -> dict[str, str]:
+    """Return parameters that make subscriptions best effort, if the topics of a driver are."""
+    values = {}
     if driver and not driver.reliable:
-        # Best effort, whatever the queue.
         space = given['namespace'].strip('/')
-        for topic in (image, points):
+        for topic in topics:
             name = topic if topic.startswith('/') else f'/{space}/{topic}'.replace('//', '/')
-            for end in (SUBSCRIPTION, LOSSLESS_SUBSCRIPTION):
+            for end in ends:
                 values[f'qos_overrides.{name}.{end}.reliability'] = 'best_effort'
+    return values
+
+
+def _node(
+    name: str,
+    given: Mapping[str, str],
+    parameters: str,
+    values: Mapping[str, Any],
+    topics: Mapping[str, str],
+) -> Node:
     return Node(
         package='ahf_ros',
-        executable='detector',
+        executable=name,
         namespace=given['namespace'],
-        parameters=[given['parameters'], values],
-        remappings=[('image', image), ('points', points)],
+        parameters=[parameters, dict(values)],
+        remappings=list(topics.items()),
         output='screen',
-        on_exit=Shutdown(reason='the detector has ended'),
+        on_exit=Shutdown(reason=f'the node {name} has ended'),
     )
 
 

@@ -158,12 +158,14 @@ class PoseNode(ProcessNode):
             topic = self.resolve_topic_name('camera_info')
             raise ValueError(f'no camera_info has come on {topic}')
         camera.check(header.frame_id, message.width, message.height)
-        if not camera.matrix[:2, 2].any():
+        rectified = settings.camera_matrix == 'p'
+        matrix = camera.projection if rectified else camera.matrix
+        if not matrix[:2, 2].any():
             raise ValueError(
-                'k of camera_info has the principal point 0, 0, accepted is one in the image: a '
-                'camera that is calibrated'
+                f'{settings.camera_matrix} of camera_info has the principal point 0, 0, accepted '
+                'is one in the image: a camera that is calibrated'
             )
-        self._tally.rectified = self._mistaken_matrix(camera, settings.camera_matrix == 'p')
+        self._tally.rectified = self._mistaken_matrix(camera, rectified)
         return camera
 
     def _pose(

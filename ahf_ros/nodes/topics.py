@@ -14,6 +14,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import CompressedImage, Image
 
+from ahf_ros.nodes.drivers import beside
 from ahf_ros.nodes.parameters import descriptor
 from ahf_ros.settings.parameter import Parameter
 
@@ -56,8 +57,7 @@ def image_topic(node: Node, transport: str) -> str:
 
 def camera_info_topic(node: Node) -> str:
     """Return the topic of the calibration of the camera: beside the base topic of the images."""
-    beside = node.resolve_topic_name(IMAGE).rpartition('/')[0]
-    return _remapped(node, 'camera_info') or f'{beside}/camera_info'
+    return _remapped(node, 'camera_info') or beside(node.resolve_topic_name(IMAGE))
 
 
 def _remapped(node: Node, name: str) -> str:

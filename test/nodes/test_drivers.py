@@ -1,4 +1,4 @@
-"""Drivers of scanners, with the layout of their messages, and the detectors of `rig.launch.py`."""
+"""Drivers of scanners, with the layout of their messages, and the nodes of `rig.launch.py`."""
 
 from __future__ import annotations
 
@@ -23,31 +23,33 @@ from sensor_msgs.msg import Image, PointCloud2, PointField
 from std_msgs.msg import Header
 from test_nodes_rig import in_space, read, scan, synthetic_camera
 
+from ahf_ros.interchange.point_clouds import organised_points
 from ahf_ros.nodes.drivers import DRIVERS, Driver
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 from support.launch_files import launched
 from support.live import PATIENCE, ros_environment
 
 # Small enough for best effort, which loses messages of more than half a megabyte.
-SCENE = SceneSettings(width=200, height=150, targets=2, dot_radius=8.0, seed=4)
+SCENE = SceneSettings(width=200, height=150, targets=4, dot_radius=6.0, seed=4)
 MAXIMUM_ERROR = 0.2e-3  # m
 NARROWER = 24  # px, with a disparity offset
 AGAIN = 1.0  # s, after which lost messages are sent again
 
-DETECTORS = """
+NODES = """
 import json, os, signal, sys
 from ahf_ros.nodes.start import start
-import ahf_ros.nodes.detector
+import ahf_ros.nodes.detector, ahf_ros.nodes.registration
 
 every = json.loads(sys.argv[1])
-for arguments in every:
+for name, arguments in every:
     if not os.fork():
-        sys.exit(start('detector', ['--ros-args', *arguments]))
+        sys.exit(start(name, ['--ros-args', *arguments]))
 signal.signal(signal.SIGINT, signal.SIG_IGN)
 sys.exit(sum(os.waitstatus_to_exitcode(os.wait()[1]) for _ in every))
 """
-"""Several detectors for the imports of one."""
+"""Several nodes for the imports of two."""
 
+GIVEN = {'registration': 'true', 'family': SCENE.family}
 ARGUMENTS = {'ensenso': {'cloud_offset_x': str(NARROWER)}}
 """What a user sets beside the driver."""
 
@@ -68,13 +70,14 @@ def pixels_of(encoding: str, grey: np.ndarray) -> np.ndarray:
 
 @dataclass
 class Scanner:
-    """What a driver publishes, and the positions that its detector finds."""
+    """What a driver publishes, and what the nodes of its rig say of it."""
 
     name: str
     driver: Driver
     image: Any
     points: Any
-    found: list[PointCloud2] = field(default_factory=list)
+    found: list[PointCloud2] = field(default_factory=list)  # positions of targets
+    registered: list[PointCloud2] = field(default_factory=list)  # clouds
 
     def shoot(self, rendering: Rendering, cloud: np.ndarray, number: int) -> None:
         """Publish image and cloud of a shot in the order of the driver."""
@@ -130,15 +133,23 @@ def cloud_of(name: str, points: np.ndarray, stamp: int) -> PointCloud2:
     )
 
 
+def xyz(message: PointCloud2) -> np.ndarray:
+    """Return the points of a cloud, shape (height, width, 3)."""
+    points = organised_points(message)
+    return np.stack([points[axis] for axis in 'xyz'], axis=2)
+
+
 @pytest.fixture
-def detectors() -> Iterator[subprocess.Popen]:
-    """Start the detectors that the launch file describes for the drivers."""
-    nodes = [
-        launched('rig', driver=name, namespace=name, **ARGUMENTS.get(name, {})).nodes
+def nodes() -> Iterator[subprocess.Popen]:
+    """Start the nodes that the launch file describes for the drivers."""
+    started = [
+        (node.node, node.arguments)
         for name in DRIVERS
+        for node in launched(
+            'rig', driver=name, namespace=name, **GIVEN, **ARGUMENTS.get(name, {})
+        ).nodes
     ]
-    arguments = json.dumps([node.arguments for (node,) in nodes])
-    command = (sys.executable, '-c', DETECTORS, arguments)
+    command = (sys.executable, '-c', NODES, json.dumps(started))
     environment = {**os.environ, **ros_environment()}
     process = subprocess.Popen(command, env=environment, start_new_session=True)
     yield process
@@ -146,7 +157,9 @@ def detectors() -> Iterator[subprocess.Popen]:
     assert process.wait(PATIENCE) == 0
 
 
-def test_every_driver_has_positions_with_the_rig(graph: Any, detectors: subprocess.Popen) -> None:
+def test_every_driver_has_positions_and_registered_clouds_with_the_rig(
+    graph: Any, nodes: subprocess.Popen
+) -> None:
     rendering, camera = render(SCENE), synthetic_camera(SCENE)
     cloud = scan(rendering, camera, 0.0, {0: 1.2}) / 1000
     scanners = []
@@ -160,25 +173,33 @@ def test_every_driver_has_positions_with_the_rig(graph: Any, detectors: subproce
         for publisher in publishers:
             graph.until(publisher.get_subscription_count)
         scanner = Scanner(name, driver, *publishers)
-        topic = f'/{name}/detector/target_points'
-        graph.node.create_subscription(PointCloud2, topic, scanner.found.append, 10)
+        for topic, heard in (
+            ('detector/target_points', scanner.found),
+            ('registration/cloud', scanner.registered),
+        ):
+            graph.node.create_subscription(PointCloud2, f'/{name}/{topic}', heard.append, 10)
         scanners.append(scanner)
     number, last = 0, -AGAIN
 
-    def all_have_positions() -> bool:
+    def all_are_registered() -> bool:
         nonlocal number, last
-        assert detectors.poll() is None
-        without = [it for it in scanners if not it.found]
+        assert nodes.poll() is None
+        without = [it for it in scanners if not it.registered]
         if without and time.monotonic() - last > AGAIN:
             number, last = number + 1, time.monotonic()
             for scanner in without:
                 scanner.shoot(rendering, cloud, number)
         return not without
 
-    graph.until(all_have_positions)
+    graph.until(all_are_registered)
     true = in_space(camera, np.array([(it.x, it.y) for it in rendering.targets])) / 1000
     for scanner in scanners:
         points = read(scanner.found[0])
         assert points['id'].tolist() == [it.id for it in rendering.targets], scanner.name
         errors = np.stack([points[axis] for axis in 'xyz'], axis=1) - true
         assert np.linalg.norm(errors, axis=1).max() < MAXIMUM_ERROR, scanner.name
+        message = scanner.registered[0]  # the first scan gives the frame
+        assert message.header.frame_id == 'registered'
+        sent = xyz(cloud_of(scanner.name, cloud, 0))
+        sent[~sent.any(axis=2)] = np.nan
+        assert np.array_equal(xyz(message), sent, equal_nan=True), scanner.name

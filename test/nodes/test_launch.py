@@ -12,19 +12,26 @@ import pytest
 
 pytest.importorskip('ament_index_python', reason='ROS 2 is not installed')
 
+from ahf_ros.nodes.drivers import DRIVERS
 from ahf_ros.nodes.settings import DetectorNodeSettings
 from ahf_ros.settings.nested import flat_parameters
 from ahf_ros.synthetic.patterns import LIGHT_NAMES
 from support import ROOT
-from support.launch_files import USERS, launched
+from support.launch_files import USERS, Started, launched
 
 NODES = {
     'detector': ['detector'],
-    'rig': ['detector'],
+    'rig': ['detector', 'pose', 'registration'],
     'demo': ['illumination', 'detector', 'scoreboard'],
 }
-REQUIRED = {'detector': {}, 'rig': {'driver': 'zivid'}, 'demo': {}}
-DETECTOR_FILE = str(ROOT / 'config' / 'detector.yaml')
+RIG = {'driver': 'zivid', 'pose': 'true', 'registration': 'true', 'coordinates': 'box.csv'}
+REQUIRED = {'detector': {}, 'rig': RIG, 'demo': {}}
+DETECTOR_FILE, POSE_FILE, REGISTRATION_FILE = (
+    str(ROOT / 'config' / f'{name}.yaml') for name in ('detector', 'pose', 'registration')
+)
+BEST_EFFORT = (
+    'qos_overrides./phoxi/phoxi_camera/cloud.subscription_lossless.reliability:=best_effort'
+)
 
 
 @pytest.mark.parametrize('name', NODES)
@@ -128,6 +135,16 @@ def test_arguments_that_may_be_misspelt_are_said(name: str, given: str, said: li
     assert launched(name, **REQUIRED[name], **{given: 'some'}).said == messages
 
 
+def test_arguments_without_effect_are_said() -> None:
+    said = launched('rig', driver='zivid', coordinates='box.csv', tf='camera', pose='false').said
+    assert said == [
+        'coordinates has no effect: pose is false and registration is false',
+        'tf has no effect: pose is false',
+    ]
+    given = {'registration': 'true', 'coordinates': 'box.csv', 'folder': 'scans'}
+    assert launched('rig', driver='zivid', **given).said == []
+
+
 def installed(package: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Let a package be one that is installed, as far as its name tells."""
     index = folder / 'share' / 'ament_index' / 'resource_index' / 'packages'
@@ -170,6 +187,52 @@ def test_a_driver_that_cannot_be_started_is_named(driver: str, words: str) -> No
 
 def test_the_lights_of_the_demo_are_choices() -> None:
     assert tuple(launched('demo').declared['light'].named['choices']) == LIGHT_NAMES
+
+
+def test_the_rig_registers_scans_and_knows_its_pose() -> None:
+    given = {'pose': 'true', 'registration': 'true', 'namespace': 'left', 'unit': 'mm'}
+    given |= {'coordinates': 'box.csv', 'tf': 'camera', 'use_sim_time': 'true'}
+    for driver, camera_info, of_pose, of_registration in (
+        (
+            'ensenso',
+            '/rectified/left/camera_info',
+            ['camera_matrix:=p'],
+            ['cloud_tolerance:=1e-05'],
+        ),
+        ('phoxi', 'info', [], ['cloud_tolerance:=0.2', BEST_EFFORT]),
+    ):
+        own = {'camera_info': 'info'} if driver == 'phoxi' else {}
+        _, pose, registration = launched('rig', driver=driver, **given, **own).nodes
+        common = ['coordinates:=box.csv', 'unit:=mm', 'use_sim_time:=true']
+        assert options(pose) == {
+            *('__ns:=/left', 'targets_frame:=registered', 'tf:=camera', *common, *of_pose),
+            *(POSE_FILE, f'camera_info:={camera_info}'),
+        }
+        assert options(registration) == {
+            *('__ns:=/left', 'frame:=registered', 'cloud:=true', *common, *of_registration),
+            *(REGISTRATION_FILE, 'target_points:=detector/target_points'),
+            f'points:={DRIVERS[driver].points}',
+        }
+
+
+def options(of: Started) -> set[str]:
+    """Return what the arguments of a process set, without quotation marks."""
+    return {it.replace("'", '') for it in of.arguments[1::2]}
+
+
+@pytest.mark.parametrize(
+    ('given', 'words'),
+    [
+        ({}, 'camera_info is empty, accepted with phoxi_camera_ros2 is a topic that somebody'),
+        ({'camera_info': 'info', 'tf': 'both'}, "tf is 'both', accepted is one of"),
+        ({'camera_info': 'info', 'pose': 'yes'}, "pose is 'yes', accepted is one of"),
+    ],
+)
+def test_a_rig_whose_pose_cannot_be_known_starts_nothing(
+    given: dict[str, str], words: str
+) -> None:
+    with pytest.raises(ValueError, match=words):
+        launched('rig', **{'driver': 'phoxi', 'pose': 'true', **given})
 
 
 def test_a_rig_without_a_driver_starts_nothing() -> None:

@@ -19,6 +19,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 
+from ahf_ros.interchange.camera_info import calibration, undistorted
 from ahf_ros.msg import CodedTarget, CodedTargetArray
 from benchmarks.registration_pose import CAMERA, SIZE, View, view
 from support.detector import overrides, own, values
@@ -213,6 +214,22 @@ def test_rectified_images_of_the_detector_are_noticed(graph: Any, tmp_path: Path
     words = '/rect/image_rect seems to be rectified, but camera_matrix is k'
     number = iter(range(10, 10**6, 10))
     node.says(words, lambda: node.targets.publish(seen(of, next(number))))
+
+
+def test_rectified_images_need_no_k(graph: Any, tmp_path: Path) -> None:
+    """As those of an Ensenso, whose k is the identity."""
+    of = scene()
+    points = coordinates(tmp_path / 'points.json', of)
+    node = PoseProcess(graph, '/p', points, *overrides(camera_matrix='p'))
+    message = seen(of, 10)
+    centres = np.array([(it.x, it.y) for it in message.targets])
+    for it, (x, y) in zip(message.targets, undistorted(calibration(info()), centres), strict=True):
+        it.x, it.y = x, y
+    node.camera.publish(info(d=[], k=np.eye(3).ravel()))
+    node.says('poses', lambda: node.targets.publish(message))
+    position = node.poses[-1].pose.pose.position
+    found = np.array([position.x, position.y, position.z])
+    assert found == pytest.approx(of.true.translation, abs=1e-3)
 
 
 @pytest.mark.parametrize(

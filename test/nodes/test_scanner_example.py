@@ -1,0 +1,132 @@
+"""The nodes of `rig.launch.py` with scans of a box that docs/examples renders, and a recording."""
+
+from __future__ import annotations
+
+import os
+import runpy
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy', reason='ROS 2 is not installed')
+
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import PointCloud2
+from std_srvs.srv import Trigger
+from test_nodes_registration import transform_of
+
+from ahf_ros.interchange.point_clouds import whole_points
+from support import ROOT, bags
+from support.launch_files import launched
+from support.live import PATIENCE, Graph, ros_environment
+from support.scans import squared_error
+
+EXAMPLE = ROOT / 'docs' / 'examples' / 'scanner.py'
+SCANNER = runpy.run_path(str(EXAMPLE))
+SCANS = range(len(SCANNER['SEEDS']))
+POSED = [0, 1, 3]  # scans that see targets of known coordinates
+UNLIKELY = 40.0  # of a chi-square of 6 degrees of freedom, which rarely exceeds 30
+
+
+@pytest.fixture
+def scanner(graph: Any, tmp_path: Path) -> Iterator[subprocess.Popen]:
+    """Return the example as a process that has written its coordinates."""
+    table = tmp_path / 'box.csv'
+    command = sys.executable, EXAMPLE, table
+    environment = {**os.environ, **ros_environment()}
+    with subprocess.Popen(command, env=environment, stdin=subprocess.PIPE, text=True) as process:
+        graph.until(table.is_file)
+        yield process
+        process.kill()
+
+
+class Rig:
+    """What a launch of the rig starts, and what it says of scans."""
+
+    def __init__(self, graph: Graph, **given: str) -> None:
+        self.graph = graph
+        result = launched('rig', driver='zivid', registration='true', pose='true', **given)
+        self.processes = [graph.start(it.node, *it.arguments) for it in result.nodes]
+        self.transforms = graph.listen(PoseWithCovarianceStamped, '/registration/transform')
+        self.residuals = graph.listen(PointCloud2, '/registration/residuals')
+        self.clouds = graph.listen(PointCloud2, '/registration/cloud')
+        self.poses = graph.listen(PoseWithCovarianceStamped, '/pose/pose')
+
+    def until_registered(self, scans: int, posed: int) -> None:
+        """Return when there are so many scans and poses of the camera."""
+        others = self.transforms, self.residuals, self.clouds
+        self.graph.until(lambda: len(self.poses) >= posed and min(map(len, others)) >= scans)
+
+    def call(self, name: str) -> str:
+        response = self.graph.call(Trigger, f'/registration/{name}', Trigger.Request())
+        assert response.success, response.message
+        return response.message
+
+
+def recording(path: Path) -> Path:
+    """Write a bag of all scans."""
+    now = time.time_ns()
+    messages = [
+        (topic, f'sensor_msgs/msg/{type(it).__name__}', now + number, serialize_message(it))
+        for number in SCANS
+        for topic, it in SCANNER['messages'](SCANNER['scan'](number), now + number)
+    ]
+    return bags.write_raw(path, messages)
+
+
+def assert_true(rig: Rig) -> None:
+    """Assert that all scans, and the camera, are where the scanner was."""
+    for number in SCANS:
+        of = SCANNER['scan'](number)
+        found = [(rig.transforms[number], 0.1e-3)]
+        found += [(rig.poses[POSED.index(number)], 1e-3)] if number in POSED else []
+        for message, error in found:
+            assert message.header.frame_id == 'box'
+            transform = transform_of(message)
+            true = replace(transform, rotation=of.rotation, translation=of.position)
+            assert squared_error(transform, true) < UNLIKELY
+            assert np.linalg.norm(transform.translation - true.translation) < error
+        residuals = whole_points(rig.residuals[number])
+        assert residuals['length'].max() < 0.2e-3
+        cloud = whole_points(rig.clouds[number])
+        walls = np.maximum(np.abs(cloud['x']), np.abs(cloud['y']))
+        assert np.isfinite(walls).sum() > 100_000
+        assert np.nanmax(np.abs(walls - SCANNER['WIDTH'] / 2)) < 1e-3
+
+
+def test_scans_of_a_box_live_and_recorded_are_in_its_frame(
+    graph: Any, scanner: subprocess.Popen, tmp_path: Path
+) -> None:
+    folder = tmp_path / 'scans'
+    given = {'coordinates': str(tmp_path / 'box.csv'), 'folder': str(folder), 'frame': 'box'}
+    rig = Rig(graph, expected_targets='12', **given)
+    for number in (*SCANS, len(SCANS)):
+        scanner.stdin.write('\n')
+        scanner.stdin.flush()
+        rig.until_registered(min(number + 1, len(SCANS)), sum(it <= number for it in POSED))
+    assert scanner.wait(PATIENCE) == 0
+    assert_true(rig)
+    assert rig.call('save').startswith('4 scans in ')
+    assert len(list(folder.glob('*.ply'))) == len(SCANS)
+
+    assert rig.call('reset') == '4 scans forgotten'
+    publishers = {name: graph.publisher(kind, name) for name, kind in SCANNER['TOPICS'].items()}
+    recorded = bags.read(recording(tmp_path / 'bag'))
+    for place, (topic, _, message) in enumerate(recorded, 1):
+        publishers[topic].publish(message)
+        if place % len(publishers) == 0:
+            rig.until_registered(len(SCANS) + place // len(publishers), 0)
+    rig.until_registered(2 * len(SCANS), 2 * len(POSED))
+    poses = [[it.pose for it in said] for said in (rig.transforms, rig.poses)]
+    for said in (*poses, [it.data for it in rig.clouds]):
+        assert said[len(said) // 2 :] == said[: len(said) // 2]
+    for process in rig.processes:
+        assert process.end()[0] == 0
