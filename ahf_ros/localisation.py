@@ -138,10 +138,12 @@ def _neighbours(
 
     Offsets are in steps of the grid.
     """
+    sizes = target.semi_major, target.semi_minor
     # As in messages, so that a position is the same in whatever way the target came.
-    axes = float(np.float32(target.semi_major)), float(np.float32(target.semi_minor))
-    if not all(map(math.isfinite, (target.x, target.y, *axes, target.angle))):
+    angle = float(np.float32(target.angle))
+    if not all(map(math.isfinite, (target.x, target.y, *sizes, angle))):
         return np.empty((0, 2)), np.empty((0, 3)), 0
+    axes = [float(np.float32(min(it, _MAXIMUM_COORDINATE))) for it in sizes]
     reach = [max(_MINIMUM_REACH, neighbourhood * axis / grid.step) for axis in axes]
     x, y = (target.x - grid.offset_x) / grid.step, (target.y - grid.offset_y) / grid.step
     places = []
@@ -154,7 +156,7 @@ def _neighbours(
     window = tuple(slice(first, end, step) for first, end in places)
     rows, columns = np.mgrid[window]
     offsets = np.stack((columns - x, rows - y), axis=-1)
-    cosine, sine = math.cos(target.angle), math.sin(target.angle)
+    cosine, sine = math.cos(angle), math.sin(angle)
     turn = np.array([[cosine, -sine], [sine, cosine]])
     inside = (((offsets @ turn) / reach) ** 2).sum(axis=-1) <= 1
     near = cloud[window][inside]

@@ -94,10 +94,10 @@ def answer_bag(task: BagTask, report: Report) -> Outcome:
         raise ValueError(
             f'output is {task.output}, accepted with storage sqlite3 is a path without ?, # and %'
         )
-    _check_outside(task.source, 'output', task.output)
+    _check_outside(task.source, 'recording', 'output', task.output)
     if task.registration:
-        for bag in (task.source, task.output):
-            _check_outside(bag, 'register', task.registration.folder)
+        _check_outside(task.source, 'recording', 'register', task.registration.folder)
+        _check_outside(task.output, 'new bag', 'register', task.registration.folder)
     with Source(task.source) as source:
         topics = _answer_topics(task, source)
         if task.registration:
@@ -117,7 +117,7 @@ def answer_bag(task: BagTask, report: Report) -> Outcome:
     return outcome
 
 
-def _check_outside(bag: Path, name: str, output: Path) -> None:
+def _check_outside(bag: Path, kind: str, name: str, output: Path) -> None:
     """Refuse an output in the folder of a bag, which would become part of it."""
     folder = bag.resolve()
     if folder.is_file():
@@ -126,7 +126,7 @@ def _check_outside(bag: Path, name: str, output: Path) -> None:
             return
     if output.resolve().is_relative_to(folder):
         raise ValueError(
-            f'{name} is {output}, which is in the bag {folder}; accepted is another folder'
+            f'{name} is {output}, which is in the {kind} {folder}; accepted is another folder'
         )
 
 

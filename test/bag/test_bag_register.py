@@ -181,8 +181,9 @@ def test_stamps_beyond_the_tolerance_and_folders_in_a_bag_are_said(
         'are 0.002000000 s apart or more, accepted is cloud_tolerance, 1e-06 s'
     ) in capsys.readouterr().err
     assert register(tmp_path, recorded, '--cloud-tolerance', '0.01') == 0
-    inside = tmp_path / 'in', tmp_path / 'other', '--register', tmp_path / 'in' / 'scans'
-    assert status('bag', *inside) == 1
-    assert 'which is in the bag' in capsys.readouterr().err
+    for inside, words in (('in', 'in the recording'), ('other', 'in the new bag')):
+        folder = tmp_path / inside / 'scans'
+        assert status('bag', tmp_path / 'in', tmp_path / 'other', '--register', folder) == 1
+        assert f'register is {folder}, which is {words}' in capsys.readouterr().err
     assert status('bag', tmp_path / 'in', tmp_path / 'other', '--adjust') == 2
     assert 'accepted with them is register' in capsys.readouterr().err
