@@ -72,7 +72,8 @@ class Scans(Registration):
         if self.records and stamp < self.records[-1].stamp:
             raise ValueError(
                 f'stamp is {stamp / 1e9:.9f} s, before that of the last scan, '
-                f'{self.records[-1].stamp / 1e9:.9f} s; accepted is a later one, or a reset'
+                f'{self.records[-1].stamp / 1e9:.9f} s; accepted is a later one, or ~/reset of '
+                'the node'
             )
         found = self.add(target_scan(target_points, minimum_confidence))
         name = f'{self._names}{len(self.records) + 1}'

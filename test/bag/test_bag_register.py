@@ -175,12 +175,15 @@ def test_stamps_beyond_the_tolerance_and_folders_in_a_bag_are_said(
 ) -> None:
     recorded = shot(0)
     recorded[1][3].header.stamp.nanosec += 2 * 10**6
-    assert register(tmp_path, recorded) == 1
+    _, kind, time, cloud = shot(0, 1000 * moved(0))[1]
+    recorded.append(('/other', kind, time, cloud))
+    chosen = '--cloud-topic', '/points'
+    assert register(tmp_path, recorded, *chosen) == 1
     assert (
         'no scan is registered, 1 image without a cloud, 1 cloud without an image; their stamps '
         'are 0.002000000 s apart or more, accepted is cloud_tolerance, 1e-06 s'
     ) in capsys.readouterr().err
-    assert register(tmp_path, recorded, '--cloud-tolerance', '0.01') == 0
+    assert register(tmp_path, recorded, *chosen, '--cloud-tolerance', '0.01') == 0
     for inside, words in (('in', 'in the recording'), ('other', 'in the new bag')):
         folder = tmp_path / inside / 'scans'
         assert status('bag', tmp_path / 'in', tmp_path / 'other', '--register', folder) == 1
