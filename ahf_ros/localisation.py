@@ -31,12 +31,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ahf_ros.cloud_settings import FULL, NEIGHBOURHOOD, CloudGrid
 from ahf_ros.features.robust import NORMAL
 from ahf_ros.interchange.point_clouds import AXES, COVARIANCE, TARGET_POINT
 from ahf_ros.target import Target
-
-NEIGHBOURHOOD = 3.0
-"""Radius of the neighbourhood of a centre, in radii of its dot: not beyond the code band."""
 
 MINIMUM_POINTS = 12
 """Minimum number of points that a position is fitted to; there are eleven unknowns."""
@@ -60,40 +58,6 @@ the variance P V / (P - 2 c f(c))^2 (Huber, Robust Statistics, 1981, 3.2), and V
 """
 _UNKNOWNS = 11
 _CENTRE = 0.05  # px, standard deviation of centres whose covariance is not known
-
-
-@dataclass(frozen=True, slots=True)
-class CloudGrid:
-    """Which pixel of the image each point of a cloud belongs to.
-
-    The point in row i and column j belongs to the pixel at x = `offset_x` + `step` j and
-    y = `offset_y` + `step` i, px.
-
-    Examples
-    --------
-    >>> CloudGrid(offset_x=32.0).fits((480, 608), (480, 640))
-    True
-    >>> CloudGrid().fits((480, 608), (480, 640))
-    False
-    """
-
-    offset_x: float = 0.0
-    offset_y: float = 0.0
-    step: float = 1.0
-
-    def fits(self, cloud: tuple[int, int], image: tuple[int, int]) -> bool:
-        """Return whether a cloud lies within an image, by the numbers of their rows and columns.
-
-        By default only a cloud of the size of the image does.
-        """
-        if self == FULL:
-            return cloud == image
-        axes = zip((self.offset_y, self.offset_x), cloud, image, strict=True)
-        return all(first + self.step * (count - 1) <= size - 0.5 for first, count, size in axes)
-
-
-FULL = CloudGrid()
-"""Grid of a cloud that has one point per pixel."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -174,9 +138,12 @@ def _neighbours(
 
     Offsets are in steps of the grid.
     """
-    axes = target.semi_major, target.semi_minor
-    if not all(map(math.isfinite, (target.x, target.y, *axes, target.angle))):
+    sizes = target.semi_major, target.semi_minor
+    # As in messages, so that a position is the same in whatever way the target came.
+    angle = float(np.float32(target.angle))
+    if not all(map(math.isfinite, (target.x, target.y, *sizes, angle))):
         return np.empty((0, 2)), np.empty((0, 3)), 0
+    axes = [float(np.float32(min(it, _MAXIMUM_COORDINATE))) for it in sizes]
     reach = [max(_MINIMUM_REACH, neighbourhood * axis / grid.step) for axis in axes]
     x, y = (target.x - grid.offset_x) / grid.step, (target.y - grid.offset_y) / grid.step
     places = []
@@ -189,7 +156,7 @@ def _neighbours(
     window = tuple(slice(first, end, step) for first, end in places)
     rows, columns = np.mgrid[window]
     offsets = np.stack((columns - x, rows - y), axis=-1)
-    cosine, sine = math.cos(target.angle), math.sin(target.angle)
+    cosine, sine = math.cos(angle), math.sin(angle)
     turn = np.array([[cosine, -sine], [sine, cosine]])
     inside = (((offsets @ turn) / reach) ** 2).sum(axis=-1) <= 1
     near = cloud[window][inside]

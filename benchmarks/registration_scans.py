@@ -161,9 +161,3 @@ def table(seed: int, runs: int) -> list[str]:
             f'| {np.mean(it.closing):.2f} | {gaps} | {np.mean(it.sigma0):.3f} |'
         )
     return lines
-
-
-if __name__ == '__main__':
-    import sys
-
-    print('\n'.join(table(*map(int, sys.argv[1:] or ['301', '100']))))

@@ -13,6 +13,7 @@ from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
 from ahf_ros.bag.definitions import CODED_TARGETS, COMPRESSED_IMAGE, IMAGE, typestore
+from ahf_ros.bag.registration import POINT_CLOUD
 from ahf_ros.synthetic.scene import SceneSettings, render
 
 STRING = 'std_msgs/msg/String'
@@ -127,3 +128,26 @@ def answers(path: Path, topic: str = '/image/coded_targets') -> list[tuple[int, 
             (time, reader.deserialize(raw, it.msgtype))
             for it, time, raw in reader.messages(wanted)
         ]
+
+
+def cloud(store: Typestore, points: np.ndarray, time: int, **changes: Any) -> Any:
+    """Return the message of an organised cloud with fields, as old as the image of its time."""
+    height, width = points.shape
+    of = header(store, time - 10**6)
+    of.frame_id = 'scanner'
+    field = store.types['sensor_msgs/msg/PointField']
+    fields: dict[str, Any] = {
+        'header': of,
+        'height': height,
+        'width': width,
+        'fields': [
+            field(name=name, offset=offset, datatype=7, count=1)
+            for name, (_, offset) in points.dtype.fields.items()
+        ],
+        'is_bigendian': False,
+        'point_step': points.itemsize,
+        'row_step': width * points.itemsize,
+        'data': np.frombuffer(points.tobytes(), np.uint8),
+        'is_dense': False,
+    }
+    return store.types[POINT_CLOUD](**(fields | changes))

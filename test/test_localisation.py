@@ -7,7 +7,8 @@ import numpy as np
 import numpy.lib.recfunctions as rfn
 import pytest
 
-from ahf_ros.localisation import CloudGrid, Positions, positions
+from ahf_ros.cloud_settings import CloudGrid
+from ahf_ros.localisation import Positions, positions
 from ahf_ros.target import Target
 
 KIND = np.dtype([('x', '<f4'), ('y', '<f4'), ('z', '<f4')])

@@ -60,6 +60,11 @@ class AnswerTopics:
         return types | {self.debug_image: COMPRESSED_IMAGE} if self.debug_image else types
 
 
+def answer_topic(image: str, output_topic: str) -> str:
+    """Return the topic of the answers to the images of a topic."""
+    return output_topic if output_topic.startswith('/') else f'{image}/{output_topic}'
+
+
 @dataclass(frozen=True, slots=True)
 class Entry:
     """Entry of one image in the journal."""

@@ -29,6 +29,7 @@ from ahf_ros.bag.output import (
     Journal,
     Outcome,
     Output,
+    answer_topic,
     begin,
     begun_with,
     check_entry,
@@ -36,6 +37,7 @@ from ahf_ros.bag.output import (
     remove_unfinished,
     write_bag,
 )
+from ahf_ros.bag.registration import RegistrationTask, check_registration
 from ahf_ros.bag.source import METADATA, Message, Source
 from ahf_ros.detectors import create_detector
 from ahf_ros.drawing.overlay import draw
@@ -72,6 +74,7 @@ class BagTask:
     debug_images: bool = False  # whether to write annotated images, as JPEG
     identification: IdentificationSettings = field(default_factory=IdentificationSettings)
     stacking: StackSettings = field(default_factory=StackSettings)
+    registration: RegistrationTask | None = None  # for `register_bag`, once all is answered
     lock_timeout: float = 0.0  # time to wait for another process that writes the bag, s
 
 
@@ -91,9 +94,14 @@ def answer_bag(task: BagTask, report: Report) -> Outcome:
         raise ValueError(
             f'output is {task.output}, accepted with storage sqlite3 is a path without ?, # and %'
         )
-    _check_outside(task)
+    _check_outside(task.source, 'recording', 'output', task.output)
+    if task.registration:
+        _check_outside(task.source, 'recording', 'register', task.registration.folder)
+        _check_outside(task.output, 'new bag', 'register', task.registration.folder)
     with Source(task.source) as source:
         topics = _answer_topics(task, source)
+        if task.registration:
+            check_registration(task.registration, source, topics)
         origin = _origin(task, source, topics)
         task.output.mkdir(parents=True, exist_ok=True)
         with locked(task.output, task.lock_timeout):
@@ -109,17 +117,16 @@ def answer_bag(task: BagTask, report: Report) -> Outcome:
     return outcome
 
 
-def _check_outside(task: BagTask) -> None:
-    """Refuse an output in the folder of the recording, which would become part of it."""
-    folder = task.source.resolve()
-    if not folder.is_dir():
+def _check_outside(bag: Path, kind: str, name: str, output: Path) -> None:
+    """Refuse an output in the folder of a bag, which would become part of it."""
+    folder = bag.resolve()
+    if folder.is_file():
         folder = folder.parent
         if not (folder / METADATA).exists():
             return
-    if task.output.resolve().is_relative_to(folder):
+    if output.resolve().is_relative_to(folder):
         raise ValueError(
-            f'output is {task.output}, which is in the recording {folder}; accepted is another '
-            'folder'
+            f'{name} is {output}, which is in the {kind} {folder}; accepted is another folder'
         )
 
 
@@ -138,8 +145,7 @@ def _answer_topics(task: BagTask, source: Source) -> dict[str, AnswerTopics]:
         )
     topics = {}
     for image in images:
-        name = task.output_topic
-        targets = name if name.startswith('/') else f'{image}/{name}'
+        targets = answer_topic(image, task.output_topic)
         debug_image = f'{targets}/debug_image/compressed' if task.debug_images else ''
         topics[image] = AnswerTopics(targets, debug_image)
     taken = {item.topic for item in source.connections}

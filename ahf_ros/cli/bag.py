@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 import sys
 from contextlib import closing, redirect_stdout
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,16 +20,23 @@ from ahf_ros.cli.options import (
     add_engine_options,
     add_option,
     add_options,
+    add_registration_options,
     add_search_options,
     add_target_options,
     settings_from,
 )
+from ahf_ros.cloud_settings import CloudSettings
 from ahf_ros.detectors import is_foreign
+from ahf_ros.registration_settings import RegistrationSettings
 from ahf_ros.session_settings import IdentificationSettings, StackSettings
 from ahf_ros.settings.parameter import Parameter
 
 if TYPE_CHECKING:
+    from ahf_ros.bag.registration import Registered, RegistrationTask
     from ahf_ros.bag.run import BagTask, Outcome
+
+_Result = list['Outcome | Registered | ValueError']
+"""What became of a bag, part by part."""
 
 # A process outlives its killed worker of a cluster by at most `SHUTDOWN_TIMEOUT`.
 _LOCK_TIMEOUT = 2 * SHUTDOWN_TIMEOUT  # s
@@ -71,6 +80,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_target_options(parser)
     add_options(parser.add_argument_group('stacks'), StackSettings)
     add_search_options(parser)
+    text = 'Of scans, images with organised clouds, as the node registration does it.'
+    group = parser.add_argument_group('registration', text)
+    group.add_argument(
+        '--register',
+        type=Path,
+        metavar='DIR',
+        help='Register all scans, and write clouds, transforms and targets to this folder, as '
+        '~/save does; for several bags, the folder for their folders.',
+    )
+    text = 'Topic of the clouds; empty: the only one.'
+    add_option(group, Parameter('cloud_topic', '', text))
+    add_registration_options(group)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -99,10 +120,11 @@ def run(options: argparse.Namespace) -> int:
         try:
             with closing(engine):
                 for item in finished_tasks(engine, tasks):
-                    outcome = item.result
-                    if isinstance(outcome, TaskFailed):
-                        outcome = ValueError(f'{item.task.source}: {outcome.reason}')
-                    failed |= not _report(item.task, outcome)
+                    result: _Result = item.result
+                    if isinstance(item.result, TaskFailed):
+                        result = [ValueError(f'{item.task.source}: {item.result.reason}')]
+                    for part in result:
+                        failed |= not _report(item.task, part)
         except EngineLost as error:
             tell('bag', error)
             failed = True
@@ -120,8 +142,9 @@ def _tasks(options: argparse.Namespace) -> list[BagTask]:
     jobs = min(options.jobs, len(options.bags))
     settings = settings_from(options, IdentificationSettings)
     settings = shared_settings(settings, jobs, options.scheduler)
+    several = len(options.bags) > 1
     outputs = [options.output]
-    if len(options.bags) > 1:
+    if several:
         outputs = [options.output / bag.stem for bag in options.bags]
         if len(set(outputs)) < len(outputs):
             raise ValueError(
@@ -137,35 +160,80 @@ def _tasks(options: argparse.Namespace) -> list[BagTask]:
             debug_images=options.debug_images,
             identification=settings,
             stacking=settings_from(options, StackSettings),
+            registration=_registration(options, output.name if several else ''),
             lock_timeout=_LOCK_TIMEOUT if options.scheduler else 0.0,
         )
         for source, output in zip(options.bags, outputs, strict=True)
     ]
 
 
-def _with_machine(outcome: Outcome | ValueError, machine: str) -> Outcome | ValueError:
-    if isinstance(outcome, ValueError):
-        return ValueError(f'{outcome} (on {machine})')
-    return outcome
+def _registration(options: argparse.Namespace, name: str) -> RegistrationTask | None:
+    """Return the registration of a bag, None if it is not wanted."""
+    from ahf_ros.bag.registration import RegistrationTask
+
+    if not options.register:
+        if options.adjust or options.coordinates or options.cloud_topic:
+            raise ValueError(
+                'adjust, coordinates and cloud_topic have no effect; accepted with them is '
+                'register'
+            )
+        return None
+    folder, coordinates = options.register / name, options.coordinates
+    if options.scheduler:
+        folder = folder.absolute()
+        coordinates = coordinates and str(Path(coordinates).absolute())
+    return RegistrationTask(
+        folder=folder,
+        cloud_topic=options.cloud_topic,
+        adjust=options.adjust,
+        settings=replace(settings_from(options, RegistrationSettings), coordinates=coordinates),
+        cloud_settings=settings_from(options, CloudSettings),
+    )
 
 
-def _attempt(task: BagTask, report: Any) -> Outcome | ValueError:
+def _with_machine(result: _Result, machine: str) -> _Result:
+    return [
+        ValueError(f'{part} (on {machine})') if isinstance(part, ValueError) else part
+        for part in result
+    ]
+
+
+def _attempt(task: BagTask, report: Any) -> _Result:
+    """Return what became of the images of a bag, and of its scans."""
+    from ahf_ros.bag.registration import register_bag
     from ahf_ros.bag.run import WRITING_ERRORS, answer_bag
 
+    result: _Result = []
     try:
         with redirect_stdout(sys.stderr):  # what other detectors print
-            return answer_bag(task, report)
+            result.append(outcome := answer_bag(task, report))
     except ValueError as error:
-        return error
+        return [error]
     except WRITING_ERRORS as error:
-        return ValueError(f'{task.output} cannot be written: {error}')
+        return [ValueError(f'{task.output} cannot be written: {error}')]
+    if task.registration:
+        folder = task.registration.folder
+        tell = partial(report, outcome.images, outcome.images)
+        try:
+            result.append(register_bag(task.registration, task.output, tell))
+        except ValueError as error:
+            result.append(error)
+        except WRITING_ERRORS as error:
+            result.append(ValueError(f'{folder} cannot be written: {error}'))
+    return result
 
 
-def _report(task: BagTask, outcome: Outcome | ValueError) -> bool:
+def _report(task: BagTask, outcome: Outcome | Registered | ValueError) -> bool:
     """Report the outcome of a bag on standard error; return whether all of it was processed."""
+    from ahf_ros.bag.registration import Registered
+
     if isinstance(outcome, ValueError):
         tell('bag', outcome)
         return False
+    if isinstance(outcome, Registered):
+        for line in outcome.said:
+            say(f'{task.source}: {line}')
+        return not outcome.refused
     refused = f', {outcome.refused} of them not accepted' if outcome.refused else ''
     damaged = f', {outcome.damaged} of them damaged' if outcome.damaged else ''
     say(f'{task.output}: {outcome.images} images answered{refused}{damaged}')

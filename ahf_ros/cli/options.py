@@ -5,12 +5,14 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from pathlib import Path
 from typing import Any, TypeVar
 
+from ahf_ros.cloud_settings import CloudSettings
 from ahf_ros.codes.families import files_by_name
 from ahf_ros.filtering.settings import AdaptiveSettings
+from ahf_ros.registration_settings import RegistrationSettings
 from ahf_ros.session_settings import AnyTargetSettings, IdentificationSettings
 from ahf_ros.settings.nested import assemble, flat_parameters
 from ahf_ros.settings.parameter import Parameter, parameters
@@ -80,6 +82,21 @@ def add_output_options(parser: Group) -> None:
         help='Write each image with its targets marked to this folder, as NAME_overlay.png.',
     )
     add_quiet(parser)
+
+
+def add_registration_options(parser: Group, without: Collection[str] = ()) -> None:
+    """Give a parser the options of a registration, but for some of those of clouds."""
+    add_options(parser, RegistrationSettings)
+    parser.add_argument(
+        '--adjust',
+        action='store_true',
+        help='Adjust all scans and targets jointly, which closes a chain of scans.',
+    )
+    for item in parameters(CloudSettings):
+        if item.name in (*without, 'cloud'):
+            parser.set_defaults(**{item.name: item.default})
+        else:
+            add_option(parser, item)
 
 
 def add_quiet(parser: Group) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,15 +26,11 @@ _COVARIANCE = [f'covariance_{_AXES[i]}_{_AXES[j]}' for i in range(6) for j in ra
 
 @dataclass(frozen=True)
 class ScanRecord:
-    """What a scan is called, and its cloud, an array (height, width), where it is kept.
-
-    The stamp is in ns; `frame_id` is the frame of the scanner.
-    """
+    """What a scan is called; the stamp is in ns, `frame_id` is the frame of the scanner."""
 
     name: str
     stamp: int = 0
     frame_id: str = ''
-    cloud: np.ndarray | None = None
 
 
 def in_common_frame(cloud: np.ndarray, transform: Transform) -> np.ndarray:
@@ -55,18 +51,23 @@ def in_common_frame(cloud: np.ndarray, transform: Transform) -> np.ndarray:
 
 
 def write_registration(
-    folder: str | Path, frame: str, field: Field, records: Sequence[ScanRecord]
+    folder: str | Path,
+    frame: str,
+    field: Field,
+    records: Sequence[ScanRecord],
+    clouds: Iterable[np.ndarray | None],
 ) -> list[Path]:
     """Write the scans of a field to a folder, each file as a whole, and return the paths.
 
-    Each cloud becomes a PLY and a PCD file with the name of its scan, in the common frame. There
-    is one record for each scan.
+    There are one record and one cloud, an array (height, width), or None for each scan. Clouds are
+    taken one after the other. Each becomes a PLY and a PCD file with the name of its scan, in the
+    common frame.
     """
     paths = []
-    for record, scan in zip(records, field.scans, strict=True):
-        if record.cloud is None:
+    for record, scan, cloud in zip(records, field.scans, clouds, strict=True):
+        if cloud is None:
             continue
-        moved = in_common_frame(record.cloud, scan.transform)
+        moved = in_common_frame(cloud, scan.transform)
         for suffix, write in (('.ply', write_ply), ('.pcd', write_pcd)):
             paths.append(Path(folder) / f'{record.name}{suffix}')
             write_whole(paths[-1], write(moved))

@@ -12,8 +12,9 @@ from std_msgs.msg import Header
 from visualization_msgs.msg import ImageMarker
 
 from ahf_ros.drawing.overlay import draw
+from ahf_ros.interchange.matching import Waiting
 from ahf_ros.msg import CodedTargetArray
-from ahf_ros.nodes.cloud import TargetPoints, Waiting
+from ahf_ros.nodes.cloud import TargetPoints
 from ahf_ros.nodes.diagnostics import CloudTally, Tally
 from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.nodes.inputs import Input

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import threading
-import time
-from collections import deque
 from operator import attrgetter
-from typing import Any, NamedTuple
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from sensor_msgs.msg import PointCloud2
@@ -14,8 +11,8 @@ from std_msgs.msg import Header
 from visualization_msgs.msg import MarkerArray
 
 from ahf_ros.interchange.image_messages import nanoseconds
+from ahf_ros.interchange.matching import ANSWER, ANSWERS, CLOUD, Matcher, Waiting
 from ahf_ros.interchange.point_clouds import organised_points
-from ahf_ros.localisation import FULL, CloudGrid, positions
 from ahf_ros.msg import CodedTargetArray
 from ahf_ros.nodes.diagnostics import CloudTally
 from ahf_ros.nodes.inputs import Input
@@ -23,82 +20,9 @@ from ahf_ros.nodes.process import LOG_PERIOD, ProcessNode
 from ahf_ros.nodes.settings import LOSSLESS, DetectorNodeSettings
 from ahf_ros.nodes.target_msg import target_labels, target_points
 from ahf_ros.nodes.topics import ANSWERS_KEPT, POINTS, TARGET_LABELS, TARGET_POINTS
-
-ANSWERS = 100
-"""Maximum number of answers waiting for the cloud of their image."""
-
-CLOUD, ANSWER = 0, 1
-"""Sides of the matcher."""
+from ahf_ros.scans import located
 
 _relevant = attrgetter('cloud', 'queue', 'queue_memory')
-
-
-class _Message(NamedTuple):
-    stamp: int
-    item: Any
-    size: int
-    arrived: float
-
-
-class Waiting(NamedTuple):
-    """What waits for its match, of each of two topics."""
-
-    counts: list[int]
-    seconds: list[float]  # for how long the oldest has waited, s; 0 where there is none
-    nearest: int  # smallest difference of two stamps since the last match, ns; 0 without any
-
-
-class Matcher:
-    """Pairs messages of two topics, whichever of them arrives first.
-
-    The stamps of a match differ by at most `tolerance`, ns; the nearest message matches. Each
-    topic keeps its order, so a match discards all messages that arrived before it on either topic.
-    The messages of a topic that wait have together at most the size in `limits`; a single one may
-    always wait. `unmatched` has counts of discarded messages of each topic, to continue.
-    """
-
-    def __init__(self, tolerance: int, limits: tuple[int, int], unmatched: list[int]) -> None:
-        self._unmatched = unmatched
-        self._tolerance = tolerance
-        self._limits = limits
-        self._waiting: tuple[deque[_Message], deque[_Message]] = (deque(), deque())
-        self._nearest = 0
-        self._lock = threading.Lock()
-
-    def put(self, side: int, stamp: int, item: Any, size: int = 1) -> Any:
-        """Return the match of a message of topic 0 or 1, or None and let the message wait.
-
-        The stamp is in ns, the size in the unit of `limits`.
-        """
-        other = 1 - side
-        own, others = self._waiting[side], self._waiting[other]
-        with self._lock:
-            apart = [abs(it.stamp - stamp) for it in others]
-            nearest = min(apart, default=0)
-            if apart and nearest <= self._tolerance:
-                for _ in range(apart.index(nearest)):
-                    self._discard(other)
-                while own:
-                    self._discard(side)
-                self._nearest = 0
-                return others.popleft().item
-            if apart:
-                self._nearest = min(self._nearest or nearest, nearest)
-            own.append(_Message(stamp, item, size, time.monotonic()))
-            while len(own) > 1 and sum(it.size for it in own) > self._limits[side]:
-                self._discard(side)
-        return None
-
-    def waiting(self) -> Waiting:
-        """Return what waits, and for how long."""
-        now = time.monotonic()
-        with self._lock:
-            seconds = [now - it[0].arrived if it else 0.0 for it in self._waiting]
-            return Waiting([len(it) for it in self._waiting], seconds, self._nearest)
-
-    def _discard(self, side: int) -> None:
-        self._waiting[side].popleft()
-        self._unmatched[side] += 1
 
 
 class TargetPoints:
@@ -160,11 +84,12 @@ class TargetPoints:
             self._publish(answer, cloud)
 
     def _publish(self, answer: CodedTargetArray, cloud: PointCloud2) -> None:
-        grid, radius = self._settings.cloud.grid, self._settings.cloud.cloud_radius
-        if not grid.fits((cloud.height, cloud.width), (answer.height, answer.width)):
-            self._refuse(unfit(cloud, answer, grid))
+        shape = answer.height, answer.width
+        try:
+            found = located(organised_points(cloud), answer.targets, shape, self._settings.cloud)
+        except ValueError as error:
+            self._refuse(str(error))
             return
-        found = positions(organised_points(cloud), answer.targets, radius, grid)
         header = Header(stamp=answer.header.stamp, frame_id=cloud.header.frame_id)
         with self._publishing:
             if self._closed:
@@ -180,17 +105,3 @@ class TargetPoints:
         self._tally.reason = reason
         logger = self._node.get_logger()
         logger.warning(f'cloud refused: {reason}', throttle_duration_sec=LOG_PERIOD)
-
-
-def unfit(cloud: PointCloud2, answer: CodedTargetArray, grid: CloudGrid) -> str:
-    """Return why a cloud does not fit its image, and what to set."""
-    size, image = f'{cloud.width} x {cloud.height}', f'{answer.width} x {answer.height}'
-    if grid == FULL:
-        return (
-            f'cloud has {size} points, accepted is {image}, the size of the image; for another '
-            'one, set cloud_offset_x, cloud_offset_y and cloud_step'
-        )
-    return (
-        f'cloud has {size} points, accepted are those that an image of {image} has room for from '
-        f'x = {grid.offset_x:g}, y = {grid.offset_y:g} in steps of {grid.step:g} px'
-    )

@@ -16,11 +16,10 @@ from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
-from ahf_ros.interchange.coordinate_files import read_coordinates
 from ahf_ros.interchange.image_messages import nanoseconds
-from ahf_ros.interchange.point_clouds import organised_points, target_scan, whole_points
+from ahf_ros.interchange.matching import ANSWER, ANSWERS, CLOUD, WAITING_MEMORY, Matcher
+from ahf_ros.interchange.point_clouds import whole_points
 from ahf_ros.interchange.registration_files import ScanRecord, write_registration
-from ahf_ros.nodes.cloud import ANSWER, ANSWERS, CLOUD, Matcher
 from ahf_ros.nodes.frames import MISSING, StaticFrames
 from ahf_ros.nodes.parameters import ParameterSettings
 from ahf_ros.nodes.pose_msg import pose_message, transform_message
@@ -32,14 +31,11 @@ from ahf_ros.nodes.registration_msg import (
 )
 from ahf_ros.nodes.settings import RegistrationNodeSettings
 from ahf_ros.nodes.topics import ANSWERS_KEPT, POINTS
-from ahf_ros.registration.session import Registration
+from ahf_ros.scans import Scans, known_targets, scan_cloud
 from ahf_ros.text import counted, printable
 
 DIAGNOSTICS_PERIOD = 1.0
 """Period of /diagnostics, s."""
-
-WAITING_MEMORY = 1024 * 2**20
-"""Memory for clouds that wait for their target points, bytes."""
 
 _MILLIMETRES = 1000.0
 
@@ -67,12 +63,8 @@ class RegistrationNode(ProcessNode):
         super().__init__('registration')
         self._settings = ParameterSettings(self, RegistrationNodeSettings)
         settings = self._settings.current
-        known = None
-        if settings.coordinates:
-            known = read_coordinates(settings.coordinates, settings.unit)
-        self._registration = Registration(known)
-        self._records: list[ScanRecord] = []
-        self._numbers = 0  # of scans since the start or a reset, so that no name comes twice
+        self._registration = Scans(known_targets(settings), settings.scan_frame)
+        self._clouds: dict[str, np.ndarray] = {}  # by the name of their scan
         self._tally = RegistrationTally()
         self._told = replace(self._tally)
         # One after the other: scans, clouds and services change the same field.
@@ -121,21 +113,18 @@ class RegistrationNode(ProcessNode):
     def _on_scan(self, message: PointCloud2) -> None:
         self._tally.received += 1
         stamp = nanoseconds(message.header)
-        name = f'{self._settings.current.scan_frame}{self._numbers + 1}'
-        record = ScanRecord(name, stamp, message.header.frame_id)
+        record = ScanRecord('')  # of a refused scan, whose cloud is given up, too
         try:
             self._register(message, stamp)
         except ValueError as error:
-            record = replace(record, name='')
             self._tally.refused += 1
             self._tally.reason = printable(str(error), 1000)
             self.get_logger().warning(
                 f'scan refused: {self._tally.reason}', throttle_duration_sec=LOG_PERIOD
             )
         else:
-            self._numbers += 1
-            self._records.append(record)
-            self._publish(len(self._records) - 1)
+            record = self._registration.records[-1]
+            self._publish(len(self._registration.records) - 1)
             self._publish_all()
         if self._settings.current.cloud:
             cloud = self._matcher.put(ANSWER, stamp, record)
@@ -144,18 +133,12 @@ class RegistrationNode(ProcessNode):
 
     def _register(self, message: PointCloud2, stamp: int) -> None:
         """Register a scan, or raise a ValueError that says why not."""
-        settings = self._settings.current
-        if len(self._records) >= settings.maximum_scans:
-            raise ValueError(
-                f'{len(self._records)} scans are registered, accepted is maximum_scans'
-            )
-        if self._records and stamp < self._records[-1].stamp:
-            raise ValueError(
-                f'stamp is {stamp / 1e9:.9f} s, before that of the last scan, '
-                f'{self._records[-1].stamp / 1e9:.9f} s; ~/reset begins anew'
-            )
-        points = whole_points(message)
-        self._registration.add(target_scan(points, settings.minimum_confidence))
+        settings, count = self._settings.current, len(self._registration.records)
+        if count >= settings.maximum_scans:
+            raise ValueError(f'{count} scans are registered, accepted is maximum_scans')
+        frame_id = message.header.frame_id
+        confidence = settings.minimum_confidence
+        self._registration.register(whole_points(message), confidence, stamp, frame_id)
 
     def _on_cloud(self, cloud: PointCloud2) -> None:
         record = self._matcher.put(CLOUD, nanoseconds(cloud.header), cloud, len(cloud.data))
@@ -164,26 +147,17 @@ class RegistrationNode(ProcessNode):
 
     def _take(self, record: ScanRecord, cloud: PointCloud2) -> None:
         """Publish the cloud of a scan in the frame, and keep it, unless the scan was refused."""
-        names = [it.name for it in self._records]
-        stamps = [it.stamp for it in self._records]
-        if record.name not in names or stamps[names.index(record.name)] != record.stamp:
+        if record not in self._registration.records:
             return
-        number = names.index(record.name)
         try:
-            if cloud.header.frame_id != record.frame_id:
-                raise ValueError(
-                    f'frame_id is {cloud.header.frame_id!r}, accepted is that of the target '
-                    f'points, {record.frame_id!r}'
-                )
-            organised_points(cloud)
-            points = whole_points(cloud)
+            points = scan_cloud(cloud, record.frame_id)
         except ValueError as error:
             self._refuse_cloud(str(error))
             return
-        scan = self._registration.field.scans[number]
+        scan = self._registration.field.scans[self._registration.records.index(record)]
         self._cloud.publish(moved_cloud(points, scan.transform, self._header(record)))
         self._tally.clouds += 1
-        used = sum(it.cloud.nbytes for it in self._records if it.cloud is not None)
+        used = sum(it.nbytes for it in self._clouds.values())
         if used + points.nbytes > self._settings.current.cloud_memory * 2**20:
             self._refuse_cloud(
                 f'clouds take {used / 2**20:.0f} MB, and cloud_memory has no room for '
@@ -191,7 +165,7 @@ class RegistrationNode(ProcessNode):
                 'kept'
             )
             return
-        self._records[number] = replace(record, cloud=points)
+        self._clouds[record.name] = points
 
     def _refuse_cloud(self, reason: str) -> None:
         self._tally.clouds_refused += 1
@@ -206,7 +180,7 @@ class RegistrationNode(ProcessNode):
 
     def _publish(self, number: int) -> None:
         """Publish transform and residuals of a scan."""
-        field, header = self._registration.field, self._header(self._records[number])
+        field, header = self._registration.field, self._header(self._registration.records[number])
         scan = field.scans[number]
         self._transform.publish(pose_message(scan.transform, header))
         self._residuals.publish(residual_points(field, scan, header))
@@ -221,7 +195,7 @@ class RegistrationNode(ProcessNode):
             before = self._frames.problem
             self._frames.publish(
                 transform_message(scan.transform, header, record.name)
-                for record, scan in zip(self._records, field.scans, strict=True)
+                for record, scan in zip(self._registration.records, field.scans, strict=True)
             )
             if (problem := self._frames.problem) and problem != before:
                 self.get_logger().warning(problem)
@@ -240,8 +214,9 @@ class RegistrationNode(ProcessNode):
         settings = self._settings.current
         if not settings.folder:
             raise ValueError("folder is '', accepted is the name of a folder")
-        field = self._registration.field
-        paths = write_registration(settings.folder, settings.frame, field, self._records)
+        field, records = self._registration.field, self._registration.records
+        clouds = [self._clouds.get(it.name) for it in records]
+        paths = write_registration(settings.folder, settings.frame, field, records, clouds)
         return (
             f'{counted(len(field.scans), "scan")} in {counted(len(paths), "file")} in '
             f'{paths[-1].parent.resolve()}'
@@ -249,19 +224,20 @@ class RegistrationNode(ProcessNode):
 
     def _undo(self) -> str:
         what = 'the adjustment'
+        names = [it.name for it in self._registration.records]
         if self._registration.undo():
-            what = self._records.pop().name
-            self._numbers -= 1
+            what = names[-1]
+            self._clouds.pop(what, None)
         else:
             self._publish_scans()
         self._publish_all()
-        return f'{what} is taken back; {counted(len(self._records), "scan")} registered'
+        left = counted(len(self._registration.records), 'scan')
+        return f'{what} is taken back; {left} registered'
 
     def _reset(self) -> str:
+        count = len(self._registration.records)
         self._registration.reset()
-        count = len(self._records)
-        self._records.clear()
-        self._numbers = 0
+        self._clouds.clear()
         self._publish_all()
         return f'{counted(count, "scan")} forgotten'
 
@@ -272,7 +248,7 @@ class RegistrationNode(ProcessNode):
         return text
 
     def _publish_scans(self) -> None:
-        for number in range(len(self._records)):
+        for number in range(len(self._registration.records)):
             self._publish(number)
 
     def _publish_diagnostics(self) -> None:

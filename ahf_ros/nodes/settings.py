@@ -7,15 +7,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
 
+from ahf_ros.cloud_settings import MAXIMUM_TOLERANCE, CloudSettings
 from ahf_ros.codes.families import families_of
 from ahf_ros.detectors import DETECTOR, detector_name
-from ahf_ros.interchange.units import UNITS
-from ahf_ros.localisation import FULL, NEIGHBOURHOOD, CloudGrid
+from ahf_ros.registration_settings import RegistrationSettings, check_frame
 from ahf_ros.session import create_identifier
 from ahf_ros.session_settings import AnyTargetSettings, IdentificationSettings, StackSettings
 from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.synthetic.scene import SceneSettings
-from ahf_ros.text import printable, shown
+from ahf_ros.text import printable
 
 LATEST, LOSSLESS = 'latest', 'lossless'
 """What becomes of images that arrive while another one is being identified."""
@@ -23,64 +23,10 @@ LATEST, LOSSLESS = 'latest', 'lossless'
 SERVICE = 'service'
 """Name of the detector that calls a service of another node."""
 
-MAXIMUM_TOLERANCE = 10.0
-"""Maximum difference between the stamps of an image and its cloud, s."""
-
 NUMBER_UNKNOWN = 'unknown (expected_targets is 0, expected_ids is empty)'
 """What stands for N in the log where no filter is searched for."""
 
-_FRAME = re.compile(r'[A-Za-z_][\w.-]*(/[\w.-]+)*', re.ASCII)
 _SERVICE_NAME = re.compile(r'[~/]?/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*', re.ASCII)
-
-
-@dataclass(frozen=True, slots=True)
-class CloudSettings:
-    """Positions of targets in space, from the point cloud of the same shot."""
-
-    cloud: bool = parameter(
-        False,
-        'Whether to subscribe to point clouds on points and to publish the positions of targets.',
-    )
-    cloud_tolerance: float = parameter(
-        1e-6,
-        'Maximum difference between the stamps of an image and its cloud, s. The default is for '
-        'clouds that went through PCL, which keeps whole microseconds; 0: equal stamps.',
-        minimum=0.0,
-        maximum=MAXIMUM_TOLERANCE,
-    )
-    cloud_radius: float = parameter(
-        NEIGHBOURHOOD,
-        'Radius around a centre within which points of the cloud are used, in radii of the dot.',
-        minimum=0.5,
-        maximum=10.0,
-    )
-    cloud_offset_x: float = parameter(
-        FULL.offset_x,
-        'Column of the image that the first column of the cloud belongs to, px.',
-        minimum=0.0,
-        maximum=100000.0,
-    )
-    cloud_offset_y: float = parameter(
-        FULL.offset_y,
-        'Row of the image that the first row of the cloud belongs to, px.',
-        minimum=0.0,
-        maximum=100000.0,
-    )
-    cloud_step: float = parameter(
-        FULL.step,
-        'Distance in the image between neighbouring points of the cloud, px.',
-        minimum=0.1,
-        maximum=100.0,
-    )
-
-    def __post_init__(self) -> None:
-        """Refuse values that are not accepted."""
-        check_parameters(self)
-
-    @property
-    def grid(self) -> CloudGrid:
-        """Pixels of the image that the points of the cloud belong to."""
-        return CloudGrid(self.cloud_offset_x, self.cloud_offset_y, self.cloud_step)
 
 
 @dataclass(frozen=True, slots=True)
@@ -279,15 +225,9 @@ class ScoreboardSettings:
 
 
 @dataclass(frozen=True, slots=True)
-class RegistrationNodeSettings:
-    """Settings of the node `registration`: which frame, and what is kept and written."""
+class RegistrationNodeSettings(RegistrationSettings):
+    """Settings of the node `registration`: also what is published, kept and written."""
 
-    frame: str = parameter(
-        'registered',
-        'Frame that all scans are registered in.',
-        form='the name of a frame, without a slash at its start',
-        read_only=True,
-    )
     scan_frame: str = parameter(
         'scan_',
         'Beginning of the names of the frames of the scans: the first one is scan_1.',
@@ -296,22 +236,6 @@ class RegistrationNodeSettings:
     )
     tf: bool = parameter(
         True, 'Whether to publish the frames of all scans on /tf_static.', read_only=True
-    )
-    coordinates: str = parameter(
-        '',
-        'File of known coordinates of targets: a folder of ahf orient, CSV or JSON; empty: the '
-        'first scan gives the frame.',
-        read_only=True,
-    )
-    unit: str = parameter(
-        '',
-        'Unit of these coordinates where the file does not say it.',
-        choices=('', *UNITS),
-        form=f'one of {", ".join(UNITS)}, or nothing',
-        read_only=True,
-    )
-    minimum_confidence: float = parameter(
-        0.9, 'Minimum confidence of targets that are used.', minimum=0.0, maximum=1.0
     )
     cloud: bool = parameter(
         False,
@@ -339,9 +263,5 @@ class RegistrationNodeSettings:
 
     def __post_init__(self) -> None:
         """Refuse values that are not accepted."""
-        check_parameters(self)
-        for name in ('frame', 'scan_frame'):
-            value = getattr(self, name)
-            if not _FRAME.fullmatch(value):
-                accepted = 'the name of a frame, without a slash at its start'
-                raise ValueError(f'{name} is {shown(value)}, accepted is {accepted}')
+        RegistrationSettings.__post_init__(self)
+        check_frame('scan_frame', self.scan_frame)

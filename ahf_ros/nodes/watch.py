@@ -10,11 +10,11 @@ from difflib import get_close_matches
 from rclpy.qos import QoSCompatibility, ReliabilityPolicy, qos_check_compatible
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from ahf_ros.nodes.cloud import ANSWER, CLOUD, Waiting
+from ahf_ros.cloud_settings import MAXIMUM_TOLERANCE
+from ahf_ros.interchange.matching import ANSWER, CLOUD, Waiting
 from ahf_ros.nodes.diagnostics import Tally
 from ahf_ros.nodes.inputs import Input
 from ahf_ros.nodes.process import ProcessNode
-from ahf_ros.nodes.settings import MAXIMUM_TOLERANCE
 from ahf_ros.nodes.topics import CODED_TARGETS, qos_words
 
 AGAIN = 10.0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from pathlib import Path
 
 import numpy as np
@@ -12,28 +11,8 @@ import pytest
 from ahf_ros.cli import main
 from ahf_ros.interchange.cloud_files import read_cloud, write_pcd, write_ply
 from ahf_ros.interchange.image_files import write_image
-from ahf_ros.orientation.camera import rotation_matrices
-from ahf_ros.synthetic.camera import tilted_camera
-from ahf_ros.synthetic.scene import SceneSettings, render
-
-SCENE = SceneSettings(width=640, height=480, targets=6, dot_radius=10.0, tilt=30.0, seed=3)
-TURN = rotation_matrices(np.array([[0.1, -0.2, 0.3]]))[0]
-SHIFT = np.array([0.1, 0.2, -0.3])  # m
-DISTANCE = 0.8  # m
-
-
-def wall() -> np.ndarray:
-    """Return the points (480, 640, 3) of the wall that the scene shows, m, with noise."""
-    setup = np.random.default_rng(np.random.SeedSequence(SCENE.seed).spawn(5)[0])
-    focal_length = SCENE.focal_length * SCENE.width
-    tilt = math.radians(SCENE.tilt)
-    camera = tilted_camera(640, 480, focal_length, tilt, SCENE.distortion, setup)
-    rows, columns = np.mgrid[:480, :640]
-    pixels = np.column_stack((columns.ravel(), rows.ravel())).astype(float)
-    points = np.column_stack((camera.wall(pixels), np.ones(len(pixels)))) @ camera.pose.T
-    points *= DISTANCE / focal_length
-    points *= 1 + 1e-4 * np.random.default_rng(0).standard_normal((len(points), 1))
-    return points.reshape(480, 640, 3)
+from ahf_ros.synthetic.scene import render
+from support.wall import SCENE, SHIFT, TURN, as_cloud, wall
 
 
 @pytest.fixture(scope='module')
@@ -46,10 +25,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ('b.pcd', (points - SHIFT) @ TURN, write_pcd),
         ('c.ply', 1000 * points, write_ply),
     ):
-        cloud = np.zeros((480, 640), [(axis, '<f4') for axis in 'xyz'])
-        for axis, letter in enumerate('xyz'):
-            cloud[letter] = moved[..., axis]
-        (made / name).write_bytes(write(cloud))
+        (made / name).write_bytes(write(as_cloud(moved)))
         write_image(made / f'{name[0]}.png', image)
     return made
 

@@ -1,11 +1,7 @@
 from __future__ import annotations
 
-import pytest
-
-pytest.importorskip('rclpy', reason='ROS 2 is not installed')
-
-from ahf_ros.nodes.cloud import Matcher
-from ahf_ros.nodes.settings import CloudSettings
+from ahf_ros.cloud_settings import CloudSettings
+from ahf_ros.interchange.matching import Matcher
 
 CLOUD, ANSWER = 0, 1
 
