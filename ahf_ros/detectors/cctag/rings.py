@@ -7,6 +7,7 @@ its values are a linear function of the ink, which is that of sharp rings under 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import product
@@ -15,6 +16,7 @@ import numpy as np
 
 from ahf_ros.codes.cctag import CircleFamily
 from ahf_ros.detectors.cctag.rays import (
+    ALONG,
     ANGLES,
     PROFILE,
     Rays,
@@ -405,11 +407,11 @@ def _aligned(
         ink, slope, by_shift, by_blur = _rings(family, ids, size, shift, blur)
         near = outlier <= _NEAR  # light is told from rings
         rays = (
-            evenly_lit_rays(values, ink, size, outlier)
+            evenly_lit_rays(values, ink, size.astype(np.float32), outlier)
             if near
             else robust_rays(values, ink, outlier)
         )
-        by_radius = [slope, slope * PROFILE, slope * PROFILE**2]
+        by_radius = [slope, slope * ALONG, slope * ALONG**2]
         normal, right = rays.equations(np.stack([*by_radius, by_shift, by_blur], axis=1), ink)
         variance = (rays.weight * rays.errors**2).sum(axis=(1, 2)) / rays.weight.sum(axis=(1, 2))
         area = size**2 * (PROFILE[1] - PROFILE[0]) * (ANGLES[1] - ANGLES[0])
@@ -436,8 +438,9 @@ def _aligned(
     covariance = affine @ covariance @ affine.transpose(0, 2, 1) + _SYSTEMATIC**2 * np.eye(2)
     values = lit(gray, frames)
     ink = _rings(family, ids, frame.mean_radii(frames), shift, blur)[0]
-    rays = Rays.of(values, ink, np.broadcast_to(PROFILE, values.shape))
-    left, shown = ((PROFILE * of**2).sum(axis=2) for of in (rays.errors, rays.deviations(values)))
+    rays = Rays.of(values, ink, np.broadcast_to(ALONG, values.shape))
+    squares = (of**2 @ ALONG for of in (rays.errors, rays.deviations(values)))
+    left, shown = (of.astype(np.float64) for of in squares)
     agreeing = (left < (1 - _AGREEING) * shown) & (
         np.sign(rays.step) == np.sign(np.median(rays.step, axis=1))[:, None]
     )
@@ -512,12 +515,12 @@ def _rings(
     """
     radii = family.radii(ids)
     sign = _signs(radii)[:, None]
-    size, shift, blur = (of[:, None, None] for of in (size, shift, blur))
+    size, shift, blur = (of[:, None, None].astype(np.float32) for of in (size, shift, blur))
     # Blur moves what lies near to the centre outwards, on the mean (Rice).
-    place = np.sqrt(PROFILE**2 + (blur / size) ** 2)
-    away = (radii[..., None] * size + sign * shift - place * size) / blur
+    place = np.sqrt(ALONG**2 + (blur / size) ** 2)
+    away = (radii.astype(np.float32)[..., None] * size + sign * shift - place * size) / blur
     ink = (sign * normal_share(away)).sum(axis=1)
-    density = np.exp(-0.5 * away**2) / np.sqrt(2 * np.pi)
+    density = np.exp(-0.5 * away**2) / math.sqrt(2 * math.pi)
     slope = -(sign * density * size / blur).sum(axis=1)
     by_shift = (density / blur).sum(axis=1)
     by_blur = -(sign * density * away).sum(axis=1)
@@ -526,4 +529,4 @@ def _rings(
 
 def _signs(radii: np.ndarray) -> np.ndarray:
     """Return 1 for circles that ink fills, -1 for those that paper fills, from shape (k, n)."""
-    return np.where(np.arange(radii.shape[1]) % 2 == 0, 1, -1)
+    return np.where(np.arange(radii.shape[1]) % 2 == 0, np.float32(1), np.float32(-1))
