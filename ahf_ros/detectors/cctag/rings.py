@@ -281,38 +281,37 @@ def identify(
         np.concatenate([more, of[likely]], axis=1)
         for of, more in zip((starts, ids, shift), again, strict=True)
     )
-    few = _tried(gray, starts, ids, shift, slice(_FEW_READINGS), family, prior)
-    possible = few.of_target.reshape(-1, _FEW_READINGS).max(axis=1, initial=0) > _HOPELESS[1]
+    few = np.arange(ids.shape[1]) < _FEW_READINGS
+    tried = np.nonzero(np.broadcast_to(few, ids.shape))
+    first = align(gray, starts[tried], ids[tried], shift[tried], family, prior)
+    possible = first.of_target.reshape(-1, _FEW_READINGS).max(axis=1) > _HOPELESS[1]
     if not possible.any():
         return NOTHING
+    first = first.select(np.repeat(possible, _FEW_READINGS))
     starts, ids, shift = (of[possible] for of in (starts, ids, shift))
-    more = _tried(gray, starts, ids, shift, slice(_FEW_READINGS, None), family, prior)
-    every = Aligned.joined([few.select(np.repeat(possible, _FEW_READINGS)), more])
-    count, rows = ids.shape[1], np.arange(len(ids))
-    of_row = [np.repeat(rows, of) for of in (_FEW_READINGS, count - _FEW_READINGS)]
-    every = every.select(np.argsort(np.concatenate(of_row), kind='stable'))
+    tried = np.nonzero(np.broadcast_to(few, ids.shape))
+    others = np.nonzero(_unlike_before(ids) & ~few)
+    more = align(gray, starts[others], ids[others], shift[others], family, prior)
+    every = Aligned.joined([first, more])
+    rows, columns = np.concatenate([tried, others], axis=1)
     independent = frame.mean_radii(starts[:, 0]) * np.ptp(PROFILE) / _INDEPENDENT
-    left = np.where(every.colour == polarity, every.left, 0.0).reshape(-1, count)
-    cost = (independent[:, None] * left + prior.squares(every).reshape(-1, count)) / 2
-    best = every.select(np.arange(len(ids)) * count + cost.argmin(axis=1))
-    others = np.where(ids == best.ids[:, None], np.inf, cost).min(axis=1)
+    left = np.where(every.colour == polarity, every.left, 0.0)
+    cost = np.full(ids.shape, np.inf)
+    cost[rows, columns] = (independent[rows] * left + prior.squares(every)) / 2
+    index = np.zeros(ids.shape, int)
+    index[rows, columns] = np.arange(len(rows))
+    best = every.select(index[np.arange(len(ids)), cost.argmin(axis=1)])
+    next_best = np.where(ids == best.ids[:, None], np.inf, cost).min(axis=1)
     best = _settled(gray, best, family, prior)
-    best = replace(best, margin=others - cost.min(axis=1))
+    best = replace(best, margin=next_best - cost.min(axis=1))
     return best.select(best.colour == polarity)
 
 
-def _tried(
-    gray: np.ndarray,
-    starts: np.ndarray,
-    ids: np.ndarray,
-    shift: np.ndarray,
-    columns: slice,
-    family: CircleFamily,
-    prior: Prior,
-) -> Aligned:
-    """Return some of the hypotheses of k targets, (k, n), brought onto the image one by one."""
-    starts, ids, shift = (of[:, columns] for of in (starts, ids, shift))
-    return align(gray, starts.reshape(-1, 3, 3), ids.ravel(), shift.ravel(), family, prior)
+def _unlike_before(ids: np.ndarray) -> np.ndarray:
+    """Return which IDs are not in their row before, shape (k, n)."""
+    same = ids[:, :, None] == ids[:, None]
+    unlike: np.ndarray = same.argmax(axis=2) == np.arange(ids.shape[1])
+    return unlike
 
 
 def _settled(gray: np.ndarray, rings: Aligned, family: CircleFamily, prior: Prior) -> Aligned:
