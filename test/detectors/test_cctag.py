@@ -10,7 +10,7 @@ import pytest
 from ahf_ros.codes import CCTAG_NAMES
 from ahf_ros.detectors import create_detector
 from ahf_ros.synthetic.scene import Rendering
-from benchmarks.textures import lookalikes
+from benchmarks.textures import lookalikes, textured_image
 from support.scenes import counted, rendering
 
 SIZE = {'width': 560, 'height': 420, 'targets': 6, 'dot_radius': 14.0, 'seed': 2}
@@ -117,3 +117,8 @@ def test_refinement_finds_the_place_again() -> None:
     moved = [replace(target, x=target.x + 0.5, y=target.y - 0.4) for target in found]
     refined = detector.refine(shown.image, moved)
     assert np.abs(errors(shown, refined)).max() < 0.05
+
+
+def test_letters_that_are_read_as_one_id_in_many_places_are_texture() -> None:
+    letters = textured_image(501)[350:380, 320:]
+    assert create_detector(family='cctag4')(letters) == []

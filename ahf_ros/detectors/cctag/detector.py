@@ -109,7 +109,7 @@ class CctagDetector(FamilyDetector):
             for family in self.design:
                 frames = likely_rings(gray, circles, octave.radii, polarity, family)
                 rings, light = _identified(gray, frames, polarity, family)
-                found += self._shown(_owning(light, rings, polarity, family), family.name)
+                found += self._shown(_owning(light, _single(rings), polarity, family), family.name)
         return found
 
     def _shown(self, rings: Aligned, family: str) -> list[Target]:
@@ -133,22 +133,25 @@ def _identified(
     Doubtful targets are read with what certain ones show.
     """
     rings = identify(gray, frames, polarity, family)
+    rings = rings.select(rings.of_target >= _POSSIBLE)
     likely = rings.select(rings.of_target >= _SURE_OF_TARGET)
     light = in_light(gray, likely, family)
-    if not len(likely.ids):
-        return rings.select(rings.of_target >= _POSSIBLE), gray
     if light is not gray:
         again = align(light, likely.frames, likely.ids, likely.shift, family)
         likely = replace(again, margin=likely.margin)
+    known, news = Prior(), light is not gray
     for _ in range(_ROUNDS):
+        prior = Prior.after(likely.select(likely.confidence >= _PROBABLE))
+        if prior == known and not news:
+            break
+        known, news = prior, False
         told = likely.confidence >= _TELLING
         unread = frames[~_near(frames, likely.frames).any(axis=1)]
         doubtful = np.concatenate([likely.frames[~told], unread])
-        prior = Prior.after(likely.select(likely.confidence >= _PROBABLE))
         again = identify(light, doubtful, polarity, family, prior)
         certain = likely.select(told)
-        likely = Aligned.joined([certain, again.select(again.of_target >= _POSSIBLE)])
-    return likely, light
+        rings = likely = Aligned.joined([certain, again.select(again.of_target >= _POSSIBLE)])
+    return rings, light
 
 
 def _near(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
@@ -156,6 +159,18 @@ def _near(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
     away = np.hypot(*(frames[:, None, :2, 2] - others[None, :, :2, 2]).transpose(2, 0, 1))
     near: np.ndarray = away < _SAME_PLACE * frame.mean_radii(others)
     return near
+
+
+def _single(rings: Aligned) -> Aligned:
+    """Return the readings less those of IDs that are read in doubt in too many other places.
+
+    An ID is there once. Texture repeats itself: any of the places may be the right one.
+    """
+    odds = rings.confidence / np.maximum(1 - rings.confidence, 1e-9)
+    rivals = (rings.ids[:, None] == rings.ids) & ~_near(rings.frames, rings.frames)
+    of_rivals = rivals @ np.where(rings.confidence < _TELLING, odds, 0.0)
+    single = odds / (1 + odds + of_rivals) >= _CERTAIN
+    return rings.select(single | (rings.confidence < _CERTAIN))
 
 
 def _owning(gray: np.ndarray, rings: Aligned, polarity: int, family: CircleFamily) -> Aligned:

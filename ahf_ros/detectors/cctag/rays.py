@@ -7,6 +7,7 @@ to the edge lose their weight.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +20,8 @@ _RAYS = 64
 ANGLES = 2 * np.pi * np.arange(_RAYS) / _RAYS
 PROFILE = np.linspace(0.06, 1.3, 72)
 """Radii at which rays are read."""
+ALONG = PROFILE.astype(np.float32)
+"""The same for rays, whose values are single precision."""
 AROUND = np.zeros((_RAYS, 5, 9))
 """What each change does to the ink on rays, by powers of radii."""
 AROUND[:, [0, 0, 1, 1, 1, 2, 2], range(7)] = -frame.displacement_basis(ANGLES, np.ones(_RAYS))
@@ -26,7 +29,7 @@ AROUND[:, [3, 4], [7, 8]] = 1.0
 _QUIET = 0.35  # quantile of rays, whose errors are usual
 _LEAST = 0.003  # standard deviation of gray values, of their mean
 _OTHER_CONTRAST = 0.2  # difference of the contrast of a ray, that quarters its weight
-_LIGHT_EDGES = PROFILE[2:-2:2]  # radii at which the light may change
+_LIGHT_EDGES = ALONG[2:-2:2]  # radii at which the light may change
 _EDGES_OF_RAY = 2
 _LEAST_STEP = 0.15  # of ln of the light
 _EXPLAINED, _OF_USUAL = 0.5, 3.0  # squares that an edge takes, of those of its ray and usual ones
@@ -36,8 +39,8 @@ _DARKEST = 0.03  # ink, of the brightness of paper, in logarithms
 
 
 def lit(gray: np.ndarray, frames: np.ndarray) -> np.ndarray:
-    """Return the gray values of rays, each in its own light, shape (k, rays, n)."""
-    values = np.maximum(sample_circles(gray, frames, ANGLES, PROFILE), 0).astype(np.float64)
+    """Return the gray values of rays, each in its own light, float32, shape (k, rays, n)."""
+    values = np.maximum(sample_circles(gray, frames, ANGLES, PROFILE), 0)
     lit: np.ndarray = values / np.maximum(values.mean(axis=2, keepdims=True), 1)
     return lit
 
@@ -47,14 +50,14 @@ def robust_rays(values: np.ndarray, ink: np.ndarray, outlier: float) -> Rays:
 
     An error of `outlier` usual deviations leaves a quarter of a weight.
     """
-    return _weighted(values, ink, np.broadcast_to(PROFILE, values.shape), outlier, 2)
+    return _weighted(values, ink, np.broadcast_to(ALONG, values.shape), outlier, 2)
 
 
 def evenly_lit_rays(values: np.ndarray, ink: np.ndarray, size: np.ndarray, outlier: float) -> Rays:
     """Return what `robust_rays` does, edges of light taken out; sizes (k,) are radii, px."""
-    rays = _weighted(values, ink, np.broadcast_to(PROFILE, values.shape), outlier, 1)
+    rays = _weighted(values, ink, np.broadcast_to(ALONG, values.shape), outlier, 1)
     light, weight = _light_edges(values, ink, np.median(rays.contrast, axis=1), size)
-    return _weighted(values / light, ink, PROFILE * weight, outlier, 1)
+    return _weighted(values / light, ink, ALONG * weight, outlier, 1)
 
 
 def _weighted(
@@ -69,7 +72,8 @@ def _weighted(
         usual = np.median(rays.contrast, axis=1, keepdims=True)
         unlike = (rays.contrast - usual) / (_OTHER_CONTRAST * np.maximum(np.abs(usual), 1e-9))
         alike = geman_mcclure(1.0, unlike)
-        of_rays = np.median(np.abs(rays.errors), axis=2)
+        middle = values.shape[2] // 2
+        of_rays = np.partition(np.abs(rays.errors), middle, axis=2)[..., middle]
         spread = NORMAL * np.quantile(of_rays, _QUIET, axis=1)[:, None, None]
         weight = geman_mcclure(usual_weight, rays.errors / (outlier * np.maximum(spread, _LEAST)))
         rays = Rays.of(values, ink, weight * alike[..., None])
@@ -86,9 +90,9 @@ def _light_edges(
     contrast = contrast[:, None]
     paper = np.where(contrast < 0, 1.0, 1 - contrast)
     bright = np.maximum(paper + contrast * ink, _DARKEST)
-    weight = PROFILE * bright  # noise is relative to the light
+    weight = ALONG * bright  # noise is relative to the light
     weight = (weight / weight.sum(axis=1, keepdims=True))[:, None]
-    steps = (PROFILE - _LIGHT_EDGES[:, None]) * size[:, None, None] / _EDGE_WIDTH
+    steps = (ALONG - _LIGHT_EDGES[:, None]) * size[:, None, None] / _EDGE_WIDTH
     steps = np.clip(0.5 + steps, 0, 1)
     away = steps - (steps * weight).sum(axis=2, keepdims=True)
     power = np.maximum((away**2 * weight).sum(axis=2), 1e-6)[:, None]
@@ -105,10 +109,10 @@ def _light_edges(
         usual = np.quantile(total - explained, _QUIET, axis=1)[:, None]
         edge = (explained > np.maximum(_OF_USUAL * usual, _EXPLAINED * total))[..., None]
         edge &= np.abs(height) > _LEAST_STEP
-        height = np.where(edge, height, 0.0)
+        height = np.where(edge, height, np.float32(0))
         rest -= height * away[rows, best]
         light += height * steps[rows, best]
-        distance = np.abs(PROFILE - _LIGHT_EDGES[best][..., None]) * size[:, None, None]
+        distance = np.abs(ALONG - _LIGHT_EDGES[best][..., None]) * size[:, None, None]
         trusted[edge & (distance < _CLOSE)] = _CLOSE_WEIGHT
     return np.exp(light), trusted
 
@@ -151,7 +155,7 @@ class Rays:
         basis = np.concatenate([np.ones_like(ink)[:, None], ink[:, None], changes], axis=1)
         products = (basis[:, :, None] * basis[:, None]).reshape(len(ink), -1, ink.shape[1])
         moments = self.weight @ products.transpose(0, 2, 1)
-        moments = moments.reshape(*self.step.shape, 7, 7)
+        moments = moments.reshape(*self.step.shape, 7, 7).astype(np.float64)
         light = moments[..., :2, :2] + 1e-6 * np.eye(2)
         mixed = moments[..., 2:, :2]
         own = moments[..., 2:, 2:] - mixed @ np.linalg.inv(light) @ mixed.swapaxes(2, 3)
@@ -164,5 +168,5 @@ class Rays:
 
 def normal_share(x: np.ndarray) -> np.ndarray:
     """Return the share of a normal distribution below x, to 0.0005 (Page, JRSS C 1977, 26, 75)."""
-    share: np.ndarray = 0.5 * (1 + np.tanh(np.sqrt(2 / np.pi) * (x + 0.044715 * x**3)))
+    share: np.ndarray = 0.5 * (1 + np.tanh(math.sqrt(2 / math.pi) * x * (1 + 0.044715 * x * x)))
     return share

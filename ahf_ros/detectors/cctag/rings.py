@@ -7,6 +7,7 @@ its values are a linear function of the ink, which is that of sharp rings under 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import product
@@ -15,6 +16,7 @@ import numpy as np
 
 from ahf_ros.codes.cctag import CircleFamily
 from ahf_ros.detectors.cctag.rays import (
+    ALONG,
     ANGLES,
     PROFILE,
     Rays,
@@ -279,38 +281,37 @@ def identify(
         np.concatenate([more, of[likely]], axis=1)
         for of, more in zip((starts, ids, shift), again, strict=True)
     )
-    few = _tried(gray, starts, ids, shift, slice(_FEW_READINGS), family, prior)
-    possible = few.of_target.reshape(-1, _FEW_READINGS).max(axis=1, initial=0) > _HOPELESS[1]
+    few = np.arange(ids.shape[1]) < _FEW_READINGS
+    tried = np.nonzero(np.broadcast_to(few, ids.shape))
+    first = align(gray, starts[tried], ids[tried], shift[tried], family, prior)
+    possible = first.of_target.reshape(-1, _FEW_READINGS).max(axis=1) > _HOPELESS[1]
     if not possible.any():
         return NOTHING
+    first = first.select(np.repeat(possible, _FEW_READINGS))
     starts, ids, shift = (of[possible] for of in (starts, ids, shift))
-    more = _tried(gray, starts, ids, shift, slice(_FEW_READINGS, None), family, prior)
-    every = Aligned.joined([few.select(np.repeat(possible, _FEW_READINGS)), more])
-    count, rows = ids.shape[1], np.arange(len(ids))
-    of_row = [np.repeat(rows, of) for of in (_FEW_READINGS, count - _FEW_READINGS)]
-    every = every.select(np.argsort(np.concatenate(of_row), kind='stable'))
+    tried = np.nonzero(np.broadcast_to(few, ids.shape))
+    others = np.nonzero(_unlike_before(ids) & ~few)
+    more = align(gray, starts[others], ids[others], shift[others], family, prior)
+    every = Aligned.joined([first, more])
+    rows, columns = np.concatenate([tried, others], axis=1)
     independent = frame.mean_radii(starts[:, 0]) * np.ptp(PROFILE) / _INDEPENDENT
-    left = np.where(every.colour == polarity, every.left, 0.0).reshape(-1, count)
-    cost = (independent[:, None] * left + prior.squares(every).reshape(-1, count)) / 2
-    best = every.select(np.arange(len(ids)) * count + cost.argmin(axis=1))
-    others = np.where(ids == best.ids[:, None], np.inf, cost).min(axis=1)
+    left = np.where(every.colour == polarity, every.left, 0.0)
+    cost = np.full(ids.shape, np.inf)
+    cost[rows, columns] = (independent[rows] * left + prior.squares(every)) / 2
+    index = np.zeros(ids.shape, int)
+    index[rows, columns] = np.arange(len(rows))
+    best = every.select(index[np.arange(len(ids)), cost.argmin(axis=1)])
+    next_best = np.where(ids == best.ids[:, None], np.inf, cost).min(axis=1)
     best = _settled(gray, best, family, prior)
-    best = replace(best, margin=others - cost.min(axis=1))
+    best = replace(best, margin=next_best - cost.min(axis=1))
     return best.select(best.colour == polarity)
 
 
-def _tried(
-    gray: np.ndarray,
-    starts: np.ndarray,
-    ids: np.ndarray,
-    shift: np.ndarray,
-    columns: slice,
-    family: CircleFamily,
-    prior: Prior,
-) -> Aligned:
-    """Return some of the hypotheses of k targets, (k, n), brought onto the image one by one."""
-    starts, ids, shift = (of[:, columns] for of in (starts, ids, shift))
-    return align(gray, starts.reshape(-1, 3, 3), ids.ravel(), shift.ravel(), family, prior)
+def _unlike_before(ids: np.ndarray) -> np.ndarray:
+    """Return which IDs are not in their row before, shape (k, n)."""
+    same = ids[:, :, None] == ids[:, None]
+    unlike: np.ndarray = same.argmax(axis=2) == np.arange(ids.shape[1])
+    return unlike
 
 
 def _settled(gray: np.ndarray, rings: Aligned, family: CircleFamily, prior: Prior) -> Aligned:
@@ -405,11 +406,11 @@ def _aligned(
         ink, slope, by_shift, by_blur = _rings(family, ids, size, shift, blur)
         near = outlier <= _NEAR  # light is told from rings
         rays = (
-            evenly_lit_rays(values, ink, size, outlier)
+            evenly_lit_rays(values, ink, size.astype(np.float32), outlier)
             if near
             else robust_rays(values, ink, outlier)
         )
-        by_radius = [slope, slope * PROFILE, slope * PROFILE**2]
+        by_radius = [slope, slope * ALONG, slope * ALONG**2]
         normal, right = rays.equations(np.stack([*by_radius, by_shift, by_blur], axis=1), ink)
         variance = (rays.weight * rays.errors**2).sum(axis=(1, 2)) / rays.weight.sum(axis=(1, 2))
         area = size**2 * (PROFILE[1] - PROFILE[0]) * (ANGLES[1] - ANGLES[0])
@@ -436,8 +437,9 @@ def _aligned(
     covariance = affine @ covariance @ affine.transpose(0, 2, 1) + _SYSTEMATIC**2 * np.eye(2)
     values = lit(gray, frames)
     ink = _rings(family, ids, frame.mean_radii(frames), shift, blur)[0]
-    rays = Rays.of(values, ink, np.broadcast_to(PROFILE, values.shape))
-    left, shown = ((PROFILE * of**2).sum(axis=2) for of in (rays.errors, rays.deviations(values)))
+    rays = Rays.of(values, ink, np.broadcast_to(ALONG, values.shape))
+    squares = (of**2 @ ALONG for of in (rays.errors, rays.deviations(values)))
+    left, shown = (of.astype(np.float64) for of in squares)
     agreeing = (left < (1 - _AGREEING) * shown) & (
         np.sign(rays.step) == np.sign(np.median(rays.step, axis=1))[:, None]
     )
@@ -512,12 +514,12 @@ def _rings(
     """
     radii = family.radii(ids)
     sign = _signs(radii)[:, None]
-    size, shift, blur = (of[:, None, None] for of in (size, shift, blur))
+    size, shift, blur = (of[:, None, None].astype(np.float32) for of in (size, shift, blur))
     # Blur moves what lies near to the centre outwards, on the mean (Rice).
-    place = np.sqrt(PROFILE**2 + (blur / size) ** 2)
-    away = (radii[..., None] * size + sign * shift - place * size) / blur
+    place = np.sqrt(ALONG**2 + (blur / size) ** 2)
+    away = (radii.astype(np.float32)[..., None] * size + sign * shift - place * size) / blur
     ink = (sign * normal_share(away)).sum(axis=1)
-    density = np.exp(-0.5 * away**2) / np.sqrt(2 * np.pi)
+    density = np.exp(-0.5 * away**2) / math.sqrt(2 * math.pi)
     slope = -(sign * density * size / blur).sum(axis=1)
     by_shift = (density / blur).sum(axis=1)
     by_blur = -(sign * density * away).sum(axis=1)
@@ -526,4 +528,4 @@ def _rings(
 
 def _signs(radii: np.ndarray) -> np.ndarray:
     """Return 1 for circles that ink fills, -1 for those that paper fills, from shape (k, n)."""
-    return np.where(np.arange(radii.shape[1]) % 2 == 0, 1, -1)
+    return np.where(np.arange(radii.shape[1]) % 2 == 0, np.float32(1), np.float32(-1))
