@@ -13,6 +13,7 @@ from typing import Any
 
 from ahf_ros.codes import CCTAG_NAMES, SQUARE_NAMES
 from ahf_ros.codes.designs import Arc
+from ahf_ros.extras import need
 from ahf_ros.printing.drawing import Drawing, Ink
 from ahf_ros.printing.sheets import Sheets
 
@@ -73,15 +74,11 @@ def _rounded(values: dict) -> dict:
 def pdf_bytes(pages: Iterable[Drawing], title: str) -> bytes:
     """Return the content of a PDF file whose pages are printed without being scaled.
 
-    A ValueError is raised if ReportLab is not installed.
+    Raises a `MissingExtra` without ReportLab.
     """
-    try:
-        from reportlab.pdfgen.canvas import Canvas
-    except ImportError as error:
-        raise ValueError(
-            'PDF needs the package reportlab, which is not installed: pip install reportlab, or '
-            "install ahf_ros with 'ahf_ros[print]'; accepted without it is SVG"
-        ) from error
+    need('print')
+    from reportlab.pdfgen.canvas import Canvas
+
     buffer = io.BytesIO()
     canvas = Canvas(buffer, pageCompression=1, invariant=1, pdfVersion=_PDF_VERSION)
     canvas.setTitle(title)

@@ -1,0 +1,44 @@
+"""What needs a package that `pip install ahf_ros` leaves out, and how to install that."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from typing import NamedTuple
+
+
+class Extra(NamedTuple):
+    """What an extra is for, and the modules that it brings."""
+
+    purpose: str
+    modules: tuple[str, ...]
+
+
+EXTRAS = {
+    'bag': Extra('ahf bag', ('mcap', 'rosbags', 'zstandard')),
+    'cluster': Extra('--scheduler', ('distributed',)),
+    'completion': Extra('completion in the shell', ('argcomplete',)),
+    'dataframe': Extra('to_dataframe', ('pandas',)),
+    'orient': Extra('ahf orient and compare', ('jinja2', 'PIL', 'scipy')),
+    'print': Extra('PDF of ahf targets', ('reportlab',)),
+    'report': Extra('ahf report', ('jinja2',)),
+    'urls': Extra('images behind URLs', ('fsspec',)),
+}
+"""The extras for users, as pyproject.toml has them."""
+
+
+class MissingExtra(ModuleNotFoundError):
+    """A package is not installed that an extra brings; the text says how to install it."""
+
+
+def missing(extra: str) -> str:
+    """Return what of an extra is not installed, and how to install it; empty where all is."""
+    purpose, modules = EXTRAS[extra]
+    lost = ', '.join(name for name in modules if find_spec(name) is None)
+    advice = f"pip install 'ahf_ros[{extra}]'"
+    return lost and f'{lost} not installed, needed for {purpose}: {advice}'
+
+
+def need(extra: str) -> None:
+    """Go on where all of an extra is installed, otherwise raise a `MissingExtra`."""
+    if said := missing(extra):
+        raise MissingExtra(said)
