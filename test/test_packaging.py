@@ -72,8 +72,8 @@ CONDA = {
 
 def test_rosdep_resolves_every_dependency_without_pip() -> None:
     """bloom refuses keys that pip resolves, and on Ubuntu 24.04 they cannot be installed."""
-    assert NAMED - RELEASED - ON_NOBLE == set()
-    assert (RELEASED | ON_NOBLE) - NAMED == set(), 'nobody needs these any more'
+    assert set() == NAMED - RELEASED - ON_NOBLE
+    assert set() == (RELEASED | ON_NOBLE) - NAMED, 'nobody needs these any more'
 
 
 @pytest.mark.skipif('AHF_ROSDISTRO' not in os.environ, reason='AHF_ROSDISTRO is no rosdistro')
