@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import configparser
 import os
+import runpy
 import shutil
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping
 from importlib import metadata
 from pathlib import Path
 
@@ -48,6 +50,24 @@ def ros_prefix() -> Path | None:
     return None
 
 
+def unsourced(environment: Mapping[str, str]) -> dict[str, str]:
+    """Return an environment without the Python path of a ROS installation that is sourced."""
+    prefixes = [it for it in environment.get('AMENT_PREFIX_PATH', '').split(os.pathsep) if it]
+    kept = [
+        path
+        for path in environment.get('PYTHONPATH', '').split(os.pathsep)
+        if not any(Path(path).is_relative_to(prefix) for prefix in prefixes)
+    ]
+    return {**environment, 'PYTHONPATH': os.pathsep.join(kept)}
+
+
+def check_prerequisites() -> None:
+    """End with a line for each thing that this machine lacks, before pip looks for wheels."""
+    script = runpy.run_path(str(HERE / 'scripts' / 'prerequisites.py'))
+    if lines := script['missing_for_nodes']():
+        sys.exit('\n'.join(lines))
+
+
 class CMakeBuild(build_ext):
     """Generate and compile the interfaces with CMake and put them into the wheel."""
 
@@ -78,7 +98,7 @@ class CMakeBuild(build_ext):
         work = Path(self.build_temp).resolve() / NAME
         shutil.rmtree(work, ignore_errors=True)
         stage = work / 'stage'
-        environment = dict(os.environ)
+        environment = unsourced(os.environ)
         prefix = ros_prefix()
         if prefix:
             environment['AMENT_PREFIX_PATH'] = environment['CMAKE_PREFIX_PATH'] = str(prefix)
@@ -123,6 +143,7 @@ class BinaryDistribution(Distribution):
 
 
 if __name__ == '__main__':
+    check_prerequisites()
     setup(
         version=ElementTree.parse(HERE / 'package.xml').findtext('version'),
         setup_requires=wheels('build'),
