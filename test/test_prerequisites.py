@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import platform
 import re
@@ -37,6 +38,10 @@ needs_wheels = pytest.mark.skipif(
     reason='ROS 2 on PyPI is not for this machine',
 )
 
+needs_setuptools = pytest.mark.skipif(
+    not importlib.util.find_spec('setuptools'), reason='setuptools is not installed'
+)
+
 
 def without_compiler(*arguments: object) -> subprocess.CompletedProcess[str]:
     environment = {**os.environ, 'PATH': os.devnull, 'PYTHONPATH': str(ROOT)}
@@ -53,6 +58,7 @@ def test_a_python_without_pip_is_said() -> None:
 
 
 @needs_wheels
+@needs_setuptools
 @pytest.mark.parametrize('arguments', [(SCRIPT, 'nodes'), (ROOT / 'ros/setup.py', '--version')])
 def test_a_missing_compiler_is_said_in_one_line(arguments: tuple[object, ...]) -> None:
     """By make, and by pip before it looks for wheels of ROS."""
@@ -61,6 +67,7 @@ def test_a_missing_compiler_is_said_in_one_line(arguments: tuple[object, ...]) -
     assert re.fullmatch(NO_COMPILER, done.stderr.strip())
 
 
+@needs_setuptools
 def test_what_is_sourced_is_not_mixed_with_ros_from_pypi() -> None:
     unsourced = runpy.run_path(str(ROOT / 'ros' / 'setup.py'))['unsourced']
     own = '/tmp/build/site'

@@ -31,8 +31,8 @@ def sheet_files(path: Path, sheets: Sheets) -> Iterator[tuple[Path, bytes]]:
     """Yield the files of sheets, and their content.
 
     The ending of `path` says the format. An SVG file holds one page: several are numbered,
-    `sheet_1.svg` and so on for `sheet.svg`. A ValueError is raised if the format is unknown, its
-    library is not installed, or the page is too small.
+    `sheet_1.svg` and so on for `sheet.svg`. A ValueError is raised if the format is unknown or the
+    page is too small, a `MissingExtra` if its library is not installed.
     """
     suffix = path.suffix.lower()
     if suffix not in FORMATS:
