@@ -30,15 +30,18 @@ class MissingExtra(ModuleNotFoundError):
     """A package is not installed that an extra brings; the text says how to install it."""
 
 
-def missing(extra: str) -> str:
-    """Return what of an extra is not installed, and how to install it; empty where all is."""
-    purpose, modules = EXTRAS[extra]
-    lost = ', '.join(name for name in modules if find_spec(name) is None)
+def missing(extra: str, *modules: str) -> str:
+    """Return what of an extra is not installed, and how to install it; empty where all is.
+
+    `modules` restricts it to those that are needed.
+    """
+    purpose, brought = EXTRAS[extra]
+    lost = ', '.join(name for name in modules or brought if find_spec(name) is None)
     advice = f"pip install 'ahf_ros[{extra}]'"
     return lost and f'{lost} not installed, needed for {purpose}: {advice}'
 
 
-def need(extra: str) -> None:
-    """Go on where all of an extra is installed, otherwise raise a `MissingExtra`."""
-    if said := missing(extra):
+def need(extra: str, *modules: str) -> None:
+    """Raise a `MissingExtra` unless all of an extra, or these of its modules, are installed."""
+    if said := missing(extra, *modules):
         raise MissingExtra(said)

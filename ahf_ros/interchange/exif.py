@@ -43,7 +43,7 @@ def read_exif(path: str | Path) -> tuple[Exif, tuple[int, int]]:
     These are 0 px where the format is not known. A ValueError names a file that cannot be read.
     Raises a `MissingExtra` without Pillow.
     """
-    need('orient')
+    need('orient', 'PIL')
     from PIL import Image, UnidentifiedImageError
 
     check_regular(path, MAXIMUM_BYTES)

@@ -45,7 +45,7 @@ class UnitWeight(NamedTuple):
 
 def special() -> ModuleType:
     """Return scipy.special, or raise a `MissingExtra`."""
-    need('orient')
+    need('orient', 'scipy')
     return import_module('scipy.special')
 
 

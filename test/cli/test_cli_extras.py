@@ -14,6 +14,7 @@ from ahf_ros import Identification
 from ahf_ros.codes.gsi import point_family, positions_of
 from ahf_ros.extras import EXTRAS, MissingExtra, missing
 from ahf_ros.interchange.network_results import write_network
+from ahf_ros.orientation.testing import unit_weight
 from support import ROOT
 from support.command_line import python, status
 from support.epochs import epoch
@@ -81,7 +82,8 @@ def test_so_does_a_comparison(
 ) -> None:
     for seed in (1, 2):
         write_network(tmp_path / f'{seed}', epoch(seed))
-    said = take_away('orient')
+    take_away('orient')
+    said = missing('orient', 'scipy')
     assert status('measure', tmp_path / '1') == 0  # which needs no extra
     capsys.readouterr()
     assert status('compare', tmp_path / '1', tmp_path / '2') == 2
@@ -150,3 +152,11 @@ def test_extras_are_those_of_the_package() -> None:
         (brought,) = re.findall(rf'^{extra} = \[(.*)\]$', text, re.MULTILINE)
         required = set(re.findall(r'"([\w-]+)', brought))
         assert required == {distributions.get(it, it) for it in modules}
+
+
+def test_the_library_needs_no_more_of_an_extra_than_it_uses(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    pytest.importorskip('scipy')
+    monkeypatch.setitem(sys.modules, 'jinja2', None)
+    assert unit_weight(1.0, 1).plausible
