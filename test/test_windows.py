@@ -71,7 +71,17 @@ def test_batches_with_every_kind_of_detector(scene: Path, tmp_path: Path) -> Non
     image = next(scene.glob('*.png'))
     example = ROOT / 'docs' / 'examples' / 'my_detector.py'
     packages.write_package(tmp_path, 'blobs', example.read_text())
-    batch = ['identify', scene, '--jobs', 2, '--json', '--output', tmp_path / 'out']
+    batch = [
+        'identify',
+        scene,
+        '--family',
+        'metashape12',
+        '--jobs',
+        2,
+        '--json',
+        '--output',
+        tmp_path / 'out',
+    ]
     command = f'"{sys.executable}" "{detector}"'
     lines = [
         batch,
