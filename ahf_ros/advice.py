@@ -78,7 +78,7 @@ class Adviser:
             self._look.start()
 
     def _advise(self, image: np.ndarray) -> None:
-        with suppress(OSError):  # where a thread has no priority of its own
+        with suppress(OSError, AttributeError):  # where a thread has no priority of its own
             os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), 19)
         with suppress(ValueError):  # which the identification has said
             lines = advice(image, *self._arguments)

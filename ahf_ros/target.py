@@ -6,6 +6,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any, overload
 
+from ahf_ros.extras import need
+
 if TYPE_CHECKING:
     import numpy as np
 
@@ -352,12 +354,9 @@ class Identification:
         ModuleNotFoundError
             If pandas is not installed.
         """
-        try:
-            import pandas
-        except ModuleNotFoundError as error:
-            raise ModuleNotFoundError(
-                'pandas is not installed, to_dataframe needs it: pip install pandas'
-            ) from error
+        need('dataframe')
+        import pandas
+
         table: dict[str, Any] = {
             it.name: [getattr(target, it.name) for target in self] for it in fields(Target)
         }

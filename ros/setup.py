@@ -10,11 +10,13 @@ from __future__ import annotations
 import atexit
 import configparser
 import os
+import runpy
 import shutil
 import subprocess
 import sys
 import tempfile
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping
 from importlib import metadata
 from pathlib import Path
 
@@ -50,6 +52,24 @@ def ros_prefix() -> Path | None:
     return None
 
 
+def unsourced(environment: Mapping[str, str]) -> dict[str, str]:
+    """Return an environment without the Python path of a ROS installation that is sourced."""
+    prefixes = [it for it in environment.get('AMENT_PREFIX_PATH', '').split(os.pathsep) if it]
+    kept = [
+        path
+        for path in environment.get('PYTHONPATH', '').split(os.pathsep)
+        if not any(Path(path).is_relative_to(prefix) for prefix in prefixes)
+    ]
+    return {**environment, 'PYTHONPATH': os.pathsep.join(kept)}
+
+
+def check_prerequisites() -> None:
+    """End with a line for each thing that this machine lacks, before pip looks for wheels."""
+    script = runpy.run_path(str(HERE / 'scripts' / 'prerequisites.py'))
+    if lines := script['missing_for_nodes']():
+        sys.exit('\n'.join(lines))
+
+
 class CMakeBuild(build_ext):
     """Generate and compile the interfaces with CMake and put them into the wheel."""
 
@@ -77,7 +97,7 @@ class CMakeBuild(build_ext):
         """Run CMake and return the directory that it installed into."""
         work = Path(self.build_temp).resolve() / NAME
         stage = work / 'stage'
-        environment = dict(os.environ)
+        environment = unsourced(os.environ)
         prefix = ros_prefix()
         if prefix:
             environment['AMENT_PREFIX_PATH'] = environment['CMAKE_PREFIX_PATH'] = str(prefix)
@@ -122,6 +142,7 @@ class BinaryDistribution(Distribution):
 
 
 if __name__ == '__main__':
+    check_prerequisites()
     # A folder of its own each time: pip's isolated build environment has a new path, and CMake
     # would remember the old one; and two environments may be set up at once.
     scratch = tempfile.mkdtemp(prefix='ahf_ros_')

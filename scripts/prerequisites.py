@@ -1,9 +1,11 @@
 """Say at once what a machine lacks to install ahf_ros, or its nodes, with pip.
 
-Runs on any Python from 3.6, also on one that is too old for the package.
+make runs it, and so does pip install ./ros. Any Python from 3.6 will do, also one that is too old
+for the package.
 """
 
 import importlib.util
+import os
 import platform
 import shutil
 import sys
@@ -23,7 +25,7 @@ def missing():
             'make PYTHON=python3.12 ...'
         )
     if not all(importlib.util.find_spec(name) for name in ('venv', 'ensurepip')):
-        lines.append('Python has no venv module: apt install python3-venv')
+        lines.append('Python has no venv or no pip: apt install python3-venv')
     return lines
 
 
@@ -34,7 +36,7 @@ def missing_for_nodes():
         oldest, newest = ('.'.join(map(str, version)) for version in (OLDEST, NEWEST))
         lines.append(
             f'Python is {platform.python_version()}, ROS 2 on PyPI is for {oldest} to {newest}: '
-            'make PYTHON=python3.12 ...'
+            'take another one, such as make PYTHON=python3.12 ...'
         )
     if (platform.system(), platform.machine()) != ('Linux', 'x86_64'):
         lines.append(
@@ -44,7 +46,8 @@ def missing_for_nodes():
     lacking = []
     if not Path(sysconfig.get_path('include'), 'Python.h').exists():
         lacking.append('python3-dev')
-    if not all(shutil.which(name) for name in ('gcc', 'g++')):
+    compilers = (os.environ.get('CC') or 'gcc', os.environ.get('CXX') or 'g++')
+    if not all(shutil.which(command.split()[0]) for command in compilers):
         lacking.append('g++')
     if lacking:
         lines.append('The messages cannot be compiled: apt install ' + ' '.join(lacking))

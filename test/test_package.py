@@ -35,34 +35,34 @@ ROSDEP = {
     'jinja2': 'python3-jinja2',
     'PIL': 'python3-pil',
     'matplotlib': 'python3-matplotlib',
-    'mcap': 'mcap-ros2-support',
     'numpy': 'python3-numpy',
     'pytest': 'python3-pytest',
     'reportlab': 'python3-reportlab',
     'rich': 'python3-rich',
-    'rosbags': 'python3-rosbags-pip',
     'ruamel': 'python3-ruamel.yaml',
     'scipy': 'python3-scipy',
     'threadpoolctl': 'python3-sklearn',
     'yaml': 'python3-yaml',
-    'zstandard': 'mcap-ros2-support',
 }
-"""Keys of rosdep of what is not a ROS package; mcap-ros2-support brings mcap and zstandard,
-scikit-learn threadpoolctl, which has no key."""
+"""Keys of rosdep of what is not a ROS package; scikit-learn brings threadpoolctl, which has no
+key."""
 
 NOT_IN_ROSDEP = {
     'pupil_apriltags',
     'Metashape',
     'distributed',
     'fsspec',
+    'mcap',
     'pandas',
     'pycolmap',
     'pypdfium2',
+    'rosbags',
     'selenium',
     'typing_extensions',
+    'zstandard',
 }
 """What tests skip without, extras, what only type checkers import, and what is only in the console
-of other software."""
+of other software. Of rosbags and mcap, rosdep would take those of pip."""
 
 TO_RUN, TO_TEST = ('depend', 'exec_depend'), ('depend', 'exec_depend', 'test_depend')
 OWN = {'ahf_ros', 'benchmarks', 'support'}

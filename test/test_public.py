@@ -225,5 +225,5 @@ def test_an_identification_is_a_table() -> None:
 
 def test_without_pandas_that_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, 'pandas', None)
-    with pytest.raises(ModuleNotFoundError, match='pandas is not installed, to_dataframe needs'):
+    with pytest.raises(ModuleNotFoundError, match='pandas not installed, needed for to_dataframe'):
         Identification(()).to_dataframe()

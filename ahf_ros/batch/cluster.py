@@ -29,6 +29,7 @@ from typing import Any
 
 from ahf_ros.batch.engine import TRIES, EngineLost, Job, Report, TaskFailed, no_report
 from ahf_ros.batch.processes import ProcessEngine
+from ahf_ros.extras import need
 from ahf_ros.text import reason_of
 
 # What calls of a client raise whose scheduler is away.
@@ -45,15 +46,12 @@ _thread = threading.local()  # of a worker
 def connect(address: str) -> Any:
     """Return a client of a scheduler, whose address is such as tcp://host:8786.
 
-    It raises a ValueError if distributed is not installed, no scheduler answers, or it has another
-    version.
+    It raises a `MissingExtra` if distributed is not installed, a ValueError if no scheduler
+    answers or it has another version.
     """
-    try:
-        import distributed
-    except ModuleNotFoundError as error:
-        raise ValueError(
-            f"{error.name} is not installed, clusters need it: pip install 'ahf_ros[cluster]'"
-        ) from error
+    need('cluster')
+    import distributed
+
     # What it logs of a scheduler that is away is said in other words.
     for name in list(logging.root.manager.loggerDict):
         if name.partition('.')[0] == 'distributed':

@@ -27,6 +27,7 @@ from ahf_ros.cli.options import (
 )
 from ahf_ros.cloud_settings import CloudSettings
 from ahf_ros.detectors import is_foreign
+from ahf_ros.extras import need
 from ahf_ros.registration_settings import RegistrationSettings
 from ahf_ros.session_settings import IdentificationSettings, StackSettings
 from ahf_ros.settings.parameter import Parameter
@@ -132,12 +133,8 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _tasks(options: argparse.Namespace) -> list[BagTask]:
-    try:
-        from ahf_ros.bag.run import BagTask
-    except ModuleNotFoundError as error:
-        raise ValueError(
-            f"{error.name} is not installed, bags need it: pip install 'ahf_ros[bag]'"
-        ) from error
+    need('bag')
+    from ahf_ros.bag.run import BagTask
 
     jobs = min(options.jobs, len(options.bags))
     settings = settings_from(options, IdentificationSettings)

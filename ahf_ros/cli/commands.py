@@ -9,7 +9,8 @@ from collections.abc import Sequence
 from importlib import import_module
 from types import ModuleType
 
-from ahf_ros.cli import tell
+from ahf_ros.cli import say, tell
+from ahf_ros.extras import MissingExtra, missing
 from ahf_ros.release import release
 
 COMMANDS = {
@@ -56,16 +57,25 @@ def run(arguments: Sequence[str] | None) -> int:
     """
     arguments = sys.argv[1:] if arguments is None else arguments
     if 'COMP_LINE' in os.environ:  # a shell wants to know how this line may go on
-        from argcomplete import autocomplete
-
-        autocomplete(_parser(os.environ['COMP_LINE'].split()))
+        return _complete(os.environ['COMP_LINE'])
     options = _parser(arguments).parse_args(arguments)
     try:
         status: int = _module(options.subcommand).run(options)
         return status
-    except ValueError as error:
+    except (ValueError, MissingExtra) as error:
         tell(options.subcommand, f'error: {error}')
         return 2
+
+
+def _complete(line: str) -> int:
+    """Print how a line of a shell may go on."""
+    if said := missing('completion'):
+        say(said)
+        return 1
+    from argcomplete import autocomplete
+
+    autocomplete(_parser(line.split()))
+    return 0
 
 
 def _module(command: str) -> ModuleType:

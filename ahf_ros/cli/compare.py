@@ -78,7 +78,7 @@ def run(options: argparse.Namespace) -> int:
                 from ahf_ros.drawing.movements import movements_figure
 
                 write_whole(path, movements_figure(found).encode())
-    except (ValueError, ModuleNotFoundError) as error:
+    except ValueError as error:
         tell('compare', error)
         return 1
     if options.json:

@@ -12,18 +12,8 @@ import sys
 from collections.abc import Iterator
 from importlib import metadata
 
+from ahf_ros.extras import EXTRAS, missing
 from ahf_ros.release import release
-
-PURPOSES = {
-    'bag': 'ahf bag',
-    'cluster': '--scheduler',
-    'completion': 'completion in the shell',
-    'orient': 'ahf orient, measure and compare',
-    'print': 'PDF of ahf targets',
-    'report': 'ahf report',
-    'urls': 'images behind URLs',
-}
-"""What each extra for users is for."""
 
 _OPENCV = tuple(
     f'opencv-{kind}python{head}' for kind in ('', 'contrib-') for head in ('', '-headless')
@@ -40,7 +30,6 @@ _VARIABLES = (
     *('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'OPENCV_FOR_THREADS_NUM'),
 )
 _REQUIREMENT = re.compile(r'(?P<name>[\w.-]+)')
-_EXTRA = re.compile(r'extra == ["\'](?P<name>[\w-]+)["\']')
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -70,7 +59,7 @@ def _machine() -> Iterator[str]:
         f'ahf_ros {release()}, Python {platform.python_version()}, {platform.system()} '
         f'{platform.release()} {platform.machine()}, {os.cpu_count()} cores'
     )
-    for name in _required(''):
+    for name in _required():
         yield f'{name} {_version(name) or "is missing"}'
     if importlib.util.find_spec('cv2'):
         yield from _opencv()
@@ -90,13 +79,8 @@ def _opencv() -> Iterator[str]:
 
 
 def _extras() -> Iterator[str]:
-    for extra, purpose in PURPOSES.items():
-        missing = [name for name in _required(extra) if not _version(name)]
-        if missing:
-            advice = f"pip install 'ahf_ros[{extra}]'"
-            yield f'{extra}: {", ".join(missing)} missing for {purpose}: {advice}'
-        else:
-            yield f'{extra}: complete, for {purpose}'
+    for extra, (purpose, _) in EXTRAS.items():
+        yield f'{extra}: {missing(extra) or f"complete, for {purpose}"}'
 
 
 def _ros() -> Iterator[str]:
@@ -132,7 +116,7 @@ def _shared_memory() -> str:
 
 
 def _problems() -> Iterator[str]:
-    for name in _required(''):
+    for name in _required():
         if not _version(name) and not name.startswith('opencv'):
             yield f'{name} is missing: pip install {name}'
     several = [name for name in _OPENCV if _version(name)]
@@ -152,14 +136,11 @@ def _problems() -> Iterator[str]:
         )
 
 
-def _required(extra: str) -> list[str]:
-    """Return the names of the packages that the package, or an extra of it, requires."""
-    names = []
-    for line in metadata.requires('ahf_ros') or ():
-        of = _EXTRA.search(line)
-        if (of['name'] if of else '') == extra and (match := _REQUIREMENT.match(line)):
-            names.append(match['name'])
-    return names
+def _required() -> list[str]:
+    """Return the names of the packages that the package requires without any extra."""
+    lines = metadata.requires('ahf_ros') or ()
+    found = [_REQUIREMENT.match(line) for line in lines if 'extra ==' not in line]
+    return [match['name'] for match in found if match]
 
 
 def _version(name: str) -> str:

@@ -108,7 +108,7 @@ def run(options: argparse.Namespace) -> int:
         found = _measured(options, points)
         if options.output:
             _write(options.output, *found)
-    except (ValueError, ModuleNotFoundError) as error:
+    except ValueError as error:
         tell('measure', error)
         return 1
     if options.json:

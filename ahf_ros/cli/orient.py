@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 from ahf_ros.cli import tell
 from ahf_ros.cli.mounting import add_mounting_arguments, check_mounting, write_mountings
 from ahf_ros.cli.options import add_option, add_quiet, parsed_by
+from ahf_ros.extras import need
 from ahf_ros.settings.parameter import Parameter
 
 if TYPE_CHECKING:
@@ -163,13 +164,14 @@ def _export(text: str) -> tuple[str, Path]:
 
 def run(options: argparse.Namespace) -> int:
     """Orient the photographs, and write each group of them that hangs together."""
+    need('orient')
     try:
         check_mounting(options)
         network, notes = _network(options)
         solutions = _oriented(network, options)
         if not solutions:
             raise ValueError('no photograph could be oriented')
-    except (ValueError, ModuleNotFoundError) as error:
+    except ValueError as error:
         tell('orient', error)
         return 1
     solutions = [

@@ -10,6 +10,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+from ahf_ros.extras import need
 from ahf_ros.interchange.files import check_regular, is_url, read_bytes
 from ahf_ros.interchange.image_files import MAXIMUM_BYTES
 
@@ -40,14 +41,11 @@ def read_exif(path: str | Path) -> tuple[Exif, tuple[int, int]]:
     """Return the Exif data of an image file, empty where there are none, and width and height.
 
     These are 0 px where the format is not known. A ValueError names a file that cannot be read.
-    Raises `ModuleNotFoundError` without Pillow.
+    Raises a `MissingExtra` without Pillow.
     """
-    try:
-        from PIL import Image, UnidentifiedImageError
-    except ModuleNotFoundError as error:
-        raise ModuleNotFoundError(
-            "Pillow is needed to read Exif data: pip install 'ahf_ros[orient]'"
-        ) from error
+    need('orient', 'PIL')
+    from PIL import Image, UnidentifiedImageError
+
     check_regular(path, MAXIMUM_BYTES)
     try:
         with warnings.catch_warnings():

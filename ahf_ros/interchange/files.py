@@ -18,6 +18,7 @@ from importlib import import_module
 from pathlib import Path, PurePath
 from typing import Any, BinaryIO
 
+from ahf_ros.extras import need
 from ahf_ros.text import printable, reason_of, shown
 
 _fcntl: Any
@@ -242,10 +243,9 @@ def _storage(url: str) -> Iterator[tuple[Any, str]]:
     A driver, or fsspec itself, may not be installed.
     """
     try:
-        try:
-            from fsspec.core import url_to_fs
-        except ModuleNotFoundError as error:
-            raise ModuleNotFoundError("fsspec: pip install 'ahf_ros[urls]'") from error
+        need('urls')
+        from fsspec.core import url_to_fs
+
         yield url_to_fs(url, use_listings_cache=False)
     except Exception as error:
         raise ValueError(f'{url} cannot be read: {reason_of(error)}') from error

@@ -7,6 +7,7 @@ from functools import partial
 from importlib import import_module
 
 from ahf_ros.ending import has_arrived, ignore_ending, signalled
+from ahf_ros.text import printable
 
 NODES = {
     'detector': 'ahf_ros.nodes.detector',
@@ -42,6 +43,10 @@ def start(node: str, arguments: list[str] | None = None) -> int:
         module = import_module(NODES[node])
     except ModuleNotFoundError as error:
         print(f'ahf_{node}: {error.name} is missing, {INSTALL}', file=sys.stderr)
+        return 1
+    except ImportError as error:  # what is there is of another distribution, or another Python
+        said = printable(str(error).split('\n')[0])
+        print(f'ahf_{node}: ROS 2 cannot be used: {said}; see ahf doctor', file=sys.stderr)
         return 1
     if has_arrived():
         ignore_ending()

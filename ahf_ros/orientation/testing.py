@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ahf_ros.extras import need
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.normals import BEHIND, Design, Layout, whitened_lengths
 from ahf_ros.orientation.precision import Precision, of_computed
@@ -43,19 +44,15 @@ class UnitWeight(NamedTuple):
 
 
 def special() -> ModuleType:
-    """Return scipy.special, or raise a `ModuleNotFoundError` that says how to install it."""
-    try:
-        return import_module('scipy.special')
-    except ModuleNotFoundError as error:
-        raise ModuleNotFoundError(
-            "scipy is needed for tests of adjustments: pip install 'ahf_ros[orient]'"
-        ) from error
+    """Return scipy.special, or raise a `MissingExtra`."""
+    need('orient', 'scipy')
+    return import_module('scipy.special')
 
 
 def unit_weight(cost: float, redundancy: int) -> UnitWeight:
     """Return the estimate and its two-sided chi-square test against 1, at 5 %.
 
-    Without redundancy it is 1. Raises `ModuleNotFoundError` without scipy.
+    Without redundancy it is 1. Raises a `MissingExtra` without scipy.
     """
     if redundancy <= 0:
         return UnitWeight(1.0, redundancy, True)

@@ -13,6 +13,7 @@ from typing import Any
 
 from ahf_ros.codes import CCTAG_NAMES, SQUARE_NAMES
 from ahf_ros.codes.designs import Arc
+from ahf_ros.extras import need
 from ahf_ros.printing.drawing import Drawing, Ink
 from ahf_ros.printing.sheets import Sheets
 
@@ -30,8 +31,8 @@ def sheet_files(path: Path, sheets: Sheets) -> Iterator[tuple[Path, bytes]]:
     """Yield the files of sheets, and their content.
 
     The ending of `path` says the format. An SVG file holds one page: several are numbered,
-    `sheet_1.svg` and so on for `sheet.svg`. A ValueError is raised if the format is unknown, its
-    library is not installed, or the page is too small.
+    `sheet_1.svg` and so on for `sheet.svg`. A ValueError is raised if the format is unknown or the
+    page is too small, a `MissingExtra` if its library is not installed.
     """
     suffix = path.suffix.lower()
     if suffix not in FORMATS:
@@ -73,15 +74,11 @@ def _rounded(values: dict) -> dict:
 def pdf_bytes(pages: Iterable[Drawing], title: str) -> bytes:
     """Return the content of a PDF file whose pages are printed without being scaled.
 
-    A ValueError is raised if ReportLab is not installed.
+    Raises a `MissingExtra` without ReportLab.
     """
-    try:
-        from reportlab.pdfgen.canvas import Canvas
-    except ImportError as error:
-        raise ValueError(
-            'PDF needs the package reportlab, which is not installed: pip install reportlab, or '
-            "install ahf_ros with 'ahf_ros[print]'; accepted without it is SVG"
-        ) from error
+    need('print')
+    from reportlab.pdfgen.canvas import Canvas
+
     buffer = io.BytesIO()
     canvas = Canvas(buffer, pageCompression=1, invariant=1, pdfVersion=_PDF_VERSION)
     canvas.setTitle(title)

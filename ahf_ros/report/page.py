@@ -24,6 +24,7 @@ from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.doubt import DOUBTFUL_BELOW, doubt
 from ahf_ros.edge_shift import edge_shift_remark
 from ahf_ros.evaluation import FALSE, RIGHT, WRONG, judge
+from ahf_ros.extras import need
 from ahf_ros.interchange.files import whole_file
 from ahf_ros.report.images import Picture, fitted, shown_image, thumbnail
 from ahf_ros.report.results import ImageResult
@@ -287,13 +288,10 @@ def page_style(name: str) -> str:
 
 
 def page_template(name: str) -> Any:
-    """Return a template of jinja2, or raise a ValueError that says how to install that."""
-    try:
-        from jinja2 import Environment, FileSystemLoader, StrictUndefined
-    except ImportError as error:
-        raise ValueError(
-            "the page needs jinja2, which is not installed: pip install 'ahf_ros[report]'"
-        ) from error
+    """Return a template of jinja2, or raise a `MissingExtra`."""
+    need('report')
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
     environment = Environment(
         loader=FileSystemLoader(_PAGE),
         autoescape=True,

@@ -370,7 +370,9 @@ def test_a_missing_library_is_named(
     monkeypatch: pytest.MonkeyPatch,
     capfd: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.delitem(sys.modules, 'ahf_ros.bag.run')
-    monkeypatch.setitem(sys.modules, 'rosbags.rosbag2', None)
+    monkeypatch.setitem(sys.modules, 'rosbags', None)
     assert status(recording, tmp_path / 'out') == 2
-    assert "is not installed, bags need it: pip install 'ahf_ros[bag]'" in capfd.readouterr().err
+    assert (
+        "rosbags not installed, needed for ahf bag: pip install 'ahf_ros[bag]'"
+        in capfd.readouterr().err
+    )

@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ahf_ros.cli.doctor import PURPOSES
-from support import ROOT
+from ahf_ros.extras import EXTRAS
 from support.command_line import ahf, python, status
 
 EXTRA = ('rclpy', 'asyncio', 'dask', 'distributed', 'jinja2', 'rosbags', 'mcap', 'scipy')
@@ -28,15 +27,9 @@ def test_it_names_versions_and_every_extra(capsys: pytest.CaptureFixture[str]) -
     said = capsys.readouterr().out
     assert f'numpy {np.__version__}' in said
     assert re.search(r'OpenCV \d.* with \d+ threads', said)
-    for extra, purpose in PURPOSES.items():
+    for extra, (purpose, _) in EXTRAS.items():
         (line,) = re.findall(rf'^  {extra}: (.*)$', said, re.MULTILINE)
         assert purpose in line
-
-
-def test_extras_for_users_are_those_of_all() -> None:
-    text = (ROOT / 'pyproject.toml').read_text()
-    (names,) = re.findall(r'^all = \["ahf_ros\[(.*)\]"\]$', text, re.MULTILINE)
-    assert set(names.split(',')) == set(PURPOSES)
 
 
 def test_two_kinds_of_opencv_are_a_problem(

@@ -133,9 +133,9 @@ def test_a_full_disk_leaves_the_old_file_and_the_rest_is_written(tmp_path: Path,
 def test_without_its_library_a_pdf_is_refused_and_svg_is_not(
     tmp_path: Path, capsys, monkeypatch
 ) -> None:
-    monkeypatch.setitem(sys.modules, 'reportlab.pdfgen.canvas', None)
+    monkeypatch.setitem(sys.modules, 'reportlab', None)
     assert targets('--ids', '1', '-o', tmp_path / 'sheet.pdf') == 2
-    assert "install ahf_ros with 'ahf_ros[print]'" in capsys.readouterr().err
+    assert "pip install 'ahf_ros[print]'" in capsys.readouterr().err
     assert targets('--ids', '1', '-o', tmp_path / 'sheet.svg') == 0
     assert [it.name for it in tmp_path.iterdir()] == ['sheet.svg']
     assert targets('--ids', '1', '-o', tmp_path / 'sheet.png') == 2

@@ -235,7 +235,7 @@ def test_no_page_is_left_in_part(
     assert [it.name for it in page.parent.iterdir()] == ['report.html']
     assert page.read_text() == 'whole'
     monkeypatch.setitem(sys.modules, 'jinja2', None)
-    assert report(results, '-o', page) == 1
+    assert report(results, '-o', page) == 2
     assert "pip install 'ahf_ros[report]'" in capsys.readouterr().err
     assert report(folder / 'no.jsonl', '-o', page) == 1
     said = capsys.readouterr().err

@@ -2,7 +2,8 @@
 
 A program has limits of time and output, and ends with this process, with all that it started. Of
 these, processes with a session of their own are found by their environment in /proc; where there
-is none, as on macOS, or where they clear their environment, they go on.
+is none, as on macOS, or where they clear their environment, they go on. On Windows, what a program
+started is ended with it if it is still there itself.
 """
 
 from __future__ import annotations
@@ -107,7 +108,7 @@ class CommandDetector:
 
     def _words(self, image: str) -> list[str]:
         try:
-            words = shlex.split(self.settings.command)
+            words = words_of(self.settings.command)
         except ValueError as error:
             raise ValueError(f'{self._named} cannot be split into words: {error}') from error
         if not words:
@@ -115,6 +116,23 @@ class CommandDetector:
         if not any('{image}' in word for word in words):
             words.append('{image}')
         return [word.replace('{image}', image) for word in words]
+
+
+def words_of(command: str, escape: str = '' if os.name == 'nt' else '\\') -> list[str]:
+    r"""Return the words of a command, as a shell does; on Windows a backslash is part of a path.
+
+    Examples
+    --------
+    >>> words_of(r'"C:\My tools\find.exe" --fast C:\a', escape='')
+    ['C:\\My tools\\find.exe', '--fast', 'C:\\a']
+    >>> words_of(r'./find\ it a')
+    ['./find it', 'a']
+    """
+    words = shlex.shlex(command, posix=True, punctuation_chars=False)
+    words.whitespace_split = True
+    words.commenters = ''
+    words.escape = escape
+    return list(words)
 
 
 def _check_running(name: str) -> None:
@@ -199,6 +217,9 @@ def _kill(process: subprocess.Popen[Any], mark: str) -> None:
 
     What they start meanwhile is found by another look.
     """
+    if not hasattr(os, 'killpg'):
+        _kill_tree(process)
+        return
     with suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGKILL)
     for _ in range(_LOOKS):
@@ -208,6 +229,16 @@ def _kill(process: subprocess.Popen[Any], mark: str) -> None:
                 os.kill(pid, signal.SIGKILL)
         if not found:
             return
+
+
+def _kill_tree(process: subprocess.Popen[Any]) -> None:
+    """End a process and what it started with the tool that Windows has for it."""
+    if process.poll() is not None:
+        return
+    with suppress(OSError):  # there is no such tool
+        tool = ['taskkill', '/F', '/T', '/PID', str(process.pid)]
+        subprocess.run(tool, capture_output=True)
+    process.kill()
 
 
 def _marked(mark: str) -> Iterator[int]:
