@@ -19,7 +19,7 @@ from ahf_ros.cli.options import (
     add_target_options,
     settings_from,
 )
-from ahf_ros.interchange.units import UNITS
+from ahf_ros.orientation.units import METRES
 from ahf_ros.session_settings import IdentificationSettings
 from ahf_ros.settings.parameter import Parameter
 
@@ -68,7 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         '--unit',
-        choices=tuple(UNITS),
+        choices=tuple(METRES),
         default='',
         help='Unit of these coordinates where the file does not say it.',
     )

@@ -6,11 +6,12 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
+from typing import Any
 
 from ahf_ros.codes.families import families_of
 from ahf_ros.detectors import DETECTOR, detector_name
-from ahf_ros.interchange.units import UNITS
 from ahf_ros.localisation import FULL, NEIGHBOURHOOD, CloudGrid
+from ahf_ros.orientation.units import METRES
 from ahf_ros.session import create_identifier
 from ahf_ros.session_settings import AnyTargetSettings, IdentificationSettings, StackSettings
 from ahf_ros.settings.parameter import check_parameters, parameter
@@ -31,6 +32,17 @@ NUMBER_UNKNOWN = 'unknown (expected_targets is 0, expected_ids is empty)'
 
 _FRAME = re.compile(r'[A-Za-z_][\w.-]*(/[\w.-]+)*', re.ASCII)
 _SERVICE_NAME = re.compile(r'[~/]?/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*', re.ASCII)
+
+
+def unit_parameter() -> Any:
+    """Return the field of a unit of coordinates."""
+    return parameter(
+        '',
+        'Unit of the coordinates, needed where their file does not say it.',
+        choices=('', *METRES),
+        form=f'one of {", ".join(METRES)}, or nothing',
+        read_only=True,
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -303,13 +315,7 @@ class RegistrationNodeSettings:
         'first scan gives the frame.',
         read_only=True,
     )
-    unit: str = parameter(
-        '',
-        'Unit of these coordinates where the file does not say it.',
-        choices=('', *UNITS),
-        form=f'one of {", ".join(UNITS)}, or nothing',
-        read_only=True,
-    )
+    unit: str = unit_parameter()
     minimum_confidence: float = parameter(
         0.9, 'Minimum confidence of targets that are used.', minimum=0.0, maximum=1.0
     )

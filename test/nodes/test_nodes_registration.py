@@ -28,10 +28,10 @@ from ahf_ros.interchange.point_clouds import (
     whole_points,
 )
 from ahf_ros.nodes.cloud_msg import cloud_message
-from ahf_ros.registration.rigid import Transform
+from ahf_ros.orientation.transform import Transform
 from ahf_ros.registration.scan import Scan
 from support.detector import overrides, own, values
-from support.scans import measured, relative, ring, squared_error, station
+from support.scans import measured, ring, squared_error, station
 
 COUNT, COMMON = 6, 5
 SIGMA = 20e-6  # m
@@ -153,7 +153,7 @@ def test_a_chain_is_registered_adjusted_undone_and_saved(node: Registrar, folder
         cloud = organised(stamp)
         node.cloud.publish(cloud)
         found = transform_of(node.send(target_points(stamp, scan(number))))
-        true = relative(station(number, COUNT), station(0, COUNT))
+        true = station(0, COUNT).inverse @ station(number, COUNT)
         assert squared_error(found, true) < 40  # of 6, whose chi-square rarely exceeds 30
         node.graph.until(lambda number=number: len(node.clouds) == number)
         moved, sent = whole_points(node.clouds[-1]), whole_points(cloud)
