@@ -28,7 +28,7 @@ import numpy as np
 
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.testing import special
-from ahf_ros.orientation.transform import Transform, lever, turned_errors
+from ahf_ros.orientation.transform import Transform, lever, turned_errors, twice
 
 FEWEST_STATIONS = 3
 
@@ -219,7 +219,7 @@ class _Model:
                 part = slice(6 * number, 6 * number + 6)
                 gaps[part] = (robot @ mount).step_from(base @ seen)
                 column = mount_column[mount_name]
-                design[part, column : column + 6] = np.kron(np.eye(2), robot.rotation)
+                design[part, column : column + 6] = twice(robot.rotation)
                 ray = base.rotation @ station.seen.translation
                 if self.free_field:
                     column = field_column[field_name]
@@ -316,7 +316,7 @@ class _Model:
             for number, index in enumerate(members):
                 station = self.stations[index]
                 base = self.fields[self._names(station)[1]]
-                turn = np.kron(np.eye(2), (base @ station.seen).rotation)
+                turn = twice((base @ station.seen).rotation)
                 residuals[station.name] = gaps[6 * number : 6 * number + 6] @ turn
         return Mounted(
             mounts=poses(self.mounts, self.mount_names, 0),

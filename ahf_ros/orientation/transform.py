@@ -112,13 +112,21 @@ def lever(places: FloatArray) -> FloatArray:
     """
     result = np.zeros((*places.shape[:-1], 6, 6))
     result[...] = np.eye(6)
-    result[..., :3, 3:] = np.cross(np.eye(3), places[..., None, :]).swapaxes(-1, -2)
+    result[..., [0, 1, 2], [4, 5, 3]] = places[..., [2, 0, 1]]
+    result[..., [0, 1, 2], [5, 3, 4]] = -places[..., [1, 2, 0]]
+    return result
+
+
+def twice(rotation: FloatArray) -> FloatArray:
+    """Return the matrix (6, 6) that turns both a shift and a turn."""
+    result = np.zeros((6, 6))
+    result[:3, :3] = result[3:, 3:] = rotation
     return result
 
 
 def turned_errors(rotation: FloatArray, covariance: FloatArray) -> FloatArray:
     """Return a covariance (6, 6) of shift and turn along the axes of another frame."""
-    turn = np.kron(np.eye(2), rotation)
+    turn = twice(rotation)
     result: FloatArray = turn @ covariance @ turn.T
     return result
 

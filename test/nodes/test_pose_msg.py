@@ -128,6 +128,10 @@ def test_what_is_published_needs_its_packages(monkeypatch: pytest.MonkeyPatch) -
 @pytest.mark.parametrize(
     ('given', 'words'),
     [
+        (
+            {'coordinates': ''},
+            "coordinates is '', accepted is a folder of ahf orient",
+        ),
         ({'targets_frame': '/map'}, "targets_frame is '/map', accepted is a name without spaces"),
         ({'targets_frame': 'a b'}, "targets_frame is 'a b', accepted is a name without spaces"),
         ({'tf': 'map'}, "tf is 'map', accepted is one of none, camera, targets"),
@@ -137,4 +141,4 @@ def test_what_is_published_needs_its_packages(monkeypatch: pytest.MonkeyPatch) -
 )
 def test_settings_name_what_is_accepted(given: dict[str, str], words: str) -> None:
     with pytest.raises(ValueError, match=words):
-        PoseNodeSettings(coordinates='a', **given)
+        PoseNodeSettings(**({'coordinates': 'a'} | given))
