@@ -4,12 +4,24 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from typing import Any
 
-from ahf_ros.interchange.units import UNITS
+from ahf_ros.orientation.units import METRES
 from ahf_ros.settings.parameter import check_parameters, parameter
 from ahf_ros.text import shown
 
 _FRAME = re.compile(r'[A-Za-z_][\w.-]*(/[\w.-]+)*', re.ASCII)
+
+
+def unit_parameter() -> Any:
+    """Return the field of a unit of coordinates."""
+    return parameter(
+        '',
+        'Unit of the coordinates, needed where their file does not say it.',
+        choices=('', *METRES),
+        form=f'one of {", ".join(METRES)}, or nothing',
+        read_only=True,
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,13 +40,7 @@ class RegistrationSettings:
         'first scan gives the frame.',
         read_only=True,
     )
-    unit: str = parameter(
-        '',
-        'Unit of these coordinates where the file does not say it.',
-        choices=('', *UNITS),
-        form=f'one of {", ".join(UNITS)}, or nothing',
-        read_only=True,
-    )
+    unit: str = unit_parameter()
     minimum_confidence: float = parameter(
         0.9, 'Minimum confidence of targets that are used.', minimum=0.0, maximum=1.0
     )

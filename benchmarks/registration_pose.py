@@ -10,8 +10,9 @@ import numpy as np
 from ahf_ros.orientation.camera import project, rotation_matrices
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.points import MeasuredPoints
-from ahf_ros.orientation.pose import Pose, Transform, cross_matrix
+from ahf_ros.orientation.pose import Pose
 from ahf_ros.orientation.single_image import resect
+from ahf_ros.orientation.transform import Transform
 from ahf_ros.target import Target
 
 SIZE = 2464, 2056
@@ -85,7 +86,7 @@ def view(
         Target(number + 1, 0, x, y, 8.0, 8.0, covariance=tuple(covariances[number].ravel()))
         for number, (x, y) in enumerate(seen.tolist())
     )
-    true = Transform(turn @ rotation.T, turn @ position + shift, np.zeros((6, 6)))
+    true = Transform(turn @ rotation.T, turn @ position + shift)
     return View(targets, points, true)
 
 
@@ -107,11 +108,9 @@ def error(found: Transform, true: Transform) -> FloatArray:
     many standard deviations.
     """
     turned = true.rotation @ found.rotation.T
-    sines = np.array([turned[2, 1], turned[0, 2], turned[1, 0]]) - turned[[1, 2, 0], [2, 0, 1]]
-    sine, cosine = np.linalg.norm(sines) / 2, (np.trace(turned) - 1) / 2
-    angle = float(np.arctan2(sine, cosine))
-    turn = sines / 2 / np.sinc(angle / np.pi)
-    cross = cross_matrix(turn)
+    turn = Transform(turned).turn
+    angle = float(np.linalg.norm(turn))
+    cross = np.cross(np.eye(3), turn)
     along = np.eye(3) + (0.5 - angle**2 / 24) * cross + (1 / 6 - angle**2 / 120) * cross @ cross
     shift = np.linalg.solve(along, true.translation - turned @ found.translation)
     return np.concatenate((shift + np.cross(turn, found.translation), turn))

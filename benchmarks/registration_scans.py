@@ -14,11 +14,11 @@ import numpy as np
 from ahf_ros.interchange.point_clouds import AXES
 from ahf_ros.localisation import positions
 from ahf_ros.orientation.network import FloatArray
-from ahf_ros.registration.rigid import Transform
+from ahf_ros.orientation.transform import Transform
 from ahf_ros.registration.scan import Scan
 from ahf_ros.registration.session import Registration
 from ahf_ros.target import Target
-from support.scans import inverse, measured, relative, ring, squared_error, station
+from support.scans import measured, ring, squared_error, station
 
 COUNT = 20
 """Number of scans around the object."""
@@ -62,7 +62,7 @@ def clouds(
     places, covariances = [], []
     for point in points:
         normal = pose.rotation.T @ (point * (1, 1, 0))
-        place, covariance = _in_cloud(inverse(pose, point), normal, random)
+        place, covariance = _in_cloud(pose.inverse.moved(point), normal, random)
         places.append(place)
         covariances.append(covariance)
     return Scan(tuple(names), np.array(places), np.array(covariances))
@@ -94,7 +94,7 @@ def run(measure: Measure, seed: int, runs: int) -> Figures:
     """Return the figures of chains that are adjusted after they close."""
     figures = Figures()
     poses = [station(number, COUNT) for number in range(COUNT)]
-    true = [relative(it, poses[0]) for it in poses]
+    true = [poses[0].inverse @ it for it in poses]
     for number in range(runs):
         random = np.random.default_rng([seed, number])
         groups = ring(COUNT, COMMON, random)

@@ -8,7 +8,7 @@ import numpy as np
 
 from ahf_ros.orientation.camera import rotation_matrices
 from ahf_ros.orientation.network import FloatArray
-from ahf_ros.registration.rigid import Transform
+from ahf_ros.orientation.transform import Transform
 from ahf_ros.registration.scan import Scan
 
 RADIUS = 0.5
@@ -36,16 +36,6 @@ def station(number: int, count: int) -> Transform:
     return Transform(rotation, (RADIUS + DISTANCE) * outward)
 
 
-def inverse(transform: Transform, points: FloatArray) -> FloatArray:
-    """Return points (..., 3) in the frame of a scanner."""
-    return (points - transform.translation) @ transform.rotation
-
-
-def relative(transform: Transform, first: Transform) -> Transform:
-    """Return a pose in the frame of the first one."""
-    return Transform(first.rotation.T @ transform.rotation, inverse(first, transform.translation))
-
-
 def covariances(count: int, sigma: float, random: np.random.Generator) -> FloatArray:
     """Return covariances (n, 3, 3) with axes of 0.5 to 2 sigma in all directions, m^2."""
     turns = rotation_matrices(random.normal(size=(count, 3)))
@@ -63,14 +53,10 @@ def measured(
     """Return what a scanner measures of points (n, 3) of the object."""
     spread = covariances(len(points), sigma, random)
     errors = np.linalg.cholesky(spread) @ random.normal(size=(len(points), 3, 1))
-    return Scan(tuple(names), inverse(transform, points) + errors[:, :, 0], spread)
+    return Scan(tuple(names), transform.inverse.moved(points) + errors[:, :, 0], spread)
 
 
 def squared_error(found: Transform, true: Transform) -> float:
     """Return the squared error of a transform over its covariance: 6 on average."""
-    turn = true.rotation @ found.rotation.T
-    angles = 0.5 * np.array(
-        [turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]
-    )
-    error = np.concatenate((true.translation - found.translation, angles))
+    error = found.step_from(true)
     return float(error @ np.linalg.solve(found.covariance, error))

@@ -12,6 +12,7 @@ from ahf_ros.settings.parameter import Parameter
 if TYPE_CHECKING:
     from ahf_ros.orientation.mounting import Mounted
     from ahf_ros.orientation.solution import Solution
+    from ahf_ros.orientation.transform import Transform
 
 _OPTICAL = '_optical_frame'
 _FIELD = 'targets'
@@ -109,11 +110,9 @@ def _on_robot(solution: Solution, options: argparse.Namespace) -> dict[str, Any]
         return frame_name(camera) + _OPTICAL if camera else _FIELD
 
     parts = [
-        (hand, name(camera), pose, result.mount_covariances[camera])
-        for camera, pose in result.mounts.items()
-    ] + [
-        (base, name(camera), pose, result.field_covariances[camera])
-        for camera, pose in result.fields.items()
+        (parent, name(camera), pose)
+        for parent, poses in ((hand, result.mounts), (base, result.fields))
+        for camera, pose in poses.items()
     ]
     return _record(result, parts, notes)
 
@@ -124,19 +123,14 @@ def _on_rig(solution: Solution, options: argparse.Namespace) -> dict[str, Any]:
 
     reference, result, notes = mounted_on_rig(solution, read_stations(options.stations))
     parts = [
-        (
-            frame_name(reference) + _OPTICAL,
-            frame_name(camera) + _OPTICAL,
-            pose,
-            result.mount_covariances[camera],
-        )
+        (frame_name(reference) + _OPTICAL, frame_name(camera) + _OPTICAL, pose)
         for camera, pose in result.mounts.items()
     ]
     return _record(result, parts, notes)
 
 
 def _record(
-    result: Mounted, parts: list[tuple[str, str, Any, Any]], notes: tuple[str, ...]
+    result: Mounted, parts: list[tuple[str, str, Transform]], notes: tuple[str, ...]
 ) -> dict[str, Any]:
     from ahf_ros.interchange.robot_files import transform_record
 

@@ -13,9 +13,9 @@ from ahf_ros.interchange.files import read_text
 from ahf_ros.interchange.network_results import read_network
 from ahf_ros.interchange.tables import Row, read_table
 from ahf_ros.interchange.target_json import parsed_json
-from ahf_ros.interchange.units import UNITS
 from ahf_ros.orientation.network import ControlPoint
 from ahf_ros.orientation.points import MeasuredPoints
+from ahf_ros.orientation.units import METRES
 from ahf_ros.text import shown
 
 _COLUMNS = ('id', 'x', 'y', 'z')
@@ -45,8 +45,8 @@ def read_coordinates(path: str | Path, unit: str = '') -> MeasuredPoints:
 
 
 def in_metres(points: MeasuredPoints, unit: str) -> MeasuredPoints:
-    """Return points that are in one of `UNITS` in metres."""
-    factor = UNITS[unit]
+    """Return points that are in one of `METRES` in metres."""
+    factor = METRES[unit]
     return replace(
         points, xyz=factor * points.xyz, covariance=factor**2 * points.covariance, unit='m'
     )
@@ -54,10 +54,10 @@ def in_metres(points: MeasuredPoints, unit: str) -> MeasuredPoints:
 
 def _chosen(said: str, unit: str, file: Path) -> str:
     """Return the unit that a file says or is given."""
-    names = ', '.join(UNITS)
+    names = ', '.join(METRES)
     if said and unit and said != unit:
         raise ValueError(f'unit is {unit!r}, accepted is that of {file}, {said!r}')
-    if (chosen := said or unit) not in UNITS:
+    if (chosen := said or unit) not in METRES:
         where = f'unit of {file} is {shown(said)}' if said else f"unit is '' and {file} has none"
         raise ValueError(f'{where}, accepted is one of {names}')
     return chosen

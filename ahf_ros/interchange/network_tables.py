@@ -9,8 +9,8 @@ import numpy as np
 from ahf_ros.interchange.camera_files import opencv_yaml, ros_yaml
 from ahf_ros.interchange.files import csv_table
 from ahf_ros.orientation.deviations import bar_deviations, control_deviations
-from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.solution import Solution
+from ahf_ros.orientation.transform import Transform
 
 Table = list[Sequence[object]]
 
@@ -43,25 +43,6 @@ def tables(solution: Solution) -> dict[str, bytes]:
     return {name: csv_table(rows) for name, rows in found.items()}
 
 
-def quaternion(rotation: FloatArray) -> FloatArray:
-    """Return the unit quaternion x, y, z, w of a rotation matrix, w not negative.
-
-    It is the eigenvector of the largest eigenvalue of a symmetric matrix (Bar-Itzhack 2000), which
-    is well conditioned for every rotation.
-    """
-    r = rotation
-    matrix = np.array(
-        [
-            [r[0, 0] - r[1, 1] - r[2, 2], 0, 0, 0],
-            [r[1, 0] + r[0, 1], r[1, 1] - r[0, 0] - r[2, 2], 0, 0],
-            [r[2, 0] + r[0, 2], r[2, 1] + r[1, 2], r[2, 2] - r[0, 0] - r[1, 1], 0],
-            [r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1], np.trace(r)],
-        ]
-    )
-    vector: FloatArray = np.linalg.eigh(matrix)[1][:, -1]  # of the lower triangle
-    return vector if vector[3] >= 0 else -vector
-
-
 def _poses(solution: Solution) -> Table:
     """Return poses as ROS has them: the camera's frame in the world, optical axes, x y z w."""
     network, values = solution.network, solution.start
@@ -69,7 +50,7 @@ def _poses(solution: Solution) -> Table:
     rows: Table = [['image', 'camera', 'x', 'y', 'z', 'qx', 'qy', 'qz', 'qw', *sigmas]]
     for index in np.flatnonzero(solution.oriented):
         variances = np.diag(solution.pose_covariances[index])
-        numbers = [*values.positions[index], *quaternion(values.rotations[index].T)]
+        numbers = [*values.positions[index], *Transform(values.rotations[index].T).quaternion]
         numbers += list(np.sqrt(np.maximum(variances, 0)))
         camera = network.cameras[network.camera_of[index]].name
         rows.append([network.photographs[index], camera, *(f'{it:.10g}' for it in numbers)])

@@ -14,8 +14,8 @@ from ahf_ros.interchange.cloud_files import write_pcd, write_ply
 from ahf_ros.interchange.files import csv_table, write_whole
 from ahf_ros.interchange.point_clouds import AXES
 from ahf_ros.orientation.network import FloatArray
+from ahf_ros.orientation.transform import Transform
 from ahf_ros.registration.field import Field, RegisteredScan
-from ahf_ros.registration.rigid import Transform
 
 TRANSFORMS_JSON, TRANSFORMS_CSV, TARGETS_CSV = 'transforms.json', 'transforms.csv', 'targets.csv'
 

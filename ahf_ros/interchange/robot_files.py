@@ -7,14 +7,13 @@ import re
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 
 from ahf_ros.interchange.files import write_whole
-from ahf_ros.interchange.network_tables import quaternion
 from ahf_ros.interchange.tables import Row, one_of, read_table
-from ahf_ros.orientation.mounting import Rigid
+from ahf_ros.orientation.camera import rotation_matrices
 from ahf_ros.orientation.network import FloatArray
+from ahf_ros.orientation.transform import Transform, rotation_vector
 
 MOUNTING_FILE = 'mounting.json'
 LAUNCH_FILE = 'static_transforms.launch.yaml'
@@ -25,7 +24,7 @@ _UNIT = 1e-3  # deviation from 1 of the length of a rounded quaternion
 _LARGEST_VECTOR = 2 * np.pi
 
 
-def read_robot_poses(path: str | Path) -> dict[str, Rigid]:
+def read_robot_poses(path: str | Path) -> dict[str, Transform]:
     """Return the pose of the hand in the frame of the base at each image.
 
     The table has image, x, y, z and a quaternion qx, qy, qz, qw or a rotation vector rx, ry, rz in
@@ -36,13 +35,14 @@ def read_robot_poses(path: str | Path) -> dict[str, Rigid]:
         raise ValueError(
             f'{path} has no rotations, accepted are qx, qy, qz, qw, or rx, ry, rz in rad'
         )
-    turned = _by_quaternion if 'qx' in columns else _by_vector
-    poses: dict[str, Rigid] = {}
+    turn = _by_quaternion if 'qx' in columns else _by_vector
+    poses: dict[str, Transform] = {}
     for row in rows:
         name = row.text('image')
         if name in poses:
             raise ValueError(f'{row.where}: {name} is there twice, accepted is one row an image')
-        poses[name] = Rigid(turned(row), np.array([row.number(axis) for axis in 'xyz']))
+        rotation = rotation_matrices(turn(row)[None])[0]
+        poses[name] = Transform(rotation, np.array([row.number(axis) for axis in 'xyz']))
     return poses
 
 
@@ -51,10 +51,7 @@ def _by_quaternion(row: Row) -> FloatArray:
     length = float(np.linalg.norm(values))
     if abs(length - 1) > _UNIT:
         raise ValueError(f'{row.where}: the quaternion has the length {length:.6g}, accepted is 1')
-    x, y, z, w = values / length
-    angle = 2 * np.arctan2(np.linalg.norm([x, y, z]), w)
-    axis = np.array([x, y, z]) / max(float(np.linalg.norm([x, y, z])), np.finfo(float).tiny)
-    return np.asarray(cv2.Rodrigues(angle * axis)[0], float)
+    return rotation_vector(values / length)
 
 
 def _by_vector(row: Row) -> FloatArray:
@@ -64,7 +61,7 @@ def _by_vector(row: Row) -> FloatArray:
             f'{row.where}: the rotation vector has the length {np.linalg.norm(vector):.4g}, '
             'accepted is one in rad, up to 2 pi'
         )
-    return np.asarray(cv2.Rodrigues(vector)[0], float)
+    return vector
 
 
 def read_stations(path: str | Path) -> dict[str, str]:
@@ -84,16 +81,14 @@ def frame_name(text: str) -> str:
     return name if name[:1].isalpha() else f'camera_{name}'.strip('_')
 
 
-def transform_record(
-    parent: str, child: str, pose: Rigid, covariance: FloatArray
-) -> dict[str, Any]:
+def transform_record(parent: str, child: str, pose: Transform) -> dict[str, Any]:
     """Return a static transform as an entry of mounting.json, in metres."""
     return {
         'parent': parent,
         'child': child,
         'translation': pose.translation.tolist(),
-        'rotation': quaternion(pose.rotation).tolist(),
-        'covariance': covariance.tolist(),
+        'rotation': pose.quaternion.tolist(),
+        'covariance': pose.covariance.tolist(),
     }
 
 

@@ -9,12 +9,11 @@ from concurrent.futures import CancelledError
 from functools import partial
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.lifecycle.node import LifecycleNodeMixin
 from rclpy.qos import QoSProfile
-from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
 from ahf_ros import ending
@@ -27,6 +26,7 @@ from ahf_ros.nodes.pipeline import STOPPING, Pipeline
 from ahf_ros.nodes.process import ProcessNode, run
 from ahf_ros.nodes.service_detector import ServiceDetector
 from ahf_ros.nodes.settings import LOSSLESS, SERVICE, DetectorNodeSettings
+from ahf_ros.nodes.status import PERIOD, publish_status
 from ahf_ros.nodes.topics import (
     CODED_TARGETS,
     IMAGE_TYPES,
@@ -43,9 +43,6 @@ from ahf_ros.text import printable
 
 ACTIVE = 'active'
 """State of a node that works."""
-
-DIAGNOSTICS_PERIOD = 1.0
-"""Period of /diagnostics, s."""
 
 REQUESTS_KEPT = 1000
 """Requests to a service that may wait. The middleware drops more without an answer."""
@@ -67,15 +64,12 @@ class DetectorNode(ProcessNode, LifecycleNodeMixin):
         self._stopping = threading.Event()
         self._worker = Worker()
         self._tally = Tally()
-        name = self.get_fully_qualified_name().lstrip('/')
-        self._diagnostics = Diagnostics(f'{name}: identification', self._tally)
-
+        self._diagnostics = Diagnostics(self._tally)
         self._watch = Watch(self, self._tally)
         declare_topics(self)
         self._answers = Answers(self, self._tally)
         self._queue = ImageQueue(self, self._worker, self._answers, self._tally)
-        self._diagnostic_array = self.publisher(DiagnosticArray, '/diagnostics', 10)
-        self.every(DIAGNOSTICS_PERIOD, self._publish_diagnostics)
+        publish_status(self, 'identification', self._status)
         self._images: Input | None = None
         self._subscribed = ('', '')
         self._service: ServiceDetector | None = None
@@ -266,16 +260,13 @@ class DetectorNode(ProcessNode, LifecycleNodeMixin):
     def _reset(self, request: Trigger.Request, response: Trigger.Response) -> None:
         self._worker.call(self._queue.pipeline.stream.reset)
 
-    def _publish_diagnostics(self) -> None:
-        # Before the counts, so that these are no older than the stamp.
-        header = Header(stamp=self.get_clock().now().to_msg())
+    def _status(self) -> DiagnosticStatus:
         state = self.state
         self._tally.inactive = '' if state == ACTIVE else state
         if self._images and state == ACTIVE:
             timeout = self._settings.current.image_timeout
             self._watch.look(self._images, timeout, self._answers.waiting())
-        status = self._diagnostics.status(DIAGNOSTICS_PERIOD)
-        self._diagnostic_array.publish(DiagnosticArray(header=header, status=[status]))
+        return self._diagnostics.status(PERIOD)
 
 
 def main(arguments: list[str] | None = None) -> int:

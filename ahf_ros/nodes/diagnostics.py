@@ -5,11 +5,12 @@ from __future__ import annotations
 from copy import copy
 from dataclasses import dataclass, field, replace
 
-from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticStatus
 from std_msgs.msg import Header
 
 from ahf_ros.edge_shift import edge_shift_remark
 from ahf_ros.interchange.image_messages import nanoseconds
+from ahf_ros.nodes.status import status_of
 from ahf_ros.target import Identification
 from ahf_ros.text import printable
 
@@ -18,6 +19,22 @@ BEHIND = 10
 
 LOSS_REMEDY = 'more depth of the publisher, or config/fastdds_shm.xml on both sides, may help'
 """What to do about images that get lost, in words."""
+
+
+@dataclass(slots=True)
+class Stamps:
+    """Stamps of images since the start."""
+
+    backwards: int = 0  # whose stamp is earlier than the stamp before
+    stamp: int = 0  # of the last image, ns
+
+    def compare_stamps(self, header: Header) -> str:
+        """Count stamps that go backwards, as when a replay starts over; return what to report."""
+        before, self.stamp = self.stamp, nanoseconds(header)
+        if self.stamp >= before:
+            return ''
+        self.backwards += 1
+        return f'stamp is {seconds(self.stamp)}, that of the image before is {seconds(before)}'
 
 
 @dataclass(slots=True)
@@ -48,7 +65,7 @@ class CloudTally:
 
 
 @dataclass(slots=True)
-class Tally:
+class Tally(Stamps):
     """Counts of images since the start, and what is to be said about them; empty if nothing is."""
 
     received: int = 0
@@ -58,8 +75,6 @@ class Tally:
     reason: str = ''  # why the last rejected image was rejected
     damaged: int = 0  # not whole, and identified as far as they go
     damage: str = ''  # of the last of these
-    backwards: int = 0  # whose stamp is earlier than the stamp before
-    stamp: int = 0  # of the last image, ns
     kind: str = ''  # size and encoding of the last image
     changes: int = 0  # of size or encoding
     change: str = ''  # the last of them
@@ -99,14 +114,6 @@ class Tally:
             'camera to fewer images'
         )
 
-    def compare_stamps(self, header: Header) -> str:
-        """Count stamps that go backwards, as when a replay starts over; return what to report."""
-        before, self.stamp = self.stamp, nanoseconds(header)
-        if self.stamp >= before:
-            return ''
-        self.backwards += 1
-        return f'stamp is {seconds(self.stamp)}, that of the image before is {seconds(before)}'
-
     def compare_kinds(self, kind: str) -> str:
         """Count changes of size or encoding; return what to report."""
         before, self.kind = self.kind, kind
@@ -120,8 +127,7 @@ class Tally:
 class Diagnostics:
     """Turns a tally into one status per period, with the rate and the level of the period."""
 
-    def __init__(self, name: str, tally: Tally) -> None:
-        self._name = name
+    def __init__(self, tally: Tally) -> None:
         self._tally = tally
         self._before = replace(tally)
 
@@ -130,8 +136,9 @@ class Diagnostics:
         tally = replace(self._tally)
         before, self._before = self._before, replace(tally, clouds=copy(tally.clouds))
         answered = tally.answered - before.answered
-        warning = '' if tally.inactive else _warning(tally, before)
-        inactive = f'the node is {tally.inactive}' if tally.inactive else ''
+        reports, message = _reports(tally, before), f'{answered} images identified'
+        if tally.inactive:
+            reports, message = (), f'the node is {tally.inactive}'
         unknown = f', not counted: {tally.lost_unknown}' if tally.lost_unknown else ''
         used, shift = tally.last.filter, tally.last.edge_shift
         values = {
@@ -161,16 +168,11 @@ class Diagnostics:
         }
         if tally.clouds:
             values |= tally.clouds.values()
-        return DiagnosticStatus(
-            level=DiagnosticStatus.WARN if warning else DiagnosticStatus.OK,
-            name=self._name,
-            message=inactive or warning or f'{answered} images identified',
-            values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
-        )
+        return status_of(reports, message, values)
 
 
-def _warning(tally: Tally, before: Tally) -> str:
-    """Return everything that is wrong since the last status; empty if nothing is."""
+def _reports(tally: Tally, before: Tally) -> tuple[object, ...]:
+    """Return everything that is wrong since the last status, and empty texts and zeros."""
     clouds, clouds_before = tally.clouds or CloudTally(), before.clouds or CloudTally()
     rejected = tally.rejected - before.rejected
     rejected_clouds = clouds.rejected - clouds_before.rejected
@@ -178,7 +180,7 @@ def _warning(tally: Tally, before: Tally) -> str:
     incomplete, split = tally.incomplete - before.incomplete, tally.split - before.split
     changes, lost = tally.changes - before.changes, tally.lost - before.lost
     damaged = tally.damaged - before.damaged
-    reports = (
+    return (
         tally.mistaken,
         rejected and f'{rejected} images rejected: {tally.reason}',
         damaged and f'{damaged} images damaged, the last: {tally.damage}',
@@ -197,7 +199,6 @@ def _warning(tally: Tally, before: Tally) -> str:
         tally.advice,
         tally.uncalibrated,
     )
-    return '; '.join(text for text in reports if text)
 
 
 def seconds(stamp: int) -> str:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import time
 from contextlib import suppress
+from functools import partial
 from importlib import import_module
 from typing import Any
 
 import numpy as np
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import NodeNameNonExistentError
@@ -31,10 +32,11 @@ from ahf_ros.nodes.pose_msg import (
 )
 from ahf_ros.nodes.pose_settings import CAMERA, NONE, PoseNodeSettings
 from ahf_ros.nodes.process import LOG_PERIOD, ProcessNode, run
-from ahf_ros.nodes.tf_parents import Parents
+from ahf_ros.nodes.status import PERIOD, publish_status
+from ahf_ros.nodes.tf import Frames
 from ahf_ros.nodes.topics import ANSWERS_KEPT, DETECTIONS
 from ahf_ros.nodes.undistortion import Calibrations
-from ahf_ros.nodes.watch import other_types, silence
+from ahf_ros.nodes.watch import other_types, silence, topics_of_others
 from ahf_ros.orientation.points import blocks
 from ahf_ros.orientation.pose import Pose
 from ahf_ros.orientation.single_image import (
@@ -48,12 +50,6 @@ from ahf_ros.text import listed, printable
 
 POSE = '~/pose'
 """Topic of the pose of the camera in the frame of the targets."""
-
-PERIOD = 1.0
-"""Period of /diagnostics, s."""
-
-TF_KEPT = 100
-"""Depth of tf, as tf2_ros has it."""
 
 _IMAGES = ('sensor_msgs/msg/Image', 'sensor_msgs/msg/CompressedImage')
 
@@ -69,10 +65,8 @@ class PoseNode(ProcessNode):
         self._rows = {name: row for row, name in enumerate(self._points.names)}
         self._own_covariances = blocks(self._points.covariance)
         self._tally = PoseTally()
-        name = self.get_fully_qualified_name().lstrip('/')
-        self._diagnostics = PoseDiagnostics(f'{name}: pose', self._tally)
+        self._diagnostics = PoseDiagnostics(self._tally)
         self._calibrations = Calibrations()
-        self._parents = Parents()
         self._images_of_detector: tuple[str, ...] = ()
         self._poses = self.publisher(PoseWithCovarianceStamped, POSE, ANSWERS_KEPT)
         self._detections: tuple[Any, Any] | None = None
@@ -80,11 +74,9 @@ class PoseNode(ProcessNode):
             kinds: Any = import_module('vision_msgs.msg')
             publisher = self.publisher(kinds.Detection3DArray, DETECTIONS, ANSWERS_KEPT)
             self._detections = kinds, publisher
-        self._tf: tuple[Any, Any] | None = None
-        if settings.tf != NONE or settings.target_frames:
-            self._open_tf()
-        self._diagnostic_array = self.publisher(DiagnosticArray, '/diagnostics', 10)
-        self.every(PERIOD, self._publish_diagnostics)
+        wanted = settings.tf != NONE or settings.target_frames
+        self._frames = Frames(self) if wanted else None
+        publish_status(self, 'pose', self._status)
         self._informed = False
         self._camera_info = self.subscribe(
             CameraInfo, 'camera_info', self._on_camera_info, MutuallyExclusiveCallbackGroup()
@@ -108,18 +100,6 @@ class PoseNode(ProcessNode):
             f'frame {settings.targets_frame}, tf {settings.tf}, {", ".join(topics)}'
         )
 
-    def _open_tf(self) -> None:
-        """Publish tf, and follow what others publish."""
-        kinds: Any = import_module('tf2_msgs.msg')
-        self._tf = kinds, self.publisher(kinds.TFMessage, '/tf', TF_KEPT)
-        group = MutuallyExclusiveCallbackGroup()
-        for topic in ('/tf', '/tf_static'):
-            self.subscribe(kinds.TFMessage, topic, self._on_tf, group, lossless=True)
-
-    def _on_tf(self, message: Any) -> None:
-        for it in message.transforms:
-            self._parents.add(it.header.frame_id, it.child_frame_id)
-
     def _on_camera_info(self, message: CameraInfo) -> None:
         self._informed = True
         self._calibrations.put(message)
@@ -128,7 +108,7 @@ class PoseNode(ProcessNode):
         begin = time.monotonic()
         tally, settings = self._tally, self._settings.current
         tally.received += 1
-        if text := tally.compare_stamps(nanoseconds(message.header)):
+        if text := tally.compare_stamps(message.header):
             self.get_logger().warning(text, throttle_duration_sec=LOG_PERIOD)
         try:
             camera = self._camera(message, settings)
@@ -219,8 +199,8 @@ class PoseNode(ProcessNode):
         if self._detections:
             kinds, publisher = self._detections
             publisher.publish(detections_message(posed, header, kinds))
-        if self._tf:
-            transforms, self._tally.no_tf = [], ''
+        if self._frames:
+            transforms = []
             if settings.tf == CAMERA:
                 to_camera = pose.camera.inverse
                 transforms.append(transform_message(to_camera, header, settings.targets_frame))
@@ -228,7 +208,8 @@ class PoseNode(ProcessNode):
                 transforms.append(transform_message(pose.camera, of_targets, header.frame_id))
             if settings.target_frames:
                 transforms += [transform_message(it.transform, header, it.frame) for it in posed]
-            self._publish_tf(transforms)
+            self._frames.publish(transforms)
+            self._tally.no_tf = self._frames.problem
 
     def _posed(self, pose: Pose, name: str, target: Target) -> PosedTarget:
         row = self._rows[name]
@@ -236,22 +217,6 @@ class PoseNode(ProcessNode):
             pose.camera, self._points.xyz[row], self._own_covariances[row]
         )
         return PosedTarget(target.family, target.id, target.confidence, transform)
-
-    def _publish_tf(self, transforms: list[Any]) -> None:
-        """Publish transforms, but for those whose frames would get two parents or a loop."""
-        assert self._tf
-        accepted = []
-        for it in transforms:
-            if text := self._parents.refusal(it.header.frame_id, it.child_frame_id):
-                self._tally.no_tf = text
-                logger = self.get_logger()
-                logger.warning(f'no tf: {text}', throttle_duration_sec=LOG_PERIOD)
-            else:
-                self._parents.add(it.header.frame_id, it.child_frame_id)
-                accepted.append(it)
-        if accepted:
-            kinds, publisher = self._tf
-            publisher.publish(kinds.TFMessage(transforms=accepted))
 
     def _mistaken_matrix(self, camera: Calibration, rectified: bool) -> str:
         """Return a message if images seem to follow the other matrix of camera_info."""
@@ -281,7 +246,7 @@ class PoseNode(ProcessNode):
 
     def _look(self) -> None:
         """Bring what depends on publishers and on time up to date."""
-        tally, source = self._tally, self._targets
+        tally, source, topics = self._tally, self._targets, partial(topics_of_others, self)
         publishers = source.publishers()
         tally.mistaken = other_types(source, publishers)
         tally.lost += source.losses.newly_lost()
@@ -289,44 +254,32 @@ class PoseNode(ProcessNode):
         timeout = self._settings.current.targets_timeout
         tally.silent = ''
         if timeout and silent > timeout:
-            why = silence(source, publishers, self._published)
+            why = silence(source, publishers, topics)
             tally.silent = f'no coded_targets for {silent:.0f} s: {why}'
         tally.uncalibrated = ''
         if tally.received and not self._informed:
             source = self._camera_info
-            why = silence(source, source.publishers(), self._published)
+            why = silence(source, source.publishers(), topics)
             tally.uncalibrated = f'no camera_info: {why}'
         read = set()
         for it in publishers:
             with suppress(NodeNameNonExistentError):  # it has ended meanwhile
-                topics = self.get_subscriber_names_and_types_by_node(
+                heard = self.get_subscriber_names_and_types_by_node(
                     it.node_name, it.node_namespace
                 )
-                read |= {topic for topic, kinds in topics if kinds[0] in _IMAGES}
+                read |= {topic for topic, kinds in heard if kinds[0] in _IMAGES}
         self._images_of_detector = tuple(sorted(read))
 
-    def _published(self) -> dict[str, list[str]]:
-        """Return the types of the topics that others publish."""
-        own = self.get_fully_qualified_name()
-        return {
-            name: kinds
-            for name, kinds in self.get_topic_names_and_types()
-            if not name.startswith(f'{own}/') and self.count_publishers(name)
-        }
-
-    def _publish_diagnostics(self) -> None:
-        header = Header(stamp=self.get_clock().now().to_msg())
+    def _status(self) -> DiagnosticStatus:
         self._look()
-        status = self._diagnostics.status(PERIOD)
-        self._diagnostic_array.publish(DiagnosticArray(header=header, status=[status]))
+        return self._diagnostics.status(PERIOD)
 
 
 def _turn(pose: Pose) -> float:
     """Return the angle between a pose and its second one, deg."""
     if pose.second is None:
         return 0.0
-    cosine = (np.sum(pose.camera.rotation * pose.second.rotation) - 1) / 2
-    return float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
+    return float(np.degrees(np.linalg.norm(pose.second.step_from(pose.camera)[3:])))
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticStatus
 
-from ahf_ros.nodes.diagnostics import LOSS_REMEDY
+from ahf_ros.nodes.diagnostics import LOSS_REMEDY, Stamps
+from ahf_ros.nodes.status import status_of
 
 
 @dataclass(slots=True)
-class PoseTally:
+class PoseTally(Stamps):
     """Counts of images since the start, and what is to be said; texts are empty if nothing is."""
 
     received: int = 0
@@ -18,8 +19,6 @@ class PoseTally:
     refused: int = 0  # without a pose
     reason: str = ''  # of the last of them
     ambiguous: int = 0  # with a second pose that fits about as well
-    backwards: int = 0  # whose stamp is earlier than the one before
-    stamp: int = 0  # of the last image, ns
     lost: int = 0  # in transport
     wrong: int = 0  # images with targets that do not agree
     rejected: str = ''  # names of the last of them, and why
@@ -33,14 +32,6 @@ class PoseTally:
     mistaken: str = ''  # message about other types on the topic
     silent: str = ''  # message about targets that do not arrive
 
-    def compare_stamps(self, stamp: int) -> str:
-        """Count stamps that go backwards, as when a replay starts over; return what to report."""
-        before, self.stamp = self.stamp, stamp
-        if stamp >= before:
-            return ''
-        self.backwards += 1
-        return f'stamp is {stamp / 1e9:.9f} s, that of the image before is {before / 1e9:.9f} s'
-
 
 MISFIT = 3.0
 """sigma0 from which on wrong weights alone do not explain residuals."""
@@ -49,8 +40,7 @@ MISFIT = 3.0
 class PoseDiagnostics:
     """Turns a tally into one status per period, with the rate and the level of the period."""
 
-    def __init__(self, name: str, tally: PoseTally) -> None:
-        self._name = name
+    def __init__(self, tally: PoseTally) -> None:
         self._tally = tally
         self._before = replace(tally)
 
@@ -59,7 +49,6 @@ class PoseDiagnostics:
         tally, before = replace(self._tally), self._before
         self._before = tally
         published = tally.published - before.published
-        warning = _warning(tally, before)
         values = {
             'rate (Hz)': f'{published / period:.2f}',
             'latency (s)': f'{tally.latency:.4f}',
@@ -76,27 +65,22 @@ class PoseDiagnostics:
             'targets used': tally.used,
             'sigma0': f'{tally.sigma0:.2f}',
         }
-        return DiagnosticStatus(
-            level=DiagnosticStatus.WARN if warning else DiagnosticStatus.OK,
-            name=self._name,
-            message=warning or f'{published} poses',
-            values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
-        )
+        return status_of(_reports(tally, before), f'{published} poses', values)
 
 
-def _warning(tally: PoseTally, before: PoseTally) -> str:
-    """Return everything that is wrong since the last status; empty if nothing is."""
+def _reports(tally: PoseTally, before: PoseTally) -> tuple[object, ...]:
+    """Return everything that is wrong since the last status, and empty texts and zeros."""
     refused = tally.refused - before.refused
     ambiguous = tally.ambiguous - before.ambiguous
     backwards, wrong = tally.backwards - before.backwards, tally.wrong - before.wrong
     lost = tally.lost - before.lost
     misfit = tally.published > before.published and tally.sigma0 > MISFIT
-    reports = (
+    return (
         tally.mistaken,
         not tally.mistaken and tally.silent,
         tally.uncalibrated,
         refused and f'{refused} images without a pose: {tally.reason}',
-        tally.no_tf and f'no tf: {tally.no_tf}',
+        tally.no_tf,
         ambiguous and f'{ambiguous} images with a second pose that fits about as well',
         wrong and f'targets left out in {wrong} images, in the last: {tally.rejected}',
         misfit
@@ -106,4 +90,3 @@ def _warning(tally: PoseTally, before: PoseTally) -> str:
         backwards and f'{backwards} stamps went backwards',
         lost and f'{lost} messages were lost in transport; {LOSS_REMEDY}',
     )
-    return '; '.join(text for text in reports if text)

@@ -19,7 +19,7 @@ from geometry_msgs.msg import (
 from geometry_msgs.msg import Transform as TransformMessage
 from std_msgs.msg import Header
 
-from ahf_ros.orientation.pose import Transform, cross_matrix
+from ahf_ros.orientation.transform import Transform
 
 
 class PosedTarget(NamedTuple):
@@ -42,13 +42,9 @@ def target_transform(camera: Transform, xyz: np.ndarray, covariance: np.ndarray)
     `camera` leads from the frame of the camera to that of the field. The covariance holds the
     errors of the pose and those of the coordinates (3, 3), as if they were independent.
     """
-    to_camera = camera.inverse
-    place = to_camera.rotation @ xyz
-    by_error = np.eye(6)
-    by_error[:3, 3:] = -cross_matrix(place)
-    whole = by_error @ to_camera.covariance @ by_error.T
-    whole[:3, :3] += to_camera.rotation @ covariance @ to_camera.rotation.T
-    return Transform(to_camera.rotation, place + to_camera.translation, whole)
+    whole = np.zeros((6, 6))
+    whole[:3, :3] = covariance
+    return camera.inverse @ Transform(translation=xyz, covariance=whole)
 
 
 def pose_with_covariance(of: Transform) -> PoseWithCovariance:

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from importlib.util import find_spec
 
-from ahf_ros.interchange.units import UNITS
+from ahf_ros.registration_settings import unit_parameter
 from ahf_ros.settings.parameter import check_parameters, parameter
 
 NONE, CAMERA, TARGETS = 'none', 'camera', 'targets'
@@ -25,13 +25,7 @@ class PoseNodeSettings:
         'CSV or JSON.',
         read_only=True,
     )
-    unit: str = parameter(
-        '',
-        'Unit of the coordinates, needed where their file does not say it.',
-        choices=('', *UNITS),
-        form=f'one of {", ".join(UNITS)}, or nothing',
-        read_only=True,
-    )
+    unit: str = unit_parameter()
     targets_frame: str = parameter(
         'targets', 'Name of the coordinate frame of the targets.', read_only=True
     )

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.time import Time
@@ -20,7 +21,6 @@ from ahf_ros.interchange.image_messages import nanoseconds
 from ahf_ros.interchange.matching import ANSWER, ANSWERS, CLOUD, WAITING_MEMORY, Matcher
 from ahf_ros.interchange.point_clouds import whole_points
 from ahf_ros.interchange.registration_files import ScanRecord, write_registration
-from ahf_ros.nodes.frames import MISSING, StaticFrames
 from ahf_ros.nodes.parameters import ParameterSettings
 from ahf_ros.nodes.pose_msg import pose_message, transform_message
 from ahf_ros.nodes.process import LOG_PERIOD, ProcessNode, run
@@ -30,12 +30,16 @@ from ahf_ros.nodes.registration_msg import (
     residual_points,
 )
 from ahf_ros.nodes.settings import RegistrationNodeSettings
+from ahf_ros.nodes.status import publish_status, status_of
+from ahf_ros.nodes.tf import PACKAGE, Frames
 from ahf_ros.nodes.topics import ANSWERS_KEPT, POINTS
 from ahf_ros.scans import Scans, known_targets, scan_cloud
 from ahf_ros.text import counted, printable
 
-DIAGNOSTICS_PERIOD = 1.0
-"""Period of /diagnostics, s."""
+_NO_TF = (
+    f'tf is True and the package {PACKAGE} is not there: no tf; ros-DISTRIBUTION-tf2-msgs '
+    'installs it'
+)
 
 _MILLIMETRES = 1000.0
 
@@ -72,12 +76,11 @@ class RegistrationNode(ProcessNode):
         self._transform = self.publisher(PoseWithCovarianceStamped, '~/transform', ANSWERS_KEPT)
         self._residuals = self.publisher(PointCloud2, '~/residuals', ANSWERS_KEPT)
         self._targets = self.publisher(PointCloud2, '~/targets')
-        self._frames: StaticFrames | None = None
-        if settings.tf:
-            if StaticFrames.available():
-                self._frames = StaticFrames(self, group)
-            else:
-                self.get_logger().warning(MISSING)
+        self._frames: Frames | None = None
+        if settings.tf and find_spec(PACKAGE):
+            self._frames = Frames(self, static=True, remedy='set scan_frame')
+        elif settings.tf:
+            self.get_logger().warning(_NO_TF)
         self._unmatched = [0, 0]  # clouds, and scans
         tolerance = round(settings.cloud_tolerance * 1e9)
         self._matcher = Matcher(tolerance, (WAITING_MEMORY, ANSWERS), self._unmatched)
@@ -97,8 +100,7 @@ class RegistrationNode(ProcessNode):
         ):
             respond = partial(self._respond, work)
             self.create_service(Trigger, f'~/{name}', respond, callback_group=group)
-        self._diagnostics = self.publisher(DiagnosticArray, '/diagnostics', 10)
-        self.every(DIAGNOSTICS_PERIOD, self._publish_diagnostics)
+        publish_status(self, 'registration', self._status)
 
     def introduction(self) -> str:
         """Return what is registered where."""
@@ -192,13 +194,10 @@ class RegistrationNode(ProcessNode):
         header = Header(stamp=now, frame_id=self._settings.current.frame)
         self._targets.publish(field_points(field, header))
         if self._frames:
-            before = self._frames.problem
             self._frames.publish(
                 transform_message(scan.transform, header, record.name)
                 for record, scan in zip(self._registration.records, field.scans, strict=True)
             )
-            if (problem := self._frames.problem) and problem != before:
-                self.get_logger().warning(problem)
 
     def _respond(
         self, work: Callable[[], str], _: Trigger.Request, response: Trigger.Response
@@ -251,7 +250,7 @@ class RegistrationNode(ProcessNode):
         for number in range(len(self._registration.records)):
             self._publish(number)
 
-    def _publish_diagnostics(self) -> None:
+    def _status(self) -> DiagnosticStatus:
         tally, told = self._tally, self._told
         for it in self._inputs_of_scans:
             tally.lost += it.losses.newly_lost()
@@ -265,7 +264,6 @@ class RegistrationNode(ProcessNode):
             tally.lost > told.lost and f'{tally.lost - told.lost} messages lost in transport',
             self._frames.problem if self._frames else '',
         )
-        warning = '; '.join(text for text in reports if text)
         self._told = replace(tally)
         field = self._registration.field
         values: dict[str, object] = {
@@ -292,15 +290,8 @@ class RegistrationNode(ProcessNode):
                     f'{np.linalg.norm(sigmas[:3]) * _MILLIMETRES:.4f}'
                 ),
             }
-        name = self.get_fully_qualified_name().lstrip('/')
-        status = DiagnosticStatus(
-            level=DiagnosticStatus.WARN if warning else DiagnosticStatus.OK,
-            name=f'{name}: registration',
-            message=warning or f'{counted(len(field.scans), "scan")} registered',
-            values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
-        )
-        header = Header(stamp=self.get_clock().now().to_msg())
-        self._diagnostics.publish(DiagnosticArray(header=header, status=[status]))
+        registered = f'{counted(len(field.scans), "scan")} registered'
+        return status_of(reports, registered, values)
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -9,8 +9,8 @@ from std_msgs.msg import Header
 from ahf_ros.interchange.point_clouds import AXES, COVARIANCE
 from ahf_ros.interchange.registration_files import in_common_frame
 from ahf_ros.nodes.cloud_msg import cloud_message
+from ahf_ros.orientation.transform import Transform
 from ahf_ros.registration.field import Field, RegisteredScan
-from ahf_ros.registration.rigid import Transform
 from ahf_ros.target import UNDECODED
 
 _PLACE = [(name, '<f4') for name in AXES] + [('id', '<i4')]

@@ -6,6 +6,7 @@ import re
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from difflib import get_close_matches
+from functools import partial
 
 from rclpy.qos import QoSCompatibility, ReliabilityPolicy, qos_check_compatible
 from rclpy.topic_endpoint_info import TopicEndpointInfo
@@ -32,6 +33,7 @@ class Watch:
     def __init__(self, node: ProcessNode, tally: Tally) -> None:
         self._node = node
         self._tally = tally
+        self._topics = partial(topics_of_others, node)
         self._reported: dict[str, float] = {}  # when what was last to be said, s
 
     def look(self, images: Input, timeout: float, clouds: tuple[Input, Waiting] | None) -> None:
@@ -93,15 +95,6 @@ class Watch:
             f'topic by -r {CODED_TARGETS}:=OTHER, or a namespace by -r __ns:=/OTHER'
         )
 
-    def _topics(self) -> Mapping[str, Sequence[str]]:
-        """Return the types of the topics that others publish."""
-        own = self._node.get_fully_qualified_name()
-        return {
-            name: [it.topic_type for it in self._node.get_publishers_info_by_topic(name)]
-            for name, _ in self._node.get_topic_names_and_types()
-            if not name.startswith(f'{own}/')
-        }
-
     def _log(self, *reports: str) -> None:
         now = time.monotonic()
         for text in filter(None, reports):
@@ -110,6 +103,16 @@ class Watch:
                 self._node.get_logger().warning(text)
             self._reported[form] = now
         self._reported = {form: at for form, at in self._reported.items() if now - at < AGAIN}
+
+
+def topics_of_others(node: ProcessNode) -> Mapping[str, Sequence[str]]:
+    """Return the types of the topics that others publish."""
+    own = node.get_fully_qualified_name()
+    return {
+        name: [it.topic_type for it in node.get_publishers_info_by_topic(name)]
+        for name, _ in node.get_topic_names_and_types()
+        if not name.startswith(f'{own}/')
+    }
 
 
 def other_types(source: Input, publishers: Iterable[TopicEndpointInfo]) -> str:

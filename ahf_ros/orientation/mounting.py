@@ -8,7 +8,8 @@ and C is inverted. Without a robot, B is the pose of a reference camera and Z is
 adjustment of the poses of network and robot, with their covariances. A network without scale gets
 that of the robot.
 
-Small changes are (translation, rotation vector in rad) of a pose's own frame: T exp(change).
+The residual of a station is the step from Z C to B X along the axes of the base: its errors are
+those of `transform`.
 
 References
 ----------
@@ -21,14 +22,13 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, replace
 
-import cv2
 import numpy as np
 
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.testing import special
+from ahf_ros.orientation.transform import Transform, lever, turned_errors, twice
 
 FEWEST_STATIONS = 3
 
@@ -42,45 +42,9 @@ class Contradiction(ValueError):
     """Poses of robot and photographs that no mounting explains."""
 
 
-class Rigid(NamedTuple):
-    """The pose of a frame in another one: x_parent = rotation x + translation."""
-
-    rotation: FloatArray
-    translation: FloatArray
-
-    def __matmul__(self, other: Rigid) -> Rigid:
-        """Return the pose of a frame that is given in this one."""
-        return Rigid(
-            self.rotation @ other.rotation, self.rotation @ other.translation + self.translation
-        )
-
-    @property
-    def inverse(self) -> Rigid:
-        """The pose of the parent in this frame."""
-        return Rigid(self.rotation.T, -self.rotation.T @ self.translation)
-
-    @property
-    def adjoint(self) -> FloatArray:
-        """(6, 6), changes of this frame as changes of its parent: T exp(c) = exp(Ad c) T."""
-        x, y, z = self.translation
-        cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-        zero = np.zeros((3, 3))
-        return np.block([[self.rotation, cross @ self.rotation], [zero, self.rotation]])
-
-    @property
-    def vector(self) -> FloatArray:
-        """(6,) translation and rotation vector, rad."""
-        return np.concatenate([self.translation, cv2.Rodrigues(self.rotation)[0][:, 0]])
-
-    def changed(self, change: FloatArray) -> Rigid:
-        """Return the pose after a change (6,) of its own frame."""
-        turn = np.asarray(cv2.Rodrigues(change[3:])[0], float)
-        return self @ Rigid(turn, np.asarray(change[:3], float))
-
-
 @dataclass(frozen=True)
 class Station:
-    """A pose of the robot and what one camera saw there; 6x6 covariances of their own changes.
+    """A pose of the robot and what one camera saw there, with their covariances.
 
     Images with the same `place` were taken at one pose of the robot, which they share.
     """
@@ -88,25 +52,20 @@ class Station:
     name: str
     place: Hashable
     camera: str
-    robot: Rigid
-    seen: Rigid
+    robot: Transform
+    seen: Transform
     """The pose of the camera in the frame of the targets, or of the targets in the camera's."""
-    robot_covariance: FloatArray
-    seen_covariance: FloatArray
 
 
 @dataclass(frozen=True)
 class Mounted:
-    """What a mounting is: poses by camera, their covariances, and what did not agree.
+    """What a mounting is: poses by camera, and what did not agree.
 
     `mounts` are the X, `fields` the Z of the module; one of them has a single pose, named ''.
-    Covariances are of (position, rotation vector about the axes of the parent's frame, rad).
     """
 
-    mounts: dict[str, Rigid]
-    fields: dict[str, Rigid]
-    mount_covariances: dict[str, FloatArray]
-    field_covariances: dict[str, FloatArray]
+    mounts: dict[str, Transform]
+    fields: dict[str, Transform]
     scale: float
     """Unit of the robot's poses over that of the network."""
     scale_sigma: float
@@ -123,7 +82,7 @@ def mounted(
     *,
     targets_on_hand: bool = False,
     scale: float | None = None,
-    field: Rigid | None = None,
+    field: Transform | None = None,
 ) -> Mounted:
     """Return where cameras, or the targets, are on the hand.
 
@@ -146,7 +105,7 @@ def mounted(
         kept = [it for it in kept if it.place != place]
 
 
-def _check(stations: Sequence[Station], field: Rigid | None) -> None:
+def _check(stations: Sequence[Station], field: Transform | None) -> None:
     if field is not None:
         if not stations:
             raise ValueError('no two cameras took photographs at one station')
@@ -170,7 +129,7 @@ def _check(stations: Sequence[Station], field: Rigid | None) -> None:
 def _turns(stations: Sequence[Station]) -> FloatArray:
     """Return rotation vectors (n, 3) of the hand from its mean rotation."""
     mean = nearest_rotation(sum((it.robot.rotation for it in stations), np.zeros((3, 3))))
-    return np.stack([cv2.Rodrigues(mean.T @ it.robot.rotation)[0][:, 0] for it in stations])
+    return np.stack([Transform(mean.T @ it.robot.rotation).turn for it in stations])
 
 
 def nearest_rotation(matrix: FloatArray) -> FloatArray:
@@ -188,7 +147,7 @@ class _Model:
         stations: Sequence[Station],
         targets_on_hand: bool,
         scale: float | None,
-        field: Rigid | None,
+        field: Transform | None,
     ) -> None:
         self.stations = stations
         cameras = sorted({it.camera for it in stations})
@@ -211,11 +170,11 @@ class _Model:
         return 6 * poses + self.free_scale
 
     def _start(
-        self, scale: float | None, field: Rigid | None
-    ) -> tuple[dict[str, Rigid], dict[str, Rigid], float]:
+        self, scale: float | None, field: Transform | None
+    ) -> tuple[dict[str, Transform], dict[str, Transform], float]:
         """Return approximate poses: rotations from all pairs, then what is linear."""
-        mounts: dict[str, Rigid] = {}
-        fields: dict[str, Rigid] = {'': field} if field else {}
+        mounts: dict[str, Transform] = {}
+        fields: dict[str, Transform] = {'': field} if field else {}
         if field is not None:
             for station in self.stations:
                 mounts[station.camera] = station.robot.inverse @ field @ station.seen
@@ -256,21 +215,20 @@ class _Model:
                 station = self.stations[index]
                 mount_name, field_name = self._names(station)
                 mount, base = self.mounts[mount_name], self.fields[field_name]
-                seen = Rigid(station.seen.rotation, self.scale * station.seen.translation)
+                robot, seen = station.robot, station.seen.scaled(self.scale)
                 part = slice(6 * number, 6 * number + 6)
-                gaps[part] = (seen.inverse @ base.inverse @ station.robot @ mount).vector
+                gaps[part] = (robot @ mount).step_from(base @ seen)
                 column = mount_column[mount_name]
-                design[part, column : column + 6] = np.eye(6)
+                design[part, column : column + 6] = twice(robot.rotation)
+                ray = base.rotation @ station.seen.translation
                 if self.free_field:
                     column = field_column[field_name]
-                    design[part, column : column + 6] = -seen.inverse.adjoint
+                    design[part, column : column + 6] = -lever(self.scale * ray)
                 if self.free_scale:
-                    along = seen.rotation.T @ station.seen.translation
-                    design[part, -1] = np.concatenate([-along, np.zeros(3)])
-                of_robot[part] = mount.inverse.adjoint
-                lengths = np.array([self.scale] * 3 + [1.0] * 3)
-                noise[part, part] = lengths[:, None] * station.seen_covariance * lengths
-            common = self.stations[members[0]].robot_covariance
+                    design[part, -1] = np.concatenate([-ray, np.zeros(3)])
+                of_robot[part] = lever(robot.rotation @ mount.translation)
+                noise[part, part] = turned_errors(base.rotation, seen.covariance)
+            common = self.stations[members[0]].robot.covariance
             residuals.append(gaps)
             rows.append(design)
             covariances.append(noise + of_robot @ common @ of_robot.T)
@@ -290,11 +248,11 @@ class _Model:
             covariance = size[:, None] * np.linalg.inv(size[:, None] * normal * size) * size
             step = covariance @ right
             for number, name in enumerate(self.mount_names):
-                self.mounts[name] = self.mounts[name].changed(step[6 * number : 6 * number + 6])
+                self.mounts[name] = self.mounts[name].stepped(step[6 * number : 6 * number + 6])
             if self.free_field:
                 for number, name in enumerate(self.field_names, len(self.mount_names)):
                     part = step[6 * number : 6 * number + 6]
-                    self.fields[name] = self.fields[name].changed(part)
+                    self.fields[name] = self.fields[name].stepped(part)
             if self.free_scale:
                 self.scale += step[-1]
             if step @ right < _CONVERGED:
@@ -344,29 +302,27 @@ class _Model:
         sigma0 = float(np.sqrt(self.cost / self.redundancy)) if self.redundancy else 1.0
         scaled = sigma0**2 * self.covariance
 
-        def turned(number: int, pose: Rigid) -> FloatArray:
-            part = slice(6 * number, 6 * number + 6)
-            turn = np.kron(np.eye(2), pose.rotation)
-            covariance: FloatArray = turn @ scaled[part, part] @ turn.T
-            return covariance
+        def poses(
+            found: dict[str, Transform], names: list[str], first: int
+        ) -> dict[str, Transform]:
+            parts = [slice(6 * it, 6 * it + 6) for it in range(first, first + len(names))]
+            return {
+                name: replace(found[name], covariance=scaled[part, part])
+                for name, part in zip(names, parts, strict=True)
+            }
 
-        first = len(self.mount_names)
         residuals = {}
         for members, gaps in zip(self.places, self.residuals, strict=True):
             for number, index in enumerate(members):
-                residuals[self.stations[index].name] = gaps[6 * number : 6 * number + 6]
+                station = self.stations[index]
+                base = self.fields[self._names(station)[1]]
+                turn = twice((base @ station.seen).rotation)
+                residuals[station.name] = gaps[6 * number : 6 * number + 6] @ turn
         return Mounted(
-            mounts=dict(self.mounts),
-            fields=dict(self.fields),
-            mount_covariances={
-                name: turned(number, self.mounts[name])
-                for number, name in enumerate(self.mount_names)
-            },
-            field_covariances={
-                name: turned(number, self.fields[name])
-                for number, name in enumerate(self.field_names, first)
-                if self.free_field
-            },
+            mounts=poses(self.mounts, self.mount_names, 0),
+            fields=poses(self.fields, self.field_names, len(self.mount_names))
+            if self.free_field
+            else self.fields,
             scale=float(self.scale),
             scale_sigma=float(np.sqrt(scaled[-1, -1])) if self.free_scale else 0.0,
             sigma0=sigma0,
@@ -376,7 +332,9 @@ class _Model:
         )
 
 
-def _approximate(stations: Sequence[Station], scale: float | None) -> tuple[Rigid, Rigid, float]:
+def _approximate(
+    stations: Sequence[Station], scale: float | None
+) -> tuple[Transform, Transform, float]:
     """Return X, Z and the scale of one camera, by a linear solution.
 
     Turns between stations of the hand are those of the camera, seen from the hand [1]_: their
@@ -385,7 +343,7 @@ def _approximate(stations: Sequence[Station], scale: float | None) -> tuple[Rigi
     pairs = [(i, j) for i in range(len(stations)) for j in range(i)]
 
     def axes(rotations: list[FloatArray]) -> FloatArray:
-        return np.stack([cv2.Rodrigues(rotations[i].T @ rotations[j])[0][:, 0] for i, j in pairs])
+        return np.stack([Transform(rotations[i].T @ rotations[j]).turn for i, j in pairs])
 
     of_hand = axes([it.robot.rotation for it in stations])
     of_seen = axes([it.seen.rotation for it in stations])
@@ -403,4 +361,4 @@ def _approximate(stations: Sequence[Station], scale: float | None) -> tuple[Rigi
         design = design[:, :-1]
     solved = np.linalg.lstsq(design, right_side, rcond=None)[0]
     size = float(solved[6]) if scale is None else scale
-    return Rigid(on_hand, solved[:3]), Rigid(of_field, solved[3:6]), size
+    return Transform(on_hand, solved[:3]), Transform(of_field, solved[3:6]), size

@@ -14,7 +14,7 @@ from ahf_ros.orientation.camera import PARAMETERS, linearise, undistort
 from ahf_ros.orientation.network import FloatArray, Rejection
 from ahf_ros.orientation.planar import principal_axes
 from ahf_ros.orientation.points import MeasuredPoints, entries
-from ahf_ros.orientation.pose import Pose, Transform
+from ahf_ros.orientation.pose import Pose
 from ahf_ros.orientation.pose_fit import (
     Fit,
     Mask,
@@ -26,6 +26,7 @@ from ahf_ros.orientation.pose_fit import (
     tested_fit,
 )
 from ahf_ros.orientation.testing import CRITICAL
+from ahf_ros.orientation.transform import Transform, camera_pose
 from ahf_ros.target import UNDECODED, Target
 from ahf_ros.text import counted, listed
 
@@ -203,11 +204,14 @@ def _determined(seen: NamedPlaces, points: MeasuredPoints) -> Pose:
         scale = 1.0 if fit.plausible else fit.cost / fit.redundancy
     rest = residuals(sight, fit)
     _check_agreement(seen, fit, rest)
-    camera = _transform(fit, scale)
+    camera = camera_pose(fit.rotation, fit.position, scale * fit.cofactors)
     _check_precision(sight, fit, camera)
+    second = None
+    if other:
+        second = camera_pose(other.rotation, other.position, scale * other.cofactors)
     return Pose(
         camera=camera,
-        second=_transform(other, scale) if other else None,
+        second=second,
         targets=_names(seen, fit.used),
         residuals=rest,
         rejected=(*seen.aside, *_rejected(seen, sight, fit, points)),
@@ -284,19 +288,6 @@ def _extents(points: FloatArray) -> float:
     """Return the extent of points across their line, relative to that along it."""
     spread, _ = principal_axes(points)
     return float(spread[1] / spread[0]) if spread[0] > 0 else 0.0
-
-
-def _transform(fit: Fit, scale: float) -> Transform:
-    """Return the pose of the camera: the covariance about the axes of the points' frame.
-
-    A small turn r of the camera about its own axes, R <- exp([r]x) R, turns R', which leads to the
-    frame of the points, by -R' r.
-    """
-    back = fit.rotation.T
-    by_error = np.zeros((6, 6))
-    by_error[:3, :3], by_error[3:, 3:] = np.eye(3), -back
-    covariance = scale * by_error @ fit.cofactors @ by_error.T
-    return Transform(back, fit.position, (covariance + covariance.T) / 2)
 
 
 def _rejected(

@@ -11,13 +11,12 @@ from typing import TypeVar
 
 import numpy as np
 
-from ahf_ros.orientation.mounting import Contradiction, Mounted, Rigid, Station, mounted
+from ahf_ros.orientation.mounting import Contradiction, Mounted, Station, mounted
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.solution import Solution
+from ahf_ros.orientation.transform import Transform, camera_pose
+from ahf_ros.orientation.units import METRES
 from ahf_ros.text import counted, listed
-
-METRES = {'m': 1.0, 'dm': 0.1, 'cm': 1e-2, 'mm': 1e-3, 'um': 1e-6, 'µm': 1e-6, 'in': 0.0254}
-"""Length of the units that a network may have."""
 
 ROBOT_UNITS = ('m', 'mm')
 
@@ -31,7 +30,7 @@ _INVERTED = 0.5  # ratio of sigma0 with inverted poses, which then are the right
 
 def mounted_on_robot(
     solution: Solution,
-    robot_poses: Mapping[str, Rigid],
+    robot_poses: Mapping[str, Transform],
     *,
     position_sigma: float,
     rotation_sigma: float,
@@ -53,9 +52,8 @@ def mounted_on_robot(
     covariance = np.diag([position_sigma**2] * 3 + [rotation_sigma**2] * 3)
 
     def calibrated(robot_unit: str, scale: float | None, inverted: bool = False) -> Mounted:
-        stations = _stations(solution, poses, METRES[robot_unit], targets_on_hand, covariance)
-        if inverted:
-            stations = [replace(it, robot=it.robot.inverse) for it in stations]
+        given = {it: pose.inverse for it, pose in poses.items()} if inverted else poses
+        stations = _stations(solution, given, METRES[robot_unit], targets_on_hand, covariance)
         return mounted(stations, targets_on_hand=targets_on_hand, scale=scale)
 
     def tried_with(inverted: bool) -> dict[str, Mounted]:
@@ -118,7 +116,9 @@ def _unit(tried: Mapping[str, Mounted], metres: float, given: str) -> tuple[str,
     return name, []
 
 
-def _matched(solution: Solution, table: Mapping[str, Rigid]) -> tuple[dict[int, Rigid], list[str]]:
+def _matched(
+    solution: Solution, table: Mapping[str, Transform]
+) -> tuple[dict[int, Transform], list[str]]:
     """Return the poses of the robot by photograph, and notes on what has no counterpart."""
     names = solution.network.photographs
     found = {index: _of_image(table, names[index]) for index in np.flatnonzero(solution.oriented)}
@@ -140,37 +140,32 @@ def _of_image(table: Mapping[str, _Value], name: str) -> _Value | None:
     return table.get(name, short.get(PurePath(name).name))
 
 
-def _pose(solution: Solution, index: int) -> tuple[Rigid, FloatArray]:
-    """Return the pose of a camera among the targets, and the covariance of its changes."""
-    turn = solution.start.rotations[index]
-    own = np.block([[turn, np.zeros((3, 3))], [np.zeros((3, 3)), -np.eye(3)]])
-    covariance = own @ solution.pose_covariances[index] @ own.T
-    return Rigid(turn.T, solution.start.positions[index]), covariance
+def _pose(solution: Solution, index: int) -> Transform:
+    """Return the pose of a camera among the targets."""
+    values = solution.start
+    return camera_pose(
+        values.rotations[index], values.positions[index], solution.pose_covariances[index]
+    )
 
 
 def _stations(
     solution: Solution,
-    poses: Mapping[int, Rigid],
+    poses: Mapping[int, Transform],
     metres: float,
     targets_on_hand: bool,
     robot_covariance: FloatArray,
 ) -> list[Station]:
     stations = []
     for index, robot in poses.items():
-        seen, covariance = _pose(solution, index)
-        if targets_on_hand:
-            covariance = seen.adjoint @ covariance @ seen.adjoint.T
-            seen = seen.inverse
-        robot = Rigid(robot.rotation, metres * robot.translation)
+        seen = _pose(solution, index)
+        robot = replace(robot.scaled(metres), covariance=robot_covariance)
         stations.append(
             Station(
                 name=solution.network.photographs[index],
                 place=(robot.rotation.tobytes(), robot.translation.tobytes()),
                 camera=_camera(solution, index),
                 robot=robot,
-                seen=seen,
-                robot_covariance=robot_covariance,
-                seen_covariance=covariance,
+                seen=seen.inverse if targets_on_hand else seen,
             )
         )
     return stations
@@ -209,7 +204,13 @@ def mounted_on_rig(
         raise ValueError('no two cameras took photographs at one station')
     reference = max(sorted(counts), key=counts.__getitem__)
     rows = [
-        _beside(solution, station, images[reference], other, metres)
+        Station(
+            name=solution.network.photographs[other],
+            place=station,
+            camera=camera,
+            robot=_pose(solution, images[reference]).scaled(metres),
+            seen=_pose(solution, other).scaled(metres),
+        )
         for station, images in by_station.items()
         if reference in images
         for camera, other in images.items()
@@ -218,25 +219,4 @@ def mounted_on_rig(
     notes = []
     if alone := sum(reference not in it or len(it) < 2 for it in by_station.values()):
         notes.append(f'{counted(alone, "station")} without {reference} and another camera')
-    identity = Rigid(np.eye(3), np.zeros(3))
-    return reference, mounted(rows, scale=1.0, field=identity), tuple(notes)
-
-
-def _beside(solution: Solution, place: str, reference: int, other: int, metres: float) -> Station:
-    (robot, robot_covariance), (seen, covariance) = (
-        _in_metres(*_pose(solution, index), metres) for index in (reference, other)
-    )
-    return Station(
-        name=solution.network.photographs[other],
-        place=place,
-        camera=_camera(solution, other),
-        robot=robot,
-        seen=seen,
-        robot_covariance=robot_covariance,
-        seen_covariance=covariance,
-    )
-
-
-def _in_metres(pose: Rigid, covariance: FloatArray, metres: float) -> tuple[Rigid, FloatArray]:
-    size = np.array([metres] * 3 + [1.0] * 3)
-    return Rigid(pose.rotation, metres * pose.translation), size[:, None] * covariance * size
+    return reference, mounted(rows, scale=1.0, field=Transform()), tuple(notes)

@@ -13,8 +13,9 @@ import numpy as np
 
 from ahf_ros.orientation.network import FloatArray, IntArray
 from ahf_ros.orientation.points import entries
+from ahf_ros.orientation.transform import Transform
 from ahf_ros.registration.field import Field, RegisteredScan
-from ahf_ros.registration.rigid import Transform, chi_square_limit
+from ahf_ros.registration.rigid import chi_square_limit
 from ahf_ros.registration.scan import Scan
 from ahf_ros.text import counted
 

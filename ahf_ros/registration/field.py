@@ -15,8 +15,8 @@ import numpy as np
 
 from ahf_ros.orientation.network import FloatArray, IntArray
 from ahf_ros.orientation.points import MeasuredPoints, blocks, entries
+from ahf_ros.orientation.transform import Transform
 from ahf_ros.registration.refusals import Match, check_shape, checked_fit
-from ahf_ros.registration.rigid import Transform
 from ahf_ros.registration.scan import Scan, block_diagonal
 
 _EXACT = 1e-6  # m, of known coordinates, beside their own precision

@@ -12,54 +12,17 @@ References
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ahf_ros.orientation import pose
-from ahf_ros.orientation.camera import rotation_matrices
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.similarity import similarity_between
+from ahf_ros.orientation.transform import Transform
 from ahf_ros.registration.scan import block_diagonal
 
 _ROUNDS = 50
 _CONVERGED = 1e-12  # decrease of the sum of weighted squares that a step promises, relative
-
-
-@dataclass(frozen=True)
-class Transform(pose.Transform):
-    """A transform from the frame of a scanner into a fixed one, R, t, and how it acts on points.
-
-    Its covariance, in m and rad, is zero where the fixed frame is that of the scan. Small errors
-    are a of t, and a turn b about the fixed axes.
-    """
-
-    rotation: FloatArray = field(default_factory=lambda: np.eye(3))
-    translation: FloatArray = field(default_factory=lambda: np.zeros(3))
-    covariance: FloatArray = field(default_factory=lambda: np.zeros((6, 6)))
-
-    def moved(self, points: FloatArray) -> FloatArray:
-        """Return points (..., 3) in the fixed frame."""
-        result: FloatArray = points @ self.rotation.T + self.translation
-        return result
-
-    def turned(self, covariances: FloatArray) -> FloatArray:
-        """Return covariances (n, 3, 3) along the axes of the fixed frame."""
-        result: FloatArray = self.rotation @ covariances @ self.rotation.T
-        return result
-
-    def changes(self, points: FloatArray) -> FloatArray:
-        """Return how `moved` of points (n, 3) changes with a and b, (n, 3, 6)."""
-        result = np.zeros((len(points), 3, 6))
-        result[:, :, :3] = np.eye(3)
-        turned = points @ self.rotation.T
-        result[:, :, 3:] = np.cross(np.eye(3), turned[:, None, :]).transpose(0, 2, 1)
-        return result
-
-    def stepped(self, step: FloatArray) -> Transform:
-        """Return the transform after small changes (6,) of t and b."""
-        turn = rotation_matrices(step[None, 3:])[0]
-        return Transform(turn @ self.rotation, self.translation + step[:3], self.covariance)
 
 
 @dataclass(frozen=True)
@@ -109,7 +72,7 @@ def fit(
             break
     residuals = (aim - transform.moved(points)).ravel()
     return Fit(
-        Transform(transform.rotation, transform.translation, covariance),
+        replace(transform, covariance=covariance),
         residuals.reshape(-1, 3),
         float(residuals @ weights @ residuals),
         gain,

@@ -17,7 +17,7 @@ from ruamel.yaml import YAML
 from ahf_ros.interchange.camera_files import ros_yaml
 from ahf_ros.interchange.network_results import read_network
 from ahf_ros.interchange.robot_files import read_robot_poses
-from ahf_ros.orientation.mounting import Rigid
+from ahf_ros.orientation.transform import Transform
 from support import ROOT
 from support.command_line import status
 from support.networks import CALIBRATION, SIZE, records, solution
@@ -189,14 +189,16 @@ def test_a_robot_says_where_its_camera_is(
     results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Poses in millimetres are recognised; files are in metres, as ROS has them."""
-    mount = Rigid(np.asarray(cv2.Rodrigues((0.1, -0.2, 1.5))[0]), np.array([0.02, -0.05, 0.1]))
-    base = Rigid(np.asarray(cv2.Rodrigues((3.0, 0.1, 0.2))[0]), np.array([0.8, 0.1, -0.2]))
+    mount = Transform(np.asarray(cv2.Rodrigues((0.1, -0.2, 1.5))[0]), np.array([0.02, -0.05, 0.1]))
+    base = Transform(np.asarray(cv2.Rodrigues((3.0, 0.1, 0.2))[0]), np.array([0.8, 0.1, -0.2]))
     rows = [('image', 'x', 'y', 'z', 'rx', 'ry', 'rz')]
     for name, rotation, position in zip(
         TRUE.network.photographs, TRUE.start.rotations, TRUE.start.positions, strict=True
     ):
-        x, y, z, *turn = (base @ Rigid(rotation.T, 1e-3 * position) @ mount.inverse).vector
-        rows.append((name, *(f'{1e3 * it:.6f}' for it in (x, y, z)), *map(str, turn)))
+        robot = base @ Transform(rotation.T, 1e-3 * position) @ mount.inverse
+        rows.append(
+            (name, *(f'{1e3 * it:.6f}' for it in robot.translation), *map(str, robot.turn))
+        )
     with (tmp_path / 'robot.csv').open('w', newline='') as file:
         csv.writer(file).writerows(rows)
     folder = results.parent

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 from ahf_ros.interchange.export.networks import NETWORK_FORMATS, write_network_export
-from ahf_ros.interchange.network_tables import quaternion
 from ahf_ros.orientation.solution import Solution
 from support.networks import SIZE, solution
 
@@ -216,14 +215,3 @@ def test_names_that_a_format_cannot_hold_are_refused(tmp_path: Path) -> None:
     quoted = replace(WHOLE, network=replace(WHOLE.network, targets=targets))
     with pytest.raises(ValueError, match='quotation mark'):
         write_network_export('mmvii', tmp_path, quoted)
-
-
-def test_quaternions_turn_as_their_matrices_do() -> None:
-    for vector in ([0, 0, 0], [np.pi, 0, 0], [0, -np.pi, 0], [0.1, 0.2, -0.3], [2.0, 2.0, 1.0]):
-        rotation = cv2.Rodrigues(np.array(vector, float))[0]
-        x, y, z, w = quaternion(rotation)
-        assert w >= 0 and x * x + y * y + z * z + w * w == pytest.approx(1)
-        cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-        np.testing.assert_allclose(
-            np.eye(3) + 2 * w * cross + 2 * cross @ cross, rotation, atol=1e-12
-        )

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from copy import copy
+from functools import cache
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -21,12 +24,14 @@ from std_msgs.msg import Header
 
 from ahf_ros.interchange.camera_info import calibration, undistorted
 from ahf_ros.msg import CodedTarget, CodedTargetArray
+from ahf_ros.target import Target
 from benchmarks.registration_pose import CAMERA, SIZE, View, view
 from support.detector import overrides, own, values
 
 EVERY = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.RELIABLE)
 
 
+@cache
 def scene() -> View:
     return view(1.0, 0.0, np.random.default_rng(31))
 
@@ -66,18 +71,20 @@ def seen(of: View, number: int, first_id: int = 0, frame: str = 'camera') -> Cod
     """Return the targets of a scene in an image taken after so many ms."""
     header = Header(stamp=Time(sec=1 + number // 1000, nanosec=number % 1000 * 10**6))
     header.frame_id = frame
-    targets = [
-        CodedTarget(
-            id=it.id + first_id,
-            x=it.x,
-            y=it.y,
-            covariance=it.covariance,
-            family='cct12',
-            confidence=1.0,
-        )
-        for it in of.targets
-    ]
+    targets = [_target(it, first_id) for it in of.targets]
     return CodedTargetArray(header=header, width=SIZE[0], height=SIZE[1], targets=targets)
+
+
+@cache
+def _target(of: Target, first_id: int) -> CodedTarget:
+    return CodedTarget(
+        id=of.id + first_id,
+        x=of.x,
+        y=of.y,
+        covariance=of.covariance,
+        family='cct12',
+        confidence=1.0,
+    )
 
 
 def number_of(message: Any) -> int:
@@ -100,20 +107,19 @@ class PoseProcess:
         self.camera = graph.publisher(CameraInfo, f'{space}/camera_info')
         graph.until(self.targets.get_subscription_count)
 
-    def says(self, words: str, send: Callable[[], Any]) -> str:
-        """Return the value and the message of the diagnostics with these words, sending on."""
-        message = ''
+    def says(self, send: Callable[[], Any], *words: str) -> str:
+        """Return the last message of the diagnostics when all words were said, sending on."""
+        begin = len(self.diagnostics)
 
         def said() -> bool:
-            nonlocal message
             send()
-            count = len(self.diagnostics)
-            self.graph.until(lambda: len(self.diagnostics) > count)
-            message = self.diagnostics[-1].status[0].message
-            return words in message
+            before = len(self.diagnostics)
+            self.graph.until(lambda: len(self.diagnostics) > before)
+            messages = [it.status[0].message for it in self.diagnostics[begin:]]
+            return all(any(text in it for it in messages) for text in words)
 
         self.graph.until(said)
-        return message
+        return self.diagnostics[-1].status[0].message
 
     def calibrated(self, of: View) -> None:
         """Send a calibration until the node has it, with images before all others."""
@@ -121,8 +127,8 @@ class PoseProcess:
 
         def posed() -> bool:
             self.targets.publish(seen(of, 0))
-            count = len(self.diagnostics)
-            self.graph.until(lambda: self.poses or len(self.diagnostics) > count)
+            before = len(self.diagnostics)
+            self.graph.until(lambda: self.poses or len(self.diagnostics) > before)
             return bool(self.poses)
 
         self.graph.until(posed)
@@ -139,8 +145,8 @@ def test_no_message_is_lost_at_100_hz_and_poses_are_those_of_the_camera(
         node.targets.publish(seen(of, number))
     graph.until(lambda: number_of(node.poses[-1]) == numbers[-1])
     assert [number_of(it) for it in node.poses if number_of(it)] == list(numbers)
-    count = len(node.diagnostics)
-    graph.until(lambda: len(node.diagnostics) > count + 1)
+    before = len(node.diagnostics)
+    graph.until(lambda: len(node.diagnostics) > before + 1)
     told = values(node.diagnostics[-1])
     assert (told['lost in transport'], told['targets used']) == ('0', str(len(of.targets)))
     assert told['published'] == str(len(node.poses))
@@ -158,62 +164,54 @@ def test_no_message_is_lost_at_100_hz_and_poses_are_those_of_the_camera(
     assert node.process.end() == (0, '')
 
 
-def test_what_is_wrong_is_said_and_nothing_is_published(graph: Any, tmp_path: Path) -> None:
+@pytest.fixture(scope='module')
+def node(graph: Any, tmp_path_factory: pytest.TempPathFactory) -> PoseProcess:
+    file = tmp_path_factory.mktemp('coordinates') / 'points.json'
+    return PoseProcess(graph, '/wrong', coordinates(file, scene()))
+
+
+@pytest.fixture(scope='module')
+def numbers() -> Iterator[int]:
+    """Return numbers of images that come one after the other."""
+    return count(1000, 10)
+
+
+def test_what_is_wrong_is_said_and_nothing_is_published(
+    node: PoseProcess, numbers: Iterator[int]
+) -> None:
     of = scene()
-    node = PoseProcess(graph, '/wrong', coordinates(tmp_path / 'points.json', of))
-    number = 1000
 
-    def image(**changes: Any) -> Callable[[], None]:
-        def send() -> None:
-            nonlocal number
-            number += 10
-            node.targets.publish(seen(of, number, **changes))
-
-        return send
+    def image() -> None:
+        node.targets.publish(seen(of, next(numbers)))
 
     topic = '/wrong/camera_info'
-    told = node.says(f'images without a pose: no camera_info has come on {topic}', image())
+    told = node.says(image, f'images without a pose: no camera_info has come on {topic}')
     assert f'no camera_info: /test publishes on {topic}' in told
-    for given, words in (
-        ({'k': np.zeros(9)}, 'k of camera_info has the focal lengths 0 and 0, accepted'),
-        ({'k': [1e3, 0, 0, 0, 1e3, 0, 0, 0, 1]}, 'has the principal point 0, 0, accepted'),
-        ({'width': 640, 'height': 480}, 'camera_info is of an image of 640 x 480 px, accepted'),
-        ({'header': Header(frame_id='other')}, "frame_id of camera_info is 'other', accepted"),
-    ):
-        node.camera.publish(info(**given))
-        node.says(words, image())
-    node.camera.publish(info())
-    words = 'no target has known coordinates: seen are cct12:501, cct12:502'
-    node.says(words, image(first_id=500))
+    node.camera.publish(info(k=[1e3, 0, 0, 0, 1e3, 0, 0, 0, 1]))
+    node.says(image, 'has the principal point 0, 0, accepted')
     assert not node.poses
-    node.says('poses', image())
-    assert node.poses
-    count = len(node.poses)
-    told = node.says(
+    node.camera.publish(info())
+    node.graph.until(lambda: image() or node.poses)
+    unknown: list[int] = []
+
+    def mistakes() -> None:
+        unknown.append(next(numbers))
+        node.targets.publish(seen(of, unknown[-1], first_id=500))
+        swapped = seen(of, next(numbers))
+        last = copy(swapped.targets[-1])
+        last.id = of.targets[-2].id
+        swapped.targets = [*swapped.targets[:-2], last]
+        node.targets.publish(swapped)
+        node.targets.publish(seen(of, 500))
+
+    node.says(
+        mistakes,
+        'no target has known coordinates: seen are cct12:501, cct12:502',
+        f'{of.targets[-2].id}, wrong ID: the place of target {of.targets[-1].id}',
         'stamps went backwards',
-        lambda: [node.targets.publish(seen(of, it)) for it in (number + 500, number + 100)],
     )
-    assert 'without a pose' not in told
-    assert len(node.poses) >= count + 2
-    flat = info(d=[], p=[2e3, 0, 1200, 0, 0, 2e3, 1000, 0, 0, 0, 1, 0])
-    node.camera.publish(flat)
-    node.says('p or r differ from k, as for rectified images, but camera_matrix is k', image())
-    swapped = seen(of, 10**6)
-    swapped.targets = [*swapped.targets[:-2], swapped.targets[-1]]
-    swapped.targets[-1].id = of.targets[-2].id
-    node.camera.publish(info())
-    words = f'{of.targets[-2].id}, wrong ID: the place of target {of.targets[-1].id}'
-    node.says(words, lambda: node.targets.publish(swapped))
-
-
-def test_rectified_images_of_the_detector_are_noticed(graph: Any, tmp_path: Path) -> None:
-    of = scene()
-    node = PoseProcess(graph, '/rect', coordinates(tmp_path / 'points.json', of))
-    graph.node.create_subscription(Image, '/rect/image_rect', lambda _: None, 1)
-    node.camera.publish(info())
-    words = '/rect/image_rect seems to be rectified, but camera_matrix is k'
-    number = iter(range(10, 10**6, 10))
-    node.says(words, lambda: node.targets.publish(seen(of, next(number))))
+    node.graph.until(lambda: number_of(node.poses[-1]) == 500)
+    assert not {number_of(it) for it in node.poses} & set(unknown)
 
 
 def test_rectified_images_need_no_k(graph: Any, tmp_path: Path) -> None:
@@ -226,27 +224,30 @@ def test_rectified_images_need_no_k(graph: Any, tmp_path: Path) -> None:
     for it, (x, y) in zip(message.targets, undistorted(calibration(info()), centres), strict=True):
         it.x, it.y = x, y
     node.camera.publish(info(d=[], k=np.eye(3).ravel()))
-    node.says('poses', lambda: node.targets.publish(message))
+    node.says(lambda: node.targets.publish(message), 'poses')
     position = node.poses[-1].pose.pose.position
     found = np.array([position.x, position.y, position.z])
     assert found == pytest.approx(of.true.translation, abs=1e-3)
 
 
-@pytest.mark.parametrize(
-    ('given', 'words'),
-    [
-        ({}, "coordinates is '', accepted is a folder of ahf orient, its network.json, CSV or"),
-        ({'coordinates': '{}/points.json', 'unit': 'm'}, "unit is 'm', accepted is that of {}/p"),
-    ],
-)
-def test_bad_parameters_end_the_node_with_the_reason(
-    graph: Any, tmp_path: Path, given: dict[str, str], words: str
+def test_the_other_matrix_of_camera_info_is_noticed(
+    node: PoseProcess, numbers: Iterator[int]
 ) -> None:
-    coordinates(tmp_path / 'points.json', scene())
-    filled = {name: value.format(tmp_path) for name, value in given.items()}
-    status, errors = graph.start('pose', *overrides(**filled)).wait()
+    def image() -> None:
+        node.targets.publish(seen(scene(), next(numbers)))
+
+    node.camera.publish(info(d=[], p=[2e3, 0, 1200, 0, 0, 2e3, 1000, 0, 0, 0, 1, 0]))
+    node.says(image, 'p or r differ from k, as for rectified images, but camera_matrix is k')
+    node.camera.publish(info())
+    node.graph.node.create_subscription(Image, '/wrong/image_rect', lambda _: None, 1)
+    node.says(image, '/wrong/image_rect seems to be rectified, but camera_matrix is k')
+
+
+def test_bad_parameters_end_the_node_with_the_reason(graph: Any, tmp_path: Path) -> None:
+    file = coordinates(tmp_path / 'points.json', scene())
+    status, errors = graph.start('pose', *overrides(coordinates=file, unit='m')).wait()
     assert status == 1
-    assert words.format(tmp_path) in errors
+    assert f"unit is 'm', accepted is that of {file}" in errors
     assert len(errors.splitlines()) == 1
 
 
@@ -260,15 +261,15 @@ def test_tf_has_one_parent(graph: Any, tmp_path: Path, parent: str) -> None:
     node = PoseProcess(graph, space, file, *given, *topics)
     heard = graph.listen(TFMessage, f'{space}/tf', EVERY)
     node.camera.publish(info(header=Header(frame_id=frame)))
-    numbers = iter(range(10, 10**6, 10))
+    numbers = count(10, 10)
 
     def image() -> None:
         node.targets.publish(seen(of, next(numbers), frame=frame))
 
     def transformed() -> bool:
         image()
-        count = len(node.diagnostics)
-        graph.until(lambda: heard or len(node.diagnostics) > count)
+        before = len(node.diagnostics)
+        graph.until(lambda: heard or len(node.diagnostics) > before)
         return bool(heard)
 
     graph.until(transformed)
@@ -281,4 +282,4 @@ def test_tf_has_one_parent(graph: Any, tmp_path: Path, parent: str) -> None:
     other.transforms[0].header.frame_id = 'base'
     static = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     graph.node.create_publisher(TFMessage, f'{space}/tf_static', static).publish(other)
-    node.says(f"no tf: '{frames[child]}' has the parent 'base' already, accepted is one", image)
+    node.says(image, f"no tf: '{frames[child]}' has the parent 'base' already, accepted is one")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import array
+import re
 from pathlib import Path
 from typing import Any
 
@@ -52,6 +53,7 @@ def detector(graph: Any, tmp_path_factory: pytest.TempPathFactory) -> Talking:
     file.write_text('family: mine\nbits: 9\nband: [1.6, 2.4]\nwords: all\n')
     given = {
         'autostart': 'true',
+        'detector': 'traditional',  # as quick as can be
         'family': 'metashape12',
         'family_file': file,
         'qos_overrides./remedies/image.subscription.depth': 5,
@@ -158,6 +160,22 @@ def test_more_parameters_than_a_node_has_are_refused_at_once(
     assert detector.set(*[('seed', 7)] * count) == (False, results[0].reason)
 
 
+def test_an_image_that_a_decoder_fills_up_is_named_with_its_stamp(
+    graph: Any, detector: Talking
+) -> None:
+    assert detector.set(('image_transport', 'compressed')) == (True, '')
+    camera = graph.publisher(CompressedImage, '/remedies/image/compressed')
+    data = cv2.imencode('.jpg', render(SCENE).image)[1].tobytes()
+    cut = CompressedImage(header=header(), format='jpeg')
+    cut.data = array.array('B', data[: len(data) // 2] + data[-2:])
+    camera.publish(cut)
+    stamp = f'stamp {cut.header.stamp.sec}.000000000 s'
+    detector.says('1 images damaged, the last: the image is damaged: ', stamp)
+    graph.until(lambda: detector.targets[-1].header == cut.header)
+    assert detector.set(('image_transport', 'raw')) == (True, '')
+    graph.until(detector.image.get_subscription_count)
+
+
 def test_a_camera_that_is_faster_than_the_identification_is_a_warning(
     graph: Any, detector: Talking
 ) -> None:
@@ -177,22 +195,23 @@ def test_a_camera_that_is_faster_than_the_identification_is_a_warning(
     )
 
 
-def test_an_image_that_a_decoder_fills_up_is_named_with_its_stamp(graph: Any) -> None:
-    pytest.importorskip('ahf_ros.imaging.whole', reason='damage is not looked for')
-    given = overrides(image_transport='compressed', image_timeout=0)
-    detector = Talking(graph, '/cut', *given, subscribed=False)
-    camera = graph.publisher(CompressedImage, '/cut/image/compressed')
-    data = cv2.imencode('.jpg', render(SCENE).image)[1].tobytes()
-    cut = CompressedImage(header=header(), format='jpeg')
-    cut.data = array.array('B', data[: len(data) // 2] + data[-2:])
-    assert detector.diagnostics
-    camera.publish(cut)
-    stamp = f'stamp {cut.header.stamp.sec}.000000000 s'
-    detector.says('1 images damaged, the last: the image is damaged: ', stamp)
-    graph.until(lambda: detector.targets)
-    status, warnings = detector.process.end()
-    assert status == 0
-    assert f', {stamp}\n' in warnings
+def test_two_detectors_on_one_topic_or_of_one_name_say_so(graph: Any, detector: Talking) -> None:
+    named = '2 nodes are named /remedies/detector: give one another name by -r __node:=OTHER'
+    every = '/remedies/detector, /remedies/detector, /remedies/second'
+    on_one_topic = f'3 nodes publish on /remedies/coded_targets, {every}: give one another topic'
+    processes = []
+    for name, node in (('third', 'detector'), ('second', 'second')):
+        places = '-r', '__ns:=/remedies', '-r', f'__node:={node}', '-r', f'/diagnostics:=/{name}'
+        processes.append(graph.start('detector', *places, *overrides(image_timeout=0)))
+    for name, words in (('third', named), ('second', on_one_topic)):
+        said = graph.listen(DiagnosticArray, f'/{name}')
+        graph.until(lambda said=said, words=words: said and words in said[-1].status[0].message)
+        assert said[-1].status[0].level == DiagnosticStatus.WARN
+    detector.says(named)
+    for process, words in zip(processes, (named, on_one_topic), strict=True):
+        status, warnings = process.end()
+        assert status == 0
+        assert words in warnings
 
 
 def test_the_log_has_what_was_said(detector: Talking) -> None:
@@ -211,25 +230,6 @@ def test_the_log_has_what_was_said(detector: Talking) -> None:
     ):
         assert words in warnings
     assert 'remap' not in warnings
+    assert re.search(r', stamp \d+\.000000000 s\n', warnings)
     slower = 'because identification is slower than the camera: set queue to lossless'
     assert slower in detector.process.log
-
-
-def test_two_detectors_on_one_topic_or_of_one_name_say_so(graph: Any) -> None:
-    named = '2 nodes are named /twins/detector: give one another name by -r __node:=OTHER'
-    every = '/twins/detector, /twins/detector, /twins/second'
-    on_one_topic = f'3 nodes publish on /twins/coded_targets, {every}: give one another topic by'
-    expected = {'first': named, 'second': on_one_topic, 'third': named}
-    processes = []
-    for name in expected:
-        node = 'second' if name == 'second' else 'detector'
-        places = '-r', '__ns:=/twins', '-r', f'__node:={node}', '-r', f'/diagnostics:=/{name}'
-        processes.append(graph.start('detector', *places, *overrides(image_timeout=0)))
-    for name, words in expected.items():
-        said = graph.listen(DiagnosticArray, f'/{name}')
-        graph.until(lambda said=said, words=words: said and words in said[-1].status[0].message)
-        assert said[-1].status[0].level == DiagnosticStatus.WARN
-    for process, words in zip(processes, expected.values(), strict=True):
-        status, warnings = process.end()
-        assert status == 0
-        assert words in warnings

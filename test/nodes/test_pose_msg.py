@@ -21,9 +21,9 @@ from ahf_ros.nodes.pose_msg import (
     transform_message,
 )
 from ahf_ros.nodes.pose_settings import PoseNodeSettings
-from ahf_ros.nodes.tf_parents import Parents
+from ahf_ros.nodes.tf import Parents
 from ahf_ros.orientation.camera import rotation_matrices
-from ahf_ros.orientation.pose import Transform
+from ahf_ros.orientation.transform import Transform
 
 # vision_msgs is not among the wheels of ROS 2 on PyPI.
 FIELDS = {
@@ -128,13 +128,17 @@ def test_what_is_published_needs_its_packages(monkeypatch: pytest.MonkeyPatch) -
 @pytest.mark.parametrize(
     ('given', 'words'),
     [
+        (
+            {'coordinates': ''},
+            "coordinates is '', accepted is a folder of ahf orient",
+        ),
         ({'targets_frame': '/map'}, "targets_frame is '/map', accepted is a name without spaces"),
         ({'targets_frame': 'a b'}, "targets_frame is 'a b', accepted is a name without spaces"),
         ({'tf': 'map'}, "tf is 'map', accepted is one of none, camera, targets"),
         ({'camera_matrix': 'd'}, "camera_matrix is 'd', accepted is one of k, p"),
-        ({'unit': 'px'}, "unit is 'px', accepted is one of m, cm, mm, um, in, ft, or nothing"),
+        ({'unit': 'px'}, "unit is 'px', accepted is one of m, dm, cm, mm, um, µm, in, ft, or"),
     ],
 )
 def test_settings_name_what_is_accepted(given: dict[str, str], words: str) -> None:
     with pytest.raises(ValueError, match=words):
-        PoseNodeSettings(coordinates='a', **given)
+        PoseNodeSettings(**({'coordinates': 'a'} | given))

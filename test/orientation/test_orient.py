@@ -189,25 +189,25 @@ def test_portrait_and_landscape_are_two_cameras():
 
 
 def test_another_zoom_in_one_camera_is_said():
-    rotations, positions = ring(8, 35)
+    rotations, positions = ring(6, 35)
     calibrations = np.stack(
-        [pinhole(FOCAL * (1.2 if index == 7 else 1), 3000, 2000) for index in range(8)]
+        [pinhole(FOCAL * (1.2 if index == 5 else 1), 3000, 2000) for index in range(6)]
     )
-    camera, of = CameraView('camera', 3000, 2000), np.zeros(8, dtype=int)
-    points, random = field(30, 0.3), np.random.default_rng(1)
+    camera, of = CameraView('camera', 3000, 2000), np.zeros(6, dtype=int)
+    points, random = field(20, 0.3), np.random.default_rng(1)
     seen = photographed(points, rotations, positions, (camera,), of, calibrations, random)
     (solution,) = orient(seen.network)
-    assert any('7.png' in it and 'camera of their own' in it for it in solution.warnings)
+    assert any('5.png' in it and 'camera of their own' in it for it in solution.warnings)
     assert error(solution, points) < 1e-3
 
 
 @pytest.mark.parametrize('depth', [0.0, 0.3])
 def test_parallel_photographs_do_not_tell_the_focal_length(depth: float):
-    rotations = [looking(np.array([0, 0, -1.0]), 0)] * 6
-    positions = [np.array([x, y, 2.5]) for x in (-0.4, 0, 0.4) for y in (-0.3, 0.3)]
-    camera, of = CameraView('camera', 3000, 2000), np.zeros(6, dtype=int)
+    rotations = [looking(np.array([0, 0, -1.0]), 0)] * 4
+    positions = [np.array([x, y, 2.5]) for x in (-0.4, 0.4) for y in (-0.3, 0.3)]
+    camera, of = CameraView('camera', 3000, 2000), np.zeros(4, dtype=int)
     calibration = pinhole(FOCAL, 3000, 2000)[None]
-    points, random = field(30, depth), np.random.default_rng(1)
+    points, random = field(20, depth), np.random.default_rng(1)
     seen = photographed(points, rotations, positions, (camera,), of, calibration, random)
     with pytest.raises(ValueError, match=r'focal length.*tilted'):
         orient(seen.network)

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from ahf_ros import Target, resect
-from ahf_ros.orientation.camera import project, rotation_matrices
+from ahf_ros.orientation.camera import project
 from ahf_ros.orientation.points import MeasuredPoints
-from ahf_ros.orientation.pose import Transform
 from benchmarks.registration_pose import (
     CAMERA,
     View,
@@ -72,24 +71,6 @@ def test_covariances_are_about_the_fixed_axes_of_the_frame() -> None:
         # Standard deviations are 0.08 on the diagonal, 0.06 beside it.
         assert np.abs(whitened - np.eye(6)).max() < 0.25
         assert np.diag(covariance).min() > 0
-
-
-def test_the_inverse_of_the_inverse_is_the_transform() -> None:
-    root = seeded(1).normal(size=(6, 6))
-    of = Transform(
-        rotation_matrices(np.array([[0.3, -2.0, 1.0]]))[0], np.arange(3.0), root @ root.T
-    )
-    again = of.inverse.inverse
-    for name in ('rotation', 'translation', 'covariance'):
-        assert np.allclose(getattr(of, name), getattr(again, name))
-
-
-@pytest.mark.parametrize('vector', [(0, 0, 0), (3.1, 0, 0), (0, -3, 0.5), (0.2, 1, -2.9)])
-def test_quaternions_turn_as_rotations_do(vector: tuple[float, ...]) -> None:
-    rotation = rotation_matrices(np.array([vector], float))[0]
-    x, y, z, w = Transform(rotation, np.zeros(3), np.eye(6)).quaternion
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    assert np.allclose(np.eye(3) + 2 * w * cross + 2 * cross @ cross, rotation)
 
 
 def test_a_wrong_id_is_named_with_the_target_that_is_there() -> None:

@@ -11,7 +11,7 @@ from ahf_ros.registration.field import added, known_field
 from ahf_ros.registration.rigid import chi_square_limit
 from ahf_ros.registration.scan import Scan
 from ahf_ros.registration.session import Registration
-from support.scans import inverse, measured, relative, ring, squared_error, station
+from support.scans import measured, ring, squared_error, station
 
 SIGMA = 20e-6  # m
 COUNT, COMMON = 8, 6  # scans around the object, and targets that neighbours share
@@ -48,7 +48,7 @@ def registered(given: list[Scan]) -> Registration:
     return registration
 
 
-TRUE = [relative(station(number, COUNT), station(0, COUNT)) for number in range(COUNT)]
+TRUE = [station(0, COUNT).inverse @ station(number, COUNT) for number in range(COUNT)]
 
 
 @pytest.fixture(scope='module')
@@ -81,7 +81,7 @@ def test_covariances_of_targets_agree_with_their_errors(adjust: bool) -> None:
             registration.adjust()
         field = registration.field
         places = [int(it) // 100 * COMMON + int(it) % 100 for it in field.names]
-        error = (field.points - inverse(station(0, COUNT), true_points(seed)[places])).ravel()
+        error = (field.points - station(0, COUNT).inverse.moved(true_points(seed)[places])).ravel()
         squares.append(error @ np.linalg.solve(field.covariance, error))
     size = len(error)
     assert np.mean(squares) == pytest.approx(size, abs=4 * np.sqrt(2 * size / 20))

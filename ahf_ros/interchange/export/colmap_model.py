@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from ahf_ros.interchange.files import csv_table
-from ahf_ros.interchange.network_tables import quaternion
 from ahf_ros.orientation.camera import PARAMETERS
 from ahf_ros.orientation.solution import Solution
+from ahf_ros.orientation.transform import Transform
 
 _SHIFT = 0.5
 _GRAY = '128 128 128'
@@ -74,7 +74,7 @@ def _images(solution: Solution, points_of: list[list[int]]) -> list[str]:
         if not name.isprintable():
             raise ValueError(f'image is {name!r}, accepted is a name that prints')
         rotation = values.rotations[index]
-        x, y, z, w = quaternion(rotation)
+        x, y, z, w = Transform(rotation).quaternion
         numbers = [w, x, y, z, *(-rotation @ values.positions[index])]
         text = ' '.join(f'{number:.15g}' for number in numbers)
         lines.append(f'{index + 1} {text} {network.camera_of[index] + 1} {name}')
