@@ -8,10 +8,11 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 
-from benchmarks import registration_pose
+from benchmarks import registration_pose, registration_scans
 
 TABLES: dict[str, Callable[[int, int | None], list[str]]] = {
     'pose': lambda seed, runs: registration_pose.table(seed, runs or 1000),
+    'scans': lambda seed, runs: registration_scans.table(seed, runs or 1000),
 }
 
 
