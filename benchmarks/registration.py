@@ -12,7 +12,7 @@ from benchmarks import registration_pose, registration_scans
 
 TABLES: dict[str, Callable[[int, int | None], list[str]]] = {
     'pose': lambda seed, runs: registration_pose.table(seed, runs or 1000),
-    'scans': lambda seed, runs: registration_scans.table(seed, runs or 100),
+    'scans': lambda seed, runs: registration_scans.table(seed, runs or 1000),
 }
 
 
