@@ -68,8 +68,8 @@ def resect(
 ) -> Pose:
     """Return the pose of the camera of one image among targets of known coordinates.
 
-    A space resection by weighted least squares [1]_. Targets with wrong IDs are found by Baarda's
-    test [2]_, left out and named. A plane may have a second pose that fits as well [3]_.
+    A space resection by weighted least squares [4]_. Targets with wrong IDs are found by Baarda's
+    test [5]_, left out and named. A plane may have a second pose that fits as well [6]_.
 
     Parameters
     ----------
@@ -99,9 +99,9 @@ def resect(
 
     References
     ----------
-    .. [1] Förstner & Wrobel, Photogrammetric Computer Vision, Springer 2016, section 12.2.
-    .. [2] Baarda, A testing procedure for use in geodetic networks, 1968.
-    .. [3] Schweighofer & Pinz, IEEE Trans. PAMI 2006, 28, 2024.
+    .. [4] Förstner & Wrobel, Photogrammetric Computer Vision, Springer 2016, section 12.2.
+    .. [5] Baarda, A testing procedure for use in geodetic networks, 1968.
+    .. [6] Schweighofer & Pinz, IEEE Trans. PAMI 2006, 28, 2024.
 
     Examples
     --------
