@@ -28,7 +28,7 @@ def test_a_network_is_read_in_metres_with_its_whole_covariance(tmp_path: Path) -
 
 def test_a_network_without_scale_needs_a_unit(tmp_path: Path) -> None:
     write_network(tmp_path, solution(unit=''))
-    with pytest.raises(ValueError, match=r"unit is '' and .* has none, accepted is one of m, cm"):
+    with pytest.raises(ValueError, match=r"unit is '' and .* has none, accepted is one of m, dm"):
         read_coordinates(tmp_path)
     assert read_coordinates(tmp_path, 'cm').unit == 'm'
 
