@@ -9,8 +9,8 @@ import threading
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from tempfile import TemporaryFile
-from typing import IO
+from functools import cache
+from tempfile import mkstemp
 
 import cv2
 import numpy as np
@@ -30,6 +30,7 @@ _PADDED = re.compile(r'(\d+) extraneous bytes before marker 0xd9')
 _PADDING = 16  # bytes after the data of all pixels, as some webcams send them
 
 _lock = threading.Lock()
+_passed = 0  # bytes that were held back and passed on
 
 
 def damage(data: bytes) -> str:
@@ -72,37 +73,44 @@ def decoded(data: np.ndarray, flags: int) -> tuple[np.ndarray | None, str]:
 def _standard_error() -> Iterator[list[str]]:
     """Hold back what this process writes to standard error, and return its lines at the end.
 
-    All others than those of decoders about damage are written afterwards.
+    All others than those of decoders about damage are written afterwards; what another thread was
+    writing at that moment follows with the next image.
     """
+    global _passed
     lines: list[str] = []
     try:
-        original = os.dup(2)
-    except OSError:  # it is closed
+        held, original = _scratch_file(), os.dup(2)
+    except OSError:  # there is no room, or standard error is closed
         yield lines
         return
     try:
-        with _scratch_file() as held:
-            os.dup2(held.fileno(), 2)
-            try:
-                yield lines
-            finally:
-                os.dup2(original, 2)
-            held.seek(0)
-            written = held.read()
-            for line in written.splitlines(keepends=True):
-                text = line.decode(errors='replace')
-                lines.append(text)
-                if not _SAID.search(text):
-                    with suppress(OSError):  # nobody reads it any more
-                        os.write(original, line)
+        os.dup2(held, 2)
+        try:
+            yield lines
+        finally:
+            os.dup2(original, 2)
+        os.lseek(held, _passed, os.SEEK_SET)  # writes are appended, wherever this is
+        written = os.read(held, os.fstat(held).st_size)
+        _passed += len(written)
+        for line in written.splitlines(keepends=True):
+            text = line.decode(errors='replace')
+            lines.append(text)
+            if not _SAID.search(text):
+                with suppress(OSError):  # nobody reads it any more
+                    os.write(original, line)
     finally:
         os.close(original)
 
 
-def _scratch_file() -> IO[bytes]:
-    if hasattr(os, 'memfd_create'):  # not on macOS
-        return os.fdopen(os.memfd_create('standard error'), 'w+b')
-    return TemporaryFile()
+@cache
+def _scratch_file() -> int:
+    """Return the descriptor of a file of this process to which every write is appended."""
+    made, name = mkstemp(prefix='ahf_')
+    os.close(made)
+    descriptor = os.open(name, os.O_RDWR | os.O_APPEND | getattr(os, 'O_BINARY', 0))
+    with suppress(OSError):  # Windows removes no open file
+        os.unlink(name)  # noqa: PTH108
+    return descriptor
 
 
 def _jpeg_ends(data: bytes) -> bool:

@@ -116,4 +116,5 @@ def test_others_may_write_to_standard_error_meanwhile(capfd):
     while writer.is_alive():
         assert decoded_damage(whole) == ''
     writer.join()
+    decoded_damage(whole)  # passes on what was being written during the last image
     assert sorted(capfd.readouterr().err.splitlines()) == sorted(lines)
