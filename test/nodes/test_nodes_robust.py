@@ -196,7 +196,7 @@ def test_any_message_is_answered_or_rejected(graph: Any) -> None:
         lambda: int(bench.told('answered')) + int(bench.told('rejected')) == len(drawn) >= 100
     )
     graph.until(lambda: len(answers) == int(bench.told('answered')))
-    assert len(answers) > 5
+    assert answers
     status, log = bench.process.end()
     assert (status, 'Traceback' in log) == (0, False), log
 
