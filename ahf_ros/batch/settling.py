@@ -44,8 +44,7 @@ def settled_tasks(engine: Engine, tasks: Sequence[ImageTask]) -> Sequence[ImageT
 
 def _looking(task: ImageTask) -> IdentificationSettings:
     """Return the settings with which a task is looked at: without a search for a filter."""
-    counted = task.settings.adaptive.listed or task.settings.expected_targets
-    if counted or task.settings.estimate_expected:
+    if task.settings.number or task.settings.estimate_expected:
         return updated(task.settings, _LOOK)
     return task.settings  # which leads to no search
 

@@ -12,7 +12,7 @@ import numpy as np
 from ahf_ros.interchange.camera_files import CameraFile
 from ahf_ros.interchange.exif import Exif
 from ahf_ros.interchange.observation_files import ObservedPhotograph
-from ahf_ros.interchange.tables import read_table
+from ahf_ros.interchange.tables import read_by_image
 from ahf_ros.orientation.network import CameraView
 
 
@@ -36,13 +36,7 @@ class CameraKnowledge:
 
 def read_cameras(path: str | Path) -> dict[str, str]:
     """Return the name of the camera of each photograph, from a table with image and camera."""
-    _, rows = read_table(path, ('image', 'camera'))
-    cameras: dict[str, str] = {}
-    for row in rows:
-        image, camera = row.text('image'), row.text('camera')
-        if cameras.setdefault(image, camera) != camera:
-            raise ValueError(f'{row.where}: {image} has two cameras, accepted is one')
-    return cameras
+    return read_by_image(path, 'camera')
 
 
 def camera_views(

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ahf_ros.interchange.files import write_whole
-from ahf_ros.interchange.tables import Row, one_of, read_table
+from ahf_ros.interchange.tables import Row, one_of, read_by_image, read_table
 from ahf_ros.orientation.camera import rotation_matrices
 from ahf_ros.orientation.network import FloatArray
 from ahf_ros.orientation.transform import Transform, rotation_vector
@@ -66,13 +66,7 @@ def _by_vector(row: Row) -> FloatArray:
 
 def read_stations(path: str | Path) -> dict[str, str]:
     """Return the station of each image: those of one station were taken at the same time."""
-    _, rows = read_table(path, ('image', 'station'))
-    stations: dict[str, str] = {}
-    for row in rows:
-        image, station = row.text('image'), row.text('station')
-        if stations.setdefault(image, station) != station:
-            raise ValueError(f'{row.where}: {image} has two stations, accepted is one')
-    return stations
+    return read_by_image(path, 'station')
 
 
 def frame_name(text: str) -> str:

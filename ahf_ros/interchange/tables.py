@@ -93,6 +93,17 @@ def read_table(path: str | Path, required: Collection[str]) -> tuple[tuple[str, 
     return columns, rows
 
 
+def read_by_image(path: str | Path, column: str) -> dict[str, str]:
+    """Return the text of a column for each image, from a table with image and that column."""
+    _, rows = read_table(path, ('image', column))
+    found: dict[str, str] = {}
+    for row in rows:
+        image, text = row.text('image'), row.text(column)
+        if found.setdefault(image, text) != text:
+            raise ValueError(f'{row.where}: {image} has two {column}s, accepted is one')
+    return found
+
+
 def one_of(path: str | Path, columns: Collection[str], groups: Collection[tuple[str, ...]]) -> int:
     """Return the number of the group of columns that a table has, -1 if it has none of them.
 

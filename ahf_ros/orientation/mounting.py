@@ -179,8 +179,8 @@ class _Model:
             for station in self.stations:
                 mounts[station.camera] = station.robot.inverse @ field @ station.seen
             return mounts, fields, 1.0 if scale is None else scale
-        found: dict[str, tuple[FloatArray, FloatArray, float]] = {}
-        for camera in {it.camera for it in self.stations}:
+        sizes = []
+        for camera in sorted({it.camera for it in self.stations}):
             mine = [it for it in self.stations if it.camera == camera]
             if len({it.place for it in mine}) < FEWEST_STATIONS:
                 raise ValueError(
@@ -194,8 +194,8 @@ class _Model:
             else:
                 mounts[camera] = mount
                 fields.setdefault('', base)
-            found[camera] = mount.translation, base.translation, size
-        return mounts, fields, float(np.median([it[2] for it in found.values()]))
+            sizes.append(size)
+        return mounts, fields, float(np.median(sizes))
 
     def _names(self, station: Station) -> tuple[str, str]:
         return ('', station.camera) if self.targets_on_hand else (station.camera, '')
