@@ -8,7 +8,6 @@ of photographs, and `colmap` needs pycolmap.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable
 
 from benchmarks import (
@@ -21,6 +20,7 @@ from benchmarks import (
     network_scale,
     network_starts,
 )
+from benchmarks.report import print_chosen
 
 TABLES: dict[str, Callable[[int, int | None], list[str]]] = {
     'camcal': lambda seed, runs: network_camcal.table(),
@@ -37,12 +37,7 @@ TABLES: dict[str, Callable[[int, int | None], list[str]]] = {
 
 def main() -> None:
     """Print the chosen table."""
-    parser = argparse.ArgumentParser(description=__doc__.split('\n\n', maxsplit=1)[0])
-    parser.add_argument('--table', choices=sorted(TABLES), required=True)
-    parser.add_argument('--seed', type=int, default=301)
-    parser.add_argument('--runs', type=int, help='runs of each row, where a table has runs')
-    options = parser.parse_args()
-    print('\n'.join(TABLES[options.table](options.seed, options.runs)))
+    print_chosen(TABLES, __doc__)
 
 
 if __name__ == '__main__':

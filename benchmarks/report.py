@@ -6,7 +6,7 @@ import argparse
 import json
 import os
 import platform
-from collections.abc import Iterable, Iterator, Sequence, Sized
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Sized
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -20,6 +20,18 @@ FIRST_TEST_SEED = 101
 
 Report = dict[str, Any]
 Item = TypeVar('Item')
+
+
+def print_chosen(
+    tables: Mapping[str, Callable[[int, int | None], list[str]]], about: str | None
+) -> None:
+    """Print the table that the command line names, of a seed and perhaps a number of runs."""
+    made = argparse.ArgumentParser(description=(about or '').split('\n\n', maxsplit=1)[0])
+    made.add_argument('--table', choices=sorted(tables), required=True)
+    made.add_argument('--seed', type=int, default=301)
+    made.add_argument('--runs', type=int, help='runs of each row, where a table has runs')
+    options = made.parse_args()
+    print('\n'.join(tables[options.table](options.seed, options.runs)))
 
 
 def parser(description: str | None, *, seeds: bool = True) -> argparse.ArgumentParser:
