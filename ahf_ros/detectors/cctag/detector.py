@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
+import cv2
 import numpy as np
 
 from ahf_ros.blas import one_blas_thread
@@ -26,15 +27,16 @@ from ahf_ros.features.dot_search import voted_dots, whole_dots
 from ahf_ros.features.dots import NO_DOTS, Dots
 from ahf_ros.features.ellipse_targets import ellipse_fields, targets_from_frames
 from ahf_ros.features.large_targets import targets_of_octaves
-from ahf_ros.features.log_edges import find_edges
+from ahf_ros.features.log_edges import LogEdges, find_edges
 from ahf_ros.features.pyramid import ImagePyramid, Octave, image_pyramid
 from ahf_ros.imaging.image import as_gray, check_image
 from ahf_ros.target import UNDECODED, Target, sorted_targets
 
 _GAIN = 2  # of ln I, for circles that blur makes gray
 _INNERMOST = 0.25  # of the radii of circles that are looked for
-_COMMON_CENTRE = 8.0, 20.0  # radii of targets whose rings vote together for their centre, px
-_COMMON_CENTRE_STEP, _COMMON_CENTRE_VOTES, _COMMON_CENTRE_SIZES = 1.0, 1.5, 1.25
+_COMMON_CENTRE = (8.0, 11.3), (11.3, 20.0)  # radii of targets whose rings vote together, px
+_COMMON_CENTRE_STEP, _COMMON_CENTRE_VOTES, _COMMON_CENTRE_SIZES = 1.0, 1.0, 1.25
+_FAINT = 3.0  # of their contrast, which narrow rings have little of
 _TELLING = 0.98  # confidence of targets that tell of others
 _PROBABLE = 0.5  # confidence of targets that tell of edges together
 _ROUNDS = 2  # in which doubtful targets are read with what others tell
@@ -204,20 +206,29 @@ def _circles(octave: Octave) -> Dots:
 def _common_centres(octave: Octave) -> Dots:
     """Return circles of several radii, about the points that the edges of many circles face.
 
-    Narrow rings are too close for a dot to be told from the next. What they share is the centre.
-    The colour is unknown.
+    Narrow rings are too close for a dot to be told from the next, and blur takes their contrast.
+    What they share is the centre. The colour is unknown.
     """
-    low, high = max(octave.radii[0], _COMMON_CENTRE[0]), _COMMON_CENTRE[1]
-    if octave.level or low >= high:
+    if octave.level:
         return NO_DOTS
     log = octave.pyramid.logs[0]
-    edges = find_edges(log).curved(2 * high)
+    edges = find_edges(cv2.addWeighted(log, _FAINT, log, 0.0, -_FAINT * cv2.mean(log)[0]))
+    found = [NO_DOTS]
+    for low, high in _COMMON_CENTRE:
+        low, high = max(octave.radii[0], low), min(octave.radii[1], high)
+        if low < high:
+            found.append(_centres(edges.curved(2 * high), low, high))
+    return Dots.joined(found)
+
+
+def _centres(edges: LogEdges, low: float, high: float) -> Dots:
+    """Return circles of radii between bounds, about what edges within the upper one face."""
     steps = np.arange(_COMMON_CENTRE_STEP, high, _COMMON_CENTRE_STEP, dtype=np.float32)
     steps = np.concatenate([-steps, steps])[:, None]
     margin = int(high) + 2
     columns = (edges.x + np.float32(margin + 0.5) + steps * edges.unit_x).astype(np.int32).ravel()
     rows = (edges.y + np.float32(margin + 0.5) + steps * edges.unit_y).astype(np.int32).ravel()
-    tall, wide = (side + 2 * margin for side in log.shape)
+    tall, wide = (side + 2 * margin for side in edges.marked.shape)
     needed = _COMMON_CENTRE_VOTES * 2 * np.pi * low
     peaks = find_peaks(columns, rows, (1, tall, wide), needed, int(low / 2))
     radii = np.exp(np.arange(np.log(low), np.log(high), np.log(_COMMON_CENTRE_SIZES)))

@@ -38,9 +38,10 @@ _CLOSE, _CLOSE_WEIGHT = 1.0, 0.02  # px from an edge of light, and what is left 
 _DARKEST = 0.03  # ink, of the brightness of paper, in logarithms
 
 
-def lit(gray: np.ndarray, frames: np.ndarray) -> np.ndarray:
+def lit(gray: np.ndarray, frames: np.ndarray, lights) -> np.ndarray:
     """Return the gray values of rays, each in its own light, float32, shape (k, rays, n)."""
     values = np.maximum(sample_circles(gray, frames, ANGLES, PROFILE), 0)
+    values /= lights.at(frames, ANGLES, PROFILE)
     lit: np.ndarray = values / np.maximum(values.mean(axis=2, keepdims=True), 1)
     return lit
 

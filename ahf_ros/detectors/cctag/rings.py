@@ -15,12 +15,12 @@ from itertools import product
 import numpy as np
 
 from ahf_ros.codes.cctag import CircleFamily
+from ahf_ros.detectors.cctag.light import Lights
 from ahf_ros.detectors.cctag.rays import (
     ALONG,
     ANGLES,
     PROFILE,
     Rays,
-    evenly_lit_rays,
     lit,
     normal_share,
     robust_rays,
@@ -48,7 +48,6 @@ _SCALES = (0.93, 0.965, 1.0, 1.035, 1.07)  # of the radius, about a frame
 _READINGS = 5  # IDs that are brought onto the image from a frame
 _REPEATS, _STAYING = 6, 0.1  # until the square of a move is a small part of the variance
 _OUTLIERS = 12.0, 8.0, 5.0, 3.0, 3.0  # deviations that quarter a weight, in rounds of Gauss-Newton
-_NEAR = 5.0  # deviations, from which on edges of light are told from rings
 _MAXIMUM_CHANGE = 0.08  # of a frame in a round, radii
 _PERSPECTIVE = 5e-4  # change of scale along a px where tilted by 45 degrees: 1 / focal length, px
 _LEAST_TILT = 0.1  # tangent of the tilt that a circular target may have
@@ -210,10 +209,11 @@ def _by_size(frames: np.ndarray) -> list[tuple[int, np.ndarray]]:
 
 
 def _profiles(
-    gray: np.ndarray, frames: np.ndarray, polarity: int, angles: np.ndarray, along: np.ndarray
+    gray: np.ndarray, frames: np.ndarray, polarity: int, angles: np.ndarray, along: np.ndarray, lights=None
 ) -> np.ndarray:
     """Return the mean profiles of rays, each in its own light, ink downwards, shape (k, n)."""
     values = np.maximum(sample_circles(gray, frames, angles, along), 0)
+    if lights is not None: values /= lights.at(frames, angles, along)
     values /= np.maximum(values.mean(axis=2, keepdims=True), 1)
     means: np.ndarray = polarity * values.mean(axis=1, dtype=np.float64)
     return means
@@ -272,26 +272,29 @@ def identify(
     """Return the best reading of each target about outermost circles, known to about a tenth."""
     if not len(frames):
         return NOTHING
-    starts, ids, shift = _likely_ids(gray, frames, polarity, family, prior)
+    lights = Lights.about(gray, frames)
+    starts, ids, shift = _likely_ids(gray, lights.moved, polarity, family, prior, lights)
     # The likeliest ID often brings the frame to its place even if it is the wrong one.
-    first = align(gray, starts[:, 0], ids[:, 0], shift[:, 0], family, prior)
+    first = align(gray, starts[:, 0], ids[:, 0], shift[:, 0], family, prior, lights)
     likely = first.of_target > _HOPELESS[0]
-    again = _likely_ids(gray, first.frames[likely], polarity, family, prior)
+    lights = Lights.about(gray, first.frames[likely])
+    again = _likely_ids(gray, lights.moved, polarity, family, prior, lights)
     starts, ids, shift = (
         np.concatenate([more, of[likely]], axis=1)
         for of, more in zip((starts, ids, shift), again, strict=True)
     )
     few = np.arange(ids.shape[1]) < _FEW_READINGS
     tried = np.nonzero(np.broadcast_to(few, ids.shape))
-    first = align(gray, starts[tried], ids[tried], shift[tried], family, prior)
+    first = align(gray, starts[tried], ids[tried], shift[tried], family, prior, lights.select(tried[0]))
     possible = first.of_target.reshape(-1, _FEW_READINGS).max(axis=1) > _HOPELESS[1]
     if not possible.any():
         return NOTHING
     first = first.select(np.repeat(possible, _FEW_READINGS))
     starts, ids, shift = (of[possible] for of in (starts, ids, shift))
+    lights = lights.select(possible)
     tried = np.nonzero(np.broadcast_to(few, ids.shape))
     others = np.nonzero(_unlike_before(ids) & ~few)
-    more = align(gray, starts[others], ids[others], shift[others], family, prior)
+    more = align(gray, starts[others], ids[others], shift[others], family, prior, lights.select(others[0]))
     every = Aligned.joined([first, more])
     rows, columns = np.concatenate([tried, others], axis=1)
     independent = frame.mean_radii(starts[:, 0]) * np.ptp(PROFILE) / _INDEPENDENT
@@ -302,7 +305,7 @@ def identify(
     index[rows, columns] = np.arange(len(rows))
     best = every.select(index[np.arange(len(ids)), cost.argmin(axis=1)])
     next_best = np.where(ids == best.ids[:, None], np.inf, cost).min(axis=1)
-    best = _settled(gray, best, family, prior)
+    best = _settled(gray, best, family, prior, lights)
     best = replace(best, margin=next_best - cost.min(axis=1))
     return best.select(best.colour == polarity)
 
@@ -314,12 +317,12 @@ def _unlike_before(ids: np.ndarray) -> np.ndarray:
     return unlike
 
 
-def _settled(gray: np.ndarray, rings: Aligned, family: CircleFamily, prior: Prior) -> Aligned:
+def _settled(gray: np.ndarray, rings: Aligned, family: CircleFamily, prior: Prior, lights: Lights) -> Aligned:
     """Return rings brought onto the image until they stay; what still moves is as uncertain."""
     moving = np.arange(len(rings.ids))
     for _ in range(_REPEATS):
         some = rings.select(moving)
-        again = align(gray, some.frames, some.ids, some.shift, family, prior)
+        again = align(gray, some.frames, some.ids, some.shift, family, prior, lights.select(moving))
         away = again.frames[:, :2, 2] - some.frames[:, :2, 2]
         spread = away[:, :, None] * away[:, None]
         again = replace(again, covariance=again.covariance + spread)
@@ -334,7 +337,7 @@ def _settled(gray: np.ndarray, rings: Aligned, family: CircleFamily, prior: Prio
 
 
 def _likely_ids(
-    gray: np.ndarray, frames: np.ndarray, polarity: int, family: CircleFamily, prior: Prior
+    gray: np.ndarray, frames: np.ndarray, polarity: int, family: CircleFamily, prior: Prior, lights: Lights,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return frames, (k, n, 3, 3), of IDs that profiles are like, (k, n), and shifts of edges."""
     weight = np.sqrt(PROFILE / PROFILE.sum())
@@ -342,7 +345,7 @@ def _likely_ids(
     shares, shifts = np.empty(shape), np.empty(shape)
     scaled = np.stack([frame.scaled(frames, np.full(len(frames), of)) for of in _SCALES])
     for of_scale, share, shift in zip(scaled, shares, shifts, strict=True):
-        profiles = _profiles(gray, of_scale, polarity, ANGLES, PROFILE) * weight
+        profiles = _profiles(gray, of_scale, polarity, ANGLES, PROFILE, lights) * weight
         for step, some in _by_size(of_scale):
             templates, of_shift = _templates(family, step, *prior.tried)
             found = _shares(profiles[some], templates, weight, PROFILE)
@@ -377,15 +380,18 @@ def align(
     shift: np.ndarray,
     family: CircleFamily,
     prior: Prior = _USUAL,
+    lights: Lights | None = None,
 ) -> Aligned:
     """Bring the rings of IDs (k,) onto an image from frames (k, 3, 3), known to about a tenth.
 
     `shift`, shape (k,), is the growth of ink to begin with, px.
     """
+    if lights is None:
+        lights = Lights.about(gray, frames)
     parts = [slice(start, start + _PART[1]) for start in range(0, len(frames), _PART[1])]
     return Aligned.joined(
         [NOTHING]
-        + [_aligned(gray, frames[part], ids[part], shift[part], family, prior) for part in parts]
+        + [_aligned(gray, frames[part], ids[part], shift[part], family, prior, lights.select(part)) for part in parts]
     )
 
 
@@ -396,20 +402,16 @@ def _aligned(
     shift: np.ndarray,
     family: CircleFamily,
     prior: Prior,
+    lights: Lights,
 ) -> Aligned:
     """Return what `align` does, by Gauss-Newton with robust weights."""
     count = len(frames)
     blur = np.full(count, prior.blur)
     for outlier in _OUTLIERS:
         size = frame.mean_radii(frames)
-        values = lit(gray, frames)
+        values = lit(gray, frames, lights)
         ink, slope, by_shift, by_blur = _rings(family, ids, size, shift, blur)
-        near = outlier <= _NEAR  # light is told from rings
-        rays = (
-            evenly_lit_rays(values, ink, size.astype(np.float32), outlier)
-            if near
-            else robust_rays(values, ink, outlier)
-        )
+        rays = robust_rays(values, ink, outlier)
         by_radius = [slope, slope * ALONG, slope * ALONG**2]
         normal, right = rays.equations(np.stack([*by_radius, by_shift, by_blur], axis=1), ink)
         variance = (rays.weight * rays.errors**2).sum(axis=(1, 2)) / rays.weight.sum(axis=(1, 2))
@@ -435,7 +437,7 @@ def _aligned(
     covariance = np.linalg.inv(normal)[:, :2, :2]
     affine = frame.local_affine(frames)
     covariance = affine @ covariance @ affine.transpose(0, 2, 1) + _SYSTEMATIC**2 * np.eye(2)
-    values = lit(gray, frames)
+    values = lit(gray, frames, lights)
     ink = _rings(family, ids, frame.mean_radii(frames), shift, blur)[0]
     rays = Rays.of(values, ink, np.broadcast_to(ALONG, values.shape))
     squares = (of**2 @ ALONG for of in (rays.errors, rays.deviations(values)))
