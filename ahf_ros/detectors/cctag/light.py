@@ -1,9 +1,9 @@
 """The light on a CCTag, found without its ID.
 
-What is printed depends on the radius only: gray values that change along a circle show the light.
-Its logarithm is taken as smooth but for a few edges, each a part of a circle or a straight line,
-in the plane of the target. The edges are found one by one, each as the best of many, and fitted
-together.
+What is printed depends on the radius only: gray values that change along a circle show the light,
+or that the circle is not in its place. The logarithm of the light is taken as a slope with a few
+edges, each a part of a circle or of a straight line in the plane of the target. They are found one
+after the other, each as the best of many, and fitted together with the place.
 """
 
 from __future__ import annotations
@@ -21,24 +21,28 @@ from ahf_ros.features.array_record import ArrayRecord
 from ahf_ros.features.sampling import sample_circles
 
 _ANGLES, _RADII = ANGLES[::2], PROFILE[::2].astype(np.float32)
-_X, _Y = (np.outer(of, _RADII).astype(np.float32) for of in (np.cos(_ANGLES), np.sin(_ANGLES)))
-_AROUND = np.stack([np.cos(_ANGLES)[:,None]+0*_RADII, np.sin(_ANGLES)[:,None]+0*_RADII, np.outer(np.cos(2*_ANGLES),_RADII), np.outer(np.sin(2*_ANGLES),_RADII)]).astype(np.float32)
-_OTHERS = 6
-_PAPER = 2 * int(np.searchsorted(_RADII[::2], 1.16))
-_FEW = np.s_[..., ::2]  # radii, for a first look
+_STEP = float(_RADII[1] - _RADII[0])
+_X, _Y = (np.outer(of(_ANGLES), _RADII).astype(np.float32) for of in (np.cos, np.sin))
+_MOVES = (0, 1, 3, 4)  # of a frame, that change what is on a circle
+_AROUND = frame.displacement_basis(_ANGLES, np.ones(len(_ANGLES)))[:, _MOVES].T[..., None]
+_AROUND = (_AROUND * np.stack([np.ones_like(_RADII)] * 2 + [_RADII] * 2)[:, None]).astype('f4')
+_OTHERS = 6  # heights that are not of edges: slopes and moves
 _EDGES = 3
-_WIDTH = 1.15  # standard deviation of an edge of light, px
-_SHARPEST = 0.05  # radii, that samples show
+_WIDTH, _SHARPEST = 1.15, 0.05  # standard deviation of an edge, px, and in radii, for samples
+_LENS = 0.75  # blur after light and ink have met, px
+_FEW = np.s_[..., ::2]  # radii, for a first look
+_PAPER = 2 * int(np.searchsorted(_RADII[_FEW], 1.16))  # radii from there on show plain paper
 _SIZES = 1.1  # ratio of radii that share the edges of a first look
 _OFFSETS = np.arange(-1.2, 1.21, 0.1)
 _STRAIGHT, _CURVED, _CURVATURE = 16, 24, 0.7
-_TOP = 40
+_FIRST = 40  # edges that are tried with all others
 _SHOWN = 0.15  # length of an edge that is looked for, of the longest
-_ROUNDS = 6
-_DEVIATIONS = 0.3, 0.3, 0.4  # of direction, offset and curvature, from the best of a first look
-_MOST_CURVED = 1.2
-_MOST_MOVED = 0.2  # in a round
-_EVIDENCE = 25.0  # twice the likelihood, in ln, that an edge adds
+_ROUNDS = 5
+_DEVIATIONS = 0.3, 0.3, 0.4, 0.3  # of direction, offset, curvature and ln of width
+_USUAL_MOVES = 1e-3  # weight of none
+_MOST_CURVED, _MOST_MOVED = 1.2, 0.2  # the latter in a round
+_HIGHEST, _MOST_LIGHT = 2.5, 4.0  # ln of an edge, and of light
+_EVIDENCE = 25.0  # twice the ln of the likelihood, that an edge adds
 _LEAST_VARIANCE = 0.003**2
 _BRIGHTEST = 2.0  # gray value, of the mean, that has more weight than others
 
@@ -48,8 +52,10 @@ class Lights(ArrayRecord):
     """The light about k targets, in radii of frames."""
 
     frames: np.ndarray  # (k, 3, 3)
-    heights: np.ndarray  # (k, 4 + e), of ln I: x, y, x^2 - y^2, 2 x y, and edges; 0 for none
-    edges: np.ndarray  # (k, e, 3): direction, rad, offset and curvature
+    heights: np.ndarray  # (k, 2 + e), of ln I: slopes, and edges, 0 for none
+    edges: np.ndarray  # (k, e, 5): direction, rad, offset, curvature, height, ln of width
+    slope: np.ndarray  # (k, n), of what is the same all around, by the radius
+    uneven: np.ndarray  # (k,), variance that is left on circles, of that of their means
     moved: np.ndarray  # (k, 3, 3), frames in the middle of what is the same all around
 
     def at(self, frames: np.ndarray, angles: np.ndarray, radii: np.ndarray) -> np.ndarray:
@@ -57,218 +63,285 @@ class Lights(ArrayRecord):
         there = np.linalg.inv(self.frames) @ frames
         points = frame.project(there, frame.circle_points(angles, radii)).astype(np.float32)
         x, y = (of[:, None] for of in np.moveaxis(points, -1, 0))
-        heights = self.heights.astype(np.float32)
-        light = (heights[:, :2, None, None] * _smooth(x, y)).sum(axis=1)
-        width = _widths(frame.mean_radii(self.frames))
+        heights = self.heights.astype(np.float32)[..., None, None]
+        light = heights[:, 0] * x[:, 0] + heights[:, 1] * y[:, 0]
+        size = frame.mean_radii(self.frames)
         for number in range(self.edges.shape[1]):
             some = np.flatnonzero(heights[:, 2 + number])
-            step = _steps(self.edges[some, number : number + 1], x[some], y[some], width[some])
-            light[some] += heights[some, 2 + number, None, None] * step[:, 0]
-        return np.exp(light)
+            edge = self.edges[some, number : number + 1]
+            step = _steps(edge, x[some], y[some], _widths(size[some]))[:, 0]
+            light[some] += heights[some, 2 + number] * step
+        slope = np.empty((len(light), len(radii)))
+        for own, known in zip(slope, self.slope, strict=True):
+            own[:] = np.interp(radii, _RADII, known)
+        light += _mixed(light, slope, _LENS / size, radii[1] - radii[0])
+        return np.exp(light.clip(-_MOST_LIGHT, _MOST_LIGHT))
 
     @staticmethod
     def about(gray: np.ndarray, frames: np.ndarray) -> Lights:
         """Return the light about targets whose frames, (k, 3, 3), are known to about a tenth."""
-        size = frame.mean_radii(frames)
-        if not len(frames):
-            return Lights(frames, np.zeros((0, 2 + _EDGES)), np.zeros((0, _EDGES, 3)), frames)
-        values = np.maximum(sample_circles(gray, frames, _ANGLES, _RADII), 1)
-        bright = np.minimum(values / values.mean(axis=(1, 2), keepdims=True), _BRIGHTEST)
-        weight = _RADII * bright**2  # noise is that of gray values
-        weight /= weight.sum(axis=(1, 2), keepdims=True)
-        values, area = np.log(values), np.pi * (_RADII[-1] * size) ** 2
-        scene = _Scene(values, weight, _widths(size), area, _slopes(values, weight))
-        edges, heights = np.zeros((len(size), _EDGES, 3)), np.zeros((len(size), _OTHERS + _EDGES))
-        fit = scene.fit(edges[:, :0])
-        heights[:, :_OTHERS] = fit.heights
-        rows = np.arange(len(size))
-        plain = _less_means(values - (fit.heights[:, :2, None, None] * _smooth(_X, _Y)).sum(axis=1), weight, _PAPER)
-        for number in range(_EDGES):
-            first = scene.first_look(plain[rows], size[rows], number) if number < 2 else np.concatenate([fit.edges, scene.first_look(fit.rest, size[rows], 0)], axis=1)
+        count, size = len(frames), frame.mean_radii(frames)
+        edges, heights = np.zeros((count, _EDGES, 5)), np.zeros((count, _OTHERS + _EDGES))
+        slope, left = np.zeros((count, len(_RADII)), np.float32), np.zeros(count)
+        if count:
+            scene = _Scene.of(gray, frames, size)
+            fit = scene.fit(edges[:, :0])
+            slope[:], left[:], heights[:, :_OTHERS] = scene.slope, fit.variance, fit.heights
+            tilt = np.einsum('ks,smn->kmn', fit.heights[:, :2], np.stack([_X, _Y]))
+            plain = _less_means(scene.values - tilt, scene.weight, _PAPER)
+            rows = np.arange(count)
+        for number in range(_EDGES if count else 0):
+            if number < 2:
+                first = _first_look(plain[rows], size[rows], number + 1)
+            else:
+                first = _first_look(fit.rest, size[rows], 1)
+                first = np.concatenate([fit.edges, first], axis=1)
             more = scene.settled(first)
-            gain = scene.area * np.log(fit.variance / more.variance)
-            better = gain > _EVIDENCE
-            rows, scene, more = rows[better], scene.select(better), more.select(better)
-            if not len(rows):
+            better = scene.area * np.log(fit.variance / more.variance) > _EVIDENCE
+            if not better.any():
                 break
-            scene = scene.without(more)
+            rows, more = rows[better], more.select(better)
+            scene = scene.select(better).in_light(more)
             fit = scene.fit(more.edges)
-            edges[rows, : number + 1], heights[rows, : _OTHERS + number + 1] = fit.edges, fit.heights
-        changes = np.zeros((len(size), 5))
-        changes[:, [0, 1, 3, 4]] = np.clip(heights[:, 2:_OTHERS], -_MOST_MOVED, _MOST_MOVED)
-        return Lights(frames, heights[:, [0, 1, *range(_OTHERS, _OTHERS + _EDGES)]], edges, frame.moved(frames, changes))
+            slope[rows], left[rows] = scene.slope, fit.variance
+            edges[rows, : number + 1] = fit.edges
+            heights[rows, : _OTHERS + number + 1] = fit.heights
+        changes = np.zeros((count, 5))
+        changes[:, _MOVES] = np.clip(heights[:, 2:_OTHERS], -_MOST_MOVED, _MOST_MOVED)
+        of_light = np.delete(heights, np.s_[2:_OTHERS], axis=1)
+        uneven = left / _power(slope)
+        return Lights(frames, of_light, edges, slope, uneven, frame.moved(frames, changes))
+
+
+def lit(gray: np.ndarray, frames: np.ndarray, lights: Lights) -> np.ndarray:
+    """Return the gray values of rays without their light, float32, shape (k, rays, n)."""
+    values = np.maximum(sample_circles(gray, frames, ANGLES, PROFILE), 0)
+    values /= lights.at(frames, ANGLES, PROFILE)
+    lit: np.ndarray = values / np.maximum(values.mean(axis=2, keepdims=True), 1e-3)
+    return lit
 
 
 @dataclass(frozen=True, slots=True)
 class _Fit(ArrayRecord):
-    edges: np.ndarray  # (k, e, 3)
-    heights: np.ndarray  # (k, 8 + e)
+    """Light that is fitted to targets."""
+
+    edges: np.ndarray  # (k, e, 5)
+    heights: np.ndarray  # (k, 6 + e): slopes, moves of the frame, and edges
     rest: np.ndarray  # (k, m, n)
     variance: np.ndarray  # (k,)
 
 
 @dataclass(frozen=True, slots=True)
 class _Scene(ArrayRecord):
-    """What the light is fitted to."""
+    """What light is fitted to."""
 
-    values: np.ndarray  # ln I, (k, m, n)
+    seen: np.ndarray  # ln I, (k, m, n)
+    values: np.ndarray  # the same, less what blur adds where light and ink change at once
     weight: np.ndarray  # of a sum of 1, the same shape
-    width: np.ndarray  # of edges, radii, (k,)
-    area: np.ndarray  # px, (k,)
     slope: np.ndarray  # of what is the same all around, by the radius, (k, n)
+    size: np.ndarray  # px, (k,)
 
-    def without(self, fit: _Fit) -> _Scene:
-        light = (fit.heights[:, :2, None, None] * _smooth(_X, _Y)).sum(axis=1)
-        steps = _steps(fit.edges, _X, _Y, self.width)
-        light = light + (fit.heights[:, _OTHERS:, None, None] * steps).sum(axis=1)
-        return replace(self, slope=_slopes(self.values - light, self.weight))
+    @staticmethod
+    def of(gray: np.ndarray, frames: np.ndarray, size: np.ndarray) -> _Scene:
+        values = np.maximum(sample_circles(gray, frames, _ANGLES, _RADII), 1)
+        bright = np.minimum(values / values.mean(axis=(1, 2), keepdims=True), _BRIGHTEST)
+        weight = _RADII * bright**2  # noise is that of gray values
+        weight /= weight.sum(axis=(1, 2), keepdims=True)
+        values = np.log(values)
+        return _Scene(values, values, weight, _slopes(values, weight), size)
 
-    def others(self) -> np.ndarray:
-        """Return (k, 8, m, n)."""
-        smooth = np.broadcast_to(_smooth(_X, _Y), (len(self.values), 2, *_X.shape))
-        return np.concatenate([smooth, -self.slope[:, None, None] * _AROUND], axis=1)
+    @property
+    def area(self) -> np.ndarray:
+        """Pixels, (k,)."""
+        area: np.ndarray = np.pi * (_RADII[-1] * self.size) ** 2
+        return area
+
+    def in_light(self, fit: _Fit) -> _Scene:
+        """Return what is seen in a light that is known."""
+        heights = fit.heights.astype(np.float32)[..., None, None]
+        light = heights[:, 0] * _X + heights[:, 1] * _Y
+        light = light + (heights[:, _OTHERS:] * self._steps(fit.edges)).sum(axis=1)
+        slope = _slopes(self.values - light, self.weight)
+        values = self.seen - _mixed(light, slope, _LENS / self.size, _STEP)
+        return replace(self, values=values, slope=_slopes(values - light, self.weight))
 
     def fit(self, edges: np.ndarray) -> _Fit:
-        """Return the best heights of edges (k, e, 3)."""
-        steps = _steps(edges, _X, _Y, self.width)
-        basis = self._centred(np.concatenate([self.others(), steps], axis=1))
-        rest = self._centred(self.values[:, None])[:, 0]
+        """Return the best heights of edges (k, e, 5)."""
+        basis = self._basis(self._steps(edges))
+        rest = _less_means(self.values, self.weight)
         extra = np.zeros(basis.shape[:2])
-        extra[:, 2:6] = 1e-3
-        heights = self._solved(basis, rest, extra)
+        extra[:, 2:_OTHERS] = _USUAL_MOVES
+        heights = self._solved(basis, rest, extra, 0.0)
         rest = rest - (heights[..., None, None].astype(np.float32) * basis).sum(axis=1)
         variance = (self.weight * rest**2).sum(axis=(1, 2)) + _LEAST_VARIANCE
         return _Fit(edges, heights, rest, variance)
 
-    def first_look(self, rest: np.ndarray, size: np.ndarray, number: int) -> np.ndarray:
-        """Return the best of some edges for what is left, shape (k, 1, 3)."""
-        best = np.empty((len(rest), number + 1, 3))
-        steps = np.rint(np.log(size) / np.log(_SIZES)).astype(int)
-        left = (rest[_FEW] * np.sqrt(_RADII[_FEW])).reshape(len(rest), -1)
-        for step in np.unique(steps).tolist():
-            edges, along = _first_edges(step)
-            some = np.flatnonzero(steps == step)
-            gain = left[some] @ along.T
-            if not number:
-                best[some, 0] = edges[np.abs(gain).argmax(axis=1)]
-                continue
-            alike = along @ along.T
-            high = np.argpartition(-np.abs(gain), _TOP, axis=1)[:, :_TOP]
-            for row, own, tops in zip(some, gain, high, strict=True):
-                a, of = own[tops][:, None], alike[tops]
-                both = (a * a + own * own - 2 * of * a * own) / np.maximum(1 - of * of, 0.1)
-                i, j = np.unravel_index(both.argmax(), both.shape)
-                best[row] = edges[tops[i]], edges[j]
-        return best
-
     def settled(self, edges: np.ndarray) -> _Fit:
-        """Return the best edges near to some, (k, e, 3), by Levenberg and Marquardt."""
+        """Return the best edges near to some, (k, e, 5), by Levenberg and Marquardt."""
         fit, count = self.fit(edges), edges.shape[1]
-        damping = np.full(len(edges), 1e-3)
+        damping = np.full((len(edges), 1), 1e-3)
         usual = np.tile(np.array(_DEVIATIONS) ** -2.0, count)
         for _ in range(_ROUNDS):
             away, across, along = _away(fit.edges, _X, _Y)
-            width = self.width[:, None, None, None]
+            width = _own_widths(fit.edges, _widths(self.size))
+            step, by_share = _logarithms(normal_share(away / width), fit.edges)
             density = np.exp(-0.5 * (away / width) ** 2) / width / math.sqrt(2 * math.pi)
-            density *= fit.heights[:, _OTHERS:, None, None].astype(np.float32)
-            _, offset, curved = _columns(fit.edges)
+            density *= by_share * fit.heights[:, _OTHERS:, None, None].astype(np.float32)
+            _, offset, curved, *_ = _columns(fit.edges)
             turn = along * (1 + curved * offset)
-            change = np.stack([turn, curved * across - 1, -(across**2 + along**2) / 2], axis=2)
+            bend = -(across**2 + along**2) / 2
+            change = np.stack([turn, curved * across - 1, bend, -away], axis=2)
             change = (density[:, :, None] * change).reshape(len(edges), -1, *_X.shape)
-            step = normal_share(away / width)
-            basis = self._centred(np.concatenate([change, self.others(), step], axis=1))
-            extra = np.zeros((len(edges), basis.shape[1]))
-            extra[:, : 3 * count] = usual * (fit.variance / self.area)[:, None]
-            move = self._solved(basis, fit.rest, extra, damping)[:, : 3 * count]
-            move = np.clip(move, -_MOST_MOVED, _MOST_MOVED).reshape(-1, count, 3)
-            moved = fit.edges + move
+            basis = self._basis(np.concatenate([change, step], axis=1))
+            extra = np.zeros(basis.shape[:2])
+            moving = np.s_[:, _OTHERS : _OTHERS + 4 * count]
+            extra[moving] = usual * (fit.variance / self.area)[:, None]
+            move = self._solved(basis, fit.rest, extra, damping)[moving]
+            moved = fit.edges.copy()
+            moved[..., [0, 1, 2, 4]] += np.clip(move, -_MOST_MOVED, _MOST_MOVED).reshape(
+                -1, count, 4
+            )
             moved[..., 2] = np.clip(moved[..., 2], -_MOST_CURVED, _MOST_CURVED)
+            moved[..., 3] = np.clip(fit.heights[:, _OTHERS:], -_HIGHEST, _HIGHEST)
             other = self.fit(moved)
             better = other.variance < fit.variance
-            damping = np.where(better, np.maximum(damping / 5, 1e-4), 10 * damping)
+            damping = np.where(better[:, None], np.maximum(damping / 5, 1e-4), 10 * damping)
             fit = fit.replaced(better, other.select(better))
         return fit
 
-    def _centred(self, basis: np.ndarray) -> np.ndarray:
-        """Return a basis (k, b, m, n) less its mean on each circle."""
-        return _less_means(basis, self.weight[:, None], len(_RADII))
+    def _steps(self, edges: np.ndarray) -> np.ndarray:
+        return _steps(edges, _X, _Y, _widths(self.size))
+
+    def _basis(self, of_edges: np.ndarray) -> np.ndarray:
+        """Return slopes, moves and what is of edges (k, b, m, n), less means of circles."""
+        slopes = np.broadcast_to(np.stack([_X, _Y]), (len(self.seen), 2, *_X.shape))
+        moves = -self.slope[:, None, None] * _AROUND
+        return _less_means(np.concatenate([slopes, moves, of_edges], axis=1), self.weight[:, None])
 
     def _solved(
-        self,
-        basis: np.ndarray,
-        rest: np.ndarray,
-        extra: np.ndarray | float = 0.0,
-        damping: np.ndarray | float = 0.0,
+        self, basis: np.ndarray, rest: np.ndarray, extra: np.ndarray, damping: np.ndarray | float
     ) -> np.ndarray:
+        """Return what the columns of a basis (k, b, m, n) have in a rest, (k, b)."""
         flat = basis.reshape(*basis.shape[:2], -1)
         weighted = flat * self.weight.reshape(len(flat), 1, -1)
         normal = (weighted @ flat.transpose(0, 2, 1)).astype(np.float64)
         right = (weighted @ rest.reshape(len(flat), -1, 1)).astype(np.float64)
-        diagonal = np.einsum('kii->ki', normal)
-        diagonal *= 1 + np.expand_dims(damping, -1)
-        diagonal += extra + 1e-7
-        return np.linalg.solve(normal, right)[..., 0]
+        index = np.arange(normal.shape[1])
+        normal[:, index, index] *= 1 + damping
+        normal[:, index, index] += extra + 1e-7
+        solved: np.ndarray = np.linalg.solve(normal, right)[..., 0]
+        return solved
 
 
-def _less_means(basis: np.ndarray, weight: np.ndarray, paper: int) -> np.ndarray:
-    """Return a basis (..., m, n) less its mean on each circle, and that of all paper outside."""
-    sums, total = (weight * basis).sum(axis=-2), weight.sum(axis=-2)
-    outer = slice(paper, None)
-    sums[..., outer] = sums[..., outer].sum(axis=-1, keepdims=True)
-    means = sums / np.concatenate([total[..., :paper], np.broadcast_to(total[..., outer].sum(axis=-1, keepdims=True), total[..., outer].shape)], axis=-1)
-    less: np.ndarray = basis - means[..., None, :]
-    return less
+def _first_look(rest: np.ndarray, size: np.ndarray, count: int) -> np.ndarray:
+    """Return the best one or two of some edges for what is left, shape (k, count, 5)."""
+    best = np.empty((len(rest), count, 5))
+    sizes = np.rint(np.log(size) / np.log(_SIZES)).astype(int)
+    left = (rest[_FEW] * np.sqrt(_RADII[_FEW])).reshape(len(rest), -1)
+    for step in np.unique(sizes).tolist():
+        edges, steps = _first_edges(step)
+        some = np.flatnonzero(sizes == step)
+        gain = left[some] @ steps.T
+        if count == 1:
+            best[some, 0] = edges[np.abs(gain).argmax(axis=1)]
+            continue
+        alike = steps @ steps.T
+        first = np.argpartition(-np.abs(gain), _FIRST, axis=1)[:, :_FIRST]
+        for row, own, tried in zip(some, gain, first, strict=True):
+            of, one = alike[tried], own[tried, None]
+            both = (one**2 + own**2 - 2 * of * one * own) / np.maximum(1 - of**2, 0.1)
+            index, second = np.unravel_index(both.argmax(), both.shape)
+            best[row] = edges[[tried[index], second]]
+    return best
 
 
-def _slopes(values: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    mean = (weight * values).sum(axis=1) / weight.sum(axis=1)
-    return np.gradient(mean, _RADII[1] - _RADII[0], axis=1).astype(np.float32)
+@lru_cache(maxsize=64)
+def _first_edges(size: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return edges (t, 5), and what is left of their steps on circles, normalised (t, n)."""
+    straight = product(np.pi * np.arange(_STRAIGHT) / _STRAIGHT, _OFFSETS, [0.0])
+    curved = product(2 * np.pi * np.arange(_CURVED) / _CURVED, _OFFSETS, [_CURVATURE])
+    edges = np.pad(np.array([*straight, *curved]), ((0, 0), (0, 2)))
+    x, y, weight = _X[_FEW], _Y[_FEW], np.sqrt(_RADII[_FEW])
+    steps = _steps(edges[None], x, y, _widths(np.array([_SIZES**size])))[0]
+    steps = _less_means(steps, np.broadcast_to(weight**2, x.shape), _PAPER // 2) * weight
+    steps = steps.reshape(len(edges), -1)
+    plane, _ = np.linalg.qr((np.stack([x, y]) * weight).reshape(2, -1).T)
+    steps = steps - (steps @ plane) @ plane.T
+    length = np.linalg.norm(steps, axis=1)
+    shown = length > _SHOWN * length.max()
+    return edges[shown], (steps[shown] / length[shown, None]).astype(np.float32)
 
 
 def _columns(edges: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return direction, offset and curvature of edges (k, e, 3), float32, (k, e, 1, 1) each."""
+    """Return the columns of edges (k, e, 5), float32, of shape (k, e, 1, 1)."""
     return tuple(np.moveaxis(edges.astype(np.float32), -1, 0)[..., None, None])
 
 
 def _away(
     edges: np.ndarray, x: np.ndarray, y: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the distances of points from edges (k, e, 3), and those across and along them."""
-    direction, offset, curved = _columns(edges)
+    """Return the distances of points from edges (k, e, 5), and those across and along them."""
+    direction, offset, curved, *_ = _columns(edges)
     cosine, sine = np.cos(direction), np.sin(direction)
     across, along = cosine * x + sine * y - offset, cosine * y - sine * x
     return across - curved / 2 * (across**2 + along**2), across, along
 
 
 def _steps(edges: np.ndarray, x: np.ndarray, y: np.ndarray, width: np.ndarray) -> np.ndarray:
-    """Return the steps of edges (k, e, 3) at points, shape (k, e, m, n)."""
-    return normal_share(_away(edges, x, y)[0] / width[:, None, None, None])
+    """Return the steps of edges (k, e, 5) at points, in their heights, shape (k, e, m, n)."""
+    share = normal_share(_away(edges, x, y)[0] / _own_widths(edges, width))
+    return _logarithms(share, edges)[0]
 
 
-def _smooth(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return what changes smoothly on circles, shape (..., 4, m, n)."""
-    axis = x.ndim - 2
-    if axis:
-        return np.concatenate([x, y], axis=axis - 1)
-    return np.stack([x, y])
+def _logarithms(share: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return steps of ln of light, in their heights, and the derivative by the share of light.
+
+    Blur mixes light, and not its logarithm.
+    """
+    height = _columns(edges)[3]
+    height = np.where(np.abs(height) < 0.01, np.float32(0.01), height)
+    more = np.expm1(height)
+    return np.log1p(more * share) / height, more / (1 + more * share) / height
+
+
+def _own_widths(edges: np.ndarray, width: np.ndarray) -> np.ndarray:
+    own: np.ndarray = width[:, None, None, None] * np.exp(_columns(edges)[4])
+    return own
 
 
 def _widths(size: np.ndarray) -> np.ndarray:
-    """Return the widths of edges, in radii, for targets of so many px."""
-    return np.maximum(_WIDTH / size, _SHARPEST).astype(np.float32)
+    """Return the usual widths of edges, in radii, about targets of so many px."""
+    widths: np.ndarray = np.maximum(_WIDTH / size, _SHARPEST).astype(np.float32)
+    return widths
 
 
-@lru_cache(maxsize=64)
-def _first_edges(step: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return edges (t, 3), and what is left of their steps on circles, normalised (t, n)."""
-    straight = product(np.pi * np.arange(_STRAIGHT) / _STRAIGHT, _OFFSETS, [0.0])
-    curved = product(2 * np.pi * np.arange(_CURVED) / _CURVED, _OFFSETS, [_CURVATURE])
-    edges = np.array([*straight, *curved])
-    x, y, weight = _X[_FEW], _Y[_FEW], np.sqrt(_RADII[_FEW])
-    steps = _steps(edges[None], x, y, _widths(np.array([_SIZES**step])))[0]
-    steps = (_less_means(steps, np.broadcast_to(weight**2, x.shape), _PAPER // 2) * weight).reshape(len(edges), -1)
-    plane, _ = np.linalg.qr((_smooth(x, y) * weight).reshape(2, -1).T)
-    steps = steps - (steps @ plane) @ plane.T
-    length = np.linalg.norm(steps, axis=1)
-    shown = length > _SHOWN * length.max()
-    return edges[shown], (steps[shown] / length[shown, None]).astype(np.float32)
+def _mixed(light: np.ndarray, slope: np.ndarray, blur: np.ndarray, step: float) -> np.ndarray:
+    """Return what blur adds to ln I where light and ink change at once, to the second order."""
+    change = np.gradient(light, step, axis=2) * (blur**2)[:, None, None]
+    mixed: np.ndarray = (change * slope[:, None]).astype(np.float32)
+    return mixed
+
+
+def _less_means(basis: np.ndarray, weight: np.ndarray, paper: int = len(_RADII)) -> np.ndarray:
+    """Return a basis (..., m, n) less its mean on each circle, and that of all from `paper` on."""
+    sums, total = (weight * basis).sum(axis=-2), weight.sum(axis=-2)
+    if paper < basis.shape[-1]:
+        sums[..., paper:] = sums[..., paper:].mean(axis=-1, keepdims=True)
+        total[..., paper:] = total[..., paper:].mean(axis=-1, keepdims=True)
+    less: np.ndarray = basis - (sums / total)[..., None, :]
+    return less
+
+
+def _slopes(values: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Return the slopes by the radius, (k, n), of the means of circles."""
+    means = (weight * values).sum(axis=1) / weight.sum(axis=1)
+    slopes: np.ndarray = np.gradient(means, _STEP, axis=1).astype(np.float32)
+    return slopes
+
+
+def _power(slopes: np.ndarray) -> np.ndarray:
+    """Return the variances, (k,), of what has slopes (k, n) by the radius."""
+    profiles, share = slopes.cumsum(axis=1) * _STEP, _RADII / _RADII.sum()
+    away = profiles - (profiles @ share)[:, None]
+    power: np.ndarray = np.maximum(away**2 @ share, _LEAST_VARIANCE)
+    return power

@@ -1,9 +1,4 @@
-"""Rays from the centre of a CCTag: each has its own light, which edges of light may change.
-
-An edge of light is a step of the logarithm of the light along a ray. What the ink of the rings
-does not explain tells where it is. Values of both sides are brought to one light, and those close
-to the edge lose their weight.
-"""
+"""Rays from the centre of a CCTag, whose light is taken out: linear functions of the ink."""
 
 from __future__ import annotations
 
@@ -14,7 +9,6 @@ import numpy as np
 
 from ahf_ros.features import frame
 from ahf_ros.features.robust import NORMAL, geman_mcclure
-from ahf_ros.features.sampling import sample_circles
 
 _RAYS = 64
 ANGLES = 2 * np.pi * np.arange(_RAYS) / _RAYS
@@ -28,48 +22,19 @@ AROUND[:, [0, 0, 1, 1, 1, 2, 2], range(7)] = -frame.displacement_basis(ANGLES, n
 AROUND[:, [3, 4], [7, 8]] = 1.0
 _QUIET = 0.35  # quantile of rays, whose errors are usual
 _LEAST = 0.003  # standard deviation of gray values, of their mean
+_ROUNDS = 2  # of weights
 _OTHER_CONTRAST = 0.2  # difference of the contrast of a ray, that quarters its weight
-_LIGHT_EDGES = ALONG[2:-2:2]  # radii at which the light may change
-_EDGES_OF_RAY = 2
-_LEAST_STEP = 0.15  # of ln of the light
-_EXPLAINED, _OF_USUAL = 0.5, 3.0  # squares that an edge takes, of those of its ray and usual ones
-_EDGE_WIDTH = 2.2  # of light, px
-_CLOSE, _CLOSE_WEIGHT = 1.0, 0.02  # px from an edge of light, and what is left there of a weight
-_DARKEST = 0.03  # ink, of the brightness of paper, in logarithms
-
-
-def lit(gray: np.ndarray, frames: np.ndarray, lights) -> np.ndarray:
-    """Return the gray values of rays, each in its own light, float32, shape (k, rays, n)."""
-    values = np.maximum(sample_circles(gray, frames, ANGLES, PROFILE), 0)
-    values /= lights.at(frames, ANGLES, PROFILE)
-    lit: np.ndarray = values / np.maximum(values.mean(axis=2, keepdims=True), 1)
-    return lit
 
 
 def robust_rays(values: np.ndarray, ink: np.ndarray, outlier: float) -> Rays:
     """Return rays, values (k, rays, n) and ink (k, n), whose weights are low where light disturbs.
 
-    An error of `outlier` usual deviations leaves a quarter of a weight.
+    An error of `outlier` usual deviations leaves a quarter of a weight. The contrast of ink is the
+    same wherever the light falls.
     """
-    return _weighted(values, ink, np.broadcast_to(ALONG, values.shape), outlier, 2)
-
-
-def evenly_lit_rays(values: np.ndarray, ink: np.ndarray, size: np.ndarray, outlier: float) -> Rays:
-    """Return what `robust_rays` does, edges of light taken out; sizes (k,) are radii, px."""
-    rays = _weighted(values, ink, np.broadcast_to(ALONG, values.shape), outlier, 1)
-    light, weight = _light_edges(values, ink, np.median(rays.contrast, axis=1), size)
-    return _weighted(values / light, ink, ALONG * weight, outlier, 1)
-
-
-def _weighted(
-    values: np.ndarray, ink: np.ndarray, usual_weight: np.ndarray, outlier: float, rounds: int
-) -> Rays:
-    """Return rays whose weights are low where values are unlike the ink.
-
-    The contrast of ink is the same wherever the light falls.
-    """
+    usual_weight = np.broadcast_to(ALONG, values.shape)
     rays = Rays.of(values, ink, usual_weight)
-    for _ in range(rounds):
+    for _ in range(_ROUNDS):
         usual = np.median(rays.contrast, axis=1, keepdims=True)
         unlike = (rays.contrast - usual) / (_OTHER_CONTRAST * np.maximum(np.abs(usual), 1e-9))
         alike = geman_mcclure(1.0, unlike)
@@ -79,43 +44,6 @@ def _weighted(
         weight = geman_mcclure(usual_weight, rays.errors / (outlier * np.maximum(spread, _LEAST)))
         rays = Rays.of(values, ink, weight * alike[..., None])
     return rays
-
-
-def _light_edges(
-    values: np.ndarray, ink: np.ndarray, contrast: np.ndarray, size: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the light along rays beyond a factor, and weights, both of the shape of the values.
-
-    The contrast of ink (k,) is that of `Rays`.
-    """
-    contrast = contrast[:, None]
-    paper = np.where(contrast < 0, 1.0, 1 - contrast)
-    bright = np.maximum(paper + contrast * ink, _DARKEST)
-    weight = ALONG * bright  # noise is relative to the light
-    weight = (weight / weight.sum(axis=1, keepdims=True))[:, None]
-    steps = (ALONG - _LIGHT_EDGES[:, None]) * size[:, None, None] / _EDGE_WIDTH
-    steps = np.clip(0.5 + steps, 0, 1)
-    away = steps - (steps * weight).sum(axis=2, keepdims=True)
-    power = np.maximum((away**2 * weight).sum(axis=2), 1e-6)[:, None]
-    rest = np.log(np.maximum(values, 0.01)) - np.log(bright)[:, None]
-    rest -= (rest * weight).sum(axis=2, keepdims=True)
-    light, trusted = np.zeros_like(rest), np.ones_like(rest)
-    rows = np.arange(len(values))[:, None]
-    for _ in range(_EDGES_OF_RAY):
-        along = (rest * weight) @ away.transpose(0, 2, 1)
-        gain = along**2 / power
-        best = gain.argmax(axis=2)
-        explained, total = gain.max(axis=2), (rest**2 * weight).sum(axis=2)
-        height = np.take_along_axis(along / power, best[..., None], axis=2)
-        usual = np.quantile(total - explained, _QUIET, axis=1)[:, None]
-        edge = (explained > np.maximum(_OF_USUAL * usual, _EXPLAINED * total))[..., None]
-        edge &= np.abs(height) > _LEAST_STEP
-        height = np.where(edge, height, np.float32(0))
-        rest -= height * away[rows, best]
-        light += height * steps[rows, best]
-        distance = np.abs(ALONG - _LIGHT_EDGES[best][..., None]) * size[:, None, None]
-        trusted[edge & (distance < _CLOSE)] = _CLOSE_WEIGHT
-    return np.exp(light), trusted
 
 
 @dataclass(frozen=True, slots=True)

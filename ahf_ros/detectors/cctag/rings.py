@@ -1,8 +1,8 @@
 """The rings of CCTags: a glance at profiles, and rings that are brought onto the image.
 
 Neighbouring circles are too close for their edges to be measured one by one. So all gray values
-about a centre are compared with the rings of an ID at once. Each ray has its own light, so that
-its values are a linear function of the ink, which is that of sharp rings under a normal blur.
+about a centre are compared with the rings of an ID at once, without the light, which is found
+first. The values of each ray are a linear function of the ink of sharp rings under a normal blur.
 """
 
 from __future__ import annotations
@@ -15,13 +15,12 @@ from itertools import product
 import numpy as np
 
 from ahf_ros.codes.cctag import CircleFamily
-from ahf_ros.detectors.cctag.light import Lights
+from ahf_ros.detectors.cctag.light import Lights, lit
 from ahf_ros.detectors.cctag.rays import (
     ALONG,
     ANGLES,
     PROFILE,
     Rays,
-    lit,
     normal_share,
     robust_rays,
 )
@@ -37,11 +36,12 @@ _TRIED_SHIFTS, _TRIED_BLURS = (-1.2, -0.6, 0.0, 0.6, 1.2), (-1.0, 0.0, 1.4)  # d
 _GROWN = (0.85, 0.9, 0.95, 1.0, 1.05)  # radii of the outermost circle, where that was found
 _NARROWEST = 0.5  # ring that is read, px; blur hides others
 _PROMISING = 0.6  # share of a profile that rings explain, from which they are looked at
-_LOOKED_AT = 4  # frames for an ID, at the most
-_APART = 0.5  # distance of the centres of different targets, radii
+_LOOKED_AT = 2  # frames for an ID, at the most
+_APART = 0.2  # distance of the centres of different frames, radii
 _PART = 2048, 48  # hypotheses and targets at a time, which bounds the memory
+_UNEVEN = 0.5  # variance on circles, of that of their means, from which frames are none
 _GAMMA = 2.2  # of gray values, unless they are light
-_CLEARLY = 0.15  # `left` by which rings must be better explained; edges of light explain little
+_CLEARLY = 0.03  # `left` by which rings must be better explained
 _TELLING_OF_GAMMA = 16  # targets
 _ENOUGH = 4  # certain targets, that tell of the edges of an image
 _SCALES = (0.93, 0.965, 1.0, 1.035, 1.07)  # of the radius, about a frame
@@ -51,10 +51,11 @@ _OUTLIERS = 12.0, 8.0, 5.0, 3.0, 3.0  # deviations that quarter a weight, in rou
 _MAXIMUM_CHANGE = 0.08  # of a frame in a round, radii
 _PERSPECTIVE = 5e-4  # change of scale along a px where tilted by 45 degrees: 1 / focal length, px
 _LEAST_TILT = 0.1  # tangent of the tilt that a circular target may have
+_LEAST_VARIANCE = 1e-6  # of gray values, of their mean
 _OF_VARIANCE = 2.0  # of gray values, that their model adds
 _SHARPEST, _SOFTEST = 0.35, 1.5  # blur: px, and in narrow rings, which more of it would hide
 _MOST_SHIFT = 0.45  # of edges, in narrow rings
-_INDEPENDENT = 1.5  # distance of independent readings along a profile, px
+_INDEPENDENT = 0.3  # distance of independent readings along a profile, px
 _SYSTEMATIC = 0.004  # standard deviation of what pixels and interpolation do to a centre, px
 _CLEAREST = 0.2  # share of rays
 _AGREEING = 0.5  # share of what a ray shows, that the rings explain
@@ -209,11 +210,10 @@ def _by_size(frames: np.ndarray) -> list[tuple[int, np.ndarray]]:
 
 
 def _profiles(
-    gray: np.ndarray, frames: np.ndarray, polarity: int, angles: np.ndarray, along: np.ndarray, lights=None
+    gray: np.ndarray, frames: np.ndarray, polarity: int, angles: np.ndarray, along: np.ndarray
 ) -> np.ndarray:
     """Return the mean profiles of rays, each in its own light, ink downwards, shape (k, n)."""
     values = np.maximum(sample_circles(gray, frames, angles, along), 0)
-    if lights is not None: values /= lights.at(frames, angles, along)
     values /= np.maximum(values.mean(axis=2, keepdims=True), 1)
     means: np.ndarray = polarity * values.mean(axis=1, dtype=np.float64)
     return means
@@ -273,19 +273,23 @@ def identify(
     if not len(frames):
         return NOTHING
     lights = Lights.about(gray, frames)
-    starts, ids, shift = _likely_ids(gray, lights.moved, polarity, family, prior, lights)
+    lights = lights.select(lights.uneven < _UNEVEN)
+    if not len(lights.frames):
+        return NOTHING
+    starts, ids, shift = _likely_ids(gray, lights, polarity, family, prior)
     # The likeliest ID often brings the frame to its place even if it is the wrong one.
     first = align(gray, starts[:, 0], ids[:, 0], shift[:, 0], family, prior, lights)
     likely = first.of_target > _HOPELESS[0]
     lights = Lights.about(gray, first.frames[likely])
-    again = _likely_ids(gray, lights.moved, polarity, family, prior, lights)
+    again = _likely_ids(gray, lights, polarity, family, prior)
     starts, ids, shift = (
         np.concatenate([more, of[likely]], axis=1)
         for of, more in zip((starts, ids, shift), again, strict=True)
     )
     few = np.arange(ids.shape[1]) < _FEW_READINGS
     tried = np.nonzero(np.broadcast_to(few, ids.shape))
-    first = align(gray, starts[tried], ids[tried], shift[tried], family, prior, lights.select(tried[0]))
+    of_first = lights.select(tried[0])
+    first = align(gray, starts[tried], ids[tried], shift[tried], family, prior, of_first)
     possible = first.of_target.reshape(-1, _FEW_READINGS).max(axis=1) > _HOPELESS[1]
     if not possible.any():
         return NOTHING
@@ -294,7 +298,8 @@ def identify(
     lights = lights.select(possible)
     tried = np.nonzero(np.broadcast_to(few, ids.shape))
     others = np.nonzero(_unlike_before(ids) & ~few)
-    more = align(gray, starts[others], ids[others], shift[others], family, prior, lights.select(others[0]))
+    of_more = lights.select(others[0])
+    more = align(gray, starts[others], ids[others], shift[others], family, prior, of_more)
     every = Aligned.joined([first, more])
     rows, columns = np.concatenate([tried, others], axis=1)
     independent = frame.mean_radii(starts[:, 0]) * np.ptp(PROFILE) / _INDEPENDENT
@@ -317,12 +322,15 @@ def _unlike_before(ids: np.ndarray) -> np.ndarray:
     return unlike
 
 
-def _settled(gray: np.ndarray, rings: Aligned, family: CircleFamily, prior: Prior, lights: Lights) -> Aligned:
+def _settled(
+    gray: np.ndarray, rings: Aligned, family: CircleFamily, prior: Prior, lights: Lights
+) -> Aligned:
     """Return rings brought onto the image until they stay; what still moves is as uncertain."""
     moving = np.arange(len(rings.ids))
     for _ in range(_REPEATS):
         some = rings.select(moving)
-        again = align(gray, some.frames, some.ids, some.shift, family, prior, lights.select(moving))
+        light = lights.select(moving)
+        again = align(gray, some.frames, some.ids, some.shift, family, prior, light)
         away = again.frames[:, :2, 2] - some.frames[:, :2, 2]
         spread = away[:, :, None] * away[:, None]
         again = replace(again, covariance=again.covariance + spread)
@@ -337,15 +345,16 @@ def _settled(gray: np.ndarray, rings: Aligned, family: CircleFamily, prior: Prio
 
 
 def _likely_ids(
-    gray: np.ndarray, frames: np.ndarray, polarity: int, family: CircleFamily, prior: Prior, lights: Lights,
+    gray: np.ndarray, lights: Lights, polarity: int, family: CircleFamily, prior: Prior
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return frames, (k, n, 3, 3), of IDs that profiles are like, (k, n), and shifts of edges."""
-    weight = np.sqrt(PROFILE / PROFILE.sum())
+    weight, frames = np.sqrt(PROFILE / PROFILE.sum()), lights.moved
     shape = len(_SCALES), len(frames), len(family.numbers)
     shares, shifts = np.empty(shape), np.empty(shape)
     scaled = np.stack([frame.scaled(frames, np.full(len(frames), of)) for of in _SCALES])
     for of_scale, share, shift in zip(scaled, shares, shifts, strict=True):
-        profiles = _profiles(gray, of_scale, polarity, ANGLES, PROFILE, lights) * weight
+        values = lit(gray, of_scale, lights)
+        profiles = polarity * values.mean(axis=1, dtype=np.float64) * weight
         for step, some in _by_size(of_scale):
             templates, of_shift = _templates(family, step, *prior.tried)
             found = _shares(profiles[some], templates, weight, PROFILE)
@@ -362,15 +371,14 @@ def _likely_ids(
 def in_light(gray: np.ndarray, rings: Aligned, family: CircleFamily) -> np.ndarray:
     """Return an image of light, where rings show clearly that its gray values have a gamma.
 
-    Blur mixes light, and not gray values, which matters where rings are narrow. Under edges of
-    light it matters less than these, which are weaker in gray values.
+    Blur mixes light, and not gray values, which matters where rings are narrow.
     """
-    some = rings.select(np.argsort(rings.left, kind='stable')[:_TELLING_OF_GAMMA])
+    some = rings.select(np.argsort(-rings.plain, kind='stable')[:_TELLING_OF_GAMMA])
     if not len(some.ids):
         return gray
     light: np.ndarray = 255 * (gray.clip(0) / 255) ** np.float32(_GAMMA)
     left = align(light, some.frames, some.ids, some.shift, family).left
-    return light if np.mean(left) < np.mean(some.left) - _CLEARLY else gray
+    return light if np.median(left - some.left) < -_CLEARLY else gray
 
 
 def align(
@@ -384,14 +392,20 @@ def align(
 ) -> Aligned:
     """Bring the rings of IDs (k,) onto an image from frames (k, 3, 3), known to about a tenth.
 
-    `shift`, shape (k,), is the growth of ink to begin with, px.
+    `shift`, shape (k,), is the growth of ink to begin with, px. The lights are those about the
+    frames, unless they are given.
     """
     if lights is None:
         lights = Lights.about(gray, frames)
     parts = [slice(start, start + _PART[1]) for start in range(0, len(frames), _PART[1])]
     return Aligned.joined(
         [NOTHING]
-        + [_aligned(gray, frames[part], ids[part], shift[part], family, prior, lights.select(part)) for part in parts]
+        + [
+            _aligned(
+                gray, frames[part], ids[part], shift[part], family, prior, lights.select(part)
+            )
+            for part in parts
+        ]
     )
 
 
@@ -416,7 +430,9 @@ def _aligned(
         normal, right = rays.equations(np.stack([*by_radius, by_shift, by_blur], axis=1), ink)
         variance = (rays.weight * rays.errors**2).sum(axis=(1, 2)) / rays.weight.sum(axis=(1, 2))
         area = size**2 * (PROFILE[1] - PROFILE[0]) * (ANGLES[1] - ANGLES[0])
-        each = np.minimum(area, 1.0) / variance / _OF_VARIANCE  # pixels are independent
+        each = (
+            np.minimum(area, 1.0) / (variance + _LEAST_VARIANCE) / _OF_VARIANCE
+        )  # pixels are independent
         normal, right = normal * each[:, None, None], right * each[:, None]
         normal[:, range(5), range(5)] += 1e-6
         usual = _usual_perspective(frames)
