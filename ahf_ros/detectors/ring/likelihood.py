@@ -256,7 +256,7 @@ def _step_evidence(
         inked = np.where(less, np.maximum(inked, 1 / np.maximum(np.abs(mark), _FLAT)), inked)
     lit = edges.astype(np.float32)[:, None, None]
     anything = _PLAIN * flat + (1 - _PLAIN) * _ANY
-    clear = (band < SATURATED) | np.isinf(limit)
+    clear = polar.tells(band)
     paper, ink = (
         np.where(clear, np.log(((1 - lit) * density + lit * _ANY) / anything), 0)
         for density in (flat, inked)
@@ -295,7 +295,7 @@ def level_evidence(
     depth = np.minimum(_DEPTH * polar.size / CORRELATION, 1)
     share = (weights(polar) * depth).astype(np.float32)
     limit = polar.glare[:, None, None]
-    seen = known & ((levels < SATURATED) | np.isinf(limit)) & (radii <= polar.reach[..., None])
+    seen = known & polar.tells(levels) & (radii <= polar.reach[..., None])
     inner, outer = band
     in_dot, in_band = radii < 1, (radii > inner) & (radii < outer)
     on_ground = ~in_dot & ~in_band
