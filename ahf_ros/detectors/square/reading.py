@@ -24,7 +24,8 @@ from ahf_ros.imaging.logarithm import LOG_OFFSET
 
 _IN_CELL = (-0.2, 0.2)  # where a cell is sampled, from its centre, in cells
 _BLURS = 0.7, 0.4  # of a usual image and of a sharp one, standard deviations in px
-_SMALL_CELL = 3.0  # below which they differ, px
+_SMALL_CELL = 2.0  # below which they differ, px
+_SMALLEST_CELL = 1.0  # that can be read, px
 _MOST_MIXED = 0.2  # share that a cell takes from each neighbour, at most
 _REACH = 0.25  # standard deviation of the window that levels are taken from, in sides
 _MINIMUM_STEP = 0.35  # from ink to paper, in the logarithm
@@ -65,17 +66,19 @@ def read(gray: np.ndarray, corners: np.ndarray, groups: Sequence[Sequence[str]])
     doubt = _SEVERAL * log(len(groups))
     frames = _frames(corners)
     bordered = np.flatnonzero(_dark_inside(gray, frames, _DEPTH))
+    sizes = np.sqrt([cv2.contourArea(of.astype(np.float32)) for of in corners])
     grids = [
         {(words(group[0]).shape[1], border) for border in borders(group[0])} for group in groups
     ]
     for cells, border in sorted(set().union(*grids)):
-        some = bordered
+        some = bordered[sizes[bordered] >= _SMALLEST_CELL * (cells + 2 * border)]
         if border > 1:
             innermost = (border - 0.5) / (cells + 2 * border)
             some = some[_dark_inside(gray, frames[some], innermost)]
         if not len(some):
             continue
-        evidence, against, which = _evidence(gray, frames[some], corners[some], cells, border)
+        places = frames[some], corners[some], sizes[some]
+        evidence, against, which = _evidence(gray, *places, cells, border)
         which = some[which]
         for index, group in enumerate(groups):
             if (cells, border) not in grids[index] or not len(which):
@@ -166,7 +169,12 @@ def _dark_inside(gray: np.ndarray, frames: np.ndarray, depth: float) -> np.ndarr
 
 
 def _evidence(
-    gray: np.ndarray, frames: np.ndarray, corners: np.ndarray, cells: int, border: int
+    gray: np.ndarray,
+    frames: np.ndarray,
+    corners: np.ndarray,
+    sizes: np.ndarray,
+    cells: int,
+    border: int,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return what the cells of quadrilaterals within a border say, and indices of these.
 
@@ -188,8 +196,7 @@ def _evidence(
         ],
         np.float64,
     ).reshape(-1, len(frames), size, size)
-    areas = np.array([cv2.contourArea(of.astype(np.float32)) for of in corners])
-    small = np.flatnonzero(np.sqrt(areas) < _SMALL_CELL * side)
+    small = np.flatnonzero(sizes < _SMALL_CELL * side)
     tried = np.concatenate([np.arange(len(frames)), small])
     blurs = np.repeat(_BLURS, [len(frames), len(small)])
     whole = _unmixed(parts.mean(axis=0)[tried], corners[tried], side, blurs)
