@@ -15,7 +15,7 @@ from ahf_ros.interchange.point_clouds import COVARIANCE
 from ahf_ros.interchange.target_messages import coded_target_array
 from ahf_ros.localisation import Positions
 from ahf_ros.msg import CodedTargetArray
-from ahf_ros.nodes.target_msg import target_annotations, target_labels, target_points
+from ahf_ros.nodes.messages import target_annotations, target_labels, target_points
 from ahf_ros.target import UNDECODED, Identification, Target
 
 SEEN = Target(18, 71, 100.0, 50.0, 20.0, 10.0, math.pi / 2, confidence=0.75)

@@ -17,8 +17,8 @@ from std_msgs.msg import Header
 
 from ahf_ros.msg import CodedTarget, CodedTargetArray
 from ahf_ros.nodes import settings
+from ahf_ros.nodes.messages import target_detections
 from ahf_ros.nodes.settings import AnswerSettings
-from ahf_ros.nodes.target_msg import target_detections
 
 # vision_msgs is not among the wheels of ROS 2 on PyPI.
 FIELDS = {

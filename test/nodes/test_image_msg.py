@@ -9,7 +9,7 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
 from ahf_ros.interchange.image_messages import decode_image
-from ahf_ros.nodes.image_msg import image_message
+from ahf_ros.nodes.messages import image_message
 
 GRAY = np.arange(12, dtype=np.uint8).reshape(3, 4)
 RED, GREEN, BLUE = 76, 150, 29  # of gray in 255, ITU-R BT.601

@@ -27,7 +27,7 @@ from ahf_ros.interchange.point_clouds import (
     target_scan,
     whole_points,
 )
-from ahf_ros.nodes.cloud_msg import cloud_message
+from ahf_ros.nodes.messages import cloud_message
 from ahf_ros.orientation.transform import Transform
 from ahf_ros.registration.scan import Scan
 from support.detector import overrides, own, values

@@ -23,8 +23,8 @@ from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import String
 from test_nodes import ENDLESS, header
 
-from ahf_ros.nodes.image_msg import image_message
-from ahf_ros.nodes.shortfall import IN_A_ROW
+from ahf_ros.nodes.messages import image_message
+from ahf_ros.nodes.pipeline import IN_A_ROW
 from ahf_ros.synthetic.scene import SceneSettings, render
 from support.detector import DetectorProcess, overrides, values
 

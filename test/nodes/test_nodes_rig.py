@@ -19,7 +19,7 @@ from visualization_msgs.msg import ImageMarker, Marker, MarkerArray
 
 from ahf_ros.interchange.point_clouds import COVARIANCE
 from ahf_ros.msg import CodedTargetArray
-from ahf_ros.nodes.image_msg import image_message
+from ahf_ros.nodes.messages import image_message
 from ahf_ros.synthetic.camera import Camera, tilted_camera
 from ahf_ros.synthetic.scene import Rendering, SceneSettings, render
 from support.detector import DetectorProcess, overrides

@@ -13,14 +13,14 @@ pytest.importorskip('rosbags', reason='rosbags is not installed')
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from std_msgs.msg import Header
 
-from ahf_ros.nodes.pose_msg import (
+from ahf_ros.nodes.messages import (
     PosedTarget,
     detections_message,
     pose_message,
     target_transform,
     transform_message,
 )
-from ahf_ros.nodes.pose_settings import PoseNodeSettings
+from ahf_ros.nodes.settings import PoseNodeSettings
 from ahf_ros.nodes.tf import Parents
 from ahf_ros.orientation.camera import rotation_matrices
 from ahf_ros.orientation.transform import Transform
@@ -117,7 +117,7 @@ def test_a_frame_has_one_parent_and_no_loop(parent: str, child: str, words: str)
 
 
 def test_what_is_published_needs_its_packages(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr('ahf_ros.nodes.pose_settings.find_spec', lambda name: None)
+    monkeypatch.setattr('ahf_ros.nodes.settings.find_spec', lambda name: None)
     with pytest.raises(ValueError, match='detections is True and the package vision_msgs is not'):
         PoseNodeSettings(coordinates='a', detections=True)
     with pytest.raises(ValueError, match="tf is 'targets' and the package tf2_msgs is not there"):

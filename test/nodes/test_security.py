@@ -18,9 +18,9 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
 from ahf_ros.msg import CodedTargetArray
-from ahf_ros.nodes.image_msg import image_message
 from ahf_ros.nodes.image_queue import WaitingMessages
 from ahf_ros.nodes.interfaces import NODES
+from ahf_ros.nodes.messages import image_message
 from ahf_ros.srv import Identify
 from support.detector import overrides
 
