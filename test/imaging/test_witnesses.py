@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ahf_ros.imaging.movement import Displacement
-from ahf_ros.imaging.witnesses import targets_moved
+from ahf_ros.imaging.movement import Displacement, targets_moved
 from ahf_ros.target import Target
 
 PLACES = np.random.default_rng(0).uniform(0, 100, (9, 2))
