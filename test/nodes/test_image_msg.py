@@ -12,30 +12,11 @@ from ahf_ros.interchange.image_messages import decode_image
 from ahf_ros.nodes.messages import image_message
 
 GRAY = np.arange(12, dtype=np.uint8).reshape(3, 4)
-RED, GREEN, BLUE = 76, 150, 29  # of gray in 255, ITU-R BT.601
 
 
 def message(encoding: str = 'mono8', step: int = 4, data: bytes | None = None, **fields) -> Image:
     values = {'height': 3, 'width': 4, 'encoding': encoding, 'step': step} | fields
     return Image(data=GRAY.tobytes() if data is None else data, **values)
-
-
-@pytest.mark.parametrize(
-    ('encoding', 'gray'), [('rgb8', (RED, GREEN, BLUE)), ('bgr8', (BLUE, GREEN, RED))]
-)
-@pytest.mark.parametrize('step', [9, 10, 11, 12])
-def test_colour_turns_gray_with_any_step(
-    encoding: str, gray: tuple[int, int, int], step: int
-) -> None:
-    padded = np.full((2, step), 99, np.uint8)
-    padded[:, :9] = 255 * np.eye(3, dtype=np.uint8).ravel()
-    sent = message(encoding, step, padded.tobytes(), height=2, width=3)
-    assert np.array_equal(decode_image(sent), [gray, gray])
-
-
-def test_data_may_not_be_longer_than_the_rows() -> None:
-    with pytest.raises(ValueError, match='data has 15 bytes, accepted are 12: 3 rows of 4 bytes'):
-        decode_image(message(data=GRAY.tobytes() + bytes(3)))
 
 
 @pytest.mark.parametrize(
