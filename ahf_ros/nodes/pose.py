@@ -30,7 +30,7 @@ from ahf_ros.nodes.messages import (
     transform_message,
 )
 from ahf_ros.nodes.parameters import ParameterSettings
-from ahf_ros.nodes.process import LOG_PERIOD, ProcessNode, run
+from ahf_ros.nodes.process import LOG_PERIOD, ProcessNode
 from ahf_ros.nodes.settings import CAMERA, NONE, PoseNodeSettings
 from ahf_ros.nodes.tf import Frames
 from ahf_ros.nodes.topics import ANSWERS_KEPT, DETECTIONS
@@ -279,8 +279,3 @@ def _turn(pose: Pose) -> float:
     if pose.second is None:
         return 0.0
     return float(np.degrees(np.linalg.norm(pose.second.step_from(pose.camera)[3:])))
-
-
-def main(arguments: list[str] | None = None) -> int:
-    """Run the node."""
-    return run(PoseNode, arguments)

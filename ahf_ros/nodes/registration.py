@@ -30,7 +30,7 @@ from ahf_ros.nodes.messages import (
     transform_message,
 )
 from ahf_ros.nodes.parameters import ParameterSettings
-from ahf_ros.nodes.process import LOG_PERIOD, ProcessNode, run
+from ahf_ros.nodes.process import LOG_PERIOD, ProcessNode
 from ahf_ros.nodes.settings import RegistrationNodeSettings
 from ahf_ros.nodes.tf import PACKAGE, Frames
 from ahf_ros.nodes.topics import ANSWERS_KEPT, POINTS
@@ -294,8 +294,3 @@ class RegistrationNode(ProcessNode):
             }
         registered = f'{counted(len(field.scans), "scan")} registered'
         return status_of(reports, registered, values)
-
-
-def main(arguments: list[str] | None = None) -> int:
-    """Run the node."""
-    return run(RegistrationNode, arguments)
