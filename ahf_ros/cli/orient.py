@@ -20,8 +20,11 @@ from ahf_ros.cli.options import add_option, add_quiet, parsed_by
 from ahf_ros.extras import need
 from ahf_ros.interchange.export.formats import NETWORK_FORMATS, parsed_export
 from ahf_ros.settings.parameter import Parameter
+from ahf_ros.text import printable
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from ahf_ros.interchange.exif import Exif
     from ahf_ros.interchange.network_files import CameraKnowledge
     from ahf_ros.interchange.observation_files import ObservedPhotograph
@@ -255,7 +258,6 @@ def _of_groups(solutions: Sequence[Solution], number: int) -> tuple[str, ...]:
 
 def _write(solution: Solution, number: int, options: argparse.Namespace) -> bool:
     """Write a network and its exports, print what was found, and return whether all is written."""
-    from ahf_ros.cli.network_table import print_network
     from ahf_ros.interchange.export.formats import write_network_export
     from ahf_ros.interchange.network_results import write_network
     from ahf_ros.report.network_page import write_network_page
@@ -288,3 +290,32 @@ def _write(solution: Solution, number: int, options: argparse.Namespace) -> bool
         tell('orient', error)
         written = False
     return written
+
+
+def print_network(solution: Solution, folder: str, console: Console | None = None) -> None:
+    """Print a network on standard error."""
+    from rich.markup import escape
+
+    from ahf_ros.cli.tables import print_table, terminal
+    from ahf_ros.orientation.strength import what_to_photograph
+    from ahf_ros.report import network_summary
+
+    console = console or terminal()
+    unit = solution.network.unit
+    print_table(folder, ('', ''), network_summary.summary(solution), console)
+    for index in solution.calibrated.nonzero()[0].tolist():
+        rows = network_summary.camera_rows(solution, index)
+        title = f'Camera {solution.network.cameras[index].name}'
+        print_table(title, ('parameter', 'value', 'standard deviation'), rows, console)
+    if bars := network_summary.bar_rows(solution):
+        head = '', 'role', f'length, {unit}', 'deviation', 'sigma', 'ratio'
+        print_table('Scale bars', head, bars, console)
+    if control := network_summary.control_rows(solution):
+        head = '', 'role', f'dx, {unit}', 'dy', 'dz', 'sigma x, y, z'
+        print_table('Control points', head, control, console)
+    if rejected := network_summary.rejected_rows(solution):
+        head = 'photograph', 'target', 'x, px', 'y, px', 'residual, sigma', 'why'
+        print_table(f'{len(rejected)} left out', head, rejected, console)
+    for mark, texts in (('yellow]!', solution.warnings), ('cyan]>', what_to_photograph(solution))):
+        for text in texts:
+            console.print(f'[{mark}[/] {escape(printable(text, len(text)))}', highlight=False)

@@ -183,7 +183,6 @@ class RegistrationNode(ProcessNode):
         return Header(stamp=stamp, frame_id=self._settings.current.frame)
 
     def _publish(self, number: int) -> None:
-        """Publish transform and residuals of a scan."""
         field, header = self._registration.field, self._header(self._registration.records[number])
         scan = field.scans[number]
         self._transform.publish(pose_message(scan.transform, header))

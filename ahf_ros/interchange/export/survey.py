@@ -209,6 +209,7 @@ def _control_points(
     if not found:
         raise ValueError(
             'no control point is a target of the images: the list has '
-            f'{listed(list(points), _NAMED)}, the images show {listed(list(labels.values()), _NAMED)}'
+            f'{listed(list(points), _NAMED)}, the images show '
+            f'{listed(list(labels.values()), _NAMED)}'
         )
     return {label: found[label] for label in labels.values() if label in found}

@@ -101,7 +101,6 @@ def mmvii_files(survey: Survey) -> dict[str, bytes]:
 
 
 def _measures(tag: str, name: dict[str, str], measures: list[dict[str, str]]) -> bytes:
-    """Return a document of MMVII with a set of measures."""
     content = Element(tag)
     _add_texts(content, name)
     items = SubElement(content, 'Measures')
