@@ -15,6 +15,7 @@ from ruamel.yaml.error import YAMLError
 from ahf_ros.interchange.files import read_text
 from ahf_ros.orientation.camera import PARAMETERS
 from ahf_ros.orientation.network import FloatArray
+from ahf_ros.orientation.points import standard_deviations
 from ahf_ros.text import reason_of, shown
 
 BROWN = ('', 'plumb_bob', 'rational_polynomial')
@@ -131,7 +132,7 @@ def _rows(
         written('camera_matrix', matrix),
         written('distortion_coefficients', distortion[None]),
         f'parameters: [{", ".join(PARAMETERS)}]',
-        written('standard_deviations', _deviations(covariance)[None]),
+        written('standard_deviations', standard_deviations(covariance)[None]),
         written('correlations', _correlations(covariance)),
     ]
 
@@ -146,13 +147,9 @@ def _opencv(calibration: FloatArray) -> tuple[FloatArray, FloatArray]:
     return matrix, np.array([value[it] for it in _COEFFICIENTS])
 
 
-def _deviations(covariance: FloatArray) -> FloatArray:
-    return np.sqrt(np.maximum(np.diag(covariance), 0))
-
-
 def _correlations(covariance: FloatArray) -> FloatArray:
     """Return correlations, those of parameters that were kept fixed as 0."""
-    sigma = _deviations(covariance)
+    sigma = standard_deviations(covariance)
     free = np.where(sigma > 0, sigma, 1)
     return np.where(np.eye(len(sigma), dtype=bool), 1, covariance / np.multiply.outer(free, free))
 

@@ -20,7 +20,7 @@ from ahf_ros.interchange.target_json import parsed_json
 from ahf_ros.orientation.camera import PARAMETERS
 from ahf_ros.orientation.deviations import bar_deviations, control_deviations
 from ahf_ros.orientation.network import CameraView, FloatArray, IntArray, Rejection
-from ahf_ros.orientation.points import MeasuredPoints, blocks
+from ahf_ros.orientation.points import MeasuredPoints, blocks, standard_deviations
 from ahf_ros.orientation.solution import Solution
 from ahf_ros.orientation.strength import rays_of
 from ahf_ros.orientation.transform import Transform
@@ -162,7 +162,7 @@ def _points_table(points: MeasuredPoints, rays: IntArray) -> bytes:
     table: list[Sequence[object]] = [header.split()]
     own = blocks(points.covariance)
     for index, (name, block) in enumerate(zip(points.names, own, strict=True)):
-        sigma = np.sqrt(np.maximum(np.diag(block), 0))
+        sigma = standard_deviations(block)
         mixed = [f'{value:.9g}' for value in block[np.triu_indices(3, 1)]]
         place = [f'{value:.12g}' for value in points.xyz[index]]
         table.append([name, *place, *(f'{it:.9g}' for it in sigma), int(rays[index]), *mixed])

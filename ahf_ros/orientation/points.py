@@ -21,6 +21,12 @@ def blocks(covariance: FloatArray) -> FloatArray:
     return own
 
 
+def standard_deviations(covariance: FloatArray) -> FloatArray:
+    """Return the square roots of the diagonal, where rounding may leave less than zero."""
+    deviations: FloatArray = np.sqrt(np.maximum(np.diag(covariance), 0))
+    return deviations
+
+
 def entries(rows: Sequence[int] | IntArray) -> IntArray:
     """Return the rows of coordinates, (3n,), of the rows of points."""
     return np.ravel(3 * np.asarray(rows, np.int64)[:, None] + np.arange(3))
