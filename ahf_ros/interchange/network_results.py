@@ -364,9 +364,8 @@ def _poses(solution: Solution) -> Table:
     sigmas = [f'sigma_{it}' for it in ('x', 'y', 'z', 'rx', 'ry', 'rz')]
     rows: Table = [['image', 'camera', 'x', 'y', 'z', 'qx', 'qy', 'qz', 'qw', *sigmas]]
     for index in np.flatnonzero(solution.oriented):
-        variances = np.diag(solution.pose_covariances[index])
         numbers = [*values.positions[index], *Transform(values.rotations[index].T).quaternion]
-        numbers += list(np.sqrt(np.maximum(variances, 0)))
+        numbers += list(standard_deviations(solution.pose_covariances[index]))
         camera = network.cameras[network.camera_of[index]].name
         rows.append([network.photographs[index], camera, *(f'{it:.10g}' for it in numbers)])
     return rows

@@ -9,7 +9,7 @@ import numpy as np
 
 from ahf_ros.interchange.files import write_whole
 from ahf_ros.orientation.camera import PARAMETERS
-from ahf_ros.orientation.points import standard_deviations
+from ahf_ros.orientation.points import correlations, standard_deviations
 from ahf_ros.orientation.solution import Solution
 from ahf_ros.orientation.strength import (
     FEW_RAYS,
@@ -120,19 +120,13 @@ def _cameras(solution: Solution, enlarged: float) -> list[dict[str, Any]]:
     cameras = []
     for index in np.flatnonzero(solution.calibrated).tolist():
         view = solution.network.cameras[index]
-        sigma = standard_deviations(solution.camera_covariances[index])
+        correlation = correlations(solution.camera_covariances[index])
         free = [PARAMETERS.index(name) for name in solution.released[index]]
         correlated = [
-            (PARAMETERS[first], PARAMETERS[second], correlation)
+            (PARAMETERS[first], PARAMETERS[second], correlation[first, second])
             for place, first in enumerate(free)
             for second in free[:place]
-            if sigma[first] > 0
-            and sigma[second] > 0
-            and abs(
-                correlation := solution.camera_covariances[index][first, second]
-                / (sigma[first] * sigma[second])
-            )
-            > _CORRELATED
+            if abs(correlation[first, second]) > _CORRELATED
         ]
         cameras.append(
             {
