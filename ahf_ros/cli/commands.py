@@ -14,29 +14,38 @@ from ahf_ros.extras import MissingExtra, missing
 from ahf_ros.release import release
 
 COMMANDS = {
-    'identify': 'Identify the coded targets in images.',
-    'watch': 'Identify the coded targets in images as they arrive.',
-    'bag': 'Identify the coded targets in the images of ROS 1 and ROS 2 bags.',
-    'render': 'Render images of targets under projected light, with their truth.',
-    'evaluate': 'Compare the output of `ahf identify --json` with the truth.',
-    'export': 'Hand the output of `ahf identify --json` to other photogrammetric software.',
-    'report': 'Make one page to look at of the output of `ahf identify --json`.',
+    'identify': ('cli.identify', 'Identify the coded targets in images.'),
+    'watch': ('cli.watch', 'Identify the coded targets in images as they arrive.'),
+    'bag': ('cli.bag', 'Identify the coded targets in the images of ROS 1 and ROS 2 bags.'),
+    'render': ('cli.render', 'Render images of targets under projected light, with their truth.'),
+    'evaluate': ('cli.evaluate', 'Compare the output of `ahf identify --json` with the truth.'),
+    'export': (
+        'cli.export',
+        'Hand the output of `ahf identify --json` to other photogrammetric software.',
+    ),
+    'report': ('cli.report', 'Make one page to look at of the output of `ahf identify --json`.'),
     'orient': (
-        'Compute coordinates of targets, poses and calibrations from identified targets alone.'
+        'cli.orient',
+        'Compute coordinates of targets, poses and calibrations from identified targets alone.',
     ),
     'measure': (
-        'Measure distances, deviations from nominal coordinates and length errors in a network.'
+        'cli.measure',
+        'Measure distances, deviations from nominal coordinates and length errors in a network.',
     ),
-    'register': 'Put scans, clouds with their images, into one frame by their coded targets.',
-    'compare': 'Find the targets that moved between two networks.',
+    'register': (
+        'cli.register',
+        'Put scans, clouds with their images, into one frame by their coded targets.',
+    ),
+    'compare': ('cli.compare', 'Find the targets that moved between two networks.'),
     'learn-family': (
-        'Learn template, positions and numbers of point-distributed targets from a survey.'
+        'cli.learn_family',
+        'Learn template, positions and numbers of point-distributed targets from a survey.',
     ),
-    'demo': 'Identify a rendered image in three ways, which shows the method.',
-    'doctor': 'Say what is installed, and what is missing for what.',
-    'targets': 'Print targets, true to scale, with their geometry.',
+    'demo': ('cli.demo', 'Identify a rendered image in three ways, which shows the method.'),
+    'doctor': ('cli.doctor', 'Say what is installed, and what is missing for what.'),
+    'targets': ('cli.targets', 'Print targets, true to scale, with their geometry.'),
 }
-"""Descriptions by command, whose module is the one of its name."""
+"""Module below `ahf_ros` and description of each command."""
 
 
 def run(arguments: Sequence[str] | None) -> int:
@@ -70,7 +79,7 @@ def _complete(line: str) -> int:
 
 
 def _module(command: str) -> ModuleType:
-    return import_module(f'ahf_ros.cli.{command.replace("-", "_")}')
+    return import_module(f'ahf_ros.{COMMANDS[command][0]}')
 
 
 def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
@@ -81,7 +90,7 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
     )
     parser.add_argument('--version', action='version', version=release())
     commands = parser.add_subparsers(dest='subcommand', metavar='COMMAND', required=True)
-    for name, text in COMMANDS.items():
+    for name, (_, text) in COMMANDS.items():
         command = commands.add_parser(name, description=text, help=text)
         if name == called:
             _module(name).add_arguments(command)
