@@ -131,7 +131,7 @@ def _problems() -> Iterator[str]:
             f'{" ".join(several)}, then pip install opencv-python-headless'
         )
     if not importlib.util.find_spec('cv2'):
-        yield 'OpenCV is missing: pip install opencv-python-headless'
+        yield 'OpenCV is missing: pip install --force-reinstall --no-deps opencv-python-headless'
     sourced = os.environ.get('ROS_DISTRO')
     wheels = _version('ahf-ros-interfaces')
     if sourced and wheels and os.environ.get('AMENT_PREFIX_PATH'):

@@ -54,6 +54,14 @@ def test_opencv_of_a_distribution_is_not_missing(
     assert 'opencv' not in said
 
 
+def test_a_missing_opencv_is_said_in_one_line() -> None:
+    program = (
+        'import sys; sys.modules["cv2"] = None; import ahf_ros.cli as it; sys.exit(it.main())'
+    )
+    done = python('-c', program, 'identify', 'a.png')
+    assert (done.returncode, done.stderr) == (1, 'ahf: error: cv2 is missing, see ahf doctor\n')
+
+
 def is_installed(name: str) -> bool:
     try:
         metadata.version(name)
