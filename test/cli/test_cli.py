@@ -129,7 +129,7 @@ def test_what_was_looked_for_is_said_where_nothing_is_found(folder, tmp_path, ca
 
 def test_the_former_name_of_the_number_of_targets_works_and_says_so(identify):
     for option in ('--expected-targets', '--expected'):
-        found, errors = identify(option, 6)
+        found, errors = identify(option, 6, '--detector', 'traditional')
         assert found['expected'] == 6
         said = 'identify: --expected is called --expected-targets now' in errors
         assert said == (option == '--expected')
@@ -189,7 +189,7 @@ def test_an_image_that_is_white_is_named_where_nothing_is_identified(tmp_path, c
     image = np.full((200, 300), 255, np.uint8)
     image[:, :30] = 90
     write_image(tmp_path / 'white.png', image)
-    status('identify', tmp_path / 'white.png')
+    status('identify', tmp_path / 'white.png', '--family', 'metashape12')
     said = 'white.png: 90 % of the image is white: gaps or bands of targets may have vanished'
     assert said in capsys.readouterr().err
 
