@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 
 from ahf_ros.codes.families import AUTO, families_of
-from ahf_ros.codes.ring import Family
+from ahf_ros.codes.ring import FAMILY_NAMES, Family
 from ahf_ros.detectors import create_detector
 from ahf_ros.detectors.contract import DetectorSettings
 from ahf_ros.detectors.ring.learning import LearntFamily, find_bands, learn_families
@@ -101,7 +101,7 @@ def _lines(image: np.ndarray, settings: DetectorSettings, expected: int) -> Iter
         yield from _of_bands(learnt, _ENLARGED, settings, expected)
     elif small := _identified(middle, replace(settings, max_radius=1e4)):
         radius = median(target.semi_major for target in small) / _ENLARGED
-        yield _of_size(len(small), radius, settings)
+        yield _of_size(len(small), radius, settings.narrowed({it.family for it in small}))
 
 
 def _learnt(image: np.ndarray) -> LearntFamily | None:
@@ -117,7 +117,8 @@ def _of_bands(
     polarity, count = int(np.median(found.bands.polarity)), len(found.words)
     own = families_of(settings.family_file).values() if settings.family_file else ()
     known = found.known([code for code in own if isinstance(code, Family)])
-    size = _of_size(count, float(np.median(found.bands.size)) / scale, settings)
+    rings = settings.narrowed(known or FAMILY_NAMES)
+    size = _of_size(count, float(np.median(found.bands.size)) / scale, rings)
     edges = edge_shift_remark(found.growth * polarity / scale)
     exact = scale == 1 and np.median(found.bands.spread) < _EXACT
     dots = f'{count} dots with a band of {found.bits} sectors'

@@ -32,6 +32,7 @@ def shown(**changes: object) -> np.ndarray:
         ({}, {'family': 'apriltag_36h11'}, ['12 dots with a band of 12 sectors: --family met']),
         ({'targets': 2}, {'family': 'aicon14'}, ['2 targets of metashape12: --family met']),
         ({'dot_radius': 3.4}, {}, [r'1[012] dots of 3\.\d px are too small: 5 px would do']),
+        ({'dot_radius': 3}, {'family': 'auto'}, [r'\d+ dots of 2\.\d px are too small: 5 px']),
         (
             {'family': 'gsi', 'dot_radius': 1.5, 'targets': 6},
             {'family': 'gsi'},
